@@ -221,7 +221,7 @@ class ClipReduction:
     def _search(self) -> Search:
         """Return a search for the keys of nodes, but for those whose steps are kept."""
         fixed = np.isin(self.world.moving, list(self.stepping))
-        return Search(self.world, self.given | self.settled | self.dense, fixed, self.options.run)
+        return Search(self.world, {**self.given, **self.settled, **self.dense}, fixed, self.options.run)
 
     @cached_property
     def morphed(self) -> tuple[Worst, np.ndarray]:
@@ -334,7 +334,8 @@ class ClipReduction:
     def _spanning(self, tracks: list[StoredTrack]) -> list[StoredTrack]:
         """Return the same with keys at both ends of the clip in one of them at least: it lasts as long as before."""
         ends = self.world.times[[0, -1]]
-        seen = [time for track in (*tracks, *self.given.values()) for time in track.times[[0, -1]].tolist()]
+        times = [*(track.times for track in tracks), *(track.times for track in self.given.values())]
+        seen = np.concatenate([own[[0, -1]] for own in times]) if times else ends[:0]
         if np.isin(ends.astype(np.float32), seen).all():
             return tracks
         number = min(
@@ -357,4 +358,4 @@ class ClipReduction:
 
     def _shown(self, tracks: Iterable[StoredTrack]) -> Tracks:
         of_channel = self._of_channel
-        return self.given | by_target(tuple(shown(of_channel[track.channel], track) for track in tracks))
+        return {**self.given, **by_target(tuple(shown(of_channel[track.channel], track) for track in tracks))}

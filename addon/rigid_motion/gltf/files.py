@@ -103,9 +103,8 @@ def reduced(document: Document, options: Options) -> Report:
     tracks = {clip.number: clip.tracks for clip in result if clip.tracks is not None}
     with damage_refused():
         changed, chosen = made_smaller(_with_note(document, tolerance + (earlier or 0.0)), references, tracks)
-        for row, clip in enumerate(result):
-            if clip.number in tracks.keys() - chosen:
-                result[row] = kept(clip.number, clip.name, clip.before, LARGER)
+        larger = tracks.keys() - chosen
+        result = [kept(it.number, it.name, it.before, LARGER) if it.number in larger else it for it in result]
         if not chosen:
             return left_alone("no clip would become smaller", size, result)
         _require_proven(changed, nodes, seen, clips, {number: tracks[number] for number in chosen})

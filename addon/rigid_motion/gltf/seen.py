@@ -17,7 +17,7 @@ import numpy as np
 
 from ..motion.affine import AffineMaps
 from ..motion.quaternions import matrices, normalise
-from .accessors import EVERY, KINDS, denormalised, numbers, raw_numbers
+from .accessors import COMPRESSIONS, EVERY, KINDS, denormalised, numbers, raw_numbers
 from .documents import Document, GltfError, Json, entry, objects
 from .nodes import Nodes
 from .tracks import CUBICSPLINE, TO_WXYZ, WEIGHTS, Clip, Track
@@ -72,7 +72,9 @@ class Seen:
     def add(self, document: Document, number: int, weights: np.ndarray) -> None:
         """Add the mesh of a node, with weights of its morph targets of up to so much (targets,)."""
         node = document.json["nodes"][number]
-        deltas, carriers, factors = np.zeros(len(weights)), [], []
+        deltas = np.zeros(len(weights))
+        carriers: list[np.ndarray] = []
+        factors: list[np.ndarray] = []
         for primitive in objects(entry(document.json, "meshes", node["mesh"]), "primitives"):
             if "POSITION" not in primitive.get("attributes", {}):
                 continue
@@ -81,7 +83,7 @@ class Seen:
             for target, moved in enumerate(objects(primitive, "targets")[: len(weights)]):
                 if "POSITION" in moved:
                     lengths = np.linalg.norm(_points(document, moved["POSITION"]), axis=1)
-                    deltas[target] = max(deltas[target], lengths.max())
+                    deltas[target] = max(float(deltas[target]), float(np.max(lengths)))
                     spread += weights[target] * (lengths if len(lengths) == len(spread) else lengths.max())
             if _has_instances(node):
                 points, spread = corners_of(points.min(axis=0), points.max(axis=0)), np.full(8, spread.max())
@@ -148,23 +150,15 @@ def _carried(document: Document, number: int, primitive: Json) -> Iterator[tuple
         columns = numbers(document, skin["inverseBindMatrices"])[: len(joints)]
         inverse = np.swapaxes(columns.reshape(-1, 4, 4), 1, 2)
     maps, attributes = AffineMaps(inverse[:, :3, :3], inverse[:, :3, 3]), primitive["attributes"]
-    sets = [
-        (attributes[name], attributes.get(name.replace("JOINTS", "WEIGHTS")))
-        for name in attributes
-        if name.startswith("JOINTS_")
-    ]
-    for carriers, shares in sets:
-        try:
-            if _is_compressed(document, carriers) or _is_compressed(document, shares):
-                raise GltfError("the mesh is compressed")
-            columns, weights = raw_numbers(document, carriers).astype(np.int64), raw_numbers(document, shares).copy()
-        except GltfError:
-            # Any joint may carry all of it.
-            for joint, own in zip(joints.tolist(), maps, strict=True):
-                yield np.array([joint]), EVERY, own[None]
-            return
-        weights[~weights.any(axis=1), 0] = 1  # What nothing carries goes with its first joint.
-        for column, share in zip(columns.T, weights.T, strict=True):
+    names = [name for name in attributes if name.startswith("JOINTS_")]
+    if any(_is_compressed(document, attributes[name]) for name in names):
+        # Any joint may carry all of it.
+        yield from ((joints[[row]], EVERY, maps[[row]]) for row in range(len(joints)))
+    elif names:
+        of_joints = np.hstack([raw_numbers(document, attributes[name]) for name in names]).astype(np.int64)
+        shares = np.hstack([numbers(document, attributes[name.replace("JOINTS", "WEIGHTS")]) for name in names])
+        shares[~shares.any(axis=1), 0] = 1.0  # What nothing carries goes with its first joint.
+        for column, share in zip(of_joints.T, shares.T, strict=True):
             some = np.flatnonzero(share)
             yield joints[column[some]], some, maps[column[some]]
 
@@ -186,20 +180,18 @@ def _instances(document: Document, node: Json) -> AffineMaps:
 
 
 def _is_compressed(document: Document, accessor: object) -> bool:
-    """Whether the numbers of an accessor of a mesh are in an extension of the primitive, as Draco has them."""
+    """Whether the numbers of an accessor of a mesh are where they cannot be read: by Draco or meshopt."""
     described = entry(document.json, "accessors", accessor)
-    return "bufferView" not in described and "sparse" not in described
+    if "bufferView" not in described:
+        return "sparse" not in described
+    extensions = entry(document.json, "bufferViews", described["bufferView"]).get("extensions")
+    return isinstance(extensions, dict) and not extensions.keys().isdisjoint(COMPRESSIONS)
 
 
 def _points(document: Document, accessor: object) -> np.ndarray:
     """Return the vectors of an accessor, shape (v, 3), or the corners of their bounds if they are compressed."""
-    try:
-        if not _is_compressed(document, accessor):
-            return numbers(document, accessor)
-    except GltfError:
-        pass
     described = entry(document.json, "accessors", accessor)
-    if "min" not in described or "max" not in described:
+    if not _is_compressed(document, accessor) or "min" not in described or "max" not in described:
         return numbers(document, accessor)
     ends = np.array([described["min"], described["max"]], dtype=np.float64)
     if described.get("normalized") is True:
