@@ -23,7 +23,7 @@ from rigid_motion.gltf import Options, reduce_file
 from rigid_motion.gltf.accessors import stored_size
 from rigid_motion.gltf.documents import read_document
 from rigid_motion_batch.analysis.metrics import geometric_mean
-from tests.gltf.player import File
+from tests.gltf.player import File, moments
 
 HEIGHT, RADIUS = 1.7, 0.03  # metres
 TOLERANCES = (1e-4, 1e-3, 5e-3)  # metres
@@ -36,15 +36,23 @@ TOOLS = {
 """Programs beside, with the arguments that make one file another."""
 
 
-def points(file: File, times: np.ndarray) -> dict[str, np.ndarray]:
-    """Return where each node's head and points beside it are in the world: name to shape (n, 7, 3)."""
-    result = {}
-    for node, worlds in zip(file.json["nodes"], file.worlds(0, times), strict=True):
-        axes = np.swapaxes(worlds[:, :3, :3], 1, 2)
-        axes = RADIUS * axes / np.linalg.norm(axes, axis=2, keepdims=True)
-        head = worlds[:, None, :3, 3]
-        result[node.get("name")] = np.concatenate((head, head + axes, head - axes), axis=1)
-    return result
+def points(file: File, clip: int, times: np.ndarray, names: list[str]) -> np.ndarray:
+    """Return where the heads of nodes and points beside them are in the world, shape (nodes, times, 7, 3)."""
+    numbers = {node.get("name"): number for number, node in enumerate(file.json["nodes"])}
+    worlds = file.worlds(clip, times)[[numbers[name] for name in names]]
+    axes = np.swapaxes(worlds[..., :3, :3], -1, -2)
+    axes = RADIUS * axes / np.linalg.norm(axes, axis=-1, keepdims=True)
+    heads = worlds[..., None, :3, 3]
+    return np.concatenate((heads, heads + axes, heads - axes), axis=-2)
+
+
+def errors_of(original: File, smaller: File, clip: int) -> np.ndarray:
+    """Return how far each node is off at eighths of the gaps between the keys of both files, shape (nodes, times)."""
+    times = moments(original, smaller, clip=clip)
+    before, after = ({node.get("name") for node in file.json["nodes"]} for file in (original, smaller))
+    names = sorted((before & after) - {None})
+    there, truth = (points(file, clip, times, names) for file in (smaller, original))
+    return np.linalg.norm(there - truth, axis=-1).max(axis=-1)
 
 
 def animation_bytes(path: Path) -> int:
@@ -57,12 +65,9 @@ def animation_bytes(path: Path) -> int:
 
 
 def beside(original: Path, smaller: Path, tool: str) -> dict[str, Any]:
-    """Return what a tool made of a clip, with its errors at eighths of the gaps between the keys of both files."""
+    """Return what a tool made of a file, with the errors of all clips."""
     files = File(original), File(smaller)
-    times = np.unique(np.concatenate([file.moments(0) for file in files]))
-    eighths = np.unique((times[:-1, None] + np.diff(times)[:, None] * np.arange(8) / 8.0).ravel())
-    truth, shown = (points(file, eighths) for file in files)
-    errors = np.array([np.linalg.norm(truth[it] - shown[it], axis=2).max(axis=1) for it in truth if it in shown])
+    errors = np.concatenate([errors_of(*files, clip).ravel() for clip in range(len(files[0].json["animations"]))])
     return {
         "tool": tool,
         "animation_bytes": animation_bytes(smaller),
