@@ -241,7 +241,12 @@ def set_up_render(
 def _smooth_edges(scene: bpy.types.Scene) -> None:
     """Have the compositor soften what is rendered: its antialiasing would take four times as long."""
     if bpy.app.version >= (5, 0):
-        tree = scene.compositing_node_group = bpy.data.node_groups.new("Smooth edges", "CompositorNodeTree")
+        tree = bpy.data.node_groups.new("Smooth edges", "CompositorNodeTree")
+        effects = getattr(scene, "compositor_effects", None)  # Blender 5.3 warns of the one group it had before.
+        if effects is None:
+            scene.compositing_node_group = tree
+        else:
+            effects.new("Smooth edges").node_group = tree
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
         output = tree.nodes.new("NodeGroupOutput")
     else:
