@@ -2,17 +2,15 @@
 
 import ctypes
 import os
-import resource
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 import pytest
 
 from rigid_motion_batch import supervising
+from tests.full_disk import disk_full_after
 from tests.scripts.baking import baked_name, frames_of_keys, one_object_file, open_again, run, with_version
 from tests.scripts.reducing import listed
 
@@ -32,17 +30,6 @@ def run_without_privileges(*arguments: object) -> subprocess.CompletedProcess[st
                 ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, capability, 0, 0, 0)
 
     return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=60, preexec_fn=give_up)
-
-
-@contextmanager
-def disk_full_after(size: int) -> Iterator[None]:
-    """Let no file grow larger than so many bytes: Blender's writing ends there, as on a full disk."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def text(path: Path) -> None:

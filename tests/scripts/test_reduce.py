@@ -220,12 +220,12 @@ def test_what_another_run_has_written_meanwhile_stays(tmp_path, capsys, monkeypa
     else:
         source = object_file(tmp_path / "shot.blend") if kind == "blend" else hand_made(tmp_path)
         result = reduced_name(source) if kind == "blend" else tmp_path / "body-keys.blend"
-        place, step = blend_files, "refuse_cut_off"
+        place, step = blend_files, "save_copy"
     real = getattr(place, step)
 
-    def write_first(*arguments: object) -> object:
+    def write_first(*arguments: object, **options: object) -> object:
         result.write_text("of the other run")
-        return real(*arguments)
+        return real(*arguments, **options)
 
     monkeypatch.setattr(place, step, write_first)
     capsys.readouterr()
@@ -242,13 +242,13 @@ def test_what_another_run_has_written_meanwhile_stays(tmp_path, capsys, monkeypa
 
 
 def test_a_file_that_was_saved_meanwhile_is_not_replaced_in_place(tmp_path, capsys, monkeypatch):
-    path, real = object_file(tmp_path / "shot.blend"), blend_files.refuse_cut_off
+    path, real = object_file(tmp_path / "shot.blend"), blend_files.save_copy
 
-    def save_first(written: Path) -> None:
+    def save_first(written: Path, **options: bool) -> None:
         path.write_bytes(b"saved by an animator")
-        real(written)
+        real(written, **options)
 
-    monkeypatch.setattr(blend_files, "refuse_cut_off", save_first)
+    monkeypatch.setattr(blend_files, "save_copy", save_first)
     assert run(path, "--in-place") == 1
     assert f"{path}: it was changed while this program was at it" in capsys.readouterr().err
     assert [(item.name, item.read_bytes()) for item in tmp_path.iterdir()] == [(path.name, b"saved by an animator")]

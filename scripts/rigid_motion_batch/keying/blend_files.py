@@ -12,6 +12,7 @@ import bpy
 
 from rigid_motion_batch.command_line import listed
 from rigid_motion_batch.files import written_beside
+from rigid_motion_batch.saving import save_copy
 from rigid_motion_batch.silencing import silenced
 
 from .records import FileProblem, Record, Unreadable, changed_at, not_written
@@ -21,8 +22,6 @@ HERE = bpy.app.version[:2]
 
 MAGIC = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
 """The bytes that .blend files begin with: as they are, compressed, and compressed by a Blender before 3.0."""
-
-CUT_OFF = "it broke off half-way, the disk may be full"
 
 NAMED = 5
 """As many of the data that are missing from a library are named."""
@@ -141,33 +140,15 @@ def write_file(output: Path, record: Record | None, opened: int | None = None) -
     """
     try:
         with silenced(errors=True), record.writing(output) if record else written_beside(output) as beside:
-            # Blender 4.5 takes a relative one to be one of $PWD, wherever it runs.
-            bpy.ops.wm.save_as_mainfile(
-                filepath=str(beside.absolute()), copy=True, check_existing=False, relative_remap=True
-            )
-            refuse_cut_off(beside)
+            save_copy(beside, relative_remap=True)
             if not record:
                 if changed_at(output) != opened:
                     raise FileProblem("it was changed while this program was at it, and stays so: do it again")
                 kept = Path(os.path.realpath(output))
                 with written_beside(kept.with_name(f"{kept.name}1")) as copy:
                     shutil.copy2(output, copy)
-    except RuntimeError as error:
-        said = " ".join(str(error).split()).removeprefix("Error: ")
-        # What it says of a file is of the name that it writes under, and without any it is of no use.
-        reason = said.rpartition(": ")[2].replace(beside.name, output.name) if ": " in said else CUT_OFF
-        raise not_written(output, reason) from None
     except OSError as error:
         raise not_written(error.filename or output, error.strerror or error) from None
-
-
-def refuse_cut_off(path: Path) -> None:
-    """Raise OSError where a file is not whole: of compressed ones Blender does not notice that a disk is full."""
-    try:
-        with cast(Any, bpy.data.libraries).load(str(path.absolute())):
-            pass
-    except OSError:
-        raise OSError(None, CUT_OFF, str(path)) from None
 
 
 def named(version: tuple[int, ...]) -> str:

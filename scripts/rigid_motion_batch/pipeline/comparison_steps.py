@@ -30,7 +30,7 @@ STAGES = ("read", "measure", "build", "render", "encode", "report")
 
 RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py")
 ANALYSIS = (*RECORDINGS, "analysis")
-SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "silencing.py")
+SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "saving.py", "silencing.py")
 REPORT = (*ANALYSIS, "report", "palette.py")
 
 ROWS, JOINT_ROWS, FILM, BLEND, PAGE = "rows.csv", "joints.csv", "comparison.mp4", "comparison.blend", "report.html"

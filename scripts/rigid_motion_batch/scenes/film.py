@@ -13,6 +13,7 @@ from pathlib import Path
 import bpy
 
 from rigid_motion_batch.files import written_beside
+from rigid_motion_batch.saving import save_copy
 from rigid_motion_batch.silencing import silenced
 
 LOSSLESS = "HUFFYUV", "MKV", ".mkv"
@@ -121,7 +122,7 @@ def _open(blend: Path) -> bpy.types.Scene:
 def save_blend(path: Path) -> None:
     """Save the open file as a compressed .blend. A file that is there is replaced."""
     with written_beside(path) as beside, silenced():
-        bpy.ops.wm.save_as_mainfile(filepath=str(beside), compress=True, copy=True, check_existing=False)
+        save_copy(beside, compress=True)
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import pytest
 from rigid_motion_batch.scenes.film import join_pieces, render_film, render_piece, save_blend
 from rigid_motion_batch.scenes.scene import build_scene
 from rigid_motion_batch.scenes.settings import SceneSettings
+from tests.full_disk import disk_full_after
 from tests.scripts.clips.recordings import reconstruct, swinging_clip
 
 SETTINGS = SceneSettings(resolution=(160, 90), fps=10)
@@ -59,6 +60,13 @@ def test_a_film_that_cannot_be_rendered_leaves_the_old_one(scene, tmp_path):
         render_film(scene, film)
     assert film.read_bytes() == b"the film of yesterday"
     assert os.listdir(tmp_path) == ["comparison.mp4"]
+
+
+def test_a_stage_that_breaks_off_leaves_nothing_and_the_reason(scene, tmp_path):
+    with disk_full_after(10_000), pytest.raises(OSError, match="may be full") as raised:
+        save_blend(tmp_path / "comparison.blend")
+    assert raised.value.filename == str(tmp_path / "comparison.blend")
+    assert os.listdir(tmp_path) == []
 
 
 def test_a_film_that_was_rendered_in_pieces_is_the_same_to_the_bit(scene, tmp_path):
