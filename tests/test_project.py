@@ -76,6 +76,23 @@ def test_one_version_everywhere():
     assert f"## {manifest['version']}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
+def test_the_blenders_that_are_tested_are_named_everywhere():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    tested = project["tool"]["rigid-motion"]["blender"]
+    installed = [f"bpy=={versions[0]}; python_version == '{python}'" for python, versions in tested.items()]
+    assert project["project"]["optional-dependencies"]["blender"] == installed
+    workflow = (ROOT / ".github" / "workflows" / "tests.yml").read_text(encoding="utf-8")
+    pairs = {(version, python) for python, versions in tested.items() for version in versions}
+    assert {*re.findall(r'blender: "(.+?)", python: "(.+?)"', workflow)} == pairs
+    newest = [*tested.values()][-1][0]
+    assert f"matrix.blender == '{newest}' && '1'" in workflow
+    for page in ("README.md", "CHANGELOG.md", "docs/index.md", "docs/animators.md"):
+        named = re.search(
+            r"Blender\S* (4\.5 LTS(?:,| or| and| LTS| [\d.]+)+)", (ROOT / page).read_text(encoding="utf-8")
+        )[1]
+        assert {*re.findall(r"\d+\.\d+", named)} == {version.rpartition(".")[0] for version, _ in pairs}, page
+
+
 @pytest.mark.parametrize("floor", FLOORS)
 def test_the_extension_imports_downwards_and_nothing_else(floor):
     below = set(itertools.takewhile(lambda name: name != floor, FLOORS))

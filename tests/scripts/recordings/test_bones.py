@@ -88,6 +88,7 @@ def test_rigs_of_libraries_can_be_read(saved, how: str) -> None:
     bpy.context.scene.collection.objects.link(arm)
     if how != "linked":
         arm = arm.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+        arm.override_library.is_system_override = False  # Blender 5.3 sets no keys where the user may edit nothing.
         arm.location, arm.pose.bones["Upper"].rotation_euler = (0, 0, 7), (0, 0, np.radians(30))
     if how == "overridden and animated anew":
         arm.animation_data_clear()
