@@ -1,6 +1,7 @@
 """Files get smaller by their animations alone: what else is in them, and what may name it, stays, and none grows."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.gltf import Options, Report, read_document, reduce_file
+from rigid_motion.gltf.rewriting import stored
+from rigid_motion.gltf.tracks import Track
 from tests.gltf.making import Making, turns, walk
 from tests.gltf.player import File
 
@@ -155,7 +158,15 @@ def test_clips_that_share_all_are_worth_it_together(tmp_path):
     assert len(after.json["accessors"]) <= 1 + 2 * len(after.json["animations"][0]["samplers"])
 
 
-@settings(max_examples=40, deadline=None)
+def test_quaternions_of_any_length_are_stored_as_the_turns_that_they_are():
+    times = np.arange(9) / 30
+    track = Track(0, 0, "rotation", "LINEAR", times, turns(times, 3).astype(np.float64))
+    long = stored(replace(track, values=3.0 * track.values), integers=True).values
+    assert np.array_equal(long, stored(track, integers=True).values)
+
+
+@pytest.mark.slow
+@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**9))
 def test_no_file_grows_and_only_node_channels_change(tmp_path_factory, seed):
     random, folder = np.random.default_rng(seed), tmp_path_factory.mktemp("random")

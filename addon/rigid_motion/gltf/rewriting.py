@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from ..motion.quaternions import normalise
 from .accessors import GrowingView, denormalised, parts_of, stored_size
 from .documents import Document, FileBytes, Json, as_text, data_uri, is_data, objects, whole
 from .references import ELSEWHERE, References, Slot, other_slots, sampler_slots, unknown, view_slots
@@ -357,7 +358,7 @@ def stored(track: Track, *, integers: bool) -> StoredTrack:
     values = track.values[..., TO_XYZW] if track.path == ROTATION else track.values
     values = values.reshape(-1, 1 if track.path == WEIGHTS else values.shape[-1])
     if integers and track.path == ROTATION and track.interpolation == LINEAR:
-        values = np.rint(values * INTEGER).astype(np.int16)
+        values = np.rint(normalise(values) * INTEGER).astype(np.int16)
     else:
         values = values.astype(np.float32)
     return StoredTrack(track.channel, track.interpolation, track.times.astype(np.float32), values)
