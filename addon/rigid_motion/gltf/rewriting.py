@@ -60,19 +60,12 @@ class StoredTrack:
         return self.times[:, None], self.values
 
 
-def rewritten(document: Document, tracks: Mapping[int, Sequence[StoredTrack]]) -> Document:
-    """Return the document with other tracks in animations, by their numbers.
-
-    Their channels that are not among the tracks go, but for those that move no node or that extensions define.
-    """
-    return _Rewriting(document, References(document.json), tracks).done()
-
-
 def made_smaller(
     document: Document, references: References, tracks: Mapping[int, Sequence[StoredTrack]]
 ) -> tuple[Document, frozenset[int]]:
     """Return the document with those of the tracks that make it smaller, and the numbers of their animations.
 
+    Channels of these that are not among the tracks go, but for those that move no node or that extensions define.
     What several animations share goes with the last of them that uses it. So an animation is worth the most together
     with all others, and one that is worth nothing then is worth nothing at all.
     """
