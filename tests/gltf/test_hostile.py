@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.gltf import GltfError, Options, documents, read_document, reduce_file, reduced, tracks
+from rigid_motion.gltf.nodes import Nodes
 from rigid_motion.gltf.tracks import read_clips
 from rigid_motion_batch.cli import reduce
 from tests.gltf.making import glb, walk
@@ -114,6 +115,11 @@ def test_channels_that_share_numbers_without_end_are_refused(tmp_path, capsys, m
     path, animation = tmp_path / "walk.glb", File(walk().write(tmp_path / "walk.glb")).json["animations"][0]
     line = ": too many channels share the numbers of so small a file; export fewer clips"
     assert line in refusal(changed(path, put("animations", to=[animation] * 20)), capsys)
+
+
+def test_whole_numbers_may_be_longer_than_those_of_computers(tmp_path):
+    document = read_document(changed(tmp_path / "walk.glb", put("nodes", 0, "translation", to=[10**29, 0.5, 0])))
+    assert Nodes(document).rest["translation"][0].tolist() == [1e29, 0.5, 0.0]
 
 
 def test_two_keys_at_one_time_are_a_cut(tmp_path):

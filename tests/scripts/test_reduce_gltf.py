@@ -29,8 +29,6 @@ sys.exit(reduce.main(sys.argv[1:]))
 """
 
 
-
-
 @pytest.fixture
 def report(monkeypatch):
     """Has files reduced as ever, and says something else of them; returns the options that were given."""

@@ -141,8 +141,8 @@ def _parents(nodes: list[Json]) -> np.ndarray:
 
 
 def _rest(nodes: list[Json], path: str) -> np.ndarray:
-    result = np.array([_vector(node.get(path, REST[path]), number, path) for number, node in enumerate(nodes)])
-    result = result.reshape(len(nodes), WIDTHS[path])
+    rows = [_vector(node.get(path, REST[path]), number, path) for number, node in enumerate(nodes)]
+    result = np.array(rows, dtype=np.float64).reshape(len(nodes), WIDTHS[path])
     if path != ROTATION:
         return result
     lengths = np.linalg.norm(result, axis=1)
