@@ -36,6 +36,15 @@ def test_what_is_written_is_read(seed: int) -> None:
     assert read == [symbol for *_, symbol in written]
 
 
+@pytest.mark.parametrize("count", [0, 1, 16, 17, 48, 51])
+def test_numbers_of_many_digits_are_read(count: int) -> None:
+    numbers, encoder = [0, (1 << count) - 1, (1 << count) // 3], Coder()
+    for number in numbers:
+        encoder.digits(count, number)
+    decoder = Coder(encoder.finish())
+    assert [decoder.digits(count) for _ in numbers] == numbers
+
+
 def test_symbols_cost_what_their_frequencies_say() -> None:
     rng, own = np.random.default_rng(1), (0, 3500, 4000, TOTAL)
     symbols = rng.choice(3, 4000, p=np.diff(own) / TOTAL)

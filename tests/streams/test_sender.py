@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import turned
 from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.bodies import Forest
+from rigid_motion.streams.bodies import FURTHEST, Forest
 from rigid_motion.streams.paths import Path
+from rigid_motion.streams.sender import GRID, LAST
 from rigid_motion.streams.wire import read
 from tests.thoroughness import combined, tried
 
@@ -135,16 +141,86 @@ def test_finish_says_the_rest() -> None:
     assert set(said) == {0, 1}
 
 
-@pytest.mark.parametrize("wrong", [{"tolerance": 0.0}, {"delay": float("nan")}, {"keepalive": -1.0}])
-def test_numbers_that_are_none_are_refused(wrong: dict) -> None:
-    with pytest.raises(ValueError, match="is not a positive number"):
-        Sender([body()], **wrong)
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *itertools.product(["tolerance", "delay", "keepalive"], [0.0, float("nan"), -1.0, 1e5, 1e308]),
+        ("tolerance", 1e-7),
+        ("delay", 1e-4),
+    ],
+)
+def test_numbers_that_are_none_are_refused(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"a {name} of .* is not a positive number"):
+        Sender([body()], **{name: value})
 
 
-def test_poses_that_are_none_are_refused() -> None:
-    sender = Sender([body(3)])
-    with pytest.raises(ValueError, match="3 finite poses"):
-        sender.add(0.0, Poses(np.full((3, 3), np.nan), np.tile((1.0, 0, 0, 0), (3, 1))))
+@pytest.mark.parametrize("rate", [float("nan"), float("inf"), -30.0, 1e-320, 1e-3, 5e-324])
+def test_rates_that_are_none_are_no_rates(rate: float) -> None:
+    assert Sender([body()], rate=rate).codec.terms.grid == GRID
+
+
+@pytest.mark.parametrize("wrong", [0.0, 1e-9, 1e4, float("nan"), np.ones(2), np.array((0.1, 0.1, 0.0))])
+def test_radii_that_are_none_are_refused(wrong: float | np.ndarray) -> None:
+    with pytest.raises(ValueError, match="a radius is one for all joints or for each"):
+        body(3, wrong)
+
+
+@pytest.mark.parametrize(("place", "turn"), [(np.nan, 1.0), (-1e4, 1.0), (0.0, 0.0), (0.0, np.inf), (0.0, np.nan)])
+def test_poses_that_are_none_are_refused_by_name_and_change_nothing(place: float, turn: float) -> None:
+    own = body(3)
+    sender, other = Sender([own]), Sender([own])
+    positions, quaternions = own.rest.positions.copy(), own.rest.quaternions.copy()
+    positions[2, 1], quaternions[2, 0] = place, turn
+    with pytest.raises(ValueError, match=r"performer, joint 2: a pose needs a place within 10000 m, and a quaternion"):
+        sender.add(0.0, Poses(positions, quaternions))
+    with pytest.raises(ValueError, match="performer, joint 2 at rest"):
+        Body("performer", own.joints, own.parents, Poses(positions, quaternions))
+    other.identity = sender.identity
+    assert sender.add(0.0, own.rest) == other.add(0.0, own.rest)
+
+
+@pytest.mark.parametrize(("way", "answers"), combined([(2600.0, 0.005), (5.0, 1e-5), (9999.0, 1e-6)], [True, False]))
+def test_as_far_as_poses_may_be_all_is_within_the_tolerance(way: tuple[float, float], answers: bool) -> None:
+    """There and back in two seconds, and then in a sample; floats have 16 digits."""
+    own, (away, tolerance) = body(4), way
+    times, poses = dance(own, 3.0)
+    share = np.where(times < 2.0, np.sin(0.5 * np.pi * times), 1.0 - times * 10.0 // 2 % 2)
+    poses.positions[0] = share[:, None] * (away, -away, 0.5 * away)
+    outcome = run(own, times, poses, tolerance=tolerance, answers=answers)
+    assert outcome.between(1.1, 3.0).max() <= tolerance * SLACK + 1e-9
+
+
+NUMBERS = st.floats() | st.sampled_from([0.0, 1.0, 5e-324, 1e-310, -1e-200, 1e200, 9999.0, -9999.0])
+
+
+@given(
+    st.lists(st.tuples(st.just(None) | NUMBERS, st.lists(NUMBERS, min_size=14, max_size=14)), max_size=6), st.booleans()
+)
+def test_whatever_numbers_poses_and_times_are_a_sender_goes_on(samples: list, answers: bool) -> None:
+    """What it takes is shown within the tolerance once it is still, and what it does not take, it says."""
+    bodies, calm = [Body.rigid("hand"), Body.rigid("tool", radius=1.0)], Poses([[0.5] * 3] * 2, [[0.5] * 4] * 2)
+    sender, receiver = Sender(bodies), Receiver()
+
+    def say(datagrams: list[bytes], now: float) -> None:
+        for datagram in datagrams:
+            receiver.take(datagram, now)
+        for _, answer in receiver.answers() if answers else ():
+            sender.hear(answer, now)
+
+    numbers = [(time, np.array(row).reshape(2, 7)) for time, row in samples]
+    clock = 0.0
+    for row, (time, pose) in enumerate(numbers):
+        clock = row / 60.0 if time is None else time
+        sound = (np.abs(pose[:, :3]) < 1e4).all() and np.isfinite(pose).all() and pose[:, 3:].any(axis=1).all()
+        with nullcontext() if sound and abs(clock) <= FURTHEST else pytest.raises(ValueError, match="needs"):
+            say(sender.add(clock, Poses(pose[:, :3], pose[:, 3:])), row / 60.0)
+        say(sender.poll(sender.next), row / 60.0)
+    for row in range(len(numbers), len(numbers) + 40):
+        say(sender.add(row / 60.0, calm), row / 60.0)
+        for shown in receiver.show(row / 60.0).values():
+            assert all(np.isfinite(own.positions).all() for own in shown.poses.values())
+    shown = np.concatenate([own.positions for own in shown.poses.values()])
+    assert np.abs(shown - 0.5).max() <= 0.005
 
 
 @pytest.mark.parametrize("seed", range(tried(4)))
@@ -157,6 +233,16 @@ def test_a_source_that_leaps_and_then_stops_leaves_keepalives(seed: int) -> None
         sender.add(time, Poses(place[None], [[1.0, 0.0, 0.0, 0.0]]))
     said = [len(sender.poll(times[-1] + pause)) for pause in np.arange(0.01, 3.0, 0.01)]
     assert 3 <= sum(said[50:]) < 12
+
+
+def test_behind_the_last_sequence_it_begins_again_without_a_sample_too() -> None:
+    own = body(3)
+    sender = Sender([own])
+    before = {read(datagram).identity for datagram in sender.add(0.0, own.rest)}
+    sender._sequence = LAST + 1
+    said = [read(datagram) for datagram in sender.poll(0.9)]
+    assert [type(datagram).__name__ for datagram in said] == ["Description", "Motion"]
+    assert not before & {datagram.identity for datagram in said}
 
 
 def test_who_joins_gets_the_description_and_a_message_that_builds_on_nothing() -> None:

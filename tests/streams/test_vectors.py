@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.streams import Receiver
-from rigid_motion.streams.coding import Coder
+from rigid_motion.streams.coding import LARGEST, LONG, Coder
 from rigid_motion.streams.messages import Codec
 from rigid_motion.streams.wire import Answer, Description, Motion, read, read_description, write
 
@@ -49,6 +49,7 @@ def test_messages() -> None:
         assert codec.write(message, base) == motion.data
         known[motion.sequence] = message
     assert {said["kind"] for said in STREAM["messages"]} >= {0, 3}
+    assert max(np.abs(said["groups"]).max() for said in STREAM["messages"]) >= LARGEST + (1 << LONG)
 
 
 def test_what_is_shown() -> None:

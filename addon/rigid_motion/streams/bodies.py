@@ -6,7 +6,6 @@ same moments, and are one array: poses of shape (joints,), each in its parent's 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,19 +14,40 @@ import numpy as np
 
 from ..motion import Poses, Skeleton, shell_error
 from ..motion.poses import joined
+from ..motion.quaternions import normalise
 
 RADIUS = 0.03
 """Of the ball at every joint, in metres, unless it is given."""
 
+SMALLEST, LARGEST = 1e-6, 1e4
+"""Metres of radii and tolerances at least; and metres that these are less than, and coordinates of places."""
+
+SHORTEST, FURTHEST = 1e-6, 2e11
+"""Seconds between two samples at least; and those of a clock, either way: beyond, floats do not tell ticks apart."""
+
 MOST_BODIES, MOST_JOINTS, LONGEST_NAME = 255, 1024, 255
 """Of a sender; and bytes of a name in UTF-8."""
+
+
+def checked(poses: Poses, names: Sequence[str]) -> Poses:
+    """Return poses (joints,) with quaternions of length 1, however long they were.
+
+    Raises ValueError with the name of a joint that is nowhere, or turned by nothing.
+    """
+    longest = np.abs(poses.quaternions).max(axis=-1, initial=0.0)
+    are_sound = (np.abs(poses.positions) < LARGEST).all(axis=-1) & (longest > 0.0) & np.isfinite(longest)
+    if not are_sound.all():
+        needs = f"a place within {LARGEST:g} m, and a quaternion of finite numbers, not all of them 0"
+        raise ValueError(f"{names[int(np.argmin(are_sound))]}: a pose needs {needs}")
+    return Poses(poses.positions, normalise(poses.quaternions / longest[..., None]))
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
     """A rigid body or a skeleton, at rest.
 
-    Raises ValueError where names, parents and poses are not as many, or a joint comes before its parent.
+    Raises ValueError where names, parents, radii and poses are not as many or out of range, or a joint comes before its
+    parent.
     """
 
     name: str
@@ -40,8 +60,10 @@ class Body:
     rest: Poses
     """Each joint in its parent's space, shape (joints,)."""
 
-    radius: float = RADIUS
-    """Of the ball at every joint within which nothing may move off by more than the tolerance, in metres."""
+    radius: float | np.ndarray = RADIUS
+    """Of the ball at every joint within which nothing may move off by more than the tolerance, in metres. One for all,
+    or one for each, shape (joints,), as what it carries is large.
+    """
 
     sliding: np.ndarray | None = None
     """Which joints change their places in their parents' space, shape (joints,). None for roots alone."""
@@ -53,13 +75,14 @@ class Body:
             raise ValueError(f"{self.name}: names, parents and rest poses of its {count} joints are not as many")
         if np.any(parents < -1) or np.any(parents >= np.arange(count)):
             raise ValueError(f"{self.name}: a joint needs to come after its parent")
-        if not (math.isfinite(self.radius) and self.radius > 0.0):
-            raise ValueError(f"{self.name}: a radius of {self.radius} is not a positive number")
+        radii = np.asarray(self.radius, dtype=np.float64)
+        if radii.shape not in ((), (count,)) or not ((radii >= SMALLEST) & (radii < LARGEST)).all():
+            raise ValueError(f"{self.name}: a radius is one for all joints or for each, {SMALLEST:g} to {LARGEST:g} m")
         names = (self.name, *self.joints)
         if not all(0 < len(name.encode(errors="replace")) <= LONGEST_NAME for name in names):
             raise ValueError(f"{self.name}: a name needs 1 to {LONGEST_NAME} bytes")
-        if not (np.isfinite(self.rest.positions).all() and np.isfinite(self.rest.quaternions).all()):
-            raise ValueError(f"{self.name}: its rest pose is not finite")
+        object.__setattr__(self, "rest", checked(self.rest, [f"{label} at rest" for label in self.labels]))
+        object.__setattr__(self, "radius", np.broadcast_to(radii, (count,)))
         object.__setattr__(self, "parents", parents)
         object.__setattr__(self, "sliding", sliding)
 
@@ -67,6 +90,11 @@ class Body:
     def skeleton(self) -> Skeleton:
         """Which joint hangs on which."""
         return Skeleton(self.parents)
+
+    @cached_property
+    def labels(self) -> list[str]:
+        """What joints are called where there are others."""
+        return [self.name if joint == self.name else f"{self.name}, {joint}" for joint in self.joints]
 
     def in_root_space(self, poses: Poses) -> Poses:
         """Return poses (joints,) of the joints, each in its parent's space, as they are in that of the roots."""
@@ -92,9 +120,10 @@ class Forest:
         parents = np.concatenate([body.parents for body in bodies])
         self.parents = np.where(parents < 0, -1, parents + np.repeat(self._ends - counts, counts))
         self.rest = joined([body.rest for body in bodies])
-        self.radii = np.repeat([body.radius for body in bodies], counts)
+        self.radii = np.concatenate([body.radius for body in bodies])
         self.sliding = np.concatenate([body.sliding for body in bodies])
         self.skeleton = Skeleton(self.parents)
+        self.labels = [label for body in bodies for label in body.labels]
 
     def __len__(self) -> int:
         return len(self.parents)

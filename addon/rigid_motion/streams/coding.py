@@ -22,8 +22,10 @@ NEAR, FAR, STALE, UNKNOWN, MIDDLE, FINER, STILL = range(7)
 """Kinds of knots. The end of a window is coded against how the message before it goes on, or one before that; against
 an old pose; against rest. Then come the first knot within, the others; and those behind an old pose or rest."""
 
-LARGEST, MOST_BITS = 14, 20
-"""Magnitudes from the first on are written in full, in so many bits at most."""
+LARGEST, LONG, MOST_LONGER = 14, 20, 32
+"""Magnitudes from the first on are written in full. The last width that tables say, in bits, stands for itself and
+fewer than so many more: 2^51 of the finest steps of the smallest tolerance are further than anything is.
+"""
 
 HISTORIES, NEIGHBOURS, SIZES = 8, 5, 6
 
@@ -79,6 +81,13 @@ class Coder:
             value = self._share(part, count)
         self._narrow(part, value, value + 1)
         return value
+
+    def digits(self, count: int, value: int = 0) -> int:
+        """Write or read a number of so many binary digits, up to 16 at a time, the highest first."""
+        read = 0
+        for shift in range((count - 1) // 16 * 16, -1, -16):
+            read |= self.flat(1 << min(count - shift, 16), value >> shift & 0xFFFF) << shift
+        return read
 
     def _share(self, part: int, count: int) -> int:
         """Return in which part of the interval the value is: beyond the last are only bytes that nobody wrote."""
@@ -145,8 +154,10 @@ def _code_group(coder: Coder, values: list[int], first_table: int) -> int:
         magnitude = coder.symbol(first_table + size, min(abs(values[axis]), LARGEST))
         if magnitude == LARGEST:
             rest = max(abs(values[axis]) - LARGEST, 0)
-            magnitude += coder.flat(1 << coder.symbol(WIDTHS, rest.bit_length()), rest)
+            width = coder.symbol(WIDTHS, min(rest.bit_length(), LONG))
+            width += coder.flat(MOST_LONGER, rest.bit_length() - LONG) if width == LONG else 0
+            magnitude += coder.digits(width, rest)
         negative = coder.flat(2, int(values[axis] < 0)) if magnitude else 0
         values[axis] = -magnitude if negative else magnitude
         total += magnitude
-    return min(total, 1 << MOST_BITS)
+    return min(total, 1 << LONG)

@@ -88,7 +88,7 @@ class Codec:
             end = base.end + terms.grid * coder.flat(FURTHEST // terms.grid + 1, whole)
             end += coder.flat(terms.grid, odd) if coder.symbol(ODD, int(odd > 0)) else 0
         else:
-            end = sum(coder.flat(1 << 16, said.end >> shift & 0xFFFF) << shift for shift in (32, 16, 0))
+            end = coder.digits(48, said.end)
             end -= end >> 47 << 48  # of either sign
         finer = coder.symbol(self._fineness, said.finer)
         inner = coder.symbol(KNOT_COUNTS, len(said.cells) - 1)
@@ -104,7 +104,7 @@ class Codec:
         if message is None:
             for cell, numbers in zip([0, *cells], groups, strict=True):
                 read.say(cell, np.array(numbers))
-        return read if np.abs(read.path.poses.positions).max() < NOWHERE else None
+        return read if read.is_somewhere else None
 
 
 class Message:
@@ -136,6 +136,11 @@ class Message:
                 self.kind = STALE if end - base.end > OLD else NEAR if back == 1 else FAR
                 self._goes_on = self.kind in (NEAR, FAR)
             self.path = Path(moments, base.path.at(moments) if self._goes_on else base.path.poses[:, [-1, -1]])
+
+    @property
+    def is_somewhere(self) -> bool:
+        """Return whether it puts all joints where something can be; otherwise nobody reads it."""
+        return bool(np.abs(self.path.poses.positions).max() < NOWHERE)
 
     def say(self, cell: int, numbers: np.ndarray | None = None, samples: Path | None = None) -> None:
         """Move the end, which comes first and is cell 0, or else a new knot, by whole numbers (groups, 3).

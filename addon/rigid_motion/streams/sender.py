@@ -17,13 +17,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..motion import Poses
-from ..motion.quaternions import normalise
 from . import wire
-from .bodies import Body, Forest
+from .bodies import FURTHEST, LARGEST, SHORTEST, SMALLEST, Body, Forest, checked
 from .fitting import Fitting, closely
 from .messages import MOST_BACK, Codec, Message
 from .paths import Path
-from .wire import NEEDS_DESCRIPTION, NEEDS_REFRESH, TICKS, Answer, Description, Motion, Terms
+from .wire import LONGEST_DELAY, NEEDS_DESCRIPTION, NEEDS_REFRESH, TICKS, Answer, Description, Motion, Terms
 
 KEEPALIVE, REFRESH = 0.5, 1.0
 """Seconds of silence after which something is said in any case; and, where nobody answers, between messages that build
@@ -48,6 +47,9 @@ LAST = 0xFFFF
 
 STEP = 1.0
 """Seconds between two samples that are no pause, but a clock that was set."""
+
+PAUSE = 0.25
+"""Seconds between two samples beyond what is usual, before which all is said: for a receiver it may be a clock."""
 
 ALMOST, CALMER = 0.99, 0.9
 """Part of an interval that it surely takes; what is left of the longest with every sample that came sooner."""
@@ -88,18 +90,23 @@ class Sender:
         rate: float | None = None,
         keepalive: float = KEEPALIVE,
     ) -> None:
-        for name, value in (("tolerance", tolerance), ("delay", delay), ("keepalive", keepalive)):
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"a {name} of {value} is not a positive number")
+        for name, value, least, most in (
+            ("tolerance", tolerance, SMALLEST, LARGEST),
+            ("delay", delay, 1.0 / TICKS, LONGEST_DELAY / TICKS),
+            ("keepalive", keepalive, 0.0, math.inf),
+        ):
+            if not (least <= value <= most and 0.0 < value < LARGEST):
+                raise ValueError(f"a {name} of {value} is not a positive number from {least:g} to {most:g}")
         even = TICKS / rate if rate else GRID
-        grid = round(even) if abs(even - round(even)) < 0.01 and even >= 1.0 else GRID
+        is_whole = 1.0 <= even <= LONGEST_DELAY and abs(even - round(even)) < 0.01
+        grid = round(even) if is_whole else GRID
         terms, self._keepalive = Terms(tolerance, round(delay * TICKS), grid), keepalive
         self._delay = terms.delay / TICKS
         self._packed = wire.describe(Forest(bodies), terms)
         # The bodies as receivers read them, in so many digits.
         read = wire.read_description(self._packed)
         if read is None or len(self._packed) > wire.LONGEST - 4:
-            raise ValueError("the delay, the tolerance or the bodies are too large to be described")
+            raise ValueError("the bodies have too many joints or too long names to be described")
         self._forest, self.codec = read[0], Codec(*read)
         self._slip = 0.0
         """What is added to the times of samples, so that a clock that was set makes no difference."""
@@ -147,31 +154,29 @@ class Sender:
         Raises
         ------
         ValueError
-            Where poses are not as many as joints, or not finite.
+            Where poses are not as many as joints; and where a place is 10 km away or further, a quaternion is 0, or any
+            number is not finite. It is as if there had been no such sample.
         """
         poses = poses if isinstance(poses, Poses) else self._forest.joined(poses)
-        finite = np.isfinite(poses.positions).all() and np.isfinite(poses.quaternions).all()
-        if poses.shape != (len(self._forest),) or not (finite and math.isfinite(time)):
-            raise ValueError(f"a sample needs {len(self._forest)} finite poses and a time")
-        times, now = self._samples.moments, time + self._slip
-        if len(times) and not 0.0 < now - times[-1] <= STEP:
+        if poses.shape != (len(self._forest),) or not abs(time) <= FURTHEST:
+            raise ValueError(f"a sample needs {len(self._forest)} poses and a time within {FURTHEST:g} s, not {time}")
+        poses, times, now = checked(poses, self._forest.labels), self._samples.moments, time + self._slip
+        if len(times) and not SHORTEST < now - times[-1] <= STEP:
             usual = times[-1] - times[-2] if len(times) > 1 else 1.0 / TICKS
-            self._slip += float(times[-1] + usual - now)
-            now = time + self._slip
+            now = float(times[-1] + usual)
+            self._slip = now - time
+        said = self._before_pause(now)
         if len(times):
             self._interval = max(now - float(times[-1]), CALMER * self._interval)
-        samples = self._samples.extended(now, Poses(poses.positions, normalise(poses.quaternions)))
-        self._samples = samples.since(now - self._delay - STEP)
-        if self._sequence > LAST:
-            self._begin()
-        return self._due(now, self._interval)
+        self._samples = self._samples.extended(now, poses).since(now - self._delay - STEP)
+        return said + self._due(now, self._interval)
 
     def poll(self, time: float) -> list[bytes]:
         """Return what is to be sent at a time at which no sample came: worth asking at `next`, where one is overdue."""
         now, times = time + self._slip, self._samples.moments
-        if not len(times) or now > times[-1] + STEP:
+        if not len(times) or not now <= times[-1] + STEP:
             return []  # Somebody set the clock, as the next sample will tell; or no sample is going to come.
-        return self._due(max(now, float(times[-1])), 0.0)
+        return self._before_pause(now) + self._due(max(now, float(times[-1])), 0.0)
 
     @property
     def next(self) -> float:
@@ -200,7 +205,7 @@ class Sender:
         if answer.receiver not in self._receivers and len(self._receivers) == MOST_RECEIVERS:
             return []
         heard, times = now + self._slip, self._samples.moments
-        if len(times) and abs(heard - times[-1]) > STEP:
+        if len(times) and not abs(heard - times[-1]) <= STEP:
             heard = float(times[-1])
         self._receivers[answer.receiver] = answer, heard
         missing = answer.before.bit_length() - answer.before.bit_count()
@@ -208,8 +213,16 @@ class Sender:
         self._desired |= bool(answer.needs & NEEDS_REFRESH) and heard - self._refreshed > PATIENCE
         return self.describe() if answer.needs & NEEDS_DESCRIPTION else []
 
+    def _before_pause(self, now: float) -> list[bytes]:
+        """Return what is to be sent of the samples that there are before one that comes late."""
+        last = float(self._samples.moments[-1]) if len(self._samples.moments) else now
+        is_pause = now - last > PAUSE + self._interval and self._sent < last and self._sequence <= LAST
+        return [self._message(last)] if is_pause else []
+
     def _due(self, now: float, interval: float) -> list[bytes]:
         """Return what is to be sent now, where nobody asks again before the interval is over."""
+        if self._sequence > LAST:
+            self._begin()
         due, self._next = [], math.inf
         if self._copies and now - self._refreshed >= AGAIN:
             is_there = self._answered(now) and self._base is not None and self._have(self._base)
@@ -266,12 +279,16 @@ class Sender:
         """Say the window until now. Where no sample is there yet, the motion is taken to go on as it went."""
         samples, last, now = self._samples, float(self._samples.moments[-1]), max(now, self._sent)
         if now - last > SOON:
-            samples = samples.extended(now, samples.going_on().pose(now))
+            there = samples.going_on().pose(now)
+            samples = samples.extended(now, Poses(np.clip(there.positions, -LARGEST, LARGEST), there.quaternions))
         end = math.floor(now * TICKS + ROUNDING)
-        number = None if refresh else self._usable(now)
-        base = self.codec.rest if number is None else self._messages[number]
-        back = 0 if number is None else self._sequence - number
-        message, is_within = Fitting(self.codec, self._path, base, back, end, samples).message()
+        # What goes on from a leap of kilometres may be nowhere: then it builds on nothing.
+        for number in (None if refresh else self._usable(now), None):
+            base = self.codec.rest if number is None else self._messages[number]
+            back = 0 if number is None else self._sequence - number
+            message, is_within = Fitting(self.codec, self._path, base, back, end, samples).message()
+            if message.is_somewhere:
+                break
         datagram = wire.write(Motion(self.identity, self._sequence, self.codec.write(message, base)))
         self._messages[self._sequence] = message
         kept = {*range(self._sequence - ANSWERED, self._sequence + 1), self._base}

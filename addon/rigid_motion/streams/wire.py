@@ -6,6 +6,7 @@ Reading never raises: what is no datagram of this version is None.
 from __future__ import annotations
 
 import json
+import math
 import zlib
 from struct import Struct
 from typing import NamedTuple
@@ -13,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..motion import Poses
-from .bodies import Body, Forest
+from .bodies import LARGEST, SMALLEST, Body, Forest
 
-VERSION = 5
+VERSION = 6
 
 TICKS = 3600
 """A second, in the unit of all times on the wire: whole numbers of it are the frames of 24, 25, 30, 60, 72, 90, 120."""
@@ -28,8 +29,8 @@ LONGEST = 65_000
 MOST_DESCRIBED = 1 << 17
 """Bytes of a description, unpacked."""
 
-LONGEST_DELAY, LARGEST = 8 * TICKS, 1e4
-"""Ticks of the delay and the grid; and metres of radii, the tolerance and places at rest, which are less."""
+LONGEST_DELAY = 8 * TICKS
+"""Ticks of the delay and the grid."""
 
 RAW = -15
 """Of zlib: its DEFLATE alone."""
@@ -101,12 +102,12 @@ def read(datagram: bytes) -> Datagram | None:
 
 def describe(forest: Forest, terms: Terms) -> bytes:
     """Return bodies and terms, packed."""
-    bodies = []
+    bodies, digits = [], max(3 - math.floor(math.log10(terms.tolerance)), 6)
     for body in forest.bodies:
         names = [own.encode(errors="replace").decode() for own in (body.name, *body.joints)]
-        rest = np.concatenate((body.rest.positions.round(6), body.rest.quaternions.round(4)), axis=1)
+        rest = np.concatenate((body.rest.positions.round(digits), body.rest.quaternions.round(4)), axis=1)
         columns = (body.parents, np.asarray(body.sliding, dtype=int), rest)
-        bodies.append((body.radius, names, *(column.tolist() for column in columns)))
+        bodies.append((np.asarray(body.radius).round(6).tolist(), names, *(column.tolist() for column in columns)))
     return zlib.compress(json.dumps((*terms, bodies), separators=(",", ":")).encode(), 9, RAW)
 
 
@@ -115,20 +116,16 @@ def read_description(data: bytes) -> tuple[Forest, Terms] | None:
     try:
         tolerance, delay, grid, bodies = json.loads(zlib.decompressobj(RAW).decompress(data, MOST_DESCRIBED))
         terms, forest = Terms(float(tolerance), int(delay), int(grid)), Forest([_body(*body) for body in bodies])
-        are_sound = 0.0 < terms.tolerance < LARGEST and all(0 < ticks <= LONGEST_DELAY for ticks in terms[1:])
+        are_sound = SMALLEST <= terms.tolerance < LARGEST and all(0 < ticks <= LONGEST_DELAY for ticks in terms[1:])
         return (forest, terms) if are_sound else None
     except (zlib.error, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError):
         return None
 
 
-def _body(radius: float, names: list[str], parents: object, sliding: object, rest: object) -> Body:
+def _body(radii: list[float], names: list[str], parents: object, sliding: object, rest: object) -> Body:
     """Return a body that is described. Raises whatever is wrong with it."""
     for name in names:
         name.encode()
     rows = np.array(rest, dtype=np.float64)
-    lengths = np.linalg.norm(rows[:, 3:], axis=1)
-    if not ((np.abs(rows) < LARGEST).all() and (lengths > 0.5).all() and radius < LARGEST):
-        raise ValueError("such a pose at rest is none")
-    poses = Poses(rows[:, :3], rows[:, 3:] / lengths[:, None])
     above, slides = np.array(parents, dtype=np.int64), np.array(sliding, dtype=bool)
-    return Body(names[0], tuple(names[1:]), above, poses, radius, slides)
+    return Body(names[0], tuple(names[1:]), above, Poses(rows[:, :3], rows[:, 3:]), np.array(radii), slides)
