@@ -90,13 +90,15 @@ def run(
     copies: int = 1,
     rate: float | None = None,
     heard_from: float = 0.0,
+    lag: float | None = None,
     seed: int = 1,
 ) -> Outcome:
     """Play samples (n,) of poses (joints, n), and draw what is shown.
 
     `lost` says of the time and the number of a datagram whether it is lost; `set_by` is what somebody added to the
     sender's clock; `drained` says when what came is taken out of the receiver's socket; `heard_from` is when the
-    receiver begins.
+    receiver begins. With a `lag`, what is shown is compared with what was so long ago, and not with what was at the
+    moment that is said to be shown.
     """
     rng, sender, receiver = np.random.default_rng(seed), Sender([own], tolerance, delay, rate), Receiver()
     outcome, pending, count = Outcome(sender, receiver), [], 0
@@ -141,11 +143,11 @@ def run(
             come(now)
             before = now
     if drawn:
-        compare(outcome, own, Path(times, poses), drawn)
+        compare(outcome, own, Path(times, poses), drawn, lag)
     return outcome
 
 
-def compare(outcome: Outcome, own: Body, truth: Path, drawn: list) -> None:
+def compare(outcome: Outcome, own: Body, truth: Path, drawn: list, lag: float | None = None) -> None:
     """Note how far off was what was drawn, from when the motion had begun."""
     drawn = [frame for frame in drawn if frame[1] >= truth.moments[0]]
     outcome.now, outcome.moments = (np.array([frame[number] for frame in drawn]) for number in (0, 1))
@@ -155,7 +157,7 @@ def compare(outcome: Outcome, own: Body, truth: Path, drawn: list) -> None:
     )
     forest = Forest([own])
     there = forest.skeleton.in_root_space(shown)
-    true = forest.skeleton.in_root_space(truth.at(outcome.moments))
+    true = forest.skeleton.in_root_space(truth.at(outcome.moments if lag is None else outcome.now - lag))
     outcome.errors = shell_error(there, true, forest.radii[:, None]).max(axis=0)
     went, goes = np.diff(there.positions, axis=1), np.diff(true.positions, axis=1)
     outcome.steps = np.linalg.norm(went, axis=-1).max(axis=0)

@@ -60,6 +60,17 @@ def test_a_clock_that_steps_is_no_motion(whose: str, step: float) -> None:
     assert np.diff(outcome.moments).min() >= 0.0
 
 
+@pytest.mark.parametrize(("step", "answers"), combined([0.3, 0.5, 0.9, -0.5], [True, False]))
+def test_a_sender_s_clock_that_is_set_by_less_than_a_second_is_soon_known(step: float, answers: bool) -> None:
+    own = body()
+    outcome = run(own, *dance(own, 6.0), set_by=lambda now: step * (now > 3.008), answers=answers, lag=0.12)
+    # A picture or two may be off by what the motion does between two samples.
+    off = outcome.between(1.0, 6.0)
+    assert np.count_nonzero(off > 4.0 * TOLERANCE) <= 2
+    assert off.max() < 0.06
+    assert np.diff(outcome.moments).min() >= 0.0
+
+
 @pytest.mark.parametrize(("bursts", "answers"), combined([0.1, 0.25], [True, False]))
 def test_a_receiver_with_a_busy_processor(bursts: float, answers: bool) -> None:
     own = body()

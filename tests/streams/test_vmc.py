@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from rigid_motion.streams.receiver import MOST_STREAMS
 from rigid_motion.streams.vmc import (
     JOINTS,
     MOST_DEVICES,
+    MOST_FRAMES,
     ROOT,
     Performer,
     write,
@@ -223,6 +225,53 @@ def test_a_skeleton_of_another_size_rest_and_naming_does_the_same():
 )
 def test_bones_are_found_by_their_usual_names(joints, bones):
     assert len(humanoid_bones(joints)) == bones
+
+
+def hips(moment: float) -> dict[str, Poses]:
+    place = [np.sin(3.0 * moment), 0.3 * np.cos(5.0 * moment), 1.0]
+    return {"Hips": Poses(place, [math.cos(moment), 0.0, 0.0, math.sin(moment)])}
+
+
+@pytest.mark.parametrize("step", [0.3, 0.5, 0.9, 5.0, -0.3, -0.5, -0.9, -5.0])
+def test_a_clock_that_is_set_is_no_motion(step):
+    """Within two samples of what was there a tenth of a second ago, before, then, and behind that."""
+    receiver, off, moments = Receiver(delay=0.1), [], []
+    for row in range(240):
+        sent = row / 60.0
+        heard(write(sent + step * (sent > 2.0), hips(sent)), 7.0 + sent, receiver)
+        for drawn in (sent, sent + 0.007):
+            for shown in receiver.show(7.0 + drawn).values():
+                moments.append(shown.moment)
+                off.append(np.linalg.norm(shown.poses["VMC"].positions[1] - hips(drawn - 0.1)["Hips"].positions))
+    assert max(off[60:]) < 0.005
+    assert np.diff(moments).min() >= 0.0
+
+
+def test_frames_that_came_late_are_no_clock_that_was_set():
+    receiver, frames = Receiver(delay=0.1), [write(row / 60.0, hips(row / 60.0)) for row in range(60)]
+    for row in (*range(30), 36, 34, 35, 30, 33, *range(37, 60)):
+        heard(frames[row], 7.0 + max(row, 36 * (29 < row < 37)) / 60.0, receiver)
+    (keys,) = receiver.keys()
+    assert np.round(keys.moments * 60.0, 3).tolist() == [*range(30), *range(36, 60)]
+
+
+@pytest.mark.parametrize("time", [1e308, -1e308, 3e11, math.inf, math.nan, 5e-324, 1e-300])
+def test_times_that_are_none_make_no_frames(time):
+    receiver, bone = Receiver(delay=0.0), osc.write_message("/VMC/Ext/Bone/Pos", "Hips", *[0.5] * 7)
+    for row, moment in enumerate((0.0, time, 0.5, -time, 1.0)):
+        said = b"/VMC/Ext/T\0\0,d\0\0" + struct.pack(">d", moment)
+        heard([bundled(bone, said)], row / 2.0, receiver)
+    (keys,) = receiver.keys()
+    assert np.diff(keys.moments).min() > 1e-7
+    for shown in receiver.show(2.0).values():
+        assert np.isfinite(shown.poses["VMC"].positions).all()
+
+
+def test_of_a_datagram_a_few_frames_are_taken():
+    """As of a program that saves them up; more are somebody who wants to keep us busy."""
+    frames = [row for number in range(600) for row in (HIPS, osc.write_message("/VMC/Ext/T", number / 60.0))]
+    (keys,) = heard([bundled(*frames)]).keys()
+    np.testing.assert_allclose(keys.moments, np.arange(MOST_FRAMES) / 60.0, atol=1e-6)
 
 
 def test_any_datagram_does_no_harm():

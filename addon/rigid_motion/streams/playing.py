@@ -29,6 +29,9 @@ than all but this part of those before: the network is quicker now, and does not
 SET = 1.0
 """A transit that differs by more than this many seconds is that of another clock; a display may not leap further."""
 
+AHEAD = 0.25
+"""Seconds by which something comes sooner than all that came lately where the sender's clock was set ahead."""
+
 SETTLING, HURRY = 0.15, 0.6
 """Seconds in which a third of a difference to the moment that should be shown is left; and by which part faster than
 time the moment goes on at most."""
@@ -60,6 +63,8 @@ class Playing:
         self._last = self._heard = -np.inf
         self._unsure = False
         """Whether our clock leapt, and nothing came since."""
+        self._leap: tuple[float, float] | None = None
+        """The moment behind which so many seconds are left out, by which the sender's clock was set ahead."""
 
     def heard(self, sent: float, arrival: float) -> None:
         """Take into account when something was sent and came."""
@@ -83,11 +88,33 @@ class Playing:
         self.longest = max(took for _, took in known)
         self._heard, self._unsure = arrival, False
 
+    def set_ahead(self, sent: float, arrival: float) -> float:
+        """Return by how much the sender's clock was set ahead, 0 if it was not, where this was sent next."""
+        before = [(when, took) for when, took in self._transits if when < arrival]
+        # Somebody who seldom looks does not know when it came, and a clock of ours that goes back says nothing.
+        if not before or self._transits[-1][0] > arrival or arrival - before[-1][0] > AHEAD:
+            return 0.0
+        step = min(took for _, took in before) - (arrival - sent)
+        return step if step > AHEAD else 0.0
+
+    def leap(self, moment: float, step: float) -> None:
+        """Leave out so many seconds behind a moment, as soon as it was shown."""
+        if self._leap and self._moment is not None:
+            self._moment += self._leap[1]
+        self._transits = deque(((when, took - step) for when, took in self._transits), MOST_TRANSITS)
+        self._leap = moment, step
+
     def moment(self, now: float) -> float | None:
         """Return the moment to be shown now; None before anything came."""
         if self.longest is None:
             return None
         desired = now - self.longest - self.delay
+        if self._leap and self._moment is not None:
+            last, step = self._leap
+            if self._moment < last:
+                desired -= step
+            else:
+                self._moment, self._leap = self._moment + step, None
         passed, self._last = now - self._last, now
         if self._moment is None:
             self._moment, passed = desired, 0.0

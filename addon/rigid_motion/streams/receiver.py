@@ -20,7 +20,7 @@ from .coding import Coder
 from .messages import Codec, Message
 from .osc import is_osc
 from .paths import Path
-from .playing import Keys, Playback, Shown, Stream
+from .playing import AHEAD, Keys, Playback, Shown, Stream
 from .vmc import VMC, Performance
 from .wire import NEEDS_DESCRIPTION, NEEDS_REFRESH, TICKS, Answer, Motion, Terms
 
@@ -131,6 +131,8 @@ class _Coded(Playback):
         self._messages: OrderedDict[int, Message] = OrderedDict()
         """Of messages by their sequence numbers, those that others built on last behind."""
         self._newest, self._needs = -1, NEEDS_REFRESH
+        self._end, self._transit = -np.inf, np.inf
+        """Seconds of the newest message: its end, and what it took."""
         self.begins = np.inf
 
     def take(self, motion: Motion, arrival: float) -> bool:
@@ -147,13 +149,15 @@ class _Coded(Playback):
             self._messages.move_to_end(sequence - read.back)
         if len(self._messages) > MOST_MESSAGES:
             self._messages.popitem(last=False)
-        lost = sequence - self._newest - 1
+        lost, end = sequence - self._newest - 1, read.end / TICKS
+        if lost == 0 and self._transit - (arrival - end) > AHEAD and (step := self.playing.set_ahead(end, arrival)):
+            self.playing.leap(self._end, step)
         if lost >= 0:
-            self._newest, self._needs = sequence, 0
+            self._newest, self._needs, self._end, self._transit = sequence, 0, end, arrival - end
             self.heard = max(self.heard, arrival)
         # What builds on nothing may be the copy, which is sent later.
         if read.back or self.playing.longest is None:
-            self.playing.heard(read.end / TICKS, arrival)
+            self.playing.heard(end, arrival)
         self._put(read.path, lost)
         return True
 

@@ -18,7 +18,7 @@ from ..motion import Poses
 from ..motion.humanoid import HUMANOID, alignments, beside, humanoid_bones
 from ..motion.poses import in_other_axes
 from ..motion.quaternions import conjugate, multiply
-from .bodies import LONGEST_NAME, Body, Forest
+from .bodies import FURTHEST, LARGEST, LONGEST_NAME, SHORTEST, Body, Forest
 from .osc import Message, read, write_bundle, write_message
 from .paths import Path
 from .playing import SET, Playback, Stream
@@ -38,9 +38,12 @@ Joint = tuple[str, str]
 DEVICES = {f"/VMC/Ext/{kind}/Pos" for kind in ("Tra", "Con", "Hmd")}
 """Trackers, controllers and headsets: rigid bodies in the world, by their serial numbers."""
 
-MOST_DEVICES, FURTHEST, AT_ONCE = 32, 1e5, 12
-"""Devices of a program; metres beyond which there is only damage; and bones of a datagram, which stays below what
-networks carry in one piece."""
+MOST_DEVICES, AT_ONCE = 32, 12
+"""Devices of a program; and bones of a datagram, which stays below what networks carry in one piece."""
+
+MOST_FRAMES, LATE = 8, 3
+"""Frames of a datagram: what else it has is dropped. And frames in a row, each sent behind the one before, that are
+before what came already: they are not late, but the sender's clock was set back."""
 
 _TO_BLENDER = np.array(((-1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
 """Unity's axes as Blender's: a mirror."""
@@ -112,11 +115,17 @@ class Performance(Playback):
         """What was said of this frame, and when it began."""
         self._begun = 0.0
         self._has_time = False
+        self._slip = self._sent = 0.0
+        """What is added to the sender's times, as often as its clock is set; and the last of them."""
+        self._late = self._frames = 0
+        """Frames in a row that are before what came already; and frames of this datagram."""
 
     def take(self, datagram: bytes, arrival: float) -> None:
         """Take a datagram."""
+        self._frames = 0
         for message in read(datagram):
-            self._hear(message, arrival)
+            if self._frames < MOST_FRAMES:
+                self._hear(message, arrival)
 
     def _hear(self, message: Message, arrival: float) -> None:
         address, (name, *numbers) = message.address, message.arguments or (None,)
@@ -125,10 +134,10 @@ class Performance(Playback):
         elif address == "/VMC/Ext/Bone/Pos" and name in HUMANOID:
             self._place((PERFORMER, str(name)), numbers, arrival)
         elif address in DEVICES and isinstance(name, str) and name != PERFORMER:
-            known = {body for body, _ in (*self._newest, *self._frame)} - {PERFORMER}
-            if 0 < len(name.encode()) <= LONGEST_NAME and (name in known or len(known) < MOST_DEVICES):
+            devices = {body for body, _ in (*self._newest, *self._frame)} - {PERFORMER}
+            if 0 < len(name.encode()) <= LONGEST_NAME and (name in devices or len(devices) < MOST_DEVICES):
                 self._place((name, name), numbers, arrival)
-        elif address == "/VMC/Ext/T" and not numbers and isinstance(name, float | int) and math.isfinite(name):
+        elif address == "/VMC/Ext/T" and not numbers and isinstance(name, float | int) and abs(name) <= FURTHEST:
             self._has_time = True
             self._sample(float(name), arrival)
 
@@ -136,7 +145,7 @@ class Performance(Playback):
         try:
             x, y, z, w = numbers[3:7]
             length = math.sqrt(x * x + y * y + z * z + w * w)
-            is_sound = 0.5 < length < 2.0 and all(-FURTHEST < number < FURTHEST for number in numbers[:3])
+            is_sound = 0.5 < length < 2.0 and all(-LARGEST < number < LARGEST for number in numbers[:3])
         except (TypeError, ValueError, OverflowError):
             is_sound = False
         if not is_sound:
@@ -147,8 +156,9 @@ class Performance(Playback):
             self._begun = arrival
         self._frame[joint] = [*numbers[:3], w / length, x / length, y / length, z / length]
 
-    def _sample(self, moment: float, arrival: float) -> None:
+    def _sample(self, sent: float, arrival: float) -> None:
         """Take the frame that is complete."""
+        self._frames += 1
         if not self._frame.keys() - {(PERFORMER, ROOT)}:
             return
         is_new = bool(self._frame.keys() - self._newest.keys())
@@ -156,15 +166,27 @@ class Performance(Playback):
         self._frame = {}
         if is_new:
             self._describe()
-        last = self.path.moments[-1] if self.path else -np.inf
-        if not is_new and last - SET <= moment <= last:
+            self.path, self.kept = None, -np.inf
+        moment = self._moment(sent, arrival)
+        if moment is None:
             return
         poses = self._poses(self._joints)
-        if is_new or moment < last:
-            self.path, self.kept = None, -np.inf
         self.put(self.path.extended(moment, poses) if self.path else Path(np.array([moment]), poses[:, None]))
         self.playing.heard(moment, arrival)
         self.heard = arrival
+
+    def _moment(self, sent: float, arrival: float) -> float | None:
+        """Return when a frame was, by a clock that is never set; None for one that came late, or twice."""
+        is_next, self._sent = sent > self._sent, sent
+        if self.path is None:
+            return sent + self._slip
+        last, self._slip = float(self.path.moments[-1]), self._slip - self.playing.set_ahead(sent + self._slip, arrival)
+        self._late = (self._late * is_next + 1) if sent + self._slip < last + SHORTEST else 0
+        if self._late >= LATE or sent + self._slip < last - SET:
+            # As long behind the last as it came behind that.
+            self._slip, self._late = last + max(arrival - self.heard, SHORTEST) - sent, 0
+        moment = sent + self._slip
+        return moment if moment > last and not self._late else None
 
     def _poses(self, joints: list[Joint]) -> Poses:
         rows = np.array([self._newest[joint] for joint in joints])
