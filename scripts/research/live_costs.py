@@ -5,7 +5,8 @@
 Whole bodies and single hands are sent by the codec of [the wire](wire.md) over UDP on loopback; a receiver in another
 process shows them, and goes by the recording's clock, however busy the machine is. Bytes are those of datagrams with
 the 28 bytes of UDP and IPv4 around each, without the description that a receiver gets when it joins. Errors are the
-largest of any joint's ball of 3 cm, in the root's space, at the moments that are shown.
+largest of any joint's ball, which reaches to the ends of bones that the file has, in the root's space, at the moments
+that are shown.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming.measuring import HEADERS, measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
-RADIUS, TOLERANCE = 0.03, 0.005
+TOLERANCE = 0.005
 DELAYS = {0.1: "100 ms", 0.2: "200 ms"}
 
 FLOATS = "float32 at 30 Hz"
@@ -50,7 +51,7 @@ def costs_of(clip: Clip) -> dict[str, Any]:
     """Return the joints of a body, and what each way to send it costs."""
     report(clip.name)
     times, poses = samples_of(clip)
-    body = body_of(clip, poses, RADIUS)
+    body = body_of(clip, poses)
     costs = {
         f"when needed, {name}": measure(body, times, poses, TOLERANCE, delay)[0] for delay, name in DELAYS.items()
     } | packed(body, times, poses)

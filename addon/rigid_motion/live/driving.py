@@ -144,6 +144,8 @@ class Driver:
 
     def __init__(self, obj: bpy.types.Object, body: Body) -> None:
         self.name, self.body = obj.name, body
+        self.ends = np.zeros(1)
+        """How long bones are that no other channel hangs on (channels,), in the unit of `locals`."""
 
     @property
     def object(self) -> bpy.types.Object | None:
@@ -207,6 +209,11 @@ class RigDriver(Driver):
         joints = [joint for joint in body.joints if pairs.get(joint, "") in bones]
         self.bones = [pairs[joint] for joint in joints]
         placed, self._follows = _space(obj, self.bones)
+        lengths = np.array([bones[name].bone.length for name in self.bones])
+        # Longer ones than a body is large are an importer's.
+        are_free = lengths <= np.abs(placed.positions).max(initial=0.0)
+        are_free[self._follows[self._follows >= 0]] = False
+        self.ends = np.where(are_free, lengths, 0.0)
         self._offsets = beside(placed, self._follows)
         """The pose of each bone with no values, seen from the bone that it follows, or in the armature."""
         _, turn, scale = obj.matrix_basis.decompose()

@@ -77,8 +77,9 @@ class Take:
         poses, parents, unit = self.driver.locals(values)
         poses = Poses(poses.positions, align_signs(poses.quaternions))
         mode = PLAIN if self._mode == "BLENDER" else self._mode
+        radii = np.maximum(self.driver.ends, RADIUS / unit)
         kept = reduce_skeleton_keys(
-            frames, poses, parents, mode, tolerance=self._tolerance / unit, radius=RADIUS / unit, tries=0
+            frames, poses, parents, mode, tolerance=self._tolerance / unit, radius=radii, tries=0
         )
         return [np.union1d(rows, (0, len(frames) - 1)) for rows in kept]
 

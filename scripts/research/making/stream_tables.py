@@ -28,7 +28,7 @@ SETTINGS = ((0.1, 0.0), (0.2, 0.0), (0.1, 0.06), (0.1, 0.15), (0.2, 0.15), (0.1,
 """Delays, and seconds that a datagram takes; None where no receiver answers."""
 
 MOST_SECONDS = 15.0  # of a recording, so that long ones do not have all the say
-BODY_RADIUS, SINGLE_RADIUS = 0.03, 0.1  # of the balls of bodies, and of single bodies
+SINGLE_RADIUS = 0.1  # of the balls of single bodies
 PRIOR = 12.0  # what a table without any counts is worth beside them: as the mean over the kinds of knots
 
 TABLE_FILE = ROOT / "addon/rigid_motion/streams/tables.py"
@@ -56,7 +56,7 @@ def samples(folder: Path) -> Iterator[tuple[Body, np.ndarray, Poses]]:
         report(clip.name)
         times, poses = samples_of(clip)
         kept = times <= times[0] + MOST_SECONDS
-        yield body_of(clip, poses, BODY_RADIUS if clip.rest_body else SINGLE_RADIUS), times[kept], poses[:, kept]
+        yield body_of(clip, poses, None if clip.rest_body else SINGLE_RADIUS), times[kept], poses[:, kept]
 
 
 def count(coder: Counting, body: Body, times: np.ndarray, poses: Poses, delay: float, latency: float | None) -> None:

@@ -86,18 +86,19 @@ def rest_body_of(joints: list[Joint]) -> RestBody:
     """Return the body of a hierarchy at rest, no joint being turned: every bone ends in the middle of its children."""
     parents = np.array([-1 if joint.parent is None else joint.parent for joint in joints])
     offsets = np.array([joint.offset for joint in joints])
-    places, tails, ends = offsets.copy(), np.zeros_like(offsets), np.zeros(len(joints))
+    places, tails, counts = offsets.copy(), np.zeros_like(offsets), np.zeros(len(joints))
     for index, joint in enumerate(joints):
         if joint.parent is not None:
             places[index] += places[joint.parent]
             tails[joint.parent] += offsets[index]
-            ends[joint.parent] += 1
+            counts[joint.parent] += 1
         if joint.end is not None:
             tails[index] += joint.end
-            ends[index] += 1
-    tails /= np.maximum(ends, 1.0)[:, None]
+            counts[index] += 1
+    tails /= np.maximum(counts, 1.0)[:, None]
+    ends = np.linalg.norm([joint.end or (0.0, 0.0, 0.0) for joint in joints], axis=1)
     unturned = np.tile((1.0, 0.0, 0.0, 0.0), (len(joints), 1))
-    return RestBody(tuple(joint.name for joint in joints), parents, Poses(places, unturned), tails)
+    return RestBody(tuple(joint.name for joint in joints), parents, Poses(places, unturned), tails, ends=ends)
 
 
 def world_poses(joints: list[Joint], values: np.ndarray, requested: Iterable[str]) -> dict[str, Poses]:

@@ -80,6 +80,11 @@ class RestBody:
 
     skin: Skin | None = None
 
+    ends: np.ndarray | None = None
+    """How far from each joint its bone ends where no child begins, shape (joints,), and 0 where an importer made that
+    up; None where the file has no such ends.
+    """
+
     @property
     def skeleton(self) -> Skeleton:
         return Skeleton(self.parents)
@@ -105,7 +110,8 @@ def repaired(rest_body: RestBody) -> tuple[RestBody, tuple[str, ...]]:
         more = ", ..." if np.count_nonzero(wrong) > MOST_NAMED else ""
         done.append(f"drew no bones for joints that are nowhere at rest ({np.count_nonzero(wrong)}: {names}{more})")
         places, tails = (np.where(wrong[:, None], 0.0, some) for some in (places, tails))
-        rest_body = replace(rest_body, rest=Poses(places, rest_body.rest.quaternions), tails=tails)
+        ends = None if rest_body.ends is None else np.where(wrong, 0.0, rest_body.ends)
+        rest_body = replace(rest_body, rest=Poses(places, rest_body.rest.quaternions), tails=tails, ends=ends)
     if skin is not None and not (np.abs(skin.vertices) < LARGEST).all():
         done.append("left out a skin with numbers that are missing, not finite or too large")
         rest_body = replace(rest_body, skin=None)

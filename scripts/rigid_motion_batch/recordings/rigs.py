@@ -32,6 +32,9 @@ LAST_FRAME = 1048574
 BLOCK = 256
 """Frames whose matrices are kept at once."""
 
+AT_CHILD = 0.01
+"""The part of its length within which a bone ends where its child begins."""
+
 SHORTEST_AXIS = 1e-12
 """Length below which an axis has no direction: bones are hidden by scaling them to nothing."""
 
@@ -316,7 +319,16 @@ def _rest_body(
     largest = 0.0 if made_up else float(np.ptp(rest.positions, axis=0).max())
     tails = _shortened(tails, rest.positions, joints.parents, largest)
     skin = skin_of(meshes, joints.names, matrices)
-    return RestBody(joints.names, joints.parents, rest, np.ascontiguousarray(tails), skin)
+    free = None if made_up else _free_ends(tails, rest, joints.parents)
+    return RestBody(joints.names, joints.parents, rest, np.ascontiguousarray(tails), skin, free)
+
+
+def _free_ends(tails: np.ndarray, rest: Poses, parents: np.ndarray) -> np.ndarray:
+    """Return how long bones are that end at none of their children, shape (joints,), and 0 for the others."""
+    lengths, hanging = np.linalg.norm(tails, axis=-1), np.flatnonzero(parents >= 0)
+    ends, gaps = rest.positions + rotate(rest.quaternions, tails), np.full(len(parents), np.inf)
+    np.minimum.at(gaps, parents[hanging], np.linalg.norm(ends[parents[hanging]] - rest.positions[hanging], axis=-1))
+    return np.where(gaps > AT_CHILD * lengths, lengths, 0.0)
 
 
 def _shortened(tails: np.ndarray, heads: np.ndarray, parents: np.ndarray, largest: float) -> np.ndarray:

@@ -17,6 +17,7 @@ from rigid_motion.streams.paths import Path
 from rigid_motion.streams.wire import Description, read
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.rest_bodies import NOTHING, TYPICAL, size_of
 
 from .rooms import ANSWERS, LISTENING, MOTION, SKELETON, Room
 
@@ -41,15 +42,30 @@ def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
     return times, poses
 
 
-def body_of(clip: Clip, poses: Poses, radius: float = RADIUS) -> Body:
-    """Return what is streamed of a clip. A rigid body is at rest as in its first sample."""
+def radii_of(clip: Clip) -> np.ndarray:
+    """Return the radii in metres of the balls at the joints of a whole body, shape (joints,).
+
+    They are those of a grown-up in proportion to the figure, and reach to the ends of bones that the file has.
+    """
+    figure, ends = clip.whole_body, clip.whole_body.ends
+    size = size_of(figure.parents, figure.rest.positions)
+    ball = RADIUS / TYPICAL * size if size > NOTHING else RADIUS / clip.metres_per_unit
+    return np.maximum(np.zeros(clip.joints) if ends is None else ends, ball) * clip.metres_per_unit
+
+
+def body_of(clip: Clip, poses: Poses, radius: float | None = None) -> Body:
+    """Return what is streamed of a clip, with its own radii if none is given.
+
+    A rigid body is at rest as in its first sample.
+    """
     if clip.rest_body is None:
-        return Body.rigid(clip.name, poses[:, 0], radius)
+        return Body.rigid(clip.name, poses[:, 0], radius or RADIUS)
+    radii = radii_of(clip) if radius is None else radius
     parents = clip.rest_body.parents
     turns = beside(to_blender(clip.rest_body.rest, clip.axes), parents).quaternions
     sliding = np.ptp(poses.positions, axis=1).max(axis=1) > SLIDES
     rest = Poses(poses.positions[:, 0], turns)
-    return Body(clip.name, clip.rest_body.joints, parents, rest, radius, sliding | (parents < 0))
+    return Body(clip.name, clip.rest_body.joints, parents, rest, radii, sliding | (parents < 0))
 
 
 def together(clips: Sequence[Clip], rate: float | None = None) -> tuple[list[Body], np.ndarray, Poses]:

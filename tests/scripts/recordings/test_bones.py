@@ -156,6 +156,7 @@ def test_an_armature_whose_bones_move_is_a_whole_body(saved) -> None:
         np.testing.assert_allclose(places(body), expected, atol=2e-6)
         np.testing.assert_allclose(body.rest_body.rest.positions, [[3, 0, 0], [3, 2, 0], [3, 4, 0]], atol=1e-6)
         np.testing.assert_allclose(body.rest_body.tails, [[0, 2, 0]] * 3, atol=1e-6)
+        np.testing.assert_allclose(body.rest_body.ends, [0, 0, 2], atol=1e-6)
 
 
 def test_of_a_rig_the_bones_count_that_deform(saved) -> None:

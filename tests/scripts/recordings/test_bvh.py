@@ -26,7 +26,8 @@ def test_without_a_name_it_is_the_whole_body_each_joint_in_its_parents_space(wri
     np.testing.assert_array_equal(body.rest_body.rest.positions, [[0, 0, 0], [2, 0, 0]])
     np.testing.assert_array_equal(body.rest_body.rest.quaternions, [[1, 0, 0, 0]] * 2)
     np.testing.assert_array_equal(body.rest_body.tails[0], [2, 0, 0])
-    assert np.linalg.norm(body.rest_body.tails[1]) > 0.0  # Its end site.
+    assert body.rest_body.ends.tolist() == [0.0, np.linalg.norm(body.rest_body.tails[1])]  # Its end site.
+    assert body.rest_body.ends[1] > 0.0
     np.testing.assert_allclose(body.poses.positions, [[[0, 0, 0], [1, 2, 0]], [[2, 0, 0]] * 2], atol=1e-15)
     there = body.rest_body.skeleton.in_root_space(body.poses)
     for joint, alone in enumerate(read_trajectories(str(recording.path) + ":*").trajectories):

@@ -127,6 +127,7 @@ def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end
     (result,) = recording.trajectories
     assert (result.metres_per_unit, recording.note, result.warnings) == (1.0, "", ())
     assert np.linalg.norm(result.rest_body.tails, axis=-1).max() < 1.0
+    assert (result.rest_body.ends is None) == (ending == ".glb"), "an importer made up where bones end"
     rest = Rest.of(make_clip(result, str(path), "soldier", "blender"))
     assert body_size(rest) == pytest.approx(1.73, abs=0.01)
     assert rest.joints.positions[:, 2].min() < 0.3, "the ground is below its feet, and not below the ends of bones"

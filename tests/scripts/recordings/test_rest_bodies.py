@@ -26,7 +26,9 @@ def test_a_joint_that_is_nowhere_at_rest_has_no_bone_and_is_told(clip: Clip, num
     rest_body.tails[2, 1] = number
     rest_body.rest.positions[5, 0] = number
     rest_body.skin.vertices[1, 1] = number
+    rest_body = replace(rest_body, ends=np.full(len(JOINTS), 0.1))
     sound, done = repaired(rest_body)
+    assert sound.ends.tolist() == [0.0 if joint in (2, 5) else 0.1 for joint in range(len(JOINTS))]
     assert done == (
         "drew no bones for joints that are nowhere at rest (2: Head, Glove)",
         "left out a skin with numbers that are missing, not finite or too large",

@@ -1,0 +1,79 @@
+"""What of recordings is streamed: bodies, and how far around each joint the tolerance holds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import rotate
+from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams.paths import Path as Motion
+from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.recordings.bvh import _read_hierarchy
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.streaming.sending import body_of, radii_of, samples_of
+from tests.recordings import RECORDINGS
+from tests.scripts.bvh_bodies import TIMES, write_body
+
+
+def ends_off(body: Body, times: np.ndarray, poses: Poses, ends: np.ndarray, tolerance: float, delay: float) -> float:
+    """How far the ends of bones (joints, 3), in their joints' axes, are shown off at most, at the samples."""
+    sender, receiver, off = Sender([body], tolerance, delay), Receiver(), [0.0]
+    truth = Motion(times, poses)
+
+    def at(local: Poses) -> np.ndarray:
+        there = body.in_root_space(local)
+        return there.positions + rotate(there.quaternions, ends)
+
+    for row, time in enumerate(times.tolist()):
+        while (due := sender.next) < time:
+            for datagram in sender.poll(due):
+                receiver.take(datagram, due)
+        for datagram in sender.add(time, poses[:, row]):
+            receiver.take(datagram, time)
+        for _, answer in receiver.answers():
+            sender.hear(answer, time)
+        for shown in receiver.show(time).values():
+            if shown.moment >= times[0]:
+                away = at(shown.poses[body.name]) - at(truth.pose(shown.moment))
+                off.append(float(np.linalg.norm(away, axis=1).max()))
+    return max(off)
+
+
+def of_file(path: Path, tolerance: float, delay: float = 0.1) -> float:
+    """The same of the End Sites of a recording."""
+    (clip,), _ = read_clips([str(path)])
+    times, poses = samples_of(clip)
+    sites = np.array([joint.end or (0.0, 0.0, 0.0) for joint in _read_hierarchy(path)[0]]) * clip.metres_per_unit
+    ends = to_blender(Poses(sites, np.tile((1.0, 0.0, 0.0, 0.0), (len(sites), 1))), clip.axes).positions
+    return ends_off(body_of(clip, poses), times, poses, ends, tolerance, delay)
+
+
+@pytest.mark.parametrize("unit", [1.0, 100.0])
+def test_the_ends_of_bones_are_within_the_tolerance(tmp_path: Path, unit: float) -> None:
+    assert 0.001 < of_file(write_body(tmp_path / "walk.bvh", unit=unit), 0.002) <= 0.002
+
+
+@pytest.mark.slow
+@pytest.mark.recordings
+@pytest.mark.parametrize("delay", [0.1, 0.2])
+def test_the_ends_of_bones_of_a_recording_are_within_the_tolerance(delay: float) -> None:
+    assert of_file(RECORDINGS / "beat_saber_body.bvh", 0.005, delay) <= 0.005 * 1.02
+
+
+@pytest.mark.parametrize(("height", "metres"), [(1.7, 1.0), (0.08, 1.0), (170.0, 0.01), (6.0, 1.0)])
+def test_balls_are_those_of_a_grown_up_in_proportion(tmp_path: Path, height: float, metres: float) -> None:
+    (clip,), _ = read_clips([str(write_body(tmp_path / "walk.bvh", TIMES[:4]))])
+    places = np.array(((0.0, 0.0, 0.0), (0.01, height, 0.0), (0.01, 0.5 * height, 0.0)))
+    figure = replace(clip.rest_body, rest=Poses(places, clip.rest_body.rest.quaternions), ends=None)
+    radii = radii_of(replace(clip, rest_body=figure, metres_per_unit=metres))
+    np.testing.assert_allclose(radii, 0.03 / 1.7 * height * metres)
+    far = replace(figure, ends=np.array((0.0, height, 0.0)))
+    radii = radii_of(replace(clip, rest_body=far, metres_per_unit=metres))
+    np.testing.assert_allclose(radii[1:], (height * metres, 0.03 / 1.7 * height * metres))
+    nowhere = replace(figure, rest=Poses(0.0 * places, clip.rest_body.rest.quaternions))
+    np.testing.assert_allclose(radii_of(replace(clip, rest_body=nowhere, metres_per_unit=metres)), 0.03)
