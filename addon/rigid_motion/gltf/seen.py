@@ -84,7 +84,7 @@ class Seen:
                 if "POSITION" in moved:
                     lengths = np.linalg.norm(_points(document, moved["POSITION"]), axis=1)
                     deltas[target] = max(float(deltas[target]), float(np.max(lengths)))
-                    spread += weights[target] * (lengths if len(lengths) == len(spread) else lengths.max())
+                    spread += weights[target] * (lengths if len(lengths) == len(spread) else np.max(lengths))
             if _has_instances(node):
                 points, spread = corners_of(points.min(axis=0), points.max(axis=0)), np.full(8, spread.max())
             for nodes, some, maps in _carried(document, number, primitive):

@@ -49,7 +49,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     help = "largest error: 5mm, 0.5cm (%(default)s)"
     parser.add_argument("--tolerance", type=Tolerance, default="5mm", metavar="LENGTH", help=help)
     parser.add_argument("--delay", type=_delay, default=0.1, metavar="S", help="seconds of delay (%(default)s)")
-    help = "of the ball at each joint: 3cm, or 0.03 for metres (3 cm of a grown-up in proportion, and to the ends of bones)"
+    help = "of each joint's ball: 3cm, or 0.03 (3 cm of a grown-up in proportion, and to the ends of bones)"
     parser.add_argument("--radius", type=radius_in_metres, metavar="LENGTH", help=help)
     parser.add_argument("--loss", type=_share, default=0.0, metavar="P", help="part of the datagrams to lose: 0.01")
     parser.add_argument("--output", "-o", type=Path, metavar="FILE", help="write what was shown, as .bvh or .csv")
