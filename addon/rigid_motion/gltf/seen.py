@@ -86,7 +86,7 @@ class Seen:
                     deltas[target] = max(float(deltas[target]), float(np.max(lengths)))
                     spread += weights[target] * (lengths if len(lengths) == len(spread) else np.max(lengths))
             if _has_instances(node):
-                points, spread = corners_of(points.min(axis=0), points.max(axis=0)), np.full(8, spread.max())
+                points, spread = corners_of(points.min(axis=0), points.max(axis=0)), np.full(8, np.max(spread))
             for nodes, some, maps in _carried(document, number, primitive):
                 larger = np.linalg.norm(maps.axes, ord=2, axis=(-2, -1))
                 self._reach(nodes, maps.at(points[some]), larger * spread[some])
