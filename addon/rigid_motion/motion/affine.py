@@ -57,6 +57,22 @@ def displacement_bound(maps: AffineMaps, truth: AffineMaps, radii: np.ndarray) -
     )
 
 
+def displacement_over(maps: AffineMaps, truth: AffineMaps, radii: np.ndarray, least: float) -> np.ndarray:
+    """Return `ball_displacement` wherever that may be more than `least`, and zero elsewhere, shape (...)."""
+    # What is not finite is not within it, either.
+    may = np.nonzero(~(displacement_bound(maps, truth, radii) <= least))
+    result = np.zeros(truth.origins.shape[:-1])
+    result[may] = ball_displacement(maps[may], truth[may], np.broadcast_to(radii, result.shape)[may])
+    return result
+
+
+def largest_displacement(maps: AffineMaps, truth: AffineMaps, radii: np.ndarray) -> float:
+    """Return the largest of `ball_displacement`, most of which need not be worked out for it."""
+    at = np.unravel_index(np.argmax(displacement_bound(maps, truth, radii)), truth.origins.shape[:-1])
+    least = float(ball_displacement(maps[at], truth[at], np.broadcast_to(radii, truth.origins.shape[:-1])[at]))
+    return max(least, float(displacement_over(maps, truth, radii, least).max()))
+
+
 def ball_displacement(maps: AffineMaps, truth: AffineMaps, radii: np.ndarray) -> np.ndarray:
     """Return the largest displacement of any point of the ball around a body's origin: the shell error of affine maps.
 

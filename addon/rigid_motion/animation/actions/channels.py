@@ -93,7 +93,7 @@ def replace_keys(
     frames: np.ndarray,
     values: np.ndarray,
     *,
-    interpolation: str = "LINEAR",
+    interpolation: str | np.ndarray = "LINEAR",
     key_type: str = "KEYFRAME",
     handle_type: str | None = None,
     selected: np.ndarray | None = None,
@@ -106,7 +106,8 @@ def replace_keys(
     frames, values : array, shape (n,)
         Frames rise. They need not be whole.
     interpolation, key_type, handle_type : str
-        What every key gets; the names are those of `bpy.types.Keyframe`. Handles are Blender's default without.
+        What every key gets; the names are those of `bpy.types.Keyframe`. Handles are Blender's default without. Codes
+        are each key's own interpolation, shape (n,).
     selected : array of bool, shape (n,), optional
         Which keys are selected; Blender's default, otherwise.
     """
@@ -120,7 +121,8 @@ def replace_keys(
     if handle_type is not None:
         codes |= {"handle_left_type": handle_type, "handle_right_type": handle_type}
     for name, value in codes.items():
-        keys.foreach_set(name, np.full(len(frames), code_of(name, value), dtype=np.int32))
+        codes_of_keys = code_of(name, value) if isinstance(value, str) else value
+        keys.foreach_set(name, np.full(len(frames), codes_of_keys, dtype=np.int32))
     if selected is not None:
         for part in ("select_control_point", "select_left_handle", "select_right_handle"):
             keys.foreach_set(part, selected)

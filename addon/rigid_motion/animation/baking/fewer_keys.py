@@ -1,7 +1,8 @@
 """Which keys a source can do without: the plan for one transform in one slot, as arrays.
 
 The few keys are poses: all channels have them on the same frames, with the values that the recording has there. Frames
-are those of the Action, lengths those of its channels.
+are those of the Action, lengths those of its channels. Keys are searched for among those of the recording and whole
+frames; between these, too, it is proven that what Blender shows is within the tolerance, and given more keys where not.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from functools import cached_property
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
+from ...gltf.errors import PARTS
 from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
-from ...motion.affine import AffineMaps, ball_displacement
+from ...motion.affine import AffineMaps, displacement_over, largest_displacement
 from ...motion.best_of import least_errors
 from ..actions.slots import Binding
 from ..compute.components import MODE_NUMBERS, ROWS, SCALE
@@ -90,6 +92,11 @@ class FewerKeys:
         return self.fewer.modes_at(self.key_frames + SAME_FRAME)
 
     @property
+    def interpolations(self) -> np.ndarray:
+        """The codes of the keys that are written, shape (k,)."""
+        return _interpolations(self.source, self.frames)
+
+    @property
     def keeps_scale(self) -> bool:
         """Return whether a scale keeps the keys it has."""
         return SCALE in self.source.keyed and ROWS[SCALE].start not in self.values
@@ -109,11 +116,11 @@ def fewer_keys(
 ) -> FewerKeys:
     """Return the keys that one slot needs, which may be as many as it has. Lengths are the scene's units.
 
-    The tolerance holds on all whole frames, on those with keys, and on `more_frames`. With a count there are so many
-    keys instead, those with the smallest largest error that is found.
+    The tolerance holds at all `moments` of what is seen, and of `more_frames`. With a count there are so many keys
+    instead, those with the smallest largest error that is found.
     """
     frames = samples_of(source)
-    seen = np.union1d(seen_frames(frames, [source]), more_frames)
+    seen = moments(np.union1d(seen_frames(frames, [source]), more_frames), [source])
     poses, truth = shown(transform, source, seen)
     samples = np.searchsorted(seen, frames)
     placing, radius = into_scene(transform), radius / scale_in_scene(transform)
@@ -123,9 +130,8 @@ def fewer_keys(
     allowed = tolerance + rounding
     truth = AffineMaps(placing, np.zeros(3)) @ truth
 
-    def error_of(fewer: Source) -> np.ndarray:
-        maps = AffineMaps(placing, np.zeros(3)) @ shown(transform, fewer, seen)[1]
-        return ball_displacement(maps, truth, np.full(len(seen), radius))
+    def maps_of(fewer: Source) -> AffineMaps:
+        return AffineMaps(placing, np.zeros(3)) @ shown(transform, fewer, seen)[1]
 
     if not source.uniform_scale:
         # The scale stays what it is, and makes the object this large.
@@ -142,9 +148,10 @@ def fewer_keys(
     values = values_on(transform, source, seen)
     while True:
         fewer = with_keys(source, seen[chosen], {row: column[chosen] for row, column in values.items()}, mode)
-        error = error_of(fewer)
+        maps = maps_of(fewer)
         if count is not None:
-            allowed = float(error.max())
+            allowed = largest_displacement(maps, truth, radius)
+        error = displacement_over(maps, truth, radius, allowed)
         if error.max() <= allowed:
             break
         more = _worst(chosen, error, samples, allowed)
@@ -154,12 +161,12 @@ def fewer_keys(
     if best_of:
         inside = poses[samples]
         mixed = with_best_modes(transform, fewer, seen[samples], inside, searched, rounding / unit, allowed / unit)
-        error_of_mixed = error_of(mixed)
+        maps_of_mixed = maps_of(mixed)
         # Outside of the keys cycles of different lengths may meet in other segments than inside.
-        if error_of_mixed.max() <= allowed:
-            fewer, error = mixed, error_of_mixed
+        if displacement_over(maps_of_mixed, truth, radius, allowed).max() <= allowed:
+            fewer, maps = mixed, maps_of_mixed
     columns = {row: column[chosen] for row, column in values.items()}
-    return FewerKeys(binding, source, fewer, seen[chosen], columns, float(error.max()))
+    return FewerKeys(binding, source, fewer, seen[chosen], columns, largest_displacement(maps, truth, radius))
 
 
 def with_best_modes(
@@ -218,6 +225,21 @@ def seen_frames(frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
     return np.union1d(frames, np.arange(np.floor(first), np.ceil(last) + 1.0))
 
 
+def moments(frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
+    """Return these frames and the moments between them that are looked at: eighths, and those just before jumps."""
+    jumps = [
+        keys.times[1:][(keys.interpolation[:, :-1] == CONSTANT).any(axis=0)] - 2.0 * SAME_FRAME
+        for source in sources
+        for keys in source.curves
+    ]
+    eighths = np.arange(np.floor(frames[0]) * PARTS, np.ceil(frames[-1]) * PARTS + 1.0) / PARTS
+    more = np.concatenate((eighths, *jumps))
+    more = more[(more > frames[0]) & (more < frames[-1])]
+    behind = np.searchsorted(frames, more)
+    apart = np.minimum(more - frames[behind - 1], frames[behind] - more)
+    return np.union1d(frames, more[apart > SAME_FRAME])
+
+
 def goes_elsewhere(name: str) -> Refused:
     """Return why something cannot have fewer keys, although those that are left say all about the time between them."""
     return Refused(
@@ -253,7 +275,10 @@ def _is_constant(columns: np.ndarray) -> np.ndarray:
 
 
 def with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray], mode: str) -> Source:
-    """Return the source with these keys alone in the channels that have values, straight lines between them."""
+    """Return the source with these keys alone in the channels that have values: straight lines between them, and holds
+    where all channels held.
+    """
+    codes = _interpolations(source, frames)
     old = {row: keys for keyed_rows, keys in source.channels for row in keyed_rows}
     alike: dict[tuple, list[int]] = {}
     for row in values:
@@ -262,11 +287,20 @@ def with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray],
     for (linear, cycles), rows in alike.items():
         points = np.empty((len(rows), len(frames), 2), np.float32)
         points[..., 0], points[..., 1] = frames, [values[row] for row in rows]
-        codes = np.full(points.shape[:2], LINEAR, CODE)
-        channels.append((rows, Keys(points, codes, linear=linear, cycles=cycles)))
+        channels.append((rows, Keys(points, np.tile(codes, (len(rows), 1)), linear=linear, cycles=cycles)))
     for keyed_rows, keys in source.channels:
         indices = [index for index, row in enumerate(keyed_rows) if row not in values]
         if indices:
             channels.append(([keyed_rows[index] for index in indices], keys.only(indices)))
     rest = {row: value for row, value in source.rest.items() if row not in values}
     return replace(source, channels=tuple(channels), rest=rest, mode=MODE_NUMBERS[mode], turns=None)
+
+
+def _interpolations(source: Source, frames: np.ndarray) -> np.ndarray:
+    """Return the codes of keys on these frames: whether all channels of the source hold until the next, shape (k,)."""
+    codes = np.full(len(frames), LINEAR, CODE)
+    keys, moving = source.key_frames, np.append(0, np.cumsum(~source.holds))
+    begins = np.searchsorted(keys, frames[:-1] + SAME_FRAME, side="right") - 1
+    ends = np.searchsorted(keys, frames[1:] - SAME_FRAME)
+    codes[:-1][moving[np.clip(begins, 0, None)] == moving[np.clip(ends, None, len(keys) - 1)]] = CONSTANT
+    return codes

@@ -8,7 +8,7 @@ these are reduced along with them. Poses are those that the channels give, witho
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -39,6 +39,7 @@ from .fewer_keys import (
     with_keys,
 )
 from .motions import SMALLEST, RigMotion, not_promised, shown
+from .proof import Proof
 
 NO_FEWER = n_(
     "{name}: its bones need their keys on all of {frames} frames to stay within the tolerance: allow a larger one"
@@ -51,6 +52,9 @@ NO_FEWER_POSES = n_(
 
 HOLD = 4.0
 """The weight of the error of what stands on the ground."""
+
+APART = 4
+"""Frames between places that are mended at once."""
 
 SHARE = 0.5
 """The part of the tolerance for the bones that the keys of the rig itself may take."""
@@ -152,6 +156,7 @@ class _Rig:
         self.stands = standing(self.frames * render.fps_base / render.fps, truth)
         """True for the bones that stand on the ground, at each moment."""
         self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
+        self.proof = Proof(self.motion, self.bindings, self.sources, self.weights)
         self._search_in()
 
     def _search_in(self) -> None:
@@ -264,16 +269,14 @@ class _Rig:
             rig = self.poses, self.skeleton.parents, mode, self.motion.radii, self.weights, fixed
             keys = self._searched(*rig, shared=shared, tolerance=tolerance)
             chosen = {number: self._within_its_keys(keys[number], number) for number in able}
-        fewer = self._proven(chosen, mode, shared=shared)
+        frames = {number: self.frames[keys] for number, keys in chosen.items()}
+        fewer = self._proven(frames, mode, shared=shared)
         if not fewer:
             text = NOT_SO_MANY if self.key_poses is not None else NO_FEWER_POSES if shared else NO_FEWER
             raise NeedsItsKeys(text, name=self.rig.name, frames=np.count_nonzero(self.sampled))
         if best_of:
-            if self.key_poses is not None:
-                # As far off as it is by now, and no farther.
-                self.tolerance = max((error for error, *_ in self.motion.over(0.0, self.weights)), default=0.0)
             self._mix(fewer)
-        errors = [self.motion.largest_error(number) for number in range(len(self.motion.bones))]
+        errors = self.proof.largest_errors().tolist()
         excepted = not_promised(self.rig)
         # Of what is not promised, that counts which has fewer keys.
         counted = [
@@ -281,6 +284,7 @@ class _Rig:
             for number, (bone, error) in enumerate(zip(self.motion.bones, errors, strict=True))
             if number in fewer or bone.name not in excepted
         ]
+        self.motion.show(fewer)
         as_whole = WholeRig(
             len(_united(distinct(source.keyed_frames) for source in fewer.values())),
             *(slide(maps.origins, self.stands) for maps in (self.motion.truth, self.motion.now())),
@@ -292,8 +296,8 @@ class _Rig:
                 self.bindings[number],
                 self.sources[number],
                 source,
-                self.frames[chosen[number]],
-                {row: column[chosen[number]] for row, column in self.values[number].items()},
+                frames[number],
+                self._values_at(number, frames[number]),
                 errors[number],
                 as_whole,
             )
@@ -316,84 +320,118 @@ class _Rig:
         """Return the moments of the first and the last key that a bone has."""
         return np.searchsorted(self.frames, self.before[number][[0, -1]] - SAME_FRAME)
 
-    def _with_keys(self, number: int, keys: np.ndarray, mode: str) -> Source:
-        columns = {row: column[keys] for row, column in self.values[number].items()}
-        return with_keys(self.sources[number], self.frames[keys], columns, mode)
+    def _values_at(self, number: int, frames: np.ndarray) -> dict[int, np.ndarray]:
+        """Return the values that a bone's channels get on these frames, each (k,), by the rows of components."""
+        every, columns = self.frames, self.values[number]
+        if not np.isin(frames, every).all():
+            every = np.union1d(every, frames)
+            columns = values_on(self.targets[number], self.sources[number], every)
+        return {row: column[np.searchsorted(every, frames)] for row, column in columns.items()}
 
     def _proven(self, chosen: dict[int, np.ndarray], mode: str, *, shared: bool) -> dict[int, Source]:
         """Return the bones that get fewer keys, and these, so that all of the rig keeps to the tolerance.
 
-        Keys are put back in `chosen` where the motion of the channels is off after all. What would not have fewer keys
-        than before stays as it is.
+        Keys are put back in `chosen`, the frames of each bone's, where the motion of the channels is off after all.
+        What would not have fewer keys than before stays as it is.
         """
         fewer: dict[int, Source] = {}
-        changed = set(chosen)
-        while True:
-            fewer |= {number: self._with_keys(number, chosen[number], mode) for number in changed}
-            dense = [n for n in changed if len(distinct(fewer[n].keyed_frames)) >= len(self.before[n])]
-            for number in dense:
-                del fewer[number], chosen[number]
-            self.motion.show({number: fewer.get(number) for number in changed})
-            over = self.motion.over(self.tolerance + self.motion.rounding, self.weights)
-            if not over:
-                return fewer
-            changed = self._put_back(over, chosen, shared=shared)
 
-    def _put_back(self, over: list[tuple[float, int, int]], chosen: dict[int, np.ndarray], *, shared: bool) -> set[int]:
-        """Put keys back where each bone is off the most, and return the bones that got any."""
+        def have(numbers: Iterable[int]) -> None:
+            for number in numbers:
+                keys = chosen[number]
+                source = with_keys(self.sources[number], keys, self._values_at(number, keys), mode)
+                fewer[number] = source
+                if len(distinct(source.keyed_frames)) >= len(self.before[number]):
+                    del fewer[number], chosen[number]
+
+        def mend(over: list[tuple[float, int, int]], motion: RigMotion) -> set[int]:
+            changed = self._put_back(over, motion, chosen, shared=shared)
+            have(changed)
+            return changed
+
+        have(list(chosen))
+        self.proof.keep_to(self.tolerance + self.motion.rounding, fewer, mend)
+        return fewer
+
+    def _put_back(
+        self, over: list[tuple[float, int, int]], motion: RigMotion, chosen: dict[int, np.ndarray], *, shared: bool
+    ) -> set[int]:
+        """Put keys back where bones are off the most, and return those that got any."""
         changed: set[int] = set()
-        off: set[int] = set()
-        for _, number, moment in over:
-            chain = list(self.motion.above(number))
-            # Once what it hangs on is put right, it may be, too.
-            if off.isdisjoint(chain):
-                off.add(number)
-                movable = list(chosen) if shared else [item for item in chain if item in chosen]
-                added = self._with_keys_at(moment, movable, chosen)
-                if not added and changed.isdisjoint(chain):
-                    names = [self.targets[item].name for item in chain if item in self.targets]
-                    raise goes_elsewhere(names[0] if names else f"{self.rig.name}/{self.motion.bones[number].name}")
-                chosen.update(added)
-                changed.update(added)
+        for error, number, moment in _apart(over, motion):
+            able = [item for item in motion.above(number) if item in chosen]
+            # What rests goes on resting, as long as others can make up for it.
+            moving = [item for item in able if len(chosen[item]) > 1]
+            share = (self.tolerance + self.motion.rounding) / error
+            blamed = motion.to_blame(number, moment, moving, share) or motion.to_blame(number, moment, able, share)
+            for those in (list(chosen),) if shared else (blamed, able):
+                if added := self._with_keys_at(float(motion.frames[moment]), those, chosen):
+                    break
+            if not added and changed.isdisjoint(motion.above(number)):
+                names = [self.targets[item].name for item in motion.above(number) if item in self.targets]
+                raise goes_elsewhere(names[0] if names else f"{self.rig.name}/{self.motion.bones[number].name}")
+            chosen.update(added)
+            changed.update(added)
         return changed
 
-    def _with_keys_at(self, moment: int, movable: list[int], chosen: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
-        """Return the keys of those of these bones that get any more at a moment: there, or on the samples around it."""
-        samples = np.flatnonzero(self.sampled)
-        at = np.searchsorted(samples, moment)
-        around = [moment] if self.sampled[moment] else samples[max(at - 1, 0) : at + 1].tolist()
-        for moments in (around, [moment]):
+    def _with_keys_at(
+        self, frame: float, numbers: Iterable[int], chosen: dict[int, np.ndarray]
+    ) -> dict[int, np.ndarray]:
+        """Return the keys of those of these bones that get any more: on the samples around a frame, or else there."""
+        samples = self.frames[self.sampled]
+        at = np.searchsorted(samples, frame)
+        around = (
+            samples[at : at + 1] if at < len(samples) and samples[at] == frame else samples[max(at - 1, 0) : at + 1]
+        )
+        for places in (around, np.array((frame,))):
             added = {}
-            for number in movable:
-                first, last = self._ends(number)
+            for number in numbers:
+                first, last = self.frames[self._ends(number)]
                 # Before and behind its keys it stays where they leave it.
-                more = [item for item in np.clip(moments, first, last).tolist() if item not in chosen[number]]
-                if more:
+                more = np.clip(places, first, last)
+                more = more[np.abs(more[:, None] - chosen[number]).min(axis=1) > SAME_FRAME]
+                if len(more):
                     added[number] = np.union1d(chosen[number], (first, *more, last))
             if added:
-                # What rests goes on resting, as long as others can make up for it.
-                moving = {number: keys for number, keys in added.items() if len(chosen[number]) > 1}
-                return moving or added
+                return added
         return {}
 
     def _mix(self, fewer: dict[int, Source]) -> None:
-        """Give segments their best modes, bone by bone from the roots on, where the whole keeps to the tolerance."""
-        motion, allowed = self.motion, self.tolerance + self.motion.rounding
-        for number in sorted(fewer, key=motion.hierarchy.order.index):
-            single, transform, radius = fewer[number], self.targets[number], float(motion.radii[number])
-            keys, frames = distinct(single.keyed_frames), self.frames
+        """Give segments their best modes, where the whole keeps to the tolerance; or by number is no farther off."""
+        motion, single = self.motion, dict(fewer)
+        allowed = self.tolerance + motion.rounding
+        if self.key_poses is not None:
+            allowed = float(self.proof.largest_errors().max()) * self.weights.max()
+        for number, source in single.items():
+            transform, radius = self.targets[number], float(motion.radii[number])
+            keys, frames = distinct(source.keyed_frames), self.frames
             inside = (frames >= keys[0] - SAME_FRAME) & (frames <= keys[-1] + SAME_FRAME)
-            if len(keys) < 2:
-                continue
-            truth = motion.poses[number]
-            largest = float(shell_error(shown(transform, single, frames)[0], truth, radius)[self.sampled].max())
-            rounding = motion.rounding / motion.unit
-            mixed = with_best_modes(transform, single, frames[inside], truth[inside], radius, rounding, largest)
-            motion.show({number: mixed})
-            if motion.over(allowed, self.weights, motion.below(number)):
-                motion.show({number: single})
-            else:
-                fewer[number] = mixed
+            if len(keys) > 1:
+                truth = motion.poses[number]
+                largest = float(shell_error(shown(transform, source, frames)[0], truth, radius)[self.sampled].max())
+                rounding = motion.rounding / motion.unit
+                fewer[number] = with_best_modes(
+                    transform, source, frames[inside], truth[inside], radius, rounding, largest
+                )
+
+        def mend(over: list[tuple[float, int, int]], there: RigMotion) -> set[int]:
+            mixed = {item for _, number, _ in _apart(over, there) for item in there.above(number) if item in single}
+            changed = {number for number in mixed if fewer[number] is not single[number]} or set(single)
+            fewer.update({number: single[number] for number in changed})
+            return changed
+
+        self.proof.keep_to(allowed, fewer, mend)
+
+
+def _apart(over: list[tuple[float, int, int]], motion: RigMotion) -> Iterator[tuple[float, int, int]]:
+    """Yield those of what is over that are the worst among all that hang together, for a few frames."""
+    taken: set[tuple[int, int]] = set()
+    for error, number, moment in over:
+        chain, span = [*motion.above(number)], int(motion.frames[moment] // APART)
+        # Once what it hangs on is put right, it may be, too.
+        if taken.isdisjoint((item, near) for item in chain for near in (span - 1, span, span + 1)):
+            taken.update((item, span) for item in chain)
+            yield error, number, moment
 
 
 def _united(frames: Iterable[np.ndarray]) -> np.ndarray:

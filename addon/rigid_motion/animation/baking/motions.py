@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
 from ...motion import Poses
-from ...motion.affine import AffineMaps, ball_displacement, displacement_bound
+from ...motion.affine import AffineMaps, ball_displacement, displacement_over, largest_displacement
 from ...motion.eulers import ORDERS
 from ...motion.quaternions import matrices, multiply
 from ..actions.reading import sources_of_users
@@ -29,7 +31,7 @@ from ..compute.sources import Source
 from ..curves.keys import LARGEST
 from ..transforms import WIDTHS, Channel, Refused, Transform, shows_differences, split_path, transform_of
 from ..transforms.posing import Hierarchy
-from ..transforms.sizes import into_scene, reach_of, scale_in_scene
+from ..transforms.sizes import into_scene, reaches_of, scale_in_scene
 
 MOVING = {*WIDTHS, "rotation_axis_angle", "rotation_mode"}
 """Properties of bones that a driver moves them by."""
@@ -109,8 +111,12 @@ def _animated_paths(rig: bpy.types.Object) -> set[str]:
     return curves | {driver.data_path for driver in _drivers(rig)}
 
 
-def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Poses, AffineMaps]:
+def shown(
+    transform: Transform, source: Source, frames: np.ndarray, rate: int | None = None
+) -> tuple[Poses, AffineMaps]:
     """Return how a source is seen on these frames (n,), with the object's own delta transforms, and what is not keyed.
+
+    With so many samples of its in-betweens a frame, if given; what moves by delta transforms has one.
 
     Returns
     -------
@@ -119,7 +125,7 @@ def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Pos
     maps : AffineMaps, shape (n,)
         Of the channels as Blender has them: location runs along its own axes, and scale may be uneven or negative.
     """
-    desired = in_betweens(source, frames).desired
+    desired = in_betweens(source, frames, rate=rate if transform.has_difference_slot else 1).desired
     delta, rest, along, count = source.original, transform.components(), source.location_axes, len(frames)
     positions, quaternions = desired.positions, desired.quaternions
     if LOCATION not in source.keyed:
@@ -200,39 +206,57 @@ class RigMotion:
         frames: np.ndarray,
         radius: float | None,
     ) -> None:
-        self.rig, self.frames, self.bones = rig, frames, list(rig.pose.bones)
+        self.rig, self.bones = rig, list(rig.pose.bones)
         self.transforms = [transform_of(bone) for bone in self.bones]
         self.hierarchy, scale = Hierarchy(self.bones), scale_in_scene(transform_of(rig))
-        self.radii = np.array([radius / scale if radius else reach_of(bone) for bone in self.bones])
-        keyed, curves = _keyed_in(rig, slot)
-        result = [
-            shown(transform, source, frames)
+        reaches = {} if radius else reaches_of(rig)
+        self.radii = np.array([radius / scale if radius else reaches[bone.name] for bone in self.bones])
+        keyed, self._curves = _keyed_in(rig, slot)
+        self._recorded = {
+            number: source
+            for number, transform in enumerate(self.transforms)
             if (source := sources.get(number) or keyed.get(transform.prefix)) is not None
-            else evaluated(transform, curves.get(transform.prefix, {}), frames)
+        }
+        self._carrier = self._recorded_carrier = keyed.get("")
+        self.poses = self._look_at(frames)
+        """Poses of each bone's channels, each of shape (m,)."""
+        self.unit = float(np.linalg.norm(self.world.axes, 2, axis=(-2, -1)).max()) or 1.0
+        """The length of the rig's unit of length in the scene, at most."""
+        sizes = np.sqrt(np.einsum("...ij,...ij->...j", self._posed.axes, self._posed.axes).max(axis=-1))
+        away = np.linalg.norm(self._posed.origins, axis=-1) + self.radii[:, None] * sizes
+        self.extent = float(away.max())
+        """The distance that any bone's ball gets from the rig's origin, in its unit."""
+        self.rounding = SMALLEST * self.unit * self.extent
+
+    def _look_at(self, frames: np.ndarray) -> list[Poses]:
+        """Have all bones be as they were recorded on these frames, and return the poses of their channels."""
+        self.frames = frames
+        result = [
+            shown(transform, self._recorded[number], frames)
+            if number in self._recorded
+            else evaluated(transform, self._curves.get(transform.prefix, {}), frames)
             for number, transform in enumerate(self.transforms)
         ]
-        self.poses = [poses for poses, _ in result]
-        """Poses of each bone's channels, each of shape (m,)."""
         self._channels = AffineMaps(
             np.stack([maps.axes for _, maps in result]), np.stack([maps.origins for _, maps in result])
         )
         self._recorded_channels = self._channels.copy()
         self._posed = self.hierarchy.posed(self._channels)
-        recorded = self._posed.copy()
-        self.world = self.carried_by(keyed.get(""))
+        self.world = self._carried_by(self._recorded_carrier)
         """The place of the rig, shape (m,) or (1,)."""
-        self._carried = self.world
-        self.truth = self.world @ recorded
+        self._carried = self._carried_by(self._carrier)
+        self.truth = self.world @ self._posed
         """The positions of the bones in the scene, shape (bones, m)."""
-        self.unit = float(np.linalg.norm(self.world.axes, 2, axis=(-2, -1)).max()) or 1.0
-        """The length of the rig's unit of length in the scene, at most."""
-        sizes = np.sqrt(np.einsum("...ij,...ij->...j", recorded.axes, recorded.axes).max(axis=-1))
-        away = np.linalg.norm(recorded.origins, axis=-1) + self.radii[:, None] * sizes
-        self.extent = float(away.max())
-        """The distance that any bone's ball gets from the rig's origin, in its unit."""
-        self.rounding = SMALLEST * self.unit * self.extent
+        return [poses for poses, _ in result]
 
-    def carried_by(self, source: Source | None) -> AffineMaps:
+    def at(self, frames: np.ndarray) -> RigMotion:
+        """Return the same rig on other frames, its bones as they were recorded."""
+        result = copy(self)
+        result.poses = []
+        result._look_at(frames)
+        return result
+
+    def _carried_by(self, source: Source | None) -> AffineMaps:
         """Return where the rig itself is, by its own keys or as it stands. Its parents are where they are now."""
         transform = transform_of(self.rig)
         if source is None:
@@ -242,15 +266,15 @@ class RigMotion:
 
     def carry(self, source: Source) -> None:
         """Let the rig itself be moved by other keys."""
-        self._carried = self.carried_by(source)
+        self._carrier, self._carried = source, self._carried_by(source)
 
-    def show(self, sources: Mapping[int, Source | None]) -> None:
-        """Let bones be moved by other keys, or as they were where it is None."""
+    def show(self, sources: Mapping[int, Source | None], rates: Mapping[int, int] = MappingProxyType({})) -> None:
+        """Let bones be moved by other keys, or as they were where it is None; with so many samples a frame, if given."""
         for number, source in sources.items():
             if source is None:
                 self._channels[number] = self._recorded_channels[number]
             else:
-                self._channels[number] = shown(self.transforms[number], source, self.frames)[1]
+                self._channels[number] = shown(self.transforms[number], source, self.frames, rates.get(number))[1]
         self.hierarchy.pose(sources, self._channels, self._posed)
 
     def now(self, number: int | slice = slice(None)) -> AffineMaps:
@@ -268,36 +292,45 @@ class RigMotion:
             yield number
             number = int(self.hierarchy.parents[number])
 
-    def below(self, number: int) -> list[int]:
-        """Return a bone and all that hang on it."""
-        return [item for item in range(len(self.bones)) if number in self.above(item)]
-
-    def over(
-        self, allowed: float, weights: np.ndarray, numbers: Iterable[int] | None = None
-    ) -> list[tuple[float, int, int]]:
+    def over(self, allowed: float, weights: np.ndarray) -> list[tuple[float, int, int]]:
         """Return where errors are over what is allowed: weighted error, bone and moment, the largest first.
 
-        `weights` are of shape (bones, m). Of these bones, or all.
+        `weights` are of shape (bones, m).
         """
         result = []
-        for number in range(len(self.bones)) if numbers is None else numbers:
-            now, truth, radius = self.now(number), self.truth[number], self.radii[number]
-            # What is not finite is not within it, either.
-            may = np.flatnonzero(~(displacement_bound(now, truth, radius) * weights[number] <= allowed))
-            if len(may):
-                errors = ball_displacement(now[may], truth[may], np.full(len(may), radius)) * weights[number, may]
-                over = ~(errors <= allowed)
-                result += [(float(e), number, int(at)) for e, at in zip(errors[over], may[over], strict=True)]
+        for number, (truth, radius, weight) in enumerate(zip(self.truth, self.radii, weights, strict=True)):
+            errors = displacement_over(self.now(number), truth, radius, allowed / weight.max()) * weight
+            at = np.flatnonzero(~(errors <= allowed))
+            result += [(error, number, moment) for error, moment in zip(errors[at].tolist(), at.tolist(), strict=True)]
         return sorted(result, reverse=True)
 
-    def largest_error(self, number: int) -> float:
-        """Return the largest displacement of any point in a bone's ball on any frame, in the scene's units."""
-        now, truth, radius = self.now(number), self.truth[number], self.radii[number]
-        bounds = displacement_bound(now, truth, radius)
-        at = [int(np.argmax(bounds))]
-        least = ball_displacement(now[at], truth[at], np.full(1, radius))
-        may = np.flatnonzero(bounds >= least)
-        return float(ball_displacement(now[may], truth[may], np.full(len(may), radius)).max(initial=least[0]))
+    def to_blame(self, number: int, moment: int, among: Iterable[int], share: float) -> list[int]:
+        """Return which of these bones, as they were recorded, would take a bone's error at a moment to a share of it.
+
+        They are few: that which helps most is the first, and so on. None where all of them would not.
+        """
+        chain, left, result = [*self.above(number)][::-1], list(among), []
+        now, recorded = self._channels[chain, moment], self._recorded_channels[chain, moment]
+        truth, world = self.truth[number, moment], self._carried[moment if len(self._carried.axes) > 1 else 0]
+        least = share * ball_displacement(self.now(number)[moment], truth, self.radii[number])
+        while left:
+            above = None
+            for row, item in enumerate(chain):
+                restored = np.isin(left, item) | (item in result)
+                axes = np.where(restored[:, None, None], recorded.axes[row], now.axes[row])
+                channels = AffineMaps(axes, np.where(restored[:, None], recorded.origins[row], now.origins[row]))
+                above = self.hierarchy.placed(item, channels, above)
+            errors = ball_displacement(world @ above, truth[None], np.full(len(left), self.radii[number]))
+            best = int(np.argmin(errors))
+            result.append(left.pop(best))
+            if errors[best] <= least:
+                return result
+        return []
+
+    def largest_errors(self) -> np.ndarray:
+        """Return the largest displacement of any point in each bone's ball, in the scene's units, shape (bones,)."""
+        numbers = range(len(self.bones))
+        return np.array([largest_displacement(self.now(n), self.truth[n], self.radii[n]) for n in numbers])
 
 
 def _keyed_in(

@@ -253,7 +253,7 @@ def _write(transform: Transform, fewer: FewerKeys) -> None:
     copy = move_by_copy(transform, fewer.binding, REDUCED)
     for row, values in fewer.values.items():
         fcurve = copy.ensure_curve(transform.channels[row])
-        replace_keys(fcurve, fewer.frames, values, handle_type="AUTO_CLAMPED")
+        replace_keys(fcurve, fewer.frames, values, interpolation=fewer.interpolations, handle_type="AUTO_CLAMPED")
         fcurve.mute = False
     for channel in (transform.mode_channel, transform.turns_channel):
         if channel in copy.curves:

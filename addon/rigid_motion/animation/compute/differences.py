@@ -35,8 +35,8 @@ from .bodies import (
 from .breakdowns import Passages
 from .components import LOCATION, MODE_NAMES, MODE_NUMBERS, REST, ROTATION, ROWS, SCALE, SMOOTH
 from .ends import MEASURED, Ends, corrected, measured_in, packed
-from .samples import Samples, kept_rows, largest_errors
-from .sources import Source, each, height, sampled
+from .samples import MOST_CORNERS, Samples, kept_rows, largest_errors
+from .sources import SAME_FRAME, Source, each, height, sampled
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""
@@ -69,7 +69,11 @@ class InBetweens:
 
 
 def in_betweens(
-    source: Source, frames: np.ndarray, mode: str | None = None, progress: np.ndarray | None = None
+    source: Source,
+    frames: np.ndarray,
+    mode: str | None = None,
+    progress: np.ndarray | None = None,
+    rate: int | None = None,
 ) -> InBetweens:
     """Return the motion of a source at any rising frames, sub-frames included.
 
@@ -81,6 +85,8 @@ def in_betweens(
         One of `MODE_IDS` for all segments, instead of the modes that they have.
     progress : array, shape (m,), optional
         How far the body has come in its segment on these frames, 0 to 1 and beyond, instead of what the channels say.
+    rate : int, optional
+        As Blender shows the modes with so many samples of the differences a frame, and straight lines between them.
     """
     frames = np.asarray(frames, dtype=np.float64)
     moments, indices = np.unique(source.held(frames), return_inverse=True) if source.steps else (frames, slice(None))
@@ -94,6 +100,8 @@ def in_betweens(
         sampled([(source, slice(len(moments)))], [moments], out=native)
         turn_into_quaternions(native, source.order)
         delta[:] = source.original[: len(delta), None]
+    if rate is not None and source.is_live:
+        delta = _between_samples(source, moments, rate)
     native, delta = native[:, indices], delta[:, indices]
 
     def moved_by(deltas: np.ndarray) -> Poses:
@@ -105,6 +113,28 @@ def in_betweens(
         )
 
     return InBetweens(frames, moved_by(source.original[:, None]), moved_by(delta))
+
+
+def _between_samples(source: Source, frames: np.ndarray, rate: int) -> np.ndarray:
+    """Return differences (., m), rotations as quaternions, with straight lines between samples, so many of them a frame.
+
+    Keys between samples are hit, unless there are too many: see `writers.corners`.
+    """
+    samples = np.concatenate((np.floor(frames * rate), np.ceil(frames * rate))) / rate
+    keys = source.key_frames[np.abs(np.rint(source.key_frames * rate) - source.key_frames * rate) > SAME_FRAME]
+    if source.cyclic is None and len(keys) <= MOST_CORNERS:
+        samples = np.concatenate((samples, keys))
+    samples = np.unique(samples)
+    rows = np.empty((2, height([source]), len(samples)))
+    delta = rows[1, : filled_height([source])]
+    _move([source], [samples], rows[0], delta)
+    if source.order is None:
+        align(delta[ROWS[ROTATION]], [0])
+    else:
+        delta[3:6] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION]].T, source.order, [0]).T
+    between = np.stack([np.interp(frames, samples, row) for row in delta])
+    turn_into_quaternions(between, source.order)
+    return between
 
 
 def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:

@@ -15,6 +15,9 @@ NOTHING = 1e-9
 MOST_SAMPLES = 16
 """The most samples a frame."""
 
+MOST_CORNERS = 64
+"""Keys between samples that are reached in one F-curve. Blender asks all modifiers on every frame."""
+
 BLOCK = 16384
 """Samples worked on at once."""
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import bpy
 import numpy as np
 
-from ...gltf.sizes import OF_A_BODY, OF_KEY_POSES
+from ...gltf.sizes import OF_A_BODY, OF_KEY_POSES, SHELL
 from .transform import Transform
 
 SOME_SIZE = 0.1
@@ -17,13 +17,50 @@ SAME_PLACE = 0.1
 """Heads of bones that are closer than this, of a bone's length, make no size."""
 
 
-def reach_of(bone: bpy.types.PoseBone) -> float:
-    """Return how far a bone reaches from its head at rest, in the rig's unit: its length.
+def reaches_of(rig: bpy.types.Object) -> dict[str, float]:
+    """Return how far each bone of a rig reaches from its head at rest, in the rig's unit, by their names.
+
+    That is its length, the farthest vertex that it deforms and the farthest corner of what is parented to it, and at
+    least a share of the figure's size: three centimetres of a grown-up.
 
     Importers make up the lengths of bones that nothing hangs on: such a bone reaches no further than the one before it,
     as far as that is long, or its head is from the head of that.
     """
-    return _length(bone.bone) or _some_size()
+    lengths = {bone.name: _length(bone.bone) or _some_size() for bone in rig.pose.bones}
+    heads = np.array([bone.bone.head_local for bone in rig.pose.bones]).reshape(-1, 3)
+    least = SHELL * _extent(heads, max(lengths.values(), default=0.0))
+    reaches = {name: max(length, least) for name, length in lengths.items()}
+    into_rig = rig.matrix_world.inverted_safe()
+    for obj in bpy.context.scene.objects:
+        if obj.parent == rig and obj.parent_type == "BONE" and obj.parent_bone in reaches:
+            corners = _corners(_evaluated(obj))
+            at_bone = (rig.matrix_world @ rig.pose.bones[obj.parent_bone].matrix).inverted_safe()
+            away = np.linalg.norm(corners @ np.array(at_bone.to_3x3()).T + at_bone.translation, axis=1).max()
+            reaches[obj.parent_bone] = max(reaches[obj.parent_bone], float(away))
+        elif obj.type == "MESH" and _deforms(rig, obj):
+            _reach_vertices(obj, np.array(into_rig @ obj.matrix_world), rig, reaches)
+    return reaches
+
+
+def _deforms(rig: bpy.types.Object, obj: bpy.types.Object) -> bool:
+    by_parent = obj.parent == rig and obj.parent_type == "ARMATURE"
+    return by_parent or any(item.type == "ARMATURE" and item.object == rig for item in obj.modifiers)
+
+
+def _reach_vertices(
+    obj: bpy.types.Object, into_rig: np.ndarray, rig: bpy.types.Object, reaches: dict[str, float]
+) -> None:
+    """Have bones of a rig reach all vertices that a mesh, as it is in the rig's space at rest, has in their groups."""
+    vertices, bones = obj.data.vertices, {group.index: group.name for group in obj.vertex_groups}
+    places = np.empty(3 * len(vertices), dtype=np.float32)
+    vertices.foreach_get("co", places)
+    places = places.reshape(-1, 3) @ into_rig[:3, :3].T + into_rig[:3, 3]
+    pairs = [(item.group, number) for number, v in enumerate(vertices) for item in v.groups if item.weight > 0.0]
+    groups, numbers = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    for group in np.unique(groups).tolist():
+        if (name := bones.get(group)) in reaches:
+            away = places[numbers[groups == group]] - np.array(rig.data.bones[name].head_local)
+            reaches[name] = max(reaches[name], float(np.linalg.norm(away, axis=1).max()))
 
 
 def _length(bone: bpy.types.Bone) -> float:
@@ -88,22 +125,27 @@ def _reach_of_chain(bone: bpy.types.Bone | None, known: dict[bpy.types.Bone, flo
 def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
     """Return how far an object or a pose bone reaches from its origin, in the scene's units.
 
-    That is the farthest corner of an object's bounding box as it is now, how far a bone reaches at rest (`reach_of`),
-    and of a rig how far its bones reach as it is posed now. Empties and cameras are as large as they are drawn; what
-    has no size at all counts as ten centimetres.
+    That is the farthest corner of the bounding boxes of an object and of all that is parented to it, as they are now,
+    how far a bone reaches at rest (`reaches_of`), and of a rig how far its bones reach as it is posed now. Empties and
+    cameras are as large as they are drawn; what has no size at all counts as ten centimetres.
     """
     if isinstance(obj, bpy.types.PoseBone):
-        return reach_of(obj) * (size_of(_evaluated(obj.id_data).matrix_world) or 1.0)
+        return reaches_of(obj.id_data)[obj.name] * (size_of(_evaluated(obj.id_data).matrix_world) or 1.0)
     evaluated = _evaluated(obj)
+    world = np.array(evaluated.matrix_world)
     if obj.pose is not None and len(obj.pose.bones):
-        axes = np.array(evaluated.matrix_world.to_3x3())
-        heads = np.array([bone.head for bone in evaluated.pose.bones]) @ axes.T
-        reaches = np.array([reach_of(bone) for bone in obj.pose.bones]) * size_of(axes)
+        heads = np.array([bone.head for bone in evaluated.pose.bones]) @ world[:3, :3].T
+        reaches = np.array(list(reaches_of(obj).values())) * size_of(world)
         return float((np.linalg.norm(heads, axis=1) + reaches).max()) or _some_size()
-    corners = np.array(evaluated.bound_box)
-    if np.ptp(corners) > 0.0:
-        return float(np.linalg.norm(corners @ np.array(evaluated.matrix_world.to_3x3()).T, axis=1).max())
-    return drawn_size(obj) * size_of(evaluated.matrix_world) or _some_size()
+    corners = np.concatenate([_corners(_evaluated(item)) for item in (obj, *obj.children_recursive)])
+    reach = float(np.linalg.norm(corners - world[:3, 3], axis=1).max())
+    return max(reach, drawn_size(obj) * size_of(world)) or _some_size()
+
+
+def _corners(evaluated: bpy.types.Object) -> np.ndarray:
+    """Return the corners of an object's bounding box in the world, (8, 3): its origin where it has no size."""
+    world = np.array(evaluated.matrix_world)
+    return np.array(evaluated.bound_box) @ world[:3, :3].T + world[:3, 3]
 
 
 def rig_size(rig: bpy.types.Object) -> float:
@@ -114,8 +156,13 @@ def rig_size(rig: bpy.types.Object) -> float:
     """
     world = _evaluated(rig).matrix_world
     heads = np.array([world @ bone.bone.head_local for bone in rig.pose.bones]).reshape(-1, 3)
+    reach = max((_length(bone.bone) or _some_size() for bone in rig.pose.bones), default=0.0) * size_of(world)
+    return _extent(heads, reach)
+
+
+def _extent(heads: np.ndarray, reach: float) -> float:
+    """Return the largest extent of heads (bones, 3) along any axis; how far any bone reaches where these are at one place."""
     extent = float(np.ptp(heads, axis=0).max()) if len(heads) else 0.0
-    reach = max((reach_of(bone) for bone in rig.pose.bones), default=0.0) * size_of(world)
     return extent if extent > SAME_PLACE * reach else reach
 
 

@@ -14,11 +14,9 @@ from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ..compute.bodies import other_angles
 from ..compute.components import PART_OF, REST, ROTATION, ROWS
 from ..compute.sample_rates import Need
+from ..compute.samples import MOST_CORNERS
 from ..compute.sources import FULL_TURN, SAME_FRAME, Source
 from .sampled import Layout, Piece
-
-MOST_CORNERS = 64
-"""Keys that are reached in one F-curve. Blender asks all modifiers on every frame."""
 
 SHARE = 0.05
 """The least share of the tolerance that makes a corner worth a modifier."""

@@ -140,11 +140,16 @@ def _needs(readings: Sequence[tuple[Binding, Source]]) -> list[Need]:
         if is_draft(binding.slot.action):
             needs.append(Need(math.inf, 0.0, most=1))
             continue
-        user = binding.users[0]
-        unit, reach = metres_per_channel_unit(user), reach_at_rest(user, reaches)
-        most = most_samples(source) if binding.kind.has_difference_slot else 1
-        needs.append(Need(TOLERANCE * max(1.0 / unit, reach), reach, most=most))
+        needs.append(need_of(binding, source, reaches))
     return needs
+
+
+def need_of(binding: Binding, source: Source, reaches: dict[bpy.types.Bone, float]) -> Need:
+    """Return how exact a source is to be between frames; for `reaches` see `reach_at_rest`."""
+    user = binding.users[0]
+    unit, reach = metres_per_channel_unit(user), reach_at_rest(user, reaches)
+    most = most_samples(source) if binding.kind.has_difference_slot else 1
+    return Need(TOLERANCE * max(1.0 / unit, reach), reach, most=most)
 
 
 def is_complete(binding: Binding, source: Source) -> bool:
