@@ -11,7 +11,7 @@ from rigid_motion import animation
 from rigid_motion.animation import is_reduced, reduce_keys_of, total_reduction, write_channel
 from rigid_motion.animation.baking.motions import not_promised
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion.animation.transforms.sizes import first_tolerance, reach_of, rig_size
+from rigid_motion.animation.transforms.sizes import first_tolerance, reaches_of, rig_size
 from tests.animation.bones.rigs import Rest, new_rig
 from tests.animation.bones.test_rig_reducing import RADIUS, TOLERANCE, bones, errors, matrices
 from tests.animation.scenes import new_object
@@ -120,6 +120,6 @@ def test_made_up_lengths_of_the_last_bones_are_no_part_of_the_size_of_a_rig(live
     bpy.context.view_layer.update()
     assert rig_size(rig) == pytest.approx(3.2)
     assert first_tolerance(bpy.context.scene, [transform_of(bone) for bone in rig.pose.bones]) == pytest.approx(9.6e-3)
-    assert reach_of(rig.pose.bones["HeadTop"]) == pytest.approx(0.8)
+    assert reaches_of(rig)["HeadTop"] == pytest.approx(0.8)
     assert animation.radius_of(rig.pose.bones["HeadTop"]) == pytest.approx(1.6)
     assert animation.radius_of(rig) == pytest.approx(2.0 * (1.6 + 0.8))

@@ -4,6 +4,7 @@ originals       what there was before keys were baked or reduced, of objects and
 bake            real keys for every frame
 motions         how transforms and rigs move with any keys, and how far off that is
 fewer_keys      the few keys that a transform needs
+proof           whether bones keep to a tolerance, at all moments
 fewer_rig_keys  those of all bones of a rig together
 reducing        the few keys that a recording needs, and the way back
 

@@ -155,8 +155,10 @@ def fewer_keys(
         if error.max() <= allowed:
             break
         more = _worst(chosen, error, samples, allowed)
-        if not len(more):
+        if not len(more) and error[chosen[0] : chosen[-1] + 1].max() <= allowed:
             raise goes_elsewhere(transform.name)
+        if not len(more) or len(distinct(fewer.keyed_frames)) >= len(distinct(source.keyed_frames)):
+            break  # It needs its keys.
         samples, chosen = np.union1d(samples, more), np.union1d(chosen, more)
     if best_of:
         inside = poses[samples]

@@ -379,10 +379,8 @@ class _Rig:
     ) -> dict[int, np.ndarray]:
         """Return the keys of those of these bones that get any more: on the samples around a frame, or else there."""
         samples = self.frames[self.sampled]
-        at = np.searchsorted(samples, frame)
-        around = (
-            samples[at : at + 1] if at < len(samples) and samples[at] == frame else samples[max(at - 1, 0) : at + 1]
-        )
+        first, last = np.searchsorted(samples, frame, side="right") - 1, np.searchsorted(samples, frame)
+        around = samples[max(first, 0) : last + 1]
         for places in (around, np.array((frame,))):
             added = {}
             for number in numbers:

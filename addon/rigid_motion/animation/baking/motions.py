@@ -269,7 +269,7 @@ class RigMotion:
         self._carrier, self._carried = source, self._carried_by(source)
 
     def show(self, sources: Mapping[int, Source | None], rates: Mapping[int, int] = MappingProxyType({})) -> None:
-        """Let bones be moved by other keys, or as they were where it is None; with so many samples a frame, if given."""
+        """Let bones be moved by other keys, or as they were where it is None; with so many samples a frame, if said."""
         for number, source in sources.items():
             if source is None:
                 self._channels[number] = self._recorded_channels[number]

@@ -60,7 +60,7 @@ class Proof:
         return self._errors.max(axis=0)
 
     def keep_to(self, allowed: float, fewer: dict[int, Source], mend: Mend) -> None:
-        """Have `fewer`, which is shown of bones in place of what they had, mended until it is within what is allowed."""
+        """Have `fewer`, which is shown of bones in place of what they had, mended until it is as is allowed."""
         while unproven := [
             number for number in range(len(self._stretches)) if self._proven.get(number) != self._near(number, fewer)
         ]:
@@ -91,8 +91,8 @@ class Proof:
         ends, result = self._stretches[number][[0, -1]], []
         for bone, source in fewer.items():
             keys = source.keyed_frames
-            first, last = (0, len(keys)) if source.goes_on else np.searchsorted(keys, ends) + (-NEAR, NEAR)
-            near = keys[max(first, 0) : last]
+            first, last = np.searchsorted(keys, ends)
+            near = keys if source.goes_on else keys[max(first - NEAR, 0) : last + NEAR]
             result.append(b"%d" % bone + near.tobytes() + source.modes_at(near).tobytes())
         return result
 

@@ -116,7 +116,7 @@ def in_betweens(
 
 
 def _between_samples(source: Source, frames: np.ndarray, rate: int) -> np.ndarray:
-    """Return differences (., m), rotations as quaternions, with straight lines between samples, so many of them a frame.
+    """Return differences (., m), rotations as quaternions, with straight lines between so many samples a frame.
 
     Keys between samples are hit, unless there are too many: see `writers.corners`.
     """

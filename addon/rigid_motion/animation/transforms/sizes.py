@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import cast
 
 import bpy
 import numpy as np
@@ -26,41 +27,39 @@ def reaches_of(rig: bpy.types.Object) -> dict[str, float]:
     Importers make up the lengths of bones that nothing hangs on: such a bone reaches no further than the one before it,
     as far as that is long, or its head is from the head of that.
     """
-    lengths = {bone.name: _length(bone.bone) or _some_size() for bone in rig.pose.bones}
-    heads = np.array([bone.bone.head_local for bone in rig.pose.bones]).reshape(-1, 3)
-    least = SHELL * _extent(heads, max(lengths.values(), default=0.0))
-    reaches = {name: max(length, least) for name, length in lengths.items()}
-    into_rig = rig.matrix_world.inverted_safe()
-    for obj in bpy.context.scene.objects:
-        if obj.parent == rig and obj.parent_type == "BONE" and obj.parent_bone in reaches:
-            corners = _corners(_evaluated(obj))
-            at_bone = (rig.matrix_world @ rig.pose.bones[obj.parent_bone].matrix).inverted_safe()
-            away = np.linalg.norm(corners @ np.array(at_bone.to_3x3()).T + at_bone.translation, axis=1).max()
-            reaches[obj.parent_bone] = max(reaches[obj.parent_bone], float(away))
-        elif obj.type == "MESH" and _deforms(rig, obj):
-            _reach_vertices(obj, np.array(into_rig @ obj.matrix_world), rig, reaches)
-    return reaches
+    bones = {bone.name: bone for bone in cast(bpy.types.Pose, rig.pose).bones}
+    heads = {name: np.array(bone.bone.head_local) for name, bone in bones.items()}
+    reaches = {name: _length(bone.bone) or _some_size() for name, bone in bones.items()}
+    least = SHELL * _extent(np.array(list(heads.values())), max(reaches.values(), default=0.0))
+    for obj in cast(bpy.types.Scene, bpy.context.scene).objects:
+        if obj.parent == rig and obj.parent_type == "BONE" and obj.parent_bone in bones:
+            at_bone = np.array((rig.matrix_world @ bones[obj.parent_bone].matrix).inverted_safe())
+            away = {obj.parent_bone: _corners(_evaluated(obj)) @ at_bone[:3, :3].T + at_bone[:3, 3]}
+        elif isinstance(obj.data, bpy.types.Mesh) and _deforms(rig, obj):
+            away = _away_from(heads, obj, np.array(rig.matrix_world.inverted_safe() @ obj.matrix_world))
+        else:
+            continue
+        for name, points in away.items():
+            reaches[name] = max(reaches[name], float(np.linalg.norm(points, axis=1).max()))
+    return {name: max(reach, least) for name, reach in reaches.items()}
 
 
 def _deforms(rig: bpy.types.Object, obj: bpy.types.Object) -> bool:
     by_parent = obj.parent == rig and obj.parent_type == "ARMATURE"
-    return by_parent or any(item.type == "ARMATURE" and item.object == rig for item in obj.modifiers)
+    modifiers = (item for item in obj.modifiers if isinstance(item, bpy.types.ArmatureModifier))
+    return by_parent or any(item.object == rig for item in modifiers)
 
 
-def _reach_vertices(
-    obj: bpy.types.Object, into_rig: np.ndarray, rig: bpy.types.Object, reaches: dict[str, float]
-) -> None:
-    """Have bones of a rig reach all vertices that a mesh, as it is in the rig's space at rest, has in their groups."""
-    vertices, bones = obj.data.vertices, {group.index: group.name for group in obj.vertex_groups}
+def _away_from(heads: Mapping[str, np.ndarray], obj: bpy.types.Object, into_rig: np.ndarray) -> dict[str, np.ndarray]:
+    """Return how far from the heads (3,) of bones the vertices in their groups are, (n, 3) each, in the rig's space."""
+    vertices = cast(bpy.types.Mesh, obj.data).vertices
     places = np.empty(3 * len(vertices), dtype=np.float32)
     vertices.foreach_get("co", places)
     places = places.reshape(-1, 3) @ into_rig[:3, :3].T + into_rig[:3, 3]
     pairs = [(item.group, number) for number, v in enumerate(vertices) for item in v.groups if item.weight > 0.0]
     groups, numbers = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    for group in np.unique(groups).tolist():
-        if (name := bones.get(group)) in reaches:
-            away = places[numbers[groups == group]] - np.array(rig.data.bones[name].head_local)
-            reaches[name] = max(reaches[name], float(np.linalg.norm(away, axis=1).max()))
+    named = {group.name: numbers[groups == group.index] for group in obj.vertex_groups if group.name in heads}
+    return {name: places[those] - heads[name] for name, those in named.items() if len(those)}
 
 
 def _length(bone: bpy.types.Bone) -> float:
@@ -72,7 +71,8 @@ def _length(bone: bpy.types.Bone) -> float:
 
 def drawn_size(obj: bpy.types.Object) -> float:
     """Return how large an empty or a camera is drawn, 0 for all else."""
-    return obj.empty_display_size if obj.type == "EMPTY" else obj.data.display_size if obj.type == "CAMERA" else 0.0
+    is_camera = isinstance(obj.data, bpy.types.Camera)
+    return obj.empty_display_size if obj.type == "EMPTY" else obj.data.display_size if is_camera else 0.0
 
 
 def _some_size() -> float:
@@ -161,7 +161,7 @@ def rig_size(rig: bpy.types.Object) -> float:
 
 
 def _extent(heads: np.ndarray, reach: float) -> float:
-    """Return the largest extent of heads (bones, 3) along any axis; how far any bone reaches where these are at one place."""
+    """Return the largest extent of heads (bones, 3) along any axis; in one place, that is how far any bone reaches."""
     extent = float(np.ptp(heads, axis=0).max()) if len(heads) else 0.0
     return extent if extent > SAME_PLACE * reach else reach
 
