@@ -98,7 +98,9 @@ def ball_displacement(maps: AffineMaps, truth: AffineMaps, radii: np.ndarray) ->
     offsets = np.abs(np.einsum("...ij,...i->...j", left, maps.origins - truth.origins))
     # Components are the leading axis from here on: s, the gaps s_1^2 - s_i^2, and s_i d_i.
     sizes, offsets = np.moveaxis(sizes, -1, 0), np.moveaxis(offsets, -1, 0)
-    gaps, pulls = sizes[0] ** 2 - sizes**2, sizes * offsets
+    squares, pulls = sizes**2, sizes * offsets
+    # One number squared may be rounded otherwise than as one of several.
+    gaps = squares[0] - squares
     least = np.maximum((pulls - gaps).max(axis=0), TINY)
     above = least
     for _ in range(NEWTON_STEPS):
