@@ -230,7 +230,7 @@ class RigMotion:
 
     def _look_at(self, frames: np.ndarray) -> list[Poses]:
         """Have all bones be as they were recorded on these frames, and return the poses of their channels."""
-        self.frames = frames
+        self.frames, self._shown = frames, {}
         result = [
             shown(transform, self._recorded[number], frames)
             if number in self._recorded
@@ -268,14 +268,26 @@ class RigMotion:
         """Let the rig itself be moved by other keys."""
         self._carrier, self._carried = source, self._carried_by(source)
 
+    def among(self, moments: np.ndarray) -> RigMotion:
+        """Return the same rig at some of its moments, by a mask (m,)."""
+        result = copy(self)
+        result.poses, result.frames, result._shown = [], self.frames[moments], dict(self._shown)
+        for name in ("_channels", "_recorded_channels", "_posed", "truth", "world", "_carried"):
+            maps = getattr(self, name)
+            setattr(result, name, maps if maps.axes.shape[-3] == 1 else maps[..., moments])
+        return result
+
     def show(self, sources: Mapping[int, Source | None], rates: Mapping[int, int] = MappingProxyType({})) -> None:
         """Let bones be moved by other keys, or as they were where it is None; with so many samples a frame, if said."""
-        for number, source in sources.items():
+        asked = {number: (source, rates.get(number)) for number, source in sources.items()}
+        changed = {number: item for number, item in asked.items() if item != self._shown.get(number, (None, None))}
+        for number, (source, rate) in changed.items():
             if source is None:
                 self._channels[number] = self._recorded_channels[number]
             else:
-                self._channels[number] = shown(self.transforms[number], source, self.frames, rates.get(number))[1]
-        self.hierarchy.pose(sources, self._channels, self._posed)
+                self._channels[number] = shown(self.transforms[number], source, self.frames, rate)[1]
+        self._shown |= changed
+        self.hierarchy.pose(changed, self._channels, self._posed)
 
     def now(self, number: int | slice = slice(None)) -> AffineMaps:
         """Return where a bone, or all of them, are in the scene by now, shape (m,) or (bones, m)."""

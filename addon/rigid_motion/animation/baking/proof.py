@@ -37,19 +37,15 @@ class Proof:
     bindings, sources : mapping
         Of the bones that may have fewer keys, by their numbers.
     weights : array, shape (bones, m)
-        How many times errors count on these frames. Between them it is the smaller one of both sides.
+        How many times errors count on these frames. Between two of them it is the smaller one.
     """
 
     def __init__(
         self, motion: RigMotion, bindings: Mapping[int, Binding], sources: Mapping[int, Source], weights: np.ndarray
     ) -> None:
-        self.rig, self.bindings = motion, bindings
+        self.rig, self.bindings, self.sources, self.weights = motion, bindings, sources, weights
         every, step = moments(motion.frames, list(sources.values())), max(1, AT_ONCE // len(motion.bones))
         self._stretches = [every[first : first + step] for first in range(0, len(every), step)]
-        behind = np.searchsorted(motion.frames, every)
-        before = np.searchsorted(motion.frames, every, side="right") - 1
-        weights = np.minimum(weights[:, before], weights[:, behind])
-        self._weights = [weights[:, first : first + step] for first in range(0, len(every), step)]
         self._proven: dict[int, list[bytes]] = {}
         self._errors = np.zeros((len(self._stretches), len(motion.bones)))
         self._looked_at: tuple[int, RigMotion] | None = None
@@ -65,26 +61,53 @@ class Proof:
             number for number in range(len(self._stretches)) if self._proven.get(number) != self._near(number, fewer)
         ]:
             for number in unproven:
-                motion, weights = self._at(number), self._weights[number]
-                motion.show({bone: fewer.get(bone) for bone in self.bindings})
                 # At first without the samples that differences are written as: they take longer, and matter little.
-                rates: dict[int, int] = {}
-                for is_written in (False, True):
-                    if is_written:
-                        rates = {bone: self._rate(bone, source) for bone, source in fewer.items()}
-                        motion.show(fewer, rates)
-                    while over := motion.over(allowed, weights):
-                        changed = mend(over, motion)
-                        if is_written:
-                            rates |= {bone: self._rate(bone, fewer[bone]) for bone in changed if bone in fewer}
-                        motion.show({bone: fewer.get(bone) for bone in changed}, rates)
+                self._is_mended(number, allowed, fewer, mend, as_written=False)
+                while self._is_mended(number, allowed, fewer, mend, as_written=True):
+                    pass
                 self._proven[number] = self._near(number, fewer)
-                self._errors[number] = motion.largest_errors()
 
-    def _at(self, number: int) -> RigMotion:
+    def _is_mended(
+        self, number: int, allowed: float, fewer: dict[int, Source], mend: Mend, *, as_written: bool
+    ) -> bool:
+        """Return whether anything was to be mended in a stretch. After that only what it touches is looked at."""
         if self._looked_at is None or self._looked_at[0] != number:
             self._looked_at = number, self.rig.at(self._stretches[number])
-        return self._looked_at[1]
+        stretch = part = self._looked_at[1]
+        found = over = self._over(stretch, allowed, fewer, as_written=as_written)
+        while over:
+            before = dict(fewer)
+            changed = mend(over, part)
+            part = stretch.among(self._touched(stretch.frames, changed, before, fewer))
+            over = self._over(part, allowed, fewer, as_written=as_written)
+        if as_written and not found:
+            self._errors[number] = stretch.largest_errors()
+        return bool(found)
+
+    def _over(
+        self, motion: RigMotion, allowed: float, fewer: Mapping[int, Source], *, as_written: bool
+    ) -> list[tuple[float, int, int]]:
+        rates = {bone: self._rate(bone, source) for bone, source in fewer.items()} if as_written else {}
+        motion.show({bone: fewer.get(bone) for bone in self.bindings}, rates)
+        before = np.searchsorted(self.rig.frames, motion.frames, side="right") - 1
+        weights = np.minimum(self.weights[:, before], self.weights[:, np.searchsorted(self.rig.frames, motion.frames)])
+        return motion.over(allowed, weights)
+
+    def _touched(
+        self, stretch: np.ndarray, changed: set[int], before: Mapping[int, Source], fewer: Mapping[int, Source]
+    ) -> np.ndarray:
+        """Return at which moments of a stretch (m,) bones may be shown otherwise than before, shape (m,)."""
+        touched = np.zeros(len(stretch) + 1)
+        for bone in changed:
+            old, new = (sources.get(bone, self.sources[bone]) for sources in (before, fewer))
+            keys = np.union1d(old.keyed_frames, new.keyed_frames)
+            differ = np.searchsorted(keys, np.setxor1d(old.keyed_frames, new.keyed_frames))
+            if not len(differ) or new.goes_on:
+                return np.ones(len(stretch), dtype=bool)
+            first, last = keys[np.maximum(differ - NEAR, 0)], keys[np.minimum(differ + NEAR, len(keys) - 1)]
+            np.add.at(touched, np.searchsorted(stretch, first), 1)
+            np.add.at(touched, np.searchsorted(stretch, last, side="right"), -1)
+        return np.cumsum(touched[:-1]) > 0
 
     def _near(self, number: int, fewer: Mapping[int, Source]) -> list[bytes]:
         """Return what tells apart whether bones are shown otherwise in a stretch."""
