@@ -84,6 +84,38 @@ def test_the_best_mode_of_each_segment_is_keyed_and_blender_shows_it(live_file, 
     assert reduction_of(obj).largest_error == pytest.approx(error.max(), abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("interpolation", "step", "rotation_mode"),
+    [
+        ("BEZIER", 1.0, "QUATERNION"),
+        ("BEZIER", 4.0, "XZY"),
+        ("LINEAR", 0.7, "QUATERNION"),
+        ("SINE", 1.0, "XZY"),
+        ("BOUNCE", 1.0, "QUATERNION"),
+        ("CONSTANT", 1.0, "QUATERNION"),
+    ],
+)
+@pytest.mark.parametrize("mode", ["motor_spline", "lerp_slerp"])
+def test_between_frames_the_tolerance_holds_as_well(live_file, mode, interpolation, step, rotation_mode):
+    obj = new_object(rotation_mode=rotation_mode)
+    frames = np.arange(1.0, 60.0, step)
+    waves = np.sin(frames[:, None] * (0.11, 0.17, 0.13))
+    # It rests for a while, so that there are keys to spare whatever is between them.
+    waves[frames > 40.0] = waves[frames > 40.0][0]
+    write_channel(obj, "location", frames, 0.02 * waves, interpolation=interpolation)
+    turns = np.column_stack((np.ones(len(frames)), 0.04 * waves[:, ::-1]))
+    values = turns / np.linalg.norm(turns, axis=1)[:, None] if rotation_mode == "QUATERNION" else 0.04 * waves
+    write_channel(obj, rotation_path(obj), frames, values, interpolation=interpolation)
+    moments = np.arange(8.0, 8.0 * frames[-1] + 1.0) / 8.0
+    truth = read_poses(obj, moments)
+    reduction = reduce_keys_of(obj, mode, TOLERANCE, RADIUS)
+    assert reduction.after < reduction.before
+    error = off(obj, moments, truth)
+    assert error <= TOLERANCE * (1.0 + 1e-5)
+    if step != 0.7 and interpolation != "CONSTANT":  # Those are looked at between eighths, too.
+        assert reduction.largest_error == pytest.approx(error, abs=1e-6)
+
+
 def test_the_tolerance_is_one_of_the_scene_also_under_a_parent_in_other_units(live_file):
     frames, poses = motion()
     alone, below, root = recorded(), new_object("Below"), new_object("Root")

@@ -35,6 +35,7 @@ class BoneCase:
     step: float = 1.0
     """Frames from key to key; 0 where it has none."""
 
+    interpolation: str = "LINEAR"
     location: bool = False
     scale: str = ""
     """"even", "uneven", "negative" for keys of it; "still" where it just is another."""
@@ -72,6 +73,7 @@ BONES = st.builds(
     local_location=st.booleans(),
     connected=st.booleans(),
     step=st.sampled_from((1.0, 1.0, 0.8, 2.0, 5.0, 0.0)),
+    interpolation=st.sampled_from(("LINEAR", "LINEAR", "BEZIER", "BEZIER", "SINE", "BOUNCE", "CONSTANT")),
     location=st.booleans(),
     scale=st.sampled_from(("", "", "even", "uneven", "negative", "still")),
     follows=st.sampled_from((*[""] * 8, "DAMPED_TRACK", "IK", "COPY_ROTATION", "LIMIT_ROTATION", "DRIVER")),
@@ -156,7 +158,7 @@ def _key(bone: bpy.types.PoseBone, settings: BoneCase) -> None:
         if not settings.step or (name == "scale" and settings.scale == "still"):
             setattr(bone, name, values[0])
         else:
-            write_channel(bone.id_data, path + name, frames, values)
+            write_channel(bone.id_data, path + name, frames, values, interpolation=settings.interpolation)
 
 
 def _constrain(rig: bpy.types.Object, number: int, settings: BoneCase) -> None:

@@ -402,15 +402,13 @@ class _Rig:
             allowed = float(self.proof.largest_errors().max()) * self.weights.max()
         for number, source in single.items():
             transform, radius = self.targets[number], float(motion.radii[number])
-            keys, frames = distinct(source.keyed_frames), self.frames
-            inside = (frames >= keys[0] - SAME_FRAME) & (frames <= keys[-1] + SAME_FRAME)
+            keys, frames = distinct(source.keyed_frames), np.union1d(self.frames, source.keyed_frames)
+            frames = frames[(frames >= keys[0] - SAME_FRAME) & (frames <= keys[-1] + SAME_FRAME)]
             if len(keys) > 1:
-                truth = motion.poses[number]
-                largest = float(shell_error(shown(transform, source, frames)[0], truth, radius)[self.sampled].max())
+                truth = shown(transform, self.sources[number], frames)[0]
+                largest = float(shell_error(shown(transform, source, frames)[0], truth, radius).max())
                 rounding = motion.rounding / motion.unit
-                fewer[number] = with_best_modes(
-                    transform, source, frames[inside], truth[inside], radius, rounding, largest
-                )
+                fewer[number] = with_best_modes(transform, source, frames, truth, radius, rounding, largest)
 
         def mend(over: list[tuple[float, int, int]], there: RigMotion) -> set[int]:
             mixed = {item for _, number, _ in _apart(over, there) for item in there.above(number) if item in single}
