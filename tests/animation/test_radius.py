@@ -32,6 +32,15 @@ def test_empties_and_cameras_are_as_large_as_they_are_drawn(live_file):
     assert (radius_of(empty), radius_of(camera)) == (pytest.approx(0.5), pytest.approx(0.5))
 
 
+def test_an_object_reaches_what_is_parented_to_it(live_file):
+    pivot, arm, tip = new_object("Pivot"), new_object("Arm", data=box(1.0)), new_object("Tip")
+    arm.parent, arm.location = pivot, (4.0, 0.0, 0.0)
+    tip.parent, tip.location = arm, (0.0, -8.0, 3.0)
+    pivot.location, pivot.empty_display_size = (10.0, 0.0, 0.0), 0.5
+    assert radius_of(pivot) == pytest.approx((4.0**2 + 8.0**2 + 3.0**2) ** 0.5)
+    assert radius_of(arm) == pytest.approx((8.0**2 + 3.0**2) ** 0.5)
+
+
 def test_what_has_no_size_counts_as_ten_centimetres(live_file):
     light = new_object("Lamp", data=bpy.data.lights.new("Lamp", "POINT"))
     assert radius_of(light) == pytest.approx(0.1)

@@ -110,6 +110,32 @@ def test_the_uneven_scale_of_an_object_counts_in_what_is_promised(live_file):
 # How large things are
 
 
+def test_a_bone_reaches_all_that_it_deforms_or_carries_and_three_centimetres_of_a_grown_up(live_file):
+    rests = [Rest("Hips", (0.0, 0.0, 0.0), (0.0, 0.0, 0.9)), Rest("Spine", (0.0, 0.0, 0.9), (0.0, 0.0, 1.69), "Hips")]
+    tiny = [Rest(name, (0.0, 0.0, 1.7), (0.0, 0.0, 1.701), "Spine") for name in ("Hand", "Finger")]
+    rig = new_rig(bones=(*rests, *tiny))
+    rig.scale = (0.5, 0.5, 0.5)
+    bpy.context.view_layer.update()
+    least = 0.03
+    assert reaches_of(rig) == pytest.approx({"Hips": 0.9, "Spine": 0.79, "Hand": least, "Finger": least})
+    mesh = bpy.data.meshes.new("Skin")
+    mesh.from_pydata([(0.0, 0.0, 1.7), (0.0, 5.0, 1.7), (0.0, 3.0, 1.7), (9.0, 0.0, 0.0)], [], [])
+    skin = new_object("Skin", data=mesh)
+    skin.matrix_world = rig.matrix_world
+    for name, vertices in (("Hand", (0, 1, 2)), ("Spine", (0,)), ("Else", (3,))):
+        skin.vertex_groups.new(name=name).add(vertices, 0.2, "REPLACE")
+    skin.vertex_groups["Hand"].add((1,), 0.0, "REPLACE")
+    assert reaches_of(rig)["Hand"] == pytest.approx(least)
+    skin.modifiers.new("Armature", "ARMATURE").object = rig
+    sword = new_object("Sword")
+    sword.parent, sword.parent_type, sword.parent_bone = rig, "BONE", "Finger"
+    sword.location = (0.0, 0.0, 0.8)
+    rig.pose.bones["Spine"].rotation_quaternion = (0.6, 0.8, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    expected = {"Hips": 0.9, "Spine": 0.8, "Hand": 3.0, "Finger": 0.8}
+    assert reaches_of(rig) == pytest.approx(expected, abs=1e-5)
+
+
 def test_made_up_lengths_of_the_last_bones_are_no_part_of_the_size_of_a_rig(live_file):
     hips, spine = (
         Rest("Hips", (0.0, 0.0, 0.0), (0.0, 0.0, 0.8)),

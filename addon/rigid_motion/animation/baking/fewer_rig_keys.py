@@ -269,8 +269,8 @@ class _Rig:
             rig = self.poses, self.skeleton.parents, mode, self.motion.radii, self.weights, fixed
             keys = self._searched(*rig, shared=shared, tolerance=tolerance)
             chosen = {number: self._within_its_keys(keys[number], number) for number in able}
-        frames = {number: self.frames[keys] for number, keys in chosen.items()}
-        fewer = self._proven(frames, mode, shared=shared)
+        keyed = {number: self.frames[keys] for number, keys in chosen.items()}
+        fewer = self._proven(keyed, mode, shared=shared)
         if not fewer:
             text = NOT_SO_MANY if self.key_poses is not None else NO_FEWER_POSES if shared else NO_FEWER
             raise NeedsItsKeys(text, name=self.rig.name, frames=np.count_nonzero(self.sampled))
@@ -296,8 +296,8 @@ class _Rig:
                 self.bindings[number],
                 self.sources[number],
                 source,
-                frames[number],
-                self._values_at(number, frames[number]),
+                keyed[number],
+                self._values_at(number, keyed[number]),
                 errors[number],
                 as_whole,
             )
@@ -368,8 +368,7 @@ class _Rig:
                 if added := self._with_keys_at(float(motion.frames[moment]), those, chosen):
                     break
             if not added and changed.isdisjoint(motion.above(number)):
-                names = [self.targets[item].name for item in motion.above(number) if item in self.targets]
-                raise goes_elsewhere(names[0] if names else f"{self.rig.name}/{self.motion.bones[number].name}")
+                raise goes_elsewhere(motion.transforms[number].name)
             chosen.update(added)
             changed.update(added)
         return changed
@@ -397,9 +396,8 @@ class _Rig:
     def _mix(self, fewer: dict[int, Source]) -> None:
         """Give segments their best modes, where the whole keeps to the tolerance; or by number is no farther off."""
         motion, single = self.motion, dict(fewer)
-        allowed = self.tolerance + motion.rounding
-        if self.key_poses is not None:
-            allowed = float(self.proof.largest_errors().max()) * self.weights.max()
+        by_number = float(self.proof.largest_errors().max()) * self.weights.max()
+        allowed = self.tolerance + motion.rounding if self.key_poses is None else by_number
         for number, source in single.items():
             transform, radius = self.targets[number], float(motion.radii[number])
             keys, frames = distinct(source.keyed_frames), np.union1d(self.frames, source.keyed_frames)

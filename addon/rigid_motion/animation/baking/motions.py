@@ -230,7 +230,8 @@ class RigMotion:
 
     def _look_at(self, frames: np.ndarray) -> list[Poses]:
         """Have all bones be as they were recorded on these frames, and return the poses of their channels."""
-        self.frames, self._shown = frames, {}
+        self.frames = frames
+        self._shown: dict[int, tuple[Source | None, int | None]] = {}
         result = [
             shown(transform, self._recorded[number], frames)
             if number in self._recorded
@@ -310,8 +311,8 @@ class RigMotion:
         `weights` are of shape (bones, m).
         """
         result = []
-        for number, (truth, radius, weight) in enumerate(zip(self.truth, self.radii, weights, strict=True)):
-            errors = displacement_over(self.now(number), truth, radius, allowed / weight.max()) * weight
+        for number, (radius, weight) in enumerate(zip(self.radii, weights, strict=True)):
+            errors = displacement_over(self.now(number), self.truth[number], radius, allowed / weight.max()) * weight
             at = np.flatnonzero(~(errors <= allowed))
             result += [(error, number, moment) for error, moment in zip(errors[at].tolist(), at.tolist(), strict=True)]
         return sorted(result, reverse=True)
@@ -332,6 +333,7 @@ class RigMotion:
                 axes = np.where(restored[:, None, None], recorded.axes[row], now.axes[row])
                 channels = AffineMaps(axes, np.where(restored[:, None], recorded.origins[row], now.origins[row]))
                 above = self.hierarchy.placed(item, channels, above)
+            assert above is not None  # the bone itself is the last of its chain
             errors = ball_displacement(world @ above, truth[None], np.full(len(left), self.radii[number]))
             best = int(np.argmin(errors))
             result.append(left.pop(best))

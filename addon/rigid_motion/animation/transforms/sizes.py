@@ -71,8 +71,9 @@ def _length(bone: bpy.types.Bone) -> float:
 
 def drawn_size(obj: bpy.types.Object) -> float:
     """Return how large an empty or a camera is drawn, 0 for all else."""
-    is_camera = isinstance(obj.data, bpy.types.Camera)
-    return obj.empty_display_size if obj.type == "EMPTY" else obj.data.display_size if is_camera else 0.0
+    if isinstance(obj.data, bpy.types.Camera):
+        return obj.data.display_size
+    return obj.empty_display_size if obj.type == "EMPTY" else 0.0
 
 
 def _some_size() -> float:
