@@ -58,7 +58,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
     tolerance: FloatProperty(
         name="Tolerance",
         description=(
-            "How far off any point may be on any frame, within the radius around what is moved. Of bones that counts "
+            "How far off any point may be at any moment, within the radius around what is moved. Of bones that counts "
             "where they get through all that they hang on. To begin with a millimetre, and of a rig 0.3 % of its size, "
             "or 2 % for key poses"
         ),
@@ -83,7 +83,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         name="Radius",
         description=(
             "How far out from the origin nothing may be off by more: the larger, the more a rotation counts. "
-            "At 0 each object has the size of its own bounding box, and each bone its length"
+            "At 0 each object has the size of its own bounding box, and each bone that of what it moves"
         ),
         default=0.0,
         min=0.0,
