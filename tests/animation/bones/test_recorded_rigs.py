@@ -93,7 +93,7 @@ def test_no_bone_of_a_rig_with_fewer_keys_is_off_by_more_than_the_tolerance(impo
     rig = imported(name)
     bones = list(rig.pose.bones)
     times = np.concatenate([key_frames(bone) for bone in bones if len(key_frames(bone))])
-    frames = np.arange(np.ceil(times.min()), np.floor(times.max()) + 1.0)
+    frames = np.arange(8.0 * np.ceil(times.min()), 8.0 * np.floor(times.max()) + 1.0) / 8.0
     truth = matrices(rig, frames)
     unit = max(np.ptp([rows[0, :3, 3] for rows in truth.values()], axis=0)) / 1.7
     refused: list[Refused] = []
