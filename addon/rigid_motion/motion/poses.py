@@ -257,8 +257,10 @@ class PackedPoses:
 
 def packed(poses: Poses) -> PackedPoses:
     """Return the same poses, components apart."""
-    rows = [components(poses.positions), components(poses.quaternions)]
-    return PackedPoses(np.concatenate(rows if poses.scales is None else [*rows, poses.scales[None]]))
+    scales = [] if poses.scales is None else [poses.scales[None]]
+    rows = np.concatenate([components(poses.positions), components(poses.quaternions), *scales])
+    # NumPy keeps components that are side by side as they are, and `take` would copy them all every time.
+    return PackedPoses(np.ascontiguousarray(rows))
 
 
 def of_rows(rows: np.ndarray) -> Poses:
