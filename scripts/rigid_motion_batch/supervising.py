@@ -279,7 +279,8 @@ def _temporary_folder() -> str | None:
 
 def _environment(folder: str | None) -> dict[str, str]:
     temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder) if folder else {}
-    return {**os.environ, **temporary, VARIABLE: folder or ""}
+    # Matrices are small here: threads of NumPy's library would wait for one another, and for those of other workers.
+    return {"OPENBLAS_NUM_THREADS": "1", **os.environ, **temporary, VARIABLE: folder or ""}
 
 
 def _this_command() -> Sequence[str]:

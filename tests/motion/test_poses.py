@@ -1,10 +1,13 @@
 """Poses and arrays of quaternions."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import Poses
+from rigid_motion.motion.poses import packed
 from rigid_motion.motion.quaternions import angle_between, conjugate, multiply, rotate
 from tests.motion.bodies import matrices
 from tests.motion.cases import random_quaternions
@@ -111,3 +114,15 @@ def test_quaternions_with_w_last_become_those_with_w_first():
     poses = Poses.from_xyzw(np.zeros((2, 7, 3)), np.roll(q, -1, axis=-1), np.ones((2, 7)))
     assert np.array_equal(poses.quaternions, q)
     assert poses.scales is not None
+
+
+@pytest.mark.parametrize("scales", [None, np.ones(100_000)], ids=["without scales", "with scales"])
+def test_a_few_samples_of_a_long_recording_are_looked_up_without_a_copy_of_it(scales):
+    long = packed(Poses(np.zeros((100_000, 3)), np.ones((100_000, 4)), scales))
+    tracemalloc.start()
+    try:
+        few = long[np.array((1, 2, 3))]
+        assert tracemalloc.get_traced_memory()[1] < 10_000
+    finally:
+        tracemalloc.stop()
+    assert few.shape == (3,)

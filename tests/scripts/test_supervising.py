@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rigid_motion_batch import supervising
 from rigid_motion_batch.recordings import importing
 from tests.scripts.baking import one_object_file
 from tests.scripts.reducing import listed, object_file, write_csv
@@ -133,3 +134,17 @@ def test_ctrl_c_at_the_very_beginning_is_no_traceback(tmp_path, moment):
         assert run.process.returncode == 130
         assert said.splitlines()[-1].startswith("Stopped. ")
         assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(("given", "threads"), [(None, "1"), ("2", "2")])
+def test_numpy_has_one_thread_in_commands_unless_it_is_given_more(given, threads, monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    if given:
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", given)
+
+    def popen(_: object, env: dict[str, str]) -> None:
+        raise RuntimeError(env["OPENBLAS_NUM_THREADS"])
+
+    monkeypatch.setattr(supervising.subprocess, "Popen", popen)
+    with pytest.raises(RuntimeError, match=f"^{threads}$"):
+        supervising.supervise("compare.py")
