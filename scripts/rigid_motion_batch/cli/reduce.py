@@ -78,8 +78,8 @@ what is written:
   replaces a .blend file itself, and keeps the one before as NAME.blend1. Nothing is written of what is left alone, not
   even under the name that --output gives. The paths of the results are printed on standard output, one a line, or with
   --json what became of each input; everything else goes to standard error, with a sentence on all of it as the last
-  line. Scripts and Python expressions in files do not run. A folder stands for the .blend, glTF, FBX, BVH, CSV (.csv,
-  .tsv) and .tum files in it and below, but for results of this program. The same command again does what is new or has
+  line. Scripts and Python expressions in files do not run. A folder stands for the .blend, glTF, VRM, FBX, BVH, CSV
+  (.csv, .tsv) and .tum files in it and below, but for results of this program. The same command again does what is new or has
   changed: the folder .rigid-motion beside the results has the record of them.
 """
 
@@ -119,8 +119,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=radius_in_metres,
         metavar="LENGTH",
         help="how far around the origin of each object, bone and node no point is off by more: 3cm, or 0.03 for "
-        "metres (as far as what it carries reaches; in glTF files at least 3 cm of a grown-up, in proportion; for "
-        f"rigid recordings {RIGID})",
+        "metres (as far as what it carries reaches, and 3 cm of a grown-up at least, in proportion; in glTF files what "
+        f"a node carries counts in any case; for rigid recordings {RIGID})",
     )
     keys.add_argument(
         "--shared", action="store_true", help="key poses: all bones of a rig get their keys on the same frames"
