@@ -17,7 +17,9 @@ from rigid_motion.animation import (
     total_reduction,
     write_channel,
 )
+from rigid_motion.animation.baking import proof
 from tests.animation.bones.rigs import Rest, in_turn, new_rig
+from tests.animation.keyed import curves_of
 from tests.balls import largest_displacements
 from tests.rigs.recorded import FRAMES, NAMES, recorded_rig
 
@@ -77,6 +79,21 @@ def test_no_bone_gets_further_off_than_the_tolerance(live_file, mode, shared, be
     assert total_reduction(bones(rig)).rig.frames == len({frame for some in keys for frame in some})
     if not best_of:
         assert {item for bone in bones(rig) for item in modes_of(bone, key_frames(bone))} == {mode}
+
+
+@pytest.mark.parametrize("best_of", [False, True])
+@pytest.mark.parametrize("mode", ["motor_spline", "lerp_slerp"])
+def test_the_tolerance_holds_where_not_all_of_a_recording_is_looked_at_at_once(live_file, monkeypatch, mode, best_of):
+    monkeypatch.setattr(proof, "AT_ONCE", 60 * len(NAMES))
+    rig = recorded_rig()
+    for fcurve in curves_of(rig).values():
+        for key in fcurve.keyframe_points:
+            key.interpolation = "BEZIER"
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig), mode, TOLERANCE, RADIUS, best_of=best_of)
+    off = errors(rig, truth)
+    assert max(off.values()) <= TOLERANCE * (1.0 + 1e-4)
+    assert total_reduction(bones(rig)).largest_error == pytest.approx(max(off.values()), abs=2e-6)
 
 
 @pytest.mark.parametrize("best_of", [False, True])
