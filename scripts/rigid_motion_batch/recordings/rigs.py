@@ -358,20 +358,14 @@ def carried_by(rig: bpy.types.Object) -> list[bpy.types.Object]:
     """Return the mesh objects that an armature deforms; none where their vertices are too many."""
     import bpy
 
-    meshes = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.data and _deforms(rig, obj)]
+    from rigid_motion.animation.transforms.sizes import deforms
+
+    meshes = [obj for obj in bpy.data.objects if obj.type == "MESH" and obj.data and deforms(rig, obj)]
     return meshes if sum(len(_mesh_of(obj).vertices) for obj in meshes) <= MOST_VERTICES else []
 
 
 def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
     return cast("bpy.types.Mesh", obj.data)
-
-
-def _deforms(rig: bpy.types.Object, obj: bpy.types.Object) -> bool:
-    by_parent = obj.parent == rig and obj.parent_type == "ARMATURE"
-    deforming = (
-        cast("bpy.types.ArmatureModifier", modifier) for modifier in obj.modifiers if modifier.type == "ARMATURE"
-    )
-    return by_parent or any(item.object == rig for item in deforming)
 
 
 def skin_of(

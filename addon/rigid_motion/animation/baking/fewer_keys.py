@@ -114,7 +114,7 @@ def fewer_keys(
     more_frames: np.ndarray = NO_FRAMES,
     count: int | None = None,
 ) -> FewerKeys:
-    """Return the keys that one slot needs, which may be as many as it has. Lengths are the scene's units.
+    """Return the keys that one slot needs, which may be those that it has. Lengths are the scene's units.
 
     The tolerance holds at all `moments` of what is seen, and of `more_frames`. With a count there are so many keys
     instead, those with the smallest largest error that is found.
@@ -158,7 +158,8 @@ def fewer_keys(
         if not len(more) and error[chosen[0] : chosen[-1] + 1].max() <= allowed:
             raise goes_elsewhere(transform.name)
         if not len(more) or len(distinct(fewer.keyed_frames)) >= len(distinct(source.keyed_frames)):
-            break  # It needs its keys.
+            columns = {row: column[chosen] for row, column in values.items()}
+            return FewerKeys(binding, source, source, seen[chosen], columns, 0.0)
         samples, chosen = np.union1d(samples, more), np.union1d(chosen, more)
     if best_of:
         inside = poses[samples]

@@ -35,7 +35,7 @@ def reaches_of(rig: bpy.types.Object) -> dict[str, float]:
         if obj.parent == rig and obj.parent_type == "BONE" and obj.parent_bone in bones:
             at_bone = np.array((rig.matrix_world @ bones[obj.parent_bone].matrix).inverted_safe())
             away = {obj.parent_bone: _corners(_evaluated(obj)) @ at_bone[:3, :3].T + at_bone[:3, 3]}
-        elif isinstance(obj.data, bpy.types.Mesh) and _deforms(rig, obj):
+        elif isinstance(obj.data, bpy.types.Mesh) and deforms(rig, obj):
             away = _away_from(heads, obj, np.array(rig.matrix_world.inverted_safe() @ obj.matrix_world))
         else:
             continue
@@ -44,7 +44,8 @@ def reaches_of(rig: bpy.types.Object) -> dict[str, float]:
     return {name: max(reach, least) for name, reach in reaches.items()}
 
 
-def _deforms(rig: bpy.types.Object, obj: bpy.types.Object) -> bool:
+def deforms(rig: bpy.types.Object, obj: bpy.types.Object) -> bool:
+    """Return whether a rig deforms an object, by a modifier or as its parent."""
     by_parent = obj.parent == rig and obj.parent_type == "ARMATURE"
     modifiers = (item for item in obj.modifiers if isinstance(item, bpy.types.ArmatureModifier))
     return by_parent or any(item.object == rig for item in modifiers)
