@@ -188,8 +188,9 @@ def _move(rig: bpy.types.Object, case: RigCase, random: np.random.Generator) -> 
         rig.parent = parent
     if case.object_keys:
         rig.rotation_mode, frames = "XYZ", frames_of(1.0)
-        write_channel(rig, "location", frames, 0.3 * _waves(random, frames, 3))
-        write_channel(rig, "rotation_euler", frames, 0.3 * _waves(random, frames, 3))
+        for path in ("location", "rotation_euler"):
+            values, eased = 0.3 * _waves(random, frames, 3), case.bones[0].interpolation
+            write_channel(rig, path, frames, values, interpolation=eased)
     data = rig.animation_data
     if case.strip and data is not None and data.action is not None:
         action, slot = data.action, data.action_slot
