@@ -9,11 +9,12 @@ Joints that stand on the ground are feet: how far they slide there counts, and w
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from ..motion import Skeleton
 from ..motion.affine import AffineMaps, ball_displacement, displacement_bound
 from ..motion.contacts import LOW, SLOW, contacts, spans
 from ..motion.skeleton_stretches import stretches
@@ -345,13 +346,22 @@ class Feet:
                 rows.append(np.full(len(samples[-1]), row))
         return np.concatenate(rows), np.concatenate(samples)
 
+    @cached_property
+    def _chains(self) -> tuple[World, np.ndarray]:
+        """The joints that ever stand and all that they hang on, and the rows of the spans' joints among them, (s,)."""
+        world, wanted = self.world, np.zeros(len(self.world.moving), dtype=bool)
+        wanted[self.spans[:, 0]] = True
+        wanted = Skeleton(world.parents).most_below(wanted)
+        chains = replace(world, moving=world.moving[wanted], shells=world.shells[wanted])
+        return chains, (np.cumsum(wanted) - 1)[self.spans[:, 0]]
+
     def _ways(self, tracks: Tracks) -> list[np.ndarray]:
         """How far each gets from where it stood at first, an array for each span."""
         if not len(self.spans):
             return []
-        rows, firsts, lasts = self.spans.T
+        (world, rows), (_, firsts, lasts) = self._chains, self.spans.T
         result, starts = [np.empty(length) for length in lasts - firsts + 1], np.empty((len(rows), 3))
-        for block in self.world.blocks(tracks):
+        for block in world.blocks(tracks):
             origins, samples = block.maps[0].origins, block.samples
             for number in np.flatnonzero((firsts < samples.stop) & (lasts >= samples.start)).tolist():
                 begin, end = max(firsts[number], samples.start), min(lasts[number] + 1, samples.stop)

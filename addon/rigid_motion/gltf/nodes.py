@@ -94,7 +94,10 @@ class Nodes:
 
     def channel(self, node: int, path: str, tracks: Tracks, times: np.ndarray) -> np.ndarray:
         """Return what a node has at times (m,) as tracks move it, shape (m, width), or (1, width) where it rests."""
-        return tracks[node, path].at(times) if (node, path) in tracks else self.rest[path][None, node]
+        if (node, path) not in tracks:
+            return self.rest[path][None, node]
+        track = tracks[node, path]
+        return track.at(times[:1] if len(track.times) == 1 else times)
 
     def _local(self, node: int, tracks: Tracks, times: np.ndarray) -> AffineMaps:
         """In its parent's space, shape (m,), or (1,) where it rests."""
