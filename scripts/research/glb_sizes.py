@@ -23,7 +23,7 @@ from rigid_motion.gltf import Options, reduce_file
 from rigid_motion.gltf.accessors import stored_size
 from rigid_motion.gltf.documents import read_document
 from rigid_motion_batch.analysis.metrics import geometric_mean
-from tests.gltf.player import File, moments
+from tests.gltf.player import File, eighths
 
 HEIGHT, RADIUS = 1.7, 0.03  # metres
 TOLERANCES = (1e-4, 1e-3, 5e-3)  # metres
@@ -36,7 +36,7 @@ TOOLS = {
 """Programs beside, with the arguments that make one file another."""
 
 
-def points(file: File, clip: int, times: np.ndarray, names: list[str]) -> np.ndarray:
+def points(file: File, clip: str | None, times: np.ndarray, names: list[str]) -> np.ndarray:
     """Return where the heads of nodes and points beside them are in the world, shape (nodes, times, 7, 3)."""
     numbers = {node.get("name"): number for number, node in enumerate(file.json["nodes"])}
     worlds = file.worlds(clip, times)[[numbers[name] for name in names]]
@@ -46,12 +46,16 @@ def points(file: File, clip: int, times: np.ndarray, names: list[str]) -> np.nda
     return np.concatenate((heads, heads + axes, heads - axes), axis=-2)
 
 
-def errors_of(original: File, smaller: File, clip: int) -> np.ndarray:
-    """Return how far each node is off at eighths of the gaps between the keys of both files, shape (nodes, times)."""
-    times = moments(original, smaller, clip=clip)
+def errors_of(original: File, smaller: File, clip: str) -> np.ndarray:
+    """Return how far each node is off at eighths of the gaps between the keys of both files, shape (nodes, times).
+
+    Without the clip it rests.
+    """
+    kept = clip if any(animation["name"] == clip for animation in smaller.json["animations"]) else None
+    times = eighths(np.union1d(original.moments(clip), smaller.moments(kept)))
     before, after = ({node.get("name") for node in file.json["nodes"]} for file in (original, smaller))
     names = sorted((before & after) - {None})
-    there, truth = (points(file, clip, times, names) for file in (smaller, original))
+    there, truth = points(smaller, kept, times, names), points(original, clip, times, names)
     return np.linalg.norm(there - truth, axis=-1).max(axis=-1)
 
 
@@ -67,7 +71,7 @@ def animation_bytes(path: Path) -> int:
 def beside(original: Path, smaller: Path, tool: str) -> dict[str, Any]:
     """Return what a tool made of a file, with the errors of all clips."""
     files = File(original), File(smaller)
-    errors = np.concatenate([errors_of(*files, clip).ravel() for clip in range(len(files[0].json["animations"]))])
+    errors = np.concatenate([errors_of(*files, clip["name"]).ravel() for clip in files[0].json["animations"]])
     return {
         "tool": tool,
         "animation_bytes": animation_bytes(smaller),

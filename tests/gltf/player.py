@@ -124,8 +124,10 @@ class File:
             return clip
         return [animation.get("name") for animation in self.json["animations"]].index(clip)
 
-    def tracks(self, clip: int | str) -> dict[tuple[int, str], Track]:
-        """Interpolation, times and values by node and path; those of meshes count as node -1 - mesh."""
+    def tracks(self, clip: int | str | None) -> dict[tuple[int, str], Track]:
+        """Interpolation, times and values by node and path; those of meshes count as node -1 - mesh. None: at rest."""
+        if clip is None:
+            return {}
         animation, result = self.json["animations"][self.clip(clip)], {}
         for channel in animation["channels"]:
             target, sampler = channel["target"], animation["samplers"][channel["sampler"]]

@@ -79,8 +79,8 @@ what is written:
   even under the name that --output gives. The paths of the results are printed on standard output, one a line, or with
   --json what became of each input; everything else goes to standard error, with a sentence on all of it as the last
   line. Scripts and Python expressions in files do not run. A folder stands for the .blend, glTF, VRM, FBX, BVH, CSV
-  (.csv, .tsv) and .tum files in it and below, but for results of this program. The same command again does what is new or has
-  changed: the folder .rigid-motion beside the results has the record of them.
+  (.csv, .tsv) and .tum files in it and below, but for results of this program. The same command again does what is new
+  or has changed: the folder .rigid-motion beside the results has the record of them.
 """
 
 
