@@ -109,12 +109,12 @@ class Playing:
         if self.longest is None:
             return None
         desired = now - self.longest - self.delay
-        if self._leap and self._moment is not None:
+        if self._leap:
             last, step = self._leap
-            if self._moment < last:
+            if self._moment is not None and self._moment < last:
                 desired -= step
             else:
-                self._moment, self._leap = self._moment + step, None
+                self._moment, self._leap = None if self._moment is None else self._moment + step, None
         passed, self._last = now - self._last, now
         if self._moment is None:
             self._moment, passed = desired, 0.0
