@@ -106,7 +106,7 @@ class ClipReduction:
     Parameters
     ----------
     world : World
-        As the clip moves it, with any moments.
+        As the clip moves it, with moments that are those of its keys at least.
     clip : Clip
     needed : container of Target
         Channels that keep a key also where nodes are as they rest.

@@ -154,22 +154,25 @@ class World:
         return result
 
     @cached_property
-    def _extremes(self) -> tuple[np.ndarray, np.ndarray]:
-        """How long the axes of each node get in the world (n, 3), and how far it gets from its parent (n,)."""
+    def _extremes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """How long the axes of each node get in the world (n, 3), how long anything of length 1 does, and how far the
+        node gets from its parent, shapes (n,).
+        """
         count = len(self.moving)
-        lengths, away = np.zeros((count, 3)), np.zeros(count)
+        lengths, largest, away = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
         hangs = self.parents >= 0
         for block in self.blocks(self.truth):
             (maps,) = block.maps
             lengths = np.maximum(lengths, np.linalg.norm(maps.axes, axis=-2).max(axis=1))
+            largest = np.maximum(largest, _largest(maps.axes).max(axis=1))
             from_parents = maps.origins[hangs] - maps.origins[self.parents[hangs]]
             away[hangs] = np.maximum(away[hangs], np.linalg.norm(from_parents, axis=-1).max(axis=1))
-        return lengths, away
+        return lengths, largest, away
 
-    @cached_property
+    @property
     def largest(self) -> np.ndarray:
-        """How long the longest axis of each node gets in the world, shape (n,)."""
-        return self._extremes[0].max(axis=1)
+        """How long anything of length 1 in a node's space gets in the world at most, shape (n,)."""
+        return self._extremes[1]
 
     @cached_property
     def balls(self) -> np.ndarray:
@@ -190,7 +193,7 @@ class World:
     @cached_property
     def reaches(self) -> np.ndarray:
         """How far what hangs on each node is from it at most, with the balls around it, shape (n,); an upper bound."""
-        result, away = self.radii.copy(), self._extremes[1]
+        result, away = self.radii.copy(), self._extremes[2]
         for row in range(len(result) - 1, -1, -1):
             if (parent := self.parents[row]) >= 0:
                 result[parent] = max(result[parent], away[row] + result[row])
@@ -199,7 +202,7 @@ class World:
     def morph_scale(self, node: int) -> float:
         """By how much the morph targets of a node's mesh are larger in the world than in it, at most."""
         morph = self.seen.morphs[node]
-        largest = np.linalg.norm(self.nodes.resting.axes[morph.carriers], axis=-2).max(axis=-1)
+        largest = _largest(self.nodes.resting.axes[morph.carriers])
         moves = np.isin(morph.carriers, self.moving)
         largest[moves] = self.largest[[self.rows[carrier] for carrier in morph.carriers[moves].tolist()]]
         return float((largest * morph.factors).max())
@@ -271,6 +274,14 @@ class World:
             rows.append(row)
             numbers.append(number + block.first)
         return largest, np.concatenate(rows), np.concatenate(numbers)
+
+
+def _largest(axes: np.ndarray) -> np.ndarray:
+    """Return how long vectors of length 1 become at most, shape (...), by axes (..., 3, 3).
+
+    It is Gershgorin's bound of the largest singular value, and exact for perpendicular axes.
+    """
+    return np.sqrt(np.abs(np.swapaxes(axes, -1, -2) @ axes).sum(axis=-1).max(axis=-1))
 
 
 def _parted(times: np.ndarray, parts: int) -> np.ndarray:

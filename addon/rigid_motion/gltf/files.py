@@ -35,7 +35,6 @@ SINGLE = 1e-6
 MOVERS = ("VRMC_node_constraint",)
 """Extensions of nodes by which these follow others."""
 
-
 NewTracks = Mapping[int, Sequence[StoredTrack]]
 """By the numbers of clips; of others they stay."""
 
@@ -102,7 +101,8 @@ def reduced(document: Document, options: Options) -> Report:
             result.append(ClipReduction(world, clip, needed, joints, size, options, amount).reduced())
     tracks = {clip.number: clip.tracks for clip in result if clip.tracks is not None}
     with damage_refused():
-        changed, chosen = made_smaller(_with_note(document, tolerance + (earlier or 0.0)), references, tracks)
+        within = tolerance if options.count is None else max((clip.error for clip in result), default=0.0)
+        changed, chosen = made_smaller(_with_note(document, within + (earlier or 0.0)), references, tracks)
         larger = tracks.keys() - chosen
         result = [kept(it.number, it.name, it.before, LARGER) if it.number in larger else it for it in result]
         if not chosen:
