@@ -97,6 +97,23 @@ def test_constant_channels_have_one_key_and_those_that_nobody_needs_none(tmp_pat
     assert len(tracks[6, "rotation"][1]) == 1
 
 
+def test_nodes_that_share_a_mesh_each_carry_it(tmp_path):
+    """A mesh of two materials that have the same vertices; one of the nodes is a hundred times as large as the other."""
+    made, times = Making(), np.arange(61) / 30
+    places = made.accessor(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]], dtype="<f4"))
+    made.json["meshes"] = [{"primitives": [{"attributes": {"POSITION": places}, "material": 0}] * 2}]
+    made.json["nodes"] = [{"mesh": 0}, {"mesh": 0, "scale": [100.0, 100.0, 100.0]}]
+    own = made.times(times)
+    for node in (0, 1):
+        made.channel(node, "rotation", own, turns(times, node))
+    path = made.write(tmp_path / "shared.glb")
+    report = reduce_file(path, tmp_path / "reduced.glb", Options(5e-3))
+    assert 1e-3 < off(File(path), File(tmp_path / "reduced.glb"), 0).error <= 5e-3 + ROUNDING
+    small, large = sorted(len(times) for _, times, _ in File(tmp_path / "reduced.glb").tracks(0).values())
+    assert report.size == pytest.approx(10.0, rel=0.1)
+    assert small < large / 3
+
+
 def test_who_reduces_again_is_told(tmp_path):
     path = walk().write(tmp_path / "walk.glb")
     for tolerance, earlier in ((1e-3, None), (2e-3, 1e-3), (1e-3, 3e-3)):

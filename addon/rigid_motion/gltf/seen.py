@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -63,19 +63,25 @@ class Seen:
         boxes[1] = -np.inf
         result = cls(np.zeros(count), boxes, {})
         tracks = [track for clip in clips for track in clip.all_tracks if track.path == WEIGHTS]
+        alike: dict[tuple[int, bytes], int] = {}
         for number, node in enumerate(objects(document.json, "nodes")):
             if "mesh" in node:
                 weights = _largest_weights(nodes, number, [track for track in tracks if track.node == number])
-                result.add(document, number, weights)
+                is_plain = "skin" not in node and not _has_instances(node)
+                first = alike.setdefault((node["mesh"], weights.tobytes()), number) if is_plain else number
+                if first == number:
+                    result.add(document, number, weights)
+                else:
+                    result.add_alike(number, first)
         return result
 
     def add(self, document: Document, number: int, weights: np.ndarray) -> None:
         """Add the mesh of a node, with weights of its morph targets of up to so much (targets,)."""
-        node = document.json["nodes"][number]
-        deltas = np.zeros(len(weights))
-        carriers: list[np.ndarray] = []
-        factors: list[np.ndarray] = []
-        for primitive in objects(entry(document.json, "meshes", node["mesh"]), "primitives"):
+        node, deltas = document.json["nodes"][number], np.zeros(len(weights))
+        factors: dict[int, float] = {}
+        primitives = objects(entry(document.json, "meshes", node["mesh"]), "primitives")
+        # Primitives of several materials often have the vertices of all of them.
+        for primitive in {str((own.get("attributes"), own.get("targets"))): own for own in primitives}.values():
             if "POSITION" not in primitive.get("attributes", {}):
                 continue
             points = _points(document, primitive["attributes"]["POSITION"])
@@ -87,23 +93,22 @@ class Seen:
                     spread += weights[target] * (lengths if len(lengths) == len(spread) else np.max(lengths))
             if _has_instances(node):
                 points, spread = corners_of(points.min(axis=0), points.max(axis=0)), np.full(8, np.max(spread))
-            for nodes, some, maps in _carried(document, number, primitive):
-                larger = np.linalg.norm(maps.axes, ord=2, axis=(-2, -1))
-                self._reach(nodes, maps.at(points[some]), larger * spread[some])
-                carriers.append(np.broadcast_to(nodes, larger.shape).ravel())
-                factors.append(larger.ravel())
-        if deltas.any() and carriers:
-            own, rows = np.unique(np.concatenate(carriers), return_inverse=True)
-            largest = np.zeros(len(own))
-            np.maximum.at(largest, rows, np.concatenate(factors))
-            self.morphs[number] = Morph(deltas, own, largest)
+            for carrier, some, maps in _carried(document, number, primitive):
+                larger = float(np.linalg.norm(maps.axes, ord=2, axis=(-2, -1)).max())
+                factors[carrier] = max(factors.get(carrier, 0.0), larger)
+                own = maps.at(points[some])
+                reach = float(np.max(np.linalg.norm(own, axis=-1) + larger * spread[some]))
+                self.reaches[carrier] = max(float(self.reaches[carrier]), reach)
+                self.boxes[0, carrier] = np.minimum(self.boxes[0, carrier], own.min(axis=(0, 1)))
+                self.boxes[1, carrier] = np.maximum(self.boxes[1, carrier], own.max(axis=(0, 1)))
+        if deltas.any() and factors:
+            self.morphs[number] = Morph(deltas, np.array([*factors]), np.array([*factors.values()]))
 
-    def _reach(self, nodes: np.ndarray, points: np.ndarray, spread: np.ndarray) -> None:
-        """Nodes carry points (..., 3) that morph targets move by up to so much (...)."""
-        nodes = np.broadcast_to(nodes, spread.shape)
-        np.maximum.at(self.reaches, nodes, np.linalg.norm(points, axis=-1) + spread)
-        np.minimum.at(self.boxes[0], nodes, points)
-        np.maximum.at(self.boxes[1], nodes, points)
+    def add_alike(self, number: int, first: int) -> None:
+        """Add to a node what another one carries, whose mesh is the same."""
+        self.reaches[number], self.boxes[:, number] = self.reaches[first], self.boxes[:, first]
+        if first in self.morphs:
+            self.morphs[number] = replace(self.morphs[first], carriers=np.array([number]))
 
     def is_same(self, other: Seen) -> bool:
         """Whether the nodes of another document carry the same, number by number."""
@@ -134,14 +139,14 @@ def _largest_weights(nodes: Nodes, number: int, tracks: list[Track]) -> np.ndarr
     return result
 
 
-def _carried(document: Document, number: int, primitive: Json) -> Iterator[tuple[np.ndarray, Any, AffineMaps]]:
-    """Yield nodes that carry vertices, which vertices these are, and the maps from their space to those of the nodes.
+def _carried(document: Document, number: int, primitive: Json) -> Iterator[tuple[int, Any, AffineMaps]]:
+    """Yield what carries vertices of a node's mesh: a node, which vertices, and the maps from the mesh to the node.
 
-    There is a node and a map for each vertex, or one node for all of them, with maps (instances, 1).
+    The maps are of shape (1, 1), or (instances, 1).
     """
     node = document.json["nodes"][number]
     if "skin" not in node:
-        yield np.array([number]), EVERY, _instances(document, node)
+        yield number, EVERY, _instances(document, node)
         return
     skin = entry(document.json, "skins", node["skin"])
     joints = np.array(skin["joints"], dtype=np.int64)
@@ -153,14 +158,17 @@ def _carried(document: Document, number: int, primitive: Json) -> Iterator[tuple
     names = [name for name in attributes if name.startswith("JOINTS_")]
     if any(_is_compressed(document, attributes[name]) for name in names):
         # Any joint may carry all of it.
-        yield from ((joints[[row]], EVERY, maps[[row]]) for row in range(len(joints)))
+        yield from ((joint, EVERY, maps[[row], None]) for row, joint in enumerate(joints.tolist()))
     elif names:
         of_joints = np.hstack([raw_numbers(document, attributes[name]) for name in names]).astype(np.int64)
         shares = np.hstack([numbers(document, attributes[name.replace("JOINTS", "WEIGHTS")]) for name in names])
         shares[~shares.any(axis=1), 0] = 1.0  # What nothing carries goes with its first joint.
-        for column, share in zip(of_joints.T, shares.T, strict=True):
-            some = np.flatnonzero(share)
-            yield joints[column[some]], some, maps[column[some]]
+        vertices, columns = np.nonzero(shares)
+        rows = of_joints[vertices, columns]
+        order = np.argsort(rows, kind="stable")
+        used, firsts = np.unique(rows[order], return_index=True)
+        for row, some in zip(used.tolist(), np.split(vertices[order], firsts[1:]), strict=True):
+            yield int(joints[row]), some, maps[[row], None]
 
 
 def _has_instances(node: Json) -> bool:
