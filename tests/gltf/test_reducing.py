@@ -98,7 +98,7 @@ def test_constant_channels_have_one_key_and_those_that_nobody_needs_none(tmp_pat
 
 
 def test_nodes_that_share_a_mesh_each_carry_it(tmp_path):
-    """A mesh of two materials that have the same vertices; one of the nodes is a hundred times as large as the other."""
+    """A mesh of two materials that have the same vertices; one node is a hundred times as large as the other."""
     made, times = Making(), np.arange(61) / 30
     places = made.accessor(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]], dtype="<f4"))
     made.json["meshes"] = [{"primitives": [{"attributes": {"POSITION": places}, "material": 0}] * 2}]

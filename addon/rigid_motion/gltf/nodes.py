@@ -116,7 +116,7 @@ def by_target(tracks: tuple[Track, ...]) -> Tracks:
 def steadied(tracks: tuple[Track, ...]) -> Tracks:
     """Return the same by node and path, where what is constant has one key."""
     kept = [
-        replace(track, times=track.times[:1], values=track.points[:1], interpolation=LINEAR)
+        replace(track, times=track.times[[0]], values=track.points[[0]], interpolation=LINEAR)
         for track in tracks
         if track.is_constant
     ]

@@ -151,7 +151,11 @@ class Channel:
             if self.stays:
                 self.times = track.times
                 break
-        self.values = track.at(self.times)
+
+    @property
+    def values(self) -> np.ndarray:
+        """What it shows at these moments, shape (m, width); worked out anew, for that of all channels is much."""
+        return self.track.at(self.times)
 
     def _halved(self, values: np.ndarray) -> np.ndarray:
         """Which gaps between the moments are too wide."""
@@ -168,22 +172,15 @@ class Channel:
             result |= self.measured(there - line) > BOW
         return result
 
-    @property
-    def rests(self) -> bool:
-        """Whether the node is all the time as it would be without the track."""
-        rest = self.world.nodes.rest_of(self.track.node, self.track.path)
-        return len(rest) == self.values.shape[1] and self._is_at(rest)
-
-    @property
-    def is_constant(self) -> bool:
-        return self._is_at(self.values[0])
-
-    def _is_at(self, value: np.ndarray) -> bool:
-        off = self.measured(self.values - value)
+    def is_at(self, value: np.ndarray, values: np.ndarray) -> bool:
+        """Whether these of its values (m, width) are one value, but for noise."""
+        if self.stays or len(value) != values.shape[1]:
+            return False
+        off = self.measured(values - value)
         if self.track.path == ROTATION:
             # Of both signs, for noise is smaller than what is left of 1 less a cosine.
-            off = np.minimum(off, self.measured(self.values + value))
-        return not self.stays and float(off.max()) <= NOISE
+            off = np.minimum(off, self.measured(values + value))
+        return float(off.max()) <= NOISE
 
     def measured(self, differences: np.ndarray) -> np.ndarray:
         """How far what the node carries, and what hangs on it, is moved by differences (m, width), of the tolerance."""
@@ -213,12 +210,12 @@ def settled(channels: Iterable[Channel], needed: Container[Target]) -> dict[Targ
     """
     result: dict[Target, Track | None] = {}
     for channel in channels:
-        track = channel.track
+        track, values = channel.track, channel.values
         target = track.node, track.path
-        if channel.rests and target not in needed:
+        if target not in needed and channel.is_at(channel.world.nodes.rest_of(*target), values):
             result[target] = None
-        elif channel.is_constant:
-            result[target] = replace(track, interpolation=LINEAR, times=channel.times[:1], values=channel.values[:1])
+        elif channel.is_at(values[0], values):
+            result[target] = replace(track, interpolation=LINEAR, times=channel.times[[0]], values=values[[0]])
         elif channel.stays:
             result[target] = track.whole
         elif track.interpolation == STEP:
@@ -226,8 +223,7 @@ def settled(channels: Iterable[Channel], needed: Container[Target]) -> dict[Targ
             keys = np.flatnonzero(np.append(True, np.any(track.points[1:] != track.points[:-1], axis=1)))
             result[target] = replace(track, times=track.times[keys], values=track.points[keys])
         elif track.path in (SCALE, WEIGHTS):
-            keys = on_lines(channel.times, channel.values, channel.measured, OF_CHANNELS)
-            times, values = channel.times[keys], channel.values[keys]
-            lines = replace(track, interpolation=LINEAR, times=times, values=values)
+            keys = on_lines(channel.times, values, channel.measured, OF_CHANNELS)
+            lines = replace(track, interpolation=LINEAR, times=channel.times[keys], values=values[keys])
             result[target] = track.whole if channel.is_curved and len(lines) >= len(track) else lines
     return result
