@@ -34,6 +34,9 @@ AT_ONCE = 2**15
 EXACTLY = 64
 """Poses whose displacement is worked out at once, those with the largest bounds first."""
 
+EVEN = 1e-4
+"""Of a scale: its axes differ by no more where it is even. Programs write some with rounding."""
+
 NOWHERE = np.empty(0, dtype=np.int64)
 
 UPWARDS = 1
@@ -153,6 +156,13 @@ class World:
             result[row] = np.linalg.norm(self.nodes.resting.axes[parent], axis=-2) if parent >= 0 else 1.0
         return result
 
+    @property
+    def _shapes_change(self) -> bool:
+        """Whether nodes may grow, or become sheared, between moments: by scales that change or are uneven."""
+        scales = [track.points for (_, path), track in self.truth.items() if path == SCALE]
+        every = [*scales, *self.nodes.rest[SCALE][:, None]]
+        return bool(self.nodes.matrices) or any(len(some) > 1 or np.ptp(some) > EVEN * np.max(some) for some in every)
+
     @cached_property
     def _extremes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """How long the axes of each node get in the world (n, 3), how long anything of length 1 does, and how far the
@@ -161,7 +171,7 @@ class World:
         count = len(self.moving)
         lengths, largest, away = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
         hangs = self.parents >= 0
-        for block in self.blocks(self.truth):
+        for block in self.blocks(self.truth, parts=PARTS if self._shapes_change else 1):
             (maps,) = block.maps
             lengths = np.maximum(lengths, np.linalg.norm(maps.axes, axis=-2).max(axis=1))
             largest = np.maximum(largest, _largest(maps.axes).max(axis=1))
