@@ -409,8 +409,9 @@ class _Rig:
                 fewer[number] = with_best_modes(transform, source, frames, truth, radius, rounding, largest)
 
         def mend(over: list[tuple[float, int, int]], there: RigMotion) -> set[int]:
-            mixed = {item for _, number, _ in _apart(over, there) for item in there.above(number) if item in single}
-            changed = {number for number in mixed if fewer[number] is not single[number]} or set(single)
+            mixed = {number for number in single if fewer[number] is not single[number]}
+            above = {item for _, number, _ in _apart(over, there) for item in there.above(number)}
+            changed = mixed & above or mixed
             fewer.update({number: single[number] for number in changed})
             return changed
 

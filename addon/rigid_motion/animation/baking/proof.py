@@ -24,7 +24,10 @@ NEAR = 3
 """Keys beside a stretch that have a say in it, on either side."""
 
 Mend = Callable[[list[tuple[float, int, int]], RigMotion], set[int]]
-"""Changes what is shown of bones, after what is over the tolerance (see `RigMotion.over`). Returns their numbers."""
+"""Changes what is shown of bones, after what is over the tolerance (see `RigMotion.over`).
+
+Returns their numbers, and none where nothing is left to be changed.
+"""
 
 
 class Proof:
@@ -70,19 +73,19 @@ class Proof:
     def _is_mended(
         self, number: int, allowed: float, fewer: dict[int, Source], mend: Mend, *, as_written: bool
     ) -> bool:
-        """Return whether anything was to be mended in a stretch. After that only what it touches is looked at."""
+        """Return whether anything was mended in a stretch. After that only what it touches is looked at."""
         if self._looked_at is None or self._looked_at[0] != number:
             self._looked_at = number, self.rig.at(self._stretches[number])
         stretch = part = self._looked_at[1]
-        found = over = self._over(stretch, allowed, fewer, as_written=as_written)
-        while over:
-            before = dict(fewer)
-            changed = mend(over, part)
+        over, before = self._over(stretch, allowed, fewer, as_written=as_written), dict(fewer)
+        is_mended = False
+        while over and (changed := mend(over, part)):
+            is_mended = True
             part = stretch.among(self._touched(stretch.frames, changed, before, fewer))
-            over = self._over(part, allowed, fewer, as_written=as_written)
-        if as_written and not found:
+            over, before = self._over(part, allowed, fewer, as_written=as_written), dict(fewer)
+        if as_written and not is_mended:
             self._errors[number] = stretch.largest_errors()
-        return bool(found)
+        return is_mended
 
     def _over(
         self, motion: RigMotion, allowed: float, fewer: Mapping[int, Source], *, as_written: bool
