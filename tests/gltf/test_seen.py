@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.gltf import Options, Report, reduce_file
@@ -141,8 +141,24 @@ def holds(path: Path, tolerance: float | None) -> Report:
     return report
 
 
+GROWS_BETWEEN_KEYS = Choice(
+    seed=127,
+    tree="one place",
+    joints=2,
+    rest="zero",
+    shows=("mesh", "skin", "sword"),
+    moves=("rotation", "scale"),
+    motion="still",
+    interpolation="wild",
+    keys=5,
+    shared="samplers",
+)
+"""What morph targets move grows by a spline between its keys."""
+
+
 @settings(max_examples=tried(300), deadline=None)
 @given(choices(), st.none() | st.floats(-4.0, -1.2))
+@example(GROWS_BETWEEN_KEYS, None)
 def test_no_vertex_of_any_file_is_off_by_more_than_the_tolerance(tmp_path_factory, choice: Choice, share):
     """Tolerances are shares of the size of what is seen, as tens to a power; the default where that is too much."""
     path = choice.made().write(tmp_path_factory.mktemp("random") / "made.glb")

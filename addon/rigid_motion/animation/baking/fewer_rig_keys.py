@@ -410,8 +410,7 @@ class _Rig:
 
         def mend(over: list[tuple[float, int, int]], there: RigMotion) -> set[int]:
             mixed = {number for number in single if fewer[number] is not single[number]}
-            above = {item for _, number, _ in _apart(over, there) for item in there.above(number)}
-            changed = mixed & above or mixed
+            changed = mixed & {item for _, number, _ in _apart(over, there) for item in there.above(number)} or mixed
             fewer.update({number: single[number] for number in changed})
             return changed
 
