@@ -114,6 +114,16 @@ def test_nodes_that_share_a_mesh_each_carry_it(tmp_path):
     assert small < large / 3
 
 
+def test_weights_of_a_node_without_a_mesh_stay_in_every_clip(tmp_path):
+    made, own = walk(), np.array([[0.1], [0.2], [0.1], [0.2]], dtype="<f4")
+    made.json["meshes"] = [{"primitives": [{"attributes": {"POSITION": made.accessor(np.eye(3, dtype="<f4"))}}]}]
+    made.json["nodes"].append({"mesh": 0})
+    for clip in (0, 1):
+        made.channel(3, "weights", made.times([0.0, 1.0]), own, clip=clip)
+    _, after, _ = both(made, tmp_path, 1e-3)
+    assert all((3, "weights") in after.tracks(clip) for clip in (0, 1))
+
+
 def test_who_reduces_again_is_told(tmp_path):
     path = walk().write(tmp_path / "walk.glb")
     for tolerance, earlier in ((1e-3, None), (2e-3, 1e-3), (1e-3, 3e-3)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import secrets
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -89,6 +90,9 @@ def reduced(document: Document, options: Options) -> Report:
         reason = f"a tolerance of {tolerance:.3g} m is more than a tenth of the size, which is {size:.3g} m"
         return left_alone(f"{reason}: give one below {MOST * size:.2g} m", size)
     options = replace(options, tolerance=tolerance)
+    # What shows nothing is a library of clips for bodies that may rest in other ways.
+    keeps_all = options.channels == ALL_CHANNELS or not seen.reaches.any()
+    moved_by = {} if keeps_all else _moved_by(nodes, clips)
     result = []
     for clip in clips:
         if clip.tracks:
@@ -97,7 +101,9 @@ def reduced(document: Document, options: Options) -> Report:
             if options.radius is not None:
                 shells[:] = options.radius
             world = World(nodes, seen, own, shells, steadied(clip.all_tracks), _key_times(clip))
-            needed, amount = _needed(nodes, seen, clip, clips, options), amount_before(document, references, clip)
+            targets = ((track.node, track.path) for track in clip.tracks)
+            needed = {target for target in targets if keeps_all or moved_by[target] - {clip.number}}
+            amount = amount_before(document, references, clip)
             result.append(ClipReduction(world, clip, needed, joints, size, options, amount).reduced())
     tracks = {clip.number: clip.tracks for clip in result if clip.tracks is not None}
     with damage_refused():
@@ -150,22 +156,18 @@ def _key_times(clip: Clip) -> np.ndarray:
     return np.unique(np.concatenate([np.unique(ends)[[0, -1]], *moved]))
 
 
-def _needed(nodes: Nodes, seen: Seen, clip: Clip, clips: Sequence[Clip], options: Options) -> set[Target]:
-    """Return the channels of a clip that keep a key also where nodes are as they rest.
+def _moved_by(nodes: Nodes, clips: Sequence[Clip]) -> dict[Target, set[int]]:
+    """Return the numbers of the clips that have channels elsewhere than where their nodes rest.
 
-    What shows the clips after one another leaves a node where the clip before had it; and a file that shows nothing is
-    a library of clips for bodies that may rest in other ways.
+    These keep a key in all clips: what shows clips one after the other leaves a node where the clip before had it.
     """
-    if options.channels == ALL_CHANNELS or not seen.reaches.any():
-        return {(track.node, track.path) for track in clip.tracks}
-    return {
-        (track.node, track.path)
-        for track in (track for other in clips if other is not clip for track in other.all_tracks)
-        if not (
-            track.is_constant
-            and np.allclose(track.at(track.times[:1])[0], nodes.rest_of(track.node, track.path), atol=SINGLE)
-        )
-    }
+    result: dict[Target, set[int]] = defaultdict(set)
+    for clip in clips:
+        for track in clip.all_tracks:
+            rest, first = nodes.rest_of(track.node, track.path), track.at(track.times[:1])[0]
+            if not (track.is_constant and len(rest) == len(first) and np.allclose(first, rest, atol=SINGLE)):
+                result[track.node, track.path].add(clip.number)
+    return result
 
 
 def _require_proven(document: Document, nodes: Nodes, seen: Seen, clips: Sequence[Clip], tracks: NewTracks) -> None:
