@@ -48,6 +48,11 @@ class Rows:
     order: list[int] | slice
     """Of the columns."""
 
+    @property
+    def size(self) -> int:
+        """How many numbers these are."""
+        return self.count * math.prod(self.shape)
+
     def __getitem__(self, rows: slice) -> np.ndarray:
         first, end, _ = rows.indices(self.count)
         each = whole(entry(self.document.json, "accessors", self.number), "count") // self.count

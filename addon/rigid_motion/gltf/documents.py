@@ -16,6 +16,7 @@ import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from os.path import isfile
 from pathlib import Path, PureWindowsPath
 from typing import Any
@@ -123,7 +124,7 @@ class Document:
     changed: frozenset[int] = frozenset()
     original: int | None = None
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Bytes of the document and its buffers as they were read, or else as they are written."""
         if self.original is not None:

@@ -20,9 +20,8 @@ from ..motion.quaternions import matrices, normalise
 from .accessors import COMPRESSIONS, EVERY, KINDS, denormalised, numbers, raw_numbers
 from .documents import Document, GltfError, Json, entry, objects
 from .nodes import Nodes
+from .references import INSTANCES
 from .tracks import CUBICSPLINE, TO_WXYZ, WEIGHTS, Clip, Track
-
-INSTANCES = "EXT_mesh_gpu_instancing"
 
 OVERSHOOT = 4.0 / 27.0
 """How far a cubic leaves its end values, at most, for a tangent of 1 at one end."""

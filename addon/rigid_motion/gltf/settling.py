@@ -186,15 +186,19 @@ class Channel:
         """How far what the node carries, and what hangs on it, is moved by differences (m, width), of the tolerance."""
         off, world = np.abs(differences), self.world
         if self.track.path == WEIGHTS:
-            morph = world.seen.morphs.get(self.track.node)
-            moved = off @ morph.deltas * world.morph_scale(self.track.node) if morph else 0.0
-            return np.maximum(moved / self.tolerance, OF_CHANNELS / WITHIN_WEIGHTS * off.max(axis=1))
+            return np.maximum(off @ self._displaced / self.tolerance, OF_CHANNELS / WITHIN_WEIGHTS * off.max(axis=1))
         if self.track.path == TRANSLATION:
             return np.linalg.norm(off, axis=1) * world.longest_above[self.row] / self.tolerance
         reach = world.reaches[self.row] / self.tolerance
         if self.track.path == ROTATION:
             return 2.0 * reach * np.linalg.norm(off, axis=1)
         return reach * (off / self._largest).max(axis=1)
+
+    @cached_property
+    def _displaced(self) -> np.ndarray:
+        """How far a weight of 1 of each morph target moves anything in the world, at most, shape (width,)."""
+        node, morphs = self.track.node, self.world.seen.morphs
+        return morphs[node].deltas * self.world.morph_scale(node) if node in morphs else np.zeros(self.values.shape[1])
 
     @cached_property
     def _largest(self) -> np.ndarray:
@@ -225,5 +229,5 @@ def settled(channels: Iterable[Channel], needed: Container[Target]) -> dict[Targ
         elif track.path in (SCALE, WEIGHTS):
             keys = on_lines(channel.times, values, channel.measured, OF_CHANNELS)
             lines = replace(track, interpolation=LINEAR, times=channel.times[keys], values=values[keys])
-            result[target] = track.whole if channel.is_curved and len(lines) >= len(track) else lines
+            result[target] = track.whole if channel.is_curved and lines.size >= track.size else lines
     return result

@@ -7,7 +7,6 @@ Source: the glTF 2.0 specification, Khronos 2021, section 3.11 and appendix C.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -64,9 +63,10 @@ class Track:
     Of a cubic spline (n, 3, width): tangent before the key, its value, tangent after it.
     """
 
-    def __len__(self) -> int:
+    @property
+    def size(self) -> int:
         """How many numbers its keys are."""
-        return len(self.times) * (1 + self.points.shape[1] * (3 if self.interpolation == CUBICSPLINE else 1))
+        return len(self.times) + int(self.values.size)
 
     @property
     def points(self) -> np.ndarray:
@@ -191,17 +191,13 @@ def read_clips(document: Document) -> tuple[Clip, ...]:
     clips = []
     for number in range(len(objects(document.json, "animations"))):
         clips.append(_clip(document, number, times, most))
-        most -= sum(map(_numbers_of, clips[-1].all_tracks))
+        most -= sum(track.values.size for track in clips[-1].all_tracks)
     return tuple(clips)
 
 
 def moves_node(target: Json) -> bool:
     """Whether what a channel is of is a node, moved in a way that glTF itself knows."""
     return "node" in target and target.get("path") in PATHS
-
-
-def _numbers_of(track: Track) -> int:
-    return len(track.times) * math.prod(track.values.shape)
 
 
 def _clip(document: Document, number: int, times: dict[int, np.ndarray], most: int) -> Clip:
@@ -229,7 +225,7 @@ def _clip(document: Document, number: int, times: dict[int, np.ndarray], most: i
             raise GltfError(f"{shown(name)}: channel {index} is the second {track.path} of node {track.node}")
         targets.add((track.node, track.path))
         (pointers if known else tracks).append(track)
-        most -= _numbers_of(track)
+        most -= track.values.size
         if most < 0:
             problem = f"{shown(name)}: channel {index}: too many channels share the numbers of so small a file"
             raise GltfError(problem, "export fewer clips")

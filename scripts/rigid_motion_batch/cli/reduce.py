@@ -18,6 +18,7 @@ from rigid_motion_batch.system_libraries import require_blender
 SCRIPT = "reduce.py"
 PROGRAM = program_of(SCRIPT)
 
+from rigid_motion.gltf.clips import CHANNELS
 from rigid_motion.gltf.sizes import OF_A_BODY, OF_KEY_POSES
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import RIGID, Tolerance, radius_in_metres
@@ -143,8 +144,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     gltf.add_argument("--glb", action="store_true", help="write GLB files of .blend and FBX files and of recordings")
     gltf.add_argument(
         "--channels",
-        choices=("needed", "all"),
-        default="needed",
+        choices=CHANNELS,
+        default=CHANNELS[0],
         help="needed: a channel that stays at rest goes, unless another clip of the file moves it or the file has no "
         "meshes; all: every channel keeps at least one key (%(default)s)",
     )
