@@ -8,13 +8,6 @@ Imports go down only: each knows those before it, and `motion` none.
 __version__ = "0.1.0"
 
 
-def glTF2ExportUserExtension() -> object:
-    """Return what tells which clips to leave out: the glTF exporter of Blender looks for this name in add-ons."""
-    from .animation.gltf_export import LeaveOut
-
-    return LeaveOut()
-
-
 def register() -> None:
     # Not on top: importing `motion` needs no Blender.
     from . import animation, translations, ui

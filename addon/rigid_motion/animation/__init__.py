@@ -1,18 +1,18 @@
 """Blender's side of a motion: Actions, slots, channels, keys, and the in-betweens that go into them. No user interface.
 
-curves      F-curves as arrays, evaluated; NumPy alone
-compute     sources, which are what is keyed as arrays, and from them to differences; NumPy alone
+fcurves     F-curves as arrays, evaluated; NumPy alone
+evaluation  from what is keyed, as arrays, to the values that channels are to have; NumPy alone
 transforms  what is moved: objects and pose bones
 actions     what is keyed: slots, channels, modes; read into sources
-writers     where differences go: sampled F-curves of delta transforms, constraints of bones and their times
+terms       what is added to channels: planned, compared with what is there, written
 queries     what is asked of motions: keys, segments, problems
-live        following edits: handlers, refresh, keys that are inserted in between
-edits       what is done to motions: choosing modes, putting constraints back
+following   following edits: handlers, refresh, keys that are inserted in between
+edits       what is done to motions: choosing modes, turns, breakdowns
 baking      other keys for the same motion
 properties  what is kept in files
 
-Data flows from Blender through actions, compute and writers back to Blender. Each room imports only those above it;
-`handlers` belongs to none, and imports none; `gltf_export` is for Blender's glTF exporter, and imports none.
+Data flows from Blender through actions, evaluation and terms back to Blender. Each room imports only those above it;
+`handlers` belongs to none, and imports none.
 """
 
 from . import properties
@@ -29,12 +29,11 @@ from .baking.reducing import (
     restore_keys,
     total_reduction,
 )
-from .compute.components import MODE_IDS
 from .edits.breakdowns import Breakdowns, breakdown
-from .edits.constraints import constraint_trouble, error_between_frames, restore_constraints, set_exact
-from .edits.mode_keys import set_mode, set_turns
-from .live import follower, rigs
-from .live.follower import is_enabled, refresh, set_enabled
+from .edits.mode_keys import copy_modes, repeat, set_mode, set_turns
+from .evaluation.components import MODE_IDS
+from .following import follower
+from .following.follower import is_enabled, refresh, set_enabled
 from .queries.keyed import key_frames, modes_of
 from .queries.segments import problem_of
 from .transforms import Refused
@@ -51,9 +50,8 @@ __all__ = [
     "bake_poses",
     "breakdown",
     "channelbag_of",
-    "constraint_trouble",
+    "copy_modes",
     "discard_dense_keys",
-    "error_between_frames",
     "is_baked",
     "is_enabled",
     "is_reduced",
@@ -66,10 +64,9 @@ __all__ = [
     "reduction_of",
     "refresh",
     "register",
-    "restore_constraints",
+    "repeat",
     "restore_keys",
     "set_enabled",
-    "set_exact",
     "set_mode",
     "set_turns",
     "total_reduction",
@@ -81,11 +78,9 @@ __all__ = [
 
 def register() -> None:
     properties.register()
-    rigs.register()
     follower.register()
 
 
 def unregister() -> None:
     follower.unregister()
-    rigs.unregister()
     properties.unregister()

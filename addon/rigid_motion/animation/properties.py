@@ -1,7 +1,7 @@
-"""What is kept in the file, on Actions and on objects. Without the extension all of it is inert, and stays in the file.
+"""What is kept in the file, on objects and bones. Without the extension all of it is inert, and stays in the file.
 
-An Action keeps the modes of what it moves: see `records`. An object or a pose bone shows its own, to be chosen and to
-be animated; an object keeps the delta transforms that it has without in-betweens.
+What happens between keys is in the keys themselves, see `actions.marks`; an object or a pose bone shows it, to be
+chosen from Python and by a button.
 """
 
 from __future__ import annotations
@@ -11,12 +11,8 @@ from typing import Any
 
 import bpy
 from bpy.props import (
-    BoolProperty,
-    BoolVectorProperty,
     CollectionProperty,
     EnumProperty,
-    FloatProperty,
-    FloatVectorProperty,
     IntProperty,
     PointerProperty,
     StringProperty,
@@ -25,9 +21,11 @@ from bpy.props import (
 from ..motion import KEYFRAME_MODES
 from .actions.refusals import MOST_TURNS
 from .baking.originals import BAKED, REDUCED
-from .compute.sources import SCREW_AXIS
 from .edits import mode_keys
-from .live import follower
+from .evaluation.components import MODE_NUMBERS
+from .evaluation.sources import SCREW_AXIS
+from .following import follower
+from .queries.keyed import mode_shown
 from .transforms import OWN_WORDS, Refused, Transform, transform_of
 
 FIRST = ("motor_spline", "dq_sclerp")
@@ -36,7 +34,7 @@ FIRST = ("motor_spline", "dq_sclerp")
 MODE_ITEMS = [
     ("BLENDER", "Blender", "Blender's own in-betweens: every channel for itself", 0),
     *(
-        (name, mode.label, ". ".join(filter(None, (mode.description, mode.same))), mode.number)
+        (name, mode.label, ". ".join(filter(None, (mode.description, mode.same, mode.algebra))), mode.number)
         for name, mode in sorted(KEYFRAME_MODES.items(), key=lambda item: (*FIRST, item[0]).index(item[0]))
     ),
 ]
@@ -56,69 +54,31 @@ TURN_AXIS_ITEMS = [
 """The axes that turns are about."""
 
 
-def _on_turns_axis(record: SlotRecord, _context: bpy.types.Context) -> None:
-    follower.follower.refresh_edited({record.id_data})
-
-
-class SlotRecord(bpy.types.PropertyGroup):
-    """One transform in one slot: its mode, and what its in-betweens were made from."""
-
-    handle: IntProperty(options={"HIDDEN"})
-    prefix: StringProperty(options={"HIDDEN"})
-    mode: EnumProperty(items=MODE_ITEMS, options={"HIDDEN"})
-    digest: StringProperty(options={"HIDDEN"})
-    rows: StringProperty(options={"HIDDEN"})
-    turns_axis: EnumProperty(
-        name="Axis of Turns",
-        description="What the body turns about by whole turns more, in all segments of its Action",
-        items=TURN_AXIS_ITEMS,
-        options=set(),
-        translation_context=OWN_WORDS,
-        update=_on_turns_axis,
-    )
-    # What the constraint of a bone is called, where that is not its usual name.
-    constraint: StringProperty(options={"HIDDEN"})
-    # How many samples a frame the in-betweens have, and how far off they are between these, in Blender's units.
-    rate: IntProperty(default=1, options={"HIDDEN"})
-    error: FloatProperty(options={"HIDDEN"})
-
-
-class BoneSlot(bpy.types.PropertyGroup):
-    """A slot with bones in it, and the one that the differences of these are in."""
-
-    handle: IntProperty(options={"HIDDEN"})
-    differences: IntProperty(options={"HIDDEN"})
-
-
-class ActionMotion(bpy.types.PropertyGroup):
-    slots: CollectionProperty(type=SlotRecord)
-    bone_slots: CollectionProperty(type=BoneSlot)
-    # Whether the manual frame range was set for samples that lie behind the keys.
-    range_is_set_here: BoolProperty(options={"HIDDEN"})
-    # Whether samples lie outside of the keys that they are for, within those of others or not.
-    has_longer: BoolProperty(options={"HIDDEN"})
-    # Whether in-betweens of bones have one sample a frame, until more are needed.
-    is_draft: BoolProperty(options={"HIDDEN"})
-
-
-class ChangedAction(bpy.types.PropertyGroup):
-    """A copy of an Action that was given other keys, and what it is a copy of."""
+class ChangedKeys(bpy.types.PropertyGroup):
+    """A note on keys that were changed, and on where those from before are."""
 
     kind: EnumProperty(
         items=[(BAKED, "Baked", "It has keys for in-betweens too"), (REDUCED, "Reduced", "It has few of the keys")],
         options={"HIDDEN"},
     )
+    # The slot with these keys.
     changed: PointerProperty(type=bpy.types.Action)
+    handle: IntProperty(options={"HIDDEN"})
+    # What has those from before, and what their data paths begin with there.
     original: PointerProperty(type=bpy.types.Action)
-    # What location, rotation and scale had when the copy was made: what had no keys gets it back.
-    components: FloatVectorProperty(size=10, options={"HIDDEN"})
+    kept_as: StringProperty(options={"HIDDEN"})
     # What became of its keys where they were reduced: a `Reduction` as JSON.
     reduction: StringProperty(options={"HIDDEN"})
 
 
-def _on_mode(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
-    if not follower.follower.busy:
-        mode_keys.on_property(_transform_with(motion))
+def _get_mode(motion: _Motion) -> int:
+    return MODE_NUMBERS[mode_shown(_transform_with(motion))]
+
+
+def _set_mode(motion: _Motion, number: int) -> None:
+    # What refuses says so in the panel.
+    with suppress(Refused):
+        mode_keys.set_mode(_transform_with(motion), next(name for name, one in MODE_NUMBERS.items() if one == number))
 
 
 def _on_turns(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
@@ -137,15 +97,8 @@ def _transform_with(motion: ObjectMotion | BoneMotion) -> Transform:
     return transform_of(obj)
 
 
-def _on_original(motion: ObjectMotion, _context: bpy.types.Context) -> None:
-    follower.follow_original(transform_of(motion.id_data))
-
-
 KEPT: Any = {"options": {"HIDDEN"}, "override": {"LIBRARY_OVERRIDABLE"}}
 """How what is kept of something is declared."""
-
-ORIGINAL: Any = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}, "update": _on_original}
-"""How an object's own delta transforms are."""
 
 
 class _Motion:
@@ -153,11 +106,12 @@ class _Motion:
 
     mode: EnumProperty(
         name="Mode",
-        description="What happens between the keys. A key of this property decides from its frame on",
+        description="What happens between the keys, all of them. Editors of keys have it for single ones",
         items=MODE_ITEMS,
-        options={"ANIMATABLE"},
-        override={"LIBRARY_OVERRIDABLE"},
-        update=_on_mode,
+        translation_context=OWN_WORDS,
+        options=set(),
+        get=_get_mode,
+        set=_set_mode,
     )
     turns: IntProperty(
         name="Turns",
@@ -175,57 +129,18 @@ class _Motion:
     )
     # The mode that was chosen before there was an Action to keep it.
     awaited: EnumProperty(items=MODE_ITEMS, **KEPT)
-    # The constraints that it was given. Who takes one off does so on purpose.
-    mounted: StringProperty(**KEPT)
-    bakes: CollectionProperty(type=ChangedAction, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
+    bakes: CollectionProperty(type=ChangedKeys, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
 
 
 class BoneMotion(_Motion, bpy.types.PropertyGroup):
-    # The name that Actions have records of the bone under. Where it has another, it was renamed.
-    recorded_as: StringProperty(**KEPT)
+    pass
 
 
 class ObjectMotion(_Motion, bpy.types.PropertyGroup):
-    # Whether in-betweens are exact between frames, by a constraint, and not in delta transforms.
-    is_exact: BoolProperty(**KEPT)
-    # Which components of delta transforms in-betweens are in; the object's own are kept meanwhile.
-    filled: BoolVectorProperty(size=13, **KEPT)
-    own_location: FloatVectorProperty(
-        name="Delta Location",
-        description="The object's own delta location, to which the in-betweens are added",
-        subtype="TRANSLATION",
-        **ORIGINAL,
-    )
-    own_quaternion: FloatVectorProperty(
-        name="Delta Rotation",
-        translation_context=OWN_WORDS,
-        description="The object's own delta rotation, to which the in-betweens are added",
-        size=4,
-        default=(1.0, 0.0, 0.0, 0.0),
-        subtype="QUATERNION",
-        **ORIGINAL,
-    )
-    own_euler: FloatVectorProperty(
-        name="Delta Rotation",
-        translation_context=OWN_WORDS,
-        description="The object's own delta rotation, to which the in-betweens are added",
-        subtype="EULER",
-        **ORIGINAL,
-    )
-    own_scale: FloatVectorProperty(
-        name="Delta Scale",
-        description="The object's own delta scale, by which the in-betweens are multiplied",
-        default=(1.0, 1.0, 1.0),
-        subtype="XYZ",
-        **ORIGINAL,
-    )
-    # Whether bones have modes, or constraints for them.
-    has_bones: BoolProperty(**KEPT)
-    # Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode.
-    detached: BoolProperty(**KEPT)
+    pass
 
 
-CLASSES = (SlotRecord, BoneSlot, ActionMotion, ChangedAction, BoneMotion, ObjectMotion)
+CLASSES = (ChangedKeys, BoneMotion, ObjectMotion)
 
 
 def register() -> None:
@@ -233,11 +148,9 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Object.rigid_motion = PointerProperty(type=ObjectMotion, override={"LIBRARY_OVERRIDABLE"})
     bpy.types.PoseBone.rigid_motion = PointerProperty(type=BoneMotion, override={"LIBRARY_OVERRIDABLE"})
-    bpy.types.Action.rigid_motion = PointerProperty(type=ActionMotion)
 
 
 def unregister() -> None:
-    del bpy.types.Action.rigid_motion
     del bpy.types.PoseBone.rigid_motion
     del bpy.types.Object.rigid_motion
     for cls in reversed(CLASSES):

@@ -31,7 +31,7 @@ class Mode:
     --------
     >>> from rigid_motion.motion import MODES
     >>> MODES["motor_spline"].label, MODES["motor_spline"].is_smooth
-    ('Smooth Screw (PGA)', True)
+    ('Smooth Screw', True)
     >>> [name for name, mode in MODES.items() if mode.for_streams]
     ['motor_spline_causal']
     """
@@ -45,11 +45,14 @@ class Mode:
     description: str
     """What it does for the motion, in one sentence, as a tooltip shows it."""
 
+    algebra: str
+    """What it is computed with, in a sentence of its own."""
+
     curves: Callable[[Segments], Curves] = field(repr=False)
     """The fast form."""
 
     reference: Callable[[Poses, Poses, np.ndarray], Poses] = field(repr=False)
-    """The same motion in the algebra it is named after, for single pairs of poses."""
+    """The same motion in that algebra, for single pairs of poses."""
 
     behind: int = 0
     """How many keys before a segment influence it."""
@@ -63,21 +66,11 @@ class Mode:
     is_separable: bool = False
     """Whether neither rotation nor location depends on the other, so that each can have keys of its own."""
 
-    short: str = ""
-    """As a pie menu shows it, where that is not the label without the algebra."""
-
     same: str = ""
     """Which other mode makes the same motion, and when, in one sentence."""
 
-    @property
-    def short_label(self) -> str:
-        """The label without the algebra, for a pie menu."""
-        return self.short or self.label.partition(" (")[0]
-
-    @property
-    def algebra(self) -> str:
-        """The algebra that it is named after, as in its label; empty for vectors and quaternions."""
-        return self.label.partition(" (")[2].rstrip(")")
+    twin: str = ""
+    """The name in `MODES` of the one that makes the same motion where nothing grows."""
 
     @property
     def is_smooth(self) -> bool:
@@ -88,55 +81,64 @@ class Mode:
 MODES: dict[str, Mode] = {
     "lerp_slerp": Mode(
         1,
-        "Vector + Quaternion",
-        "The origin runs along a straight line while the object turns at an even speed",
+        "Straight",
+        "The origin runs along a straight line while the body turns at an even speed",
+        "Algebra: vectors and quaternions",
         curves.lerp_slerp,
         vector_quaternion.lerp_slerp,
         is_separable=True,
     ),
     "dq_sclerp": Mode(
         2,
-        "Screw (Dual Quaternion)",
+        "Screw",
         "Turns about and slides along one fixed axis in space, both at an even speed",
+        "Algebra: dual quaternions",
         curves.screw,
         dual_quaternions.dq_sclerp,
     ),
     "pga_lerp": Mode(
         3,
-        "Motor Blend (PGA)",
+        "Screw Blend",
         "Nearly the screw motion, slower at the keys and faster half-way",
+        "Algebra: motors of projective geometric algebra (PGA)",
         curves.motor_lerp,
         pga.pga_lerp,
     ),
     "pga_slerp": Mode(
         4,
-        "Motor Screw (PGA)",
-        "The screw motion, by the exponential of the motor's logarithm",
+        "Motor Screw",
+        "The screw motion, computed as the exponential of the motor's logarithm",
+        "Algebra: motors of projective geometric algebra (PGA)",
         curves.screw,
         pga.pga_slerp,
         same="The same motion as Screw",
+        twin="dq_sclerp",
     ),
     "cga_lerp": Mode(
         5,
-        "Versor Blend (CGA)",
-        "The motor blend, with uniform scale blended along with it",
+        "Spiral Blend",
+        "The motion of Screw Blend, with uniform scale blended along with it",
+        "Algebra: versors of conformal geometric algebra (CGA)",
         curves.similarity_lerp,
         cga.cga_lerp,
-        same="The same motion as Motor Blend where nothing grows",
+        same="The same motion as Screw Blend where nothing grows",
+        twin="pga_lerp",
     ),
     "cga_slerp": Mode(
         6,
-        "Versor Spiral (CGA)",
-        "Turns, slides and grows at even rates: a screw that widens as the object grows",
+        "Spiral",
+        "Turns, slides and grows at even rates: a screw that widens as the body grows",
+        "Algebra: versors of conformal geometric algebra (CGA)",
         curves.similarity_slerp,
         cga.cga_slerp,
-        short="Spiral",
         same="The same motion as Screw where nothing grows",
+        twin="dq_sclerp",
     ),
     "motor_spline": Mode(
         7,
-        "Smooth Screw (PGA)",
+        "Smooth Screw",
         "Screws that flow into one another: no corner at a key, neither in the path nor in the turning",
+        "Algebra: motors of projective geometric algebra (PGA)",
         curves.motor_spline,
         pga.pga_slerp,
         behind=1,
@@ -147,6 +149,7 @@ MODES: dict[str, Mode] = {
         8,
         "Smooth Screw for Streams",
         "Screws that flow into one another as far as that can be without knowing what comes after the next key",
+        "Algebra: motors of projective geometric algebra (PGA)",
         curves.motor_spline_causal,
         pga.pga_slerp,
         behind=2,

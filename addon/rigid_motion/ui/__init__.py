@@ -1,40 +1,24 @@
 """What an animator sees: operators, menus, panels, the overlay and the preferences. No mathematics.
 
-targets         what an editor means, and operators on it    operators    what can be done to that
-pose_operators  Blender's and Rigify's, as is seen           reducing     fewer keys, and all of them again
-menus           entries in Blender's menus, and the pies     breakdown    those that key poses by a slider
-keymap          shortcuts                                    panels       the sidebar, with its notes
-shown           the transform seen on the screen             overlay      paths in the viewport
-wording         labels, texts and lines of a panel           preferences  of the extension
-gltf_export     glTF files with few keys                     live         bodies over a network
-manual          where the documentation is
+targets      what an editor means, and operators on it    operators    what can be done to that
+reducing     fewer keys, and all of them again            breakdown    operators that key poses by a slider
+menus        entries in Blender's menus, and the pies     keymap       shortcuts
+panels       the sidebar, with its notes                  overlay      paths in the viewport
+wording      labels, texts and lines of a panel           preferences  of the extension
+gltf_export  glTF files with few keys                     live         bodies over a network
+manual       where the documentation is
 """
 
 from __future__ import annotations
 
 import bpy
 
-from . import (
-    breakdown,
-    gltf_export,
-    keymap,
-    live,
-    manual,
-    menus,
-    operators,
-    overlay,
-    panels,
-    pose_operators,
-    preferences,
-    reducing,
-    shown,
-)
+from . import breakdown, gltf_export, keymap, live, manual, menus, operators, overlay, panels, preferences, reducing
 
 CLASSES = (
     *preferences.CLASSES,
     *operators.CLASSES,
     *breakdown.CLASSES,
-    *pose_operators.CLASSES,
     *reducing.CLASSES,
     *gltf_export.CLASSES,
     *menus.CLASSES,
@@ -45,7 +29,6 @@ CLASSES = (
 
 def register() -> None:
     overlay.register()
-    shown.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     live.register()
@@ -62,5 +45,4 @@ def unregister() -> None:
     live.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
-    shown.unregister()
     overlay.unregister()

@@ -31,18 +31,6 @@ WAY = 300.0
 FINE, STEP = 0.1, 0.1
 """The part of a movement that Shift leaves, and the steps of Ctrl."""
 
-DIGITS = {
-    **{name: str(n) for n, name in enumerate(("ZERO", "ONE", "TWO", "THREE", "FOUR"))},
-    **{name: str(n) for n, name in enumerate(("FIVE", "SIX", "SEVEN", "EIGHT", "NINE"), 5)},
-    **{f"NUMPAD_{n}": str(n) for n in range(10)},
-    "PERIOD": ".",
-    "NUMPAD_PERIOD": ".",
-    "COMMA": ".",
-    "MINUS": "-",
-    "NUMPAD_MINUS": "-",
-}
-"""The characters that keys type into a number."""
-
 LINE, HANDLE, TEXT = (0.8, 0.8, 0.8, 0.7), (0.28, 0.45, 0.7, 1.0), (0.95, 0.95, 0.95, 1.0)
 """Colours, red, green, blue, alpha."""
 
@@ -99,8 +87,8 @@ class Slider:
             self.overshoots = not self.overshoots
         elif event.type == "BACK_SPACE":
             self.typed = self.typed[:-1]
-        elif event.type in DIGITS:
-            self.typed += DIGITS[event.type]
+        elif event.unicode and event.unicode in "0123456789.,-":
+            self.typed += event.unicode.replace(",", ".")
         else:
             return False
         return True
@@ -178,7 +166,7 @@ class _Breakdown(OnTargets):
 
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO", "BLOCKING", "GRAB_CURSOR_X"}
     nothing_to_do = n_(
-        "These objects have Blender's own in-betweens: choose a mode first, or take Blender's Pose > In-Betweens"
+        "All of it has Blender's own in-betweens: choose a mode first, or take Blender's Pose > In-Betweens"
     )
     with_work = staticmethod(with_modes)
     kind: ClassVar[str]

@@ -1,22 +1,16 @@
-"""Shortcuts: Alt T for the pie menus, beside T, by which Blender chooses the interpolation of keys; and Ctrl C in Pose
-Mode, which is Blender's own again where its poll fails.
-"""
+"""Shortcuts: Alt T for the pie menus, beside T, by which Blender chooses the interpolation of keys."""
 
 from __future__ import annotations
 
-import sys
 from typing import NamedTuple
 
 import bpy
 import rna_keymap_ui
 from bpy.app.translations import contexts
 
-from .menus import RIGID_MOTION_MT_pie_keys, RIGID_MOTION_MT_pie_object, RIGID_MOTION_MT_pie_pose
-from .pose_operators import RIGID_MOTION_OT_copy_pose
+from .menus import RIGID_MOTION_MT_pie_keys, RIGID_MOTION_MT_pie_view
 
 PIE = "wm.call_menu_pie"
-COMMAND = "oskey" if sys.platform == "darwin" else "ctrl"
-"""The modifier that Blender has for copying."""
 
 
 class Shortcut(NamedTuple):
@@ -24,19 +18,14 @@ class Shortcut(NamedTuple):
     space: str
     """The space of the keymap."""
 
-    operator: str
-    key: str
-    modifier: str
-    menu: str = ""
-    """The menu that the operator calls."""
+    menu: str
 
 
 SHORTCUTS = (
-    Shortcut("Object Mode", "EMPTY", PIE, "T", "alt", RIGID_MOTION_MT_pie_object.__name__),
-    Shortcut("Pose", "EMPTY", PIE, "T", "alt", RIGID_MOTION_MT_pie_pose.__name__),
-    Shortcut("Dopesheet", "DOPESHEET_EDITOR", PIE, "T", "alt", RIGID_MOTION_MT_pie_keys.__name__),
-    Shortcut("Graph Editor", "GRAPH_EDITOR", PIE, "T", "alt", RIGID_MOTION_MT_pie_keys.__name__),
-    Shortcut("Pose", "EMPTY", RIGID_MOTION_OT_copy_pose.bl_idname, "C", COMMAND),
+    Shortcut("Object Mode", "EMPTY", RIGID_MOTION_MT_pie_view.__name__),
+    Shortcut("Pose", "EMPTY", RIGID_MOTION_MT_pie_view.__name__),
+    Shortcut("Dopesheet", "DOPESHEET_EDITOR", RIGID_MOTION_MT_pie_keys.__name__),
+    Shortcut("Graph Editor", "GRAPH_EDITOR", RIGID_MOTION_MT_pie_keys.__name__),
 )
 
 _items: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
@@ -48,9 +37,8 @@ def register() -> None:
         return
     for shortcut in SHORTCUTS:
         keymap = configuration.keymaps.new(name=shortcut.keymap, space_type=shortcut.space)
-        item = keymap.keymap_items.new(shortcut.operator, shortcut.key, "PRESS", **{shortcut.modifier: True})
-        if shortcut.menu:
-            item.properties.name = shortcut.menu
+        item = keymap.keymap_items.new(PIE, "T", "PRESS", alt=True)
+        item.properties.name = shortcut.menu
         _items.append((keymap, item))
 
 
@@ -66,7 +54,7 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     for shortcut in SHORTCUTS:
         keymap = configuration.keymaps.find(shortcut.keymap, space_type=shortcut.space)
         for item in keymap.keymap_items if keymap else ():
-            if item.idname == shortcut.operator and (not shortcut.menu or item.properties.name == shortcut.menu):
+            if item.idname == PIE and item.properties.name == shortcut.menu:
                 row = layout.column()
                 row.context_pointer_set("keymap", keymap)
                 row.label(text=shortcut.keymap, text_ctxt=contexts.id_windowmanager)

@@ -12,6 +12,7 @@ from bpy.app.translations import pgettext_tip as tip_
 from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ..animation.properties import MODE_ITEMS
+from ..animation.transforms import OWN_WORDS
 from ..live import receiving, sending
 from ..live.driving import matched
 from ..live.sockets import NotAllowed
@@ -78,6 +79,7 @@ class LiveSettings(bpy.types.PropertyGroup):
         name="Mode",
         description="What fills in between the keys that are recorded",
         items=MODE_ITEMS,
+        translation_context=OWN_WORDS,
         default="lerp_slerp",
     )
     tolerance: FloatProperty(

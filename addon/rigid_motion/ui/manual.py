@@ -13,36 +13,32 @@ DOCS = f"{WEBSITE}/blob/main/docs/"
 ANIMATORS = "animators.md"
 
 MODES = f"{ANIMATORS}#which-mode-is-good-for-what"
-SEE = f"{ANIMATORS}#see-the-motion"
 EDIT = f"{ANIMATORS}#edit"
 BREAKDOWN = f"{ANIMATORS}#breakdown-push-and-relax"
-IN_THE_FILE = f"{ANIMATORS}#what-is-in-the-file"
 LIMITS = f"{ANIMATORS}#limits"
 LIVE = "live.md"
 
 PAGES = (
     ("bpy.ops.rigid_motion.set_mode", MODES),
-    *((f"bpy.ops.rigid_motion.{name}", EDIT) for name in ("set_turns", "copy_pose", "create_pose_asset")),
-    *((f"bpy.ops.rigid_motion.{name}", BREAKDOWN) for name in ("breakdown", "push", "relax")),
+    *((f"bpy.ops.rigid_motion.{name}", EDIT) for name in ("set_turns", "copy_mode", "add_cycles")),
+    *(
+        (f"bpy.ops.rigid_motion.{name}", f"{ANIMATORS}#breakdown-push-and-relax")
+        for name in ("breakdown", "push", "relax")
+    ),
     ("bpy.ops.rigid_motion.*bake", f"{ANIMATORS}#bake"),
     ("bpy.ops.rigid_motion.reduce_keys", "reduction.md"),
     ("bpy.ops.rigid_motion.*_keys", f"{ANIMATORS}#reduce-keys"),
-    ("bpy.ops.rigid_motion.mend", IN_THE_FILE),
-    ("bpy.ops.rigid_motion.exact", LIMITS),
     ("bpy.ops.rigid_motion.refresh", LIMITS),
     ("bpy.ops.rigid_motion.live_*", LIVE),
     ("bpy.ops.rigid_motion.*", f"{ANIMATORS}#choose-a-mode"),
     ("bpy.types.livesettings.*", LIVE),
     ("bpy.types.livebone.*", LIVE),
     ("bpy.types.objectmotion.mode", MODES),
-    ("bpy.types.objectmotion.own_*", IN_THE_FILE),
     ("bpy.types.objectmotion.*", EDIT),
-    ("bpy.types.slotrecord.*", EDIT),
     ("bpy.types.bonemotion.mode", f"{ANIMATORS}#rigs"),
     ("bpy.types.bonemotion.*", EDIT),
-    ("bpy.types.rigidmotionoverlay.*", SEE),
+    ("bpy.types.rigidmotionoverlay.*", f"{ANIMATORS}#see-the-motion"),
     ("bpy.types.rigidmotionpreferences.*", f"{ANIMATORS}#install"),
-    ("bpy.types.showntransform.*", SEE),
 )
 """Operators and properties, in lower case as Blender asks for them, and the page of each: the first that fits."""
 

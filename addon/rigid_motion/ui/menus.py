@@ -6,33 +6,41 @@ whole object, or in Pose Mode for the whole bone. The mode that is chosen at pre
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
-from ..animation.transforms import OWN_WORDS
+from ..animation.actions.slots import active_fcurves
+from ..animation.evaluation.components import SCALE
+from ..animation.transforms import OWN_WORDS, Transform
 from .gltf_export import RIGID_MOTION_OT_export_gltf
-from .pose_operators import RIGID_MOTION_OT_copy_pose, RIGID_MOTION_OT_create_pose_asset, draw_parent_switch
-from .targets import CURRENT, SELECTED, WHOLE, active_target, is_posing, modes_meant
-from .wording import LABELS, SHORT_LABELS
+from .targets import CURRENT, SELECTED, WHOLE, active_target, modes_meant
+from .wording import LABELS, twin_of
 
 
-def _draw_modes(
-    context: bpy.types.Context,
-    layout: bpy.types.UILayout,
-    scope: str,
-    modes: Iterable[str] = LABELS,
-    labels: Mapping[str, str] = LABELS,
-    no_icon: str = "BLANK1",
+def _draw_modes(context: bpy.types.Context, layout: bpy.types.UILayout, scope: str) -> None:
+    """Draw all modes, and behind those that make the same motion as another one what that is."""
+    active = active_target(context)
+    present, grows = modes_meant(context, active, scope), _grows(active)
+    for mode, label in LABELS.items():
+        text = iface_(label, OWN_WORDS)
+        if twin := twin_of(mode, grows=grows):
+            text += f" (= {iface_(LABELS[twin], OWN_WORDS)})"
+        _draw_mode(layout, mode, scope, text, present, "BLANK1")
+
+
+def _draw_mode(
+    layout: bpy.types.UILayout, mode: str, scope: str, text: str, present: set[str], no_icon: str = "NONE"
 ) -> None:
-    present = modes_meant(context, active_target(context), scope)
-    for mode in modes:
-        # One tick where all is one; dots where modes are mixed.
-        icon = no_icon if mode not in present else "CHECKMARK" if len(present) == 1 else "DOT"
-        text = iface_(labels[mode], OWN_WORDS) if labels is SHORT_LABELS else iface_(labels[mode])
-        properties = layout.operator("rigid_motion.set_mode", text=text, icon=icon, translate=False)
-        properties.mode, properties.on = mode, scope
+    # One tick where all is one; dots where modes are mixed.
+    icon = no_icon if mode not in present else "CHECKMARK" if len(present) == 1 else "DOT"
+    properties = layout.operator("rigid_motion.set_mode", text=text, icon=icon, translate=False)
+    properties.mode, properties.on = mode, scope
+
+
+def _grows(target: Transform | None) -> bool:
+    """Return whether something has keys of its scale."""
+    path = "" if target is None else target.prefix + SCALE
+    return target is not None and any(fcurve.data_path == path for fcurve in active_fcurves(target.animated))
 
 
 def _draw_breakdowns(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
@@ -41,61 +49,48 @@ def _draw_breakdowns(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
         self.layout.operator(f"rigid_motion.{name}")
 
 
-def _draw_rest(self: bpy.types.Menu, context: bpy.types.Context, pie: str) -> None:
-    layout = self.layout
-    layout.operator("rigid_motion.set_turns", text="Set Turns...")
-    _draw_breakdowns(self, context)
-    layout.separator()
-    layout.operator("rigid_motion.bake", text="Bake to Keys...")
-    layout.operator("rigid_motion.unbake")
-    layout.separator()
-    for name in ("reduce_keys", "restore_keys", "discard_dense_keys"):
-        layout.operator(f"rigid_motion.{name}")
-    layout.separator()
-    layout.operator("rigid_motion.clear")
-    layout.operator("rigid_motion.refresh")
-    layout.operator("rigid_motion.mend" if is_posing(context) else "rigid_motion.exact")
-    layout.separator()
-    layout.operator("wm.call_menu_pie", text="Pie Menu").name = pie
-
-
-class _InView:
-    """For all that is selected in a viewport."""
+class _Menu:
+    """All there is for one scope; the other one is in a menu of its own."""
 
     bl_label = "Rigid Motion"
+    scope: str
+    beside: str
+    """The menu of modes for the other scope."""
+
     pie: str
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.operator_context = "INVOKE_REGION_WIN"
-        _draw_modes(context, layout, WHOLE)
+        _draw_modes(context, layout, self.scope)
         layout.separator()
-        layout.menu(RIGID_MOTION_MT_current.__name__)
-        _draw_rest(self, context, self.pie)
+        layout.menu(self.beside)
+        layout.separator()
+        layout.operator("rigid_motion.set_turns", text="Set Turns...")
+        layout.operator_menu_enum("rigid_motion.add_cycles", "mode")
+        layout.operator("rigid_motion.copy_mode")
+        _draw_breakdowns(self, context)
+        layout.separator()
+        layout.operator("rigid_motion.bake", text="Bake to Keys...")
+        layout.operator("rigid_motion.unbake")
+        layout.separator()
+        for name in ("reduce_keys", "restore_keys", "discard_dense_keys"):
+            layout.operator(f"rigid_motion.{name}")
+        layout.separator()
+        layout.operator("rigid_motion.clear")
+        layout.operator("rigid_motion.refresh")
+        layout.separator()
+        layout.operator("wm.call_menu_pie", text="Pie Menu").name = self.pie
 
 
-class RIGID_MOTION_MT_object(_InView, bpy.types.Menu):
-    bl_description = "How the selected objects move from key to key"
-    pie = "RIGID_MOTION_MT_pie_object"
+class RIGID_MOTION_MT_view(_Menu, bpy.types.Menu):
+    bl_description = "How the selected objects or bones move from key to key"
+    scope, beside, pie = WHOLE, "RIGID_MOTION_MT_current", "RIGID_MOTION_MT_pie_view"
 
 
-class RIGID_MOTION_MT_pose(_InView, bpy.types.Menu):
-    bl_description = "How the selected bones move from key to key"
-    pie = "RIGID_MOTION_MT_pie_pose"
-
-
-class RIGID_MOTION_MT_keys(bpy.types.Menu):
-    bl_label = "Rigid Motion"
+class RIGID_MOTION_MT_keys(_Menu, bpy.types.Menu):
     bl_description = "How objects and bones move on from the selected keys"
-
-    def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.operator_context = "INVOKE_REGION_WIN"
-        _draw_modes(context, layout, SELECTED)
-        layout.separator()
-        text = iface_("Whole Bone") if is_posing(context) else iface_("Whole Object")
-        layout.menu(RIGID_MOTION_MT_whole.__name__, text=text, translate=False)
-        _draw_rest(self, context, RIGID_MOTION_MT_pie_keys.__name__)
+    scope, beside, pie = SELECTED, "RIGID_MOTION_MT_whole", "RIGID_MOTION_MT_pie_keys"
 
 
 class RIGID_MOTION_MT_current(bpy.types.Menu):
@@ -107,20 +102,22 @@ class RIGID_MOTION_MT_current(bpy.types.Menu):
 
 
 class RIGID_MOTION_MT_whole(bpy.types.Menu):
-    bl_label = "Whole Object"
+    bl_label = "All Segments"
     bl_description = "One mode for all segments of the objects and bones that are shown"
 
     def draw(self, context: bpy.types.Context) -> None:
         _draw_modes(context, self.layout, WHOLE)
 
 
+MORE = "More"
+
 SLICES = (
     "BLENDER",
     "dq_sclerp",
-    "cga_lerp",
+    MORE,
     "motor_spline",
     "lerp_slerp",
-    "pga_slerp",
+    "cga_lerp",
     "cga_slerp",
     "pga_lerp",
 )
@@ -128,65 +125,54 @@ SLICES = (
 
 
 class _Pie:
-    """One slice for each mode: Blender's own in-betweens on the left, the screw on the right, the smooth one on top.
+    """One slice for each motion: Blender's own in-betweens on the left, the screw on the right, the smooth one on top.
 
-    Around them, what is alike is side by side: the screws, the blends, those that grow, those that go straight.
+    Where nothing grows, the slices of modes that differ from others only by that are empty. Below is the whole menu.
     """
 
     scope: str
+    menu: str
 
     def draw(self, context: bpy.types.Context) -> None:
-        # Entries of a menu are aligned, those of a pie stand alone.
-        _draw_modes(context, self.layout.menu_pie(), self.scope, SLICES, SHORT_LABELS, "NONE")
+        active, pie = active_target(context), self.layout.menu_pie()
+        present, grows = modes_meant(context, active, self.scope), _grows(active)
+        for mode in SLICES:
+            if mode == MORE:
+                pie.operator("wm.call_menu", text="More...").name = self.menu
+            elif twin_of(mode, grows=grows):
+                pie.separator()
+            else:
+                _draw_mode(pie, mode, self.scope, iface_(LABELS[mode], OWN_WORDS), present)
 
 
-class RIGID_MOTION_MT_pie_object(_Pie, bpy.types.Menu):
-    bl_label = "Rigid Motion of Object"
-    scope = WHOLE
-
-
-class RIGID_MOTION_MT_pie_pose(_Pie, bpy.types.Menu):
-    bl_label = "Rigid Motion of Bones"
-    scope = WHOLE
+class RIGID_MOTION_MT_pie_view(_Pie, bpy.types.Menu):
+    bl_label = "Rigid Motion"
+    scope, menu = WHOLE, RIGID_MOTION_MT_view.__name__
 
 
 class RIGID_MOTION_MT_pie_keys(_Pie, bpy.types.Menu):
     bl_label = "Rigid Motion of Keys"
-    scope = SELECTED
+    scope, menu = SELECTED, RIGID_MOTION_MT_keys.__name__
 
 
 CLASSES = (
-    RIGID_MOTION_MT_object,
-    RIGID_MOTION_MT_pose,
+    RIGID_MOTION_MT_view,
     RIGID_MOTION_MT_keys,
     RIGID_MOTION_MT_current,
     RIGID_MOTION_MT_whole,
-    RIGID_MOTION_MT_pie_object,
-    RIGID_MOTION_MT_pie_pose,
+    RIGID_MOTION_MT_pie_view,
     RIGID_MOTION_MT_pie_keys,
 )
 
 
-def _draw_in_view(self: bpy.types.Menu, context: bpy.types.Context) -> None:
+def _draw_in_view(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     self.layout.separator()
-    self.layout.menu((RIGID_MOTION_MT_pose if is_posing(context) else RIGID_MOTION_MT_object).__name__)
+    self.layout.menu(RIGID_MOTION_MT_view.__name__)
 
 
 def _draw_keys(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.menu(RIGID_MOTION_MT_keys.__name__)
-
-
-def _draw_copy(self: bpy.types.Menu, context: bpy.types.Context) -> None:
-    self.layout.separator()
-    self.layout.operator(RIGID_MOTION_OT_copy_pose.bl_idname, icon="COPYDOWN")
-    self.layout.operator(RIGID_MOTION_OT_create_pose_asset.bl_idname)
-    draw_parent_switch(self.layout, context)
-
-
-def _draw_copy_and_view(self: bpy.types.Menu, context: bpy.types.Context) -> None:
-    _draw_copy(self, context)
-    _draw_in_view(self, context)
 
 
 def _draw_export(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
@@ -200,8 +186,7 @@ ENTRIES = {
     "GRAPH_MT_context_menu": _draw_keys,
     "VIEW3D_MT_object_animation": _draw_in_view,
     "VIEW3D_MT_object_context_menu": _draw_in_view,
-    "VIEW3D_MT_pose": _draw_copy,
-    "VIEW3D_MT_pose_context_menu": _draw_copy_and_view,
+    "VIEW3D_MT_pose_context_menu": _draw_in_view,
     "VIEW3D_MT_pose_slide": _draw_breakdowns,
     "TOPBAR_MT_file_export": _draw_export,
 }

@@ -12,7 +12,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty
 
 from .. import animation
-from ..animation.properties import MODE_ITEMS, OWN_WORDS
+from ..animation.properties import MODE_ITEMS
+from ..animation.transforms import OWN_WORDS
 from . import keymap, manual
 from .wording import split
 
@@ -84,6 +85,7 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
         description="What Set Rigid Motion Mode takes where no mode is named: in Search, by a shortcut of your own",
         items=MODE_ITEMS,
         default=DEFAULT_MODE,
+        translation_context=OWN_WORDS,
     )
     live_update: BoolProperty(
         name="Live Update",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import bpy
@@ -11,17 +11,19 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from .. import animation
-from ..animation import Refused
+from ..animation import Reduction, Refused
 from ..animation.baking.originals import REDUCED
-from ..animation.properties import MODE_ITEMS, OWN_WORDS
+from ..animation.properties import MODE_ITEMS
 from ..animation.queries.polls import with_more_keys_than
-from ..animation.transforms import Transform
+from ..animation.transforms import OWN_WORDS, Transform
 from ..animation.transforms.sizes import first_tolerance
 from .targets import OnChanged, OnTargets, each_target, with_bones_of_rigs
-from .wording import counted_modes, labelled, reduced_to, reduction_rows, reduction_summary, split
+from .wording import labelled, reduction_rows, reduction_summary, split
 
-MOST_LISTED = 5
-"""Targets whose reductions are listed one by one."""
+
+def reduction_of(targets: Sequence[Transform]) -> Reduction | None:
+    """Return what became of the keys of a target, with its modes, or of those of several together."""
+    return animation.reduction_of(targets[0]) if len(targets) == 1 else animation.total_reduction(targets)
 
 
 class _OfRigsToo:
@@ -36,13 +38,13 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
     bl_idname = "rigid_motion.reduce_keys"
     bl_label = "Reduce Keys to Poses"
     bl_description = (
-        "Leave only the keys that the motion needs, location and rotation together, in a copy of the Action: "
-        "for imported motion capture, baked simulations and solved cameras. Restore Keys gives all of them back"
+        "Leave only the keys that the motion needs, location and rotation together: for imported motion capture, "
+        "baked simulations and solved cameras. Restore Keys gives all of them back"
     )
 
     nothing_to_do = n_(
-        "None of these objects has more than two keys. Constraints, drivers and simulations are turned into keys first "
-        "(Object > Animation > Bake Action, with Visual Keying)"
+        "Nothing here has more than two keys. Constraints, drivers and simulations are turned into keys first "
+        "(Animation > Bake Action, with Visual Keying)"
     )
     with_work = staticmethod(partial(with_more_keys_than, count=2))
 
@@ -98,6 +100,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         description="What fills in between the keys that are left, and which keys those are",
         items=[item for item in MODE_ITEMS if item[0] != "BLENDER"],
         default="motor_spline",
+        translation_context=OWN_WORDS,
     )
     best_of: BoolProperty(
         name="Best per Segment",
@@ -131,19 +134,9 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         of_rigs = ("hold",) if self.by == "NUMBER" else ("shared", "hold")
         for name in ("radius", "mode", "best_of", *(of_rigs if rigs else ())):
             layout.prop(self, name)
-        if rigs:
-            reduction = animation.total_reduction(targets)
-            column = layout.column(align=True)
-            for label, text in () if reduction is None else reduction_rows(context.scene, reduction):
-                labelled(column, label).label(text=text, translate=False)
-            return
-        for target in targets[:MOST_LISTED]:
-            if (reduction := animation.reduction_of(target)) is not None:
-                labelled(layout, target.name).label(text=reduced_to(context.scene, reduction), translate=False)
-                if self.best_of:
-                    column = layout.column(align=True)
-                    for line in counted_modes(reduction.segments):
-                        labelled(column).label(text=line, translate=False)
+        column = layout.column(align=True)
+        for label, text in reduction_rows(context.scene, reduction_of(targets)):
+            labelled(column, label).label(text=text, translate=False)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         targets = list(self.each_target(context))
@@ -154,7 +147,6 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         return super().execute(context)
 
     def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
-        scene = context.scene
         before = [len(target.motion.bakes) for target in targets]
         animation.reduce_keys_of(
             targets,
@@ -168,22 +160,15 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
             refused=refused,
         )
         reduced = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]
-        if not reduced:
-            return ""
-        if len(reduced) > MOST_LISTED or any(target.is_part for target in reduced):
-            return reduction_summary(scene, animation.total_reduction(reduced))
-        summaries = [reduction_summary(scene, animation.reduction_of(target)) for target in reduced]
-        if len(reduced) == len(targets) == 1:
-            return summaries[0]
-        return "; ".join(f"{target.name}: {summary}" for target, summary in zip(reduced, summaries, strict=True))
+        return reduction_summary(context.scene, reduction_of(reduced)) if reduced else ""
 
 
 class RIGID_MOTION_OT_restore_keys(_OfRigsToo, OnChanged, bpy.types.Operator):
     bl_idname = "rigid_motion.restore_keys"
     bl_label = "Restore Keys"
-    bl_description = "Give reduced objects all the keys back that they had before, to the last handle"
+    bl_description = "Give back all the keys that there were before they were reduced, to the last handle"
     kind = REDUCED
-    nothing_to_do = n_("The keys of these objects are not reduced")
+    nothing_to_do = n_("The keys here are not reduced")
     verb = staticmethod(animation.restore_keys)
     summary = n_("back to the keys from before they were reduced")
 
@@ -196,7 +181,7 @@ class RIGID_MOTION_OT_discard_dense_keys(_OfRigsToo, OnChanged, bpy.types.Operat
         "The reduced keys stay as they are"
     )
     kind = REDUCED
-    nothing_to_do = n_("The keys of these objects are not reduced")
+    nothing_to_do = n_("The keys here are not reduced")
     verb = staticmethod(animation.discard_dense_keys)
     summary = n_("the keys from before they were reduced are removed from the file")
 

@@ -21,39 +21,30 @@ from bpy.app.translations import pgettext_tip as tip_
 
 from ..animation import Refused, key_frames, modes_of
 from ..animation.actions.slots import active_fcurves
-from ..animation.baking.originals import BAKED, REDUCED, entries_of
+from ..animation.baking.originals import BAKED, REDUCED, notes_of
 from ..animation.queries.keyed import source_of
 from ..animation.queries.polls import with_more_keys_than
 from ..animation.queries.segments import frame_in_action, segment_at
-from ..animation.transforms import SEGMENT_PROPERTIES, WIDTHS, Transform, split_path, transform_in, transform_of
-from .wording import names_of, plural_of, spoken_of
+from ..animation.transforms import TURNS_PROPERTY, WIDTHS, Transform, split_path, transform_in, transform_of
+from .wording import names_of
 
 KEY_EDITORS = ("DOPESHEET_EDITOR", "GRAPH_EDITOR")
 
 WHOLE, CURRENT, SELECTED = "WHOLE", "CURRENT", "SELECTED"
 
 SCOPES = [
-    (WHOLE, "All Segments", "One mode for all segments. Keys of the mode are removed"),
-    (CURRENT, "Current Segment", "The segment that the playhead is in. The others keep their modes"),
-    (SELECTED, "Selected Keys", "The segments that the selected keys begin. The others keep their modes"),
+    (WHOLE, "All Segments", "All segments alike"),
+    (CURRENT, "Current Segment", "The segment that the playhead is in. The others stay as they are"),
+    (SELECTED, "Selected Keys", "The segments that the selected keys begin. The others stay as they are"),
 ]
-"""The parts of a target that get a mode, as the items of an enum property."""
+"""The parts of a target that get a mode or turns, as the items of an enum property."""
 
 Frames = tuple[float, ...] | None
 """Frames of keys, None for all of a target."""
 
-NO_TARGETS = n_("Select an object with keys first")
-
-NO_BONES = n_("Select bones first")
+NO_TARGETS = n_("Select objects or bones with keys first")
 
 NOTHING_SHOWN = n_("No keys of location, rotation or scale are shown here")
-
-BUT = {
-    "objects": n_("{done} of {count} objects: {summary}. But"),
-    "bones": n_("{done} of {count} bones: {summary}. But"),
-    "objects and bones": n_("{done} of {count} objects and bones: {summary}. But"),
-}
-"""The text before refusals where something was done."""
 
 LATER = {
     BAKED: n_("These keys were baked since: Un-Bake first"),
@@ -190,13 +181,13 @@ def modes_meant(context: bpy.types.Context, target: Transform | None, scope: str
 
 
 def _shown_in_editor(context: bpy.types.Context) -> Iterator[Transform]:
-    """Yield the objects and the bones of which location, rotation, scale or the mode is shown in a key editor."""
+    """Yield the objects and the bones of which location, rotation, scale or turns are shown in a key editor."""
     shown = {fcurve.as_pointer() for fcurve in context.visible_fcurves or ()}
     for obj in _animated_in_editor(context) if shown else ():
         result = set()
         for fcurve in active_fcurves(obj):
             prefix, prop = split_path(fcurve.data_path)
-            if prefix not in result and (prop in WIDTHS or prop in SEGMENT_PROPERTIES) and fcurve.as_pointer() in shown:
+            if prefix not in result and (prop in WIDTHS or prop == TURNS_PROPERTY) and fcurve.as_pointer() in shown:
                 result.add(prefix)
                 if (target := transform_in(obj, prefix)) is not None:
                     yield target
@@ -211,7 +202,7 @@ def _animated_in_editor(context: bpy.types.Context) -> Iterable[bpy.types.Object
 
 
 class OnTargets:
-    """Operators on the selected objects or bones, or on those that the editor shows. Their texts are about objects."""
+    """Operators on the selected objects or bones, or on those that the editor shows."""
 
     bl_options: Any = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender reads it
 
@@ -253,12 +244,8 @@ class OnTargets:
     def reason(cls, targets: list[Transform], context: bpy.types.Context) -> str:
         """Return why the operator is greyed out, in the user's language."""
         if targets:
-            return tip_(spoken_of(cls.nothing_to_do, plural_of(targets)))
-        return tip_(NOTHING_SHOWN if is_key_editor(context) else NO_BONES if is_posing(context) else NO_TARGETS)
-
-    @classmethod
-    def description(cls, context: bpy.types.Context, _properties: bpy.types.OperatorProperties) -> str:
-        return tip_(spoken_of(cls.bl_description, "bones" if is_posing(context) else "objects"))
+            return tip_(cls.nothing_to_do)
+        return tip_(NOTHING_SHOWN if is_key_editor(context) else NO_TARGETS)
 
     def execute(self, context: bpy.types.Context) -> Any:
         targets = self.meant(context)
@@ -298,9 +285,8 @@ class OnTargets:
             self.report({"ERROR"}, "\n".join(refusals))
             return {"CANCELLED"}
         if refused:
-            but = rpt_(BUT[plural_of(targets)]).format(
-                done=len(targets) - len(refused), count=len(targets), summary=summary
-            )
+            text = rpt_("{done} of {all}: {summary}. But")
+            but = text.format(done=len(targets) - len(refused), all=names_of(targets), summary=summary)
             self.report({"WARNING"}, "\n".join([but, *refusals]))
         else:
             self.report({"INFO"}, f"{names_of(targets)}: {summary}")
@@ -316,8 +302,8 @@ class OnChanged(OnTargets):
     def last_changes(cls, targets: Iterable[Transform]) -> dict[Transform, str]:
         """Return what was done last to the keys of each target that something was done to."""
         result = {}
-        for target, entries in entries_of(targets):
-            if kind := next((entry.kind for entry in entries if entry.original is not None), None):
+        for target, notes in notes_of(targets):
+            if kind := next((note.kind for note in notes if note.original is not None), None):
                 result[target] = kind
         return result
 
@@ -329,7 +315,7 @@ class OnChanged(OnTargets):
             return True
         reason = cls.reason(targets, context)
         for target, later in changes.items():
-            if any(entry.kind == cls.kind and entry.original is not None for entry in target.motion.bakes):
+            if any(note.kind == cls.kind and note.original is not None for note in target.motion.bakes):
                 reason = tip_(LATER[later])
         cls.poll_message_set(reason)
         return False

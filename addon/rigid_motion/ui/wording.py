@@ -7,8 +7,7 @@ labels two fifths of the width, and cuts the names of modes off in a sidebar as 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import blf
 import bpy
@@ -17,24 +16,14 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..animation import Reduction, WholeRig
-from ..animation.properties import MODE_ITEMS, OWN_WORDS
+from ..animation.evaluation.components import LOCATION, ROTATION
+from ..animation.properties import MODE_ITEMS
 from ..animation.queries.segments import NEAR_HALF_TURN, SegmentFacts
-from ..animation.transforms import Transform
-from ..animation.writers.bone_constraints import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
+from ..animation.transforms import OWN_WORDS, Transform
 from ..motion import KEYFRAME_MODES
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
-"""Each mode as menus show it."""
-
-SHORT_LABELS = {name: KEYFRAME_MODES[name].short_label if name in KEYFRAME_MODES else LABELS[name] for name in LABELS}
-"""Labels without the algebra, for pies and lists. Translated as `OWN_WORDS`: Blender has another Screw."""
-
-ALGEBRAS = {
-    "Dual Quaternion": n_("Algebra: dual quaternions"),
-    "PGA": n_("Algebra: motors of projective geometric algebra (PGA)"),
-    "CGA": n_("Algebra: versors of conformal geometric algebra (CGA)"),
-}
-"""The algebras that modes are named after."""
+"""Each mode as menus show it. Translated as `OWN_WORDS`: Blender has another Screw."""
 
 DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 """The effect of each mode on the motion, in one sentence without a full stop."""
@@ -45,33 +34,14 @@ NO_SEGMENT = n_("No segment on this frame")
 STRIPS = n_("Moved by strips: enter one to see its segments (NLA Editor, Tab)")
 BAKED = n_("Baked to keys. Un-Bake brings its own keys back")
 OUT_OF_DATE = n_("The keys have changed since: Live Update is off, in the preferences")
-DELTA_EDITED = n_(
-    "The delta transform holds the in-betweens, so this edit of it lasts until the frame changes. "
-    "To keep it, edit Delta Transform below"
-)
-
 NO_BONE = n_("No Bone Active")
-BLENDED = n_("Strips are blended here, and in-betweens of bones are approximate meanwhile. For exact ones, bake first")
-
-TROUBLES = {
-    REMOVED: ("ERROR", n_('The constraint "Rigid Motion" was removed, so the in-betweens are Blender\'s own')),
-    OTHER_SLOT: ("ERROR", n_('The constraint "Rigid Motion" shows another Action, not the one that moves the bone')),
-    MUTED: ("INFO", n_('The constraint "Rigid Motion" is muted, so the in-betweens are Blender\'s own')),
-    CHANGED: ("ERROR", n_('The constraint "Rigid Motion" has other settings, which put the bone elsewhere')),
-    NOT_FIRST: ("ERROR", n_('Another constraint comes before "Rigid Motion", which has to be the first')),
-    WEAK: (
-        "INFO",
-        n_('The constraint "Rigid Motion" has an influence below 1: a part of Blender\'s in-betweens is left'),
-    ),
-}
-"""Troubles with the constraint of a bone, each behind its icon."""
-
-COUNTED = {
-    "objects": n_("{count} objects"),
-    "bones": n_("{count} bones"),
-    "objects and bones": n_("{count} objects and bones"),
-}
-"""Several targets by their number."""
+PARTS = {LOCATION: n_("Location"), ROTATION: n_("Rotation")}
+MOVED_ALONE = n_(
+    "Keyed alone on frame {frames}: not all of {part} has a key there, so the motion is not rigid. Key all of it (I)"
+)
+DENSE = n_(
+    "{count} modifiers on a channel: with so many segments Blender plays slower. Reduce the keys, or clear the modes"
+)
 
 LABEL = 0.28
 """The part of the width that labels have."""
@@ -113,11 +83,12 @@ def cautions(segment: SegmentFacts) -> list[str]:
     return texts
 
 
-def algebra_of(mode: str) -> str:
-    """Return the line of a tooltip that says which algebra a mode is in, in English;
-    empty where it is named after none.
-    """
-    return ALGEBRAS.get(KEYFRAME_MODES[mode].algebra, "") if mode in KEYFRAME_MODES else ""
+def twin_of(mode: str, *, grows: bool) -> str:
+    """Return the mode that makes the same motion and that lists show in its place, "" for one that is its own."""
+    one = KEYFRAME_MODES.get(mode)
+    if one is None or not one.twin or (grows and one.curves is not KEYFRAME_MODES[one.twin].curves):
+        return ""
+    return one.twin
 
 
 def degrees(angle: float) -> str:
@@ -159,7 +130,7 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
             text = rpt_("; not promised for what follows constraints or drivers, and hangs on it: {bones}")
             summary += text.format(bones=listed(followers))
     if len(reduction.segments) > 1:
-        summary += rpt_("; segments: {modes}").format(modes=", ".join(counted_modes(reduction.segments)))
+        summary += rpt_("; segments: {modes}").format(modes=", ".join(_counted_modes(reduction.segments)))
     return summary
 
 
@@ -170,8 +141,10 @@ def reduced_to(scene: bpy.types.Scene, reduction: Reduction) -> str:
     return iface_("{keys}, {error} off").format(keys=became, error=error)
 
 
-def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[str, str]]:
+def reduction_rows(scene: bpy.types.Scene, reduction: Reduction | None) -> list[tuple[str, str]]:
     """Return what became of keys, and of the rig where it is one, as labels and what belongs to them."""
+    if reduction is None:
+        return []
     rows = [
         (iface_("Keys", OWN_WORDS), f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"),
         (
@@ -191,6 +164,8 @@ def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[s
         if followers := reduction.rig.not_promised.followers:
             # What follows constraints or drivers is somewhere else than its keys say.
             rows.append((iface_("Not Promised", OWN_WORDS), listed(followers)))
+    if len(reduction.segments) > 1:
+        rows += [("", line) for line in _counted_modes(reduction.segments)]
     return rows
 
 
@@ -202,10 +177,10 @@ def _slides(scene: bpy.types.Scene, rig: WholeRig) -> str | None:
     return iface_("{after}, recorded {before}").format(after=after, before=before)
 
 
-def counted_modes(segments: Mapping[str, int]) -> list[str]:
+def _counted_modes(segments: Mapping[str, int]) -> list[str]:
     """Return each mode with how many segments have it, most of them first."""
     return [
-        f"{count} {iface_(SHORT_LABELS[mode], OWN_WORDS)}"
+        f"{count} {iface_(LABELS[mode], OWN_WORDS)}"
         for mode, count in sorted(segments.items(), key=lambda item: -item[1])
     ]
 
@@ -218,24 +193,11 @@ def listed(items: Sequence[str], most: int = 3) -> str:
 
 def names_of(targets: Sequence[Transform]) -> str:
     """Return one target by its name, several by their number."""
-    return targets[0].name if len(targets) == 1 else rpt_(COUNTED[plural_of(targets)]).format(count=len(targets))
-
-
-def plural_of(targets: Iterable[Transform]) -> str:
-    """Return what several targets are called together."""
-    kinds = {target.plural for target in targets}
-    return "objects and bones" if len(kinds) > 1 else next(iter(kinds), "objects")
-
-
-def spoken_of(text: str, kind: str) -> str:
-    """Return a text about objects, as it is where `kind` is meant: "objects", "bones" or "objects and bones".
-
-    It is English in and out: what comes out is translated as a whole.
-    """
-    if kind == "bones":
-        text = text.replace("an object", "a bone").replace("Object > ", "Pose > ")
-        text = re.sub(r"\bobject\b", "bone", text)
-    return re.sub(r"\bobjects\b", kind, text)
+    if len(targets) == 1:
+        return targets[0].name
+    are_parts = {target.is_part for target in targets}
+    text = n_("{count} bones") if are_parts == {True} else n_("{count} objects")
+    return rpt_(text if len(are_parts) == 1 else n_("{count} objects and bones")).format(count=len(targets))
 
 
 def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ...motion import Poses
-from ..curves.keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys, Stepped
+from ..fcurves.keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
+from .marks import marks_of
+from .modifiers import is_term, read_cycles
 
 KEY_FIELDS = {
     "co": (2, np.float32),
@@ -171,18 +174,27 @@ def ensure_group(channelbag: bpy.types.ActionChannelbag, name: str) -> bpy.types
     return channelbag.groups.get(name) or channelbag.groups.new(name)
 
 
-def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag) -> bpy.types.FCurve:
-    """Return a copy of an F-curve in another slot or Action, which has none like it, in a group of the same name."""
-    copy = channelbag.fcurves.new(fcurve.data_path, index=fcurve.array_index)
-    if fcurve.group is not None:
-        copy.group = ensure_group(channelbag, fcurve.group.name)
+def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag, path: str) -> bpy.types.FCurve:
+    """Return a copy of an F-curve for this data path, in place of what another slot has there.
+
+    A new one is in a group of the same name. Terms are left out: they are planned from the keys.
+    """
+    index = fcurve.array_index
+    copy = channelbag.fcurves.find(path, index=index)
+    if copy is None:
+        copy = channelbag.fcurves.new(path, index=index)
+        if fcurve.group is not None:
+            copy.group = ensure_group(channelbag, fcurve.group.name)
+    for modifier in list(copy.modifiers):
+        copy.modifiers.remove(modifier)
     set_key_fields(copy, key_fields(fcurve.keyframe_points))
-    for modifier in fcurve.modifiers:
+    for modifier in itertools.filterfalse(is_term, fcurve.modifiers):
         _copy_settings(modifier, copied := copy.modifiers.new(modifier.type))
         if modifier.type == "ENVELOPE":
             for point in modifier.control_points:
                 _copy_settings(point, copied.control_points.add(point.frame))
     _copy_settings(fcurve, copy)
+    copy.data_path = path
     return copy
 
 
@@ -193,13 +205,6 @@ def _copy_settings(source: bpy.types.bpy_struct, target: bpy.types.bpy_struct) -
             value = getattr(source, prop.identifier)
             is_array = getattr(prop, "is_array", False)
             setattr(target, prop.identifier, tuple(value) if is_array else value)
-
-
-def add_cycles(fcurve: bpy.types.FCurve, cycles: Cycles) -> None:
-    """Give an F-curve a Cycles modifier like this."""
-    modifier = fcurve.modifiers.new("CYCLES")
-    modifier.mode_before, modifier.mode_after = cycles.before, cycles.after
-    modifier.cycles_before, modifier.cycles_after = cycles.before_count, cycles.after_count
 
 
 def code_of(name: str, value: str) -> int:
@@ -229,9 +234,20 @@ def read_poses(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
     return Poses(positions, quaternions, None if np.allclose(scales, 1.0, atol=1e-6) else scales)
 
 
-def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[list[int], Keys]]]:
-    """Return the keys of F-curves, the first Cycles modifier and the Stepped ones of each;
-    none of their other modifiers.
+class Read(NamedTuple):
+    """Channels of one owner that are keyed together."""
+
+    numbers: list[int]
+    """Their numbers in the sequence of the owner's channels."""
+
+    keys: Keys
+
+    marks: np.ndarray
+    """The marks of the keys, shape (n,): see `marks`."""
+
+
+def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[Read]]:
+    """Return the keys of F-curves, and the Cycles modifier that each begins with; none of their other modifiers.
 
     Parameters
     ----------
@@ -240,30 +256,31 @@ def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[
 
     Returns
     -------
-    list of lists of (list of int, Keys)
-        For each owner those together that are keyed together: their indices in its sequence, and their keys.
+    list of lists of Read
+        For each owner those together that are keyed together.
     """
     batches: dict[tuple, list[tuple]] = {}
     for owner, curves in enumerate(fcurves):
         for index, fcurve in enumerate(curves):
             keys = fcurve.keyframe_points
-            modifiers = fcurve.modifiers
-            cycles, steps = (read_cycles(modifiers), read_steps(modifiers)) if modifiers else (None, ())
-            batches.setdefault((len(keys), fcurve.extrapolation, cycles, steps), []).append((owner, index, keys))
-    result: list[list[tuple[list[int], Keys]]] = [[] for _ in fcurves]
-    for (_, extrapolation, cycles, steps), batch in batches.items():
+            cycles = read_cycles(fcurve)
+            batches.setdefault((len(keys), fcurve.extrapolation, cycles), []).append((owner, index, keys))
+    result: list[list[Read]] = [[] for _ in fcurves]
+    for (_, extrapolation, cycles), batch in batches.items():
         owners, indices, channels = zip(*batch, strict=True)
-        for rows, keys in _read_batch(owners, channels, extrapolation == "LINEAR", cycles, steps):
-            result[owners[rows[0]]].append(([indices[row] for row in rows], keys))
-    for keys_of_owner in result:
-        keys_of_owner.sort(key=lambda pair: pair[0])
+        for rows, keys, marks in _read_batch(owners, channels, extrapolation == "LINEAR", cycles):
+            result[owners[rows[0]]].append(Read([indices[row] for row in rows], keys, marks))
+    for reads in result:
+        reads.sort(key=lambda read: read.numbers)
     return result
 
 
 def _read_batch(
-    owners: Sequence[int], channels: Sequence, linear: bool, cycles: Cycles | None, steps: tuple[Stepped, ...]
-) -> Iterator[tuple[list[int], Keys]]:
-    """Yield the keys of channels with equally many `keyframe_points` each, and the rows of those keyed together."""
+    owners: Sequence[int], channels: Sequence, linear: bool, cycles: Cycles | None
+) -> Iterator[tuple[list[int], Keys, np.ndarray]]:
+    """Yield the rows of channels that are keyed together, of such with equally many `keyframe_points` each, and what
+    `Read` has of them.
+    """
     points = _read_property("co", channels, np.float32, 2)
     groups = _keyed_together(owners, points[..., 0])
     order = [row for rows in groups for row in rows]
@@ -285,7 +302,9 @@ def _read_batch(
     rows = np.flatnonzero(eased.repeat(sizes)).tolist()
     easing = _read_property("easing", channels, CODE, rows=rows)
     _replace_unknown(easing, EASINGS, AUTO)
-    settings = [_read_property(name, channels, np.float32, rows=rows) for name in ("back", "amplitude", "period")]
+    back, amplitude = (_read_property(name, channels, np.float32) for name in ("back", "amplitude"))
+    settings = [back, amplitude, _read_property("period", channels, np.float32, rows=rows)]
+    marks = marks_of(back, amplitude)
     # A key that is no breakdown in the first of the channels that are keyed together is none.
     breakdowns = _read_property("type", channels, CODE, rows=bounds[:-1].tolist()) == BREAKDOWN
     rows = np.flatnonzero(any_in_group(breakdowns).repeat(sizes)).tolist()
@@ -299,8 +318,8 @@ def _read_batch(
         easings = (easing[at], np.stack([values[at] for values in settings])) if eased[number] else (None, None)
         marked = breakdowns[at].all(axis=0)
         marked = marked if marked.any() else None
-        others = (linear, cycles, steps, marked, bool(sound[number]))
-        yield rows, Keys(points[at], interpolation[at], *handles, *easings, *others)
+        others = {"linear": linear, "cycles": cycles, "breakdowns": marked, "is_sound": bool(sound[number])}
+        yield rows, Keys(points[at], interpolation[at], *handles, *easings, **others), marks[at].max(axis=0)
 
 
 def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]]:
@@ -327,24 +346,3 @@ def _read_property(
 def _replace_unknown(codes: np.ndarray, names: dict[int, str], replacement: int) -> None:
     """Treat codes without a meaning, in a damaged file, as Blender does. Those with a meaning have no gaps."""
     codes[(codes < min(names)) | (codes > max(names))] = replacement
-
-
-def read_cycles(modifiers: Iterable[bpy.types.FModifier]) -> Cycles | None:
-    for modifier in modifiers:
-        if modifier.type == "CYCLES" and not modifier.mute:
-            return Cycles(modifier.mode_before, modifier.mode_after, modifier.cycles_before, modifier.cycles_after)
-    return None
-
-
-def read_steps(modifiers: Iterable[bpy.types.FModifier]) -> tuple[Stepped, ...]:
-    """Return the Stepped modifiers of an F-curve that are not muted, first to last."""
-    return tuple(
-        Stepped(
-            modifier.frame_step,
-            modifier.frame_offset,
-            modifier.frame_start if modifier.use_frame_start else -np.inf,
-            modifier.frame_end if modifier.use_frame_end else np.inf,
-        )
-        for modifier in modifiers
-        if modifier.type == "STEPPED" and not modifier.mute
-    )

@@ -1,32 +1,20 @@
 """Which Action slots move something, and the F-curves in them, transform by transform.
 
 A slot may have several users, and moves transforms of each: the object itself, and the bones of a rig.
-`bindings_in_slot` is where a slot is taken apart. What the in-betweens of bones differ in is in a second slot of the
-same Action.
+`bindings_in_slot` is where a slot is taken apart.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property, partial
 
 import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..transforms import (
-    CONSTRAINT,
-    GROUP,
-    SEGMENT_PROPERTIES,
-    WIDTHS,
-    Channel,
-    Transform,
-    prefix_of,
-    split_path,
-    transform_in,
-)
+from ..transforms import TURNS_PROPERTY, WIDTHS, Channel, Transform, split_path, transform_in
 
 Curves = dict[Channel, bpy.types.FCurve]
 
@@ -55,24 +43,6 @@ class Slot:
         return min(first for first, _ in spans), max(last for _, last in spans)
 
     @property
-    def in_nla(self) -> bool:
-        """Return whether a strip shows it, or stands beside it in the NLA of one of its users."""
-        return any(len(user.animation_data.nla_tracks) > 0 for user in self.users)
-
-    @property
-    def is_seen_between(self) -> bool:
-        """Return whether strips may show what is between the frames of its Action on whole frames of a scene."""
-        return any(
-            (strip.scale, strip.repeat) != (1.0, 1.0)
-            or strip.use_reverse
-            or strip.use_animated_time
-            or not (strip.frame_start - strip.action_frame_start).is_integer()
-            for user in self.users
-            for strip in strips_of(user)
-            if strip.action == self.action
-        )
-
-    @property
     def channelbag(self) -> bpy.types.ActionChannelbag | None:
         slot = slot_with(self.action, self.handle)
         return None if slot is None else action_get_channelbag_for_slot(self.action, slot)
@@ -82,21 +52,12 @@ class Slot:
         return () if (channelbag := self.channelbag) is None else channelbag.fcurves
 
     @property
-    def differences(self) -> int:
-        """The handle of the slot that the differences of bones are in, 0 where there is none yet."""
-        pairs = self.action.rigid_motion.bone_slots
-        return next((pair.differences for pair in pairs if pair.handle == self.handle), 0)
+    def is_editable(self) -> bool:
+        """Return whether its Action may be written: not where that is linked, or overrides what is.
 
-    @property
-    def bones_channelbag(self) -> bpy.types.ActionChannelbag | None:
-        """The channelbag with the differences of bones: of the slot that goes with this one."""
-        slot = slot_with(self.action, self.differences)
-        return None if slot is None else action_get_channelbag_for_slot(self.action, slot)
-
-    @property
-    def records(self) -> Iterator[bpy.types.PropertyGroup]:
-        """What its Action keeps of what it moves."""
-        return (record for record in self.action.rigid_motion.slots if record.handle == self.handle)
+        Python would be let write linked Actions, and overrides of them lose what is written when the file is opened.
+        """
+        return self.action.is_editable and self.action.override_library is None
 
     def plays_in(self, animated: bpy.types.Object) -> bool:
         """Return whether something moves by it outside of strips, or in the strip that is being edited."""
@@ -121,7 +82,7 @@ class Binding:
 
     @cached_property
     def curves(self) -> Curves:
-        """Its F-curves, those that in-betweens are in among them; looked for when they are first asked for."""
+        """Its F-curves; looked for when they are first asked for."""
         return self.find()[self.prefix]
 
     @property
@@ -134,37 +95,18 @@ class Binding:
         return self.users[0].name
 
     @property
-    def group(self) -> str:
-        """The name of the group of in-betweens, and of channels of modes and turns."""
-        return self.kind.difference_group(self.prefix)
-
-    @property
-    def home(self) -> bpy.types.ActionChannelbag | None:
-        """The channelbag that in-betweens are in, or are to be in."""
-        return self.slot.bones_channelbag if self.kind.has_difference_slot else self.channelbag
-
-    @cached_property
-    def filled(self) -> Curves:
-        """The F-curves that in-betweens are in. Who writes them sets it anew."""
-        channelbag, apart = self.home, self.kind.has_difference_slot
-        group = None if channelbag is None else channelbag.groups.get(self.group)
-        if group is None:
-            return {}
-        is_own = {self.prefix + prop for prop in WIDTHS}.__contains__ if apart else _is_difference
+    def moving(self) -> Curves:
+        """Its channels of location, rotation and scale, which modes are for. What it has of others is none of ours."""
         return {
-            (path, fcurve.array_index): fcurve
-            for fcurve in group.channels
-            if not fcurve.keyframe_points and is_own(path := fcurve.data_path)
+            (path, index): fcurve
+            for (path, index), fcurve in self.curves.items()
+            if path.removeprefix(self.prefix) in WIDTHS
         }
 
     @property
     def is_keyed(self) -> bool:
-        """Return whether it has channels of location, rotation or scale."""
-        return any(path.removeprefix(self.prefix) in WIDTHS for path, _ in self.curves)
-
-    def has_filled(self, curves: Curves) -> None:
-        """Take note of the F-curves that in-betweens are in by now."""
-        self.__dict__["filled"] = curves
+        """Return whether it has channels of location, rotation or scale, with keys or samples."""
+        return any(fcurve.keyframe_points or fcurve.sampled_points for fcurve in self.moving.values())
 
     def ensure_curve(self, channel: Channel) -> bpy.types.FCurve:
         """Return the F-curve of a channel, made where there is none yet."""
@@ -184,10 +126,8 @@ def bindings_in_slot(slot: Slot, prefixes: Collection[str] | None = None) -> lis
     for fcurve in slot.fcurves:
         path = fcurve.data_path
         prefix, prop = split_path(path)
-        if prefix in curves or prop in WIDTHS or prop in SEGMENT_PROPERTIES or prop.startswith(_TIMES):
+        if prefix in curves or prop in WIDTHS or prop == TURNS_PROPERTY:
             curves.setdefault(prefix, {})[path, fcurve.array_index] = fcurve
-    for record in slot.records:
-        curves.setdefault(record.prefix, {})
     return bindings_with(slot, channelbag, curves)
 
 
@@ -230,14 +170,9 @@ def _curves_under(channelbag: bpy.types.ActionChannelbag | None, prefixes: Itera
     return curves
 
 
-_TIMES = f'constraints["{CONSTRAINT}'
-"""The beginning of the paths of channels that say at what time constraints of ours are."""
-
-
 def _users_of(slot: Slot, prefix: str) -> tuple[Transform, ...]:
     """Return what a prefix stands for in each of the users of a slot that has it."""
-    users = tuple(user for obj in slot.users if (user := transform_in(obj, prefix)) is not None)
-    return users[0].together(users) if users else ()
+    return tuple(user for obj in slot.users if (user := transform_in(obj, prefix)) is not None)
 
 
 def slot_with(action: bpy.types.Action, handle: int) -> bpy.types.ActionSlot | None:
@@ -265,16 +200,6 @@ def bindings_for(transform: Transform) -> list[Binding]:
     """Return what moves a transform, as if nothing else used the same slots: without a look at other objects."""
     slots = slots_alone(transform.animated)
     return [binding for slot in slots for binding in bindings_in_slot(slot, (transform.prefix,))]
-
-
-def filled_bindings(obj: bpy.types.Object) -> list[Binding]:
-    """Return what is filled in of all that an object's Actions move of it, as if nothing else used the same slots."""
-    result = []
-    for slot in slots_alone(obj):
-        channelbag = slot.bones_channelbag
-        bones = () if channelbag is None else map(prefix_of, channelbag.groups.keys())
-        result += [binding for binding in bindings_in_slot(slot, {"", *bones}) if binding.filled]
-    return result
 
 
 def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
@@ -313,16 +238,6 @@ def _slots(
     ]
 
 
-def actions_of(animated: bpy.types.ID) -> Iterator[bpy.types.Action]:
-    """Yield the Actions that move something, by themselves and in strips."""
-    data = animated.animation_data
-    if data is not None:
-        if data.action is not None:
-            yield data.action
-        if len(data.nla_tracks):
-            yield from (strip.action for strip in strips_of(animated) if strip.action is not None)
-
-
 def slots_alone(obj: bpy.types.Object) -> list[Slot]:
     """Return the slots that move an object, as if nothing else used them."""
     data = obj.animation_data
@@ -349,22 +264,6 @@ def active_fcurves(animated: bpy.types.Object) -> bpy.types.bpy_prop_collection 
     return () if channelbag is None else channelbag.fcurves
 
 
-def handles_of_differences(action: bpy.types.Action) -> set[int]:
-    """Return the handles of the slots that differences of bones are in."""
-    return {pair.differences for pair in action.rigid_motion.bone_slots}
-
-
-def counterpart_in(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.types.ActionSlot | None:
-    """Return the same slot in a copy of an Action, or in the original: by its name, or renamed by its handle."""
-    return action.slots.get(slot.identifier) or slot_with(action, slot.handle)
-
-
-def in_action(action: bpy.types.Action, slot: Slot) -> Slot | None:
-    """Return the same slot in a copy of its Action, or in the original. None where it was taken out of it."""
-    result = counterpart_in(action, slot_with(*slot.key))
-    return None if result is None else replace(slot, action=action, handle=result.handle)
-
-
 def strips_of(obj: bpy.types.Object) -> Iterator[bpy.types.NlaStrip]:
     """Return the strips in the NLA of an object, those in strips of strips among them."""
     return with_inner_strips(strip for track in obj.animation_data.nla_tracks for strip in track.strips)
@@ -375,60 +274,3 @@ def with_inner_strips(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.type
     for strip in strips:
         yield strip
         yield from with_inner_strips(strip.strips)
-
-
-def choose_slots(obj: bpy.types.Object) -> None:
-    """Have strips show the only slot with keys that they can, as Blender does where an Action has no differences in it.
-
-    A strip that was made to show none remembers which one it showed.
-    """
-    data = obj.animation_data
-    for track in data.nla_tracks if data is not None else ():
-        for strip in track.strips:
-            if (slot := _slot_to_choose(strip)) is not None:
-                is_new = not strip.last_slot_identifier
-                strip.action_slot = slot
-                if is_new:
-                    _give_length(strip, track, slot)
-
-
-def _slot_to_choose(strip: bpy.types.NlaStrip) -> bpy.types.ActionSlot | None:
-    action = strip.action
-    if action is None or strip.action_slot_handle or strip.last_slot_identifier in action.slots:
-        return None
-    differences = handles_of_differences(action)
-    keyed = [slot for slot in strip.action_suitable_slots if slot.handle not in differences]
-    return keyed[0] if differences and len(keyed) == 1 else None
-
-
-def _give_length(strip: bpy.types.NlaStrip, track: bpy.types.NlaTrack, slot: bpy.types.ActionSlot) -> None:
-    """Have a strip show all of its Action, up to the next strip: Blender makes those without a slot one frame long."""
-    if (strip.action_frame_start, strip.action_frame_end) != (0.0, 1.0):
-        return
-    channelbag = action_get_channelbag_for_slot(strip.action, slot)
-    keyed = [fcurve.range() for fcurve in channelbag.fcurves if len(fcurve.keyframe_points)] if channelbag else []
-    if strip.action.use_frame_range or not keyed:
-        first, last = strip.action.frame_range
-    else:
-        # Differences may lie behind the keys.
-        first, last = min(begin for begin, _ in keyed), max(end for _, end in keyed)
-    room = min((item.frame_start for item in track.strips if item.frame_start > strip.frame_start), default=math.inf)
-    strip.action_frame_end = min(last, first + room - strip.frame_start)
-    strip.action_frame_start = first
-
-
-def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
-    """Return whether an F-curve is one that in-betweens of an object are in: without keys, and in the group of them."""
-    group = fcurve.group
-    is_in_group = group is not None and group.name == GROUP
-    return is_in_group and not fcurve.keyframe_points and _is_difference(fcurve.data_path)
-
-
-def _is_difference(path: str) -> bool:
-    """Return whether a data path is that of a delta transform."""
-    return path.startswith("delta_")
-
-
-def is_time(fcurve: bpy.types.FCurve) -> bool:
-    """Return whether an F-curve says at what time a constraint of ours is."""
-    return split_path(fcurve.data_path)[1].startswith(_TIMES)

@@ -20,14 +20,12 @@ from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
 from ...motion.affine import AffineMaps, displacement_over, largest_displacement
 from ...motion.best_of import least_errors
 from ..actions.slots import Binding
-from ..compute.components import MODE_NUMBERS, ROWS, SCALE
-from ..compute.differences import in_betweens
-from ..compute.sources import SAME_FRAME, Source, distinct
-from ..curves.keys import CODE, CONSTANT, LINEAR, Keys
+from ..evaluation.components import MODE_NUMBERS, PART_OF, ROWS, SCALE
+from ..evaluation.sources import SAME_FRAME, Marks, Source, distinct
+from ..fcurves.keys import CODE, CONSTANT, LINEAR, Keys
 from ..transforms import Refused, Transform
 from ..transforms.sizes import into_scene, scale_in_scene
-from ..writers.channel_values import channel_values
-from .motions import ALL_PROMISED, SMALLEST, NotPromised, shown
+from .motions import SMALLEST, NotPromised, continuous_values, shown
 
 NO_FRAMES = np.empty(0)
 
@@ -38,39 +36,28 @@ class NeedsItsKeys(Refused):
 
 @dataclass(frozen=True)
 class WholeRig:
-    """What became of all bones of a rig that were given fewer keys together."""
+    """What became of all bones of a rig that were given fewer keys together. Lengths are in the scene's units."""
 
     frames: int
     """On how many frames any of them has keys by now."""
 
     slide_before: float
-    """The distance that what stands on the ground slid there as it was recorded, in the scene's units."""
+    """The distance that what stands on the ground slid there as it was recorded."""
 
     slide_after: float
-    """The distance that it slides now."""
+    largest_error: float
+    """The largest error of all bones that the tolerance is promised for, with keys or without."""
 
-    largest_error: float = 0.0
-    """The largest error of all bones that the tolerance is promised for, with keys or without, in scene units."""
-
-    not_promised: NotPromised = ALL_PROMISED
-    """The bones that it is not promised for."""
+    not_promised: NotPromised
 
 
 @dataclass(frozen=True, eq=False)
 class FewerKeys:
-    """The keys that one slot is to have, and what had them before."""
+    """The keys that one slot is to have, and those that it has."""
 
     binding: Binding
     source: Source
     fewer: Source
-    """The planned motion, as a source."""
-
-    frames: np.ndarray
-    """Shape (k,)."""
-
-    values: dict[int, np.ndarray]
-    """Values that are written on these frames, by the rows of components, each of shape (k,)."""
-
     largest_error: float
     """In the scene's units."""
 
@@ -79,27 +66,21 @@ class FewerKeys:
 
     @cached_property
     def before(self) -> int:
-        return len(distinct(self.source.keyed_frames))
+        return count_of(self.source)
 
     @cached_property
-    def key_frames(self) -> np.ndarray:
-        """The frames that are written and those of keys that a scale keeps, shape (n,)."""
-        return distinct(self.fewer.keyed_frames)
-
-    @property
-    def modes(self) -> np.ndarray:
-        """The numbers of the modes that go on from each of these, shape (n,)."""
-        return self.fewer.modes_at(self.key_frames + SAME_FRAME)
-
-    @property
-    def interpolations(self) -> np.ndarray:
-        """The codes of the keys that are written, shape (k,)."""
-        return _interpolations(self.source, self.frames)
+    def after(self) -> int:
+        return count_of(self.fewer)
 
     @property
     def keeps_scale(self) -> bool:
         """Return whether a scale keeps the keys it has."""
-        return SCALE in self.source.keyed and ROWS[SCALE].start not in self.values
+        return has_uneven_scale(self.source)
+
+
+def count_of(source: Source) -> int:
+    """Return on how many frames a source has keys."""
+    return len(distinct(source.keyed_frames))
 
 
 def fewer_keys(
@@ -120,11 +101,12 @@ def fewer_keys(
     instead, those with the smallest largest error that is found.
     """
     frames = samples_of(source)
-    seen = moments(np.union1d(seen_frames(frames, [source]), more_frames), [source])
-    poses, truth = shown(transform, source, seen)
-    samples = np.searchsorted(seen, frames)
     placing, radius = into_scene(transform), radius / scale_in_scene(transform)
     unit = float(np.linalg.norm(placing, 2))
+    seen = np.union1d(seen_frames(frames, [source]), more_frames)
+    seen = moments(seen, [source])
+    poses, truth = shown(transform, source, seen)
+    samples = np.searchsorted(seen, frames)
     size = float(np.sqrt(np.einsum("nij,nij->nj", truth.axes, truth.axes).max()))
     rounding = SMALLEST * unit * (float(np.abs(truth.origins).max()) + radius * size)
     allowed = tolerance + rounding
@@ -157,9 +139,8 @@ def fewer_keys(
         more = _worst(chosen, error, samples, allowed)
         if not len(more) and error[chosen[0] : chosen[-1] + 1].max() <= allowed:
             raise goes_elsewhere(transform.name)
-        if not len(more) or len(distinct(fewer.keyed_frames)) >= len(distinct(source.keyed_frames)):
-            columns = {row: column[chosen] for row, column in values.items()}
-            return FewerKeys(binding, source, source, seen[chosen], columns, 0.0)
+        if not len(more) or count_of(fewer) >= count_of(source):
+            return FewerKeys(binding, source, source, 0.0)
         samples, chosen = np.union1d(samples, more), np.union1d(chosen, more)
     if best_of:
         inside = poses[samples]
@@ -168,8 +149,7 @@ def fewer_keys(
         # Outside of the keys cycles of different lengths may meet in other segments than inside.
         if displacement_over(maps_of_mixed, truth, radius, allowed).max() <= allowed:
             fewer, maps = mixed, maps_of_mixed
-    columns = {row: column[chosen] for row, column in values.items()}
-    return FewerKeys(binding, source, fewer, seen[chosen], columns, largest_displacement(maps, truth, radius))
+    return FewerKeys(binding, source, fewer, largest_displacement(maps, truth, radius))
 
 
 def with_best_modes(
@@ -189,8 +169,7 @@ def with_best_modes(
         alike = [Poses(poses.positions, poses.quaternions) for poses in alike]
     errors = np.stack([shell_error(poses, truth, radius) for poses in alike])
     best = least_errors(errors, np.searchsorted(frames, keys - SAME_FRAME), rounding, allowed)
-    points = np.stack((keys, numbers[[*best, best[-1]]]), axis=-1)[None].astype(np.float32)
-    return replace(source, mode=Keys(points, np.full(points.shape[:2], CONSTANT, CODE)))
+    return replace(source, mode=Marks(keys, numbers[[*best, best[-1]]]))
 
 
 def _worst(chosen: np.ndarray, error: np.ndarray, samples: np.ndarray, allowed: float) -> np.ndarray:
@@ -256,14 +235,11 @@ def goes_elsewhere(name: str) -> Refused:
 
 def values_on(transform: Transform, source: Source, frames: np.ndarray) -> dict[int, np.ndarray]:
     """Return what the channels that get other keys have on these frames, each (n,), by the rows of components."""
-    by_path = channel_values(transform, source, in_betweens(source, frames))
-    if SCALE in source.keyed and not source.uniform_scale:
-        scale = source.values_at(frames)[ROWS[SCALE]].T
-        if np.all(_is_constant(scale)):
-            by_path[transform.prefix + transform.properties[SCALE]] = scale
-    keyed = {row for rows, _ in source.channels for row in rows}
-    columns = {row: by_path[path][:, index] for row, (path, index) in transform.channels.items() if path in by_path}
-    return {row: column for row, column in columns.items() if row in keyed or not _is_constant(column)}
+    values, keyed = continuous_values(source, frames), {row for rows, _ in source.channels for row in rows}
+    rows = [row for row in transform.channels if PART_OF[row] in source.keyed]
+    if has_uneven_scale(source):
+        rows = [row for row in rows if PART_OF[row] != SCALE]
+    return {row: values[row] for row in rows if row in keyed or not _is_constant(values[row])}
 
 
 def has_uneven_scale(source: Source) -> bool:

@@ -21,15 +21,16 @@ from ...motion.contacts import slide, standing
 from ...motion.poses import placed
 from ...motion.quaternions import align_signs
 from ..actions.refusals import refuse_modified
-from ..actions.slots import Binding, Slot
-from ..compute.sources import SAME_FRAME, Source, distinct
+from ..actions.slots import Binding
 from ..edits.apply import Readings, readable
+from ..evaluation.sources import SAME_FRAME, Source, distinct
 from ..transforms import Refused, Transform, transform_of
 from ..transforms.sizes import scale_in_scene
 from .fewer_keys import (
     FewerKeys,
     NeedsItsKeys,
     WholeRig,
+    count_of,
     fewer_keys,
     goes_elsewhere,
     samples_of,
@@ -86,41 +87,38 @@ def fewer_keys_of_rigs(
     """
     together: dict[tuple[bpy.types.Object, bpy.types.Action, int], _Members] = {}
     for transform, reading in readings.items():
-        if transform.animated.pose is not None:
-            try:
-                keyed = readable(transform, reading)
-                for _, source in keyed:
-                    refuse_modified(transform.name, source)
-            except Refused:
-                continue  # Its own plan says so.
-            for binding, source in keyed:
-                if source.channels and not source.driven:
-                    key = transform.animated, binding.slot.action, binding.slot.handle
-                    together.setdefault(key, {})[transform] = binding, source
+        if transform.animated.pose is None:
+            continue
+        try:
+            keyed = readable(transform, reading)
+            for binding, _ in keyed:
+                refuse_modified(transform.name, binding)
+        except Refused:
+            continue  # Its own plan says so.
+        for binding, source in keyed:
+            if source.channels and not source.driven:
+                together.setdefault((transform.animated, *binding.slot.key), {})[transform] = binding, source
     plans: Plans = {}
     for (obj, *_), members in together.items():
-        of_rig = members.pop(transform_of(obj), None)
+        own = members.pop(transform_of(obj), None)
         if not members:
             continue
         try:
             rig = _Rig(obj, members, tolerance if count is None else math.inf, radius, hold=hold)
             if count is not None:
-                rig.find_key_poses(mode, count, None if of_rig is None else of_rig[1])
-            if of_rig is not None:
+                rig.find_key_poses(mode, count, None if own is None else own[1])
+            if own is not None:
                 of_object = plans.setdefault(transform_of(obj), [])
-                of_object.append(rig.reduce_own_keys(transform_of(obj), *of_rig, mode, best_of=best_of))
+                of_object.append(rig.reduce_own_keys(transform_of(obj), *own, mode, best_of=best_of))
             fewer = rig.fewer_keys(mode, shared=shared, best_of=best_of)
-            if of_rig is not None and fewer:
-                # How far it is off counts at the bones, which is known by now.
-                whole = next(iter(fewer.values())).rig
-                of_object[-1] = replace(of_object[-1], largest_error=whole.largest_error)
-        except Refused as refusal:
-            plans.update(dict.fromkeys(members, refusal))
-            continue
         except ValueError as problem:
-            refusal = Refused(n_("{name} cannot be reduced: {problem}"), name=obj.name, problem=problem)
+            text = n_("{name} cannot be reduced: {problem}")
+            refusal = problem if isinstance(problem, Refused) else Refused(text, name=obj.name, problem=problem)
             plans.update(dict.fromkeys(members, refusal))
             continue
+        if own is not None:
+            # How far it is off counts at the bones, which is known by now.
+            of_object[-1] = replace(of_object[-1], largest_error=next(iter(fewer.values())).rig.largest_error)
         for transform, plan in fewer.items():
             result = plans.setdefault(transform, [])
             if isinstance(result, list):
@@ -137,15 +135,14 @@ class _Rig:
         self.rig, self.tolerance = rig, tolerance
         numbers = {bone.name: number for number, bone in enumerate(rig.pose.bones)}
         self.targets = {numbers[transform.carrier.name]: transform for transform in members}
-        self.bindings = {numbers[transform.carrier.name]: binding for transform, (binding, _) in members.items()}
-        self.sources = {numbers[transform.carrier.name]: source for transform, (_, source) in members.items()}
+        self.bindings = {number: members[transform][0] for number, transform in self.targets.items()}
+        self.sources = {number: members[transform][1] for number, transform in self.targets.items()}
         self.before = {number: distinct(source.keyed_frames) for number, source in self.sources.items()}
         samples = _united(map(samples_of, self.sources.values()))
         self.frames = seen_frames(samples, list(self.sources.values()))
         self.sampled = np.isin(self.frames, samples)
         """True for the moments that keys may be on."""
-        slot: Slot = next(iter(self.bindings.values())).slot
-        self.motion = RigMotion(rig, slot, self.sources, self.frames, radius)
+        self.motion = RigMotion(rig, next(iter(self.bindings.values())).slot, self.sources, self.frames, radius)
         self.values = {
             number: values_on(self.targets[number], source, self.frames) for number, source in self.sources.items()
         }
@@ -156,7 +153,7 @@ class _Rig:
         self.stands = standing(self.frames * render.fps_base / render.fps, truth)
         """True for the bones that stand on the ground, at each moment."""
         self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
-        self.proof = Proof(self.motion, self.bindings, self.sources, self.weights)
+        self.proof = Proof(self.motion, self.sources, self.weights)
         self._search_in()
 
     def _search_in(self) -> None:
@@ -198,14 +195,14 @@ class _Rig:
             keys = np.union1d(np.clip(self.key_poses, first, last), (first, last))
             values = {row: column[keys] for row, column in values_on(transform, source, self.frames).items()}
             fewer = with_keys(source, self.frames[keys], values, mode)
-            if len(distinct(fewer.keyed_frames)) >= len(distinct(source.keyed_frames)):
+            if count_of(fewer) >= count_of(source):
                 fewer = source
             self.motion.carry(fewer)
-            return FewerKeys(binding, source, fewer, self.frames[keys], values, 0.0)
+            return FewerKeys(binding, source, fewer, 0.0)
         share = SHARE * self.tolerance / self.weights.max()
         reach = self.motion.extent * scale_in_scene(transform)
         plan = fewer_keys(transform, binding, source, mode, share, reach, best_of=best_of, more_frames=self.frames)
-        if len(plan.key_frames) < plan.before:
+        if plan.after < plan.before:
             self.motion.carry(plan.fewer)
             self.largest_own = plan.largest_error
         return plan
@@ -227,32 +224,16 @@ class _Rig:
             radii, fixed = np.append(0.0, radii), [False, *fixed]
             weights = np.vstack((np.zeros(len(self.frames)), weights))
         if not all(fixed):
-            keys = self._searched(poses, parents, mode, radii, weights, fixed, shared=True, budget=count)
-            self.key_poses = keys[fixed.index(False)]
+            wishes = {"radius": radii, "fixed": fixed, "shared": True, "budget": count}
+            self.key_poses = self._searched(poses, parents, mode, weights, **wishes)[fixed.index(False)]
 
     def _searched(
-        self,
-        poses: Poses,
-        parents: np.ndarray,
-        mode: str,
-        radii: np.ndarray,
-        weights: np.ndarray,
-        fixed: list[bool],
-        **wishes: Any,
+        self, poses: Poses, parents: np.ndarray, mode: str, weights: np.ndarray, **wishes: Any
     ) -> list[np.ndarray]:
         """Return the moments of the keys of each joint that are found."""
-        samples = np.flatnonzero(self.sampled)
-        keys = reduce_skeleton_keys(
-            self.frames[samples],
-            poses[:, samples],
-            parents,
-            mode,
-            radius=radii,
-            weights=weights[:, samples],
-            fixed=fixed,
-            **wishes,
-        )
-        return [samples[rows] for rows in keys]
+        at = np.flatnonzero(self.sampled)
+        keys = reduce_skeleton_keys(self.frames[at], poses[:, at], parents, mode, weights=weights[:, at], **wishes)
+        return [at[rows] for rows in keys]
 
     def _fixed(self) -> list[bool]:
         """Return which bones keep the keys that they have."""
@@ -266,8 +247,8 @@ class _Rig:
             chosen = {number: self._within_its_keys(self.key_poses, number) for number in able}
         elif able:
             tolerance = (self.tolerance - self.largest_own) / (self.motion.unit * self.parts)
-            rig = self.poses, self.skeleton.parents, mode, self.motion.radii, self.weights, fixed
-            keys = self._searched(*rig, shared=shared, tolerance=tolerance)
+            wishes = {"radius": self.motion.radii, "fixed": fixed, "shared": shared, "tolerance": tolerance}
+            keys = self._searched(self.poses, self.skeleton.parents, mode, self.weights, **wishes)
             chosen = {number: self._within_its_keys(keys[number], number) for number in able}
         keyed = {number: self.frames[keys] for number, keys in chosen.items()}
         fewer = self._proven(keyed, mode, shared=shared)
@@ -279,11 +260,7 @@ class _Rig:
         errors = self.proof.largest_errors().tolist()
         excepted = not_promised(self.rig)
         # Of what is not promised, that counts which has fewer keys.
-        counted = [
-            error
-            for number, (bone, error) in enumerate(zip(self.motion.bones, errors, strict=True))
-            if number in fewer or bone.name not in excepted
-        ]
+        counted = [errors[n] for n, bone in enumerate(self.motion.bones) if n in fewer or bone.name not in excepted]
         self.motion.show(fewer)
         as_whole = WholeRig(
             len(_united(distinct(source.keyed_frames) for source in fewer.values())),
@@ -293,13 +270,7 @@ class _Rig:
         )
         return {
             self.targets[number]: FewerKeys(
-                self.bindings[number],
-                self.sources[number],
-                source,
-                keyed[number],
-                self._values_at(number, keyed[number]),
-                errors[number],
-                as_whole,
+                self.bindings[number], self.sources[number], source, errors[number], as_whole
             )
             for number, source in fewer.items()
         }
@@ -341,7 +312,7 @@ class _Rig:
                 keys = chosen[number]
                 source = with_keys(self.sources[number], keys, self._values_at(number, keys), mode)
                 fewer[number] = source
-                if len(distinct(source.keyed_frames)) >= len(self.before[number]):
+                if count_of(source) >= len(self.before[number]):
                     del fewer[number], chosen[number]
 
         def mend(over: list[tuple[float, int, int]], motion: RigMotion) -> set[int]:

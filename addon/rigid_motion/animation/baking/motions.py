@@ -7,29 +7,28 @@ follow these it is told which they are.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
-from dataclasses import dataclass
-from types import MappingProxyType
+from typing import NamedTuple
 
 import bpy
 import numpy as np
-from mathutils import Euler, Quaternion
 
 from ...motion import Poses
 from ...motion.affine import AffineMaps, ball_displacement, displacement_over, largest_displacement
-from ...motion.eulers import ORDERS
-from ...motion.quaternions import matrices, multiply
+from ...motion.quaternions import align_signs, matrices, multiply
+from ..actions.modifiers import on_top
 from ..actions.reading import sources_of_users
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import Slot, bindings_in_slot, slots_alone
-from ..compute.bodies import turn_into_quaternions
-from ..compute.components import LOCATION, ROTATION, ROWS, SCALE
-from ..compute.differences import in_betweens
-from ..compute.sources import Source
-from ..curves.keys import LARGEST
-from ..transforms import WIDTHS, Channel, Refused, Transform, shows_differences, split_path, transform_of
+from ..evaluation.bodies import turn_into_quaternions
+from ..evaluation.channel_values import channel_values
+from ..evaluation.components import LOCATION, REST, ROTATION, ROWS, SCALE
+from ..evaluation.differences import channel_differences, seen_values
+from ..evaluation.sources import Source
+from ..fcurves.keys import LARGEST
+from ..transforms import WIDTHS, Channel, Refused, Transform, is_part, split_path, transform_of
 from ..transforms.posing import Hierarchy
 from ..transforms.sizes import into_scene, reaches_of, scale_in_scene
 
@@ -43,80 +42,54 @@ SMALLEST = 1e-6
 """Errors of single precision, relative to how far something gets."""
 
 
-@dataclass(frozen=True)
-class NotPromised:
-    """The bones that a tolerance is not promised for, by their names."""
+AT_ONCE = 2**17
+"""Transforms times frames that are worked out in one go."""
+
+
+class NotPromised(NamedTuple):
+    """The names of the bones that a tolerance is not promised for."""
 
     followers: tuple[str, ...] = ()
-    """Bones that follow constraints or drivers."""
+    """Those that follow constraints or drivers."""
 
     below: tuple[str, ...] = ()
-    """Bones that hang on these."""
+    """Those that hang on these."""
 
     def __bool__(self) -> bool:
         return bool(self.followers)
 
-    def __contains__(self, name: str) -> bool:
+    def __contains__(self, name: object) -> bool:
         return name in self.followers or name in self.below
-
-
-ALL_PROMISED = NotPromised()
 
 
 def not_promised(rig: bpy.types.Object) -> NotPromised:
     """Return the bones of a rig whose motion is not that of their channels, and of those above them, alone."""
-    followers = {*_constrained(rig), *_driven(rig)}
-    bones = rig.pose.bones
-    below = {bone.name for bone in bones if any(parent.name in followers for parent in bone.parent_recursive)}
-    ordered = [bone.name for bone in bones]
-    return NotPromised(
-        tuple(name for name in ordered if name in followers),
-        tuple(name for name in ordered if name in below - followers),
-    )
-
-
-def _constrained(rig: bpy.types.Object) -> Iterator[str]:
-    animated = _animated_paths(rig)
-    for bone in rig.pose.bones:
+    drivers = () if rig.animation_data is None else list(rig.animation_data.drivers)
+    driven = {driver.data_path for driver in drivers if not driver.mute}
+    animated = {fcurve.data_path for slot in slots_alone(rig) for fcurve in slot.fcurves}
+    animated |= {driver.data_path for driver in drivers}
+    bones, followers = rig.pose.bones, set()
+    for bone in bones:
+        if not driven.isdisjoint(f"{bone.path_from_id()}.{name}" for name in MOVING):
+            followers.add(bone.name)
         for constraint in bone.constraints:
-            if shows_differences(constraint):
-                continue
-            path = constraint.path_from_id()
-            is_switched = any(f"{path}.{name}" in animated for name in ("influence", "mute", "enabled"))
-            if is_switched or (not constraint.mute and constraint.influence > 0.0):
-                yield bone.name
+            switches = {f"{constraint.path_from_id()}.{name}" for name in ("influence", "mute", "enabled")}
+            if not animated.isdisjoint(switches) or (not constraint.mute and constraint.influence > 0.0):
+                followers.add(bone.name)
                 if constraint.type in CHAINS:
                     # The bone itself is the last of a chain, unless that is to reach for its head.
                     count = constraint.chain_count - getattr(constraint, "use_tail", True)
                     above = bone.parent_recursive[:count] if constraint.chain_count else bone.parent_recursive
-                    yield from (parent.name for parent in above)
+                    followers |= {parent.name for parent in above}
+    below = {bone.name for bone in bones if any(parent.name in followers for parent in bone.parent_recursive)}
+    names = [bone.name for bone in bones]
+    return NotPromised(
+        tuple(name for name in names if name in followers), tuple(name for name in names if name in below - followers)
+    )
 
 
-def _driven(rig: bpy.types.Object) -> Iterator[str]:
-    names = {f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].': bone.name for bone in rig.pose.bones}
-    for driver in _drivers(rig):
-        prefix, prop = split_path(driver.data_path)
-        if prefix in names and prop in MOVING and not driver.mute:
-            yield names[prefix]
-
-
-def _drivers(rig: bpy.types.Object) -> Iterator[bpy.types.FCurve]:
-    data = rig.animation_data
-    yield from data.drivers if data is not None else ()
-
-
-def _animated_paths(rig: bpy.types.Object) -> set[str]:
-    """Return the data paths that drivers or F-curves of the rig set."""
-    curves = {fcurve.data_path for slot in slots_alone(rig) for fcurve in slot.fcurves}
-    return curves | {driver.data_path for driver in _drivers(rig)}
-
-
-def shown(
-    transform: Transform, source: Source, frames: np.ndarray, rate: int | None = None
-) -> tuple[Poses, AffineMaps]:
+def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Poses, AffineMaps]:
     """Return how a source is seen on these frames (n,), with the object's own delta transforms, and what is not keyed.
-
-    With so many samples of its in-betweens a frame, if given; what moves by delta transforms has one.
 
     Returns
     -------
@@ -125,86 +98,90 @@ def shown(
     maps : AffineMaps, shape (n,)
         Of the channels as Blender has them: location runs along its own axes, and scale may be uneven or negative.
     """
-    desired = in_betweens(source, frames, rate=rate if transform.has_difference_slot else 1).desired
-    delta, rest, along, count = source.original, transform.components(), source.location_axes, len(frames)
-    positions, quaternions = desired.positions, desired.quaternions
-    if LOCATION not in source.keyed:
-        position = rest[ROWS[LOCATION]] + delta[ROWS[LOCATION]]
-        positions = np.tile(position if along is None else along @ position, (count, 1))
-    if ROTATION not in source.keyed:
-        column = rest[:, None].copy()
-        turn_into_quaternions(column, source.order)
-        quaternions = np.tile(multiply(delta[ROWS[ROTATION]], column[ROWS[ROTATION], 0]), (count, 1))
-    if desired.scales is not None:
-        return Poses(positions, quaternions, desired.scales), _maps(
-            positions, quaternions, desired.scales[:, None], along
-        )
-    scale = np.tile(rest[ROWS[SCALE]] * delta[ROWS[SCALE]], (count, 1))
-    if SCALE in source.keyed:
-        scale = (source.values_at(frames)[ROWS[SCALE]] * delta[ROWS[SCALE], None]).T
-    mean = np.cbrt(np.abs(scale.prod(axis=1)))
-    return Poses(positions, quaternions, mean), _maps(positions, quaternions, scale, along)
+    (result,) = shown_together([transform], [source], frames)
+    return result
+
+
+def shown_together(
+    transforms: Sequence[Transform], sources: Sequence[Source], frames: np.ndarray
+) -> Iterator[tuple[Poses, AffineMaps]]:
+    """Yield what `shown` returns for each of several transforms."""
+    step = max(1, AT_ONCE // len(frames))
+    for first in range(0, len(sources), step):
+        some = sources[first : first + step]
+        through = [source for source in some if source.cyclic is None]
+        values = iter(channel_differences(through, [frames] * len(through)))
+        for transform, source in zip(transforms[first : first + step], some, strict=True):
+            rows = seen_values(source, frames) if source.cyclic is not None else np.add(*next(values))
+            rest = transform.components()
+            for part in ROWS.keys() - source.keyed:
+                rows[ROWS[part]] = rest[ROWS[part], None]
+            yield _placed(transform, rows, source.original)
 
 
 def evaluated(
     transform: Transform, curves: Mapping[Channel, bpy.types.FCurve], frames: np.ndarray
 ) -> tuple[Poses, AffineMaps]:
-    """Return what `shown` does, for a bone that makes no source: as Blender evaluates its F-curves, or as it stands."""
-    bone, frame_list = transform.carrier, frames.tolist()
+    """Return what `shown` does as Blender evaluates F-curves, for what makes no source or has more to it than keys."""
+    rest = transform.components()
+    rows = np.tile(rest[:, None], (1, len(frames)))
+    for row, channel in transform.channels.items():
+        fcurve = curves.get(channel)
+        if fcurve is not None and not fcurve.mute and not fcurve.is_empty:
+            rows[row] = [fcurve.evaluate(frame) for frame in frames.tolist()]
+    for part in ROWS.values():
+        if not (np.abs(rows[part]) < LARGEST).all():
+            rows[part] = rest[part, None]
+    return _placed(transform, rows, REST)
 
-    def values(name: str) -> np.ndarray:
-        stands = getattr(bone, name)
-        columns = []
-        for index, value in enumerate(stands):
-            fcurve = curves.get((transform.prefix + name, index))
-            has_say = fcurve is not None and not fcurve.mute and not fcurve.is_empty
-            columns.append([fcurve.evaluate(frame) for frame in frame_list] if has_say else [value] * len(frame_list))
-        result = np.array(columns, dtype=np.float64).T
-        return result if (np.abs(result) < LARGEST).all() else np.tile(np.array(stands), (len(frame_list), 1))
 
-    mode = bone.rotation_mode
-    if mode in ORDERS:
-        turns = [Euler(angles, mode).to_quaternion() for angles in values("rotation_euler").tolist()]
-    elif mode == "AXIS_ANGLE":
-        turns = [Quaternion(axis, angle) for angle, *axis in values("rotation_axis_angle").tolist()]
-    else:
-        turns = [Quaternion(turn).normalized() for turn in values("rotation_quaternion").tolist()]
-    along, scale = transform.location_axes, values("scale")
-    positions = values("location") if along is None else values("location") @ along.T
-    quaternions = np.array(turns, dtype=np.float64)
+def _placed(transform: Transform, rows: np.ndarray, delta: np.ndarray) -> tuple[Poses, AffineMaps]:
+    """Return what `shown` does for values of channels (10, n), which become quaternions, and delta transforms (10,)."""
+    turn_into_quaternions(rows, transform.order)
+    along, (positions, quaternions, scale) = transform.location_axes, (rows[part].T for part in ROWS.values())
+    positions, scale = positions + delta[ROWS[LOCATION]], scale * delta[ROWS[SCALE]]
+    quaternions = multiply(delta[ROWS[ROTATION]], quaternions)
+    maps = AffineMaps(np.moveaxis(matrices(quaternions), -1, 0) * scale[:, None, :], positions)
     mean = np.cbrt(np.abs(scale.prod(axis=1)))
-    return Poses(positions, quaternions, mean), _maps(positions, quaternions, scale, along)
+    return Poses(positions if along is None else positions @ along.T, quaternions, mean), maps
 
 
-def _maps(positions: np.ndarray, quaternions: np.ndarray, scale: np.ndarray, along: np.ndarray | None) -> AffineMaps:
-    """Return the maps with positions (n, 3) along the body's axes, quaternions (n, 4) and scales (n, 3) or (n, 1)."""
-    axes = np.moveaxis(matrices(quaternions), -1, 0) * scale[:, None, :]
-    return AffineMaps(axes, positions if along is None else positions @ along)
+def continuous_values(source: Source, frames: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
+    """Return what the channels of a source have on rising frames (m,), without jumps of rotation, shape (10, m).
+
+    `added` (10, m) is what is on top of that.
+    """
+    values = seen_values(source, frames) + added
+    turned = values if source.order is None else values.copy()
+    if source.order is not None:
+        turn_into_quaternions(turned, source.order)
+    values[ROWS[ROTATION]] = rotation_values(turned[ROWS[ROTATION]].T, values[ROWS[ROTATION], 0], source.order)
+    return values
+
+
+def rotation_values(quaternions: np.ndarray, first: np.ndarray, order: str | None) -> np.ndarray:
+    """Return a motion's rotations (m, 4) as the rows of channels, the first as near to `first` (4,) as may be, (4, m).
+
+    The order is None for quaternions, which stay as long as they are and of which the first one stays, AXIS_ANGLE, or
+    that of Euler angles, which have the first three rows.
+    """
+    if order is None:
+        return align_signs(quaternions).T
+    count = len(quaternions)
+    ends = np.concatenate((REST[:3], first, REST[7:]))[None, :, None].repeat(2, axis=0)
+    poses, progress = Poses(np.zeros((count, 3)), align_signs(quaternions)), np.arange(count) / count
+    return channel_values(poses, np.array([count]), progress, ends, REST[:, None], order)[ROWS[ROTATION]]
 
 
 class RigMotion:
-    """The bones of a rig on many frames, as they were recorded and as they are by now.
+    """The bones of a rig on frames (m,) of an Action, as they were recorded and as they are by now.
 
-    Parameters
-    ----------
-    rig : bpy.types.Object
-    slot : Slot
-        What moves them.
-    sources : mapping
-        What is keyed of bones, by their numbers, where that is read already.
-    frames : array, shape (m,)
-        Those of the Action that are looked at.
-    radius : float or None
-        Of the ball around every bone's head, in the scene's units; as far as each bone reaches where None.
+    `sources` is what is keyed of bones, by their numbers, where that is read already. The radius is that of the ball
+    around every bone's head, in the scene's units; as far as each bone reaches where None.
     """
 
     def __init__(
-        self,
-        rig: bpy.types.Object,
-        slot: Slot,
-        sources: Mapping[int, Source],
-        frames: np.ndarray,
-        radius: float | None,
+        self, rig: bpy.types.Object, slot: Slot, sources: Mapping[int, Source], frames: np.ndarray, radius: float | None
     ) -> None:
         self.rig, self.bones = rig, list(rig.pose.bones)
         self.transforms = [transform_of(bone) for bone in self.bones]
@@ -231,12 +208,12 @@ class RigMotion:
     def _look_at(self, frames: np.ndarray) -> list[Poses]:
         """Have all bones be as they were recorded on these frames, and return the poses of their channels."""
         self.frames = frames
-        self._shown: dict[int, tuple[Source | None, int | None]] = {}
+        self._shown: dict[int, Source | None] = {}
+        recorded = [self.transforms[number] for number in self._recorded]
+        known = dict(zip(recorded, shown_together(recorded, [*self._recorded.values()], frames), strict=True))
         result = [
-            shown(transform, self._recorded[number], frames)
-            if number in self._recorded
-            else evaluated(transform, self._curves.get(transform.prefix, {}), frames)
-            for number, transform in enumerate(self.transforms)
+            known.get(transform) or evaluated(transform, self._curves.get(transform.prefix, {}), frames)
+            for transform in self.transforms
         ]
         self._channels = AffineMaps(
             np.stack([maps.axes for _, maps in result]), np.stack([maps.origins for _, maps in result])
@@ -278,15 +255,15 @@ class RigMotion:
             setattr(result, name, maps if maps.axes.shape[-3] == 1 else maps[..., moments])
         return result
 
-    def show(self, sources: Mapping[int, Source | None], rates: Mapping[int, int] = MappingProxyType({})) -> None:
-        """Let bones be moved by other keys, or as they were where it is None; with so many samples a frame, if said."""
-        asked = {number: (source, rates.get(number)) for number, source in sources.items()}
-        changed = {number: item for number, item in asked.items() if item != self._shown.get(number, (None, None))}
-        for number, (source, rate) in changed.items():
-            if source is None:
-                self._channels[number] = self._recorded_channels[number]
-            else:
-                self._channels[number] = shown(self.transforms[number], source, self.frames, rate)[1]
+    def show(self, sources: Mapping[int, Source | None]) -> None:
+        """Let bones be moved by other keys, or as they were where it is None."""
+        changed = {number: source for number, source in sources.items() if source is not self._shown.get(number)}
+        now = {number: source for number, source in changed.items() if source is not None}
+        shown_now = shown_together([self.transforms[number] for number in now], [*now.values()], self.frames)
+        for number, (_, maps) in zip(now, shown_now, strict=True):
+            self._channels[number] = maps
+        for number in changed.keys() - now.keys():
+            self._channels[number] = self._recorded_channels[number]
         self._shown |= changed
         self.hierarchy.pose(changed, self._channels, self._posed)
 
@@ -354,11 +331,12 @@ def _keyed_in(
     sources: dict[str, Source] = {}
     bindings = bindings_in_slot(slot)
     for binding, of_users in zip(bindings, sources_of_users(bindings), strict=True):
-        for user, source in zip(binding.users, of_users, strict=True):
-            if user.animated == rig and isinstance(source, Source) and source.channels and not source.driven:
-                with suppress(Refused):
-                    refuse_numbers(user.name, source)
-                    sources[binding.prefix] = source
+        source = next((one for user, one in zip(binding.users, of_users, strict=True) if user.animated == rig), None)
+        has_more = is_part(binding.prefix) and any(any(on_top(fcurve)) for fcurve in binding.curves.values())
+        if isinstance(source, Source) and source.channels and not source.driven and not has_more:
+            with suppress(Refused):
+                refuse_numbers(binding.name, source)
+                sources[binding.prefix] = source
     curves: dict[str, dict[Channel, bpy.types.FCurve]] = {}
     for fcurve in slot.fcurves:
         path = fcurve.data_path

@@ -13,7 +13,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
-import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -23,27 +22,24 @@ from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
 from ..actions.refusals import refuse_drivers, refuse_modified
 from ..actions.slots import Binding, bindings_for, bindings_in_slot, slots_of
-from ..compute.components import MODE_NAMES
-from ..compute.sources import distinct
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
-from ..edits.mode_keys import set_whole
-from ..live.segment_keys import set_mode_in
+from ..edits.mode_keys import set_mode_in
+from ..evaluation.components import MODE_NAMES, PART_OF, SCALE
+from ..evaluation.sources import SAME_FRAME, Source, distinct
 from ..queries.keyed import segment_modes
-from ..transforms import Refused, Transform, shows_differences, transform_of
+from ..transforms import Refused, Transform, transform_of
 from ..transforms.sizes import radius_of
-from .bake import go_back
-from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, fewer_keys, has_uneven_scale
+from .bake import bindings_with_original, go_back
+from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, count_of, fewer_keys, has_uneven_scale
 from .fewer_rig_keys import Plans, fewer_keys_of_rigs
-from .motions import NotPromised
+from .motions import MOVING, NotPromised
 from .originals import (
     REDUCED,
+    Note,
+    Originals,
     discard_originals,
-    entries_in_use,
-    entries_of,
     has_original,
-    move_by_copy,
-    refuse_tweak_mode,
-    refuse_without_original,
+    notes_of,
 )
 
 HAS_KEYS = (
@@ -140,42 +136,38 @@ def reduce_keys_of(
     if count is not None and count < 2:
         raise Refused(n_("a motion has 2 keys at least, not {count}"), count=count)
     of_rigs: Plans = {}
+    originals = Originals(REDUCED)
 
     def survey(readings: Mapping[Transform, Readings]) -> None:
         wishes = {"shared": shared, "hold": hold, "best_of": best_of, "count": count}
         of_rigs.update(fewer_keys_of_rigs(readings, mode, tolerance, radius, **wishes))
 
     def plan(transform: Transform, readings: Readings) -> list[FewerKeys]:
-        refuse_tweak_mode(transform)
         keyed = [(binding, source) for binding, source in readable(transform, readings) if source.channels]
         if not keyed:
             raise Refused(_why_nothing_is_keyed(transform, 0))
-        for _, source in keyed:
-            refuse_modified(transform.name, source)
-            refuse_drivers(transform, source.driven)
+        for binding, source in keyed:
+            refuse_modified(transform.name, binding)
+            refuse_drivers(transform, binding, source.driven)
         result = of_rigs.get(transform, [])
         if isinstance(result, Refused):
             raise result
         if transform.is_part:
             if not result:
-                before = sum(len(distinct(source.keyed_frames)) for _, source in keyed)
-                keeps_scale = any(has_uneven_scale(source) for _, source in keyed)
-                raise _no_fewer(transform, before, keeps_scale=keeps_scale, count=count)
+                raise _no_fewer(transform, keyed, count)
             return result
         size = radius or radius_of(transform.carrier)
         planned = {fewer.binding for fewer in result}
         rest = [item for item in keyed if item[0] not in planned]
         wishes = {"best_of": best_of, "count": count}
-        result = [*result, *(fewer_keys(transform, *item, mode, tolerance, size, **wishes) for item in rest)]
-        fewer = [reduced for reduced in result if len(reduced.key_frames) < reduced.before]
-        if not fewer:
-            before, keeps_scale = sum(kept.before for kept in result), any(kept.keeps_scale for kept in result)
-            raise _no_fewer(transform, before, keeps_scale=keeps_scale, count=count)
-        return fewer
+        every = [*result, *(fewer_keys(transform, *item, mode, tolerance, size, **wishes) for item in rest)]
+        if fewer := [reduced for reduced in every if reduced.after < reduced.before]:
+            return fewer
+        raise _no_fewer(transform, keyed, count)
 
     def act(transform: Transform, fewer: list[FewerKeys]) -> None:
         for reduced in fewer:
-            _write(transform, reduced)
+            _write(transform, reduced, originals)
 
     done = apply_edit(targets, plan, act, refused, survey=survey)
     return reduction_of(list(done)[-1]) if done else None
@@ -184,45 +176,49 @@ def reduce_keys_of(
 def reduction_of(target: Target) -> Reduction | None:
     """Return what became of the keys that something moves by when they were reduced. None where they were not."""
     transform = transform_of(target)
-    if not len(transform.motion.bakes):
+    notes = _notes_on([transform])
+    if not notes:
         return None
-    bindings = bindings_for(transform)
-    entries = _reduced(entries_in_use(transform))
-    reduced = {entry.changed for entry in entries}
-    modes = [mode for binding in bindings if binding.slot.action in reduced for mode in segment_modes(binding)]
-    return _summed(list(map(_noted_in, entries)), dict(Counter(modes)))
+    reduced = (binding for binding in bindings_for(transform) if (transform.prefix, *binding.slot.key) in notes)
+    modes = Counter(mode for binding in reduced for mode in segment_modes(binding))
+    return _summed(list(map(_noted_in, notes.values())), dict(modes))
 
 
-def _reduced(entries: Iterable[bpy.types.PropertyGroup]) -> list[bpy.types.PropertyGroup]:
-    return [entry for entry in entries if entry.kind == REDUCED]
+def _notes_on(transforms: Iterable[Transform]) -> dict[tuple, Note]:
+    """Return the latest notes on keys that were reduced, by prefixes and slots: once for all that move by them."""
+    result: dict[tuple, Note] = {}
+    for transform, notes in notes_of(transforms):
+        for note in notes:
+            if note.kind == REDUCED:
+                result.setdefault((transform.prefix, note.changed, note.handle), note)
+    return result
 
 
 def _summed(reductions: Sequence[Reduction], segments: dict[str, int]) -> Reduction | None:
     """Return all of these together, None where there are none. What they say of a rig is that with the most frames."""
     if not reductions:
         return None
-    rigs = [reduction.rig for reduction in reductions if reduction.rig is not None]
+    rigs = [item.rig for item in reductions if item.rig is not None]
     return Reduction(
-        sum(reduction.before for reduction in reductions),
-        sum(reduction.after for reduction in reductions),
-        max(reduction.largest_error for reduction in reductions),
+        sum(item.before for item in reductions),
+        sum(item.after for item in reductions),
+        max(item.largest_error for item in reductions),
         segments,
         max(rigs, key=lambda rig: rig.frames, default=None),
-        tuple(map(sum, zip(*(reduction.channel_keys for reduction in reductions), strict=True))),
+        tuple(map(sum, zip(*(item.channel_keys for item in reductions), strict=True))),
     )
 
 
-def _noted_in(entry: bpy.types.PropertyGroup) -> Reduction:
-    noted = json.loads(entry.reduction)
+def _noted_in(note: Note) -> Reduction:
+    noted = json.loads(note.reduction)
     if rig := noted["rig"]:
-        names = {name: tuple(bones) for name, bones in rig["not_promised"].items()}
-        noted["rig"] = WholeRig(**{**rig, "not_promised": NotPromised(**names)})
+        noted["rig"] = WholeRig(**{**rig, "not_promised": NotPromised(*map(tuple, rig["not_promised"]))})
     return Reduction(**noted)
 
 
 def total_reduction(targets: Targets) -> Reduction | None:
     """Return what became of the keys of several targets together, without their modes. None where none were reduced."""
-    noted = [_noted_in(entry) for _, entries in entries_of(transforms_of(targets)) for entry in _reduced(entries)]
+    noted = map(_noted_in, _notes_on(transforms_of(targets)).values())
     # Of bones it is the error of their rigs.
     of_whole = [replace(item, largest_error=item.rig.largest_error) if item.rig else item for item in noted]
     return _summed(of_whole, {})
@@ -242,41 +238,44 @@ def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None
     """Remove the keys from the file that there were before they were reduced. See `edits.apply`."""
     apply_edit(
         targets,
-        lambda transform, _: refuse_without_original(transform, REDUCED),
-        lambda transform, _: discard_originals(transform, REDUCED),
+        lambda transform, readings: bindings_with_original(transform, REDUCED, readings),
+        lambda transform, bindings: discard_originals(transform, REDUCED, bindings),
         refused,
     )
 
 
-def _write(transform: Transform, fewer: FewerKeys) -> None:
-    channel_keys = _channel_keys(fewer.binding)
-    copy = move_by_copy(transform, fewer.binding, REDUCED)
-    for row, values in fewer.values.items():
-        fcurve = copy.ensure_curve(transform.channels[row])
-        replace_keys(fcurve, fewer.frames, values, interpolation=fewer.interpolations, handle_type="AUTO_CLAMPED")
-        fcurve.mute = False
-    for channel in (transform.mode_channel, transform.turns_channel):
-        if channel in copy.curves:
-            copy.channelbag.fcurves.remove(copy.curves.pop(channel))
-    modes = fewer.modes
-    if np.ptp(modes) == 0:
-        set_whole(copy, MODE_NAMES[modes[0]])
-    else:
-        for mode in np.unique(modes).tolist():
-            set_mode_in(copy, MODE_NAMES[mode], fewer.key_frames[modes == mode])
-    keys = channel_keys, _channel_keys(copy)
-    reduction = Reduction(fewer.before, len(fewer.key_frames), fewer.largest_error, {}, fewer.rig, keys)
-    transform.motion.bakes[-1].reduction = json.dumps(asdict(reduction))
+def _write(transform: Transform, fewer: FewerKeys, originals: Originals) -> None:
+    binding, channel_keys = fewer.binding, _channel_keys(fewer.binding)
+    notes = originals.keep(binding)
+    if not notes:
+        return
+    for rows, keys in fewer.fewer.channels:
+        for row, values, codes in zip(rows, keys.values, keys.interpolation, strict=True):
+            if PART_OF[row] != SCALE or not fewer.keeps_scale:
+                fcurve = binding.ensure_curve(transform.channels[row])
+                replace_keys(fcurve, keys.times, values, interpolation=codes, handle_type="AUTO_CLAMPED")
+                fcurve.mute = False
+    if transform.turns_channel in binding.curves:
+        binding.channelbag.fcurves.remove(binding.curves.pop(transform.turns_channel))
+    frames = distinct(fewer.fewer.keyed_frames)
+    modes = fewer.fewer.modes_at(frames + SAME_FRAME)
+    for mode in np.unique(modes).tolist():
+        set_mode_in(binding, MODE_NAMES[mode], None if np.all(modes == mode) else frames[modes == mode])
+    keys = channel_keys, _channel_keys(binding)
+    reduction = Reduction(fewer.before, fewer.after, fewer.largest_error, {}, fewer.rig, keys)
+    for note in notes:
+        note.reduction = json.dumps(asdict(reduction))
 
 
 def _channel_keys(binding: Binding) -> int:
     return sum(len(fcurve.keyframe_points) for fcurve in binding.curves.values())
 
 
-def _no_fewer(transform: Transform, before: int, *, keeps_scale: bool, count: int | None) -> Refused:
+def _no_fewer(transform: Transform, keyed: Sequence[tuple[Binding, Source]], count: int | None) -> Refused:
+    before = sum(count_of(source) for _, source in keyed)
     if before <= 2:
         return Refused(_why_nothing_is_keyed(transform, before))
-    if keeps_scale:
+    if any(has_uneven_scale(source) for _, source in keyed):
         return Refused(
             n_(
                 "{name} keeps its {count} keys: its scale changes differently along its axes, which is no "
@@ -285,37 +284,26 @@ def _no_fewer(transform: Transform, before: int, *, keeps_scale: bool, count: in
             name=transform.name,
             count=before,
         )
+    text = n_("{name} needs its {count} keys to stay within the tolerance: allow a larger one")
     if count is not None:
-        return NeedsItsKeys(n_("{name} has {count} keys: ask for fewer"), name=transform.name, count=before)
-    return NeedsItsKeys(
-        n_("{name} needs its {count} keys to stay within the tolerance: allow a larger one"),
-        name=transform.name,
-        count=before,
-    )
+        text = n_("{name} has {count} keys: ask for fewer")
+    return NeedsItsKeys(text, name=transform.name, count=before)
 
 
 def _why_nothing_is_keyed(transform: Transform, count: int) -> str:
     """Return what moves something that has hardly a key, and how that becomes keys."""
     obj = transform.carrier
     has = rpt_(HAS_KEYS[min(count, 2)]).format(name=transform.name, count=count)
-    constraints = {
-        constraint.type for constraint in obj.constraints if constraint.enabled and not shows_differences(constraint)
-    }
+    constraints = {constraint.type for constraint in obj.constraints if constraint.enabled}
     if not transform.is_part and obj.rigid_body is not None and obj.rigid_body.type == "ACTIVE":
         return rpt_(SIMULATED).format(has=has)
     if constraints & SOLVED:
         return rpt_(SOLVED_CAMERA).format(has=has)
-    if constraints or _is_driven(transform):
+    data, paths = transform.animated.animation_data, tuple(transform.prefix + name for name in MOVING)
+    if constraints or (data is not None and any(driver.data_path in paths for driver in data.drivers)):
         return rpt_(CONSTRAINED_BONE if transform.is_part else CONSTRAINED).format(has=has)
     if not transform.is_part and any(
         binding.kind.is_part for slot in slots_of([transform.animated]) for binding in bindings_in_slot(slot)
     ):
         return rpt_("{has}, its bones have: select those in Pose mode, and reduce theirs").format(has=has)
     return rpt_("{has}: there is nothing to reduce").format(has=has)
-
-
-def _is_driven(transform: Transform) -> bool:
-    data = transform.animated.animation_data
-    paths = [driver.data_path for driver in (data.drivers if data else ())]
-    begins = tuple(transform.prefix + name for name in ("location", "rotation", "scale"))
-    return any(path.startswith(begins) for path in paths)

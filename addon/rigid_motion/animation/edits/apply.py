@@ -11,12 +11,11 @@ from typing import TypeVar
 
 import bpy
 
-from ..actions.reading import leading, sources_of_users
-from ..actions.records import follow_renamed
+from ..actions.reading import sources_of_users
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import Binding, bindings_of
-from ..compute.sources import Source
-from ..live import follower
+from ..evaluation.sources import Source
+from ..following import follower
 from ..transforms import Refused, Transform, transform_of
 
 Target = bpy.types.Object | bpy.types.PoseBone | Transform
@@ -43,7 +42,6 @@ def apply_edit(
     plan: Callable[[Transform, Readings], Plan],
     act: Callable[[Transform, Plan], Result],
     refused: list[Refused] | None,
-    becomes: Callable[[Source], Source] | None = None,
     survey: Callable[[Mapping[Transform, Readings]], None] | None = None,
 ) -> dict[Transform, Result]:
     """Do something to each target.
@@ -55,8 +53,6 @@ def apply_edit(
         Says for one what there is to do, without doing any of it. May raise `Refused`.
     act
         Does it.
-    becomes
-        What becomes of a source by it, where no F-curve of the animator's is touched: nothing is read again then.
     survey
         Is shown all readings before the first plan, where plans depend on one another.
 
@@ -68,7 +64,6 @@ def apply_edit(
     transforms = transforms_of(targets)
     readings: dict[Transform, Readings] = {transform: [] for transform in transforms}
     bindings = bindings_of(transforms)
-    follow_renamed(bindings)
     of_users = sources_of_users(bindings)
     for binding, sources in zip(bindings, of_users, strict=True):
         for user, source in zip(binding.users, sources, strict=True):
@@ -88,16 +83,7 @@ def apply_edit(
         refused.extend(refusals)
     with follower.follower.turn():
         results = {transform: act(transform, planned) for transform, planned in plans}
-    acted = {transform for transform, _ in plans}
-    if becomes is None:
-        follower.refresh(acted)
-    else:
-        leaders = {
-            binding: leading(binding, [becomes(source) if isinstance(source, Source) else source for source in sources])
-            for binding, sources in zip(bindings, of_users, strict=True)
-            if not acted.isdisjoint(binding.users)
-        }
-        follower.follower.alone(follower.follower.refresh_bindings, list(leaders), list(leaders.values()))
+    follower.refresh(transform for transform, _ in plans)
     return results
 
 

@@ -20,20 +20,19 @@ from ..actions.channels import KeyFields, key_fields, set_key_fields
 from ..actions.reading import added_values, read
 from ..actions.refusals import refuse_linked
 from ..actions.slots import Binding, read_again
-from ..compute.bodies import body_poses
-from ..compute.components import DEPENDS_ON_KEYS, MODE_NAMES, MODE_NUMBERS
-from ..compute.differences import in_betweens
-from ..compute.sources import SAME_FRAME, Source
-from ..compute.turning import needs_turning
-from ..live import follower
-from ..live.inserted_keys import set_key
-from ..live.kept_timing import nearest_key
-from ..live.segment_keys import share_out_turns
+from ..evaluation.bodies import body_poses
+from ..evaluation.channel_values import channel_values
+from ..evaluation.components import AXIS_ANGLE, DEPENDS_ON_KEYS, MODE_NAMES, MODE_NUMBERS, ROWS, SCALE
+from ..evaluation.differences import in_betweens
+from ..evaluation.sources import SAME_FRAME, Source
+from ..evaluation.turning import needs_turning
+from ..following import follower
+from ..following.inserted import set_key
+from ..following.kept_timing import nearest_key
+from ..following.shared_turns import share_out_turns
 from ..queries.keyed import active_binding
 from ..queries.segments import frame_in_action
 from ..transforms import Channel, Refused, Transform
-from ..writers.channel_values import components_near
-from ..writers.table import shown_components
 from .apply import Readings, Targets, apply_edit, readable
 
 BREAKDOWN, PUSH, RELAX = KINDS = ("BREAKDOWN", "PUSH", "RELAX")
@@ -99,13 +98,13 @@ class _Between:
                 return straight
             mode = LIKE_BLENDER if self.mode == "BLENDER" else None
             middle = np.array([0.5 * sum(self.ends)])
-            return components_near(
+            return _components_near(
                 self.source, in_betweens(self.source, middle, mode, np.array([factor])).desired, straight
             )
         share = -factor if kind == PUSH else factor
         native = self.source.values_at(np.array([self.frame]))[:, 0]
         towards = in_betweens(self.source, np.array([self.frame])).desired
-        straight = self.seen + share * (components_near(self.source, towards, native) - self.seen)
+        straight = self.seen + share * (_components_near(self.source, towards, native) - self.seen)
         if self.mode == "BLENDER" and self.source.order is not None:
             return straight
         original, axes = self.source.original[:, None, None], self.source.location_axes
@@ -113,10 +112,10 @@ class _Between:
         ways = Poses(
             np.concatenate((now.positions, towards.positions)),
             np.concatenate((now.quaternions, towards.quaternions)),
-            None if now.scales is None else np.concatenate((now.scales, towards.scales)),
+            None if now.scales is None else np.append(now.scales * self.source.original[7:].mean(), towards.scales),
         )
         mode = LIKE_BLENDER if self.mode == "BLENDER" else self.mode
-        return components_near(
+        return _components_near(
             self.source, interpolate((0.0, 1.0), ways, np.array([share]), mode, extrapolate=True), straight
         )
 
@@ -171,7 +170,6 @@ class Breakdowns:
         with self._edit():
             for between in self._between:
                 between.key(self.kind, factor)
-                follower.follower.inserted.notice_values(between.transform, self._frame)
 
     def cancel(self) -> None:
         """Let all be as it was, with the poses that had no key yet."""
@@ -214,7 +212,6 @@ class Breakdowns:
             )
         keys = source.key_frames
         after = int(np.searchsorted(keys, frame))
-        seen = shown_components(transform)
         keyed = [*(transform.channels[row] for rows, _ in source.channels for row in rows), transform.turns_channel]
         curves = {channel: binding.curves.get(channel) for channel in keyed}
         return _Between(
@@ -223,14 +220,14 @@ class Breakdowns:
             source,
             frame,
             (float(keys[after - 1]), float(keys[after])),
-            (transform.components() if seen is None else seen) - added,
+            transform.components() - added,
             {name: tuple(getattr(transform.carrier, name)) for name in transform.properties.values()},
             {channel: fcurve and key_fields(fcurve.keyframe_points) for channel, fcurve in curves.items()},
         )
 
 
 def _without(source: Source, frame: float) -> Source:
-    """Return what is keyed but for this frame, and without holds. A channel with no other key keeps its value."""
+    """Return what is keyed but for this frame. A channel with no other key keeps its value."""
     channels, rest = [], dict(source.rest)
     for rows, keys in source.channels:
         others = np.abs(keys.times - frame) >= SAME_FRAME
@@ -238,4 +235,22 @@ def _without(source: Source, frame: float) -> Source:
             channels.append((rows, keys if others.all() else keys.at(others)))
         else:
             rest |= dict(zip(rows, keys.values[:, 0].tolist(), strict=True))
-    return replace(source, channels=tuple(channels), rest=rest).unheld
+    return replace(source, channels=tuple(channels), rest=rest)
+
+
+def _components_near(source: Source, pose: Poses, near: np.ndarray) -> np.ndarray:
+    """Return the components that show one pose (1,) with the own delta transforms, shape (10,).
+
+    The rotation is in the sign and the turn that `near` (10,) has, and so is the scale that the modes leave to Blender.
+    """
+    original, axes = source.original, source.location_axes
+    moved = replace(pose, positions=pose.positions if axes is None else pose.positions @ axes)
+    ends = np.stack((near, near))[..., None]
+    result = channel_values(moved, np.array([1]), np.zeros(1), ends, original[:, None], source.order)[:, 0]
+    # What lies between two signs or axes has no length to speak of.
+    turned = result[3 if source.order is None else 4 : 7]
+    if source.order in (None, AXIS_ANGLE):
+        turned /= np.linalg.norm(turned) or 1.0
+    scale = original[ROWS[SCALE]].mean()
+    result[ROWS[SCALE]] = near[ROWS[SCALE]] if pose.scales is None or scale == 0.0 else pose.scales[0] / scale
+    return result

@@ -8,13 +8,12 @@ import bpy
 import numpy as np
 
 from ..actions.channels import key_points, selected_keys
-from ..actions.reading import keyed_in, read
-from ..actions.records import recorded_mode
+from ..actions.reading import keyed_in, modes_said, read
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import Binding, bindings_for, bindings_of
-from ..compute.components import MODE_NAMES
-from ..compute.sources import SAME_FRAME, Source, distinct
-from ..transforms import WIDTHS, Channel, Refused, Transform, transform_of
+from ..evaluation.components import MODE_NAMES, UNKNOWN
+from ..evaluation.sources import SAME_FRAME, Marks, Source, distinct
+from ..transforms import WIDTHS, Refused, Transform, transform_of
 
 
 def active_binding(transform: Transform, bindings: Iterable[Binding] | None = None) -> Binding | None:
@@ -69,7 +68,7 @@ def sources_of(bindings: Sequence[Binding]) -> list[Source | None]:
 def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False) -> np.ndarray:
     """Return the frames of location, rotation and scale keys, or of the selected ones alone, shape (n,), rising.
 
-    Keys of the channels of modes and turns count among the selected ones.
+    Keys of the channel of turns count among the selected ones.
     """
     binding = active_binding_alone(transform_of(carrier))
     return np.empty(0) if binding is None else frames_in(binding, selected=selected)
@@ -80,13 +79,25 @@ def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[
     transform = transform_of(carrier)
     binding = active_binding_alone(transform)
     if binding is None:
-        return [transform.motion.mode or "BLENDER"] * len(frames)
-    return [MODE_NAMES[number] for number in modes_in(binding, np.asarray(frames, dtype=np.float64))]
+        return [transform.motion.awaited or "BLENDER"] * len(frames)
+    return [MODE_NAMES[number] for number in modes_in(binding, np.asarray(frames, dtype=np.float64)).tolist()]
+
+
+def mode_shown(transform: Transform) -> str:
+    """Return the mode of the first segment of a transform, in its Action or the lowest of its strips with keys.
+
+    Without any keys it is the one that is awaited.
+    """
+    bindings = [binding for binding in bindings_for(transform) if binding.is_keyed]
+    binding = active_binding(transform, bindings) or next(iter(bindings), None)
+    if binding is None:
+        return transform.motion.awaited or "BLENDER"
+    return MODE_NAMES[int(modes_in(binding, frames_in(binding)[:1])[0])]
 
 
 def segment_modes(binding: Binding) -> list[str]:
     """Return the modes of the segments between the keys of a slot, one after the other."""
-    return [MODE_NAMES[number] for number in modes_in(binding, frames_in(binding)[:-1])]
+    return [MODE_NAMES[number] for number in modes_in(binding, frames_in(binding)[:-1]).tolist()]
 
 
 def frames_in(binding: Binding, *, selected: bool = False) -> np.ndarray:
@@ -95,34 +106,29 @@ def frames_in(binding: Binding, *, selected: bool = False) -> np.ndarray:
     transform = binding.users[0]
     for channel, fcurve in binding.curves.items():
         path = channel[0].removeprefix(binding.prefix)
-        if path in WIDTHS or (selected and channel in (transform.mode_channel, transform.turns_channel)):
+        if path in WIDTHS or (selected and channel == transform.turns_channel):
             keyed = key_points(fcurve)[:, 0]
             result.append(keyed[selected_keys(fcurve)] if selected else keyed)
     frames = np.unique(np.concatenate(result)).astype(np.float64) if result else np.empty(0)
     return distinct(frames)
 
 
-def modes_in(binding: Binding, frames: np.ndarray) -> list[int]:
-    """Return the numbers of the modes at these frames; Blender's own where there is what is no mode."""
-    values = _held_in(binding, binding.users[0].mode_channel, frames)
-    modes = [recorded_mode(binding)] * len(frames) if values is None else np.rint(values).tolist()
-    return [int(mode) if mode in MODE_NAMES else 0 for mode in modes]
+def modes_in(binding: Binding, frames: np.ndarray) -> np.ndarray:
+    """Return the numbers of the modes at these frames, shape (n,); Blender's own where there is what is no mode."""
+    modes = modes_said(binding)
+    if isinstance(modes, Marks):
+        at = np.searchsorted(modes.frames, frames + 0.5 * SAME_FRAME, side="right") - 1
+        numbers = modes.numbers[np.clip(at, 0, None)]
+    else:
+        numbers = np.full(len(frames), modes)
+    return np.where(numbers == UNKNOWN, 0, numbers)
 
 
 def turns_in(binding: Binding, frames: np.ndarray) -> np.ndarray:
     """Return the turns more of the segments at these frames, shape (n,)."""
-    turns = _held_in(binding, binding.users[0].turns_channel, frames, before=0.0)
-    return np.zeros(len(frames)) if turns is None else np.nan_to_num(turns)
-
-
-def _held_in(binding: Binding, channel: Channel, frames: np.ndarray, before: float | None = None) -> np.ndarray | None:
-    """Return what the keys of a channel say of segments that begin on these frames, shape (n,).
-
-    Before its keys that is what the first one says, if nothing else is given. None where no keys have a say.
-    """
-    fcurve = binding.curves.get(channel)
+    fcurve = binding.curves.get(binding.users[0].turns_channel)
     if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
-        return None
+        return np.zeros(len(frames))
     times, values = key_points(fcurve).T
     at = np.searchsorted(times, frames + 0.5 * SAME_FRAME, side="right")
-    return np.insert(values, 0, values[0] if before is None else before)[at]
+    return np.nan_to_num(np.insert(values, 0, 0.0)[at])

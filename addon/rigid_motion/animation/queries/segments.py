@@ -11,16 +11,14 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..actions.mode_property import has_to_do_with_modes
-from ..actions.reading import differing_users, sources_of_users
-from ..actions.records import recorded_digest
+from ..actions.reading import differing_users, is_marked, planned_from, sources_of_users
 from ..actions.refusals import refuse_numbers
-from ..actions.slots import Binding, bindings_for, bindings_of
-from ..compute.components import MODE_NAMES, PART_OF
-from ..compute.differences import differences
-from ..compute.sources import SAME_FRAME, Source
-from ..compute.turning import turning_in, values_at_ends
-from ..curves.keys import cycled
+from ..actions.slots import Binding, bindings_of
+from ..evaluation.components import MODE_NAMES
+from ..evaluation.sources import SAME_FRAME, Source
+from ..evaluation.spans import spans
+from ..evaluation.turning import turning_in, values_at_ends
+from ..fcurves.keys import cycled
 from ..transforms import Refused, Transform, transform_of
 from .keyed import active_binding_alone
 
@@ -32,9 +30,6 @@ NEAR_HALF_TURN = np.radians(170.0)
 
 NEAR = 1e-6
 """Values that differ by less are the same."""
-
-SAME_VALUE = 1e-5
-"""Values of properties that differ by less are the same but for single precision."""
 
 
 @dataclass(frozen=True)
@@ -84,23 +79,26 @@ def frame_in_action(obj: bpy.types.Object, frame: float) -> float:
 
 
 def segment_at(source: Source, frame: float) -> SegmentFacts | None:
-    """Return the segment that a frame is in, None before the first key and after the last.
+    """Return the segment that a frame is in, None before the first key and after the last where no cycle repeats them.
 
     A key is in the segment that it starts; the last one in the segment that it ends.
     """
-    keys = source.key_frames
-    if len(keys) < 2 or not keys[0] - SAME_FRAME <= frame <= keys[-1] + SAME_FRAME:
+    keys, moment, backwards = source.key_frames, frame, False
+    if source.cyclic is not None:
+        (moment,), (backwards,) = cycled(source.cyclic, np.array([frame]))
+    if len(keys) < 2 or not keys[0] - SAME_FRAME <= moment <= keys[-1] + SAME_FRAME:
         return None
-    index = int(np.clip(np.searchsorted(keys, frame + SAME_FRAME, side="right") - 1, 0, len(keys) - 2))
+    index = int(np.clip(np.searchsorted(keys, moment + SAME_FRAME, side="right") - 1, 0, len(keys) - 2))
     ends = keys[index : index + 2]
+    first, last = frame + moment - ends[::-1] if backwards else frame - moment + ends
     rows = values_at_ends(source, index)
     location, rotation, scale = np.split(rows, (3, 7))
     alike = float(rotation[:, 0] @ rotation[:, 1]) / float(np.prod(np.linalg.norm(rotation, axis=0)) or 1.0)
     swept, turned = np.abs(np.diff(rotation[:3])), turning_in(source, index)
     return SegmentFacts(
-        first=float(ends[0]),
-        last=float(ends[1]),
-        key=_deciding_key(source, ends[0]),
+        first=float(first),
+        last=float(last),
+        key=float(ends[0]),
         mode=MODE_NAMES[source.modes[index]],
         turn=float(turned.totals[0]),
         turns=float(turned.spins.turns[0]),
@@ -115,63 +113,8 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
 def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
     """Return whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
     binding = active_binding_alone(transform_of(target))
-    return binding is not None and recorded_digest(binding) == (source.digest if source.is_live else "")
-
-
-def parts_with_in_betweens(transform: Transform) -> set[str]:
-    """Return which of location, rotation and scale in-betweens are in. `Refused` where it turns by axis and angle."""
-    filled = {channel for binding in bindings_for(transform) for channel in binding.filled}
-    return {PART_OF[row] for row, channel in transform.differences.items() if channel in filled}
-
-
-def is_blended(transform: Transform) -> bool:
-    """Return whether in-betweens of a bone are in an Action that strips fade in or out, or mix with what is below.
-
-    Blender blends the keys, and the time of the constraint beside them: that is not the blend of the poses.
-    """
-    data = transform.animated.animation_data
-    if not transform.has_difference_slot or data is None or not len(data.nla_tracks):
-        return False
-    slots = {binding.slot.key for binding in bindings_for(transform) if recorded_digest(binding)}
-    if (data.action, data.action_slot_handle) in slots:
-        below = any(track.strips for track in data.nla_tracks)
-        if below and (data.action_influence < 1.0 or data.action_blend_type != "REPLACE"):
-            return True
-    strips = [strip for track in data.nla_tracks if not track.mute for strip in track.strips if not strip.mute]
-    return any(
-        strip.blend_in or strip.blend_out or strip.use_animated_influence or strip.blend_type != "REPLACE"
-        for strip in strips
-        if (strip.action, strip.action_slot_handle) in slots
-    ) or bool(slots and any(strip.type == "TRANSITION" for strip in strips))
-
-
-def has_edited_differences(transform: Transform, frame: float) -> bool:
-    """Return whether something has another difference than its in-betweens on this frame of its Action.
-
-    So it is once what they are in was edited, until the frame changes.
-    """
-    if transform.has_difference_slot:
-        # What a constraint adds cannot be edited.
-        return False
-    binding = active_binding_alone(transform)
-    if binding is None or binding.slot.in_nla:
-        # Strips are blended with one another.
-        return False
-    return any(
-        abs(transform.animated.path_resolve(path)[index] - fcurve.evaluate(frame)) > SAME_VALUE
-        for (path, index), fcurve in binding.filled.items()
-        if not fcurve.mute
-    )
-
-
-def _deciding_key(source: Source, start: float) -> float:
-    """Return the key that a segment's mode hangs on."""
-    cyclic = source.cyclic
-    if cyclic is None:
-        return float(start)
-    moment = cycled(cyclic, np.array([start + SAME_FRAME]))[0][0]
-    keys = source.keyed_frames
-    return float(keys[max(np.searchsorted(keys, moment, side="right") - 1, 0)])
+    planned = None if binding is None else planned_from(binding)
+    return planned is None or (source.is_live and planned == source.digest24)
 
 
 def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str:
@@ -182,12 +125,12 @@ def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str
         for binding, sources in zip(bindings, sources_of_users(bindings), strict=True):
             source = sources[binding.users.index(transform)]
             if isinstance(source, Refused):
-                if not has_to_do_with_modes(binding):
+                if not is_marked(binding):
                     continue
                 raise source
             refuse_numbers(transform.name, source)
             if source.is_live:
-                differences([source])
+                spans(source)
                 _refuse_differing(transform, binding, sources)
     except Refused as problem:
         return str(problem)

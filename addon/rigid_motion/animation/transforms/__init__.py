@@ -1,10 +1,9 @@
 """What is moved: one small interface for whatever has location, rotation and scale, and the kinds that have it.
 
-A transform knows whose Action animates it, on which property its channels are, and where the difference between
-Blender's in-betweens and the desired ones goes.
+A transform knows whose Action animates it, and on which property its channels are.
 
-transform  the interface: channels, and where differences go
-kinds      objects, by their delta transforms, or by a constraint where they are to be exact between frames; bones
+transform  the interface
+kinds      objects and pose bones
 sizes      how large things are, and how far they reach
 posing     where the poses of bones put them
 
@@ -14,63 +13,34 @@ Each module imports only those above it.
 from __future__ import annotations
 
 from .kinds import (
-    CONSTRAINT,
-    GROUP,
-    ORIGINALS,
     BoneTransform,
-    ExactObjectTransform,
     ObjectTransform,
     bone_name,
-    default_of,
-    difference_constraints,
     is_part,
     let_override_be_read,
     prefix_of,
-    shows_differences,
     split_path,
     transform_in,
     transform_of,
 )
-from .transform import (
-    LINKED,
-    MODE_PROPERTY,
-    OWN_WORDS,
-    SEGMENT_PROPERTIES,
-    WIDTHS,
-    Channel,
-    Refused,
-    Transform,
-    rotation_of,
-    set_rotation,
-    visible_components,
-)
+from .transform import GROUP, LINKED, OWN_WORDS, TURNS_PROPERTY, WIDTHS, Channel, Refused, Transform
 
 __all__ = [
-    "CONSTRAINT",
     "GROUP",
     "LINKED",
-    "MODE_PROPERTY",
-    "ORIGINALS",
     "OWN_WORDS",
-    "SEGMENT_PROPERTIES",
+    "TURNS_PROPERTY",
     "WIDTHS",
     "BoneTransform",
     "Channel",
-    "ExactObjectTransform",
     "ObjectTransform",
     "Refused",
     "Transform",
     "bone_name",
-    "default_of",
-    "difference_constraints",
     "is_part",
     "let_override_be_read",
     "prefix_of",
-    "rotation_of",
-    "set_rotation",
-    "shows_differences",
     "split_path",
     "transform_in",
     "transform_of",
-    "visible_components",
 ]

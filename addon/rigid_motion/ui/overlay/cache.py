@@ -18,12 +18,12 @@ from bpy.app.handlers import persistent
 
 from ...animation.actions.channels import selected_keys
 from ...animation.actions.slots import Binding
-from ...animation.compute.sources import Source
+from ...animation.evaluation.sources import Source
 from ...animation.handlers import append_handlers, remove_handlers
 from ...animation.queries.keyed import active_bindings, frames_in
 from ...animation.transforms import Transform, transform_of
 from .ghosts import ghosts_of
-from .kinds import PATH_KINDS
+from .kinds import axis_length_of, followed
 from .parents import Carried, Parents
 from .points import Path, trace
 
@@ -140,15 +140,16 @@ def _read(
     else:
         parents = None
     mode, tick_step, axes_size, ghost_step, *_ = settings
-    kind = PATH_KINDS[type(target)]
-    point, size = kind.point(target.carrier, source, turn), kind.axis_length(target.carrier, source)
+    point = followed(target.carrier, source, turn) if target.is_part else None
+    size = axis_length_of(target, source)
     entry.selected = _selection(binding)
     # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
     of_point = () if point is None else (point.moves, point.stays.tobytes(), point.tip.tobytes())
     selected = frames_in(binding, selected=True)
     stands = [getattr(target.carrier, prop)[:] for name, prop in target.properties.items() if name not in source.keyed]
     entry.digest = (
-        *(source.digest, tuple(source.rest.items()), of_point, selected.tobytes(), size, entry.settings),
+        *(source.digest, source.original.tobytes(), tuple(source.rest.items()), of_point, selected.tobytes(), size),
+        entry.settings,
         *(tuple(stands) if ghost_step else (), parents and parents.digest),
     )
     if before is not None and before.digest == entry.digest:

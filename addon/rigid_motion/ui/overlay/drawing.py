@@ -26,7 +26,7 @@ from ..preferences import DEFAULT_LOOK, Color, preferences
 from ..targets import selected_in_view
 from . import cache
 from .ghosts import Ghosts, shape_of
-from .kinds import PATH_KINDS
+from .kinds import space_of
 from .points import TICKS, Path, Readable, readable, thinned
 from .settings import RigidMotionOverlay, is_shown
 
@@ -265,7 +265,7 @@ def _complain(problem: Exception) -> None:
 def _draw(context: bpy.types.Context) -> None:
     scene, depsgraph = context.scene, context.view_layer.depsgraph
     settings, targets = scene.rigid_motion_overlay, list(map(transform_of, selected_in_view(context)))
-    spaces = {target: PATH_KINDS[type(target)].space(target.carrier, depsgraph) for target in targets}
+    spaces = {target: space_of(target, depsgraph) for target in targets}
     result = cache.paths_of(targets, scene, {target: turned for target, (_, turned) in spaces.items()})
     paths = [(target, path) for target, path in zip(targets, result, strict=True) if path is not None]
     cache.keep_only(len(targets))

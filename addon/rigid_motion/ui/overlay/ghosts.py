@@ -12,8 +12,8 @@ import bpy
 import numpy as np
 
 from ...animation.baking.motions import shown
-from ...animation.compute.components import MODE_NUMBERS
-from ...animation.compute.sources import Source
+from ...animation.evaluation.components import MODE_NUMBERS
+from ...animation.evaluation.sources import Source
 from ...animation.transforms import Transform
 from ...animation.transforms.sizes import drawn_size
 from ...motion.affine import AffineMaps

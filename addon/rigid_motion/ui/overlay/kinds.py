@@ -6,18 +6,15 @@ frame. The head of a bone that only turns stays where it is: there it is the pat
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
-
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ...animation.compute.components import LOCATION
-from ...animation.compute.sources import Source
-from ...animation.transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform
+from ...animation.evaluation.components import LOCATION
+from ...animation.evaluation.sources import Source
+from ...animation.transforms import Transform
 from .parents import unless_same
-from .points import Followed, axis_length_of, space_of
+from .points import Followed, axis_length_of_object, space_of_object
 
 
 def space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, np.ndarray | None]:
@@ -65,28 +62,15 @@ def axis_length_of_bone(bone: bpy.types.PoseBone, source: Source) -> float:
     return float(size if source.uniform_scale else size * np.abs(np.array(bone.scale)).max()) or 1.0
 
 
-Carrier = bpy.types.Object | bpy.types.PoseBone
+def space_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, np.ndarray | None]:
+    """Return where a path leads in the world, and what stands between rotation and location in it, None where nothing
+    does.
+    """
+    if transform.is_part:
+        return space_of_bone(transform.carrier, depsgraph)
+    return space_of_object(transform.carrier, depsgraph), None
 
 
-class PathKind(NamedTuple):
-    """How the paths of one kind of transform are drawn."""
-
-    space: Callable[[Carrier, bpy.types.Depsgraph], tuple[Matrix, np.ndarray | None]]
-    """Returns where a path leads in the world, and what stands between rotation and location in it,
-    None where nothing does."""
-
-    point: Callable[[Carrier, Source, np.ndarray | None], Followed | None]
-    """The point that a path is of, None for the origin."""
-
-    axis_length: Callable[[Carrier, Source], float]
-    """Returns how long its local axes are."""
-
-
-OBJECT = PathKind(lambda obj, depsgraph: (space_of(obj, depsgraph), None), lambda *_: None, axis_length_of)
-
-PATH_KINDS: dict[type[Transform], PathKind] = {
-    BoneTransform: PathKind(space_of_bone, followed, axis_length_of_bone),
-    ObjectTransform: OBJECT,
-    ExactObjectTransform: OBJECT,
-}
-"""A row for each of the `transforms.KINDS`."""
+def axis_length_of(transform: Transform, source: Source) -> float:
+    """Return how long its local axes are."""
+    return (axis_length_of_bone if transform.is_part else axis_length_of_object)(transform.carrier, source)

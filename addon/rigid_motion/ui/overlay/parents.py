@@ -15,9 +15,9 @@ from mathutils import Matrix
 
 from ...animation.actions.slots import Binding
 from ...animation.baking.motions import MOVING, not_promised, shown
-from ...animation.compute.sources import Source
+from ...animation.evaluation.sources import Source
 from ...animation.queries.keyed import active_bindings, sources_of
-from ...animation.transforms import Transform, shows_differences, transform_of
+from ...animation.transforms import Transform, transform_of
 from ...animation.transforms.posing import Hierarchy
 from ...motion.affine import AffineMaps
 
@@ -178,10 +178,7 @@ def _moves_by_keys(transform: Transform, carried: Carried) -> bool:
     data, body = obj.animation_data, obj.rigid_body
     in_strips = data is not None and (data.use_tweak_mode or any(track.strips for track in data.nla_tracks))
     driven = data is not None and any(driver.data_path.removeprefix("delta_") in MOVING for driver in data.drivers)
-    constrained = any(
-        not constraint.mute and constraint.influence > 0.0 and not shows_differences(constraint)
-        for constraint in obj.constraints
-    )
+    constrained = any(not constraint.mute and constraint.influence > 0.0 for constraint in obj.constraints)
     return not (in_strips or driven or constrained or body is not None) and _hangs_on_a_whole(obj)
 
 

@@ -1,7 +1,7 @@
 """The points of a path: where an object comes through, natively and in a mode, as arrays for the overlay to draw.
 
-Points are (n, 3), in the space of the object's channels, its own delta transforms included; `space_of` leads from there
-into the world. Frames are those of the Action. No window and no graphics card is needed here.
+Points are (n, 3), in the space of the object's channels, its own delta transforms included; `space_of_object` leads
+from there into the world. Frames are those of the Action. No window and no graphics card is needed here.
 
 On a short path, or one that is looked at from afar, ticks would be a solid bar. They stay evenly timed: of a path that
 moves too little from tick to tick, only every second, fifth, tenth... is left. Where the object nearly rests even those
@@ -18,8 +18,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...animation.compute.differences import in_betweens
-from ...animation.compute.sources import Source
+from ...animation.evaluation.differences import in_betweens
+from ...animation.evaluation.sources import Source
 from ...animation.transforms.sizes import drawn_size
 from ...motion import Poses
 from ...motion.affine import AffineMaps, turned
@@ -172,7 +172,6 @@ def trace(
     """
     if len(source.key_frames) < 2:
         return None
-    source = source.unheld
     first, last = source.seen_range
     keys = source.keyed_frames
     ticks = tick_frames(first, last, tick_step)
@@ -285,7 +284,7 @@ def thinned(line: np.ndarray) -> np.ndarray:
         line = line[stays]
 
 
-def axis_length_of(obj: bpy.types.Object, source: Source) -> float:
+def axis_length_of_object(obj: bpy.types.Object, source: Source) -> float:
     """Return how long to draw an object's local axes: half as long as it is. At scale 1,
     where the source has a scale.
     """
@@ -296,7 +295,7 @@ def axis_length_of(obj: bpy.types.Object, source: Source) -> float:
     return float(size.max()) or 1.0
 
 
-def space_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
+def space_of_object(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
     """Return the matrix from the space of an object's channels into the world, as its parent is on the current frame.
 
     For a parent that is an object: that one's evaluated matrix, and the inverse at parenting. For a bone, vertices or a

@@ -7,7 +7,8 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from ...animation.properties import MODE_ITEMS, OWN_WORDS
+from ...animation.properties import MODE_ITEMS
+from ...animation.transforms import OWN_WORDS
 from ..wording import draw_text, labelled
 
 MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MODE_ITEMS[1:]]
@@ -27,6 +28,7 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
         name="Mode",
         description="The mode to draw. Another one than keyed shows what it would do, and changes nothing",
         items=MODE_CHOICES,
+        translation_context=OWN_WORDS,
         options=set(),
     )
     show_native: BoolProperty(

@@ -1,0 +1,18 @@
+"""From what is keyed to the values that channels are to have for the modes: NumPy alone.
+
+components      the rows of arrays: location, rotation, scale; and the numbers of modes
+marks           what keys say beyond their values: modes and axes from frames on, and whether anything changes
+rounds          cycles: whether what is added repeats with them
+keyed           what is keyed, as arrays with a digest
+sources         the segments between keys: their modes, turns and parts
+source_cache    the sources of earlier edits
+bodies          the channels' own values, progress in a segment, and poses of a body
+turning         whole turns, of angles or of the channel
+breakdowns      keys that lie on a path instead of shaping it
+ends            the poses that segments run between, the keys beside them, and what modes make of them
+channel_values  from poses back to quaternions, Euler angles, or an angle about an axis
+differences     from sources to what is to be added to their channels
+spans           the stretches of time in which that is smooth
+
+Each module imports only those above it.
+"""

@@ -1,0 +1,365 @@
+"""What segments run between: the poses at their ends, how they turn, the keys beside them, and what modes make of them.
+
+Arrays are of S segments, one behind the other.
+
+A smooth mode looks at the keys beside a segment, and with handles at how fast the motion passes its keys. The direction
+of the tangent at a key is that of the mode, a mean of the twists before and after it. How far the motion has come in a
+segment is what the channels say, as in the other modes: their progress along the segment's chord. The screws on both
+sides of a key differ in speed and direction. So the tangent is made as long on either side as the screw is along the
+mean of both, which makes the speed the same where handles are smooth and the path is straight; what is lacking on a
+bent path, for the speed that Blender's own in-betweens have in that direction, is added to the progress. With two keys,
+and where no handle has a say, nothing changes.
+
+Twists (6, S) are along the body's own axes at the key, a radian counting as much as a unit of length; segments stand
+along the last axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from ...motion import KEYFRAME_MODES, Poses, prepare, twists
+from ...motion.curves import twist_shares
+from ...motion.poses import beyond
+from ...motion.segments import prepare_within
+from .bodies import LEAST_SCALE, body_poses, idle_progress, location_axes
+from .components import LOCATION, ROTATION, SCALE, TWISTS
+from .sources import Source
+from .turning import Turning, needs_turning, turning_of, without_spins
+
+STEP = 1.0 / 8.0
+"""The part of a segment that slopes are measured over: exact for cubics in time, and finite for vertical handles."""
+
+SLOPES = np.array((18.0, -9.0, 2.0)) / (6.0 * STEP)
+"""The slope at 0 of the cubic through 0 and three values that are `STEP` apart."""
+
+MEASURED = np.concatenate((np.arange(1, 4) * STEP, 1.0 - np.arange(3, 0, -1) * STEP))
+"""The moments in the time of a segment where it is measured: next to its first key, and next to its second."""
+
+AT_REST = 1e-9
+"""What moves and turns by less from key to key rests, but for rounding."""
+
+FASTEST = 3.0
+"""The largest slope of progress that is corrected: up to here a cubic between two keys does not turn back.
+Source: Fritsch and Carlson, "Monotone piecewise cubic interpolation", 1980."""
+
+SHORTEST = 0.1
+"""The length of a tangent from which on progress is not corrected any further to make up for it."""
+
+POSED = (LOCATION,) * 3 + (ROTATION,) * 4 + (SCALE,)
+"""The parts that the columns of `packed` poses are of."""
+
+SMALL = 0.01
+"""The least part that the mean has of the squared speeds that it is made of: where the motion turns back on itself
+there is no direction to measure along."""
+
+
+def with_neighbours(
+    times: np.ndarray, keys: Poses, holds: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, Poses]:
+    """Return frames and poses (S, 4) of the keys around each segment, from those (S, 2) at its ends.
+
+    `pairs` are the segments that meet, as `meeting` finds them. Where there is none, or a cycle jumps, the motion goes
+    on as in the segment; where a segment holds, it rests.
+    """
+    rows = packed(keys)
+    previous, following = packed(beyond(keys[:, 0], keys[:, 1])), packed(beyond(keys[:, 1], keys[:, 0]))
+    # Between two keys on one frame there is nothing, and what is on either side meets there.
+    lasts = times[:, 1] > times[:, 0]
+    duration = np.where(lasts, times[:, 1] - times[:, 0], 1.0)
+    left, right = pairs
+    previous[right] = np.where(holds[left, None], rows[right, 0], rows[left, 0])
+    following[left] = np.where(holds[right, None], rows[left, 1], rows[right, 1])
+    before, behind = duration.copy(), duration.copy()
+    before[right], behind[left] = duration[left], duration[right]
+    start, end = times[:, 0], np.where(lasts, times[:, 1], times[:, 0] + duration)
+    four = np.stack((previous, rows[:, 0], rows[:, 1], following), axis=1)
+    return (
+        np.stack((start - before, start, end, end + behind), axis=1),
+        Poses(four[..., :3], four[..., 3:7], None if keys.scales is None else four[..., 7]),
+    )
+
+
+def spins_of_neighbours(
+    signs: np.ndarray, spins: np.ndarray, around: Poses, holds: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]
+) -> tuple[Poses, np.ndarray]:
+    """Return what spins make of `with_neighbours`: the keys (S, 4) in signs that say which way round segments turn, and
+    the angular velocities (3, 2, S, 3) that spins add at both ends of the three segments between them.
+
+    From the signs (S,) and velocities (3, 2, S) of the segments.
+    """
+    quaternions = around.quaternions.copy()
+    # Where nothing is beside a segment, its motion goes on.
+    steps = signs[:, None].repeat(3, axis=1)
+    beside = np.stack((spins[:, [0, 0]], spins, spins[:, [1, 1]]), axis=3)
+    left, right = pairs
+    for segments, others, side in ((right, left, 0), (left, right, 2)):
+        steps[segments, side] = np.where(holds[others], 1.0, signs[others])
+        beside[:, :, segments, side] = np.where(holds[others], 0.0, spins[:, :, others])
+    quaternions[:, 1:] *= np.cumprod(steps, axis=1)[..., None]
+    return Poses(around.positions, quaternions, around.scales), beside
+
+
+def meeting(
+    owners: np.ndarray, times: np.ndarray, keys: Poses, sources: Sequence[Source]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the segments (p,) before and after each key at which two of them meet: both have the same pose there.
+
+    It is one as far as it is that of the part between whose keys they run.
+    """
+    rows, lasts = packed(keys), np.flatnonzero(times[:, 1] > times[:, 0])
+    left, right = lasts[:-1], lasts[1:]
+    own = np.array([[source.part in (None, LOCATION, part) for part in POSED] for source in sources])
+    same = rows[right, 0] == rows[left, 1]
+    meet = (owners[right] == owners[left]) & np.all(same | ~own[owners[left], : rows.shape[-1]], axis=1)
+    return left[meet], right[meet]
+
+
+def packed(poses: Poses) -> np.ndarray:
+    """Return positions, quaternions and scales in one array (..., 7 or 8)."""
+    scales = () if poses.scales is None else (poses.scales[..., None],)
+    return np.concatenate((poses.positions, poses.quaternions, *scales), axis=-1)
+
+
+def native_twists(keys: Poses, measured: Poses) -> np.ndarray:
+    """Return Blender's own twists at both ends, and the growth of log scale, shape (2, 7, S), in unit time.
+
+    From the poses at both keys (S, 2) and those of Blender's own in-betweens at the moments `MEASURED` (S, 6).
+    """
+    ends = np.zeros(6, dtype=int)
+    ends[3:] = 1
+    result = np.zeros((7, len(keys.positions), 6))
+    result[:6] = twists.between(
+        keys.positions[:, ends].reshape(-1, 3),
+        keys.quaternions[:, ends].reshape(-1, 4),
+        measured.positions.reshape(-1, 3),
+        measured.quaternions.reshape(-1, 4),
+    ).reshape(6, -1, 6)
+    if keys.scales is not None:
+        # Blender's own in-betweens may pass 0.
+        result[6] = np.log(np.maximum(measured.scales, LEAST_SCALE) / keys.scales[:, ends])
+    return np.stack((result[..., :3] @ SLOPES, -(result[..., :2:-1] @ SLOPES)))
+
+
+def tangents_and_lacks(
+    slopes: np.ndarray,
+    native: np.ndarray,
+    screws: np.ndarray,
+    times: np.ndarray,
+    pairs: tuple[np.ndarray, np.ndarray],
+    counting: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lengths of tangents at both ends of S segments, and what the slopes of progress lack there, (2, S).
+
+    Where no segment meets another these are 1 and 0.
+
+    Parameters
+    ----------
+    slopes : array, shape (2, S)
+        Of progress, in unit time.
+    native : array, shape (2, 7, S)
+        As `native_twists` has them.
+    screws : array, shape (2, 7, S)
+        The twists that lead from key to key in unit time, as they are at both ends: spins turn about axes of their own.
+        And the growth of log scale, which counts where nothing else changes.
+    times : array, shape (S, 2)
+        The frames of both keys.
+    pairs : tuple of array of int, shape (p,)
+        The segments that meet at a key: those before it, and those after it.
+    counting : array of bool, shape (7, p)
+        What of a twist counts where they meet.
+    """
+    tangents, lacks = np.ones(slopes.shape), np.zeros(slopes.shape)
+    durations = times[:, 1] - times[:, 0]
+    speeds = screws / np.where(durations > 0.0, durations, np.inf)
+    before, after = pairs
+    twists_there = np.where(counting[:6], np.stack((screws[1][:6, before], screws[0][:6, after])), 0.0)
+    moves = np.abs(twists_there).max(axis=(0, 1), initial=0.0) > AT_REST
+    counting = np.concatenate((counting[:6], counting[6:] & ~moves))
+    of_before, of_after = (np.where(counting, speeds[side][:, pairs[1 - side]], 0.0) for side in (1, 0))
+    share = twist_shares(durations[before], durations[after])
+    parts = share * of_before, (1.0 - share) * of_after
+    mean = parts[0] + parts[1]
+    squared = np.maximum(_dot(mean, mean), SMALL * sum(_dot(part, part) for part in parts))
+    for side, segments, of_side, alone in ((1, before, of_before, share == 1.0), (0, after, of_after, share == 0.0)):
+        length = _ratio(_dot(of_side, mean), squared)
+        speed = _ratio(_dot(np.where(counting, native[side][:, segments], 0.0), mean), durations[segments] * squared)
+        slope = speed / np.copysign(np.maximum(np.abs(length), SHORTEST), length)
+        tangents[side, segments] = length
+        lack = np.clip(slope, -FASTEST, FASTEST) - np.clip(slopes[side, segments], -FASTEST, FASTEST)
+        lacks[side, segments] = np.where(alone, 0.0, lack)
+    return tangents, lacks
+
+
+def twists_counting(sources: Sequence[Source], joint: np.ndarray) -> np.ndarray:
+    """Return what of twists and growths counts (7, k) for parts, all of it where that is joint (k,)."""
+    counting = np.zeros((7, len(joint)), dtype=bool)
+    for number, source in enumerate(sources):
+        counting[TWISTS[source.part], number] = True
+    return counting | joint
+
+
+def corrected(progress: np.ndarray, elapsed: np.ndarray, lacks: np.ndarray) -> np.ndarray:
+    """Return progress (m,) with the slopes that it lacks (2, m) at either end, at times from 0 to 1 in its segment."""
+    left = 1.0 - elapsed
+    added = elapsed * left * (left * lacks[0] - elapsed * lacks[1])
+    return np.where((elapsed > 0.0) & (left > 0.0), progress + added, progress)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("rs,rs->s", a, b)
+
+
+def _ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a / b, 0 where b is 0."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b != 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """What S segments of several sources run between, with the objects' own delta transforms."""
+
+    owners: np.ndarray
+    """The number of the source of each, shape (S,)."""
+
+    times: np.ndarray
+    """The frames of both keys, shape (S, 2)."""
+
+    keys: Poses
+    """The poses at both, shape (S, 2)."""
+
+    axes: np.ndarray | None
+    """The axes that location runs along, as columns in those of the poses, shape (S, 3, 3); None where they are one."""
+
+    original: np.ndarray
+    """The objects' own delta transforms, shape (10, S)."""
+
+    pairs: tuple[np.ndarray, np.ndarray] | None = None
+    """For smooth modes the segments that meet at a key, before it and after it."""
+
+    counting: np.ndarray | None = None
+    """For smooth modes what of twists counts where they meet, shape (7, p): the part's own where not both are joint."""
+
+    around: tuple[np.ndarray, Poses] | None = None
+    """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
+
+    turning: Turning | None = None
+    """The turning of the segments, None where all of them go the shortest way."""
+
+    whole: Turning | None = None
+    """The turning in whole turns alone, for smooth modes."""
+
+    spins: np.ndarray | None = None
+    """For smooth modes what spins add at both ends of the three segments around, shape (3, 2, S, 3)."""
+
+    tangents: np.ndarray | None = None
+    """The lengths of the tangents of smooth modes at both keys, shape (2, S); None where all are 1."""
+
+    prepared: dict[str, Callable[..., Poses]] = field(default_factory=dict)
+    """The poses that each mode makes of all segments, once it has been asked for."""
+
+    @classmethod
+    def of(cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray) -> Ends:
+        """Return the ends of the channels (10, S) at both ends, and which of the segments have a smooth mode."""
+        sources = [source for source, _ in segments]
+        owners = np.repeat(np.arange(len(sources)), [span.stop - span.start for _, span in segments])
+        firsts, lasts = ([source.key_frames[part] for source in sources] for part in (slice(-1), slice(1, None)))
+        times = np.stack((np.concatenate(firsts), np.concatenate(lasts)), axis=1)
+        original = np.stack([source.original for source in sources], axis=1)[:, owners]
+        axes = location_axes(sources, owners)
+        keys = body_poses(np.stack((start, end), axis=2), original[..., None], axes, sources[0])
+        turned = whole = None
+        if any(map(needs_turning, sources)):
+            turned, whole = turning_of(sources, start, end, keys, original)
+        ends = cls(owners, times, keys, axes, original, turning=turned, whole=whole)
+        if not smooth.any():
+            return ends
+        holds, pairs = np.concatenate([source.holds for source in sources]), meeting(owners, times, keys, sources)
+        (frames, around), spins = with_neighbours(times, keys, holds, pairs), None
+        if whole is not None:
+            signs = np.where(np.einsum("si,si->s", whole.second, keys.quaternions[:, 1]) < 0.0, -1.0, 1.0)
+            around, spins = spins_of_neighbours(signs, whole.twists, around, holds, pairs)
+        joint = np.concatenate([source.joint for source in sources])
+        counting = twists_counting([sources[owner] for owner in owners[pairs[0]]], joint[pairs[0]] & joint[pairs[1]])
+        ends = replace(ends, pairs=pairs, counting=counting, around=(frames, around), spins=spins)
+        return ends if counting.all() else replace(ends, tangents=ends._of_parts())
+
+    def _of_parts(self) -> np.ndarray:
+        """Return the lengths of tangents (2, S): none at keys before or after which what counts there rests."""
+        assert self.pairs is not None
+        assert self.counting is not None
+        tangents, (before, after) = np.ones((2, len(self.times))), self.pairs
+        turns = np.stack((self.screws[1][:, before], self.screws[0][:, after]))
+        rests = np.any(np.abs(np.where(self.counting, turns, 0.0)).max(axis=1) < AT_REST, axis=0)
+        rests &= ~self.counting.all(axis=0)
+        tangents[1, before[rests]] = tangents[0, after[rests]] = 0.0
+        return tangents
+
+    @cached_property
+    def screws(self) -> np.ndarray:
+        """The twists from key to key with spins, as they are at both ends, and the growths of log scale, (2, 7, S)."""
+        first, second = self.keys[:, 0], self.keys[:, 1]
+        turned = second.quaternions if self.whole is None else self.whole.second
+        screws = twists.between(
+            first.positions, first.quaternions, second.positions, turned, shortest=self.whole is None
+        )
+        growth = np.zeros(len(first.positions)) if first.scales is None else np.log(second.scales / first.scales)
+        screws = np.stack(2 * (np.concatenate((screws, growth[None])),))
+        if self.whole is not None:
+            screws[:, :3] += np.moveaxis(self.whole.twists, 1, 0)
+        return screws
+
+    def idle_progress(self, segment: int, frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
+        """Return the progress on frames (m,) of a segment that turns although no channel changes in it."""
+        first, last = (np.full(len(frames), end) for end in self.times[segment])
+        return idle_progress(sources[self.owners[segment]], frames, first, last)
+
+    def at_keys(self, progress: np.ndarray, measured: np.ndarray, source: Source) -> tuple[np.ndarray, np.ndarray]:
+        """Return `tangents_and_lacks`, from progress (S, 6) and the channels (., S, 6) at the moments `MEASURED`."""
+        slopes = np.stack((progress[:, :3] @ SLOPES, (1.0 - progress[:, :2:-1]) @ SLOPES))
+        poses = body_poses(measured, self.original[..., None], self.axes, source)
+        if self.whole is not None:
+            # Angles turn by spins, too. These are known, and what is left is less than half a turn.
+            poses = without_spins(poses, self.whole.by_angles, progress)
+        native = native_twists(self.keys, poses)
+        assert self.pairs is not None
+        assert self.counting is not None
+        if self.whole is not None:
+            native[:, :3] += slopes[:, None] * np.moveaxis(self.whole.twists, 1, 0)
+        tangents, lacks = tangents_and_lacks(slopes, native, self.screws, self.times, self.pairs, self.counting)
+        return tangents if self.tangents is None else tangents * self.tangents, lacks
+
+    def poses(self, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
+        """Return what a mode makes of the segments, each with so many samples (S,) of this progress (m,).
+
+        Positions are along the body's own axes at rest.
+        """
+        if mode not in self.prepared:
+            self.prepared[mode] = self._prepare(mode)
+        is_smooth = KEYFRAME_MODES[mode].is_smooth
+        # Of the three segments between four keys the one in the middle.
+        of_each = np.multiply.outer(counts, (0, 1, 0)).ravel() if is_smooth else counts
+        poses = self.prepared[mode](of_each, progress, slice(0, len(of_each)))
+        turning = self.whole if is_smooth else self.turning
+        return poses if turning is None else turning.spins.add_to(poses, counts, progress)
+
+    def _prepare(self, mode: str) -> Callable[..., Poses]:
+        curves: Callable[..., Any] = KEYFRAME_MODES[mode].curves
+        turned = self.turning
+        if not KEYFRAME_MODES[mode].is_smooth:
+            times, keys = np.broadcast_to((0.0, 1.0), self.times.shape), self.keys
+            if turned is None:
+                return prepare(times, keys, mode)
+            quaternions = np.stack((turned.first, turned.second), axis=1)
+            return prepare_within(curves, times, replace(keys, quaternions=quaternions), is_aligned=True)
+        assert self.around is not None
+        if self.tangents is None and turned is None:
+            return prepare(*self.around, mode)
+        tangents = None if self.tangents is None else self.tangents[..., None]
+        curves = partial(curves, tangents=tangents, spins=self.spins)
+        return prepare_within(curves, *self.around, is_aligned=turned is not None)

@@ -1,0 +1,76 @@
+"""What keys say beyond their values: marks from frames on, which frames are one, and whether anything changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..fcurves.keys import Keys
+
+FULL_TURN = 2.0 * np.pi
+
+HALF_TURN = np.pi - 1e-4
+"""Half a turn between two keys by angles, of which single precision has lost a little."""
+
+WHOLE_TURN = 1e-5
+"""Turns of the channel that differ by less from whole ones do so for rounding."""
+
+PARALLEL = 1e-6
+"""Axes are parallel whose cosine is nearer to one: by less than a tenth of a degree."""
+
+SCREW_AXIS = "SCREW"
+"""Turns are about the axis that a segment turns about anyway, and the local Z axis where it does not turn."""
+
+TURN_AXES = (SCREW_AXIS, "X", "Y", "Z")
+"""The axes that turns are about: that of the segment's screw, or always the same local axis."""
+
+SAME_FRAME = 0.01
+"""Keys closer than this are one key to Blender, and here."""
+
+
+def distinct(frames: np.ndarray) -> np.ndarray:
+    """Return rising frames of keys, those that are one key to Blender once."""
+    return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """Numbers that hold from frames on, each until the next; before the first one there is that one, too."""
+
+    frames: np.ndarray
+    """Rising, shape (n,)."""
+
+    numbers: np.ndarray
+    """Shape (n,)."""
+
+    def at(self, frames: np.ndarray) -> np.ndarray:
+        """Return the numbers (m,) at frames (m,)."""
+        return np.asarray(self.numbers)[np.clip(np.searchsorted(self.frames, frames, side="right") - 1, 0, None)]
+
+    def __repr__(self) -> str:
+        return f"{np.asarray(self.frames, dtype=float).tolist()} {np.asarray(self.numbers, dtype=int).tolist()}"
+
+
+def vary(keys: Keys) -> np.ndarray:
+    """Return which curves (c,) have more than one value, at keys or handles."""
+    if len(keys.times) < 2:
+        return np.zeros(len(keys.points), dtype=bool)
+    values = [points[..., 1] for points in (keys.points, keys.left, keys.right) if points is not None]
+    return np.any(np.concatenate(values, axis=1) != keys.values[:, :1], axis=1)
+
+
+def sweeps(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Return by how much angles change (S,) of angles and axes (4, S) to others; 0 where the axes are not parallel."""
+    lengths = np.sqrt(np.einsum("ks,ks->s", start[1:], start[1:]) * np.einsum("ks,ks->s", end[1:], end[1:]))
+    dot = np.einsum("ks,ks->s", start[1:], end[1:])
+    is_parallel = (lengths > 0.0) & (np.abs(dot) >= (1.0 - PARALLEL) * lengths)
+    return np.where(is_parallel, np.sign(dot) * end[0] - start[0], 0.0)
+
+
+def turns_at(keys: Keys, frames: np.ndarray) -> np.ndarray:
+    """Return what the channel of turns has from frames (m,) on: none before its first key, whole ones but for parts."""
+    at = np.searchsorted(keys.times, frames, side="right") - 1
+    turns = np.where(at < 0, 0.0, keys.values[0, np.clip(at, 0, None)])
+    whole = np.rint(turns)
+    return np.where(np.abs(turns - whole) < WHOLE_TURN, whole, turns)

@@ -1,0 +1,290 @@
+"""How far bodies turn between their keys beyond the shortest way: by whole turns, of angles or of the channel.
+
+An angle about an axis that is the same at both keys says how far. So do Euler angles: of the axis that goes furthest in
+a segment, if that is more than half a turn, as many turns are added to the shortest rotation as it lacks of the angle;
+at half a turn, which has two shortest ways, the sense of the angle decides. The axis stands still in the body where the
+angles turned about before it change less, and else in space. What the channel of turns has comes on top. Inserted keys
+may leave parts of turns in it: a part is taken off the way to the second key, and made by the spin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...motion import Poses, twists
+from ...motion.eulers import quaternions_from_extrinsic_eulers
+from ...motion.quaternions import conjugate, normalise, rotate
+from ...motion.spins import FULL_TURN, Spins
+from .bodies import body_poses
+from .components import AXIS_ANGLE, ROTATION, ROWS
+from .marks import HALF_TURN, SCREW_AXIS, sweeps
+from .sources import Source
+
+NO_TURN = 1e-4
+"""Radians: what turns by less has no axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """How S segments turn."""
+
+    spins: Spins
+
+    by_angles: Spins
+    """Spins that the angles of the channels make by themselves."""
+
+    first: np.ndarray
+    """The quaternions of the first keys, shape (S, 4)."""
+
+    second: np.ndarray
+    """The rotations that segments turn to without spins, in the sign that says which way round: the second keys, but
+    for what is not whole of the spins, shape (S, 4)."""
+
+    turn: np.ndarray
+    """The rotation there as a vector along the axes of the body, shape (3, S)."""
+
+    @cached_property
+    def twists(self) -> np.ndarray:
+        """The angular velocities that spins add at both ends in unit time, along the body's axes, shape (3, 2, S)."""
+        return self.spins.twists(self.first, self.second)
+
+    @property
+    def totals(self) -> np.ndarray:
+        """By how much each segment turns, in radians, shape (S,)."""
+        return np.linalg.norm(self.turn + self.twists[:, 0], axis=0)
+
+    @property
+    def about(self) -> np.ndarray:
+        """Angles that segments turn about the axes of their spins, in radians, shape (S,)."""
+        return np.einsum("ks,ks->s", self.turn + self.twists[:, 0], self.axes_in_body)
+
+    @property
+    def axes_in_body(self) -> np.ndarray:
+        """The axes of spins, along those of the body at the first key, shape (3, S)."""
+        return replace(self.spins, turns=np.ones(len(self.first))).twists(self.first, self.second)[:, 0] / FULL_TURN
+
+
+def needs_turning(source: Source) -> bool:
+    """Return whether any segment may turn otherwise than by the shortest way."""
+    return source.has_half_turns or source.turns is not None
+
+
+def turning(
+    start: np.ndarray,
+    end: np.ndarray,
+    keys: Poses,
+    original: np.ndarray,
+    order: str | None,
+    turns: np.ndarray,
+    axes: np.ndarray,
+    backwards: np.ndarray,
+    counts: np.ndarray,
+) -> Turning:
+    """Return how S segments turn.
+
+    Parameters
+    ----------
+    start, end : array, shape (., S)
+        The channels at both ends.
+    keys : Poses, shape (S, 2)
+        What they make of the body.
+    original : array, shape (S, 4)
+        The rotations of the objects' own delta transforms, which the channels' are turned by.
+    order : str or None
+        Of the Euler angles, AXIS_ANGLE, or None for quaternions.
+    turns : array, shape (S,)
+        What the channel of turns has. What is not whole of it is a part of the turn to the second key.
+    axes : array of str, shape (S,)
+        Of `TURN_AXES`, what they are about.
+    backwards : array of bool, shape (S,)
+        Whether time runs backwards.
+    counts : array of bool, shape (S,)
+        Whether angles say which way round it turns, and how far.
+    """
+    first, count = keys.quaternions[:, 0], len(turns)
+    second, turn = _shortest(first, keys.quaternions[:, 1])
+    spins = Spins(np.zeros(count), np.zeros((3, count)), np.zeros(count, dtype=bool))
+    result, senses = Turning(spins, spins, first, second, turn), np.zeros(count)
+    parts = turns - np.rint(turns)
+    if order is not None:
+        senses = _add_angles(result, start[ROWS[ROTATION]], end[ROWS[ROTATION]], original, order, parts, counts)
+    result = replace(result, by_angles=replace(spins, turns=spins.turns.copy()))
+    _add_channel(result, turns, senses, axes, backwards)
+    return result
+
+
+def turning_of(
+    sources: Sequence[Source], start: np.ndarray, end: np.ndarray, keys: Poses, original: np.ndarray
+) -> tuple[Turning, Turning]:
+    """Return how S segments of alike sources turn, and the same in whole turns alone.
+
+    From their channels (10, S) and poses (S, 2) at both ends, and the objects' own delta transforms (10, S).
+    """
+    turns = np.concatenate([source.segment_turns for source in sources])
+    backwards = np.concatenate([source.run_backwards for source in sources])
+    axes = np.concatenate([source.axes_of_turns for source in sources])
+    others = axes, backwards, np.concatenate([source.turns_with_keys for source in sources])
+    given = (start, end, keys, original[ROWS[ROTATION]].T, sources[0].order)
+    result = turning(*given, turns, *others)
+    if np.all(turns == np.rint(turns)):
+        return result, result
+    # What is not whole goes by the shortest way between the keys, as without what the channel has.
+    by_angles, spins = turning(*given, np.zeros_like(turns), *others), result.spins
+    lacking = result.about - np.einsum("ks,ks->s", by_angles.turn, result.axes_in_body)
+    whole = np.where(spins.turns == np.rint(spins.turns), spins.turns, np.rint(lacking / FULL_TURN))
+    return result, replace(by_angles, spins=replace(spins, turns=whole))
+
+
+def turning_in(source: Source, segment: int, turns: float | None = None) -> Turning:
+    """Return how one of the segments of a source turns, with other turns than those of its channel if so given.
+
+    Where its rotation has keys of its own, how that turns between the two around the middle of the segment.
+    """
+    rotation, at = source, segment
+    ends = middle = source.key_frames[segment : segment + 2]
+    if source.is_uneven:
+        middle = np.full(2, middle.mean())
+        # Outside of its own keys it stands still.
+        rotation, ends = source.parts.get(ROTATION, source), middle
+        at = int(np.searchsorted(rotation.key_frames, middle[0])) - 1
+        if ROTATION in source.parts and 0 <= at < len(rotation.key_frames) - 1:
+            ends = rotation.key_frames[at : at + 2]
+    rows, original = rotation.values_at(ends), source.original[:, None]
+    start, end = rows[:, :1], rows[:, 1:]
+    poses = body_poses(rows[:, None], original[..., None], None, source)
+    one, is_turned = slice(max(at, 0), at + 1), ends[0] < ends[1]
+    channel = rotation.segment_turns[one] if turns is None else np.array([turns])
+    channel, axes = (channel, rotation.axes_of_turns[one]) if is_turned else (np.zeros(1), np.array([SCREW_AXIS]))
+    backwards, counts = np.zeros(1, dtype=bool), np.ones(1, dtype=bool)
+    return turning(start, end, poses, original[ROWS[ROTATION]].T, source.order, channel, axes, backwards, counts)
+
+
+def values_at_ends(source: Source, segment: int) -> np.ndarray:
+    """Return what the channels have at both ends of a segment, (10, 2)."""
+    return source.values_at(source.key_frames[segment : segment + 2])
+
+
+def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the shortest turns (3, S) from quaternions (S, 4) to others."""
+    nowhere = np.zeros((len(first), 3))
+    return twists.between(nowhere, first, nowhere, second)[:3]
+
+
+def _shortest(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the second quaternions (S, 4), in the sign of the shorter way from the first, and the turns (3, S)."""
+    signs = np.where(np.einsum("si,si->s", first, second) < 0.0, -1.0, 1.0)
+    return second * signs[:, None], shortest_turns(first, second)
+
+
+def _take_off(result: Turning, some: np.ndarray, parts: np.ndarray) -> None:
+    """Take off what is not whole of the spins of some segments, in turns (s,), from where they turn to; in place."""
+    if parts.any():
+        spins = Spins(-parts, result.spins.axes[:, some], result.spins.in_space[some])
+        ends = Poses(np.zeros((len(some), 3)), result.second[some])
+        turned = spins.add_to(ends, np.ones(len(some), dtype=int), np.ones(len(some))).quaternions
+        result.second[some], result.turn[:, some] = _shortest(result.first[some], turned)
+
+
+def _add_angles(
+    result: Turning,
+    start: np.ndarray,
+    end: np.ndarray,
+    original: np.ndarray,
+    order: str,
+    parts: np.ndarray,
+    counts: np.ndarray,
+) -> np.ndarray:
+    """Add the turns that angles (4, S) at both ends say, and have half turns go in their sense; in place.
+
+    `parts` (S,) is what the channel has that is not whole: so much of what the angles say is spin. Returns the sense of
+    the angle that counts, 0 where none does, shape (S,).
+    """
+    senses, spins = np.zeros(len(parts)), result.spins
+    if order == AXIS_ANGLE:
+        by = sweeps(start, end)
+    else:
+        change = (end - start)[:3]
+        furthest = np.abs(change).argmax(axis=0)
+        by = np.take_along_axis(change, furthest[None], axis=0)[0]
+    some = np.flatnonzero(counts & ((np.abs(by) >= HALF_TURN) | (parts != 0.0)))
+    if order == AXIS_ANGLE:
+        some = some[by[some] != 0.0]
+    if not len(some):
+        return senses
+    by, sense = by[some], np.sign(by[some])
+    if order == AXIS_ANGLE:
+        axes = normalise(start[1:, some].T)
+        stands = np.zeros(len(some), dtype=bool)
+    else:
+        in_body, in_space = (
+            np.stack([_axis(angles[:3, some], furthest[some], order, before=before) for angles in (start, end)])
+            for before in (True, False)
+        )
+        moved, turned = (np.linalg.norm(np.diff(both, axis=0)[0], axis=1) for both in (in_space, in_body))
+        stands = moved < turned
+        axes = np.where(stands[:, None], rotate(original[some], _mean(in_space)), _mean(in_body))
+    spins.axes[:, some], spins.in_space[some] = axes.T, stands
+    part = sense * parts[some]
+    _take_off(result, some, part)
+    turn, by = result.turn[:, some], by - FULL_TURN * part
+    about = np.einsum("sk,sk->s", axes, np.where(stands[:, None], rotate(result.first[some], turn.T), turn.T))
+    # Half a turn has two shortest ways, and rounding errors would choose one of them.
+    size = np.linalg.norm(turn, axis=0)
+    is_half = np.abs(np.abs(by - FULL_TURN * np.rint(by / FULL_TURN)) - np.pi) <= np.pi - HALF_TURN
+    other = is_half & (size >= HALF_TURN) & (about * sense < -1.0)
+    factor = np.where(other, 1.0 - FULL_TURN / np.maximum(size, 1.0), 1.0)
+    result.turn[:, some] *= factor
+    result.second[some] *= np.where(other, -1.0, 1.0)[:, None]
+    turns = np.where(
+        (np.abs(by) > FULL_TURN - HALF_TURN) | (part != 0.0), np.rint((by - about * factor) / FULL_TURN), 0
+    )
+    spins.turns[some] = turns
+    senses[some] = np.where((turns != 0) | (part != 0.0), sense, 0.0)
+    return senses
+
+
+def _axis(angles: np.ndarray, axis: np.ndarray, order: str, *, before: bool) -> np.ndarray:
+    """Return one of the axes of Euler angles (3, S) each, (S, 3): in the body, `before` other turns, or in space."""
+    result = np.eye(3)[axis]
+    turn = np.array([order.index(name) for name in "XYZ"])
+    others = turn[:, None] < turn[axis] if before else turn[:, None] > turn[axis]
+    turned = quaternions_from_extrinsic_eulers(np.where(others, angles, 0.0).T, order)
+    return rotate(conjugate(turned) if before else turned, result)
+
+
+def _mean(ends: np.ndarray) -> np.ndarray:
+    """Return the unit vector (S, 3) half-way between two (2, S, 3), the first one where they are opposite."""
+    total = ends.sum(axis=0)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.where(length > NO_TURN, total / np.maximum(length, NO_TURN), ends[0])
+
+
+def _add_channel(
+    result: Turning, turns: np.ndarray, senses: np.ndarray, axes: np.ndarray, backwards: np.ndarray
+) -> None:
+    """Add what the channel has, in place: about the axis of the angles' own turns where these have a sense (S,)."""
+    spins, others = result.spins, np.flatnonzero((turns != 0.0) & (senses == 0.0))
+    spins.turns[:] += senses * turns
+    if not len(others):
+        return
+    size = np.linalg.norm(result.turn[:, others], axis=0)
+    is_local = (axes[others] != SCREW_AXIS) | (size < NO_TURN)
+    # What has no axis of its own turns about the last of them, Z.
+    local = np.eye(3)[:, ["XYZ".find(name) for name in axes[others]]]
+    spins.axes[:, others] = np.where(is_local, local, result.turn[:, others] / np.maximum(size, NO_TURN))
+    spins.in_space[others] = False
+    added = np.where(is_local & backwards[others], -1, 1) * turns[others]
+    spins.turns[others] += added
+    _take_off(result, others, added - np.rint(added))
+
+
+def without_spins(measured: Poses, spins: Spins, progress: np.ndarray) -> Poses:
+    """Return poses (S, k) at this progress (S, k) of S segments without the spins that they have."""
+    counts = np.full(len(progress), progress.shape[1])
+    flat = Poses(measured.positions.reshape(-1, 3), measured.quaternions.reshape(-1, 4))
+    unspun = replace(spins, turns=-spins.turns).add_to(flat, counts, progress.ravel())
+    return replace(measured, quaternions=unspun.quaternions.reshape(measured.quaternions.shape))

@@ -1,0 +1,182 @@
+"""F-curves as arrays: their keys, what their codes mean, and the modifiers that say which frame of them is shown.
+
+Frames and values are Blender's, in its single precision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+_EASED = ("BACK", "BOUNCE", "CIRC", "CUBIC", "ELASTIC", "EXPO", "QUAD", "QUART", "QUINT", "SINE")
+
+INTERPOLATIONS = dict(enumerate(("CONSTANT", "LINEAR", "BEZIER", *_EASED)))
+"""From the code of `bpy.types.Keyframe.interpolation` to its name."""
+
+CONSTANT, LINEAR, BEZIER, *_ = INTERPOLATIONS
+ELASTIC = 3 + _EASED.index("ELASTIC")
+
+EASINGS = dict(enumerate(("AUTO", "EASE_IN", "EASE_OUT", "EASE_IN_OUT")))
+"""From the code of `bpy.types.Keyframe.easing` to its name."""
+
+AUTO = 0
+
+CODE = np.uint8
+"""The type that Blender keeps codes in: any other takes longer to read."""
+
+KEY_TOLERANCE = float(np.float32(1e-4))
+"""Frames from a key within which Blender takes its value."""
+
+LARGEST = 1e30
+"""Frames and values from here on are damage. An infinite one that is typed, or set by a script, becomes 3.4e38."""
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """A Cycles modifier. Modes are NONE, REPEAT, REPEAT_OFFSET or MIRROR; a count of 0 is without end."""
+
+    before: str
+    after: str
+    before_count: int
+    after_count: int
+
+    @property
+    def endless(self) -> Cycles:
+        """Cycles whose rounds have no end on either side: what a mode sees that looks over the seam of a round."""
+        before, after = self.before, self.after
+        return Cycles(after if before == "NONE" else before, before if after == "NONE" else after, 0, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Keys:
+    """c F-curves that are keyed together: n keys each, on the same frames, with the same extrapolation and cycles.
+
+    Frames and values are in single precision, codes are `INTERPOLATIONS` and `EASINGS`. What does not bear on the
+    values of the curves is None.
+    """
+
+    points: np.ndarray
+    """Frame and value, shape (c, n, 2)."""
+
+    interpolation: np.ndarray
+    """Codes of the segments that the keys begin, shape (c, n)."""
+
+    left: np.ndarray | None = None
+    """The handles before the keys, frame and value, shape (c, n, 2)."""
+
+    right: np.ndarray | None = None
+    """The handles behind the keys, frame and value, shape (c, n, 2)."""
+
+    easing: np.ndarray | None = None
+    """Codes, shape (c, n)."""
+
+    easing_settings: np.ndarray | None = None
+    """BACK's overshoot, ELASTIC's amplitude and ELASTIC's period in frames, shape (3, c, n)."""
+
+    linear: bool = False
+    """True if the curves go on at their slope outside of the keys, instead of holding their value."""
+
+    cycles: Cycles | None = None
+
+    breakdowns: np.ndarray | None = None
+    """True for the keys of type *Breakdown*, shape (n,), where any is."""
+
+    is_sound: bool = True
+    """True if all numbers that were read are smaller than `LARGEST`, and the keys in the order of their frames."""
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Frames of the keys, shape (n,), double precision."""
+        return self.points[0, :, 0].astype(np.float64)
+
+    @property
+    def values(self) -> np.ndarray:
+        """Values of the keys, shape (c, n)."""
+        return self.points[..., 1]
+
+    def only(self, channels: Sequence[int]) -> Keys:
+        """Return the keys of these channels alone."""
+        return self._part((channels,))
+
+    def at(self, chosen: np.ndarray) -> Keys:
+        """Return the chosen ones of the keys, by a mask of shape (n,)."""
+        part = self._part((slice(None), chosen))
+        return part if self.breakdowns is None else replace(part, breakdowns=self.breakdowns[chosen])
+
+    def _part(self, part: tuple) -> Keys:
+        arrays = {name: getattr(self, name) for name in ("points", "interpolation", "left", "right", "easing")}
+        parts = {name: array[part] for name, array in arrays.items() if array is not None}
+        settings = None if self.easing_settings is None else self.easing_settings[(slice(None), *part)]
+        return replace(self, **parts, easing_settings=settings)
+
+    @property
+    def raw(self) -> bytes:
+        """All of it as bytes, for a digest that tells whether anything has changed."""
+        names = ("points", "interpolation", "left", "right", "easing", "easing_settings", "breakdowns")
+        present = [array for name in names if (array := getattr(self, name)) is not None]
+        header = f"{self.points.shape} {len(present)} {self.linear} {self.cycles};"
+        return b"".join((header.encode(), *(array.tobytes() for array in present)))
+
+
+def cycled(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return times folded back into the range of the keys by the curve's cycles.
+
+    Parameters
+    ----------
+    keys : Keys
+        The curve. Without cycles times stay what they are.
+    times : array, shape (m,)
+        Frames.
+
+    Returns
+    -------
+    folded : array, shape (m,)
+        In the range of the keys, or as they were where no cycle reaches.
+    backwards : array of bool, shape (m,)
+        Whether time runs backwards there.
+    """
+    with np.errstate(all="ignore"):
+        folded, backwards, _ = fold(keys, np.asarray(times))
+    return folded, backwards
+
+
+def fold(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times folded, whether they run backwards, and how many times the change from first to
+    last key is to be added.
+
+    Outside of the keys in single precision and in Blender's order of steps: it decides on which side of a key a frame
+    falls. Between them times stay what they are.
+    """
+    result, folded = times.astype(np.float64), times.astype(np.float32)
+    backwards, rounds = np.zeros(times.shape, dtype=bool), np.zeros(times.shape, np.float32)
+    frames = keys.points[0, :, 0]
+    if keys.cycles is None or not len(frames) or frames[0] == frames[-1]:
+        return result, backwards, rounds
+    begin, end = frames[0], frames[-1]
+    period = end - begin
+    for mode, count, outside, side in (
+        (keys.cycles.before, keys.cycles.before_count, folded < begin, -1),
+        (keys.cycles.after, keys.cycles.after_count, folded > end, 1),
+    ):
+        if mode == "NONE":
+            continue
+        near, far = (begin, end) if side < 0 else (end, begin)
+        distance = folded[outside] - near
+        cycle = side * distance / period
+        reached = (cycle <= count) | (count == 0)
+        at = np.flatnonzero(outside)[reached]
+        distance, cycle = distance[reached], cycle[reached]
+        remainder = np.fmod(distance, period)
+        odd = (np.trunc(cycle) % 2 == 1) & (mode == "MIRROR")
+        reverse = (np.trunc(cycle.astype(np.float64) + 1.0) % 2 == 1) & (mode == "MIRROR")
+        time = np.where(reverse, near - remainder, begin + remainder)
+        time = np.where(remainder == 0.0, np.where(odd, far, near), time)
+        result[at] = np.where(time < begin, time + period, time)
+        backwards[at] = reverse
+        if mode == "REPEAT_OFFSET":
+            away_from_keys = np.floor if side < 0 else np.ceil
+            rounds[at] = away_from_keys(distance / period)
+    return result, backwards, rounds

@@ -1,0 +1,188 @@
+"""From what is keyed to the terms in its channels: read, planned, compared with what there is, written.
+
+Whether anything has changed that in-betweens depend on, the digest of the source tells: the terms keep that of what
+they were planned from. They travel with the file through undo, redo, saving and loading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+
+import bpy
+import numpy as np
+
+from ..actions.marks import read_marks, write_marks
+from ..actions.modifiers import add_cycles, has_terms, terms_in
+from ..actions.reading import is_marked, keyed_in, planned_from
+from ..actions.refusals import refuse_numbers
+from ..actions.slots import Binding, read_again
+from ..evaluation.components import MODE_NUMBERS
+from ..evaluation.source_cache import cache_source, cached_source
+from ..evaluation.sources import Source
+from ..fcurves.keys import Cycles
+from ..terms.apply import apply, remove_terms
+from ..terms.planning import plan
+from ..transforms import WIDTHS, Refused
+from .inserted import divided, key_fellows, key_other_parts
+from .kept_timing import keep_timing
+from .shared_turns import share_out_turns
+
+Reading = tuple[Binding, Source]
+
+
+def refresh_bindings(
+    bindings: Sequence[Binding],
+    *,
+    may_key: bool = False,
+    is_doubtful: bool = False,
+    before_writing: Callable[[Collection[Binding]], object] = lambda _: None,
+) -> int:
+    """Bring the terms of these bindings up to date with what is keyed in them.
+
+    Parameters
+    ----------
+    bindings
+        Of editable Actions.
+    may_key
+        Whether keys that were inserted on in-betweens may be completed.
+    is_doubtful
+        Whether terms may be others than those that were planned.
+    before_writing
+        Is called once before anything is written that has Blender evaluate Actions anew, with what is to be written.
+
+    Returns
+    -------
+    int
+        How many of them were changed.
+    """
+    bindings = [binding for binding in bindings if binding.slot.is_editable]
+    for binding in bindings:
+        _tidy(binding)
+    _adopt(bindings)
+    marked, dropped = [], []
+    for binding in bindings:
+        (marked if is_marked(binding) else dropped).append(binding)
+    stale: list[Reading] = []
+    current: list[Source] = []
+    for binding, source in zip(marked, keyed_in(marked), strict=True):
+        if not _is_desired(binding, source):
+            dropped.append(binding)
+        elif is_doubtful or source.digest24 != planned_from(binding):
+            stale.append((binding, source))
+        else:
+            current.append(source)
+    dropped = [binding for binding in dropped if any(map(has_terms, binding.moving.values()))]
+    if stale or dropped:
+        before_writing([*dropped, *(binding for binding, _ in stale)])
+    for binding in dropped:
+        remove_terms(binding)
+    stale = _completed(stale) if stale and may_key else stale
+    # Not before: what has the same keys as something else had is no edit of that which was followed.
+    for source in current:
+        cache_source(source)
+    return len(dropped) + (sum(_apply(stale)) if stale else 0)
+
+
+def _tidy(binding: Binding) -> None:
+    """Do what Blender does where a channel has no modifiers: without keys it is gone, and *Make Cyclic* works."""
+    for channel, fcurve in list(binding.curves.items()):
+        modifiers = fcurve.modifiers
+        if not modifiers or channel[0].removeprefix(binding.prefix) not in WIDTHS:
+            continue
+        if not fcurve.keyframe_points and not fcurve.sampled_points:
+            if len(terms := terms_in(fcurve)) == len(modifiers):
+                binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+                continue
+            for term in terms:
+                modifiers.remove(term)
+        elif len(modifiers) > 1 and (last := modifiers[-1]).type == "CYCLES":
+            add_cycles(fcurve, Cycles(last.mode_before, last.mode_after, last.cycles_before, last.cycles_after))
+
+
+def _adopt(bindings: Iterable[Binding]) -> None:
+    """Give keys the mode that their transform has waited with for the first of them."""
+    for binding in bindings:
+        for user in binding.users:
+            if (mode := user.motion.awaited) != "BLENDER" and binding.is_keyed and user.animated.is_editable:
+                user.motion.awaited = "BLENDER"
+                if not is_marked(binding):
+                    mark_all(binding, MODE_NUMBERS.get(mode, 0))
+
+
+def mark_all(binding: Binding, number: int) -> None:
+    """Have all keys of a slot say this mode; none at all where it is Blender's."""
+    for (path, _), fcurve in binding.curves.items():
+        if path.removeprefix(binding.prefix) in WIDTHS and fcurve.keyframe_points:
+            write_marks(fcurve, np.full(len(fcurve.keyframe_points), number + 1 if number else 0))
+
+
+def _is_desired(binding: Binding, source: Source | Refused) -> bool:
+    """Return whether there is more to a source than Blender's own in-betweens, and it can be had."""
+    if isinstance(source, Refused):
+        return False
+    try:
+        refuse_numbers(binding.name, source)
+    except Refused:
+        return False
+    return source.is_live
+
+
+def _completed(stale: Sequence[Reading]) -> list[Reading]:
+    """Complete keys that were inserted on in-betweens, and return what is keyed then."""
+    olds = [cached_source(planned_from(binding)) for binding, _ in stale]
+    result = list(stale)
+
+    def known() -> Iterator[tuple[Binding, Source, Source]]:
+        return ((*reading, old) for reading, old in zip(result, olds, strict=True) if old is not None)
+
+    for complete in (key_fellows, key_other_parts):
+        result = _read_anew(result, {binding for binding, now, old in known() if complete(binding, now, old)})
+    insertions = {binding: one for binding, now, old in known() if (one := divided(binding, now, old)) is not None}
+    keep_timing(insertions.values())
+    result = _read_anew(result, insertions)
+    return _read_anew(result, {binding for binding, now, old in known() if share_out_turns(binding, now, old)})
+
+
+def _read_anew(readings: Sequence[Reading], changed: Collection[Binding]) -> list[Reading]:
+    """Return readings with what is keyed by now in those of them that were changed."""
+    old = [binding for binding, _ in readings if binding in changed]
+    fresh = read_again(old)
+    by_binding = dict(zip(old, zip(fresh, keyed_in(fresh), strict=True), strict=True))
+    return [
+        (binding, source) if isinstance((now := by_binding.get(binding, (binding, source)))[1], Refused) else now
+        for binding, source in readings
+    ]
+
+
+def _apply(stale: Sequence[Reading]) -> list[bool]:
+    """Plan and write the terms of these. Those with numbers that make no motion have none."""
+    try:
+        planned = plan([source for _, source in stale])
+    except ValueError:
+        if len(stale) == 1:
+            return [remove_terms(stale[0][0])]
+        return [changed for reading in stale for changed in _apply([reading])]
+    result = []
+    for (binding, source), terms in zip(stale, planned, strict=True):
+        result.append(apply(binding, source, terms))
+        _carry_marks(binding, source)
+        cache_source(source)
+    return result
+
+
+def _carry_marks(binding: Binding, source: Source) -> None:
+    """Mark the keys that go on with what others say, so that they say it without these."""
+    channels = binding.users[0].channels.values()
+    for fcurve in filter(None, map(binding.curves.get, channels)):
+        marks = read_marks(fcurve)
+        if len(marks) and not marks.all():
+            times = np.empty((len(marks), 2), np.float32)
+            fcurve.keyframe_points.foreach_get("co", times.ravel())
+            write_marks(fcurve, np.where(marks, marks, source.modes_at(times[:, 0].astype(np.float64)) + 1))
+
+
+def is_keying_safe() -> bool:
+    """Return whether keys may be inserted: not while Blender moves keys, for it remembers where in memory they are."""
+    manager = bpy.context.window_manager
+    windows = () if manager is None else manager.windows
+    return not any(item.bl_idname.startswith("TRANSFORM_OT_") for window in windows for item in window.modal_operators)

@@ -1,0 +1,207 @@
+"""Turns of segments, and how they are shared out where keys divide these."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...motion.quaternions import conjugate, rotate
+from ...motion.spins import FULL_TURN
+from ..actions.channels import ensure_group, key_points, replace_keys, selected_keys
+from ..actions.marks import read_marks, write_marks
+from ..actions.slots import Binding
+from ..evaluation.components import LOCATION, MODE_NAMES, ROTATION, ROWS
+from ..evaluation.differences import in_betweens
+from ..evaluation.marks import WHOLE_TURN
+from ..evaluation.sources import SAME_FRAME, TURN_AXES, Source
+from ..evaluation.turning import Turning, needs_turning, shortest_turns, turning_in
+from ..queries.keyed import frames_in, turns_in
+from ..transforms import GROUP, bone_name
+
+
+def set_turns_in(
+    binding: Binding, turns: float | Sequence[float], frames: Sequence[float], axis: str | None = None
+) -> None:
+    """Key the channel of turns of a slot on the frames of keys that begin segments, with one number on all of these or
+    one on each, rising; and behind them where others go on. About this one of `TURN_AXES`, all of them, if it is given.
+
+    Where there are no turns in any segment, the channel goes.
+    """
+    chosen, keyed = np.asarray(frames, dtype=np.float64), frames_in(binding)
+    is_chosen = is_among(chosen, keyed)
+    desired = turns_in(binding, keyed)
+    desired[is_chosen] = turns
+    channel = binding.users[0].turns_channel
+    fcurve = binding.ensure_curve(channel)
+    if fcurve.group is None:
+        fcurve.group = ensure_group(binding.channelbag, bone_name(binding.prefix) or GROUP)
+    if axis is None:
+        marks = read_marks(fcurve)
+        mark = int(marks[0]) if len(marks) else 0
+    else:
+        mark = TURN_AXES.index(axis) + 1
+    # Muted it has no say. Now it has, and all other segments keep the turns that they had without.
+    old = [] if fcurve.mute else list(zip(*key_points(fcurve).T.tolist(), selected_keys(fcurve).tolist(), strict=True))
+    fcurve.mute = False
+    keys: list[tuple[float, float, bool]] = []
+    passed = 0
+    for frame, number, meant in zip(keyed.tolist(), desired.tolist(), is_chosen.tolist(), strict=True):
+        while passed < len(old) and old[passed][0] < frame - SAME_FRAME:
+            keys.append(old[passed])
+            passed += 1
+        replaced = passed < len(old) and old[passed][0] <= frame + SAME_FRAME
+        if meant or replaced or not keys or abs(keys[-1][1] - number) > WHOLE_TURN:
+            # Selected as the key of the pose is, so that both move together.
+            keys.append((frame, number, meant or (replaced and old[passed][2])))
+        passed += replaced
+    keys += old[passed:]
+    if not any(number for _, number, _ in keys):
+        binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+        return
+    times, numbers, selected = map(np.array, zip(*keys, strict=True))
+    replace_keys(fcurve, times, numbers, interpolation="CONSTANT", selected=selected)
+    write_marks(fcurve, np.full(len(times), mark))
+
+
+def is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return which of the frames (n,) are one of the chosen, shape (n,)."""
+    chosen = np.sort(chosen)
+    return np.searchsorted(chosen, frames + SAME_FRAME) > np.searchsorted(chosen, frames - SAME_FRAME, side="right")
+
+
+STRAIGHT = ("lerp_slerp",)
+"""Modes by which the path of the origin does not depend on how the body turns."""
+
+ONE_AXIS = 1e-5
+"""Radians off an axis, for rounding."""
+
+SAMPLES = 16
+"""Samples of each part of a segment, and of each turn in it, to see how far a motion turns."""
+
+
+def share_out_turns(binding: Binding, source: Source, old: Source, progress: float | None = None) -> bool:
+    """Share the turns of segments out among the parts that keys divide them into, so that the motion stays as it is.
+
+    Where keys go between such parts, these have whole turns together again. Returns whether anything was changed.
+
+    Parameters
+    ----------
+    binding : Binding
+    source : Source
+        What is keyed by now.
+    old : Source
+        What was keyed before.
+    progress : float, optional
+        How far the pose of the one new key is along its segment, instead of where the body was on its frame.
+    """
+    source, old = _turning_part(source), _turning_part(old)
+    if old.order != source.order or source.cyclic is not None or not needs_turning(old):
+        return False
+    if source.key_count == old.key_count:
+        return False
+    shared = _divided(old, source, progress) if source.key_count > old.key_count else _joined(old, source)
+    chosen = np.array(list(shared))
+    if not shared or np.array_equal(turns_in(binding, chosen), list(shared.values())):
+        return False
+    set_turns_in(binding, list(shared.values()), chosen)
+    return True
+
+
+def _turning_part(source: Source) -> Source:
+    """Return what turns a body by itself: where parts have keys of their own, those of the rotation."""
+    return source.parts.get(ROTATION, source) if source.is_uneven else source
+
+
+def _divided(old: Source, source: Source, progress: float | None) -> dict[float, float]:
+    """Return the turns of the parts that keys divide segments into, by the frames that these begin on."""
+    shared: dict[float, float] = {}
+    for segment in np.flatnonzero(old.modes).tolist():
+        parts = _within(source.key_frames, *old.key_frames[segment : segment + 2])
+        are_as_before = source.segment_turns[parts] == old.segment_turns[segment]
+        if len(parts) > 1 and np.all(are_as_before & (source.modes[parts] != 0)):
+            turned = turning_in(old, segment)
+            if turned.spins.turns[0]:
+                along = None if progress is None else (0.0, progress, 1.0)
+                shares, axes = _shares(old, turned, source.key_frames[[*parts, parts[-1] + 1]], along=along)
+                whole = _is_enough_in_whole_turns(old, segment, turned)
+                for part, share, axis in zip(parts.tolist(), shares, axes, strict=True):
+                    shared[float(source.key_frames[part])] = _turns_of(source, part, turned, share, axis, whole=whole)
+    return shared
+
+
+def _joined(old: Source, source: Source) -> dict[float, float]:
+    """Return the whole turns of segments in place of which there were several, not all of them in whole turns."""
+    shared: dict[float, float] = {}
+    for segment in np.flatnonzero(source.segment_turns != np.rint(source.segment_turns)).tolist():
+        ends = source.key_frames[segment : segment + 2]
+        parts = _within(old.key_frames, *ends)
+        if len(parts) > 1 and source.segment_turns[segment] == old.segment_turns[parts[0]]:
+            turned = turning_in(old, int(parts[0]))
+            shares, axes = _shares(old, turned, ends, float(np.abs(old.segment_turns[parts]).sum()))
+            shared[float(ends[0])] = _turns_of(source, segment, turned, shares[0], axes[0], whole=True)
+    return shared
+
+
+def _within(frames: np.ndarray, first: float, last: float) -> np.ndarray:
+    """Return the segments between these frames of keys that begin from a first frame on, and before a last one."""
+    return np.flatnonzero((frames[:-1] > first - SAME_FRAME) & (frames[:-1] < last - SAME_FRAME))
+
+
+def _is_enough_in_whole_turns(source: Source, segment: int, turned: Turning) -> bool:
+    """Return whether it makes no difference for the motion what part of a turn is spin.
+
+    So it is where all of it is about one axis, and the path of the origin does not depend on it.
+    """
+    ends = source.values_at(source.key_frames[segment : segment + 2])[ROWS[LOCATION]]
+    is_straight = MODE_NAMES[source.modes[segment]] in STRAIGHT or not np.ptp(ends, axis=1).any()
+    return is_straight and float(np.abs(np.cross(turned.turn[:, 0], turned.axes_in_body[:, 0])).max()) < ONE_AXIS
+
+
+def _shares(
+    source: Source,
+    turned: Turning,
+    frames: np.ndarray,
+    turns: float | None = None,
+    along: Sequence[float] | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what part of the turn of a segment is made from each of the frames (p + 1,) in it to the next, (p,); and
+    the axis of its spins as it lies in the body on each of them, (p, 3). `turns` are about as many as are made in all,
+    `along` is the progress (p + 1,) on the frames, if it is not that of the motion.
+    """
+    steps = SAMPLES * (1 + int(abs(turned.spins.turns[0] if turns is None else turns)))
+
+    def sampled(ends: Sequence[float]) -> np.ndarray:
+        inner = [np.linspace(*pair, steps, endpoint=False) for pair in itertools.pairwise(ends)]
+        return np.append(np.concatenate(inner), ends[-1])
+
+    progress = None if along is None else sampled(along)
+    quaternions = in_betweens(source, sampled(frames), progress=progress).desired.quaternions
+    axes = np.tile(turned.spins.axes[:, 0], (len(quaternions), 1))
+    if turned.spins.in_space[0]:
+        axes = rotate(conjugate(quaternions), axes)
+    angles = np.einsum("sk,sk->s", shortest_turns(quaternions[:-1], quaternions[1:]).T, axes[:-1])
+    return angles.reshape(-1, steps).sum(axis=1) / turned.about[0], axes[:-1:steps]
+
+
+def _turns_of(source: Source, segment: int, of: Turning, share: float, axis: np.ndarray, *, whole: bool) -> float:
+    """Return the turns that a segment needs to have this share of a turning,
+    whose axis (3,) is as it lies in the body there.
+
+    They are whole where that is enough: where the path of the origin does not depend on what part of a turn is spin.
+    """
+
+    def about(result: Turning) -> float:
+        return float(axis @ result.twists[:, 0, 0]) / FULL_TURN
+
+    one = turning_in(source, segment, turns=1.0)
+    sense = np.copysign(
+        1.0, about(one) - float(axis @ one.by_angles.twists(one.first, one.second)[:, 0, 0]) / FULL_TURN
+    )
+    if whole:
+        none = turning_in(source, segment, turns=0.0)
+        return float(sense * np.rint((share * of.about[0] - float(axis @ none.turn[:, 0])) / FULL_TURN - about(none)))
+    turns = share * float(of.spins.turns[0])
+    part = turns - np.rint(turns)
+    return float(sense * (part + np.rint(turns - about(turning_in(source, segment, turns=sense * part)))))

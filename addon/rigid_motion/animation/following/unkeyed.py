@@ -1,0 +1,105 @@
+"""Poses without keys. Blender leaves them as they are while others are keyed, but to write a modifier has it evaluate
+all of the Action anew: so they are set again afterwards.
+
+What has another value after that than before was not where its channel has it, unless that was edited or has other
+terms by now.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..actions.slots import Slot
+from ..transforms import WIDTHS, Channel, prefix_of, split_path
+
+SAME_VALUE = 1e-6
+"""Values that differ by less, relative or absolute below 1, are the same in single precision."""
+
+
+class Poses:
+    """What the channels of a slot move of its users, as it is before something is written.
+
+    Parameters
+    ----------
+    slot : Slot
+    edited : collection of Channel
+        Channels that were edited: what they move goes where they have it.
+    written : collection of Channel
+        Channels that are about to be written.
+    frame : float
+        The frame that is shown.
+    """
+
+    def __init__(self, slot: Slot, edited: Collection[Channel], written: Collection[Channel], frame: float) -> None:
+        # Under NLA strips there is no telling where channels have something, and Blender evaluates all in any case.
+        self._users = [user for user in slot.users if slot.plays_in(user) and not len(user.animation_data.nla_tracks)]
+        self._left_out, self._others = set(edited), []
+        for fcurve in slot.fcurves if self._users else ():
+            channel = path, _ = fcurve.data_path, fcurve.array_index
+            if fcurve.mute:
+                self._left_out.add(channel)
+            elif not split_path(path)[0] or split_path(path)[1] not in WIDTHS:
+                self._others.append(channel)
+            if channel in written and channel not in self._left_out:
+                shown, value = fcurve.evaluate(frame), _value_of(self._users[0], channel)
+                if value is None or abs(value - shown) <= SAME_VALUE * max(1.0, abs(shown)):
+                    self._left_out.add(channel)
+        self._before = [(_of_bones(user), [_value_of(user, other) for other in self._others]) for user in self._users]
+
+    def set_again(self) -> bool:
+        """Set what is not as it was to that. Returns whether anything was."""
+        changed = False
+        for user, (bones, values) in zip(self._users, self._before, strict=True):
+            then = dict(zip(self._others, values, strict=True))
+            for name, now in _of_bones(user).items():
+                for number, index in np.argwhere(now != bones[name]).tolist():
+                    then[prefix_of(user.pose.bones[number].name) + name, index] = float(bones[name][number, index])
+            for channel, value in then.items():
+                if channel not in self._left_out and value is not None and _value_of(user, channel) != value:
+                    changed |= _set_value(user, channel, value)
+        return changed
+
+
+def _of_bones(rig: bpy.types.Object) -> dict[str, np.ndarray]:
+    """Return the properties of all bones that move them, (bones, width) each."""
+    bones, result = () if rig.pose is None else rig.pose.bones, {}
+    for name, width in WIDTHS.items() if bones else ():
+        result[name] = np.empty((len(bones), width), np.float32)
+        bones.foreach_get(name, result[name].ravel())
+    return result
+
+
+def _value_of(user: bpy.types.Object, channel: Channel) -> Any:
+    """Return what a channel moves, None where that is not there or no number."""
+    path, index = channel
+    try:
+        prop = user.path_resolve(path)
+        value = prop if isinstance(prop, int | float) else prop[index]
+    except (ValueError, IndexError, TypeError, KeyError):
+        return None
+    return value if isinstance(value, int | float) else None
+
+
+def _set_value(user: bpy.types.Object, channel: Channel, value: Any) -> bool:
+    """Set what a channel moves. Returns whether that can be done."""
+    path, index = channel
+    prop = user.path_resolve(path)
+    if not isinstance(prop, int | float):
+        prop[index] = value
+        return True
+    if path.endswith('"]'):
+        holder, _, name = path[:-2].rpartition('["')
+        (user.path_resolve(holder) if holder else user)[bpy.utils.unescape_identifier(name)] = value
+        # Of a custom property Blender does not know by itself that it was set.
+        user.update_tag()
+        return True
+    holder, _, name = path.rpartition(".")
+    owner = user.path_resolve(holder) if holder else user
+    if name not in owner.bl_rna.properties:
+        return False
+    setattr(owner, name, value)
+    return True

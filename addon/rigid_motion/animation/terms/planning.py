@@ -1,0 +1,257 @@
+"""Which terms the channels of sources should have: their differences as polynomials on pieces of time, and carriers.
+
+A difference is smooth within a span. It is tried on Chebyshev nodes, of all spans of all sources at once. Where no
+polynomial follows it, the span is split, at its breaks, and then at whole frames, halves, quarters and eighths, and
+the pieces are tried in the next round. What is left in the end lies between two neighbouring eighths of frames: there
+it runs straight, and is exact on both.
+
+Ranges of modifiers include both ends. At keys nothing is to be added, so ranges open by one step of single precision;
+of two pieces that meet the earlier one has the frame. Frames are those of the Action.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from ..evaluation.components import LOCATION, ROTATION, ROWS
+from ..evaluation.differences import channel_differences
+from ..evaluation.sources import Source
+from ..evaluation.spans import Span, spans
+from .carriers import GUARD, Term, carry, fit_of
+
+NODES = 24
+"""How many moments a piece is tried on."""
+
+MOST_DEGREE = NODES - 5
+"""The highest degree of a polynomial. What is behind it tells whether all has been seen."""
+
+UNSEEN = 10.0
+"""How many times the last coefficients the unseen ones may add up to. Those of a kink fall as slowly as 1 / k^2, which
+makes five times; and each of them is missed twice, as nodes take it for one of the seen ones."""
+
+LOCATION_TOLERANCE = 4e-6
+"""How far off location may be, in units: what single precision leaves of 64 units anyway, and no one sees."""
+
+TOLERANCE = 2e-6
+"""How far off rotation and scale may be: 2 micrometres at an arm's length."""
+
+BASE = np.full(10, TOLERANCE)
+BASE[ROWS[LOCATION]] = LOCATION_TOLERANCE
+"""The tolerances of rows, where values are not large."""
+
+SINGLE_PRECISION = 1e-7
+"""Nothing is closer than this share of the values that differences are added to: a step is 1.2e-7 of them at most."""
+
+EDGE = 1e-8
+"""The share of a span that moments keep away from its ends, where there is no difference but next to which there is."""
+
+FITTING = 0.5
+"""The share of the tolerance that polynomials may use up; carriers have the rest."""
+
+FRACTIONS = 1, 2, 4, 8
+"""Into how many parts of a frame spans may be split: renderers blur motion by samples on such."""
+
+LAST_FRAME = 1048574
+"""Blender's MAXFRAMEF: ranges of modifiers reach from its negative to it."""
+
+
+class _Pieces(NamedTuple):
+    """P pieces of spans that are to be tried."""
+
+    spans: np.ndarray
+    """The number of the span among all, rising, shape (P,)."""
+
+    first: np.ndarray
+    """Shape (P,), in single precision, as `last` is."""
+
+    last: np.ndarray
+
+    rows: np.ndarray
+    """Which rows are open, shape (P, 10)."""
+
+
+class _Polynomials(NamedTuple):
+    """Finished ones, a row each."""
+
+    spans: np.ndarray
+    rows: np.ndarray
+    first: np.ndarray
+    last: np.ndarray
+    series: np.ndarray
+    """Shape (., NODES)."""
+
+    tolerances: np.ndarray
+    """What carriers may use up."""
+
+
+class _Spans:
+    """The spans of all sources, and their differences on any frames: where planning meets evaluation."""
+
+    def __init__(self, sources: Sequence[Source]) -> None:
+        self.sources = sources
+        found = [(number, span) for number, source in enumerate(sources) for span in spans(source)]
+        self.all: list[Span] = [span for _, span in found]
+        self.owners = np.array([number for number, _ in found], int)
+        ends = np.array([(span.first, span.last) for span in self.all]).reshape(-1, 2)
+        self.first, self.last = np.float32(np.clip(ends, -LAST_FRAME, LAST_FRAME)).astype(float).T
+        self.by_angles = np.array([source.order is not None for source in sources], bool)[self.owners]
+        self.is_key = np.array([(span.first_is_key, span.last_is_key) for span in self.all], bool).reshape(-1, 2)
+
+    def pieces(self) -> _Pieces:
+        """Return all spans as pieces, but for those with no frame of single precision inside."""
+        rows = np.zeros((len(self.all), len(BASE)), bool)
+        for number, span in enumerate(self.all):
+            rows[number, list(span.rows)] = True
+        every = np.flatnonzero(_after(self.first) < self.last)
+        return _Pieces(every, self.first[every], self.last[every], rows[every])
+
+    def differences(self, numbers: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return (difference, native) of spans with these rising numbers (P,), on frames (P, M); each (P, 10, M)."""
+        first, last = self.first[numbers, None], self.last[numbers, None]
+        frames = np.clip(frames, first + EDGE * (last - first), last - EDGE * (last - first))
+        owners, starts = np.unique(self.owners[numbers], return_index=True)
+        asked = [np.unique(of_source, return_inverse=True) for of_source in np.split(frames, starts[1:])]
+        values = channel_differences([self.sources[owner] for owner in owners], [rising for rising, _ in asked])
+        shape = (len(BASE), -1, frames.shape[1])
+        both = [np.stack(pair)[:, :, places.ravel()] for pair, (_, places) in zip(values, asked, strict=True)]
+        difference, native = np.concatenate(both, axis=2).reshape(2, *shape).transpose(0, 2, 1, 3)
+        return difference, native
+
+
+def plan(sources: Sequence[Source]) -> list[dict[int, list[Term]]]:
+    """Return, for each source, the terms that its channels should have, by rows; in order of time.
+
+    Rows without terms are left out.
+    """
+    result: list[dict[int, list[Term]]] = [{} for _ in sources]
+    every = _Spans(sources)
+    finished = []
+    pieces = every.pieces()
+    while len(pieces.spans):
+        polynomials, pieces = _tried(every, pieces)
+        finished.append(polynomials)
+        pieces, straight = _split(every, pieces)
+        if len(straight.spans):
+            finished.append(_straight(every, straight))
+    if not finished:
+        return result
+    found = _Polynomials(*(np.concatenate(parts) for parts in zip(*finished, strict=True)))
+    found = _Polynomials(
+        *(values[np.lexsort((found.first, found.rows, every.owners[found.spans]))] for values in found)
+    )
+    ranges = _ranges(every, found)
+    is_seen = ranges[:, 0] <= ranges[:, 1]
+    found, ranges = _Polynomials(*(values[is_seen] for values in found)), ranges[is_seen]
+    terms = carry(found.series, found.first, found.last, found.tolerances, ranges)
+    for owner, row, some in zip(every.owners[found.spans].tolist(), found.rows.tolist(), terms, strict=True):
+        if some:
+            result[owner].setdefault(row, []).extend(some)
+    return result
+
+
+def _after(frames: np.ndarray) -> np.ndarray:
+    return np.nextafter(np.float32(frames), np.float32(np.inf)).astype(float)
+
+
+def _before(frames: np.ndarray) -> np.ndarray:
+    return np.nextafter(np.float32(frames), np.float32(-np.inf)).astype(float)
+
+
+def _ranges(every: _Spans, found: _Polynomials) -> np.ndarray:
+    """Return the first and last frame (., 2) of polynomials in order of sources, rows and time."""
+    begins, ends = found.first == every.first[found.spans], found.last == every.last[found.spans]
+    opens = np.where(begins, every.is_key[found.spans, 0], True)
+    closes = np.where(ends, every.is_key[found.spans, 1], False)
+    # Two spans may meet where there is no key.
+    owners = every.owners[found.spans]
+    alike = (owners[1:] == owners[:-1]) & (found.rows[1:] == found.rows[:-1])
+    opens[1:] |= alike & (found.last[:-1] == found.first[1:])
+    first = np.where(opens, _after(found.first), found.first)
+    return np.stack([first, np.where(closes, _before(found.last), found.last)], 1)
+
+
+def _tolerances(native: np.ndarray) -> np.ndarray:
+    """Return what is close enough where values are `native` (P, 10, M); shape (P, 10)."""
+    return np.maximum(BASE, SINGLE_PRECISION * np.abs(native).max(axis=2))
+
+
+def _tried(every: _Spans, pieces: _Pieces) -> tuple[_Polynomials, _Pieces]:
+    """Return the polynomials of the rows that one follows, and the pieces with the other rows open.
+
+    A polynomial ends where the difference does, so that what is 0 at keys stays so.
+    """
+    nodes, to_series = fit_of(NODES)
+    middles, halves = (pieces.first + pieces.last) / 2, (pieces.last - pieces.first) / 2
+    moments = middles[:, None] + halves[:, None] * np.concatenate([[-1.0], nodes, [1.0]])
+    difference, native = every.differences(pieces.spans, moments)
+    tolerances = _tolerances(native)
+    series = (difference[..., 1:-1].reshape(-1, NODES) @ to_series).reshape(difference[..., 1:-1].shape)
+    # What each degree leaves: at most, and at both ends, where a slope may be infinite and no node sees it.
+    size = np.abs(series)
+    behind = np.cumsum(size[..., ::-1], axis=2)[..., ::-1] - size
+    at_first = difference[..., :1] - np.cumsum(series * (-1.0) ** np.arange(NODES), axis=2)
+    at_last = difference[..., -1:] - np.cumsum(series, axis=2)
+    unseen = UNSEEN * behind[..., MOST_DEGREE]
+    missed = behind + np.maximum(np.abs(at_first), np.abs(at_last)) + unseen[..., None]
+    is_close = missed[..., : MOST_DEGREE + 1] <= FITTING * tolerances[..., None]
+    is_close[..., 0] = False
+    degrees = is_close.argmax(axis=2)
+    matters = pieces.rows & (size.sum(axis=2) + unseen > GUARD * tolerances)
+    followed = is_close.any(axis=2)
+    # Several values of all angles turn alike, and which of them it is hangs on the frames that are asked for.
+    turning = ROWS[ROTATION]
+    is_torn = every.by_angles[pieces.spans] & (matters & ~followed)[:, turning].any(axis=1)
+    followed[is_torn, turning], matters[is_torn, turning] = False, pieces.rows[is_torn, turning]
+    number, row = np.nonzero(matters & followed)
+    degree = degrees[number, row]
+    chosen = np.where(np.arange(NODES) <= degree[:, None], series[number, row], 0.0)
+    chosen[:, :2] += _line(at_first[number, row, degree], at_last[number, row, degree])
+    allowed = (1.0 - FITTING) * tolerances[number, row]
+    polynomials = _Polynomials(pieces.spans[number], row, pieces.first[number], pieces.last[number], chosen, allowed)
+    rows = matters & ~followed
+    is_open = rows.any(axis=1)
+    return polynomials, _Pieces(*(values[is_open] for values in pieces._replace(rows=rows)))
+
+
+def _line(first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Return the series (., 2) of what runs straight from the first value to the last."""
+    return np.stack([first + last, last - first], 1) / 2
+
+
+def _split(every: _Spans, pieces: _Pieces) -> tuple[_Pieces, _Pieces]:
+    """Return the parts of pieces, and the pieces that cannot be split.
+
+    Parts are between breaks, or else on both sides of the whole frame that is nearest to the middle; or of the half,
+    the quarter or the eighth where no whole frame is inside.
+    """
+    parts: list[tuple[int, float, float]] = []
+    rest: list[tuple[int, float, float]] = []
+    ends = zip(pieces.spans.tolist(), pieces.first.tolist(), pieces.last.tolist(), strict=True)
+    for number, (span, first, last) in enumerate(ends):
+        breaks = np.float32(every.all[span].breaks).astype(float)
+        between = np.unique(breaks[(first < breaks) & (breaks < last)]).tolist()
+        middles = (float(np.floor(parts_of * (first + last) / 2 + 0.5)) / parts_of for parts_of in FRACTIONS)
+        between = between or [middle for middle in middles if first < middle < last][:1]
+        (parts if between else rest).extend((number, *both) for both in pairwise([first, *between, last]))
+    return _parts(pieces, parts), _parts(pieces, rest)
+
+
+def _parts(pieces: _Pieces, ends: list[tuple[int, float, float]]) -> _Pieces:
+    """Return parts of pieces, given by number, first and last frame."""
+    table = np.array(ends).reshape(-1, 3)
+    numbers = table[:, 0].astype(int)
+    return _Pieces(pieces.spans[numbers], table[:, 1], table[:, 2], pieces.rows[numbers])
+
+
+def _straight(every: _Spans, pieces: _Pieces) -> _Polynomials:
+    """Return polynomials of degree 1 that are exact at both ends of pieces."""
+    difference, native = every.differences(pieces.spans, np.stack([pieces.first, pieces.last], 1))
+    number, row = np.nonzero(pieces.rows)
+    series = np.zeros((len(number), NODES))
+    series[:, :2] = _line(*difference[number, row].T)
+    allowed = (1.0 - FITTING) * _tolerances(native)[number, row]
+    return _Polynomials(pieces.spans[number], row, pieces.first[number], pieces.last[number], series, allowed)
