@@ -18,6 +18,7 @@ from hypothesis.stateful import precondition, rule
 from tests.animation.bones.rigs import select_only
 
 LAST = 40
+seeds = st.integers(0, 2**16)
 shares = st.floats(0.0, 1.0, exclude_max=True)
 frames_in = st.integers(-4, 4 * (LAST + 5)).map(lambda quarter: quarter / 4)
 
@@ -75,6 +76,7 @@ class TakenAway:
     @precondition(lambda self: self.on)
     @rule(who=shares, cleared=st.booleans(), there=frames_in)
     def take_the_animation_away_for_a_while(self, who, cleared, there):
+        """It stays where it is seen, and goes on as before with its Action."""
         obj = self._animated(self._named(who))
         action, slot = self._linked(obj)
         if action is None or not self._is_free(obj.name):

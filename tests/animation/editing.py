@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import bpy
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.stateful import precondition, rule
 
-from rigid_motion import animation
-from tests.animation.edit_steps import LAST, frames_in, shares
-from tests.animation.keyed import MODE_IDS, WIDTHS, Carrier, curves_of, key_frames, mode_at, snapshot, transform_paths
-from tests.animation.machine import Machine, goes_on
-from tests.animation.oracle import expected_bases, is_beside_path, may_spin
+from tests.animation.body_oracle import Own, bodies_of, is_beside_path, may_spin
+from tests.animation.bones import rigs
+from tests.animation.edit_steps import LAST, frames_in, seeds, shares
+from tests.animation.keyed import (
+    KEY_FIELDS,
+    MARKED_FIELDS,
+    WIDTHS,
+    Carrier,
+    curves_of,
+    key_frames,
+    mode_at,
+    moving_curves,
+    snapshot,
+    transform_paths,
+)
+from tests.animation.oracle import expected_bases
 from tests.animation.path_oracle import DEPENDS_ON_KEYS
 from tests.animation.scenes import random_values
+from tests.animation.settings_steps import SAME_FRAME, Settings
 
-INTERPOLATIONS = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items]
-EASINGS = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["easing"].enum_items]
-HANDLES = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["handle_left_type"].enum_items]
+__all__ = ["LAST", "Editing", "frames_in", "seeds", "shares"]
 
-seeds = st.integers(0, 2**16)
-SAME_FRAME = 0.005
-
-periods = st.just(0.0) | st.floats(0.1, 10.0)
-"""Of ELASTIC, in frames. Of many thousand swings in a segment, single precision makes noise, also in Blender itself."""
+ORDERS = (*rigs.ORDERS, "AXIS_ANGLE")
 
 
 def segment_start(keys: np.ndarray, frame: float) -> float:
@@ -31,57 +39,51 @@ def segment_start(keys: np.ndarray, frame: float) -> float:
     return float(keys[np.clip(np.searchsorted(keys, frame) - 1, 0, len(keys) - 2)])
 
 
-def mode_channel(carrier: Carrier) -> bpy.types.FCurve | None:
-    """The mode channel where it has keys, muted or not."""
-    fcurve = curves_of(carrier).get(("rigid_motion.mode", 0))
-    return fcurve if fcurve is not None and len(fcurve.keyframe_points) else None
-
-
 def without_turns(keys: dict) -> dict:
     """A snapshot without the channel of turns."""
     return {channel: kept for channel, kept in keys.items() if channel[0] != "rigid_motion.turns"}
 
 
-def assert_only_a_key_more(made: dict, after: dict, frame: float) -> None:
-    """Between these snapshots no key changed but on this frame; and handles, as Blender has them follow a key.
+def assert_only_completed(made: dict, after: dict, frame: float) -> None:
+    """Between these snapshots no key changed but on this frame, where others than the components that were keyed may
+    have one by now; and handles, as Blender has them follow a key.
 
     Those of the keys beside it may be set. Turns are shared out between the parts of a segment.
     """
     made, after = without_turns(made), without_turns(after)
-    assert set(made) == set(after)
-    for channel, (*rest, points) in after.items():
-        *rest_made, points_made = made[channel]
+    for channel, (*rest, keys) in after.items():
+        if channel not in made:
+            assert len(keys) == 1, f"{channel} is new"
+            continue
+        *rest_made, keys_made = made[channel]
         assert rest == rest_made
         others, others_made = (
-            [point for point in keys if abs(point[0] - frame) >= SAME_FRAME] for keys in (points, points_made)
+            [key for key in of_one if abs(key[0] - frame) >= SAME_FRAME] for of_one in (keys, keys_made)
         )
-        assert len(points) - len(others) <= 1
-        assert [(*point[:2], *point[6:-2]) for point in others] == [(*point[:2], *point[6:-2]) for point in others_made]
-        behind = sum(point[0] < frame for point in others)
-        for number, (point, point_made) in enumerate(zip(others, others_made, strict=True)):
+        assert len(keys) - len(others) <= 1
+        assert [(*key[:2], *key[6:10]) for key in others] == [(*key[:2], *key[6:10]) for key in others_made]
+        behind = sum(key[0] < frame for key in others)
+        for number, (key, key_made) in enumerate(zip(others, others_made, strict=True)):
             # Handles that are free are the animator's; only those beside the new key are shortened with their segment.
             if number not in (behind - 1, behind):
-                assert point[-2:] == point_made[-2:]
-                assert point == point_made or point[-2:] != ("FREE", "FREE")
+                assert key[10:12] == key_made[10:12]
+                assert key == key_made or key[10:12] != ("FREE", "FREE")
 
 
 def is_timed_together(carrier: Carrier, frame: float) -> bool:
     """Whether all channels go from key to key on the same frames here, with handles on the same frames or none."""
     timings = set()
-    for (path, _), fcurve in curves_of(carrier).items():
+    for fcurve in moving_curves(carrier):
         points = fcurve.keyframe_points
-        if path in WIDTHS and len(points) and not fcurve.mute:
-            number = sum(point.co[0] < frame for point in points)
-            if not 0 < number < len(points):
-                return False
-            before, behind = points[number - 1], points[number]
-            handles = before.handle_right[0] - before.co[0], behind.co[0] - behind.handle_left[0]
-            eased = before.interpolation, before.easing
-            timings.add(
-                (before.co[0], behind.co[0], eased, *np.round(np.minimum(handles, behind.co[0] - before.co[0]), 4))
-            )
-            if fcurve.extrapolation == "LINEAR" or before.interpolation not in ("BEZIER", "LINEAR"):
-                return False
+        number = sum(point.co[0] < frame for point in points)
+        if not 0 < number < len(points):
+            return False
+        before, behind = points[number - 1], points[number]
+        handles = before.handle_right[0] - before.co[0], behind.co[0] - behind.handle_left[0]
+        eased = before.interpolation, before.easing
+        timings.add((before.co[0], behind.co[0], eased, *np.round(np.minimum(handles, behind.co[0] - before.co[0]), 4)))
+        if fcurve.extrapolation == "LINEAR" or before.interpolation not in ("BEZIER", "LINEAR"):
+            return False
     return len(timings) == 1
 
 
@@ -90,104 +92,96 @@ def shapes_path(carrier: Carrier, frame: float) -> bool:
     return mode_at(carrier, frame) in DEPENDS_ON_KEYS and may_spin(carrier)
 
 
-def is_seen_exactly(carrier: Carrier, frame: float) -> bool:
-    """Whether it is seen where it has to be on this frame: objects are between frames only where that is asked for."""
-    return frame % 1.0 == 0.0 or isinstance(carrier, bpy.types.PoseBone) or carrier.rigid_motion.is_exact
+def _is(fcurve: bpy.types.FCurve, carrier: Carrier, path: str, index: int) -> bool:
+    prefix = "" if isinstance(carrier, bpy.types.Object) else f"{carrier.path_from_id()}."
+    return (fcurve.data_path, fcurve.array_index) == (prefix + path, index)
 
 
-class Editing(Machine):
+class Editing(Settings):
     """An animator at work on carriers of keys. What they are, machines say that are derived from it."""
 
-    def _has_keys_for_any_pose(self, carrier: Carrier) -> bool:
-        """What is not keyed, or muted, beside other channels of the same property has no key to get a value."""
-        keyed = {name for name, fcurve in curves_of(carrier).items() if len(fcurve.keyframe_points) and not fcurve.mute}
-        return all(
-            {(path, index) in keyed for index in range(WIDTHS[path])} in ({True}, {False})
-            for path in transform_paths(carrier)
-        )
+    def _completes(self, frame: float) -> Callable[[dict, dict], None]:
+        """Keys are as the edit made them, but for what goes with keys that were inserted on this frame."""
 
-    def _only_share_out_turns(self, made: dict, after: dict) -> None:
-        """Keys are as the edit made them, but for turns, which new keys share out."""
-        for name in self.names:
-            assert without_turns(after[name]) == without_turns(made[name]), f"the keys of {name} were changed"
+        def settle(made: dict, after: dict) -> None:
+            for name in self.names:
+                assert_only_completed(made[name], after[name], frame)
 
-    def _curve(self, obj: Carrier, share: float) -> bpy.types.FCurve | None:
-        curves = [c for (path, _), c in curves_of(obj).items() if path in WIDTHS and len(c.keyframe_points)]
-        return curves[int(share * len(curves))] if curves else None
-
-    def _frame(self, obj: Carrier, share: float) -> float | None:
-        keys = key_frames(obj)
-        return float(keys[int(share * len(keys))]) if len(keys) else None
-
-    def _keys_on(self, obj: Carrier, frame: float, with_mode: bool = True):
-        for (path, _), fcurve in curves_of(obj).items():
-            if path in WIDTHS or (with_mode and path == "rigid_motion.mode"):
-                for point in fcurve.keyframe_points:
-                    if abs(point.co[0] - frame) < SAME_FRAME:
-                        yield fcurve, point
+        return settle
 
     # Edits
 
     @precondition(lambda self: self.on)
-    @rule(who=shares, what=st.sampled_from(("location", "rotation", "scale", "all")), posed=st.booleans(), seed=seeds)
-    def insert_a_key_at_the_current_frame(self, who, what, posed, seed):
+    @rule(
+        who=shares,
+        what=st.sampled_from((None, None, (0,), (1,), (2,), (0, 1))),
+        index=st.none() | st.integers(0, 2),
+        posed=st.booleans(),
+        seed=seeds,
+    )
+    def insert_a_key_at_the_current_frame(self, who, what, index, posed, seed):
+        """Of all, or of parts of it or one component, as Auto Key does. It takes what is seen, and nothing jumps."""
         name, frame = self._named(who), bpy.context.scene.frame_current_final
         obj = self._found(name)
-        keys = key_frames(obj)
-        held, settable = self._holds_pose(obj, frame), self._has_keys_for_any_pose(obj)
-        goes_on_as_before = held and not posed and is_timed_together(obj, frame) and not shapes_path(obj, frame)
-        goes_on_as_before = goes_on_as_before and mode_at(obj, frame) == mode_at(obj, segment_start(keys, frame))
-        goes_by = np.arange(keys[0], keys[-1], 0.5) if goes_on_as_before and is_seen_exactly(obj, frame) else ()
-        if len(goes_by):
-            first, last = keys[keys < frame][-1], keys[keys > frame][0]
-            if is_beside_path(obj, first, last, self.owns.get(name)):
-                # The new key is nearest to another moment of the path: up to the keys around it the motion may change.
-                goes_by = goes_by[(goes_by <= first) | (goes_by >= last)]
+        bpy.context.view_layer.update()
+        paths = transform_paths(obj) if what is None else [transform_paths(obj)[part] for part in what]
+        index = -1 if what is None or index is None else index
+        goes_by = self._frames_to_go_by(name) if what is None and not posed and not self._is_posed(obj) else np.empty(0)
         before = expected_bases(obj, goes_by, self.owns.get(name))
-        moved = self._is_posed(obj)
         if posed:
             self._pose(obj, seed)
-        seen = self._basis(obj)
-        places = {"location": 0, "rotation": 1, "scale": 2}
-        everything = transform_paths(obj)
-        paths = everything if what == "all" else (everything[places[what]],)
+        alone = self._sharing(name) == {name} or not posed
+        seen = {other: self._basis(self._found(other)) for other in self.names if other == name or alone}
+        values = {path: tuple(getattr(obj, path)) for path in paths}
 
         def insert() -> None:
             for path in paths:
-                self._found(name).keyframe_insert(path, frame=frame)
+                self._found(name).keyframe_insert(path, frame=frame, index=index)
 
-        def settle(made: dict, after: dict) -> None:
-            obj = self._found(name)
-            sharing = self._sharing(name) if held else set()
-            for other in self.names:
-                if other not in sharing:
-                    assert after[other] == made[other], f"the keys of {other} were changed"
-            if held:
-                assert_only_a_key_more(made[name], after[name], frame)
-                # Off whole frames a key shows as the samples beside it have it, but it has the pose all the same.
-                now = expected_bases(obj, [frame], self.owns.get(name))[0]
-                size = max(1.0, np.abs(seen).max())
-                error = np.abs(now - seen).max() if settable else 0.0
-                assert error < 2e-5 * size, f"{name} jumped from\n{seen}\nto\n{now}\nkeys {keys}"
-                if len(before) and settable and not moved:
-                    error = np.abs(expected_bases(obj, goes_by, self.owns.get(name)) - before).max(axis=(1, 2))
-                    size = max(1.0, np.abs(before).max())
-                    worst = goes_by[error.argmax()]
-                    assert error.max() < 1e-3 * size, f"{name} moves by {error.max():.3g} on {worst}, keys {keys}"
+        self._edit(insert, self._completes(frame))
+        self._assert_in_place(seen)
+        obj = self._found(name)
+        for path in paths:
+            for number in range(WIDTHS[path]) if index < 0 else (index,):
+                (value,) = [key.co[1] for curve, key in self._keys_on(obj, frame) if _is(curve, obj, path, number)]
+                assert abs(value - values[path][number]) < 1e-5 * max(1.0, abs(value)), f"{path} {number} of {name}"
+        if not posed and not self._is_posed(obj):
+            bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
+            self._assert_in_place(seen)
+        if len(before):
+            error = np.abs(expected_bases(obj, goes_by, self.owns.get(name)) - before).max(axis=(1, 2))
+            worst = goes_by[error.argmax()]
+            assert error.max() < 1e-3 * max(1.0, np.abs(before).max()), f"{name} moves by {error.max()} on {worst}"
 
-        self._edit(insert, settle)
-
-    def _holds_pose(self, obj: Carrier, frame: float) -> bool:
-        """Whether a key inserted now falls where a mode acts: into a segment, or where the outermost ones go on."""
-        keys = key_frames(obj)
-        if len(keys) < 2 or np.abs(keys - frame).min() < 0.01:
-            return False
-        return (keys[0] < frame < keys[-1] or goes_on(obj)) and mode_at(obj, segment_start(keys, frame)) != "BLENDER"
-
-    def _pose(self, obj: Carrier, seed: int) -> None:
-        for path in transform_paths(obj)[:2]:
-            setattr(obj, path, random_values(obj, path, 1, seed)[0])
+    def _assert_in_place(self, seen: dict) -> None:
+        """Things are still shown as they were."""
         bpy.context.view_layer.update()
+        for name, then in seen.items():
+            now = self._basis(self._found(name))
+            error = np.abs(now - then).max()
+            assert error < 1e-5 * max(1.0, np.abs(then).max()), f"{name} jumped from\n{then}\nto\n{now}"
+
+    def _frames_to_go_by(self, name) -> np.ndarray:
+        """Frames on which a key of all that is keyed, inserted now, leaves the motion as it is."""
+        obj, frame = self._found(name), bpy.context.scene.frame_current_final
+        keys = key_frames(obj)
+        kept = (
+            *(len(keys) > 1 and keys[0] < frame < keys[-1] and np.abs(keys - frame).min() >= 0.01,),
+            *(len(bodies_of(obj, Own())) == 1,),
+        )
+        if not all(kept) or not is_timed_together(obj, frame):
+            return np.empty(0)
+        if shapes_path(obj, frame) or mode_at(obj, frame) != mode_at(obj, segment_start(keys, frame)):
+            return np.empty(0)
+        if len(modes := {mode_at(obj, key) for key in keys}) > 1 and "motor_spline" in modes:
+            # A smooth segment beside one of another mode has the new key for its neighbour.
+            return np.empty(0)
+        goes_by = np.arange(keys[0], keys[-1], 0.5)
+        if is_beside_path(obj, frame, self.owns.get(name)):
+            # The new key is nearest to another moment of the path: up to the keys around it the motion may change.
+            first, last = keys[keys < frame][-1], keys[keys > frame][0]
+            goes_by = goes_by[(goes_by <= first) | (goes_by >= last)]
+        return goes_by
 
     def _is_posed(self, obj: Carrier) -> bool:
         """Whether it was posed by hand on this frame."""
@@ -198,26 +192,40 @@ class Editing(Machine):
             if path in WIDTHS and len(fcurve.keyframe_points) and not fcurve.mute
         )
 
-    @rule(who=shares, which=shares, kind=st.sampled_from(("KEYFRAME", "BREAKDOWN")))
-    def set_the_type_of_keys(self, who, which, kind):
-        name = self._named(who)
+    @precondition(lambda self: self.on)
+    @rule(who=shares, other=shares, by=st.sampled_from((0.0, 4.0, 0.25)))
+    def paste_keys_of_another(self, who, other, by):
+        """As the Dope Sheet does: each key is inserted with all that it has, its mode among it."""
+        name, other = self._named(who), self._named(other)
+        if name == other or name in self._sharing(other):
+            return
+        model = self._found(other)
+        if model.rotation_mode != self._found(name).rotation_mode or not curves_of(self._found(name)):
+            return
+        modes = [mode_at(model, frame) for frame in key_frames(model)]
 
-        def change() -> None:
+        def paste() -> None:
+            model, curves = self._found(other), curves_of(self._found(name))
+            for channel, fcurve in curves_of(model).items():
+                copy = curves.get(channel)
+                if channel[0] in WIDTHS and copy is not None:
+                    copy.keyframe_points.clear()
+                    for key in fcurve.keyframe_points:
+                        pasted = copy.keyframe_points.insert(key.co[0] + by, key.co[1])
+                        for field in (*KEY_FIELDS, *MARKED_FIELDS):
+                            setattr(pasted, field, getattr(key, field))
+                    copy.update()
+
+        if self._has_same_channels(name, other):
+            self._edit(paste)
             obj = self._found(name)
-            frame = self._frame(obj, which)
-            if frame is not None:
-                for fcurve, point in self._keys_on(obj, frame, False):
-                    point.type = kind
-                    fcurve.update()
+            assert [mode_at(obj, frame) for frame in key_frames(obj)] == modes
 
-        self._edit(change)
-
-    @rule(who=shares, seed=seeds, frame=frames_in)
-    def pose_it_without_a_key_and_go_elsewhere(self, who, seed, frame):
-        back = bpy.context.scene.frame_current
-        self._pose(self._found(self._named(who)), seed)
-        bpy.context.scene.frame_set(int(frame + self.shift))
-        bpy.context.scene.frame_set(back)
+    def _has_same_channels(self, *names) -> bool:
+        """Whether these have the same channels with keys, none of them muted."""
+        keyed = [{channel for channel, kept in snapshot(self._found(name)).items() if kept[-1]} for name in names]
+        muted = any(curve.mute for name in names for curve in curves_of(self._found(name)).values())
+        return keyed[0] == keyed[1] and not muted and not any(path not in WIDTHS for path, _ in keyed[0])
 
     @rule(who=shares, frame=frames_in, seed=seeds, partly=st.booleans())
     def insert_keys_of_any_value_anywhere(self, who, frame, seed, partly):
@@ -230,10 +238,10 @@ class Editing(Machine):
                     value = random_values(obj, path, 1, seed)[0, index]
                     fcurve.keyframe_points.insert(frame, value)
 
-        self._edit(insert, self._only_share_out_turns)
+        self._edit(insert, self._completes(frame))
 
-    @rule(who=shares, which=shares, to=frames_in, one_channel=st.booleans(), with_mode=st.booleans())
-    def move_keys(self, who, which, to, one_channel, with_mode):
+    @rule(who=shares, which=shares, to=frames_in, one_channel=st.booleans())
+    def move_keys(self, who, which, to, one_channel):
         name, to = self._named(who), to + self.shift
 
         def move() -> None:
@@ -242,7 +250,7 @@ class Editing(Machine):
             if frame is None or any(True for _ in self._keys_on(obj, to)):
                 return
             moved = []
-            for fcurve, point in list(self._keys_on(obj, frame, with_mode))[: 1 if one_channel else None]:
+            for fcurve, point in list(self._keys_on(obj, frame))[: 1 if one_channel else None]:
                 point.co_ui.x = to
                 moved.append(fcurve)
             for fcurve in moved:
@@ -263,154 +271,23 @@ class Editing(Machine):
 
         self._edit(delete)
 
-    @rule(who=shares, which=shares, at=shares, seed=seeds)
-    def change_a_value(self, who, which, at, seed):
+    @precondition(lambda self: self.on)
+    @rule(who=shares, parts=st.sets(st.integers(0, 2), min_size=1))
+    def delete_all_keys(self, who, parts):
+        """It stays where it is, as in Blender."""
         name = self._named(who)
+        if self._sharing(name) != {name}:
+            return
+        seen = {name: self._basis(self._found(name))}
 
-        def change() -> None:
-            fcurve = self._curve(self._found(name), which)
-            if fcurve is not None:
-                point = fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))]
-                point.co_ui.y = np.exp(np.random.default_rng(seed).normal())
-                fcurve.update()
-
-        self._edit(change)
-
-    @rule(
-        who=shares,
-        which=shares,
-        interpolation=st.sampled_from(INTERPOLATIONS),
-        easing=st.sampled_from(EASINGS),
-        one_channel=st.booleans(),
-        shape=st.tuples(st.floats(0.0, 3.0), st.floats(0.0, 2.0), periods),
-    )
-    def ease(self, who, which, interpolation, easing, one_channel, shape):
-        name = self._named(who)
-
-        def change() -> None:
+        def delete() -> None:
             obj = self._found(name)
-            frame = self._frame(obj, which)
-            if frame is not None:
-                for fcurve, point in list(self._keys_on(obj, frame, False))[: 1 if one_channel else None]:
-                    point.interpolation, point.easing = interpolation, easing
-                    point.back, point.amplitude, point.period = shape
-                    fcurve.update()
+            for part in sorted(parts):
+                for index in range(4):
+                    fcurve = curves_of(obj).get((transform_paths(obj)[part], index))
+                    if fcurve is not None:
+                        fcurve.keyframe_points.clear()
 
-        self._edit(change)
-
-    @rule(who=shares, which=shares, at=shares, kind=st.sampled_from(HANDLES), seed=seeds)
-    def shape_handles(self, who, which, at, kind, seed):
-        name = self._named(who)
-
-        def change() -> None:
-            fcurve = self._curve(self._found(name), which)
-            if fcurve is not None:
-                point = fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))]
-                point.interpolation = "BEZIER"
-                point.handle_left_type = point.handle_right_type = kind
-                by = np.random.default_rng(seed).normal(size=4) * (5.0, 1.0, 5.0, 1.0)
-                point.handle_left = point.co[0] - abs(by[0]), point.co[1] + by[1]
-                point.handle_right = point.co[0] + abs(by[2]), point.co[1] + by[3]
-                fcurve.update()
-
-        self._edit(change)
-
-    @rule(who=shares, which=shares, linear=st.booleans())
-    def extrapolate(self, who, which, linear):
-        name = self._named(who)
-
-        def change() -> None:
-            fcurve = self._curve(self._found(name), which)
-            if fcurve is not None:
-                fcurve.extrapolation = "LINEAR" if linear else "CONSTANT"
-                fcurve.update()
-
-        self._edit(change)
-
-    @rule(who=shares, which=shares)
-    def mute_a_channel(self, who, which):
-        name = self._named(who)
-        if len(self._sharing(name)) > 1:
-            return
-
-        def change() -> None:
-            fcurve = self._curve(self._found(name), which)
-            if fcurve is not None:
-                fcurve.mute = not fcurve.mute
-
-        self._edit(change)
-
-    @rule(who=shares, at=shares, mode=st.none() | st.sampled_from(MODE_IDS))
-    def mute_the_mode_channel_or_change_a_key_of_it(self, who, at, mode):
-        name = self._named(who)
-
-        def change() -> None:
-            fcurve = mode_channel(self._found(name))
-            if fcurve is None:
-                return
-            if mode is None:
-                fcurve.mute = not fcurve.mute
-            else:
-                fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))].co_ui.y = MODE_IDS.index(mode)
-                fcurve.update()
-
-        self._edit(change)
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares, which=st.sets(st.integers(0, 5), min_size=1), mode=st.sampled_from(MODE_IDS))
-    def set_the_mode_of_keys(self, who, which, mode):
-        name = self._named(who)
-        obj = self._found(name)
-        keys = key_frames(obj)
-        if not len(keys):
-            return
-        chosen = sorted({float(keys[number % len(keys)]) for number in which})
-        expected = [mode if frame in chosen else mode_at(obj, frame) for frame in keys]
-        transforms = {channel: kept for channel, kept in snapshot(obj).items() if channel[0] in WIDTHS}
-
-        def change() -> None:
-            animation.set_mode(self._found(name), mode, chosen)
-
-        self._edit(change)
-        obj = self._found(name)
-        assert [mode_at(obj, frame) for frame in keys] == expected == animation.modes_of(obj, keys)
-        assert {channel: kept for channel, kept in snapshot(obj).items() if channel[0] in WIDTHS} == transforms
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares, which=st.sets(st.integers(0, 5), min_size=1), turns=st.integers(-3, 3))
-    def set_the_turns_of_keys(self, who, which, turns):
-        name = self._named(who)
-        keys = key_frames(self._found(name))
-        if not len(keys):
-            return
-        chosen = sorted({float(keys[number % len(keys)]) for number in which})
-
-        def change() -> None:
-            animation.set_turns(self._found(name), turns, chosen, refused=[])
-
-        self._edit(change)
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares, mode=st.sampled_from(MODE_IDS))
-    def set_the_mode_of_all_segments(self, who, mode):
-        name = self._named(who)
-
-        def change() -> None:
-            animation.set_mode(self._found(name), mode)
-
-        self._edit(change)
-        assert {mode_at(self._found(name), frame) for frame in (1.0, 20.0)} == {mode}
-        assert self._found(name).rigid_motion.mode == mode
-
-    @rule(frame=frames_in)
-    def go_to_a_frame(self, frame):
-        frame += self.shift
-        bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
-
-    @precondition(lambda self: self.on)
-    @rule(end=st.integers(5, LAST + 20))
-    def change_the_frame_range(self, end):
-        def change() -> None:
-            bpy.context.scene.frame_end = end
-
-        self._edit(change)
+        self._edit(delete)
+        if len(parts) == 3:
+            self._assert_in_place(seen)

@@ -29,7 +29,7 @@ assert not hasattr(bpy.types.PoseBone, "rigid_motion")
 poses = lambda: [bone.matrix for name in rigs for bone in bpy.data.objects[name].evaluated_get(graph).pose.bones]
 opened_poses, played, played_poses = np.array(poses()), [], []
 for frame in np.load(found):
-    scene.frame_set(int(frame))
+    scene.frame_set(int(frame // 1), subframe=float(frame % 1))
     played.append(np.array(worlds()))
     played_poses.append(np.array(poses()))
 worlds, poses = np.swapaxes(played, 0, 1), np.swapaxes(played_poses, 0, 1)

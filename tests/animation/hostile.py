@@ -11,8 +11,10 @@ import bpy
 import numpy as np
 
 from rigid_motion import animation
-from rigid_motion.animation import MODE_IDS, channelbag_of, modes_of, problem_of, set_mode
+from rigid_motion.animation import MODE_IDS, modes_of, problem_of, set_mode
+from rigid_motion.animation.actions.marks import write_marks
 from tests.animation.keyed import WIDTHS, curves_of
+from tests.animation.modified import is_term
 from tests.animation.scenes import FRAMES, key, new_object
 from tests.blank import blank
 
@@ -25,7 +27,7 @@ NAN, INF = float("nan"), float("inf")
 LARGEST = float(np.finfo(np.float32).max)
 
 TRANSFORMS = ("location", "rotation_quaternion", "scale")
-LOCATION_Y, TURN_W, MODE = ("location", 1), ("rotation_quaternion", 0), ("rigid_motion.mode", 0)
+LOCATION_Y, TURN_W = ("location", 1), ("rotation_quaternion", 0)
 
 Damage = Callable[[bpy.types.Object], None]
 
@@ -68,7 +70,7 @@ def use(obj: bpy.types.Object) -> None:
     """What an animator does next, and what the panel asks for."""
     with soon():
         for (path, _), fcurve in curves_of(obj).items():
-            if path in ("location", "rigid_motion.mode") and len(fcurve.keyframe_points):
+            if path == "location" and len(fcurve.keyframe_points):
                 fcurve.keyframe_points[-1].select_control_point = True
                 fcurve.keyframe_points[-1].co_ui.y += 1.0
                 fcurve.update()
@@ -80,11 +82,6 @@ def use(obj: bpy.types.Object) -> None:
         assert set(modes_of(obj, np.array(FRAMES))) <= set(MODE_IDS)
         problem_of(obj)
         animation.refresh()
-
-
-def own_properties(block: bpy.types.ID) -> object:
-    """What properties of extensions are kept in, open to any value."""
-    return block.bl_system_properties_get() if bpy.app.version >= (5, 0) else block
 
 
 # Damage
@@ -117,13 +114,22 @@ def each(*damages: Damage) -> Damage:
     return damage
 
 
-def mode_key(value: float) -> Damage:
-    """A mode channel whose second key has this value."""
+def marks(*of_keys: int) -> Damage:
+    """The keys of all channels say these, of which those above the modes that there are mean nothing."""
 
     def damage(obj: bpy.types.Object) -> None:
-        fcurve = channelbag_of(obj).fcurves.new("rigid_motion.mode")
-        for frame in FRAMES[:-1]:
-            fcurve.keyframe_points.insert(frame, 1.0).interpolation = "CONSTANT"
-        numbers(MODE, "co.y", value, 1)(obj)
+        for fcurve in curves_of(obj).values():
+            write_marks(fcurve, np.array(of_keys))
+
+    return damage
+
+
+def terms(change: Callable[[bpy.types.FCurve, bpy.types.FModifierGenerator], None]) -> Damage:
+    """The terms of all channels are changed, one after the other."""
+
+    def damage(obj: bpy.types.Object) -> None:
+        for fcurve in curves_of(obj).values():
+            for modifier in [item for item in fcurve.modifiers if is_term(item)]:
+                change(fcurve, modifier)
 
     return damage

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from rigid_motion.motion import KEYFRAME_MODES
+from tests.animation.modified import is_term
 
 Carrier = bpy.types.Object | bpy.types.PoseBone
 """What has location, rotation and scale. Pose bones have no delta transforms of their own."""
 
 MODE_IDS = ("BLENDER", *KEYFRAME_MODES)
-WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
-KEY_FIELDS = (
-    *("interpolation", "easing", "back", "amplitude", "period", "type"),
-    *("handle_left_type", "handle_right_type"),
-)
+BY_NUMBER = {0: "BLENDER", **{mode.number: name for name, mode in KEYFRAME_MODES.items()}}
+WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, "scale": 3}
+KEY_FIELDS = "interpolation", "easing", "period", "type", "handle_left_type", "handle_right_type"
+MARKED_FIELDS = "back", "amplitude"
+"""In the lowest six bits of these keys say their modes: in the former 16 more than a number, in the latter 42."""
 
 
 def curves_of(carrier: Carrier) -> dict[tuple[str, int], bpy.types.FCurve]:
@@ -45,7 +48,9 @@ def _prefix(carrier: Carrier) -> str:
 
 
 def rotation_path(obj: Carrier) -> str:
-    return "rotation_quaternion" if obj.rotation_mode == "QUATERNION" else "rotation_euler"
+    return {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}.get(
+        obj.rotation_mode, "rotation_euler"
+    )
 
 
 def transform_paths(obj: Carrier) -> tuple[str, str, str]:
@@ -53,35 +58,78 @@ def transform_paths(obj: Carrier) -> tuple[str, str, str]:
 
 
 def snapshot(obj: Carrier) -> dict[tuple[str, int], tuple]:
-    """All that the animator keyed, to the last handle: every channel but the in-betweens."""
+    """All that the animator keyed, to the last handle, and no modes: every channel without its in-betweens."""
     return {
         name: (
             fcurve.extrapolation,
             fcurve.mute,
-            tuple((modifier.type, modifier.mute) for modifier in fcurve.modifiers),
+            tuple((modifier.type, modifier.mute) for modifier in fcurve.modifiers if not is_term(modifier)),
             tuple(
-                (*key.co, *key.handle_left, *key.handle_right, *(getattr(key, field) for field in KEY_FIELDS))
+                (
+                    *(*key.co, *key.handle_left, *key.handle_right),
+                    *(getattr(key, field) for field in KEY_FIELDS),
+                    *(_bits(key, field) & ~63 for field in MARKED_FIELDS),
+                )
                 for key in fcurve.keyframe_points
             ),
         )
         for name, fcurve in curves_of(obj).items()
-        if not name[0].startswith("delta_") and 'constraints["Rigid Motion' not in name[0]
     }
 
 
-def key_frames(obj: Carrier) -> np.ndarray:
-    """Where any transform channel has a key; keys less than a hundredth of a frame apart are one."""
-    curves = (curve_of(obj, path, index) for path in transform_paths(obj) for index in range(WIDTHS[path]))
-    frames = sorted({key.co[0] for curve in curves if curve and not curve.mute for key in curve.keyframe_points})
+def _bits(key: bpy.types.Keyframe, field: str) -> int:
+    return int(np.float32(getattr(key, field)).view(np.int32))
+
+
+def mark_of(key: bpy.types.Keyframe) -> int:
+    """The number of the mode that a key says it has, from 1 on, or 0."""
+    back, amplitude = (_bits(key, field) & 63 for field in MARKED_FIELDS)
+    return back - 16 if amplitude == 42 and 16 < back < 32 else 0
+
+
+def moving_curves(obj: Carrier) -> list[bpy.types.FCurve]:
+    """The F-curves with keys of its location, rotation and scale, in this order."""
+    return [curve for path in transform_paths(obj) for curve in moving_in(obj, path).values()]
+
+
+def moving_in(obj: Carrier, path: str) -> dict[int, bpy.types.FCurve]:
+    """Those of one property by index, none that are muted; a rotation or scale with one of these is left alone."""
+    curves = {index: curve_of(obj, path, index) for index in range(WIDTHS[path])}
+    if path != "location" and muted_in(obj, path):
+        return {}
+    return {index: c for index, c in curves.items() if c is not None and len(c.keyframe_points) and not c.mute}
+
+
+def muted_in(obj: Carrier, path: str) -> list[int]:
+    """The indices of the channels of a property that are muted."""
+    curves = ((index, curve_of(obj, path, index)) for index in range(WIDTHS[path]))
+    return [index for index, curve in curves if curve is not None and curve.mute]
+
+
+def distinct(frames: Iterable[float]) -> np.ndarray:
+    """Frames of keys, rising; those less than a hundredth of a frame apart are one."""
+    frames = sorted(set(frames))
     return np.array([frame for i, frame in enumerate(frames) if i == 0 or frame - frames[i - 1] > 0.01])
 
 
+def key_frames(obj: Carrier) -> np.ndarray:
+    """Where any transform channel has a key."""
+    return distinct(key.co[0] for curve in moving_curves(obj) for key in curve.keyframe_points)
+
+
 def mode_at(obj: Carrier, frame: float) -> str:
-    """The mode of the segment that begins on this frame."""
-    fcurve = curve_of(obj, "rigid_motion.mode")
-    if fcurve is None or fcurve.mute or not len(fcurve.keyframe_points):
-        return obj.rigid_motion.mode
-    return MODE_IDS[round(fcurve.evaluate(frame + 0.002))]
+    """The mode of the segment that begins on this frame: what the last key says that says any, or else the first."""
+    said = [
+        (key.co[0], -number, mark)
+        for number, curve in enumerate(moving_curves(obj))
+        for key in curve.keyframe_points
+        if (mark := mark_of(key))
+    ]
+    if not said:
+        return "BLENDER"
+    # On one frame the channel that comes first has it.
+    *_, mark = max((key for key in said if key[0] < frame + 0.005), default=min(said))
+    return BY_NUMBER[mark - 1]
 
 
 def turns_at(obj: Carrier, first: float) -> float:

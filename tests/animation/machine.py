@@ -1,4 +1,4 @@
-"""What a machine of edits does around them: undo steps, files, the extension on and off."""
+"""What a machine of edits does around them: undo steps, files, the extension on and off; and what always holds."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from rigid_motion import animation
 from tests.animation.edit_steps import LAST, Complaints, Edit, shares
-from tests.animation.keyed import WIDTHS, Carrier, curves_of, key_frames, snapshot
+from tests.animation.keyed import Carrier, curves_of, key_frames, mode_at, moving_curves, snapshot
+from tests.animation.modified import is_term
 from tests.animation.oracle import Own
 from tests.blank import blank
 
@@ -25,12 +26,18 @@ Name = Hashable
 
 def goes_on(obj: Carrier) -> bool:
     """Whether any of its channels goes on at its slope outside of its keys."""
-    curves = curves_of(obj).items()
-    return any(
-        fcurve.extrapolation == "LINEAR"
-        for (path, _), fcurve in curves
-        if path in WIDTHS and len(fcurve.keyframe_points) and not fcurve.mute
-    )
+    return any(fcurve.extrapolation == "LINEAR" for fcurve in moving_curves(obj))
+
+
+def assert_keys_kept(name: Name, made: dict, after: dict) -> None:
+    """No key was changed. Channels without keys may be gone; and components that a mode needs have a first one."""
+    for channel, kept in after.items():
+        if made.get(channel, (0, 0, 0, ()))[-1]:
+            assert kept == made[channel], f"the keys of {name}, {channel}, are\n{kept}\ninstead of\n{made[channel]}"
+        elif kept[-1]:
+            assert len(kept[-1]) == 1
+            assert any(path in (channel[0], "rigid_motion.turns") and keys[-1] for (path, _), keys in made.items())
+    assert not any(kept[-1] for channel, kept in made.items() if channel not in after)
 
 
 class Machine(RuleBasedStateMachine):
@@ -55,6 +62,9 @@ class Machine(RuleBasedStateMachine):
         self.before_bake: dict[Name, dict] = {}
         self.history: list[tuple[dict, dict]] = []
         self.place = -1
+        self.steps = 0
+        self.playing: dict[Name, np.ndarray] | None = None
+        """What played when the extension was switched off, until something is edited."""
 
     def teardown(self) -> None:
         if self.on:
@@ -113,6 +123,7 @@ class Machine(RuleBasedStateMachine):
 
     def _edit(self, change: Callable[[], None], settle: Callable[[dict, dict], None] | None = None) -> None:
         """Do it, and let the handlers see it: they leave keys as the edit made them, unless `settle` says otherwise."""
+        self.playing = None
         made: dict[str, dict] = {}
 
         def noted() -> None:
@@ -124,7 +135,7 @@ class Machine(RuleBasedStateMachine):
         after = self._keyed()
         if settle is None:
             for name in self.names:
-                assert after[name] == made[name], f"the keys of {name} were changed"
+                assert_keys_kept(name, made[name], after[name])
         else:
             settle(made, after)
         if self.on:
@@ -182,30 +193,63 @@ class Machine(RuleBasedStateMachine):
     @rule()
     def switch_the_extension_off(self):
         animation.unregister()
-        self.on = False
+        self.on, self.playing = False, self._play()
+
+    def _play(self) -> dict[Name, np.ndarray]:
+        """How all is shown on some frames."""
+        scene = bpy.context.scene
+        before, played = (scene.frame_current, scene.frame_subframe), {name: [] for name in self.names}
+        for frame in np.arange(self.shift, self.shift + LAST, 5.375):
+            scene.frame_set(int(frame // 1), subframe=frame % 1)
+            for name in self.names:
+                played[name].append(self._basis(self._found(name)))
+        scene.frame_set(before[0], subframe=before[1])
+        return {name: np.array(bases) for name, bases in played.items()}
 
     @precondition(lambda self: not self.on)
     @rule()
     def switch_the_extension_on(self):
+        if self.playing is not None:
+            # Without the extension all plays as it did with it.
+            played = self._play()
+            for name, then in self.playing.items():
+                assert np.abs(played[name] - then).max() < 1e-6 * max(1.0, np.abs(then).max())
         keyed = self._keyed()
         animation.register()
         bpy.context.view_layer.update()
         bpy.context.scene.frame_set(bpy.context.scene.frame_current)
         self.on = True
-        assert self._keyed() == keyed
+        for name, after in self._keyed().items():
+            assert_keys_kept(name, keyed[name], after)
         self._start_history()
 
-    def _frames_that_are_seen(self, objects: list[Carrier]) -> range:
-        """Where curves go on outside of their keys, in-betweens do so from there to the frame range of the scene."""
-        first, last = int(self.shift) - 1, int(self.shift) + LAST + 5
+    def _frames_that_are_seen(self, objects: list[Carrier]) -> np.ndarray:
+        """Some eighths of frames, and those of keys, as far as in-betweens are there: before and behind the keys of
+        curves that go on, within the frame range of the scene.
+        """
+        first, last, keys = self.shift - 1.0, self.shift + LAST + 5.0, np.concatenate([key_frames(o) for o in objects])
         for obj in filter(goes_on, objects):
-            keys = key_frames(obj)
-            first = max(first, min(bpy.context.scene.frame_start, int(np.floor(keys[0]))))
-            last = min(last, max(bpy.context.scene.frame_end, int(np.ceil(keys[-1]))))
-        return range(first, last + 1)
+            own = key_frames(obj)
+            first = max(first, min(bpy.context.scene.frame_start, own[0]))
+            last = min(last, max(bpy.context.scene.frame_end, own[-1]))
+        self.steps += 1
+        random = np.random.default_rng(self.steps)
+        eighths = np.round(8.0 * random.uniform(first, last, 14)) / 8.0
+        frames = np.concatenate((eighths, np.floor(eighths[:5]), random.permutation(keys)[:5]))
+        return np.unique(frames[(frames >= first) & (frames <= last)])
 
     # What holds all the time
 
     @invariant()
     def nothing_failed_in_a_handler(self):
         assert self.complaints.found == []
+
+    @precondition(lambda self: self.on and self.history)
+    @invariant()
+    def nothing_is_wrong_and_nothing_is_left(self):
+        for name in self.names:
+            carrier = self._found(name)
+            assert animation.problem_of(carrier) == ""
+            if {mode_at(carrier, frame) for frame in key_frames(carrier)} <= {"BLENDER"}:
+                terms = [term for fcurve in curves_of(carrier).values() for term in fcurve.modifiers if is_term(term)]
+                assert terms == [], f"{name} has terms without a mode"

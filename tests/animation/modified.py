@@ -8,36 +8,64 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-STEPPED = ("frame_step", "frame_offset", "use_frame_start", "frame_start", "use_frame_end", "frame_end")
-"""The settings of a Stepped modifier."""
-
 FCurves = Sequence[bpy.types.FCurve]
 
 
 def acting(fcurves: Iterable[bpy.types.FCurve]) -> list[bpy.types.FModifier]:
-    """The modifiers of these that are not muted, without Cycles."""
+    """The animator's modifiers of these that are not muted, without Cycles."""
     return [
         modifier
         for fcurve in fcurves
         for modifier in fcurve.modifiers
-        if modifier.type != "CYCLES" and not modifier.mute
+        if modifier.type != "CYCLES" and not modifier.mute and not is_term(modifier)
     ]
 
 
-def led_to(settings: Iterable[dict[str, object]], frames: Sequence[float]) -> np.ndarray:
-    """The frames that Blender shows with Stepped modifiers of these settings, first to last."""
-    action = bpy.data.actions.new("Frames")
+def is_term(modifier: bpy.types.FModifier) -> bool:
+    """Whether a modifier is what the extension adds: a product with a factor that is constant, in a range."""
+    if modifier.type != "GENERATOR" or modifier.mode != "POLYNOMIAL_FACTORISED":
+        return False
+    return modifier.use_additive and modifier.use_restricted_range and modifier.coefficients[-2] == 0.0
+
+
+def copy_modifier(modifier: bpy.types.FModifier, fcurve: bpy.types.FCurve) -> None:
+    """Add one like it to an F-curve."""
+    copy = fcurve.modifiers.new(modifier.type)
+    props = {prop.identifier: prop for prop in modifier.bl_rna.properties}
+    # Some of them are others' limits.
+    for name in sorted(props, key=lambda name: (name not in ("mode", "poly_order"), "end" in name)):
+        if not props[name].is_readonly and props[name].type not in ("POINTER", "COLLECTION"):
+            value = getattr(modifier, name)
+            setattr(copy, name, tuple(value) if getattr(props[name], "is_array", False) else value)
+
+
+@contextmanager
+def _spare(points: Iterable[tuple[float, float]], modifiers: Iterable[bpy.types.FModifier]) -> Iterator:
+    """An F-curve of an Action that nothing uses, with linear keys and copies of modifiers."""
+    action = bpy.data.actions.new("Spare")
     strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
-    fcurve = strip.channelbag(action.slots.new("OBJECT", "Frames"), ensure=True).fcurves.new("location")
-    for frame in (-1024.0, 1024.0):
-        fcurve.keyframe_points.insert(frame, frame).interpolation = "LINEAR"
-    for setting in settings:
-        modifier = fcurve.modifiers.new("STEPPED")
-        for name, value in setting.items():
-            setattr(modifier, name, value)
-    result = np.array([fcurve.evaluate(frame) for frame in frames])
-    bpy.data.actions.remove(action)
-    return np.round(result, 3)
+    fcurve = strip.channelbag(action.slots.new("OBJECT", "Spare"), ensure=True).fcurves.new("location")
+    for frame, value in points:
+        fcurve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
+    for modifier in modifiers:
+        copy_modifier(modifier, fcurve)
+    try:
+        yield fcurve
+    finally:
+        bpy.data.actions.remove(action)
+
+
+def led_to(modifiers: Iterable[bpy.types.FModifier], frames: Sequence[float]) -> np.ndarray:
+    """The frames that Blender shows with these Stepped modifiers."""
+    with _spare(((-1024.0, -1024.0), (1024.0, 1024.0)), modifiers) as fcurve:
+        return np.round([fcurve.evaluate(frame) for frame in frames], 3)
+
+
+def modified(fcurve: bpy.types.FCurve, held: np.ndarray, values: np.ndarray, frames: Sequence[float]) -> np.ndarray:
+    """What the animator's modifiers of an F-curve make of it on frames, which has these values where it is held."""
+    times, first = np.unique(held, return_index=True)
+    with _spare(zip(times, values[first], strict=True), acting([fcurve])) as spare:
+        return np.array([spare.evaluate(frame) for frame in frames])
 
 
 def held_frames(fcurves: FCurves, frames: Sequence[float]) -> np.ndarray:
@@ -45,18 +73,22 @@ def held_frames(fcurves: FCurves, frames: Sequence[float]) -> np.ndarray:
     for fcurve in fcurves:
         stepped = [item for item in acting([fcurve]) if item.type == "STEPPED"]
         if stepped and len(fcurve.keyframe_points) > 1:
-            return led_to([{name: getattr(item, name) for name in STEPPED} for item in stepped], frames)
+            return led_to(stepped, frames)
     return np.asarray(frames)
 
 
 @contextmanager
-def without_modifiers(fcurves: FCurves) -> Iterator[None]:
-    """Modifiers but for Cycles are muted meanwhile; nothing is evaluated."""
-    result = acting(fcurves)
-    for item in result:
-        item.mute = True
+def without_modifiers(fcurves: FCurves, *, ours: bool = False) -> Iterator[None]:
+    """Modifiers but for Cycles are muted meanwhile, or our terms alone; nothing is evaluated."""
+    before = []
+    for fcurve in fcurves:
+        muted = np.zeros(len(fcurve.modifiers), bool)
+        fcurve.modifiers.foreach_get("mute", muted)
+        before.append((fcurve, muted))
+        meant = [is_term(item) if ours else item.type != "CYCLES" for item in fcurve.modifiers]
+        fcurve.modifiers.foreach_set("mute", muted | np.array(meant, bool))
     try:
         yield
     finally:
-        for item in result:
-            item.mute = False
+        for fcurve, muted in before:
+            fcurve.modifiers.foreach_set("mute", muted)

@@ -12,7 +12,7 @@ from rigid_motion.motion import Poses, twists
 from rigid_motion.motion.quaternions import multiply, rotate
 
 if TYPE_CHECKING:
-    from tests.animation.oracle import Path
+    from tests.animation.body_oracle import Path
 
 
 DEPENDS_ON_KEYS = {"pga_lerp", "cga_lerp", "motor_spline"}
@@ -26,9 +26,9 @@ def lies_on_path(curves: list[bpy.types.FCurve], frame: float, mode: str) -> boo
     return mode in DEPENDS_ON_KEYS and not repeats and types == {"BREAKDOWN"}
 
 
-def beside_path(path: Path, ends: Poses, share: np.ndarray) -> Poses:
+def beside_path(path: Path, frames: np.ndarray, share: np.ndarray) -> Poses:
     """The poses between two keys (2,) of which at least one is a breakdown: along the path, and as far off as they."""
-    places, offs = _beside(path, ends)
+    places, offs = _beside(path, frames)
     (first, second), growths = offs[:, :6], offs[:, 6]
     poses = path.poses(places[0] + (places[1] - places[0]) * share)
     blend = np.clip(share, 0.0, 1.0)
@@ -43,15 +43,18 @@ def beside_path(path: Path, ends: Poses, share: np.ndarray) -> Poses:
     return poses
 
 
-def goes_beside(path: Path, ends: Poses) -> bool:
+def goes_beside(path: Path, frames: np.ndarray) -> bool:
     """Whether any of these keys (2,) is off the path, and not by rounding alone."""
-    return bool(np.abs(_beside(path, ends)[1]).max() > 1e-4)
+    return bool(np.abs(_beside(path, frames)[1]).max() > 1e-4)
 
 
-def _beside(path: Path, ends: Poses) -> tuple[list[float], np.ndarray]:
+def _beside(path: Path, frames: np.ndarray) -> tuple[list[float], np.ndarray]:
     """How far along the path the poses are that are nearest to keys (2,), and how far these are off it, (2, 7)."""
-    places = [_nearest(path, ends[number : number + 1]) for number in (0, 1)]
-    return places, _off(path.poses(np.array(places)), ends)
+    places = []
+    for frame in frames[:, None]:
+        along = path.shared_with_key(frame[0])
+        places.append(_nearest(along, along.body.key_poses(frame)))
+    return places, _off(path.poses(np.array(places)), path.body.key_poses(frames))
 
 
 def _nearest(path: Path, key: Poses) -> float:

@@ -10,8 +10,9 @@ import addon_utils
 import bpy
 import numpy as np
 
-from rigid_motion.animation import write_channel
-from tests.animation.keyed import WIDTHS, rotation_path
+from rigid_motion.animation import key_frames, set_mode, write_channel
+from rigid_motion.animation.actions.channels import replace_keys
+from tests.animation.keyed import WIDTHS, Carrier, curves_of, rotation_path
 from tests.animation.oracle import Own, as_quaternion, unit
 
 FRAMES = (1.0, 11.0, 24.0, 40.0)
@@ -51,6 +52,18 @@ def key(
     return obj
 
 
+def key_densely(obj: Carrier) -> None:
+    """Give an object or a bone linear keys on all eighths of frames instead, of what channels have; and no modes."""
+    curves = list(curves_of(obj).values())
+    first, last = curves[0].range()
+    frames = np.arange(first, last + 0.125, 0.125)
+    shown = [[fcurve.evaluate(frame) for frame in frames] for fcurve in curves]
+    set_mode(obj, "BLENDER", key_frames(obj))
+    for fcurve, values in zip(curves, shown, strict=True):
+        replace_keys(fcurve, frames, np.array(values))
+        assert not fcurve.modifiers
+
+
 def give_own_deltas(obj: bpy.types.Object, seed: int = 0) -> Own:
     """Delta transforms of the object's own, at random."""
     random = np.random.default_rng(seed)
@@ -65,6 +78,8 @@ def own_deltas(obj: bpy.types.Object) -> Own:
     """What an object without in-betweens has for delta transforms."""
     if obj.rotation_mode == "QUATERNION":
         turned = unit(obj.delta_rotation_quaternion)
+    elif obj.rotation_mode == "AXIS_ANGLE":
+        turned = (1.0, 0.0, 0.0, 0.0)
     else:
         turned = as_quaternion(obj.delta_rotation_euler, obj.rotation_mode)
     return Own(tuple(obj.delta_location), turned, tuple(obj.delta_scale))

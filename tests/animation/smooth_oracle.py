@@ -12,9 +12,18 @@ from tests.animation.spin_oracle import Spin
 
 
 def with_tangents(
-    times: np.ndarray, keys: Poses, segment: int, u: np.ndarray, tangents: tuple[float, float], spins: Sequence[Spin]
+    times: np.ndarray,
+    keys: Poses,
+    segment: int,
+    u: np.ndarray,
+    tangents: tuple[float, float],
+    spins: Sequence[Spin],
+    rests: Sequence[bool],
 ) -> Poses:
-    """The segment between keys whose tangents are so many times as long as those of the mode, without its own spin."""
+    """The segment between keys whose tangents are so many times as long as those of the mode, without its own spin.
+
+    Keys at which the body rests have none.
+    """
     screws = twists.between(keys.positions[:-1], keys.quaternions[:-1], keys.positions[1:], keys.quaternions[1:])
     growths = np.zeros(len(times) - 1) if keys.scales is None else np.diff(np.log(keys.scales))
     durations = np.diff(times)
@@ -24,12 +33,11 @@ def with_tangents(
         for at in (slice(None, -1), slice(1, None))
     )
     bends = []
-    for key, tangent in zip((segment, segment + 1), tangents, strict=True):
+    for key, tangent, is_at_rest in zip((segment, segment + 1), tangents, rests, strict=True):
         if 0 < key < len(durations):
             part = share_of(*durations[key - 1 : key + 1])
-            rests = not (arriving[key - 1].any() and leaving[key].any())
             rate = part * arriving[key - 1] / durations[key - 1] + (1.0 - part) * leaving[key] / durations[key]
-            rate = 0.0 * rate if rests else rate
+            rate = 0.0 * rate if is_at_rest else rate
         else:
             rate = (leaving if key == segment else arriving)[segment] / durations[segment]
         bends.append(tangent * durations[segment] * rate - (leaving if key == segment else arriving)[segment])

@@ -44,10 +44,23 @@ def shortest(first: Sequence[float], second: Sequence[float]) -> np.ndarray:
     return np.array(xyz) * (2.0 * np.arctan2(length, abs(w)) / max(length, 1e-12))
 
 
+def about_one_axis(first: Sequence[float], second: Sequence[float]) -> float:
+    """By how much an angle about an axis (4,) changes to another one, 0 where the axes are not parallel."""
+    lengths = np.linalg.norm(first[1:]) * np.linalg.norm(second[1:])
+    dot = float(np.dot(first[1:], second[1:]))
+    is_parallel = lengths > 0.0 and abs(dot) >= (1.0 - 1e-6) * lengths
+    return float(np.sign(dot) * second[0] - first[0]) if is_parallel else 0.0
+
+
 def _axis_of_angles(
     angles: np.ndarray, order: str, quaternions: np.ndarray, own: Sequence[float]
 ) -> tuple[float, Vector, bool]:
-    """How far that of two sets of Euler angles (2, 3) goes which goes furthest; its axis, and whether in space."""
+    """How far that of two sets of Euler angles (2, 3) goes which goes furthest; its axis, and whether in space.
+
+    Or of angles about axes (2, 4).
+    """
+    if order == "AXIS_ANGLE":
+        return about_one_axis(*angles), Vector(angles[0, 1:]).normalized(), False
     change = angles[1] - angles[0]
     which = int(np.argmax(np.abs(change)))
     in_space, in_body = [], []
@@ -83,8 +96,8 @@ def spin_and_end(
 ) -> tuple[Spin, np.ndarray]:
     """The spin between two quaternions (2, 4), and where the body turns to without it, (4,).
 
-    With the turns that Euler angles (2, 3) say, and those of the channel on top; what is not whole of these is a part
-    of the rotation, unless `whole` turns are wanted.
+    With the turns that Euler angles (2, 3), or angles and axes (2, 4), say, and those of the channel on top; what is
+    not whole of these is a part of the rotation, unless `whole` turns are wanted.
     """
     first, second = quaternions
     part = 0.0 if abs(turns - round(turns)) < 1e-5 else turns - round(turns)

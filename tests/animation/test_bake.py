@@ -6,12 +6,11 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import bake, bake_poses, read_poses, set_mode
+from rigid_motion.animation import bake, bake_poses, read_poses, set_mode, unbake
 from rigid_motion.motion import Poses, interpolate
-from rigid_motion.motion.eulers import ORDERS
 from rigid_motion.motion.quaternions import angle_between
-from tests.animation.keyed import curves_of
-from tests.animation.oracle import assert_shown, expected_worlds, shown_worlds
+from tests.animation.keyed import curves_of, rotation_path, snapshot
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import FRAMES, key, new_object
 
 
@@ -56,25 +55,15 @@ def test_a_shared_action_keeps_what_others_have_in_it(empty):
     assert_read_back(other, frames, still)
 
 
-def test_an_object_that_turns_by_axis_and_angle_is_refused_untouched(empty):
-    empty.rotation_mode = "AXIS_ANGLE"
-    with pytest.raises(ValueError, match="Tool turns by axis and angle"):
-        bake_poses(empty, *motion())
-    assert empty.animation_data is None
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_a_part_is_baked_where_its_angles_are_not_all_keyed_outside_of_it(live_file, order):
-    for seed in range(10):
-        obj = key(new_object(f"Tool {seed}", order), seed=seed)
-        for frame, index in ((-5.0, 1), (50.0, 2)):
-            curves_of(obj)["rotation_euler", index].keyframe_points.insert(frame, 3.0)
-        set_mode(obj, "dq_sclerp")
-        frames = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
-        assert_shown([obj], frames)
-        expected = expected_worlds(obj, frames)
-        assert bake(obj, first=frames[0], last=frames[-1]) == (frames[0], frames[-1])
-        assert np.abs(shown_worlds([obj], frames)[0] - expected).max() < 1e-5 * np.abs(expected).max()
+@pytest.mark.parametrize("order", ["QUATERNION", "AXIS_ANGLE", "XZY"])
+def test_poses_are_shown_however_an_object_turns_and_between_frames_it_goes_no_other_way(empty, order):
+    empty.rotation_mode = order
+    frames, poses = motion(200)
+    bake_poses(empty, frames, poses)
+    assert_read_back(empty, frames, poses)
+    steps = angle_between(poses.quaternions[1:], poses.quaternions[:-1])
+    between = read_poses(empty, frames[:-1] + 0.5).quaternions
+    assert np.all(angle_between(between, poses.quaternions[:-1]) < steps + 1e-3)
 
 
 def test_delta_scales_that_cancel_out_leave_the_scale_to_blender(live_file):
@@ -90,22 +79,53 @@ def test_delta_scales_that_cancel_out_leave_the_scale_to_blender(live_file):
         assert np.isfinite([point.co.y for point in points]).all()
 
 
-@pytest.mark.parametrize(
-    ("modes", "options", "baked"),
-    [
-        ({1: "motor_spline"}, {"last": 12}, (1.0, 41.0)),
-        ({1: "motor_spline"}, {"first": 30}, (1.0, 41.0)),
-        ({1: "motor_spline", 31: "dq_sclerp"}, {"last": 12}, (1.0, 31.0)),
-        ({1: "dq_sclerp", 11: "motor_spline"}, {"last": 5}, (1.0, 41.0)),
-        ({1: "dq_sclerp", 11: "pga_lerp", 31: "motor_spline"}, {"last": 5}, (1.0, 11.0)),
+def give_cycles(obj: bpy.types.Object, mode: str) -> None:
+    for (path, _), fcurve in curves_of(obj).items():
+        keys = fcurve.keyframe_points
+        if mode == "REPEAT_OFFSET" and path != "location":
+            keys[-1].co_ui.y = keys[0].co.y
+        cycles = fcurve.modifiers.new("CYCLES")
+        cycles.mode_before = cycles.mode_after = mode
+
+
+def give_to_location(obj: bpy.types.Object, kind: str, **settings: float) -> None:
+    for index in range(3):
+        modifier = curves_of(obj)["location", index].modifiers.new(kind)
+        for name, value in settings.items():
+            setattr(modifier, name, value)
+
+
+BESIDE_KEYS = {
+    "nothing": lambda obj: None,
+    "noise": lambda obj: give_to_location(obj, "NOISE", scale=3.0),
+    "holds": lambda obj: give_to_location(obj, "STEPPED", frame_step=4.0, frame_offset=2.0),
+    "cycles": lambda obj: give_cycles(obj, "REPEAT"),
+    "cycles that go on": lambda obj: give_cycles(obj, "REPEAT_OFFSET"),
+    "mirrored cycles": lambda obj: give_cycles(obj, "MIRROR"),
+    "cycles with limits": lambda obj: (give_cycles(obj, "REPEAT"), give_to_location(obj, "LIMITS", use_max_x=True)),
+    "a slope": lambda obj: [setattr(fcurve, "extrapolation", "LINEAR") for fcurve in curves_of(obj).values()],
+    "an angle on another frame": lambda obj: curves_of(obj)[rotation_path(obj), 1].keyframe_points.insert(50.0, 3.0),
+    "location on other frames": lambda obj: [
+        curves_of(obj)["location", index].keyframe_points.insert(17.0, 2.0) for index in range(3)
     ],
-    ids=str,
-)
-def test_what_a_smooth_mode_hangs_together_with_is_baked_as_a_whole(live_file, modes, options, baked):
-    frames = np.arange(1.0, 42.0)
-    obj = key(new_object(), frames[::10], interpolation="LINEAR")
-    for frame, mode in modes.items():
-        set_mode(obj, mode, [one for one in frames[::10] if one >= frame])
-    before = read_poses(obj, frames)
-    assert bake(obj, **options) == baked
-    assert_read_back(obj, frames, before)
+}
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "XYZ", "AXIS_ANGLE"])
+@pytest.mark.parametrize("beside", BESIDE_KEYS)
+def test_baked_keys_are_shown_as_before_whatever_there_is_beside_keys(live_file, beside, order):
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 70
+    obj = key(new_object(rotation_mode=order), seed=len(beside), scale="even")
+    BESIDE_KEYS[beside](obj)
+    set_mode(obj, "pga_slerp", FRAMES[:2])
+    set_mode(obj, "dq_sclerp", FRAMES[2:3])
+    frames = np.arange(0.0, 71.0)
+    if beside == "noise":  # Outside of the keys it goes on.
+        frames = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
+    (before,), keys = shown_worlds([obj], frames), snapshot(obj)
+    bake(obj)
+    bpy.context.view_layer.update()
+    assert np.abs(shown_worlds([obj], frames)[0] - before).max() < 2e-5 * np.abs(before).max()
+    unbake(obj)
+    assert snapshot(obj) == keys
+    assert len(bpy.data.actions) == 1

@@ -38,7 +38,7 @@ def on_path(keys: Poses, mode: str, factor: float, times=FRAMES) -> Poses:
     return interpolate((0.0, 1.0), keys[1:3], np.array([factor]), mode, extrapolate=True)
 
 
-@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ["QUATERNION", "YZX"]))
+@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ["QUATERNION", "YZX", "AXIS_ANGLE"]))
 @pytest.mark.parametrize("scale", [None, "even"])
 def test_a_breakdown_is_on_the_path_of_the_mode(live_file, mode, order, scale):
     obj = new_object(rotation_mode=order)
@@ -97,7 +97,8 @@ def test_another_factor_and_cancelling_leave_nothing_behind(live_file):
     assert snapshot(obj) == before
     assert tuple(obj.location) == (7.0, 8.0, 9.0)
     np.testing.assert_allclose(world_now("Again"), seen, atol=1e-6)
-    assert np.abs(shown_worlds([obj], np.arange(1.0, 41.0))[0] - played).max() == 0.0
+    # Terms are the same, but summed in another order.
+    np.testing.assert_allclose(shown_worlds([obj], np.arange(1.0, 41.0))[0], played, rtol=0, atol=2e-6)
 
 
 @pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline", "pga_lerp", "lerp_slerp"])
@@ -138,13 +139,13 @@ def test_what_cannot_be_keyed_is_refused_and_the_others_are_keyed(live_file):
     for obj in (good, bad):
         key(obj)
         set_mode(obj, "dq_sclerp")
-    bad.rotation_mode = "AXIS_ANGLE"
+    curves_of(bad)["location", 1].modifiers.new("ENVELOPE")
     bpy.context.scene.frame_set(int(NOW))
     refused: list[Refused] = []
     breakdown([good, bad, idle], 0.5, refused=refused)
     assert NOW in key_frames(good).tolist()
     assert NOW not in key_frames(bad).tolist()
-    assert sorted(str(item).split(" ")[0] for item in refused) == ["Bad", "Idle"]
+    assert sorted(str(item)[:4] for item in refused) == ["Bad:", "Idle"]
 
 
 def test_a_breakdown_below_a_hold_is_that_of_the_keys(live_file):

@@ -8,39 +8,48 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import key_frames, modes_of, problem_of, read_poses, set_mode
-from tests.animation.keyed import curves_of
+from tests.animation.keyed import curves_of, snapshot
 from tests.animation.oracle import assert_shown
 from tests.animation.scenes import FRAMES, key, new_object
 
 PLAYED = np.arange(-2.0, 44.0)
 
 
-@pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
-def test_an_action_that_goes_on_outside_of_its_keys_is_no_longer_for_it(live_file, interpolation):
-    live_file.scene.frame_end = 250
-    obj = key(new_object(), (1.0, 50.0, 100.0), interpolation=interpolation)
+@pytest.mark.parametrize("kind", ["LINK_COPY", "FULL_COPY"])
+def test_linear_extrapolation_goes_on_to_where_a_scene_ends_that_was_made_anew(live_file, kind):
+    obj = key(new_object(), (5.0, 11.0, 30.0), interpolation="LINEAR")
+    action = obj.animation_data.action
+    live_file.scene.frame_start, live_file.scene.frame_end = 0, 45
     for fcurve in curves_of(obj).values():
         fcurve.extrapolation = "LINEAR"
     set_mode(obj, "dq_sclerp")
-    action, slot = obj.animation_data.action, obj.animation_data.action_slot
-    assert tuple(action.frame_range) == (1.0, 100.0)
-    assert_shown([obj], np.arange(1.0, 251.0))
-    obj.animation_data.action = None
-    strip = obj.animation_data.nla_tracks.new().strips.new("Strip", 1, action)
-    strip.action_slot = slot
-    assert (strip.frame_start, strip.frame_end) == (1.0, 100.0)
-    set_mode(obj, "BLENDER")
-    assert not action.use_frame_range
+    assert tuple(action.frame_range) == (5.0, 30.0), "an Action that goes on is no longer for it"
+    assert_shown([obj], np.arange(46.0))
+    bpy.ops.scene.new(type=kind)
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_end = 70
+    bpy.context.view_layer.update()
+    assert_shown(bpy.context.scene.objects, np.arange(71.0))
 
 
-def test_a_frame_range_that_the_animator_has_set_stays(live_file):
-    obj = key(new_object(), (-10.0, 5.0, 20.0))
-    action = obj.animation_data.action
-    action.use_frame_range, action.frame_start, action.frame_end = True, -3.0, 9.0
-    set_mode(obj, "dq_sclerp")
-    assert_shown([obj], np.arange(-12.0, 23.0))
-    set_mode(obj, "BLENDER")
-    assert (action.use_frame_range, action.frame_start, action.frame_end) == (True, -3.0, 9.0)
+def test_three_slots_of_one_action_have_modes_and_keys_of_their_own(live_file):
+    objects = [new_object(name, order) for name, order in (("A", "QUATERNION"), ("B", "XYZ"), ("C", "ZYX"))]
+    action = bpy.data.actions.new("Shared")
+    for seed, obj in enumerate(objects):
+        obj.animation_data_create().action = action
+        obj.animation_data.action_slot = action.slots.new("OBJECT", obj.name)
+        key(obj, (1.0 + seed, 10.0, 30.0 + seed), seed=seed)
+    for obj, mode in zip(objects, ("dq_sclerp", "pga_lerp", "BLENDER"), strict=True):
+        set_mode(obj, mode)
+    assert [any(fcurve.modifiers for fcurve in curves_of(obj).values()) for obj in objects] == [True, True, False]
+    assert_shown(objects, PLAYED)
+    before = [snapshot(obj) for obj in objects]
+    set_mode(objects[2], "lerp_slerp", [10.0])
+    assert [snapshot(obj) for obj in objects] == before
+    assert_shown(objects, PLAYED)
+    action.slots.remove(objects[0].animation_data.action_slot)
+    bpy.context.view_layer.update()
+    assert_shown(objects[1:], PLAYED)
 
 
 def test_a_mode_that_was_chosen_before_there_were_keys_waits_for_them(live_file):
@@ -61,19 +70,15 @@ def test_a_mode_that_was_chosen_before_there_were_keys_waits_for_them(live_file)
 
 def test_many_objects_get_a_mode_at_once_and_what_refuses_is_named(live_file):
     objects = [key(new_object(f"Tool {number}"), seed=number) for number in range(4)]
-    objects[2].rotation_mode = "AXIS_ANGLE"
-    with pytest.raises(animation.Refused, match="Tool 2 turns by axis and angle"):
+    curves_of(objects[2])["location", 0].modifiers.new("ENVELOPE")
+    with pytest.raises(animation.Refused, match="Tool 2: Location X has an Envelope"):
         set_mode(objects, "dq_sclerp")
     assert {obj.rigid_motion.mode for obj in objects} == {"BLENDER"}
     refused: list = []
     set_mode(objects, "dq_sclerp", refused=refused)
     assert [str(refusal)[:6] for refusal in refused] == ["Tool 2"]
     assert [obj.rigid_motion.mode for obj in objects] == ["dq_sclerp", "dq_sclerp", "BLENDER", "dq_sclerp"]
-    assert_shown([obj for obj in objects if obj.rotation_mode == "QUATERNION"], PLAYED)
-    animation.bake([obj for obj in objects if obj.rotation_mode == "QUATERNION"])
-    animation.unbake(objects, refused=refused)
-    assert [str(refusal)[:6] for refusal in refused] == ["Tool 2", "Tool 2"]
-    assert len(bpy.data.actions) == 4
+    assert_shown(objects[:2], PLAYED)
 
 
 def test_what_is_deleted_with_an_edit_of_it_still_to_be_seen_is_asked_for_nothing_more(live_file):

@@ -1,241 +1,112 @@
-"""Stepped modifiers hold the poses of a mode; Noise and its like are added on top. Blender itself says what they do.
+"""F-curve modifiers of the animator's act on what is seen, of whatever kind and whenever they come.
 
-Where a Stepped modifier leads is asked of a spare F-curve that has its own frame for a value. Where an object has to be
-without modifiers, `tests.animation.oracle` says, with all of them muted.
+Blender itself says what they do: to an object with a linear key on every eighth of a frame, of what channels had.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import bpy
 import numpy as np
 import pytest
-from mathutils import Euler, Matrix, Quaternion
 
-from rigid_motion.animation import bake, problem_of, set_mode, unbake
-from rigid_motion.animation.curves.keys import Stepped, held
-from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
-from tests.animation.bones.rigs import key_bone, new_rig
-from tests.animation.keyed import Carrier, curves_of, key_frames, rotation_path, snapshot
-from tests.animation.modified import led_to, without_modifiers
-from tests.animation.oracle import expected_bases, shown_worlds, world_now
-from tests.animation.scenes import give_own_deltas, key, new_object
+from rigid_motion.animation import problem_of, refresh, repeat, set_mode
+from tests.animation.bones.rigs import in_turn
+from tests.animation.keyed import curves_of, rotation_path, snapshot
+from tests.animation.modified import is_term
+from tests.animation.oracle import shown_worlds, world_now
+from tests.animation.scenes import key, key_densely, new_object
 
-PLAYED = np.arange(-9.0, 52.0)
+PLAYED = np.arange(1.0, 40.0, 0.25)
+RANGE = {"use_restricted_range": True, "frame_start": 7.0, "frame_end": 31.0, "blend_in": 5.0}
+PART = {"use_influence": True, "influence": 0.5}
 
-STEPS: dict[str, dict[str, object]] = {
-    "twos": {"frame_step": 2.0, "frame_offset": 1.0},
-    "threes, from zero": {"frame_step": 3.0},
-    "long, behind the offset": {"frame_step": 7.0, "frame_offset": 20.0},
-    "from a frame on": {"frame_step": 4.0, "use_frame_start": True, "frame_start": 9.0},
-    "up to a frame": {"frame_step": 4.0, "frame_offset": 1.0, "use_frame_end": True, "frame_end": 26.0},
+MODIFIERS: dict[str, tuple[str, dict[str, object]]] = {
+    "twos": ("STEPPED", {"frame_step": 2.0, "frame_offset": 1.0}),
+    "twos and a half, for a while": ("STEPPED", {"frame_step": 2.5, "use_frame_start": True, "frame_start": 9.0}),
+    "stepped in part": ("STEPPED", {"frame_step": 3.0, **PART}),
+    "noise": ("NOISE", {"strength": 1.5, "scale": 4.0, "phase": 3.0}),
+    "noise in part of the time": ("NOISE", {"strength": 1.5, "scale": 4.0, **RANGE}),
+    "noise that multiplies": ("NOISE", {"strength": 1.5, "scale": 4.0, "blend_type": "MULTIPLY", **PART}),
+    "limits": ("LIMITS", {"use_min_y": True, "min_y": -0.4, "use_max_y": True, "max_y": 0.3}),
+    "sine": ("FNGENERATOR", {"use_additive": True, "amplitude": 0.7, "phase_multiplier": 0.4}),
+    "sine instead": ("FNGENERATOR", {"amplitude": 0.7, "phase_multiplier": 0.4, **PART}),
+    "ramp": ("GENERATOR", {"use_additive": True, "coefficients": (0.5, -0.02), **RANGE}),
+    "ramp of factors": ("GENERATOR", {"use_additive": True, "mode": "POLYNOMIAL_FACTORISED"}),
+    "muted": ("LIMITS", {"use_min_y": True, "min_y": 5.0, "mute": True}),
 }
-"""Settings of a Stepped modifier that leads to whole frames."""
-
-BROKEN = {"frame_step": 2.5, "frame_offset": 0.5}
 
 
-def channels(carrier: Carrier) -> list[bpy.types.FCurve]:
-    """The animator's F-curves of location, rotation and scale."""
-    result = curves_of(carrier)
-    paths = ("location", rotation_path(carrier), "scale")
-    return [fcurve for (path, _), fcurve in result.items() if path in paths and len(fcurve.keyframe_points)]
-
-
-def modify(fcurves: Sequence[bpy.types.FCurve], kind: str, **settings: object) -> list[bpy.types.FModifier]:
-    added = []
+def modify(fcurves, kind: str, settings: dict[str, object]) -> None:
     for fcurve in fcurves:
         modifier = fcurve.modifiers.new(kind)
         for name, value in settings.items():
             setattr(modifier, name, value)
-        added.append(modifier)
     bpy.context.view_layer.update()
-    return added
 
 
-def expected(carrier: Carrier, frames: np.ndarray, own=None) -> np.ndarray:
-    with without_modifiers(channels(carrier)):
-        return expected_bases(carrier, frames, own)
+def some_of(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
+    """Channels that get modifiers: not all of any part."""
+    curves = curves_of(obj)
+    return [curves["location", 1], curves["location", 2], curves[rotation_path(obj), 1], curves["scale", 0]]
 
 
-def assert_same(shown: np.ndarray, reference: np.ndarray) -> None:
-    np.testing.assert_allclose(shown, reference, rtol=0, atol=2e-5 * max(1.0, np.abs(reference).max()))
-
-
-def played(settings: dict[str, object]) -> np.ndarray:
-    """Quarter frames where all of them are held: what is held is exact between frames, too."""
-    return PLAYED if "use_frame_start" in settings or "use_frame_end" in settings else np.arange(-9.0, 52.0, 0.25)
-
-
-@pytest.mark.parametrize("settings", [*STEPS.values(), BROKEN], ids=[*STEPS, "broken"])
-def test_the_frames_that_are_held_are_blenders(empty_file, settings):
-    frames = np.arange(-30.0, 60.0, 0.25)
-    ends = {name: settings[f"frame_{name}"] for name in ("start", "end") if settings.get(f"use_frame_{name}")}
-    modifier = Stepped(settings["frame_step"], settings.get("frame_offset", 0.0), **ends)
-    np.testing.assert_allclose(held([modifier], frames), led_to([settings], frames), atol=1e-3)
-
-
-@pytest.mark.parametrize("order", ["QUATERNION", "ZXY"])
-@pytest.mark.parametrize("frames", [(1.0, 11.0, 24.0, 40.0), (-7.0, 3.0, 12.5, 31.0)], ids=["after zero", "before"])
-@pytest.mark.parametrize("settings", STEPS.values(), ids=STEPS)
-def test_holds_of_all_kinds(live_file, settings, frames, order):
-    obj = key(new_object(rotation_mode=order), frames, seed=4)
-    modify(channels(obj), "STEPPED", **settings)
-    set_mode(obj, "dq_sclerp")
-    frames = played(settings)
-    assert_same(shown_worlds([obj], frames)[0], expected(obj, led_to([settings], frames)))
-
-
-@pytest.mark.parametrize("settings", STEPS.values(), ids=STEPS)
-def test_bones_hold_their_poses(live_file, settings):
-    rig = new_rig()
-    for number, bone in enumerate(rig.pose.bones):
-        key_bone(bone, seed=number)
-        if number:
-            set_mode(bone, "motor_spline")
-            modify(channels(bone), "STEPPED", **settings)
-    frames = played(settings)
-    at = led_to([settings], frames)
-    bases = {bone.name: expected(bone, at if number else frames) for number, bone in enumerate(rig.pose.bones)}
-    assert_same_poses(rig, frames, *shown_poses([rig], frames), expected_poses(rig, frames, bases))
-
-
-def test_one_behind_another_and_a_channel_with_a_single_key(live_file):
-    obj = key(new_object(), seed=4)
-    for axis in range(3):
-        obj.keyframe_insert("scale", index=axis, frame=1)
-    moving = [fcurve for fcurve in channels(obj) if len(fcurve.keyframe_points) > 1]
-    modify(moving, "STEPPED", frame_step=2.0)
-    modify(moving, "STEPPED", frame_step=5.0, frame_offset=1.0)
-    set_mode(obj, "cga_lerp")
-    at = led_to([{"frame_step": 2.0}], led_to([{"frame_step": 5.0, "frame_offset": 1.0}], PLAYED))
-    assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, at))
-
-
-NOISE = {"strength": 1.5, "scale": 4.0, "phase": 3.0}
-ADDED: dict[str, tuple[str, dict[str, object]]] = {
-    "noise": ("NOISE", NOISE),
-    "noise in part": ("NOISE", NOISE | {"use_influence": True, "influence": 0.4}),
-    "sine": ("FNGENERATOR", {"use_additive": True, "amplitude": 0.7, "phase_multiplier": 0.4}),
-}
-"""Types and settings of modifiers that add something."""
-
-
-def difference(carrier: Carrier, path: str, frames: np.ndarray) -> np.ndarray:
-    """What modifiers add to a property on these frames, shape (m, width)."""
-    curves = [fcurve for (name, _), fcurve in curves_of(carrier).items() if name == path]
-
-    def values() -> np.ndarray:
-        return np.array([[fcurve.evaluate(frame) for fcurve in curves] for frame in frames])
-
-    shown = values()
-    with without_modifiers(channels(carrier)):
-        return shown - values()
-
-
-@pytest.mark.parametrize("kind", ADDED)
-@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
-def test_what_is_added_to_a_location_is_on_top_of_the_mode(live_file, kind, mode):
-    obj = new_object()
-    own = give_own_deltas(obj, 1)
-    key(obj, seed=2, scale="even")
-    set_mode(obj, mode)
-    name, settings = ADDED[kind]
-    modify([curves_of(obj)["location", axis] for axis in (0, 2)], name, **settings)
-    added = difference(obj, "location", PLAYED)
-    assert np.ptp(added[:, 0]) > 0.1
-    reference = expected(obj, PLAYED, own)
-    reference[:, :3, 3] += added
-    assert problem_of(obj) == ""
-    assert_same(shown_worlds([obj], PLAYED)[0], reference)
-
-
-@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
-def test_what_is_added_to_a_rotation_turns_the_mode_by_what_it_turns_blenders(live_file, order):
-    obj = key(new_object(rotation_mode=order), seed=2)
-    set_mode(obj, "dq_sclerp")
-    path = rotation_path(obj)
-    modify([curves_of(obj)[path, 1]], "NOISE", strength=0.8, scale=5.0)
-    reference = expected(obj, PLAYED)
-    curves = [curves_of(obj)[path, index] for index in range(len(getattr(obj, path)))]
-
-    def turned() -> list[Matrix]:
-        rows = [[fcurve.evaluate(frame) for fcurve in curves] for frame in PLAYED]
-        return [
-            (Quaternion(row).normalized() if order == "QUATERNION" else Euler(row, order)).to_matrix() for row in rows
-        ]
-
-    noisy = turned()
-    with without_modifiers(channels(obj)):
-        for number, (with_noise, without) in enumerate(zip(noisy, turned(), strict=True)):
-            reference[number, :3, :3] = reference[number, :3, :3] @ np.array(without.inverted() @ with_noise)
-    assert_same(shown_worlds([obj], PLAYED)[0], reference)
-
-
-def test_a_scale_with_noise_is_blenders_own(live_file):
-    obj = key(new_object(), seed=2, scale="even")
+@pytest.mark.parametrize(("what", "order"), in_turn(MODIFIERS, ("QUATERNION", "ZXY", "AXIS_ANGLE")))
+@pytest.mark.parametrize("before", [False, True], ids=["after the mode", "before the mode"])
+def test_a_modifier_acts_on_what_is_seen(live_file, what, order, before):
+    obj, dense = (key(new_object(name, order), seed=4, scale="even") for name in ("Tool", "Dense"))
+    keys = snapshot(obj)
+    set_mode(dense, "cga_slerp")
+    key_densely(dense)
+    for moved in (obj, dense):
+        if moved is dense or before:
+            modify(some_of(moved), *MODIFIERS[what])
     set_mode(obj, "cga_slerp")
-    modify([curves_of(obj)["scale", 1]], "NOISE", strength=0.3)
-    scales = np.array([[curves_of(obj)["scale", axis].evaluate(frame) for axis in range(3)] for frame in PLAYED])
-    shown = np.linalg.norm(shown_worlds([obj], PLAYED)[0][:, :3, :3], axis=1)
-    np.testing.assert_allclose(shown, np.abs(scales), rtol=1e-4)
+    if not before:
+        modify(some_of(obj), *MODIFIERS[what])
+    assert problem_of(obj) == ""
+    assert refresh() == 0
+    shown, expected = shown_worlds([obj, dense], PLAYED)
+    assert np.abs(shown - expected).max() < 2e-5 * max(1.0, np.abs(expected).max())
+    for fcurve in some_of(obj):
+        kept = next(item for item in fcurve.modifiers if item.type == MODIFIERS[what][0] and not is_term(item))
+        for name, value in MODIFIERS[what][1].items():
+            got = getattr(kept, name)
+            assert (tuple(got) if name == "coefficients" else got) == pytest.approx(value), name
+    set_mode(obj, "BLENDER")
+    assert {len(fcurve.modifiers) for fcurve in some_of(obj)} == {1}
+    for fcurve in some_of(obj):
+        fcurve.modifiers.remove(fcurve.modifiers[0])
+    assert snapshot(obj) == keys
 
 
-@pytest.mark.parametrize("carrier", ["object", "Euler object", "bone"])
-@pytest.mark.parametrize("kind", ["stepped", "noise", "both"])
-def test_a_bake_has_what_was_seen_and_comes_undone(live_file, carrier, kind):
-    if carrier == "bone":
-        rig = new_rig()
-        result = key_bone(rig.pose.bones["Upper"], seed=3)
-    else:
-        result = key(new_object(rotation_mode="XYZ" if carrier == "Euler object" else "QUATERNION"), seed=3)
-    set_mode(result, "dq_sclerp")
-    if kind != "noise":
-        modify(channels(result), "STEPPED", frame_step=3.0)
-    if kind != "stepped":
-        rotation = curves_of(result)[rotation_path(result), 2]
-        modify([curves_of(result)["location", 0], rotation], "NOISE", strength=0.5, scale=6.0)
-    frames = np.arange(1.0, 47.0) if kind == "stepped" else np.arange(1.0, 41.0)
-
-    def seen() -> np.ndarray:
-        return shown_poses([rig], frames)[0]["Upper"] if carrier == "bone" else shown_worlds([result], frames)[0]
-
-    before, keyed = seen(), snapshot(result)
-    bake(result, first=12.0, last=15.0)
-    assert not any(fcurve.modifiers for fcurve in channels(result))
-    assert_same(seen(), before)
-    unbake(result)
-    assert snapshot(result) == keyed
-    assert_same(seen(), before)
+@pytest.mark.parametrize("paths", [("location",), ("location", "rotation_quaternion")], ids=len)
+def test_a_key_in_between_has_what_is_seen_and_the_noise_once_more_as_in_blender(live_file, paths):
+    obj, twin = (key(new_object(name), seed=5) for name in ("Tool", "Twin"))
+    set_mode([obj, twin], "dq_sclerp")
+    key_densely(twin)
+    for moved in (obj, twin):
+        curves = curves_of(moved)
+        modify([curves["location", 1], curves["rotation_quaternion", 3]], *MODIFIERS["noise"])
+    live_file.scene.frame_set(17)
+    seen = obj.location.y
+    for moved in (obj, twin):
+        for path in paths:
+            moved.keyframe_insert(path, frame=17)
+    for frame in (18, 17):
+        live_file.scene.frame_set(frame)
+    np.testing.assert_allclose(world_now("Tool"), world_now("Twin"), atol=1e-5)
+    (added,) = (point.co.y for point in curves_of(obj)["location", 1].keyframe_points if point.co.x == 17.0)
+    assert added == pytest.approx(seen, abs=1e-5)
 
 
-def test_a_key_in_between_keeps_the_pose_that_is_seen_with_its_noise(live_file):
-    result = key(new_object(), seed=5)
-    set_mode(result, "dq_sclerp")
-    modify([curves_of(result)["location", 1], curves_of(result)["rotation_quaternion", 3]], "NOISE", **NOISE)
-    bpy.context.scene.frame_set(17)
-    before = world_now()
-    result.keyframe_insert("location", frame=17)
-    result.keyframe_insert("rotation_quaternion", frame=17)
-    assert_same(world_now(), before)
-    assert 17.0 in key_frames(result).tolist()
-    bpy.context.scene.frame_set(18)
-    bpy.context.scene.frame_set(17)
-    assert_same(world_now(), before)
-
-
-def test_a_bake_has_every_round_of_cycles_as_it_was_seen(live_file):
-    obj = key(new_object(), seed=3)
-    set_mode(obj, "dq_sclerp")
-    modify(channels(obj), "CYCLES", mode_before="MIRROR")
-    modify(channels(obj), "STEPPED", frame_step=7.0)
-    modify([curves_of(obj)["location", 0]], "NOISE", strength=0.5, scale=6.0)
-    bpy.context.scene.frame_end = 90
-    bpy.context.view_layer.update()
-    frames = np.arange(1.0, 91.0)
-    (before,), keyed = shown_worlds([obj], frames), snapshot(obj)
-    bake(obj)
-    assert_same(shown_worlds([obj], frames)[0], before)
-    unbake(obj)
-    assert snapshot(obj) == keyed
+def test_cycles_steps_and_noise_act_one_after_the_other(live_file):
+    obj, dense = (key(new_object(name), seed=4) for name in ("Tool", "Dense"))
+    for moved in (dense, obj):
+        set_mode(moved, "dq_sclerp")
+        if moved is dense:
+            key_densely(dense)
+        modify(curves_of(moved).values(), *MODIFIERS["twos"])
+        modify([curves_of(moved)["location", 0]], *MODIFIERS["noise"])
+        repeat(moved, "MIRROR")
+    shown, expected = shown_worlds([obj, dense], np.arange(-60.0, 120.0, 0.5))
+    assert np.abs(shown - expected).max() < 2e-5 * max(1.0, np.abs(expected).max())

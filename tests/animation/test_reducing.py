@@ -40,7 +40,7 @@ def test_so_many_keys_have_less_of_an_error_than_as_many_evenly_in_time(live_fil
     truth, shown = read_poses(obj, frames), read_poses(obj, moments)
     reduction = reduce_keys_of(obj, "motor_spline", radius=RADIUS, count=count)
     assert len(key_frames(obj)) == reduction.after == count
-    assert reduction.largest_error == pytest.approx(off(obj, moments, shown), abs=1e-6)
+    assert reduction.largest_error == pytest.approx(off(obj, moments, shown), abs=1e-5)
     evenly = frames[np.linspace(0, len(frames) - 1, count).round().astype(int)]
     even = interpolate(evenly, truth[np.searchsorted(frames, evenly)], moments, "motor_spline")
     even_error = shell_error(even, shown, RADIUS).max()
@@ -65,7 +65,8 @@ def test_no_motion_has_fewer_keys_than_two_or_more_than_it_had(live_file, count,
 def test_the_best_mode_of_each_segment_is_keyed_and_blender_shows_it(live_file, name, mode, rotation_mode):
     obj = recorded(name, rotation_mode)
     frames = key_frames(obj)
-    truth = read_poses(obj, frames)
+    moments = np.arange(8.0 * frames[0], 8.0 * frames[-1] + 1.0) / 8.0
+    truth, between = read_poses(obj, frames), read_poses(obj, moments)
     reduce_keys_of(obj, mode, TOLERANCE, RADIUS)
     single, expected = key_frames(obj), shell_error(read_poses(obj, frames), truth, RADIUS)
     restore_keys(obj)
@@ -73,15 +74,16 @@ def test_the_best_mode_of_each_segment_is_keyed_and_blender_shows_it(live_file, 
     kept = key_frames(obj)
     modes = modes_of(obj, kept[:-1])
     assert reduction.segments == {mode: modes.count(mode) for mode in modes}
-    assert kept.tolist() == single.tolist() == keys_of(obj, "rigid_motion.mode")
+    assert kept.tolist() == single.tolist()
     assert len(set(modes)) > 1
     shown = read_poses(obj, frames)
-    keys = truth[np.isin(frames, kept)]
+    keys = between[np.isin(moments, kept)]
     assert shell_error(shown, interpolate_by_segments(kept, keys, frames, modes), RADIUS).max() < 5e-6
     error = shell_error(shown, truth, RADIUS)
     assert np.mean(error**2) < np.mean(expected**2)
-    assert error.max() <= TOLERANCE * (1.0 + 1e-5)
-    assert reduction_of(obj).largest_error == pytest.approx(error.max(), abs=1e-6)
+    assert off(obj, moments, between) <= TOLERANCE + 1e-5
+    # Between frames it counts but for where the recording's lines cut corners.
+    assert off(obj, frames, truth) - 1e-5 <= reduction_of(obj).largest_error <= off(obj, moments, between) + 1e-5
 
 
 @pytest.mark.parametrize(
@@ -139,7 +141,7 @@ def test_all_that_was_there_comes_back_to_the_last_handle(live_file, rotation_mo
     obj["weight"] = 1.0
     write_channel(obj, '["weight"]', np.arange(1.0, 60.0), np.arange(59.0), interpolation="BOUNCE")
     recorded(obj=obj)
-    curves_of(obj)["location", 2].mute = True
+    curves_of(obj)['["weight"]', 0].mute = True
     set_mode(obj, "pga_lerp", [11.0])
     action, before, frames = obj.animation_data.action, snapshot(obj), np.arange(-3.0, 130.0)
     truth = read_poses(obj, frames)
@@ -242,7 +244,7 @@ def test_cycles_that_fewer_keys_would_change_are_refused(live_file):
     assert snapshot(obj) == before
 
 
-def test_a_strip_shows_the_reduced_keys_and_then_its_own_again(live_file):
+def test_the_keys_of_a_strip_are_reduced_and_then_its_own_again(live_file):
     obj = recorded()
     action = obj.animation_data.action
     obj.animation_data.action = None
@@ -250,11 +252,9 @@ def test_a_strip_shows_the_reduced_keys_and_then_its_own_again(live_file):
     frames = np.arange(31.0, strip.frame_end + 1.0)
     truth = read_poses(obj, frames)
     reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
-    assert strip.action != action
     assert reduction.after < 0.5 * reduction.before
     assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
     restore_keys(obj)
-    assert strip.action == action
     assert off(obj, frames, truth) < 1e-6
 
 
@@ -274,7 +274,7 @@ def test_the_file_keeps_the_dense_keys_until_they_are_let_go(live_file, tmp_path
     reopen(tmp_path / "let_go.blend")
     obj = bpy.data.objects["Tool"]
     assert not is_reduced(obj)
-    assert [action.name for action in bpy.data.actions] == ["ToolAction Reduced"]
+    assert [action.name for action in bpy.data.actions] == ["ToolAction"]
     assert snapshot(obj) == reduced
     assert reduction_of(obj).after == reduction.after
     with pytest.raises(Refused, match="Tool is not reduced, or has another Action by now"):
@@ -286,19 +286,6 @@ def reopen(path: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(path))
 
 
-@pytest.mark.parametrize("kept_by", ["another object", "the asset browser"])
-def test_an_action_that_something_else_needs_stays_when_it_is_discarded(live_file, kept_by):
-    obj = recorded()
-    action = obj.animation_data.action
-    if kept_by == "another object":
-        new_object("Other").animation_data_create().action = action
-    else:
-        action.asset_mark()
-    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
-    discard_dense_keys(obj)
-    assert action in list(bpy.data.actions)
-
-
 def test_what_was_done_last_is_taken_back_first(live_file):
     obj = recorded()
     dense = snapshot(obj)
@@ -308,7 +295,8 @@ def test_what_was_done_last_is_taken_back_first(live_file):
     with pytest.raises(Refused, match="Tool was baked since it was reduced: Un-Bake first"):
         restore_keys(obj)
     baked = snapshot(obj)
-    reduce_keys_of(obj, "dq_sclerp", TOLERANCE, RADIUS)
+    for tolerance in (0.5 * TOLERANCE, TOLERANCE):
+        reduce_keys_of(obj, "dq_sclerp", tolerance, RADIUS)
     with pytest.raises(Refused, match="Tool was reduced since it was baked: Restore Keys first"):
         unbake(obj)
     restore_keys(obj)
@@ -318,3 +306,10 @@ def test_what_was_done_last_is_taken_back_first(live_file):
     restore_keys(obj)
     assert (snapshot(obj), is_baked(obj), is_reduced(obj)) == (dense, False, False)
     assert len(bpy.data.actions) == 1
+    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
+    bake(obj)
+    reduce_keys_of(obj, "dq_sclerp", TOLERANCE, RADIUS)
+    discard_dense_keys(obj)
+    unbake(obj)
+    assert snapshot(obj) == reduced
+    assert (reduction_of(obj).before, is_reduced(obj)) == (len(dense["location", 0][-1]), False)

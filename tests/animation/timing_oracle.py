@@ -9,32 +9,29 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-from tests.animation.keyed import WIDTHS, Carrier, curve_of, rotation_path, transform_paths, turns_at
+Curves = dict[tuple[str, int], bpy.types.FCurve]
+"""F-curves with keys by data path and index."""
 
 
-def progress(obj: Carrier, first: float, last: float, frames: np.ndarray) -> np.ndarray:
+def progress(curves: Curves, first: float, last: float, frames: np.ndarray, turns: float = 0.0) -> np.ndarray:
     """How far the channels have come between two keys: the share of the chord that they make up together."""
     done, whole = np.zeros(len(frames)), 0.0
-    for path in transform_paths(obj):
+    for (path, _), fcurve in curves.items():
         weight = 4.0 if path == "rotation_quaternion" else 1.0
-        for index in range(WIDTHS[path]):
-            fcurve = curve_of(obj, path, index)
-            if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute:
-                begin, end, *values = timing(fcurve, [first, last, *frames])
-                done += weight * (end - begin) * (np.array(values) - begin)
-                whole += weight * (end - begin) ** 2
+        begin, end, *values = timing(fcurve, [first, last, *frames])
+        done += weight * (end - begin) * (np.array(values) - begin)
+        whole += weight * (end - begin) ** 2
     if whole > 0.0:
         return done / whole
-    return _counted(obj, first, last, frames) if turns_at(obj, first) else done
+    return _counted(curves, first, last, frames) if turns else done
 
 
-def _counted(obj: Carrier, first: float, last: float, frames: np.ndarray) -> np.ndarray:
+def _counted(curves: Curves, first: float, last: float, frames: np.ndarray) -> np.ndarray:
     """The same where the body spins and no channel changes: of a value that goes up by one from key to key.
 
     It has the keys of the first channel that turns, with flat handles.
     """
-    curves = (curve_of(obj, rotation_path(obj), index) for index in range(WIDTHS[rotation_path(obj)]))
-    like = next(curve for curve in curves if curve is not None and len(curve.keyframe_points) and not curve.mute)
+    like = min(curves.items(), key=lambda item: ("rotation" not in item[0][0], item[0]))[1]
     with spare_curve() as fcurve:
         fcurve.extrapolation = like.extrapolation
         fcurve.keyframe_points.add(len(like.keyframe_points))

@@ -17,9 +17,7 @@ import rigid_motion
 from rigid_motion import ui
 from rigid_motion.animation import properties
 from rigid_motion.ui.overlay.settings import RigidMotionOverlay
-from rigid_motion.ui.shown import ShownTransform
-from rigid_motion.ui.targets import OnTargets
-from rigid_motion.ui.wording import DESCRIPTIONS, OWN_WORDS, SHORT_LABELS, spoken_of
+from rigid_motion.ui.wording import LABELS, OWN_WORDS
 
 PACKAGE = Path(rigid_motion.__file__).parent
 FLOORS = ("animation", "live", "ui")
@@ -43,7 +41,7 @@ DRAWN = {
 }
 """Functions that translate a literal they are given: under which name, and its context."""
 
-CLASSES = (*ui.CLASSES, *properties.CLASSES, RigidMotionOverlay, ShownTransform)
+CLASSES = (*ui.CLASSES, *properties.CLASSES, RigidMotionOverlay)
 
 
 def messages() -> set[Message]:
@@ -52,8 +50,7 @@ def messages() -> set[Message]:
     for cls in CLASSES:
         result |= set(of_class(cls))
         result |= set(of_properties(cls))
-    result |= {(DEFAULT, spoken_of(text, "bones")) for text in DESCRIPTIONS.values()}
-    result |= {(OWN_WORDS, label) for label in SHORT_LABELS.values()}
+    result |= {(OWN_WORDS, label) for label in LABELS.values()}
     return {(context, text) for context, text in result if text}
 
 
@@ -67,15 +64,10 @@ def parsed(path: Path) -> ast.Module:
 
 
 def of_class(cls: type) -> Iterator[Message]:
-    """Label and description; those of operators on objects also as they are for bones."""
+    """Label and description."""
     is_operator = issubclass(cls, bpy.types.Operator)
     yield OF_OPERATORS if is_operator else DEFAULT, getattr(cls, "bl_label", "")
-    description = getattr(cls, "bl_description", "")
-    yield DEFAULT, description
-    if issubclass(cls, OnTargets):
-        yield DEFAULT, spoken_of(description, "bones")
-        for kind in ("objects", "bones", "objects and bones"):
-            yield DEFAULT, spoken_of(cls.nothing_to_do, kind)
+    yield DEFAULT, getattr(cls, "bl_description", "")
 
 
 def of_properties(cls: type) -> Iterator[Message]:

@@ -17,21 +17,14 @@ LANGUAGES = translations.languages()
 GERMAN = LANGUAGES["de"]
 
 UNSEEN = {
-    "Rigid Motion Rest",
     # Names in files and in Blender's own interface
     " Live",
+    " Original",
+    " to ",
     "Rigid Motion",
     "Object Transforms",
     "Object Mode",
     "Graph Editor",
-    # A part of the name of a mode, by which its algebra is looked up
-    "Dual Quaternion",
-    # Parts of a sentence that stand for what is meant, before it is translated as a whole
-    "objects and bones",
-    "an object",
-    "a bone",
-    "Object > ",
-    "Pose > ",
     # Descriptions of properties that are kept in files and never drawn
     "It has keys for in-betweens too",
     "It has few of the keys",
@@ -42,11 +35,9 @@ UNSEEN = {
     # For the log, and for those who call the program from Python
     "In-betweens could not be brought up to date",
     "neither an object nor a pose bone: ",
-    "Keys are not in memory as expected, and are read by Blender's own functions, which takes longer",
     "The paths could not be drawn",
     "What came over the network cannot be shown",
     "What is selected cannot be sent",
-    "The transform on the screen cannot be shown",
     "a mode for keyframes can look one key behind and ahead of a segment: see with_neighbours",
     " frames do not fit poses of shape ",
     "interpolation: LINEAR or CONSTANT, not ",

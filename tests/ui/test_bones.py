@@ -1,4 +1,4 @@
-"""Pose bones in the interface: which are meant, what menus, operators and the panel say, and their constraint."""
+"""Pose bones in the interface: which are meant, what menus and operators say."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ import bpy
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import constraint_trouble, modes_of, restore_constraints, set_mode
-from rigid_motion.animation.transforms import CONSTRAINT, Refused, transform_of
+from rigid_motion.animation import modes_of, set_mode
+from rigid_motion.animation.transforms import transform_of
 from rigid_motion.animation.transforms.sizes import first_tolerance
-from rigid_motion.animation.writers.bone_constraints import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 from rigid_motion.ui import menus
-from rigid_motion.ui.panels import facts_and_notes
 from rigid_motion.ui.targets import (
     KEY_EDITORS,
     SELECTED,
@@ -20,14 +18,11 @@ from rigid_motion.ui.targets import (
     scope_for,
     targets_of,
 )
-from rigid_motion.ui.wording import BLENDED, TROUBLES
-from tests.animation.bones.poses import seen
-from tests.animation.bones.rigs import select_bones
 from tests.animation.scenes import editor
 from tests.rigs.recorded import FRAMES as RECORDED
 from tests.rigs.recorded import recorded_rig
-from tests.ui.conftest import keyed, select_keys
-from tests.ui.rigs import FRAMES, key_bone, keyed_rig, new_rig
+from tests.ui.conftest import select_keys
+from tests.ui.rigs import FRAMES, keyed_rig, new_rig
 from tests.ui.test_menus import drawn
 
 operators = bpy.ops.rigid_motion
@@ -163,135 +158,7 @@ def test_key_poses_begin_with_a_larger_tolerance_for_as_long_as_nobody_sets_one(
 def test_the_menu_of_poses_ticks_the_mode_of_the_active_bone_and_has_a_pie(rig):
     set_mode(bone(rig, "Arm"), "pga_lerp")
     set_mode(bone(rig), SCREW)
-    entries = drawn(menus.RIGID_MOTION_MT_pose)
+    entries = drawn(menus.RIGID_MOTION_MT_view)
     assert [p.mode for name, icon, p in entries if name == "rigid_motion.set_mode" and icon == "CHECKMARK"] == [SCREW]
-    assert "rigid_motion.mend" in [name for name, *_ in entries]
-    assert [p.name for name, _, p in entries if name == "wm.call_menu_pie"] == ["RIGID_MOTION_MT_pie_pose"]
-
-
-def notes_on(target, frame=5.0):
-    bpy.context.scene.frame_set(int(frame))
-    segment, notes = facts_and_notes(target, frame)
-    return notes, segment and segment.mode
-
-
-@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
-def test_the_transform_on_screen_is_that_of_the_bone(extension, order):
-    rig = new_rig()
-    bone = rig.pose.bones["Hand"]
-    bone.rotation_mode = order
-    rotation = "rotation_quaternion" if order == "QUATERNION" else "rotation_euler"
-    key_bone(bone, scale="even")
-    select_bones(rig, "Hand")
-    set_mode(bone, SCREW)
-    bpy.context.scene.frame_set(6)
-    before = seen(rig, "Hand")
-    shown = bpy.context.window_manager.rigid_motion_shown
-    values = [tuple(shown.location), tuple(getattr(shown, rotation)), tuple(shown.scale)]
-    assert values[0] != pytest.approx(tuple(bone.location), abs=1e-3)
-    bone.constraints[CONSTRAINT].mute = True
-    animation.set_enabled(False)
-    rig.animation_data.action = None
-    bone.location, bone.scale = values[0], values[2]
-    setattr(bone, rotation, values[1])
-    bpy.context.view_layer.update()
-    assert seen(rig, "Hand") == pytest.approx(before, abs=1e-5)
-
-
-def put_behind(bone):
-    bone.constraints.new("COPY_LOCATION").target = bone.id_data
-    bone.constraints.move(1, 0)
-
-
-def show_another(bone):
-    animation.set_enabled(False)
-    ours(bone).action = bpy.data.actions.new("Other")
-
-
-def ours(bone):
-    return bone.constraints[CONSTRAINT]
-
-
-TAMPERINGS = [
-    (lambda bone: bone.constraints.remove(ours(bone)), REMOVED),
-    (lambda bone: setattr(ours(bone), "name", "Mine"), REMOVED),
-    (lambda bone: setattr(ours(bone), "use_eval_time", False), REMOVED),
-    (show_another, OTHER_SLOT),
-    (lambda bone: setattr(ours(bone), "mute", True), MUTED),
-    (lambda bone: setattr(ours(bone), "mix_mode", "AFTER_FULL"), CHANGED),
-    (put_behind, NOT_FIRST),
-    (lambda bone: setattr(ours(bone), "influence", 0.5), WEAK),
-]
-
-
-@pytest.mark.parametrize(("tamper", "trouble"), TAMPERINGS)
-def test_a_constraint_that_is_not_as_it_was_made_is_noted_and_mended(rig, tamper, trouble):
-    hand = bone(rig)
-    set_mode([hand, bone(rig, "Arm")], SCREW)
-    bpy.context.scene.frame_set(5)
-    before = seen(rig, "Hand")
-    tamper(hand)
-    bpy.context.view_layer.update()
-    assert constraint_trouble(hand) == trouble
-    assert constraint_trouble(bone(rig, "Arm")) == ""
-    notes, mode = notes_on(hand)
-    assert (notes, mode) == ([TROUBLES[trouble]], SCREW)
-
-    assert operators.mend() == {"FINISHED"}
-    assert constraint_trouble(hand) == ""
-    assert hand.constraints[0].name == CONSTRAINT
-    assert len([item for item in hand.constraints if item.type == "ACTION"]) == 1
-    for constraint in list(hand.constraints)[1:]:
-        hand.constraints.remove(constraint)
-    bpy.context.scene.frame_set(4)
-    bpy.context.scene.frame_set(5)
-    assert seen(rig, "Hand") == pytest.approx(before, abs=1e-5)
-    assert not operators.mend.poll()
-
-
-def test_an_influence_that_is_keyed_is_meant_so(rig):
-    set_mode(bone(rig), SCREW)
-    constraint = bone(rig).constraints[CONSTRAINT]
-    constraint.influence = 0.5
-    constraint.keyframe_insert("influence", frame=1)
-    assert constraint_trouble(bone(rig)) == ""
-
-
-def test_what_has_no_in_betweens_has_no_trouble_and_cannot_be_mended(rig):
-    bpy.ops.object.mode_set(mode="OBJECT")
-    tool = keyed("Tool")
-    set_mode(tool, SCREW)
-    refused = []
-    restore_constraints([tool, bone(rig)], refused=refused)
-    assert [str(refusal).split(" has ")[0] for refusal in refused] == ["Tool", "Rig/Hand"]
-    assert constraint_trouble(tool) == constraint_trouble(bone(rig)) == ""
-    with pytest.raises(Refused, match="choose a mode"):
-        restore_constraints(bone(rig))
-
-
-def test_strips_that_are_blended_are_noted(rig):
-    set_mode(bone(rig), SCREW)
-    data = rig.animation_data
-    action, data.action = data.action, None
-    strip = data.nla_tracks.new().strips.new("Strip", 1, action)
-    assert ("INFO", BLENDED) not in notes_on(bone(rig))[0]
-    strip.blend_in = 10.0
-    assert ("INFO", BLENDED) in notes_on(bone(rig))[0]
-    assert ("INFO", BLENDED) not in notes_on(bone(rig, "Arm"))[0]
-
-
-def test_a_transition_between_strips_is_noted(rig):
-    set_mode(bone(rig), SCREW)
-    data = rig.animation_data
-    action, slot, data.action = data.action, data.action_slot, None
-    track = data.nla_tracks.new()
-    for start in (1, 100):
-        strip = track.strips.new("Strip", start, action)
-        strip.action_slot, strip.action_frame_start, strip.action_frame_end, strip.select = slot, 1, 21, True
-    bpy.context.view_layer.update()
-    assert ("INFO", BLENDED) not in notes_on(bone(rig))[0]
-    bpy.ops.object.mode_set(mode="OBJECT")
-    with editor("NLA_EDITOR"):
-        bpy.ops.nla.transition_add()
-    assert [strip.type for strip in track.strips] == ["CLIP", "TRANSITION", "CLIP"]
-    assert ("INFO", BLENDED) in notes_on(bone(rig))[0]
+    assert "rigid_motion.copy_mode" in [name for name, *_ in entries]
+    assert [p.name for name, _, p in entries if name == "wm.call_menu_pie"] == ["RIGID_MOTION_MT_pie_view"]

@@ -11,14 +11,14 @@ import pytest
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.ui.breakdown import CLASSES, WAY, Slider
-from tests.animation.keyed import snapshot
+from tests.animation.keyed import curves_of
 from tests.ui.conftest import FRAMES
 
 operators = bpy.ops.rigid_motion
 
 
-def event(kind: str, value: str = "PRESS", x: float = 0.0, **held: bool) -> SimpleNamespace:
-    return SimpleNamespace(type=kind, value=value, mouse_x=x, **{"ctrl": False, "shift": False} | held)
+def event(kind: str, value: str = "PRESS", x: float = 0.0, unicode: str = "", **held: bool) -> SimpleNamespace:
+    return SimpleNamespace(type=kind, value=value, mouse_x=x, unicode=unicode, **{"ctrl": False, "shift": False} | held)
 
 
 def test_a_breakdown_is_keyed_by_its_factor(tool):
@@ -39,8 +39,9 @@ def test_a_new_key_has_the_type_that_the_scene_is_set_to(tool):
     bpy.context.scene.frame_set(14)
     bpy.context.scene.tool_settings.keyframe_type = "BREAKDOWN"
     operators.breakdown(factor=0.25)
-    for fields in snapshot(tool).values():
-        assert [key[11] for key in fields[-1]] == ["KEYFRAME", "KEYFRAME", "BREAKDOWN", "KEYFRAME", "KEYFRAME"]
+    for fcurve in curves_of(tool).values():
+        types = [key.type for key in fcurve.keyframe_points]
+        assert types == ["KEYFRAME", "KEYFRAME", "BREAKDOWN", "KEYFRAME", "KEYFRAME"]
 
 
 @pytest.mark.parametrize("cls", CLASSES)
@@ -81,8 +82,8 @@ def test_e_lets_it_go_beyond_the_ends(extension):
 
 def test_a_number_is_typed_in_per_cent(extension):
     slider = Slider(0.5, 0.0, 1.0)
-    for kind in ("MINUS", "TWO", "NUMPAD_5", "PERIOD", "FIVE"):
-        assert slider.handle(event(kind))
+    for kind, unicode in (("MINUS", "-"), ("TWO", "2"), ("NUMPAD_5", "5"), ("COMMA", ","), ("FIVE", "5")):
+        assert slider.handle(event(kind, unicode=unicode))
     assert slider.factor == pytest.approx(-0.255)
     for _ in range(10):
         slider.handle(event("BACK_SPACE"))

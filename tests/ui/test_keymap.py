@@ -40,21 +40,11 @@ def test_the_shortcut_is_free(name):
 
 def test_the_shortcut_is_in_both_modes_of_the_viewport_and_in_both_key_editors(extension):
     keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
-    pies = [shortcut for shortcut in keymap.SHORTCUTS if shortcut.menu]
-    assert len(pies) == 4
-    for shortcut in pies:
+    assert len(keymap.SHORTCUTS) == 4
+    for shortcut in keymap.SHORTCUTS:
         items = keymaps.find(shortcut.keymap, space_type=shortcut.space).keymap_items
         result = [item for item in items if item.idname == keymap.PIE and item.properties.name == shortcut.menu]
         assert [(item.type, bool(item.alt), bool(item.ctrl), bool(item.shift)) for item in result] == [
             ("T", True, False, False)
         ]
         assert hasattr(bpy.types, shortcut.menu)
-
-
-@pytest.mark.parametrize("name", ["blender_default", "industry_compatible_data"])
-def test_a_pose_is_copied_by_the_key_that_blender_has_for_it(extension, name):
-    (of_blender,) = [event for operator, event in dict(keymaps_of_blender(name))["Pose"] if operator == "pose.copy"]
-    items = bpy.context.window_manager.keyconfigs.addon.keymaps.find("Pose", space_type="EMPTY").keymap_items
-    (item,) = [item for item in items if item.idname == "rigid_motion.copy_pose"]
-    assert of_blender == {"type": item.type, "value": item.value, keymap.COMMAND: True}
-    assert bool(getattr(item, keymap.COMMAND))

@@ -12,7 +12,6 @@ from rigid_motion.animation.properties import BoneMotion, ObjectMotion
 from rigid_motion.ui import manual, operators
 from rigid_motion.ui.overlay.settings import RigidMotionOverlay
 from rigid_motion.ui.preferences import RigidMotionPreferences
-from rigid_motion.ui.shown import ShownTransform
 from tests.test_glossary import anchors
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -30,7 +29,7 @@ def test_every_operator_has_a_page(cls, extension):
 
 @pytest.mark.parametrize(
     "cls",
-    [ObjectMotion, BoneMotion, RigidMotionOverlay, RigidMotionPreferences, ShownTransform],
+    [ObjectMotion, BoneMotion, RigidMotionOverlay, RigidMotionPreferences],
     ids=lambda cls: cls.__name__,
 )
 def test_every_property_that_is_drawn_has_a_page(cls, extension):

@@ -5,11 +5,12 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import bpy
+import numpy as np
 import pytest
 
-from rigid_motion.animation import MODE_IDS
+from rigid_motion.animation import MODE_IDS, write_channel
 from rigid_motion.ui import menus
-from tests.ui.conftest import select_keys
+from tests.ui.conftest import FRAMES, select_keys
 
 
 class Layout:
@@ -27,6 +28,9 @@ class Layout:
     def menu(self, name, text="", translate=True):
         self.drawn.append((name, "", ""))
 
+    def operator_menu_enum(self, name, prop):
+        self.drawn.append((name, "", ""))
+
     def operator(self, name, text="", icon="NONE", translate=True):
         properties = SimpleNamespace(mode="", on="", name="", text=text)
         self.drawn.append((name, icon, properties))
@@ -36,34 +40,53 @@ class Layout:
 def drawn(menu):
     """What a menu draws for the active object: operator or menu, icon, properties."""
     layout = Layout()
-    own = {name: getattr(menu, name, None) for name in ("scope", "pie")}
+    own = {name: getattr(menu, name, None) for name in ("scope", "pie", "menu", "beside")}
     menu.draw(SimpleNamespace(layout=layout, **own), bpy.context)
     return layout.drawn
 
 
-MODE_MENUS = [menu for menu in menus.CLASSES if menu.__name__.startswith("RIGID_MOTION_MT_")]
+PIES = [menu for menu in menus.CLASSES if "_pie_" in menu.__name__]
+MODE_MENUS = [menu for menu in menus.CLASSES if menu not in PIES]
+
+
+def offered(menu):
+    """The modes that a menu offers, and how it calls them."""
+    return {properties.mode: properties.text for name, _, properties in drawn(menu) if name == "rigid_motion.set_mode"}
 
 
 @pytest.mark.parametrize("menu", MODE_MENUS, ids=lambda menu: menu.__name__)
-def test_every_menu_offers_every_mode(tool, menu):
-    offered = [properties.mode for name, _, properties in drawn(menu) if name == "rigid_motion.set_mode"]
-    assert sorted(offered) == sorted(MODE_IDS)
+def test_every_menu_offers_every_mode_and_says_which_are_one_motion(tool, menu):
+    modes = offered(menu)
+    assert sorted(modes) == sorted(MODE_IDS)
+    assert {text for text in modes.values() if "=" in text} == {
+        *("Motor Screw (= Screw)", "Spiral (= Screw)", "Spiral Blend (= Screw Blend)")
+    }
+
+
+@pytest.mark.parametrize("menu", PIES, ids=lambda menu: menu.__name__)
+def test_a_pie_has_one_slice_for_each_motion_and_the_way_to_all_modes(tool, menu):
+    motions = {"BLENDER", "motor_spline", "dq_sclerp", "lerp_slerp", "pga_lerp"}
+    assert offered(menu).keys() == motions
+    (more,) = [properties.name for name, _, properties in drawn(menu) if name == "wm.call_menu"]
+    assert offered(getattr(bpy.types, more)).keys() == set(MODE_IDS)
+    write_channel(tool, "scale", FRAMES, np.ones((len(FRAMES), 3)))
+    assert offered(menu).keys() == motions | {"cga_slerp", "cga_lerp"}
 
 
 def test_the_mode_that_is_chosen_is_ticked(tool):
     bpy.ops.rigid_motion.set_mode(mode="pga_lerp")
-    ticked = {p.mode: icon for name, icon, p in drawn(menus.RIGID_MOTION_MT_object) if name == "rigid_motion.set_mode"}
+    ticked = {p.mode: icon for name, icon, p in drawn(menus.RIGID_MOTION_MT_view) if name == "rigid_motion.set_mode"}
     assert [mode for mode, icon in ticked.items() if icon == "CHECKMARK"] == ["pga_lerp"]
 
 
 def test_modes_that_are_mixed_have_dots(tool):
     select_keys(tool, 11.0)
     bpy.ops.rigid_motion.set_mode(mode="dq_sclerp", on="SELECTED")
-    icons = {p.mode: icon for name, icon, p in drawn(menus.RIGID_MOTION_MT_object) if name == "rigid_motion.set_mode"}
+    icons = {p.mode: icon for name, icon, p in drawn(menus.RIGID_MOTION_MT_view) if name == "rigid_motion.set_mode"}
     assert {mode for mode, icon in icons.items() if icon == "DOT"} == {"BLENDER", "dq_sclerp"}
     assert "CHECKMARK" not in icons.values()
 
 
 def test_menus_draw_without_an_object(extension):
-    for menu in MODE_MENUS:
+    for menu in (*MODE_MENUS, *PIES):
         assert drawn(menu)

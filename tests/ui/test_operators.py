@@ -6,9 +6,20 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import bake_poses, is_baked, key_frames, modes_of, read_poses, reduction_of
+from rigid_motion.animation import (
+    bake_poses,
+    key_frames,
+    modes_of,
+    problem_of,
+    read_poses,
+    reduction_of,
+    set_mode,
+    write_channel,
+)
+from rigid_motion.animation.transforms import transform_of
 from rigid_motion.motion import MODES, Poses, interpolate, shell_error
-from rigid_motion.ui import CLASSES, gltf_export, live, pose_operators
+from rigid_motion.ui import CLASSES, gltf_export, live
+from rigid_motion.ui.operators import axis_of_turns
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.scenes import new_object
 from tests.ui.conftest import FRAMES, keyed, select_keys
@@ -45,23 +56,11 @@ def test_turns_of_selected_keys_keep_the_axis_unless_there_is_another(tool):
     operators.set_mode(mode="dq_sclerp")
     select_keys(tool, FRAMES[2])
     operators.set_turns(turns=1, on="SELECTED", axis="X")
-    record = tool.animation_data.action.rigid_motion.slots[0]
     assert turns(tool)[FRAMES[2]] == 1.0
-    assert record.turns_axis == "X"
+    assert axis_of_turns(transform_of(tool)) == "X"
     operators.set_turns(turns=2, on="SELECTED")
     assert turns(tool)[FRAMES[2]] == 2.0
-    assert record.turns_axis == "X"
-
-
-def test_a_mode_key_is_selected_with_its_pose_and_the_one_that_ends_it_is_not(tool):
-    select_keys(tool, 11.0)
-    operators.set_mode(mode="dq_sclerp", on="SELECTED")
-    slot = tool.animation_data.action_slot
-    curve = tool.animation_data.action.layers[0].strips[0].channelbag(slot).fcurves.find("rigid_motion.mode")
-    parts = ("select_control_point", "select_left_handle", "select_right_handle")
-    selected = {key.co.x: {getattr(key, part) for part in parts} for key in curve.keyframe_points}
-    assert selected[11.0] == {True}
-    assert selected[21.0] == {False}
+    assert axis_of_turns(transform_of(tool)) == "X"
 
 
 @pytest.mark.parametrize(("frame", "segment"), [(1, 0), (5, 0), (11, 1), (20.5, 1), (30, 2), (41, 2)])
@@ -79,13 +78,14 @@ def test_without_selected_keys_nothing_changes(tool):
 
 
 def test_one_that_refuses_is_named_and_the_others_are_done(tool, capfd):
-    stubborn = keyed("Stubborn", "AXIS_ANGLE")
+    stubborn = keyed("Stubborn")
+    curves_of(stubborn)["location", 1].modifiers.new("ENVELOPE")
     assert operators.set_mode(mode="dq_sclerp") == {"FINISHED"}
     assert modes(tool) == ["dq_sclerp"] * 3
-    assert stubborn.rigid_motion.mode == "BLENDER"
+    assert modes(stubborn) == ["BLENDER"] * 3
     said = capfd.readouterr().out
-    assert "1 of 2 objects: Screw (Dual Quaternion). But" in said
-    assert "Stubborn turns by axis and angle" in said
+    assert "1 of 2 objects: Screw. But" in said
+    assert "Stubborn: Location Y has an Envelope" in said
 
 
 def test_without_a_selection_the_active_object_is_meant(tool):
@@ -95,36 +95,19 @@ def test_without_a_selection_the_active_object_is_meant(tool):
 
 
 @pytest.mark.parametrize(
-    "name", ["set_mode", "clear", "bake", "unbake", "reduce_keys", "restore_keys", "discard_dense_keys"]
+    "name", ["set_mode", "clear", "bake", "unbake", "reduce_keys", "restore_keys", "discard_dense_keys", "add_cycles"]
 )
 def test_without_any_object_an_operator_says_why_not(extension, name):
     operator = getattr(operators, name)
     assert not operator.poll()
-    with pytest.raises(RuntimeError, match="Select an object with keys first"):
+    with pytest.raises(RuntimeError, match="Select objects or bones with keys first"):
         operator()
 
 
-@pytest.mark.parametrize(
-    ("options", "frames"),
-    [
-        ({"step": 10.0}, [1, 11, 21, 31, 41]),
-        ({"frames": "CUSTOM", "first": 12.0, "last": 13.0, "step": 2.5}, [1, 11, 13.5, 16, 18.5, 21, 41]),
-        ({"frames": "SCENE", "step": 5.0}, [1, 6, 11, 21, 41]),
-    ],
-    ids=["action", "custom", "scene"],
-)
-def test_what_is_baked_is_the_range_asked_for_in_whole_segments(tool, options, frames):
-    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 2, 9
+def test_what_is_baked_has_keys_on_every_step_and_those_that_there_were(tool):
     operators.set_mode(mode="dq_sclerp")
-    operators.bake(**options)
-    assert key_frames(tool).tolist() == frames
-
-
-def test_a_range_that_ends_before_its_start_is_refused(tool):
-    operators.set_mode(mode="dq_sclerp")
-    with pytest.raises(RuntimeError, match="before its start"):
-        operators.bake(frames="CUSTOM", first=20.0, last=10.0)
-    assert not is_baked(tool)
+    operators.bake(step=8.0)
+    assert key_frames(tool).tolist() == [1, 9, 11, 17, 21, 25, 33, 41]
 
 
 def refusal_of(name: str) -> str:
@@ -140,7 +123,7 @@ def refusal_of(name: str) -> str:
 def test_buttons_with_nothing_to_do_are_greyed_out_with_the_reason(tool):
     assert "choose a mode" in refusal_of("bake")
     assert "Blender's own in-betweens already" in refusal_of("clear")
-    assert "None of these objects is baked" in refusal_of("unbake")
+    assert "Nothing here is baked" in refusal_of("unbake")
     assert "not reduced" in refusal_of("restore_keys")
     assert refusal_of("reduce_keys") == ""
     operators.set_mode(mode="dq_sclerp")
@@ -160,6 +143,61 @@ def test_a_mode_that_waits_for_keys_can_be_cleared_and_has_nothing_to_bake(exten
     operators.set_mode(mode="dq_sclerp")
     assert refusal_of("clear") == ""
     assert "choose a mode" in refusal_of("bake")
+
+
+def test_modes_are_copied_key_by_key_where_keys_are_on_the_same_frames(extension):
+    alike, other, model = keyed("Alike"), keyed("Other"), keyed("Model")
+    for fcurve in curves_of(other).values():
+        fcurve.keyframe_points[1].co_ui.x += 3.0
+    other.animation_data.action.update_tag()
+    set_mode(model, "pga_lerp", FRAMES[1:2])
+    set_mode(model, "dq_sclerp", FRAMES[2:3])
+    bpy.context.scene.frame_set(25)
+    assert operators.copy_mode() == {"FINISHED"}
+    assert modes(alike) == modes(model) == ["BLENDER", "pga_lerp", "dq_sclerp"]
+    assert modes_of(other, key_frames(other)) == ["dq_sclerp"] * 4
+    set_mode(model, "BLENDER")
+    bpy.context.scene.frame_set(100)
+    operators.copy_mode()
+    assert modes(alike) == modes(other) == ["BLENDER"] * 3
+    model.select_set(False)
+    alike.select_set(False)
+    other.select_set(False)
+    assert "Select what is to have the mode" in refusal_of("copy_mode")
+
+
+def test_what_has_no_keys_yet_waits_for_them_with_the_mode_that_is_copied(extension):
+    waiting = new_object("Waiting")
+    set_mode(keyed("Model"), "dq_sclerp")
+    waiting.select_set(True)
+    operators.copy_mode()
+    assert waiting.rigid_motion.mode == "dq_sclerp"
+
+
+@pytest.mark.parametrize("kind", ["REPEAT", "MIRROR"])
+def test_cycles_are_on_all_channels_and_in_front(tool, kind):
+    operators.set_mode(mode="dq_sclerp")
+    assert operators.add_cycles(mode=kind) == {"FINISHED"}
+    for fcurve in curves_of(tool).values():
+        first = fcurve.modifiers[0]
+        assert (first.type, first.mode_before, first.mode_after) == ("CYCLES", kind, kind)
+    curves_of(tool)["location", 0].modifiers[0].mode_after = "NONE"
+    bpy.context.view_layer.update()
+    assert "repeats, but not all of it together" in problem_of(tool)
+    assert operators.add_cycles(mode=kind) == {"FINISHED"}
+    assert problem_of(tool) == ""
+    curves_of(tool)["location", 0].keyframe_points.insert(50.0, 3.0)
+    with pytest.raises(RuntimeError, match="on the same frames to repeat"):
+        operators.add_cycles(mode=kind)
+
+
+def test_with_an_offset_what_turns_needs_to_end_as_it_begins(tool):
+    operators.set_mode(mode="dq_sclerp")
+    with pytest.raises(RuntimeError, match="ends turned or scaled otherwise than it begins"):
+        operators.add_cycles(mode="REPEAT_OFFSET")
+    write_channel(tool, "rotation_quaternion", FRAMES, np.tile((1.0, 0.0, 0.0, 0.0), (len(FRAMES), 1)))
+    assert operators.add_cycles(mode="REPEAT_OFFSET") == {"FINISHED"}
+    assert problem_of(tool) == ""
 
 
 def recorded(name: str = "Tool", size: float = 1.0) -> bpy.types.Object:
@@ -186,18 +224,18 @@ def test_the_best_mode_of_each_segment_is_said_and_is_one_step_to_undo(extension
     said = capfd.readouterr().out
     assert "; segments: " in said
     for mode, count in segments.items():
-        assert f"{count} {MODES[mode].short_label}" in said
+        assert f"{count} {MODES[mode].label}" in said
     bpy.ops.ed.undo()
     assert snapshot(bpy.data.objects["Tool"]) == before
 
 
 def test_the_tolerance_is_a_millimetre_in_any_unit(extension):
     bpy.context.scene.unit_settings.scale_length = 0.01
-    obj = recorded(size=100.0)
+    obj = recorded(size=10.0)
     frames = key_frames(obj)
     truth = read_poses(obj, frames)
-    operators.reduce_keys(radius=10.0)
-    error = shell_error(read_poses(obj, frames), truth, 10.0).max()
+    operators.reduce_keys(radius=1.0)
+    error = shell_error(read_poses(obj, frames), truth, 1.0).max()
     assert 0.02 < error < 0.1 * 1.001
 
 
@@ -229,7 +267,7 @@ def test_reduced_keys_are_restored_or_the_others_discarded(extension):
     assert snapshot(obj) == reduced
     assert not operators.restore_keys.poll()
     assert not operators.discard_dense_keys.poll()
-    assert [action.name for action in bpy.data.actions] == ["ToolAction Reduced"]
+    assert [action.name for action in bpy.data.actions] == ["ToolAction"]
 
 
 @pytest.mark.parametrize("operator", OPERATORS, ids=lambda operator: operator.bl_idname)
@@ -237,8 +275,8 @@ def test_every_operator_and_property_says_what_it_is_for(extension, operator):
     assert operator.bl_idname.startswith("rigid_motion.")
     assert len(operator.bl_description) > 20
     assert not operator.bl_description.endswith(".")
-    # Blender's operator that is called makes the step of undo, if it makes one; an export and a port change nothing.
-    without_undo = {*pose_operators.CLASSES, *gltf_export.CLASSES, *live.CLASSES}
+    # An export and a port change nothing.
+    without_undo = {*gltf_export.CLASSES, *live.CLASSES}
     assert {"REGISTER", "UNDO"} - operator.bl_options <= ({"UNDO"} if operator in without_undo else set())
     kind = getattr(bpy.ops.rigid_motion, operator.bl_idname.partition(".")[2]).get_rna_type()
     for prop in kind.properties:

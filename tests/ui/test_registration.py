@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 import rigid_motion
-from rigid_motion.animation.live import follower
+from rigid_motion.animation.following import follower
 from rigid_motion.ui import keymap, menus
 
 
@@ -17,7 +17,7 @@ def footprint():
     lists = (getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers) if not name.startswith("_"))
     return {
         "classes": {name for name in dir(bpy.types) if "rigid_motion" in name.lower() or "RigidMotion" in name},
-        "properties": [hasattr(kind, "rigid_motion") for kind in (bpy.types.Object, bpy.types.Action)],
+        "properties": [hasattr(kind, "rigid_motion") for kind in (bpy.types.Object, bpy.types.PoseBone)],
         "of scenes": hasattr(bpy.types.Scene, "rigid_motion_overlay"),
         "operators": dir(bpy.ops.rigid_motion),
         "menus": [len(getattr(bpy.types, menu)._dyn_ui_initialize()) for menu in menus.ENTRIES],

@@ -8,6 +8,7 @@ import pytest
 
 from rigid_motion.animation import bake, problem_of, set_mode
 from tests.animation.keyed import curves_of, snapshot
+from tests.animation.modified import is_term
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object
 
@@ -55,14 +56,38 @@ def test_a_driven_angle_or_scale_takes_all_of_it_to_blender_and_the_rest_keeps_i
     for fcurve in [c for (name, _), c in curves_of(other).items() if name == path]:
         fcurve.mute = True
     set_mode(other, "dq_sclerp")
-    bpy.context.scene.frame_set(17)
-    parts = [name for name in ("location", "rotation_euler", "scale") if name != path]
-    for name in parts:
-        delta = f"delta_{name}"
-        np.testing.assert_allclose(getattr(obj, delta), getattr(other, delta), atol=1e-6)
-    assert path not in {name.removeprefix("delta_") for name, _ in curves_of(obj) if name.startswith("delta_")}
-    assert np.abs(obj.delta_location).max() > 1e-3, "there is a mode in it"
+    for frame in (17, 33):
+        bpy.context.scene.frame_set(frame)
+        for name in ("location", "rotation_euler", "scale"):
+            if name != path:
+                assert tuple(getattr(obj, name)) == pytest.approx(tuple(getattr(other, name)), abs=1e-5)
+    with_modes = {name for (name, _), fcurve in curves_of(obj).items() if fcurve.modifiers}
+    assert "location" in with_modes, "there is a mode in it"
+    assert path not in with_modes
     assert problem_of(obj) == ""
+
+
+@pytest.mark.parametrize(("path", "index"), [("location", 2), ("rotation_euler", 1)])
+def test_a_muted_channel_is_left_alone_and_takes_all_of_a_rotation_to_blender(live_file, path, index):
+    obj, other = (key(new_object(name, "XYZ")) for name in ("Tool", "Other"))
+    curves_of(obj)[path, index].mute = True
+    obj.location[2] = 3.0
+    for (name, row), fcurve in curves_of(other).items():
+        if name == path and (row == index or path != "location"):
+            for point in fcurve.keyframe_points:
+                point.co_ui.y = obj.location[2] if path == "location" else 0.0
+            fcurve.update()
+    native = shown(obj)
+    for carrier in (obj, other):
+        set_mode(carrier, "dq_sclerp")
+    filled = {name for name, fcurve in curves_of(obj).items() if any(map(is_term, fcurve.modifiers))}
+    axes = (0, 1) if path == "location" else (0, 1, 2)
+    assert {row for name, row in filled if name == "location"} == set(axes)
+    assert path == "location" or not {name for name in filled if name[0] == path}
+    now, then = shown(obj), shown(other)
+    np.testing.assert_allclose(now[:, axes, 3], then[:, axes, 3], atol=1e-5)
+    turned = then if path == "location" else native
+    np.testing.assert_allclose(now[:, :3, :3], turned[:, :3, :3], atol=1e-5)
 
 
 def test_its_motion_is_baked_and_the_driver_stays(live_file):

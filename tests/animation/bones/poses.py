@@ -22,8 +22,11 @@ from tests.animation.oracle import expected_bases, play, shortest_quaternion, sh
 
 TOLERANCE = 1e-5
 
+Poses = dict[str, np.ndarray]
+"""Matrices of bones by their names."""
 
-def shown_poses(rigs: Iterable[bpy.types.Object], frames: Sequence[float]) -> list[dict[str, np.ndarray]]:
+
+def shown_poses(rigs: Iterable[bpy.types.Object], frames: Sequence[float]) -> list[Poses]:
     """All bones of rigs by name, as the scene evaluates them. It returns to its frame."""
     rigs, scene = list(rigs), bpy.context.scene
     before, subframe = scene.frame_current, scene.frame_subframe
@@ -55,22 +58,13 @@ def names_of(rig: bpy.types.Object) -> list[str]:
     return [pose_bone.name for pose_bone in rig.pose.bones]
 
 
-def expected_poses(
-    rig: bpy.types.Object,
-    frames: Sequence[float],
-    bases: dict[str, np.ndarray] | None = None,
-    bones: Iterable[str] | None = None,
-) -> dict[str, np.ndarray]:
-    """These bones by name, or all, and their parents, from their channels, modes, parents and settings.
-
-    `bases` are what moves bones in the space of their channels, where that is known already.
-    """
+def expected_poses(rig: bpy.types.Object, frames: Sequence[float], bones: Iterable[str] | None = None) -> Poses:
+    """These bones by name, or all, and their parents, from their channels, modes, parents and settings."""
     frames, result = np.asarray(frames, dtype=np.float64), {}
-    bases = bases or {}
     asked = [rig.pose.bones[name] for name in (names_of(rig) if bones is None else bones)]
     needed = {item.name for bone in asked for item in (bone, *bone.parent_recursive)}
     for pose_bone in (bone for bone in rig.pose.bones if bone.name in needed):
-        basis = bases[pose_bone.name] if pose_bone.name in bases else expected_bases(pose_bone, frames)
+        basis = expected_bases(pose_bone, frames)
         parent = None if pose_bone.parent is None else result[pose_bone.parent.name]
         result[pose_bone.name] = _placed(pose_bone.bone, basis, parent)
     return result
@@ -114,8 +108,8 @@ def assert_posed(rig: bpy.types.Object, frames: Sequence[float], bones: Iterable
 def assert_same_poses(
     rig: bpy.types.Object,
     frames: Sequence[float],
-    shown: dict[str, np.ndarray],
-    expected: dict[str, np.ndarray],
+    shown: Poses,
+    expected: Poses,
     bones: Iterable[str] | None = None,
     tolerance: float = TOLERANCE,
 ) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -16,76 +16,34 @@ from tests.animation.scenes import new_object
 LAST = 30
 """Keys are on frames from 1 to this."""
 
-ROTATION_MODES = (*ORDERS, "AXIS_ANGLE")
-
-
-@dataclass(frozen=True)
-class BoneCase:
-    """How one bone of a rig is at random."""
-
-    parent: int
-    """How many bones before it its parent is; 0 for none."""
-
-    seed: int
-    rotation_mode: str = "QUATERNION"
-    inherit_rotation: bool = True
-    inherit_scale: str = "FULL"
-    local_location: bool = True
-    connected: bool = False
-    step: float = 1.0
-    """Frames from key to key; 0 where it has none."""
-
-    interpolation: str = "LINEAR"
-    location: bool = False
-    scale: str = ""
-    """"even", "uneven", "negative" for keys of it; "still" where it just is another."""
-
-    follows: str = ""
-    """The type of a constraint, or "DRIVER"."""
-
-
-@dataclass(frozen=True)
-class RigCase:
-    """A rig, what is asked of it, and how it moves."""
-
-    bones: tuple[BoneCase, ...]
-    seed: int = 0
-    object_keys: bool = False
-    parented: bool = False
-    size: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    strip: float = 0.0
-    """The scale of the strip that it moves by; 0 for none."""
-
-    mode: str = "motor_spline"
-    shared: bool = False
-    hold: bool = True
-    best_of: bool = False
-    tolerance: float = 0.01
-
-
 BONES = st.builds(
-    BoneCase,
+    SimpleNamespace,
+    # So many bones before it; 0 for none.
     parent=st.integers(0, 3),
     seed=st.integers(0, 1 << 20),
-    rotation_mode=st.sampled_from(ROTATION_MODES),
+    rotation_mode=st.sampled_from(ORDERS),
     inherit_rotation=st.booleans(),
     inherit_scale=st.sampled_from(INHERIT_SCALES),
     local_location=st.booleans(),
     connected=st.booleans(),
+    # Frames from key to key; 0 where it has none.
     step=st.sampled_from((1.0, 1.0, 0.8, 2.0, 5.0, 0.0)),
     interpolation=st.sampled_from(("LINEAR", "LINEAR", "BEZIER", "BEZIER", "SINE", "BOUNCE", "CONSTANT")),
     location=st.booleans(),
+    # What keys of it are, or that it just is another.
     scale=st.sampled_from(("", "", "even", "uneven", "negative", "still")),
+    # A type of constraints, or a driver.
     follows=st.sampled_from((*[""] * 8, "DAMPED_TRACK", "IK", "COPY_ROTATION", "LIMIT_ROTATION", "DRIVER")),
 )
 
 RIGS = st.builds(
-    RigCase,
+    SimpleNamespace,
     bones=st.lists(BONES, min_size=1, max_size=6).map(tuple),
     seed=st.integers(0, 1 << 20),
     object_keys=st.booleans(),
     parented=st.booleans(),
     size=st.sampled_from(((1.0, 1.0, 1.0), (0.5, 0.5, 0.5), (1.0, 2.0, 0.7))),
+    # The scale of the strip that it moves by; 0 for none.
     strip=st.sampled_from((0.0, 0.0, 1.0, 1.5, 2.0)),
     mode=st.sampled_from(("motor_spline", "lerp_slerp", "dq_sclerp", "cga_lerp")),
     shared=st.booleans(),
@@ -99,7 +57,7 @@ def name_of(number: int) -> str:
     return f"Bone {number}"
 
 
-def build(case: RigCase, name: str = "Rig") -> bpy.types.Object:
+def build(case: SimpleNamespace, name: str = "Rig") -> bpy.types.Object:
     """The rig of a case, in the open file."""
     random = np.random.default_rng(case.seed)
     rig = new_object(name, data=bpy.data.armatures.new(name))
@@ -137,7 +95,7 @@ def _waves(random: np.random.Generator, frames: np.ndarray, count: int) -> np.nd
     return np.sin(random.uniform(0.05, 0.35, count) * frames[:, None] + random.uniform(0.0, 6.0, count))
 
 
-def _key(bone: bpy.types.PoseBone, settings: BoneCase) -> None:
+def _key(bone: bpy.types.PoseBone, settings: SimpleNamespace) -> None:
     random = np.random.default_rng(settings.seed)
     bone.rotation_mode = settings.rotation_mode
     path = f"{bone.path_from_id()}."
@@ -161,7 +119,7 @@ def _key(bone: bpy.types.PoseBone, settings: BoneCase) -> None:
             write_channel(bone.id_data, path + name, frames, values, interpolation=settings.interpolation)
 
 
-def _constrain(rig: bpy.types.Object, number: int, settings: BoneCase) -> None:
+def _constrain(rig: bpy.types.Object, number: int, settings: SimpleNamespace) -> None:
     bone, other = rig.pose.bones[name_of(number)], name_of((number + 1) % len(rig.pose.bones))
     if settings.follows == "DRIVER":
         driver = bone.driver_add("location", 1).driver
@@ -180,7 +138,7 @@ def _constrain(rig: bpy.types.Object, number: int, settings: BoneCase) -> None:
         constraint.chain_count = 2
 
 
-def _move(rig: bpy.types.Object, case: RigCase, random: np.random.Generator) -> None:
+def _move(rig: bpy.types.Object, case: SimpleNamespace, random: np.random.Generator) -> None:
     rig.scale = case.size
     if case.parented:
         parent = new_object(f"{rig.name} parent")

@@ -1,102 +1,32 @@
-"""The bones of rigs as what is edited, where they have to be, and what may be in their Actions."""
+"""The bones of rigs as what is edited, and rigs that come and go, or whose bones get other names and are no more."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import ClassVar, NamedTuple
-
 import bpy
 import numpy as np
-from hypothesis.stateful import invariant, precondition
+from hypothesis import strategies as st
+from hypothesis.stateful import invariant, precondition, rule
 
-from rigid_motion import animation
-from tests.animation.bones.poses import shown_poses
-from tests.animation.bones.rigs import CONSTRAINT, Rest
+from tests.animation.bones.poses import TOLERANCE
+from tests.animation.bones.rigs import Rest, with_edit_bones
 from tests.animation.edit_steps import TakenAway
-from tests.animation.editing import Editing
-from tests.animation.keyed import WIDTHS, curves_of, key_frames, mode_at, transform_paths
-from tests.animation.machine import goes_on
+from tests.animation.editing import Editing, shares
+from tests.animation.keyed import key_frames
 from tests.animation.oracle import expected_bases, shortest_quaternion
 
 BONES = (
     Rest("Body", (0.1, -0.2, 0.9), (0.15, -0.1, 1.4), roll=0.4),
-    Rest("Arm", (0.3, 0.0, 1.4), (0.6, 0.1, 1.3), "Body", roll=-1.1),
+    Rest("Arm", (0.3, 0.0, 1.4), (0.6, 0.1, 1.3), "Body", roll=-1.1, settings=(("use_local_location", False),)),
     Rest("Prop", (-0.5, 0.3, 0.2), (-0.4, 0.3, 0.6), roll=0.9),
 )
 """A chain of two bones, and one that nothing moves but its keys."""
-
-TOLERANCE = 1e-5
 
 Name = tuple[str, str]
 """Of a rig, and of a bone of it."""
 
 
-def has_live_segments(bone: bpy.types.PoseBone) -> bool:
-    return any(mode_at(bone, frame) != "BLENDER" for frame in key_frames(bone)[:-1])
-
-
-def as_blender_has_it(bone: bpy.types.PoseBone, frames: Iterable[float]) -> np.ndarray:
-    """Where its channels alone move a bone, matrices of (m, 4, 4)."""
-    return expected_bases(bone, frames, keys=np.empty(0))
-
-
-def smallest_scale(bone: bpy.types.PoseBone, frames: Iterable[float]) -> np.ndarray:
-    """The smallest scale of a bone by its channels, and of its parents, along any axis; at most 1."""
-    least = np.ones(len(frames))
-    for item in (bone, *bone.parent_recursive):
-        curves = curves_of(item)
-        for index, rest in enumerate(item.scale):
-            fcurve = curves.get(("scale", index))
-            keyed = fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute
-            least = np.minimum(least, [fcurve.evaluate(frame) for frame in frames] if keyed else rest)
-    return least
-
-
-def own_constraints(bone: bpy.types.PoseBone) -> list[bpy.types.Constraint]:
-    return [constraint for constraint in bone.constraints if constraint.name.startswith(CONSTRAINT)]
-
-
-def channelbags(action: bpy.types.Action) -> list[bpy.types.ActionChannelbag]:
-    return [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
-
-
-def slots_of_differences(action: bpy.types.Action) -> list[bpy.types.ActionSlot]:
-    return [slot for slot in action.slots if slot.name_display.startswith(CONSTRAINT)]
-
-
-def carried_by(bone: bpy.types.PoseBone, parent: np.ndarray) -> np.ndarray:
-    """What a bone is moved in, in the armature's space, where its parent is at these matrices (m, 4, 4)."""
-    rest = np.array(bone.bone.matrix_local, dtype=np.float64)
-    if bone.parent is None:
-        return rest
-    return parent @ np.linalg.inv(np.array(bone.parent.bone.matrix_local, dtype=np.float64)) @ rest
-
-
-class Motion(NamedTuple):
-    """What moves a bone in the space of its channels on m frames."""
-
-    desired: np.ndarray
-    """Matrices (m, 4, 4)."""
-
-    native: np.ndarray
-    """The same as Blender has it."""
-
-    precision: np.ndarray
-    """What part of single precision is left of its directions, (m,); 0 where Blender loses them.
-
-    Blender takes a constraint's bone apart: what is mirrored or has no size loses its way of turning there.
-    """
-
-
 class RigEditing(TakenAway, Editing):
-    """An animator at work on the bones of rigs: what every edit is checked by."""
-
-    KEPT: ClassVar = (*Editing.KEPT, "taken_off")
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.taken_off: set[Name] = set()
-        """The bones whose constraints somebody took off."""
+    """An animator at work on the bones of rigs, and on armatures."""
 
     def _found(self, name: Name) -> bpy.types.PoseBone:
         rig, bone = name
@@ -105,18 +35,13 @@ class RigEditing(TakenAway, Editing):
     def _animated(self, name: Name) -> bpy.types.Object:
         return bpy.data.objects[name[0]]
 
-    def _is_exact(self, name: Name) -> bool:
-        frames = np.array([bpy.context.scene.frame_current_final])
-        chain = (self._found(name), *self._found(name).parent_recursive)
-        return all(self._motion(bone, frames).precision[0] > 0.2 for bone in chain)
-
     def _basis(self, bone: bpy.types.PoseBone) -> np.ndarray:
-        evaluated = bone.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones[bone.name]
-        parent = None if bone.parent is None else np.array(evaluated.parent.matrix, dtype=np.float64)
-        return np.linalg.solve(carried_by(bone, parent), np.array(evaluated.matrix, dtype=np.float64))
+        """What its channels make of it, as it is evaluated. What its parents make of that is Blender's."""
+        rig = bone.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        return np.array(rig.pose.bones[bone.name].matrix_basis, dtype=np.float64)
 
-    def _rigs(self) -> list[bpy.types.Object]:
-        return [bpy.data.objects[name] for name in sorted({rig for rig, _ in self.names})]
+    def _rigs(self) -> list[str]:
+        return sorted({rig for rig, _ in self.names})
 
     def _sharing(self, name: Name) -> set[Name]:
         rig, bone = name
@@ -125,144 +50,149 @@ class RigEditing(TakenAway, Editing):
     def _rigs_sharing(self, name: str) -> set[str]:
         """The rigs that move by the same slot as this one, itself among them."""
         linked = self._linked(bpy.data.objects[name])
-        return {name} | {rig.name for rig in self._rigs() if linked[0] is not None and self._linked(rig) == linked}
+        others = (rig for rig in self._rigs() if linked[0] is not None)
+        return {name} | {rig for rig in others if self._linked(bpy.data.objects[rig]) == linked}
 
     def _is_free(self, rig: str) -> bool:
         """Whether its Action may be exchanged without losing a bake's way back, or leaving others behind."""
-        own = {name for name in self.names if name[0] == rig}
-        return self._rigs_sharing(rig) == {rig} and not own & (self.before_bake.keys() | self.taken_off)
-
-    def _edit(self, change, settle=None) -> None:
-        super()._edit(change, settle)
-        # Without in-betweens there is nothing to be taken off, and what comes anew is put on.
-        gone = {name for name in self.taken_off if not self._has_differences(name)}
-        if gone:
-            self.taken_off -= gone
-            if self.on:
-                self.history[self.place] = self._remembered()
-
-    def _has_differences(self, name: Name) -> bool:
-        bone = self._found(name)
-        action, _ = self._linked(bone.id_data)
-        handles = {slot.handle for slot in slots_of_differences(action)} if action is not None else ()
-        bags = [bag for bag in channelbags(action) if bag.slot_handle in handles] if handles else ()
-        return any(curve.data_path.startswith(f"{bone.path_from_id()}.") for bag in bags for curve in bag.fcurves)
+        return self._rigs_sharing(rig) == {rig} and not {name for name in self.before_bake if name[0] == rig}
 
     # What holds all the time
-
-    def _motion(self, bone: bpy.types.PoseBone, frames: np.ndarray, how: Callable = expected_bases) -> Motion:
-        """What was muted or taken off does not move a bone."""
-        is_off = (bone.id_data.name, bone.name) in self.taken_off or any(
-            constraint.mute for constraint in own_constraints(bone)
-        )
-        native, scale = as_blender_has_it(bone, frames), smallest_scale(bone, frames)
-        precision = shortest_quaternion(bone, frames) * np.where(scale > 0.02, scale, 0.0)
-        return Motion(native if is_off else how(bone, frames), native, precision)
-
-    def _is_at_odds(self, name: Name) -> bool:
-        """Whether another rig that moves by the same Action has this bone otherwise where nothing is keyed."""
-        bone = self._found(name)
-        keyed = {
-            channel for channel, fcurve in curves_of(bone).items() if len(fcurve.keyframe_points) and not fcurve.mute
-        }
-        others = [self._found(other) for other in self._sharing(name) - {name}]
-        return any(
-            getattr(other, path)[index] != getattr(bone, path)[index]
-            for other in others
-            for path in transform_paths(bone)
-            for index in range(WIDTHS[path])
-            if (path, index) not in keyed
-        )
-
-    def _placed(self, bone: bpy.types.PoseBone, shown: dict[str, np.ndarray], bases: np.ndarray) -> np.ndarray:
-        return carried_by(bone, None if bone.parent is None else shown[bone.parent.name]) @ bases
-
-    def _assert_placed(
-        self,
-        rig: bpy.types.Object,
-        frames: np.ndarray,
-        motions: dict[str, Motion],
-        tolerance: float = TOLERANCE,
-        shown: dict[str, np.ndarray] | None = None,
-    ) -> None:
-        """Bones are at these matrices in the space of their channels, on top of what carries them as it is shown."""
-        shown = shown or shown_poses([rig], frames)[0]
-        for name, motion in motions.items():
-            bone = rig.pose.bones[name]
-            placed, native = (self._placed(bone, shown, bases) for bases in (motion.desired, motion.native))
-            size = max(1.0, np.abs(placed).max(initial=0.0), np.abs(native).max(initial=0.0))
-            error = np.abs(shown[name] - placed).max(axis=(1, 2), initial=0.0) / size * motion.precision
-            worst = int(np.argmax(error))
-            assert error[worst] < tolerance, (
-                f"{rig.name}, {name} ({bone.rotation_mode}) is off by {error[worst]:.3g} of its size on frame "
-                f"{frames[worst]} (keys on {key_frames(bone)}):\n{shown[name][worst]}\ninstead of\n{placed[worst]}"
-            )
 
     @precondition(lambda self: self.on and self.history)
     @invariant()
     def everything_is_where_it_has_to_be(self):
-        rigs = self._rigs()
-        frames = np.array(self._frames_that_are_seen([self._found(name) for name in self.names]), dtype=np.float64)
-        for rig, shown in zip(rigs, shown_poses(rigs, frames), strict=True):
-            bones = [bone for bone in rig.pose.bones if not self._is_at_odds((rig.name, bone.name))]
-            motions = {bone.name: self._motion(bone, frames) for bone in bones}
-            self._assert_placed(rig, frames, motions, shown=shown)
+        scene = bpy.context.scene
+        frames = self._frames_that_are_seen([self._found(name) for name in self.names])
+        before, shown = (scene.frame_current, scene.frame_subframe), {name: [] for name in self.names}
+        for frame in frames:
+            scene.frame_set(int(frame // 1), subframe=frame % 1)
+            for name, bases in shown.items():
+                bases.append(self._basis(self._found(name)))
+        scene.frame_set(before[0], subframe=before[1])
+        for name, bases in shown.items():
+            bone = self._found(name)
+            expected = expected_bases(bone, frames)
+            error = np.abs(np.array(bases) - expected).max(axis=(1, 2)) / max(1.0, np.abs(expected).max())
+            error *= shortest_quaternion(bone, frames)
+            worst = int(np.argmax(error))
+            assert error[worst] < TOLERANCE, (
+                f"{name} ({bone.rotation_mode}) is off by {error[worst]:.3g} of its size on frame {frames[worst]} "
+                f"(keys on {key_frames(bone)}):\n{bases[worst]}\ninstead of\n{expected[worst]}"
+            )
 
-    @precondition(lambda self: self.on and self.history)
-    @invariant()
-    def between_whole_frames_and_on_keys_there_bones_are_where_they_have_to_be(self):
-        rig = self._rigs()[-1]
-        bones = [
-            bone
-            for bone in rig.pose.bones
-            if len(key_frames(bone)) > 1 and not goes_on(bone) and not self._is_at_odds((rig.name, bone.name))
-        ]
-        if bones:
-            keys = key_frames(bones[0])
-            whole = np.arange(np.ceil(keys[0]), np.floor(keys[-1]))
-            frames = np.unique((*(whole[:: max(1, len(whole) // 6)] + 0.25), *keys[keys % 1.0 > 0.0][:6]))
-            motions = {bone.name: self._motion(bone, frames) for bone in bones}
-            self._assert_placed(rig, frames, motions, 10 * TOLERANCE)
+    # Bones and rigs that come and go
 
-    @precondition(lambda self: self.on and self.history)
-    @invariant()
-    def constraints_are_those_of_the_action_in_use(self):
-        for rig in self._rigs():
-            action, _ = self._linked(rig)
-            for bone in rig.pose.bones:
-                result = own_constraints(bone)
-                assert len(result) <= int(has_live_segments(bone)), f"{bone.name} of {rig.name}"
-                for constraint in result:
-                    assert constraint.action == action
-                    assert constraint.action_slot in slots_of_differences(action)
+    @precondition(lambda self: self.on)
+    @rule(who=shares, in_edit_mode=st.booleans())
+    def rename_a_bone(self, who, in_edit_mode):
+        rig, old = self._named(who)
+        if self._rigs_sharing(rig) != {rig}:
+            return
+        new, self.fresh = f'Renamed "{self.fresh}"', self.fresh + 1
+        self._rename(rig, {old: new}, in_edit_mode)
 
-    @precondition(lambda self: self.on and self.history)
-    @invariant()
-    def nothing_is_left_in_actions_of_what_has_no_mode(self):
-        rigs = self._rigs()
-        for action in {self._linked(rig)[0] for rig in rigs} - {None}:
-            users = [rig for rig in rigs if self._linked(rig)[0] == action]
-            live = {bone.path_from_id() for rig in users for bone in rig.pose.bones if has_live_segments(bone)}
-            present = {bone.path_from_id() for rig in users for bone in rig.pose.bones}
-            slots = {slot.handle for slot in slots_of_differences(action)}
-            keyed = []
-            for bag in channelbags(action):
-                assert bag.slot_handle not in slots or len(bag.fcurves), f"an empty slot is left in {action.name}"
-                for fcurve in bag.fcurves:
-                    is_of_extension = bag.slot_handle in slots or CONSTRAINT in fcurve.data_path
-                    path = fcurve.data_path[: fcurve.data_path.find('"]') + 2]
-                    if is_of_extension and path.startswith("pose"):
-                        # What a bone leaves behind that is deleted is Blender's to keep.
-                        assert path in live or path not in present, f"{fcurve.data_path} is left in {action.name}"
-                    elif len(fcurve.keyframe_points):
-                        keyed.append(fcurve.range())
-            assert len(slots) <= 1
-            if keyed:
-                begin, end = min(first for first, _ in keyed), max(last for _, last in keyed)
-                assert tuple(action.frame_range) == (begin, end if end > begin else begin + 1.0), action.name
+    @precondition(lambda self: self.on)
+    @rule(who=shares, other=shares, in_edit_mode=st.booleans())
+    def swap_the_names_of_two_bones(self, who, other, in_edit_mode):
+        rig, one = self._named(who)
+        bones = [bone for owner, bone in self.names if owner == rig and bone != one]
+        if self._rigs_sharing(rig) != {rig} or not bones:
+            return
+        two = bones[int(other * len(bones))]
+        self._rename(rig, {one: two, two: one}, in_edit_mode)
 
-    @precondition(lambda self: self.on and self.history)
-    @invariant()
-    def nothing_is_wrong(self):
-        fine = [name for name in self.names if not self._is_at_odds(name)]
-        assert {animation.problem_of(self._found(name)) for name in fine} <= {""}
+    def _rename(self, rig: str, names: dict[str, str], in_edit_mode: bool) -> None:
+        """Rename bones, whatever is baked, all at once."""
+        keyed = self._keyed()
+
+        def rename(bones: bpy.types.ArmatureBones | bpy.types.ArmatureEditBones) -> None:
+            bpy.context.view_layer.update()
+            given = [(bones[old], new) for old, new in names.items()]
+            for number, (bone, _) in enumerate(given):
+                bone.name = f"Between {number}"
+            for bone, new in given:
+                bone.name = new
+
+        def change() -> None:
+            obj = bpy.data.objects[rig]
+            if in_edit_mode:
+                with_edit_bones(obj, rename)
+            else:
+                rename(obj.data.bones)
+            self.names = [self._now(name, rig, names) for name in self.names]
+            self.before_bake = {self._now(name, rig, names): kept for name, kept in self.before_bake.items()}
+
+        self._edit(change)
+        assert self._keyed() == {self._now(name, rig, names): kept for name, kept in keyed.items()}
+
+    @staticmethod
+    def _now(name: Name, rig: str, names: dict[str, str]) -> Name:
+        return (rig, names.get(name[1], name[1])) if name[0] == rig else name
+
+    @precondition(lambda self: self.on and 2 < len(self.names) < 8)
+    @rule(who=shares, deleted=st.booleans())
+    def duplicate_or_delete_a_bone(self, who, deleted):
+        rig, bone = self._named(who)
+        before = set(bpy.data.objects[rig].pose.bones.keys())
+        if not self._is_free(rig) or len(before) < 2:
+            return
+
+        def act(edit_bones: bpy.types.ArmatureEditBones) -> None:
+            if deleted:
+                edit_bones.remove(edit_bones[bone])
+                return
+            for edit_bone in edit_bones:
+                edit_bone.select = edit_bone.select_head = edit_bone.select_tail = edit_bone.name == bone
+            bpy.ops.armature.duplicate()
+
+        def change() -> None:
+            with_edit_bones(bpy.data.objects[rig], act)
+            there = bpy.data.objects[rig].pose.bones.keys()
+            self.names = [name for name in self.names if name[0] != rig or name[1] in there]
+            self.names += [(rig, made) for made in sorted(set(there) - before)]
+
+        self._edit(change)
+        assert len(bpy.data.objects[rig].pose.bones) == len(before) + (-1 if deleted else 1)
+
+    @precondition(lambda self: self.on)
+    @rule(who=shares)
+    def move_along_other_axes(self, who):
+        rig, bone = self._named(who)
+
+        def change() -> None:
+            rest = bpy.data.objects[rig].data.bones[bone]
+            rest.use_local_location = not rest.use_local_location
+
+        if self._rigs_sharing(rig) == {rig}:
+            self._edit(change)
+
+    @precondition(lambda self: self.on and len(self.names) < 5)
+    @rule(who=shares, copied=st.booleans())
+    def copy_a_rig(self, who, copied):
+        rig, _ = self._named(who)
+        if not self._is_free(rig):
+            return
+        new, self.fresh = f"Copy {self.fresh}", self.fresh + 1
+        self._edit(lambda: self._copy(rig, new, copied))
+
+    def _copy(self, rig: str, new: str, copied: bool) -> None:
+        """The same rig once more, with the same Action or with a copy of it."""
+        obj = bpy.data.objects[rig]
+        made = obj.copy()
+        made.name, made.data = new, obj.data.copy()
+        bpy.context.scene.collection.objects.link(made)
+        action, slot = self._linked(obj)
+        if copied and action is not None:
+            made.animation_data.action = action.copy()
+            made.animation_data.action_slot = made.animation_data.action.slots[slot.identifier]
+        self.names += [(new, bone.name) for bone in made.pose.bones]
+
+    @precondition(lambda self: self.on)
+    @rule(who=shares)
+    def flip_the_action(self, who):
+        """All values are mirrored, and all that there are names of two sides for goes to the other side."""
+        rig, _ = self._named(who)
+        obj = bpy.data.objects[rig]
+        if self._is_free(rig) and self._linked(obj)[0] is not None:
+            self._edit(lambda: self._linked(bpy.data.objects[rig])[0].flip_with_pose(bpy.data.objects[rig]))

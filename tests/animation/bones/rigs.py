@@ -22,10 +22,10 @@ FRAMES = (1.0, 11.0, 24.0, 40.0)
 PLAYED = np.arange(-2.0, 44.0)
 """From before the first key until after the last."""
 
-ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
-CONSTRAINT = "Rigid Motion"
-"""What the constraints that show modes are called, and what their names begin with where a rig has several Actions."""
+BETWEEN = np.arange(-2.0, 44.0, 0.375)
+"""The same at all eighths of frames, whole ones among them."""
 
+ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "AXIS_ANGLE")
 INHERIT_SCALES = ("FULL", "FIX_SHEAR", "ALIGNED", "AVERAGE", "NONE", "NONE_LEGACY")
 
 
@@ -180,59 +180,40 @@ def moving_rig(
     return rig
 
 
-def twin_of(rig: bpy.types.Object) -> bpy.types.Object:
-    """The same rig once more, as it is without keys and modes. Constraints that aim at the rig aim at its twin."""
+def twin_of(rig: bpy.types.Object, frames: np.ndarray) -> bpy.types.Object:
+    """The same rig once more, with real keys on all of these frames, of where each bone has to be by its channels.
+
+    Constraints that aim at the rig aim at its twin.
+    """
     twin = rig.copy()
     twin.name = f"{rig.name} twin"
     bpy.context.scene.collection.objects.link(twin)
     twin.animation_data_clear()
     for pose_bone in twin.pose.bones:
-        for constraint in [item for item in pose_bone.constraints if item.name.startswith(CONSTRAINT)]:
-            pose_bone.constraints.remove(constraint)
-        for aiming in (item for constraint in pose_bone.constraints for item in (constraint, *_targets(constraint))):
+        for constraint in pose_bone.constraints:
             for name in ("target", "pole_target"):
-                if getattr(aiming, name, None) == rig:
-                    setattr(aiming, name, twin)
-        pose_bone.rigid_motion.mode = "BLENDER"
+                if getattr(constraint, name, None) == rig:
+                    setattr(constraint, name, twin)
+    for pose_bone in rig.pose.bones:
+        _write_basis(twin.pose.bones[pose_bone.name], frames, expected_bases(pose_bone, frames))
     return twin
 
 
-def _targets(constraint: bpy.types.Constraint) -> Iterable[bpy.types.ConstraintTargetBone]:
-    """What an Armature constraint aims at, in a list of its own."""
-    return constraint.targets if constraint.type == "ARMATURE" else ()
-
-
-def key_desired(
-    twin: bpy.types.Object, rig: bpy.types.Object, frames: np.ndarray, bases: dict[str, np.ndarray] | None = None
-) -> None:
-    """Give a twin real keys on all frames, of where each bone of the rig has to be in the space of its channels."""
-    for name, matrices in (bases or expected_basis_matrices(rig, frames)).items():
-        write_basis(twin.pose.bones[name], frames, matrices)
-
-
-def expected_basis_matrices(rig: bpy.types.Object, frames: np.ndarray) -> dict[str, np.ndarray]:
-    """Where each bone has to be in the space of its channels, matrices of (m, 4, 4)."""
-    return {pose_bone.name: expected_bases(pose_bone, frames) for pose_bone in rig.pose.bones}
-
-
-def write_basis(pose_bone: bpy.types.PoseBone, frames: np.ndarray, bases: np.ndarray) -> None:
+def _write_basis(pose_bone: bpy.types.PoseBone, frames: np.ndarray, bases: np.ndarray) -> None:
     """Key a bone so that its matrices in the space of its channels are these (m, 4, 4), without shear."""
     scale = np.linalg.norm(bases[:, :3, :3], axis=1)
     write_bone(pose_bone, "location", frames, bases[:, :3, 3])
     write_bone(pose_bone, "scale", frames, scale)
-    turned = rotations_as_channels(bases[:, :3, :3] / scale[:, None, :], pose_bone.rotation_mode)
+    turned = _as_channels(bases[:, :3, :3] / scale[:, None, :], pose_bone.rotation_mode)
     write_bone(pose_bone, rotation_path(pose_bone), frames, turned)
 
 
-def rotations_as_channels(rotations: np.ndarray, rotation_mode: str) -> np.ndarray:
-    """Rotation matrices (m, 3, 3) as quaternions, or as angles about X, Y and Z, by SciPy."""
+def _as_channels(rotations: np.ndarray, rotation_mode: str) -> np.ndarray:
+    """Rotation matrices (m, 3, 3) as quaternions, an angle and an axis, or angles about X, Y and Z, by SciPy."""
     turned = Rotation.from_matrix(rotations)
     if rotation_mode == "QUATERNION":
         return np.roll(turned.as_quat(), 1, axis=1)
+    if rotation_mode == "AXIS_ANGLE":
+        return np.column_stack((turned.magnitude(), turned.as_rotvec()))
     # Blender's orders name the turns about resting axes, the first one first, as SciPy's small letters do.
     return turned.as_euler(rotation_mode.lower())[:, [rotation_mode.index(axis) for axis in "XYZ"]]
-
-
-def own_constraints(rig: bpy.types.Object) -> dict[str, list[bpy.types.ActionConstraint]]:
-    """The constraints of this extension on each bone."""
-    return {bone.name: [c for c in bone.constraints if c.name.startswith(CONSTRAINT)] for bone in rig.pose.bones}

@@ -7,6 +7,7 @@ by more, in the world; and the largest error that is reported is the largest.
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -19,7 +20,8 @@ from rigid_motion.animation.baking.motions import not_promised
 from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.poses import shown_poses
-from tests.animation.bones.random_rigs import LAST, RIGS, RigCase, build
+from tests.animation.bones.random_rigs import LAST, RIGS, build
+from tests.animation.keyed import WIDTHS
 from tests.animation.oracle import shown_worlds
 from tests.blank import blank
 from tests.thoroughness import tried
@@ -35,7 +37,7 @@ def test_no_bone_that_is_promised_is_off_by_more(tmp_path_factory, case):
     assert not complaints(case, tmp_path_factory.mktemp("promise"))
 
 
-def complaints(case: RigCase, folder: Path) -> list[str]:
+def complaints(case: SimpleNamespace, folder: Path) -> list[str]:
     """What is amiss where a rig is reduced, saved, and played from both files without the extension.
 
     They are returned: what pytest shows of a failure, Blender may have freed by then.
@@ -98,7 +100,7 @@ def key_count(transform: object) -> int:
     data = rig.animation_data
     strip = data.nla_tracks[0].strips[0] if len(data.nla_tracks) else data
     bag = strip.action.layers[0].strips[0].channelbag(strip.action_slot)
-    names = [transform.prefix + name for name in ("location", "rotation_quaternion", "rotation_euler", "scale")]
+    names = [transform.prefix + name for name in WIDTHS]
     times = [point.co.x for curve in bag.fcurves if curve.data_path in names for point in curve.keyframe_points]
     return len(np.unique(np.round(times, 2)))
 

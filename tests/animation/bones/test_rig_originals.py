@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import re
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import (
-    Refused,
-    bake,
-    channelbag_of,
-    is_baked,
-    reduce_keys_of,
-    refresh,
-    set_mode,
-    unbake,
-)
-from tests.animation.bones.poses import assert_posed, assert_same_poses, shown_poses
+from rigid_motion.animation import bake, is_baked, reduce_keys_of, set_mode, unbake
+from tests.animation.bones.poses import assert_posed, shown_poses
 from tests.animation.bones.rigs import PLAYED, key_all, moving_rig, new_rig, select_only
 from tests.animation.bones.test_rig_edits import assert_nothing_stale, make_lower_fore, swap_two
-from tests.animation.bones.test_slots_of_rigs import separate_slots_of
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.oracle import shown_worlds
-from tests.animation.scenes import editor, key, new_object, new_strip, push_down
+from tests.animation.scenes import editor, enabled, key, new_object, new_strip, push_down, tweak
 
 OF_BOTH = pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
 
@@ -50,89 +44,59 @@ def test_bones_that_were_renamed_get_their_own_keys_back(live_file, count, renam
     assert_nothing_stale()
 
 
-@pytest.mark.parametrize("count", [2, 4], ids=["some bones baked", "all bones baked"])
-def test_another_rig_that_plays_baked_keys_keeps_them(live_file, count):
-    rig = moving_rig()
-    own, before = rig.animation_data.action, [snapshot(bone) for bone in rig.pose.bones]
-    bake(list(rig.pose.bones)[:count])
-    shared = rig.animation_data.action
-    other = new_rig("Other")
-    other.animation_data_create().action = shared
-    other.animation_data.action_slot = shared.slots[0]
-    refresh()
-    keys, expected = [snapshot(bone) for bone in other.pose.bones], shown_poses([other], PLAYED)[0]
-    unbake(list(rig.pose.bones)[:count])
-    refresh()
-    assert (rig.animation_data.action, other.animation_data.action) == (own, shared)
-    assert [snapshot(bone) for bone in rig.pose.bones] == before
-    assert [snapshot(bone) for bone in other.pose.bones] == keys
-    assert_same_poses(other, PLAYED, shown_poses([other], PLAYED)[0], expected)
-    assert not [action for action in bpy.data.actions if not action.users]
-    assert_nothing_stale()
-
-
-@pytest.mark.parametrize("muted", [False, True], ids=["without keys", "muted"])
 @OF_BOTH
-def test_what_has_no_keys_gets_its_value_back(live_file, of_bones, muted):
-    obj = key_all(new_rig()) if of_bones else key(new_object())
-    carrier, targets = (obj.pose.bones["Upper"], list(obj.pose.bones)) if of_bones else (obj, obj)
-    for index in (1, 2):
-        fcurve = curves_of(carrier)["location", index]
-        if muted:
-            fcurve.mute = True
-        else:
-            channelbag_of(obj).fcurves.remove(fcurve)
-    carrier.location.yz = rest = (0.75, 0.25)
-    set_mode(targets, "dq_sclerp")
-    expected = shown_poses([obj], PLAYED)[0] if of_bones else shown_worlds([obj], PLAYED)[0]
-    bpy.context.scene.frame_set(20)
-    bake(targets)
-    bpy.context.view_layer.update()
-    assert tuple(carrier.location.yz) != rest
-    unbake(targets)
-    assert tuple(carrier.location.yz) == rest
-    if of_bones:
-        assert_same_poses(obj, PLAYED, shown_poses([obj], PLAYED)[0], expected)
-        assert_posed(obj, PLAYED)
-    else:
-        assert np.abs(shown_worlds([obj], PLAYED)[0] - expected).max() < 1e-5
-
-
-def sharing(of_bones: bool) -> tuple[bpy.types.Object, list, bpy.types.Object]:
-    """Something baked, its targets, and what still moves by its original."""
+def test_all_that_moves_by_an_action_is_baked_together_and_gets_its_keys_back_from_either(live_file, of_bones):
     obj, targets = moving(of_bones)
     targets = targets[:2]
     other = obj.copy()
     bpy.context.scene.collection.objects.link(other)
+    others = [other.pose.bones[bone.name] for bone in targets] if of_bones else [other]
+    before, expected = list(map(snapshot, targets)), [shown(one, PLAYED) for one in (obj, other)]
+    for bake_by, back_by in (([*targets, *others], others), (others, targets)):
+        bake(bake_by)
+        assert all(map(is_baked, [*targets, *others]))
+        for one, places in zip((obj, other), expected, strict=True):
+            assert np.abs(shown(one, PLAYED) - places).max() < 2e-5
+        assert list(map(snapshot, targets)) != before
+        unbake(back_by)
+        assert not any(map(is_baked, [*targets, *others]))
+        assert list(map(snapshot, targets)) == before
+        assert list(bpy.data.actions) == [obj.animation_data.action]
+    assert_nothing_stale()
+
+
+@OF_BOTH
+def test_a_duplicate_has_a_way_back_of_its_own(live_file, of_bones):
+    obj, targets = moving(of_bones)
+    before = list(map(snapshot, targets))
     bake(targets)
-    bpy.context.view_layer.update()
-    return obj, targets, other
-
-
-@OF_BOTH
-def test_a_slot_that_was_renamed_in_the_original_is_found(live_file, of_bones):
-    obj, targets, other = sharing(of_bones)
-    other.animation_data.action_slot.name_display = "Hero"
+    select_only(obj)
+    bpy.ops.object.duplicate()
+    other = bpy.context.object
+    assert other.animation_data.action != obj.animation_data.action
+    others = list(other.pose.bones) if of_bones else [other]
+    unbake(others)
+    assert list(map(snapshot, others)) == before
+    assert list(map(snapshot, targets)) != before
     unbake(targets)
-    assert (obj.animation_data.action, obj.animation_data.action_slot) == (
-        other.animation_data.action,
-        other.animation_data.action_slot,
-    )
+    assert list(map(snapshot, targets)) == before
+    assert len(bpy.data.actions) == 2
 
 
 @OF_BOTH
-def test_a_slot_that_was_taken_out_of_the_original_refuses_the_way_back_with_a_way_out(live_file, of_bones):
-    obj, targets, other = sharing(of_bones)
-    baked, original = obj.animation_data.action, other.animation_data.action
-    separate_slots_of(other)
-    assert other.animation_data.action != original
-    with pytest.raises(Refused, match=f"their slot was taken out of the Action {original.name}. Choose by hand"):
-        unbake(targets)
-    assert obj.animation_data.action == baked
-    assert is_baked(targets[0])
-    refused = []
-    bake(list(other.pose.bones) if of_bones else other, refused=refused)
-    assert refused == []
+def test_what_is_muted_stays_where_it_is(live_file, of_bones):
+    obj = key_all(new_rig()) if of_bones else key(new_object())
+    carrier, targets = (obj.pose.bones["Upper"], list(obj.pose.bones)) if of_bones else (obj, obj)
+    curves_of(carrier)["location", 1].mute = True
+    carrier.location.y = 0.75
+    set_mode(targets, "dq_sclerp")
+    expected, before = shown(obj, PLAYED), snapshot(carrier)["location", 1]
+    for act in (bake, unbake):
+        act(targets)
+        bpy.context.view_layer.update()
+        assert np.abs(shown(obj, PLAYED) - expected).max() < 2e-5
+        assert carrier.location.y == 0.75
+        assert snapshot(carrier)["location", 1] == before
 
 
 def put_into_a_meta_strip(obj: bpy.types.Object) -> None:
@@ -158,10 +122,10 @@ def test_what_plays_in_a_strip_of_strips_is_baked_there(live_file, of_bones):
     bpy.context.view_layer.update()
     before = shown(obj, PLAYED)
     (strip,) = obj.animation_data.nla_tracks[0].strips[0].strips
-    for act, action in ((bake, f"{own.name} Baked"), (unbake, own.name)):
+    for act in (bake, unbake):
         act(targets)
         bpy.context.view_layer.update()
-        assert strip.action.name == action
+        assert strip.action == own
         assert np.abs(shown(obj, PLAYED) - before).max() < 2e-5
 
 
@@ -188,26 +152,33 @@ def test_two_slots_of_one_action_that_move_the_same_are_baked_each_for_itself(li
     assert strip.action == action
 
 
-@pytest.mark.parametrize("again", ["bake", "reduce"])
-def test_keys_are_changed_again_after_the_original_was_chosen_by_hand(live_file, again):
-    rig = key_all(new_rig(), np.arange(1.0, 41.0, 3.0), amount=0.05)
-    bones, data = list(rig.pose.bones), rig.animation_data
-    set_mode(bones, "dq_sclerp")
-    own, slot = data.action, data.action_slot
+@OF_BOTH
+def test_the_keys_of_a_strip_are_baked_while_it_is_edited(live_file, of_bones):
+    obj, targets = moving(of_bones)
+    before = list(map(snapshot, targets))
+    tweak(obj, push_down(obj))
+    bake(targets)
+    assert list(map(snapshot, targets)) != before
+    unbake(targets)
+    assert list(map(snapshot, targets)) == before
 
-    def change() -> None:
-        if again == "bake":
-            bake(bones)
-        else:
-            reduce_keys_of(bones, "motor_spline", 50.0)
-        bpy.context.view_layer.update()
 
-    change()
-    first = data.action
-    data.action, data.action_slot = own, slot
-    bpy.context.view_layer.update()
-    change()
-    assert data.action not in (own, first)
-    counts = {len(curves_of(bone)["location", 0].keyframe_points) for bone in bones}
-    assert 14 not in counts
+def clips_of(obj: bpy.types.Object, folder: Path) -> tuple[set[str], set[bytes]]:
+    """The names of what Blender's exporters write with their default settings."""
+    path = str(folder / obj.name)
+    with enabled("io_scene_gltf2", "io_scene_fbx"):
+        bpy.ops.export_scene.gltf(filepath=f"{path}.gltf", export_format="GLTF_SEPARATE")
+        bpy.ops.export_scene.fbx(filepath=f"{path}.fbx")
+    animations = json.loads((folder / f"{obj.name}.gltf").read_text())["animations"]
+    stacks = re.findall(rb"([\w|. ]+)\x00\x01AnimStack", (folder / f"{obj.name}.fbx").read_bytes())
+    return {animation["name"] for animation in animations}, set(stacks)
+
+
+@OF_BOTH
+def test_what_is_kept_is_no_clip_of_an_export(live_file, tmp_path, of_bones):
+    obj, targets = moving(of_bones)
+    before = clips_of(obj, tmp_path)
+    bake(targets)
+    reduce_keys_of(targets, "dq_sclerp", 0.1)
     assert len(bpy.data.actions) == 3
+    assert clips_of(obj, tmp_path) == before

@@ -10,20 +10,22 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import key_frames, set_mode
-from tests.animation.bones.poses import placed
-from tests.animation.bones.rigs import key_all, new_rig, own_clipboard, pose_mode
-from tests.animation.keyed import curves_of, rotation_path
+from tests.animation.bones.poses import assert_posed, placed
+from tests.animation.bones.rigs import BETWEEN, key_all, new_rig, own_clipboard, pose_mode
+from tests.animation.bones.test_rig_edits import HANDS
+from tests.animation.keyed import rotation_path
+from tests.animation.scenes import new_object
 
-BETWEEN = 15
-ORDERS = ("QUATERNION", "XYZ")
+NOW = 15
+EXACT = {"rtol": 0.0, "atol": 1e-5}
 
 
-@pytest.fixture(params=ORDERS)
+@pytest.fixture(params=("QUATERNION", "XYZ", "AXIS_ANGLE"))
 def rig(request, live_file) -> bpy.types.Object:
     """A rig in Pose Mode with a mode on each of its bones, in the middle of a segment."""
-    rig = key_all(new_rig(rotation_mode=request.param))
+    rig = key_all(new_rig(bones=HANDS, rotation_mode=request.param), amount=0.6)
     set_mode(list(rig.pose.bones), "dq_sclerp")
-    live_file.scene.frame_set(BETWEEN)
+    live_file.scene.frame_set(NOW)
     return pose_mode(rig)
 
 
@@ -31,88 +33,69 @@ def insert_keys(rig: bpy.types.Object) -> None:
     for bone in rig.pose.bones:
         for path in ("location", rotation_path(bone)):
             bone.keyframe_insert(path)
-
-
-def apply_visual_transform(rig: bpy.types.Object) -> None:
-    assert bpy.ops.pose.visual_transform_apply() == {"FINISHED"}
+    bpy.context.view_layer.update()
 
 
 def as_an_animator(operator: Callable, **settings: object) -> None:
-    """With undo, and so as Blender keeps in mind which operator it was."""
+    """With undo, as in a window."""
     assert operator("EXEC_DEFAULT", True, **settings) == {"FINISHED"}
 
 
-@pytest.mark.parametrize("by", ["animator", "script"])
-def test_the_visual_transform_applied_leaves_bones_where_they_are(rig, live_file, by):
-    seen = placed(rig)
-    if by == "script":
-        apply_visual_transform(rig)
-    else:
-        as_an_animator(bpy.ops.pose.visual_transform_apply)
-    assert np.abs(placed(rig) - seen).max() < 2e-5
+def assert_keyed_as_seen(rig: bpy.types.Object, seen: np.ndarray) -> None:
+    """A pose is seen, stays so as it is keyed, and is there when one comes back."""
+    np.testing.assert_allclose(placed(rig), seen, **EXACT)
     insert_keys(rig)
-    assert np.abs(placed(rig) - seen).max() < 2e-5
-    for bone in rig.pose.bones:
-        assert float(BETWEEN) in key_frames(bone)
-    live_file.scene.frame_set(BETWEEN + 1)
-    live_file.scene.frame_set(BETWEEN)
-    assert np.abs(placed(rig) - seen).max() < 2e-5
+    np.testing.assert_allclose(placed(rig), seen, **EXACT)
+    assert all(float(NOW) in key_frames(bone) for bone in rig.pose.bones)
+    for frame in (NOW + 1, NOW):
+        bpy.context.scene.frame_set(frame)
+    np.testing.assert_allclose(placed(rig), seen, **EXACT)
+    assert_posed(rig, BETWEEN[::3])
 
 
-@pytest.mark.parametrize("keyed", ["at once", "later"])
-@pytest.mark.parametrize("applied", [False, True], ids=["as it is", "with the visual transform applied"])
-def test_rigify_keeps_a_transform_where_it_is_seen_when_a_parent_is_switched(rig, live_file, applied, keyed):
-    """What its switches do: matrices as they are, the switch, and each matrix set again.
-
-    Those of limbs take the matrices with constraints; *Switch Parent* takes that of the properties alone, in which what
-    is seen has to be.
-    """
-    # Its functions alone: as an add-on it would leave classes behind, which the tests of its human register anew.
-    tools = importlib.import_module("rigify.utils.animation")
-    seen, hand = placed(rig), rig.pose.bones["Hand"]
-    if applied:
-        apply_visual_transform(rig)
-    matrix = tools.get_transform_matrix(rig, "Hand", with_constraints=not applied)
-    # The switch: what the hand hangs on is elsewhere from now on.
-    switch = hand.parent.constraints.new("COPY_ROTATION")
-    switch.target, switch.subtarget = rig, "Body"
-    switch.owner_space = switch.target_space = "POSE"
-    assert np.abs(placed(rig)[3] - seen[3]).max() > 0.1
-    flags = set() if keyed == "at once" else None
-    tools.set_transform_from_matrix(rig, "Hand", matrix, keyflags=flags)
-    assert np.abs(placed(rig)[3] - seen[3]).max() < 2e-5
-    insert_keys(rig)
-    assert np.abs(placed(rig)[3] - seen[3]).max() < 2e-5
-    live_file.scene.frame_set(BETWEEN + 1)
-    live_file.scene.frame_set(BETWEEN)
-    assert np.abs(placed(rig)[3] - seen[3]).max() < 2e-5
-
-
-def test_where_one_property_of_a_whole_pose_is_keyed_so_is_the_rest(rig):
+def test_the_visual_transform_applied_leaves_bones_where_they_are(rig):
     seen = placed(rig)
-    apply_visual_transform(rig)
-    placed(rig)
-    for bone in rig.pose.bones:
-        bone.keyframe_insert("location")
-    assert np.abs(placed(rig) - seen).max() < 2e-5
-    bone = rig.pose.bones["Body"]
-    assert len(curves_of(bone)[rotation_path(bone), 0].keyframe_points) == 5
+    as_an_animator(bpy.ops.pose.visual_transform_apply)
+    assert_keyed_as_seen(rig, seen)
 
 
-def test_undo_brings_back_a_whole_pose_as_it_was_seen(rig, live_file, tmp_path):
-    live_file.scene.frame_set(24)
+@pytest.mark.parametrize("flipped", [False, True], ids=["as it is", "flipped"])
+def test_a_pose_copied_on_an_in_between_is_pasted_as_it_was_seen(rig, live_file, tmp_path, flipped):
+    live_file.scene.frame_set(30)
     copied = placed(rig)
     with own_clipboard(tmp_path):
         as_an_animator(bpy.ops.pose.copy)
-        live_file.scene.frame_set(BETWEEN)
-        bpy.ops.ed.undo_push(message="Begin")
-        as_an_animator(bpy.ops.pose.paste)
-    assert np.abs(placed(rig) - copied).max() < 2e-5
-    as_an_animator(bpy.ops.pose.transforms_clear)
-    assert np.abs(placed(rig) - np.array([bone.bone.matrix_local for bone in rig.pose.bones])).max() < 1e-6
+        live_file.scene.frame_set(NOW)
+        as_an_animator(bpy.ops.pose.paste, flipped=flipped)
+    if flipped:
+        mirror = np.diag((-1.0, 1.0, 1.0, 1.0))
+        copied = mirror @ copied[[0, 2, 1]] @ mirror
+    assert_keyed_as_seen(rig, copied)
+
+
+@pytest.mark.parametrize("cleared", ["transforms", "rot"])
+def test_cleared_bones_rest_and_undo_brings_back_what_was_seen(rig, cleared):
+    bpy.ops.ed.undo_push(message="Begin")
+    seen = placed(rig)
+    as_an_animator(getattr(bpy.ops.pose, f"{cleared}_clear"))
+    np.testing.assert_allclose([bone.matrix_basis.to_quaternion().angle for bone in rig.pose.bones], 0.0, atol=1e-6)
     with bpy.context.temp_override(mode="OBJECT"):
         assert bpy.ops.ed.undo() == {"FINISHED"}
     rig = bpy.data.objects["Rig"]
-    assert np.abs(placed(rig) - copied).max() < 2e-5
-    insert_keys(rig)
-    assert np.abs(placed(rig) - copied).max() < 2e-5
+    assert_keyed_as_seen(rig, seen)
+
+
+def test_rigify_keeps_a_transform_where_it_is_seen_when_a_parent_is_switched(rig):
+    """What *Switch Parent* does: a matrix of the properties, the switch, and the matrix set again."""
+    # Its functions alone: as an add-on it would leave classes behind, which the tests of its human register anew.
+    tools = importlib.import_module("rigify.utils.animation")
+    seen, hand = placed(rig), rig.pose.bones["Hand.R"]
+    matrix = tools.get_transform_matrix(rig, "Hand.R", with_constraints=False)
+    # The switch: what the hand hangs on is elsewhere from now on.
+    hand.parent.constraints.new("COPY_ROTATION").target = new_object("Elsewhere")
+    assert np.abs(placed(rig)[2] - seen[2]).max() > 0.01
+    tools.set_transform_from_matrix(rig, "Hand.R", matrix, keyflags=set())
+    for _ in range(2):
+        np.testing.assert_allclose(placed(rig)[2], seen[2], **EXACT)
+        for frame in (NOW + 1, NOW):
+            bpy.context.scene.frame_set(frame)

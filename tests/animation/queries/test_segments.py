@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import refresh, set_enabled, set_mode, set_turns, write_channel
+from rigid_motion.animation import refresh, repeat, set_enabled, set_mode, set_turns, write_channel
 from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.animation.queries.segments import frame_in_action, is_up_to_date, segment_at
 from tests.animation.scenes import new_object
@@ -92,13 +92,13 @@ def test_a_scale_that_differs_from_axis_to_axis_is_told_where_it_changes(live_fi
     assert not at(obj, 5).scales_unevenly
 
 
-def test_a_segment_that_a_cycle_repeats_hangs_on_the_key_it_is_a_copy_of(live_file):
+@pytest.mark.parametrize(("mode", "ends"), [("REPEAT", (41.0, 61.0)), ("MIRROR", (31.0, 51.0))])
+def test_a_segment_that_a_cycle_repeats_hangs_on_the_key_it_is_a_copy_of(live_file, mode, ends):
     obj = turned((0, 90, 120))
-    slot = obj.animation_data.action_slot
-    for fcurve in obj.animation_data.action.layers[0].strips[0].channelbag(slot).fcurves:
-        fcurve.modifiers.new("CYCLES")
+    repeat(obj, mode)
+    assert (at(obj, 5).first, at(obj, 5).last) == (1.0, 11.0)
     again = at(obj, 30 + 20)
-    assert (again.first, again.last, again.key) == (41.0, 61.0, 11.0)
+    assert (again.first, again.last, again.key) == (*ends, 11.0)
     assert np.degrees(again.turn) == pytest.approx(30.0, abs=0.1)
     assert again.distance == pytest.approx(2.0, abs=0.01)
 

@@ -10,14 +10,14 @@ from contextlib import contextmanager
 from importlib import import_module
 
 import bpy
-from bpy.app.translations import pgettext_iface, pgettext_rpt
+from bpy.app.translations import pgettext_iface, pgettext_rpt, pgettext_tip
 
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.keyed import cube
 from tests.gui.scenarios.panel_notes import SCREW, extension, key, preferences
 
-NOTHING_REDUCED = "The keys of these objects are not reduced"
+NOTHING_REDUCED = "The keys here are not reduced"
 
 
 def speak(language: str) -> None:
@@ -65,15 +65,13 @@ def scenario(hand: Hand) -> Steps[None]:
 
 def reported() -> Steps[None]:
     """In reports, and in the texts that operators put together."""
-    cube().rotation_mode = "AXIS_ANGLE"
-    assert "Cube dreht sich nach Achse und Winkel" in refusal(), refusal()
     key({1: 0, 20: 90, 40: 100})
     curve = cube().animation_data.action.layers[0].strips[0].channelbags[0].fcurves.find("location", index=1)
-    curve.modifiers.new("FNGENERATOR")
-    assert "Position Y hat einen Modifikator vom Typ Eingebaute Funktion" in refusal(), refusal()
+    curve.modifiers.new("ENVELOPE")
+    assert "Position Y hat eine Hüllkurve" in refusal(), refusal()
     operators = import_module(f"{extension().module}.ui.operators")
-    tooltip = operators.RIGID_MOTION_OT_unbake.description(bpy.context, None)
-    assert tooltip.startswith("Gebackenen Objekten die Aktionen zurückgeben"), tooltip
+    tooltip = pgettext_tip(operators.RIGID_MOTION_OT_unbake.bl_description)
+    assert tooltip.startswith("Gebackenem die Aktion zurückgeben"), tooltip
     yield
 
 

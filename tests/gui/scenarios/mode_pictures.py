@@ -125,13 +125,13 @@ def hammer(view: bpy.types.Area) -> float:
     ghosts(tool, shown(tool), MODE, (9, 13, 17))
     body("Hand", STAND, (wrist, (0.16, 0.3, 0.16)))
     label("Screw", (0, 0, 1.15), MODE, view)
-    label("Blender,\nVector + Quaternion", (-1.08, 0, 0.1), NATIVE, view)
+    label("Blender,\nStraight", (-1.08, 0, 0.1), NATIVE, view)
     bpy.context.scene.frame_set(25)
     return 3.9
 
 
 def throw(view: bpy.types.Area) -> float:
-    """A stick that flies and turns. Its middle flies straight with Vector + Quaternion, and bends with the screw."""
+    """A stick that flies and turns. Its middle flies straight with Straight, and bends with the screw."""
     aim(view, (90, 0, 0), (0, 0, 0.77))
     sticks = [body(name, METAL, ((0, 0, 0), (0.9, 0.08, 0.08)), ((0.4, 0, 0), (0.16, 0.12, 0.12))) for name in "AB"]
     for stick, mode in zip(sticks, (STRAIGHT, SCREW), strict=True):
@@ -144,7 +144,7 @@ def throw(view: bpy.types.Area) -> float:
     assert np.ptp(straight) < 1e-5
     assert np.ptp(bent) > 0.8
     show_chosen_paths()
-    label("Vector + Quaternion", (0, 0, -0.28), MODE, view)
+    label("Straight", (0, 0, -0.28), MODE, view)
     label("Screw", (-0.7, 0, 1.02), MODE, view)
     bpy.context.scene.frame_set(1)
     return 5.0

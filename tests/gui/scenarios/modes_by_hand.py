@@ -5,30 +5,32 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from rigid_motion.animation.actions.marks import read_marks
 from tests.animation.keyed import curve_of
 from tests.animation.oracle import assert_shown, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.keyed import cube, key_the_cube
+from tests.gui.keyed import FRAMES, cube, key_the_cube
 
 BETWEEN = range(4, 41, 9)
-BLENDER, STRAIGHT, SCREW, SMOOTH = "BLENDER", "lerp_slerp", "dq_sclerp", "motor_spline"
+STRAIGHT, SCREW, SMOOTH = (dict.fromkeys(map(float, FRAMES), number) for number in (1, 2, 7))
+"""What keys say if the whole cube has a mode."""
 
 ROW = 26
 """Pixels from one row of a panel to the next."""
 
 
-def assert_modes(keys: dict[float, int], of_object: str = BLENDER) -> None:
-    """The cube has this mode or else these keys of modes, and on every frame it is where they have it."""
-    assert cube().rigid_motion.mode == of_object or keys, cube().rigid_motion.mode
-    assert mode_keys() == keys, mode_keys()
+def assert_modes(modes: dict[float, int]) -> None:
+    """The keys of the cube say these modes, and on every frame it is where they have it."""
+    assert said() == modes, said()
     assert_shown([cube()], BETWEEN)
 
 
-def mode_keys() -> dict[float, int]:
-    """The keys of the cube's modes: frame and number of the mode."""
-    curve = curve_of(cube(), "rigid_motion.mode")
-    return {} if curve is None else {key.co.x: round(key.co.y) for key in curve.keyframe_points}
+def said() -> dict[float, int]:
+    """The frames of the cube's keys that say a mode, and its number."""
+    curve = curve_of(cube(), "location")
+    marks = read_marks(curve).tolist()
+    return {key.co.x: mark - 1 for key, mark in zip(curve.keyframe_points, marks, strict=True) if mark}
 
 
 def scenario(hand: Hand) -> Steps[None]:
@@ -50,32 +52,33 @@ def in_the_viewport(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     around = places.box_around(centre, 840, 380)
     yield from hand.hover(centre)
     yield from hand.pie("T", "N", alt=True)
-    assert_modes({}, SMOOTH)
+    assert_modes(SMOOTH)
     yield from hand.hover(centre)
     yield from hand.press("Z", ctrl=True)
-    assert_modes({}, BLENDER)
+    assert_modes({})
     yield from hand.pie("T", "E", picture="pie", box=around, alt=True)
-    assert_modes({}, SCREW)
+    assert_modes(SCREW)
     yield from hand.press("Z", ctrl=True)
-    assert_modes({}, BLENDER)
+    assert_modes({})
     yield from hand.press("Z", ctrl=True, shift=True)
-    assert_modes({}, SCREW)
+    assert_modes(SCREW)
 
     yield from hand.open_menu(view, "VIEW3D_MT_object")
-    yield from hand.choose("Vector + Quaternion")
-    assert_modes({}, STRAIGHT)
+    yield from hand.choose("Straight")
+    assert_modes(STRAIGHT)
     yield from hand.click(centre, button="RIGHTMOUSE")
     yield from hand.picture("context-menu")
     yield from hand.choose("Clear Modes")
-    assert_modes({}, BLENDER)
+    assert_modes({})
 
-    cube().rotation_mode = "AXIS_ANGLE"
+    curve = curve_of(cube(), "location")
+    envelope = curve.modifiers.new("ENVELOPE")
     yield from hand.hover(centre)
     yield from hand.pie("T", "E", alt=True)
     yield from hand.picture("refused")
     yield from hand.press("ESC")
-    assert cube().rigid_motion.mode == BLENDER, "an object that turns by axis and angle refuses"
-    cube().rotation_mode = "QUATERNION"
+    assert_modes({})
+    curve.modifiers.remove(envelope)
 
 
 def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
@@ -85,46 +88,47 @@ def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
     yield from hand.press("UP_ARROW")
     yield from hand.press("RIGHT_ARROW")
     yield from hand.picture("menu", (sheet.x, sheet.y + sheet.height - 120, 920, 620))
-    yield from hand.choose("Screw (Dual Quaternion)")
+    # A search would find the same mode among those for all segments.
+    yield from hand.press("DOWN_ARROW")
+    yield from hand.press("DOWN_ARROW")
+    yield from hand.press("RET")
     yield from hand.picture("panel-of-keys", places.box(places.region(sheet, "UI")))
-    assert_modes({1: 2, 20: 0})
+    assert_modes({1: 2, 20: 0, 40: 0})
     yield from hand.press("F9")
     yield from hand.picture("adjust-last-operation")
     yield from hand.press("ESC")
     yield from hand.click(places.key(sheet, 20))
-    yield from hand.click(button="RIGHTMOUSE")
-    yield from hand.choose("Motor Blend (PGA)")
-    assert_modes({1: 2, 20: 3, 40: 0})
     yield from hand.hover(places.key(sheet, 100))
-    yield from hand.pie("T", "SW", picture="pie-of-keys", alt=True)
-    assert_modes({1: 2, 20: 6, 40: 0})
+    yield from hand.pie("T", "NW", picture="pie-of-keys", alt=True)
+    assert_modes({1: 2, 20: 1, 40: 0})
+    yield from hand.hover(places.key(sheet, 100))
     yield from hand.press("A", alt=True)
     yield from hand.pie("T", "E", alt=True)
     yield from hand.picture("no-key-selected")
     yield from hand.press("ESC")
-    assert mode_keys() == {1: 2, 20: 6, 40: 0}, "without a selected key nothing changes"
+    assert said() == {1: 2, 20: 1, 40: 0}, "without a selected key nothing changes"
 
 
 def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """For the object by its property, then for the segment under the playhead; its turns, and exact between frames."""
+    """For the whole object, then for the segment under the playhead; and its turns."""
+    bpy.ops.rigid_motion.set_mode(mode="motor_spline")
+    bpy.ops.ed.undo_push(message="Mode")
     yield from hand.open_sidebar(view, "Animation")
-    x, y = yield from hand.find_button(view, "UI", "rigid_motion.mode")
-    yield from hand.click((x, y))
+    x, y = yield from hand.find_button(view, "UI", "rigid_motion.turns")
+    # Above the turns are the frames, the segment and the object.
+    yield from hand.click((x, y + 3 * ROW))
     yield from hand.choose_row(3)
-    assert_modes({}, STRAIGHT)
-    yield from hand.click((x, y - ROW))
+    assert_modes(STRAIGHT)
+    yield from hand.click((x, y + 2 * ROW))
     yield from hand.picture("modes-in-the-panel")
     yield from hand.choose_row(2)
-    assert_modes({1: 2, 20: 1})
+    assert_modes({1: 2, 20: 1, 40: 1})
     turns = yield from hand.find_button(view, "UI", "rigid_motion.turns")
     yield from hand.click(turns)
     yield from hand.type("3")
     yield from hand.press("RET")
     assert cube().rigid_motion.turns == 3
-    assert_modes({1: 2, 20: 1})
-    exact = yield from hand.find_button(view, "UI", "rigid_motion.exact")
-    yield from hand.click(exact)
-    assert cube().constraints.keys() == ["Rigid Motion"]
+    assert_modes({1: 2, 20: 1, 40: 1})
     yield from hand.picture("panel")
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.search("Set Turns")
@@ -133,8 +137,7 @@ def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert (last.bl_idname, last.turns) == ("RIGID_MOTION_OT_set_turns", 3), "it begins with the turns that there are"
     for _ in range(5):
         yield from hand.press("Z", ctrl=True)
-    assert not cube().constraints
-    assert_modes({}, BLENDER)
+    assert_modes({})
 
 
 def baked(hand: Hand, view: bpy.types.Area) -> Steps[None]:
@@ -150,7 +153,7 @@ def baked(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.search("Un-Bake")
     assert len(cube().rigid_motion.bakes) == 0
-    assert_modes({1: 2, 20: 6, 40: 0})
+    assert_modes({1: 2, 20: 1, 40: 0})
 
 
 def in_the_graph_editor(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
@@ -159,6 +162,6 @@ def in_the_graph_editor(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
     yield from hand.hover(places.centre(places.region(graph)))
     yield from hand.press("A")
     yield from hand.open_menu(graph, "GRAPH_MT_key")
-    yield from hand.choose("Vector + Quaternion")
+    yield from hand.choose("Straight")
     assert_modes({1: 1, 20: 1, 40: 1})
     yield from hand.picture("graph-editor")

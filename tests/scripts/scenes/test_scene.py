@@ -204,7 +204,7 @@ def test_modes_that_are_one_motion_share_a_lane_that_names_them_all():
     lanes = [child.name for child in scene.collection.children if child.name.startswith("Lane ")]
     assert lanes == ["Lane lerp_slerp", "Lane dq_sclerp", "Lane pga_lerp", "Lane motor_spline"]
     assert bpy.data.curves["dq_sclerp title"].body == "Screw"
-    assert bpy.data.curves["dq_sclerp names"].body == "= Motor Screw, Versor Spiral"
+    assert bpy.data.curves["dq_sclerp names"].body == "= Motor Screw, Spiral"
 
 
 def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_much():

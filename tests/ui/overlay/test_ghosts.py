@@ -10,7 +10,7 @@ from rigid_motion.animation import set_mode
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.ui.overlay.cache import path_of
 from rigid_motion.ui.overlay.ghosts import MOST_EDGES, MOST_GHOSTS, ghost_frames, octahedron, shape_of
-from rigid_motion.ui.overlay.points import space_of
+from rigid_motion.ui.overlay.points import space_of_object
 from tests.animation.bones.poses import shown_poses
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object
@@ -47,7 +47,7 @@ def test_ghosts_of_an_object_are_where_it_is_shown(ghostly, under, scale, order)
             key(obj.parent, FRAMES, seed=3)
     set_mode(obj, "motor_spline")
     bpy.context.view_layer.update()
-    path, space = path_of(obj, ghostly), space_of(obj, bpy.context.evaluated_depsgraph_get())
+    path, space = path_of(obj, ghostly), space_of_object(obj, bpy.context.evaluated_depsgraph_get())
     assert_as_shown(path, space, shown_worlds([obj], WHOLE)[0])
 
 

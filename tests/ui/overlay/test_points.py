@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import set_mode
-from rigid_motion.animation.compute.components import ROWS
+from rigid_motion.animation.evaluation.components import ROWS
 from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion.ui.overlay.cache import path_of
@@ -23,10 +23,11 @@ from rigid_motion.ui.overlay.points import (
     Path,
     axis_frames,
     sample_frames,
-    space_of,
+    space_of_object,
     thinned,
     tick_frames,
 )
+from tests.animation.keyed import curves_of
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import FRAMES, key, new_object
 from tests.ui.rigs import new_rig
@@ -37,7 +38,7 @@ ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 def in_world(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
     """Points of a path as the overlay places them on the current frame."""
-    space = np.array(space_of(obj, bpy.context.evaluated_depsgraph_get()))
+    space = np.array(space_of_object(obj, bpy.context.evaluated_depsgraph_get()))
     return points @ space[:3, :3].T + space[:3, 3]
 
 
@@ -180,11 +181,11 @@ def test_without_a_second_key_there_is_no_path(scene):
 
 
 def test_what_rigid_motion_refuses_or_a_driver_moves_has_no_path(scene):
-    turned = key(new_object("Turned"))
-    turned.rotation_mode = "AXIS_ANGLE"
+    enveloped = key(new_object("Enveloped"))
+    curves_of(enveloped)["location", 0].modifiers.new("ENVELOPE")
     driven = key(new_object("Driven"))
     driven.driver_add("location", 0)
-    assert path_of(turned, scene) is None
+    assert path_of(enveloped, scene) is None
     assert path_of(driven, scene) is None
 
 

@@ -1,0 +1,158 @@
+"""F-curves to test with: drawn at random or written out, and the same ones in Blender."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+from hypothesis import strategies as st
+
+from rigid_motion.animation.actions.channels import read_keys
+from rigid_motion.animation.fcurves.evaluation import evaluate
+from rigid_motion.animation.fcurves.keys import EASINGS, ELASTIC, INTERPOLATIONS, Cycles, Keys
+
+CODES = {name: code for code, name in INTERPOLATIONS.items()}
+MODES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")
+
+
+@contextmanager
+def as_fcurve(keys: Keys, *, update: bool = True) -> Iterator[bpy.types.FCurve]:
+    """The only curve of `keys` as an F-curve of Blender's. Without an update handles stay as they are given."""
+    action = bpy.data.actions.new("Measured")
+    slot = action.slots.new("OBJECT", "Measured")
+    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
+    fcurve = strip.channelbag(slot, ensure=True).fcurves.new("location", index=0)
+    try:
+        points, count = fcurve.keyframe_points, len(keys.times)
+        points.add(count)
+        free = bpy.types.Keyframe.bl_rna.properties["handle_left_type"].enum_items["FREE"].value
+        settings = np.zeros((3, count), np.float32) if keys.easing_settings is None else keys.easing_settings
+        for name, values in {
+            "co": keys.points,
+            "interpolation": keys.interpolation,
+            "handle_left_type": np.full(count, free, np.int32),
+            "handle_right_type": np.full(count, free, np.int32),
+            "handle_left": keys.points if keys.left is None else keys.left,
+            "handle_right": keys.points if keys.right is None else keys.right,
+            "easing": np.zeros(count, np.int32) if keys.easing is None else keys.easing,
+            "back": settings[0],
+            "amplitude": settings[1],
+            "period": settings[2],
+        }.items():
+            points.foreach_set(name, np.ascontiguousarray(values).ravel())
+        if update:
+            fcurve.update()
+        if keys.linear:
+            fcurve.extrapolation = "LINEAR"
+        if keys.cycles is not None:
+            modifier = fcurve.modifiers.new("CYCLES")
+            modifier.mode_before, modifier.mode_after = keys.cycles.before, keys.cycles.after
+            modifier.cycles_before, modifier.cycles_after = keys.cycles.before_count, keys.cycles.after_count
+        yield fcurve
+    finally:
+        bpy.data.actions.remove(action)
+
+
+def read_one(fcurve: bpy.types.FCurve) -> Keys:
+    (((places, keys, _),),) = read_keys([[fcurve]])
+    assert places == [0]
+    return keys
+
+
+def evaluate_one(keys: Keys, frames: np.ndarray, **options: bool) -> np.ndarray:
+    """The values of the only curve of these keys, shape (m,)."""
+    ((values,),) = evaluate([keys], [frames], **options)
+    return values
+
+
+def joined(curves: Sequence[Keys]) -> Keys:
+    """Curves that are keyed together, as one."""
+    rows = {
+        field.name: None
+        if getattr(curves[0], field.name) is None
+        else np.concatenate(
+            [getattr(keys, field.name) for keys in curves], axis=1 if field.name == "easing_settings" else 0
+        )
+        for field in dataclasses.fields(Keys)[:6]
+    }
+    return dataclasses.replace(curves[0], **rows)
+
+
+def assert_as_blender(keys: Keys, frames: np.ndarray, *, update: bool = True, tolerance: float = 1e-5) -> None:
+    """The values are Blender's, within `tolerance` of the size of the curve, its handles and its swings."""
+    with as_fcurve(keys, update=update) as fcurve:
+        read = read_one(fcurve)
+        result = evaluate_one(read, frames)
+        expected = np.array([fcurve.evaluate(frame) for frame in frames.tolist()])
+    handles = [rows for rows in (read.left, read.right) if rows is not None]
+    # What swings elastically has a size even where every frame happens on a zero of the sine.
+    swings = [] if read.easing_settings is None else read.easing_settings[1][read.interpolation == ELASTIC].tolist()
+    size = max(
+        1e-30, np.abs(expected).max(), *(np.abs(rows[..., 1]).max() for rows in (read.points, *handles)), *swings
+    )
+    np.testing.assert_allclose(result, expected, rtol=0.0, atol=tolerance * size)
+
+
+def keys_of(
+    times: Sequence[float], values: Sequence[float], interpolation: str | Sequence[str] = "LINEAR", **others: object
+) -> Keys:
+    names = [interpolation] * len(times) if isinstance(interpolation, str) else interpolation
+    codes = np.array([CODES[name] for name in names], dtype=np.int32)
+    for name, rows in others.items():
+        if name in ("left", "right"):
+            others[name] = np.asarray(rows, np.float32)[None]
+        elif name == "easing":
+            others[name] = rows[None]
+        elif name == "easing_settings":
+            others[name] = np.asarray(rows, np.float32)[:, None]
+    return Keys(np.column_stack((times, values)).astype(np.float32)[None], codes[None], **others)
+
+
+def frames_about(keys: Keys) -> np.ndarray:
+    """Frames on and between the keys, and far before and after them. Sixteenths are exact in single precision."""
+    return np.arange(16.0 * (keys.times[0] - 60.0), 16.0 * (keys.times[-1] + 60.0), 7.0) / 16.0
+
+
+def numbers(limit: float) -> st.SearchStrategy[float]:
+    """Of all sizes up to the limit, none so small that it vanishes in single precision."""
+    whole = st.integers(-1024, 1024).map(lambda number: number / 1024.0)
+    return st.tuples(whole, st.sampled_from((1.0, 0.1, 1e-3))).map(lambda pair: limit * pair[0] * pair[1])
+
+
+@st.composite
+def curves(
+    draw: st.DrawFn, kinds: Sequence[str] = tuple(CODES), gaps: Sequence[float] = (0.25, 1.0, 10.0, 37.5)
+) -> Keys:
+    """Curves of up to six keys, with handles that are short, long, or reach past the next key."""
+    count = draw(st.integers(1, 6))
+
+    def each(strategy: st.SearchStrategy, *shape: int) -> np.ndarray:
+        size = int(np.prod((*shape, count)))
+        return np.array(draw(st.lists(strategy, min_size=size, max_size=size))).reshape(*shape, count)
+
+    times = draw(st.sampled_from((0.0, 1.0, 1000.0, -500.0))) + np.cumsum(each(st.sampled_from(tuple(gaps))))
+    values = each(numbers(draw(st.sampled_from((1.0, 1000.0)))))
+    if draw(st.booleans()):
+        values[:] = values[0]
+    lengths = each(st.sampled_from((0.0, 0.125, 1.0, 4.0, 50.0)), 2)
+    heights = each(numbers(1.0 + np.abs(values).max()), 2)
+    return keys_of(
+        times,
+        values,
+        each(st.sampled_from(tuple(kinds))).tolist(),
+        left=np.column_stack((times - lengths[0], values + heights[0])),
+        right=np.column_stack((times + lengths[1], values + heights[1])),
+        easing=each(st.sampled_from(tuple(EASINGS))).astype(np.int32),
+        easing_settings=(
+            each(st.sampled_from((0.0, 1.70158, -2.0, 4.0))),
+            each(st.sampled_from((0.0, 0.25, 1.0, 3.0))) * draw(st.sampled_from((1.0, np.abs(values).max()))),
+            each(st.sampled_from((0.0, 4.0, 13.0, -3.0))),
+        ),
+        linear=draw(st.booleans()),
+    )
+
+
+all_cycles = st.builds(Cycles, st.sampled_from(MODES), st.sampled_from(MODES), st.integers(0, 3), st.integers(0, 3))

@@ -1,0 +1,67 @@
+"""How exact in-betweens are: at any time, far from frame 0, with any timing, and in the channels themselves."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import refresh, set_mode
+from rigid_motion.motion import KEYFRAME_MODES
+from tests.animation.bones.rigs import in_turn
+from tests.animation.oracle import expected_worlds, shown_worlds
+from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
+
+ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "AXIS_ANGLE")
+EIGHTHS = np.arange(FRAMES[0] - 1.0, FRAMES[-1] + 1.0, 0.125)
+SHIFTS = (0.0, -5000.0, 100_000.0)
+TIMINGS = ("LINEAR", "BEZIER", "SINE", "CUBIC", "EXPO", "BACK", "CIRC", "BOUNCE", "ELASTIC", "CONSTANT")
+BETWEEN, ON_FRAMES = 1e-4, 1e-5
+"""Metres that a point may be off, a metre away from the origin of something that moves metres."""
+
+POINTS = np.concatenate((np.zeros((1, 3)), np.eye(3)))
+
+
+def errors(obj: bpy.types.Object, frames: np.ndarray, owns: dict) -> np.ndarray:
+    """How far off the origin of an object is, or a point along one of its axes, at most on each frame."""
+    pairs = shown_worlds([obj], frames)[0], expected_worlds(obj, frames, owns)
+    shown, expected = (m[:, None, :3, :3] @ POINTS[:, :, None] + m[:, None, :3, 3:] for m in pairs)
+    return np.linalg.norm(shown - expected, axis=2).max(axis=(1, 2))
+
+
+@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
+@pytest.mark.parametrize("shift", SHIFTS)
+@pytest.mark.parametrize("placed", [False, True], ids=["", "with a parent and delta transforms"])
+def test_every_mode_is_exact_at_any_time(live_file, mode, order, shift, placed):
+    obj, owns = new_object("Tool", order), {}
+    if placed and order != "AXIS_ANGLE":
+        owns["Tool"] = give_own_deltas(obj)
+        obj.parent = new_object("Parent", "XYZ")
+        obj.parent.location, obj.parent.rotation_euler = (1.0, 2.0, -0.5), (0.3, -0.4, 1.0)
+    key(obj, np.array(FRAMES) + shift, interpolation="BEZIER" if placed else "LINEAR")
+    set_mode(obj, mode)
+    bpy.context.view_layer.update()
+    off = errors(obj, EIGHTHS + shift, owns)
+    assert off.max() < BETWEEN
+    assert off[::8].max() < ON_FRAMES
+    assert refresh() == 0
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+@pytest.mark.parametrize("timing", TIMINGS)
+def test_every_timing_is_exact(live_file, timing, mode):
+    obj = key(new_object("Tool", "XYZ"), interpolation=timing)
+    set_mode(obj, mode)
+    off = errors(obj, EIGHTHS, {})
+    assert off[::8].max() < ON_FRAMES
+    assert off.max() < BETWEEN
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_channels_have_what_is_seen(live_file, order):
+    obj = key(new_object("Tool", order))
+    set_mode(obj, "dq_sclerp")
+    for frame in (1.0, 7.375, 17.0, 39.5):
+        live_file.scene.frame_set(int(frame), subframe=frame % 1.0)
+        expected = expected_worlds(obj, [frame])[0]
+        assert np.abs(np.array(obj.matrix_basis) - expected).max() < ON_FRAMES
