@@ -28,9 +28,6 @@ BAKED, UNBAKED = "-baked", "-unbaked"
 STEPS = 0.01, 1e6
 """Frames from key to key: keys closer than that are one key to Blender."""
 
-LAST_FRAME = 1048574
-"""Of Blender's frames, which begin as far before 0."""
-
 EPILOG = """
 examples:
   python scripts/bake.py shot.blend
@@ -71,33 +68,22 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         metavar="N",
         help="frames from key to key; 0.25 for keys between the frames (1)",
     )
-    frame = bounded("frame", -LAST_FRAME, LAST_FRAME)
     keys.add_argument(
         "--hold",
         action="store_true",
         default=None,
         help="hold each pose until the next key: with --step 2 the motion is on twos (straight lines)",
     )
-    keys.add_argument(
-        "--first",
-        type=frame,
-        metavar="FRAME",
-        help="bake from here on, widened to whole segments, and over smooth ones beside them (first key)",
-    )
-    keys.add_argument("--last", type=frame, metavar="FRAME", help="bake up to here (last key)")
     add_file_options(parser)
     options = parser.parse_args(arguments)
     if options.unbake:
-        for option in ("step", "hold", "first", "last"):
+        for option in ("step", "hold"):
             if getattr(options, option) is not None:
                 parser.error(f"--{option} is for baking, and says nothing to --unbake: leave it out")
-    if None not in (options.first, options.last) and options.first > options.last:
-        parser.error(f"--last {options.last:g} is before --first {options.first:g}")
     try:
         refuse_odd_places(options)
-        given = {"step": options.step or 1.0, "first": options.first, "last": options.last}
-        hold = "CONSTANT" if options.hold else "LINEAR"
-        options.work = Unbake.of(options) if options.unbake else Bake.of(options, **given, interpolation=hold)
+        given = {"step": options.step or 1.0, "interpolation": "CONSTANT" if options.hold else "LINEAR"}
+        options.work = Unbake.of(options) if options.unbake else Bake.of(options, **given)
         options.todo = _planned(options)
     except ValueError as error:
         parser.error(str(error))
@@ -117,15 +103,13 @@ class Bake(Work):
 
     doing, done = "Baking", "baked"
     step: float
-    first: float | None
-    last: float | None
     interpolation: str
 
     def do(self, doing: Doing) -> None:
         from rigid_motion_batch.keying.baking import baking
         from rigid_motion_batch.keying.jobs import do_blend
 
-        do_blend(doing, baking(self.step, self.first, self.last, self.interpolation))
+        do_blend(doing, baking(self.step, self.interpolation))
 
 
 class Unbake(Work):

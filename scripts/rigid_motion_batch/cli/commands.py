@@ -23,7 +23,6 @@ RESEARCH = {
     "benchmark_live": "benchmark_live",
     "live_costs": "live_costs",
     "reduction": "reduction",
-    "subframes": "subframes",
     "glb_sizes": "glb_sizes",
     "stream_tables": "making.stream_tables",
     "pages": "pages",

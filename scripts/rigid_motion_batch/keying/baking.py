@@ -7,12 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from rigid_motion import animation
 from rigid_motion.animation import Refused
-from rigid_motion.animation.actions.reading import keyed_in
-from rigid_motion.animation.actions.records import recorded_mode
-from rigid_motion.animation.actions.refusals import refuse_numbers
+from rigid_motion.animation.actions.reading import modes_said
 from rigid_motion.animation.actions.slots import Binding, bindings_of
-from rigid_motion.animation.compute.sources import Source
-from rigid_motion.animation.queries.keyed import segment_modes
+from rigid_motion.animation.evaluation.sources import Marks
+from rigid_motion.animation.queries.keyed import frames_in, segment_modes
 from rigid_motion.animation.transforms import Transform
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.keying.jobs import Action, Result
@@ -21,17 +19,15 @@ FEW = 4
 """As many bones are named; of more it is said how many they are."""
 
 
-def baking(step: float, first: float | None, last: float | None, interpolation: str) -> Action:
-    """Return the action that makes keys of this interpolation on every `step` frames, from `first` to `last`."""
+def baking(step: float, interpolation: str) -> Action:
+    """Return the action that makes keys of this interpolation on every `step` frames."""
 
     def bake(targets: Sequence[Transform]) -> Result:
         problems = {target: problem for target in targets if (problem := animation.problem_of(target))}
         fit = [target for target in targets if target not in problems]
         modes, refusals = modes_of(fit), list[Refused]()
         begin, end = (
-            animation.bake(fit, step=step, first=first, last=last, interpolation=interpolation, refused=refusals)
-            if fit
-            else (0.0, 0.0)
+            animation.bake(fit, step=step, interpolation=interpolation, refused=refusals) if fit else (0.0, 0.0)
         )
         return _result(targets, modes, problems | _by_target(refusals, fit), f", frames {begin:g} to {end:g}")
 
@@ -71,32 +67,16 @@ def _by_target(refusals: Iterable[Refused], targets: Sequence[Transform]) -> dic
 
 def with_rigid_segments(targets: Sequence[Transform]) -> list[Transform]:
     """Return those that are to move otherwise than by Blender's own in-betweens, in any segment and possible or not."""
-    places = bindings_of(targets)
-    rigid = {
-        user
-        for place, source in zip(places, keyed_in(places), strict=True)
-        if _has_rigid_segments(place, source)
-        for user in place.users
-    }
+    rigid = {user for place in bindings_of(targets) if _has_rigid_segments(place) for user in place.users}
     return [target for target in targets if target in rigid]
 
 
-def _has_rigid_segments(place: Binding, source: Source | Refused) -> bool:
-    try:
-        if isinstance(source, Refused):
-            raise source
-        refuse_numbers(place.name, source)
-        return source.is_live
-    except ValueError:
-        return bool(segment_modes(place)) and _has_mode(place)
-
-
-def _has_mode(place: Binding) -> bool:
-    """Return whether there is any mode but Blender's own in a slot, also one that this version does not know."""
-    channel = place.curves.get(place.users[0].mode_channel)
-    if channel is None or channel.mute or not len(channel.keyframe_points):
-        return recorded_mode(place) != 0
-    return any(not abs(key.co.y) < 0.5 for key in channel.keyframe_points)
+def _has_rigid_segments(place: Binding) -> bool:
+    """Return whether a segment of a slot has another mode than Blender's own, be it one that nobody knows."""
+    modes = modes_said(place)
+    if isinstance(modes, Marks):
+        return bool(modes.numbers[:-1].any())
+    return modes != 0 and len(frames_in(place)) > 1
 
 
 def modes_of(targets: Sequence[Transform]) -> dict[Transform, str]:

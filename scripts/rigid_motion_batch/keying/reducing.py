@@ -55,8 +55,8 @@ def reduced(targets: Sequence[Transform], how: Reductions) -> Result:
         refused=refusals,
     )
     done = [target for target, count in zip(targets, before, strict=True) if _bakes(target) > count]
-    # Refusals come in the order of what refused.
-    problems = dict(zip([target for target in targets if target not in done], refusals, strict=True))
+    # Refusals come in the order of what refused. What shares its keys with another one has fewer all the same.
+    problems = dict(zip([target for target in targets if target not in done], refusals, strict=False))
     doubt = _doubt(targets, how.tolerance, unit)
     left = {target for target, refusal in problems.items() if isinstance(refusal, NeedsItsKeys)}
     reasons = {target: _reason(target, refusal) for target, refusal in problems.items()}
