@@ -23,7 +23,7 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")
 from examples import figure
 from examples.stills import render_still
 from rigid_motion import animation
-from rigid_motion.animation.compute.differences import in_betweens
+from rigid_motion.animation.evaluation.differences import in_betweens
 from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs, rotate
@@ -150,10 +150,10 @@ def by_mode(keyed: bpy.types.Object, mode: str) -> Poses:
     """The poses on all frames by a mode, at the times that the keys of an object ask for.
 
     Modes for streams are none of Blender's, so all are asked in the same way: how far along a segment the body is, is
-    the share of the straight way that Vector + Quaternion has gone.
+    the share of the straight way that Straight has gone.
     """
     keys = key_poses()
-    straight = in_betweens(source_of(keyed), FRAMES, "lerp_slerp").requested.positions
+    straight = in_betweens(source_of(keyed), FRAMES, "lerp_slerp").desired.positions
     key_frames = np.array([frame for frame, *_ in KEYS])
     segment = np.searchsorted(key_frames, FRAMES, side="right") - 1
     way = np.diff(keys.positions, axis=0)[segment]
