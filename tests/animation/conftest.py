@@ -13,19 +13,13 @@ from tests.complaints import complaints
 
 
 @pytest.fixture
-def live_file(empty_file, caplog: pytest.LogCaptureFixture) -> bpy.types.Context:
+def live_file(empty_file, caplog: pytest.LogCaptureFixture) -> Iterator[bpy.types.Context]:
     """A new file without objects, edits followed."""
     animation.register()
     try:
         with caplog.at_level(logging.WARNING):
             yield empty_file
     finally:
+        animation.set_enabled(True)
         animation.unregister()
     assert complaints(caplog) == []
-
-
-@pytest.fixture
-def following(live_file: bpy.types.Context) -> Iterator[None]:
-    """Errors that handlers log make the test fail, see `live_file`."""
-    yield
-    animation.set_enabled(True)

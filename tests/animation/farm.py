@@ -27,28 +27,25 @@ PLAY = """
 rigs = [name for name in names if bpy.data.objects[name].pose]
 assert not hasattr(bpy.types.PoseBone, "rigid_motion")
 poses = lambda: [bone.matrix for name in rigs for bone in bpy.data.objects[name].evaluated_get(graph).pose.bones]
-opened_poses, played, played_poses = np.array(poses()), [], []
+played, played_poses = [], []
 for frame in np.load(found):
     scene.frame_set(int(frame // 1), subframe=float(frame % 1))
     played.append(np.array(worlds()))
     played_poses.append(np.array(poses()))
 worlds, poses = np.swapaxes(played, 0, 1), np.swapaxes(played_poses, 0, 1)
-np.savez(found.replace(".npy", ".npz"), opened=opened, worlds=worlds, opened_poses=opened_poses, poses=poses)
+np.savez(found.replace(".npy", ".npz"), opened=opened, worlds=worlds, poses=poses)
 """
 
-SAVE = """
-bpy.ops.wm.save_as_mainfile(filepath=found if found.endswith(".blend") else found.replace(".npy", "-farm.blend"))
-"""
+SAVE = "bpy.ops.wm.save_as_mainfile(filepath=found)"
 
 
 class Played(NamedTuple):
-    """What a file shows as it is opened, and on all frames played: world matrices of objects, and those of the bones of
-    rigs in their armature's space, (., 4, 4) and (., frames, 4, 4).
+    """World matrices of objects as a file is opened (n, 4, 4) and on all frames played (n, frames, 4, 4), and those of
+    the bones of rigs among them in the space of their armature (., frames, 4, 4).
     """
 
     opened: np.ndarray
     worlds: np.ndarray
-    opened_poses: np.ndarray
     poses: np.ndarray
 
 
@@ -65,7 +62,7 @@ def on_a_farm(program: str, *arguments: object) -> None:
 
 
 def played_on_a_farm(path: Path, names: Sequence[str], frames: np.ndarray) -> Played:
-    """Play a file there, and run a program on it afterwards; `SAVE` saves it as NAME-farm.blend."""
+    """Play a file there."""
     found = path.with_suffix(".npy")
     np.save(found, frames)
     on_a_farm(PLAY, path, found, *names)

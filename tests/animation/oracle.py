@@ -13,10 +13,11 @@ import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
-from rigid_motion.motion.quaternions import normalise
-from tests.animation.body_oracle import Own, bodies_of, channels, native
+from rigid_motion.animation.actions.modifiers import on_top
+from rigid_motion.motion import quaternions
+from tests.animation.body_oracle import Body, Own, channels, native
 from tests.animation.keyed import WIDTHS, Carrier, curve_of, curves_of, key_frames, rotation_path
-from tests.animation.modified import acting, held_frames, modified, without_modifiers
+from tests.animation.modified import held_frames, modified, without_modifiers
 
 __all__ = ["Own"]
 
@@ -32,23 +33,15 @@ def expected_bases(
     own, fcurves = own or Own(), [fcurve for (path, _), fcurve in curves_of(obj).items() if path in WIDTHS]
     held = held_frames(fcurves, frames)
     with without_modifiers(fcurves):
-        location, quaternion, scale = _components(obj, held, own, keys)
+        location, quaternion, scale = Body(obj, own, keys).components(np.asarray(held, dtype=np.float64))
     for path, values, delta in (("location", location, own.location), ("scale", scale, own.scale)):
         for index in range(3):
             fcurve = curve_of(obj, path, index)
-            if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute and acting([fcurve]):
+            if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute and list(on_top(fcurve)):
                 has = values[:, index] - delta[index] if path == "location" else values[:, index] / delta[index]
                 has = modified(fcurve, held, has, frames)
                 values[:, index] = has + delta[index] if path == "location" else has * delta[index]
     return matrices(location, quaternion, scale)
-
-
-def _components(
-    obj: Carrier, frames: Sequence[float], own: Own, keys: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    frames = np.asarray(frames, dtype=np.float64)
-    components = [body.components(frames) for body in bodies_of(obj, own, keys)]
-    return components[0] if len(components) == 1 else tuple(of[part] for part, of in enumerate(components))
 
 
 def expected_worlds(obj: bpy.types.Object, frames: Sequence[float], owns: dict[str, Own] | None = None) -> np.ndarray:
@@ -62,12 +55,8 @@ def expected_worlds(obj: bpy.types.Object, frames: Sequence[float], owns: dict[s
 
 def matrices(location: np.ndarray, quaternion: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Scaled first, then turned, then moved, shape (m, 4, 4)."""
-    w, x, y, z = normalise(quaternion).T
     made = np.zeros((len(location), 4, 4))
-    made[:, :3, 0] = np.stack((1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)), axis=1)
-    made[:, :3, 1] = np.stack((2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)), axis=1)
-    made[:, :3, 2] = np.stack((2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)), axis=1)
-    made[:, :3, :3] *= scale[:, None, :]
+    made[:, :3, :3] = np.moveaxis(quaternions.matrices(quaternions.normalise(quaternion)), 2, 0) * scale[:, None, :]
     made[:, :3, 3], made[:, 3, 3] = location, 1.0
     return made
 
@@ -115,14 +104,20 @@ def assert_shown(
     """
     objects = list(objects)
     for obj, shown in zip(objects, shown_worlds(objects, frames), strict=True):
-        expected = expected_worlds(obj, frames, owns)
-        size = max(1.0, np.abs(expected).max(initial=0.0), _reach(obj, frames))
-        error = np.abs(shown - expected).max(axis=(1, 2), initial=0.0) / size * shortest_quaternion(obj, frames)
-        worst = int(np.argmax(error))
-        assert error[worst] < 1e-5, (
-            f"{obj.name} is off by {error[worst]:.3g} of its size on frame {frames[worst]} "
-            f"(keys on {key_frames(obj)}):\n{shown[worst]}\ninstead of\n{expected[worst]}"
-        )
+        assert_there(obj, frames, shown, expected_worlds(obj, frames, owns), _reach(obj, frames))
+
+
+def assert_there(
+    carrier: Carrier, frames: Sequence[float], shown: np.ndarray, expected: np.ndarray, size: float = 1.0
+) -> None:
+    """These matrices are those expected on frames, to 1e-5 of what is largest."""
+    size = max(1.0, np.abs(expected).max(initial=0.0), size)
+    error = np.abs(shown - expected).max(axis=(1, 2), initial=0.0) / size * shortest_quaternion(carrier, frames)
+    worst = int(np.argmax(error))
+    assert error[worst] < 1e-5, (
+        f"{carrier!r} is off by {error[worst]:.3g} of its size on frame {frames[worst]} "
+        f"(keys on {key_frames(carrier)}):\n{shown[worst]}\ninstead of\n{expected[worst]}"
+    )
 
 
 def _reach(obj: Carrier, frames: Sequence[float]) -> float:

@@ -1,84 +1,180 @@
-"""Where breakdowns lie beside the path of a mode, and how that is made up for, worked out apart from the program."""
+"""Along what path a mode moves a body between two keys, and how that is made up for where breakdowns lie beside it.
+
+Smooth modes, whose keys are passed at speeds of their own, are worked out from their formula.
+"""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import bpy
 import numpy as np
 
-from rigid_motion.motion import Poses, twists
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate, twists
 from rigid_motion.motion.quaternions import multiply, rotate
+from tests.animation.spin_oracle import Spin
+from tests.animation.timing_oracle import progress
 
 if TYPE_CHECKING:
-    from tests.animation.body_oracle import Path
+    from tests.animation.body_oracle import Body
 
 
-DEPENDS_ON_KEYS = {"pga_lerp", "cga_lerp", "motor_spline"}
-"""Another key on the path of one of these would make another path of it."""
+class Path:
+    """What a mode makes of the segment between keys that shape it."""
+
+    def __init__(self, body: Body, frame: float, mode: str) -> None:
+        self.body, self.mode, self.keys = body, mode, body.shaping
+        self.first, self.last = self.keys[self.keys <= frame][-1], self.keys[self.keys > frame][0]
+
+    def poses(self, share: np.ndarray, elapsed: np.ndarray | None = None) -> Poses:
+        """At this progress, which without times is along the path alone."""
+        if not KEYFRAME_MODES[self.mode].is_smooth:
+            ends = self.body.key_poses(np.array((self.first, self.last)))
+            spin, ends.quaternions[1] = self.body.spin_and_end(self.first, self.last)
+            return spin.add_to(interpolate((0.0, 1.0), ends, share, self.mode, extrapolate=True), share)
+        leaving, arriving = self._passings()
+        if elapsed is not None:
+            share = share + leaving[1] * elapsed * (1.0 - elapsed) ** 2 - arriving[1] * elapsed**2 * (1.0 - elapsed)
+        return self.body.spin(self.first, self.last).add_to(self._smooth(share, (leaving[0], arriving[0])), share)
+
+    def _smooth(self, share: np.ndarray, tangents: tuple[float, float]) -> Poses:
+        """The segment with the keys next to it; beside a segment that holds, the object rests."""
+        place = int(np.flatnonzero(self.keys == self.first)[0])
+        around = self.keys[max(place - 1, 0) : place + 3]
+        shown = around.copy()
+        before = int(place > 0)
+        if before and self.body.codes(around[0]) == {"CONSTANT"}:
+            shown[0] = shown[1]
+        if len(around) > before + 2 and self.body.codes(around[before + 1]) == {"CONSTANT"}:
+            shown[before + 2] = shown[before + 1]
+        spins = [
+            self.body.spin(*pair) if pair == pair_shown else Spin()
+            for pair, pair_shown in zip(itertools.pairwise(around), itertools.pairwise(shown), strict=True)
+        ]
+        return _with_tangents(around, self.body.key_poses(shown), before, share, tangents, spins)
+
+    def _passings(self) -> list[tuple[float, float]]:
+        """At both ends of a segment how long the tangent is, and what the slope of progress lacks."""
+        place, codes = int(np.flatnonzero(self.keys == self.first)[0]), self.body.codes(self.first)
+        passings = [(1.0, 0.0), (1.0, 0.0)]
+        if "BEZIER" in codes and codes <= {"LINEAR", "BEZIER"}:
+            if place > 0:
+                passings[0] = _passing(self.body, self.keys[place - 1 : place + 2], after=True)
+            if place + 2 < len(self.keys):
+                passings[1] = _passing(self.body, self.keys[place : place + 3], after=False)
+        return passings
+
+    def beside(self, frames: np.ndarray, share: np.ndarray) -> Poses:
+        """The poses between two keys (2,) of which at least one is a breakdown: along it, and as far off as they."""
+        places, offs = self.nearest(frames)
+        (first, second), growths = offs[:, :6], offs[:, 6]
+        poses = self.poses(places[0] + (places[1] - places[0]) * share)
+        blend = np.clip(share, 0.0, 1.0)
+        if self.mode == "motor_spline":
+            blend = blend * blend * (3.0 - 2.0 * blend)
+        change = steps(_moved(first[:, None]), _moved(second[:, None]))[:, :6].T
+        poses = _after(_after(poses, _moved(first[:, None] * np.ones(len(share)))), _moved(change * blend))
+        if poses.scales is not None:
+            poses = replace(poses, scales=poses.scales * np.exp(growths[0] + blend * (growths[1] - growths[0])))
+        return poses
+
+    def nearest(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far along the path the poses are that are nearest to keys (2,), and how far these are off it, (2, 7).
+
+        A radian is as far as a unit of length.
+        """
+        keys, places = self.body.key_poses(frames), []
+        for number in range(2):
+            low, high = -0.25, 1.25
+            for _ in range(7):
+                grid, step = np.linspace(low, high, 49, retstep=True)
+                off = steps(self.poses(grid), keys[np.full(len(grid), number)])
+                place = grid[np.argmin((off**2).sum(axis=1))]
+                # At an end one step beyond it is looked at as well.
+                low, high = np.clip((place - step, place + step), -0.25 - 1.0 / 32.0, 1.25 + 1.0 / 32.0)
+            places.append(place)
+        return np.array(places), steps(self.poses(np.array(places)), keys)
 
 
-def lies_on_path(curves: list[bpy.types.FCurve], frame: float, mode: str) -> bool:
-    """Whether a key between others is a breakdown in all channels that have one there, where that matters."""
-    types = {key.type for curve in curves for key in curve.keyframe_points if key.co[0] == frame}
-    repeats = any(modifier.type == "CYCLES" and not modifier.mute for curve in curves for modifier in curve.modifiers)
-    return mode in DEPENDS_ON_KEYS and not repeats and types == {"BREAKDOWN"}
+def _passing(body: Body, keys: np.ndarray, *, after: bool) -> tuple[float, float]:
+    """How long the tangent is, and what the slope of progress lacks, before or after the key in the middle of three."""
+    times = np.diff(keys)
+    begin, end = keys[after : after + 2]
+    frames = keys[1] + times[int(after)] / 8.0 * (np.arange(4) if after else -np.arange(4))
+    poses = body.key_poses(keys)
+    spun = np.array([body.spin(*pair).twist(poses.quaternions[1]) for pair in itertools.pairwise(keys)])
+    screws = steps(poses[[0, 1]], poses[[1, 2]]) + spun
+    progressed = progress(body.curves, begin, end, frames, body.turns(begin))
+    rate = np.polyfit(frames - keys[1], progressed, 3)[2]
+    # Angles turn by the spin, too, and less than half a turn is left without it.
+    by_angles = body.spin(begin, end, channel=False)
+    left = by_angles._replace(turns=-by_angles.turns).add_to(body.key_poses(frames), progressed)
+    native = np.polyfit(frames - keys[1], steps(left[[0] * 4], left), 3)[2] + rate * spun[int(after)]
+    if np.abs(screws[:, :6]).max() > 1e-9:
+        screws[:, 6] = 0.0
+    share = _share_of(*times)
+    speeds = [part * screw / time for part, screw, time in zip((share, 1.0 - share), screws, times, strict=True)]
+    mean = sum(speeds)
+    squared = max(mean @ mean, 0.01 * sum(speed @ speed for speed in speeds))
+    if not squared > 0.0:
+        return 0.0, 0.0
+    length = screws[int(after)] / times[int(after)] @ mean / squared
+    if share == float(not after):
+        return length, 0.0
+    passed = native @ mean / squared / np.copysign(max(abs(length), 0.1), length)
+    return length, np.clip(passed, -3.0, 3.0) - np.clip(rate * times[int(after)], -3.0, 3.0)
 
 
-def beside_path(path: Path, frames: np.ndarray, share: np.ndarray) -> Poses:
-    """The poses between two keys (2,) of which at least one is a breakdown: along the path, and as far off as they."""
-    places, offs = _beside(path, frames)
-    (first, second), growths = offs[:, :6], offs[:, 6]
-    poses = path.poses(places[0] + (places[1] - places[0]) * share)
-    blend = np.clip(share, 0.0, 1.0)
-    if path.mode == "motor_spline":
-        blend = blend * blend * (3.0 - 2.0 * blend)
-    begin, end = _moved(first[:, None]), _moved(second[:, None])
-    change = twists.between(begin.positions, begin.quaternions, end.positions, end.quaternions)
-    begin = begin[np.zeros(len(share), dtype=int)]
-    poses = _after(_after(poses, begin), _moved(change * blend))
-    if poses.scales is not None:
-        poses = replace(poses, scales=poses.scales * np.exp(growths[0] + blend * (growths[1] - growths[0])))
-    return poses
+def _with_tangents(
+    times: np.ndarray,
+    keys: Poses,
+    segment: int,
+    u: np.ndarray,
+    tangents: tuple[float, float],
+    spins: Sequence[Spin],
+) -> Poses:
+    """The segment between keys whose tangents are so many times as long as those of the mode, without its own spin.
+
+    A key before or after which the body rests has none.
+    """
+    screws, durations = steps(keys[:-1], keys[1:]), np.diff(times)
+    leaving, arriving = (
+        screws + [spin.twist(quaternion) for spin, quaternion in zip(spins, keys.quaternions[at], strict=True)]
+        for at in (slice(None, -1), slice(1, None))
+    )
+    bends = []
+    for key, tangent in zip((segment, segment + 1), tangents, strict=True):
+        own = (leaving if key == segment else arriving)[segment]
+        rate = own / durations[segment]
+        if 0 < key < len(durations):
+            part = _share_of(*durations[key - 1 : key + 1])
+            rate = part * arriving[key - 1] / durations[key - 1] + (1.0 - part) * leaving[key] / durations[key]
+            rate = rate * (arriving[key - 1].any() and leaving[key].any())
+        bends.append(tangent * durations[segment] * rate - own)
+    first = np.where(u < 0.0, u, np.where(u > 1.0, 0.0, u * (1.0 - u) ** 2))
+    second = np.where(u < 0.0, 0.0, np.where(u > 1.0, u - 1.0, -(u**2) * (1.0 - u)))
+    added = np.outer(bends[0], first) + np.outer(bends[1], second)
+    rigid = Poses(keys.positions, keys.quaternions)[segment : segment + 2]
+    result = _after(interpolate((0.0, 1.0), rigid, u, "dq_sclerp", extrapolate=True), _moved(added[:6]))
+    if keys.scales is None:
+        return result
+    return replace(result, scales=keys.scales[segment] * np.exp(u * screws[segment, 6] + added[6]))
 
 
-def goes_beside(path: Path, frames: np.ndarray) -> bool:
-    """Whether any of these keys (2,) is off the path, and not by rounding alone."""
-    return bool(np.abs(_beside(path, frames)[1]).max() > 1e-4)
+def _share_of(before: float, after: float) -> float:
+    """Of the twist before a key in that of the key."""
+    if max(before, after) >= 16.0 * min(before, after):
+        return float(before > after)
+    return min(max(after / (before + after), 1.0 - after / before), before / after)
 
 
-def _beside(path: Path, frames: np.ndarray) -> tuple[list[float], np.ndarray]:
-    """How far along the path the poses are that are nearest to keys (2,), and how far these are off it, (2, 7)."""
-    places = []
-    for frame in frames[:, None]:
-        along = path.shared_with_key(frame[0])
-        places.append(_nearest(along, along.body.key_poses(frame)))
-    return places, _off(path.poses(np.array(places)), path.body.key_poses(frames))
-
-
-def _nearest(path: Path, key: Poses) -> float:
-    """How far along the path the pose is that is nearest to a key, a radian being as far as a unit of length."""
-
-    def distances(shares: np.ndarray) -> np.ndarray:
-        return (_off(path.poses(shares), key[np.zeros(len(shares), dtype=int)]) ** 2).sum(axis=1)
-
-    grid = np.linspace(-0.25, 1.25, 49)
-    best = grid[np.argmin(distances(grid))]
-    low, high = best - 1.0 / 32.0, best + 1.0 / 32.0
-    for _ in range(40):
-        # By the golden section.
-        first, second = high - (high - low) / 1.618034, low + (high - low) / 1.618034
-        of_first, of_second = distances(np.array((first, second)))
-        low, high = (low, second) if of_first < of_second else (first, high)
-    return 0.5 * (low + high)
-
-
-def _off(poses: Poses, keys: Poses) -> np.ndarray:
-    """The twists from poses (n,) to keys, with the growth of log scale, shape (n, 7)."""
-    result = twists.between(poses.positions, poses.quaternions, keys.positions, keys.quaternions)
-    growths = np.zeros(len(keys.positions)) if keys.scales is None else np.log(keys.scales / poses.scales)
-    return np.vstack((result, growths)).T
+def steps(first: Poses, second: Poses) -> np.ndarray:
+    """The twists from poses (n,) to others, and how log scale grows, shape (n, 7)."""
+    result = twists.between(first.positions, first.quaternions, second.positions, second.quaternions)
+    grown = np.zeros(len(first)) if first.scales is None else np.log(np.maximum(second.scales, 1e-3) / first.scales)
+    return np.vstack((result, grown)).T
 
 
 def _moved(rows: np.ndarray) -> Poses:

@@ -26,7 +26,7 @@ def new_object(name: str = "Tool", rotation_mode: str = "QUATERNION", data: bpy.
     return obj
 
 
-def random_values(obj: bpy.types.Object, path: str, count: int, seed: int = 0, even: bool = True) -> np.ndarray:
+def random_values(obj: Carrier, path: str, count: int, seed: int = 0, even: bool = True) -> np.ndarray:
     """Values for the keys of a property, none of them half a turn apart."""
     random = np.random.default_rng((seed, sum(map(ord, path))))
     values = random.normal(size=(count, WIDTHS[path]))
@@ -38,18 +38,27 @@ def random_values(obj: bpy.types.Object, path: str, count: int, seed: int = 0, e
 
 
 def key(
-    obj: bpy.types.Object,
+    carrier: Carrier,
     frames: Sequence[float] = FRAMES,
     *,
     seed: int = 0,
+    location: bool = True,
     scale: str | None = None,
     interpolation: str = "BEZIER",
-) -> bpy.types.Object:
+) -> Carrier:
     """Key location, rotation and (with scale "even" or "uneven") scale at random on these frames."""
-    for path in ("location", rotation_path(obj), *(["scale"] if scale else [])):
-        values = random_values(obj, path, len(frames), seed, scale == "even")
-        write_channel(obj, path, np.array(frames), values, interpolation=interpolation)
-    return obj
+    # Bones of a rig move each in its own way.
+    seed += 0 if isinstance(carrier, bpy.types.Object) else sum(map(ord, carrier.name))
+    for path in (*(["location"] if location else []), rotation_path(carrier), *(["scale"] if scale else [])):
+        values = random_values(carrier, path, len(frames), seed, scale == "even")
+        write(carrier, path, np.array(frames), values, interpolation)
+    return carrier
+
+
+def write(carrier: Carrier, path: str, frames: np.ndarray, values: np.ndarray, interpolation: str = "LINEAR") -> None:
+    """Replace a property's channels, which the Dope Sheet lists under a bone as it does those keyed by hand."""
+    group = "" if isinstance(carrier, bpy.types.Object) else carrier.name
+    write_channel(carrier.id_data, carrier.path_from_id(path), frames, values, interpolation=interpolation, group=group)
 
 
 def key_densely(obj: Carrier) -> None:

@@ -91,7 +91,6 @@ def spin_and_end(
     angles: np.ndarray | None = None,
     order: str = "XYZ",
     own: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
-    axis: str = "SCREW",
     whole: bool = False,
 ) -> tuple[Spin, np.ndarray]:
     """The spin between two quaternions (2, 4), and where the body turns to without it, (4,).
@@ -114,8 +113,7 @@ def spin_and_end(
     if not sense and turns:
         turn = shortest(first, second)
         length = np.linalg.norm(turn)
-        is_screw = axis == "SCREW" and length >= 1e-4
-        spin = Spin(turns, tuple(turn / length if is_screw else np.eye(3)["XYZ".find(axis)]))
+        spin = Spin(turns, tuple(turn / length)) if length >= 1e-4 else Spin(turns)
         end = _without(spin._replace(turns=part), second)
     elif not sense:
         end = second

@@ -1,35 +1,50 @@
-"""Baked poses, read back from the evaluated scene, are the poses that were baked."""
+"""Baked poses are shown as before, whatever there is beside keys, and the way back from them leaves no trace.
+
+All is read back from the evaluated scene. Bones, Actions and names may have changed meanwhile.
+"""
 
 from __future__ import annotations
+
+import json
+import re
+from functools import partial
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import bake, bake_poses, read_poses, set_mode, unbake
+from rigid_motion.animation import bake, bake_poses, is_baked, reduce_keys_of, set_mode, unbake
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between
-from tests.animation.keyed import curves_of, rotation_path, snapshot
+from rigid_motion_batch.recordings.world_poses import read_poses
+from tests.animation.bones.poses import shown_of
+from tests.animation.bones.rigs import PLAYED, key_all, new_rig, select_only
+from tests.animation.bones.test_rig_edits import assert_nothing_stale
+from tests.animation.keyed import Carrier, curves_of, snapshot
 from tests.animation.oracle import shown_worlds
-from tests.animation.scenes import FRAMES, key, new_object
+from tests.animation.scenes import FRAMES, editor, enabled, key, new_object, new_strip, push_down, tweak
+
+OF_BOTH = pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
 
 
-@pytest.fixture
-def empty(empty_file) -> bpy.types.Object:
-    """An empty in quaternion mode, in the scene."""
-    return new_object("Tool")
+def moving(
+    of_bones: bool, mode: str = "dq_sclerp", name: str = "Mover", order: str = "QUATERNION", **settings: object
+) -> tuple[bpy.types.Object, list]:
+    """A rig or an object that has a mode, and what has it. `settings` are those of `key` and `key_all`."""
+    make, give = (new_rig, key_all) if of_bones else (new_object, key)
+    obj = give(make(name, rotation_mode=order), **settings)
+    targets = list(obj.pose.bones) if of_bones else [obj]
+    set_mode(targets, mode)
+    return obj, targets
 
 
-def motion(count: int = 60, scaled: bool = False, step: float = 1.0) -> tuple[np.ndarray, Poses]:
+def motion() -> tuple[np.ndarray, Poses]:
     """Frames and wild poses: half of the keys have the other sign."""
     random = np.random.default_rng(11)
-    keys = Poses(
-        random.normal(size=(8, 3)),
-        random.normal(size=(8, 4)),
-        np.exp(random.normal(size=8)) if scaled else None,
-    )
-    frames = 1.0 + step * np.arange(count)
-    poses = interpolate(np.linspace(frames[0], frames[-1], 8), keys, frames, "dq_sclerp")
+    keys = Poses(random.normal(size=(8, 3)), random.normal(size=(8, 4)), np.exp(random.normal(size=8)))
+    frames = np.arange(1.0, 201.0)
+    poses = interpolate(np.linspace(1.0, 200.0, 8), keys, frames, "dq_sclerp")
     poses.quaternions[::2] *= -1.0
     return frames, poses
 
@@ -38,31 +53,24 @@ def assert_read_back(obj: bpy.types.Object, frames: np.ndarray, poses: Poses) ->
     read = read_poses(obj, frames)
     assert np.abs(read.positions - poses.positions).max() < 1e-5
     assert angle_between(read.quaternions, poses.quaternions).max() < 1e-5 * np.pi
-    if poses.scales is not None:
-        assert np.abs(read.scales / poses.scales - 1.0).max() < 1e-5
-
-
-def test_a_shared_action_keeps_what_others_have_in_it(empty):
-    frames, poses = motion()
-    bake_poses(empty, frames, poses)
-    other = new_object("Other")
-    data = other.animation_data_create()
-    data.action = empty.animation_data.action
-    data.action_slot = data.action.slots.new("OBJECT", "Other")
-    still = Poses(poses.positions * 0.0, poses.quaternions)
-    bake_poses(other, frames, still)
-    assert_read_back(empty, frames, poses)
-    assert_read_back(other, frames, still)
+    assert np.abs(read.scales / poses.scales - 1.0).max() < 1e-5
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "AXIS_ANGLE", "XZY"])
-def test_poses_are_shown_however_an_object_turns_and_between_frames_it_goes_no_other_way(empty, order):
-    empty.rotation_mode = order
-    frames, poses = motion(200)
-    bake_poses(empty, frames, poses)
-    assert_read_back(empty, frames, poses)
+def test_poses_are_shown_however_an_object_turns_and_between_frames_it_goes_no_other_way(live_file, order):
+    obj, other = (new_object(name, order) for name in ("Tool", "Other"))
+    frames, poses = motion()
+    bake_poses(obj, frames, poses)
+    # A shared Action keeps what others have in it.
+    data = other.animation_data_create()
+    data.action = obj.animation_data.action
+    data.action_slot = data.action.slots.new("OBJECT", "Other")
+    still = Poses(poses.positions * 0.0, poses.quaternions, poses.scales)
+    bake_poses(other, frames, still)
+    assert_read_back(obj, frames, poses)
+    assert_read_back(other, frames, still)
     steps = angle_between(poses.quaternions[1:], poses.quaternions[:-1])
-    between = read_poses(empty, frames[:-1] + 0.5).quaternions
+    between = read_poses(obj, frames[:-1] + 0.5).quaternions
     assert np.all(angle_between(between, poses.quaternions[:-1]) < steps + 1e-3)
 
 
@@ -79,8 +87,8 @@ def test_delta_scales_that_cancel_out_leave_the_scale_to_blender(live_file):
         assert np.isfinite([point.co.y for point in points]).all()
 
 
-def give_cycles(obj: bpy.types.Object, mode: str) -> None:
-    for (path, _), fcurve in curves_of(obj).items():
+def give_cycles(carrier: Carrier, mode: str) -> None:
+    for (path, _), fcurve in curves_of(carrier).items():
         keys = fcurve.keyframe_points
         if mode == "REPEAT_OFFSET" and path != "location":
             keys[-1].co_ui.y = keys[0].co.y
@@ -88,44 +96,154 @@ def give_cycles(obj: bpy.types.Object, mode: str) -> None:
         cycles.mode_before = cycles.mode_after = mode
 
 
-def give_to_location(obj: bpy.types.Object, kind: str, **settings: float) -> None:
+def give_to_location(carrier: Carrier, kind: str, **settings: float) -> None:
     for index in range(3):
-        modifier = curves_of(obj)["location", index].modifiers.new(kind)
+        modifier = curves_of(carrier)["location", index].modifiers.new(kind)
         for name, value in settings.items():
             setattr(modifier, name, value)
 
 
+def mute_one(carrier: Carrier) -> None:
+    curves_of(carrier)["location", 1].mute = True
+    carrier.location.y = 0.75
+
+
 BESIDE_KEYS = {
-    "nothing": lambda obj: None,
-    "noise": lambda obj: give_to_location(obj, "NOISE", scale=3.0),
-    "holds": lambda obj: give_to_location(obj, "STEPPED", frame_step=4.0, frame_offset=2.0),
-    "cycles": lambda obj: give_cycles(obj, "REPEAT"),
-    "cycles that go on": lambda obj: give_cycles(obj, "REPEAT_OFFSET"),
-    "mirrored cycles": lambda obj: give_cycles(obj, "MIRROR"),
-    "cycles with limits": lambda obj: (give_cycles(obj, "REPEAT"), give_to_location(obj, "LIMITS", use_max_x=True)),
-    "a slope": lambda obj: [setattr(fcurve, "extrapolation", "LINEAR") for fcurve in curves_of(obj).values()],
-    "an angle on another frame": lambda obj: curves_of(obj)[rotation_path(obj), 1].keyframe_points.insert(50.0, 3.0),
-    "location on other frames": lambda obj: [
-        curves_of(obj)["location", index].keyframe_points.insert(17.0, 2.0) for index in range(3)
-    ],
+    "noise": lambda it: give_to_location(it, "NOISE", scale=3.0),
+    "holds": lambda it: give_to_location(it, "STEPPED", frame_step=4.0, frame_offset=2.0),
+    "cycles": lambda it: give_cycles(it, "REPEAT"),
+    "cycles that go on": lambda it: give_cycles(it, "REPEAT_OFFSET"),
+    "mirrored cycles": lambda it: give_cycles(it, "MIRROR"),
+    "cycles with limits": lambda it: (give_cycles(it, "REPEAT"), give_to_location(it, "LIMITS", use_max_x=True)),
+    "a channel that is muted": mute_one,
 }
 
 
-@pytest.mark.parametrize("order", ["QUATERNION", "XYZ", "AXIS_ANGLE"])
+@pytest.mark.parametrize(
+    ("of_bones", "order"), [(False, "QUATERNION"), (False, "XYZ"), (False, "AXIS_ANGLE"), (True, "XYZ")]
+)
 @pytest.mark.parametrize("beside", BESIDE_KEYS)
-def test_baked_keys_are_shown_as_before_whatever_there_is_beside_keys(live_file, beside, order):
+def test_baked_keys_are_shown_as_before_whatever_there_is_beside_keys(live_file, beside, of_bones, order):
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 70
-    obj = key(new_object(rotation_mode=order), seed=len(beside), scale="even")
-    BESIDE_KEYS[beside](obj)
-    set_mode(obj, "pga_slerp", FRAMES[:2])
-    set_mode(obj, "dq_sclerp", FRAMES[2:3])
+    obj, targets = moving(of_bones, "BLENDER", order=order, seed=len(beside), scale="even")
+    BESIDE_KEYS[beside](targets[0])
+    set_mode(targets, "pga_slerp", FRAMES[:2])
+    set_mode(targets, "dq_sclerp", FRAMES[2:3])
     frames = np.arange(0.0, 71.0)
-    if beside == "noise":  # Outside of the keys it goes on.
-        frames = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
-    (before,), keys = shown_worlds([obj], frames), snapshot(obj)
-    bake(obj)
+    before, keys = shown_of(obj, frames), list(map(snapshot, targets))
+    muted = {name: rows for name, rows in keys[0].items() if curves_of(targets[0])[name].mute}
+    bake(targets)
     bpy.context.view_layer.update()
-    assert np.abs(shown_worlds([obj], frames)[0] - before).max() < 2e-5 * np.abs(before).max()
-    unbake(obj)
-    assert snapshot(obj) == keys
+    assert np.abs(shown_of(obj, frames) - before).max() < 2e-5 * np.abs(before).max()
+    assert muted.items() <= snapshot(targets[0]).items()
+    unbake(targets)
+    assert np.abs(shown_of(obj, frames) - before).max() < 2e-5 * np.abs(before).max()
+    assert list(map(snapshot, targets)) == keys
     assert len(bpy.data.actions) == 1
+
+
+@OF_BOTH
+def test_all_that_moves_by_an_action_is_baked_together_and_gets_its_keys_back_from_either(live_file, of_bones):
+    obj, targets = moving(of_bones)
+    targets = targets[:2]
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    others = [other.pose.bones[bone.name] for bone in targets] if of_bones else [other]
+    before, expected = list(map(snapshot, targets)), [shown_of(one, PLAYED) for one in (obj, other)]
+    for bake_by, back_by in (([*targets, *others], others), (others, targets)):
+        bake(bake_by)
+        assert all(map(is_baked, [*targets, *others]))
+        for one, places in zip((obj, other), expected, strict=True):
+            assert np.abs(shown_of(one, PLAYED) - places).max() < 2e-5
+        assert list(map(snapshot, targets)) != before
+        unbake(back_by)
+        assert not any(map(is_baked, [*targets, *others]))
+        assert list(map(snapshot, targets)) == before
+        assert list(bpy.data.actions) == [obj.animation_data.action]
+    assert_nothing_stale()
+
+
+@OF_BOTH
+def test_a_duplicate_has_a_way_back_of_its_own(live_file, of_bones):
+    obj, targets = moving(of_bones)
+    before = list(map(snapshot, targets))
+    bake(targets)
+    select_only(obj)
+    bpy.ops.object.duplicate()
+    other = bpy.context.object
+    assert other.animation_data.action != obj.animation_data.action
+    others = list(other.pose.bones) if of_bones else [other]
+    unbake(others)
+    assert list(map(snapshot, others)) == before
+    assert list(map(snapshot, targets)) != before
+    unbake(targets)
+    assert list(map(snapshot, targets)) == before
+    assert len(bpy.data.actions) == 2
+
+
+def in_a_strip_of_strips(obj: bpy.types.Object, _other: bpy.types.Object) -> None:
+    push_down(obj)
+    select_only(obj)
+    obj.animation_data.nla_tracks[0].strips[0].select = obj.animation_data.nla_tracks[0].select = True
+    with editor("NLA_EDITOR"):
+        bpy.ops.nla.meta_add()
+
+
+def in_another_slot_too(obj: bpy.types.Object, other: bpy.types.Object, *, in_strips: bool = False) -> None:
+    select_only(obj, other)
+    bpy.ops.anim.merge_animation()
+    action, slot = obj.animation_data.action, obj.animation_data.action_slot
+    if in_strips:
+        obj.animation_data.action = None
+        new_strip(obj, 1, action, slot)
+    new_strip(obj, 50, action, other.animation_data.action_slot)
+
+
+ARRANGED = {
+    "in a strip of strips": in_a_strip_of_strips,
+    "while its strip is edited": lambda obj, _: tweak(obj, push_down(obj)),
+    "in another slot too": in_another_slot_too,
+    "in two strips": partial(in_another_slot_too, in_strips=True),
+}
+
+
+@pytest.mark.parametrize("arranged", ARRANGED)
+@OF_BOTH
+def test_what_plays_in_strips_or_several_slots_is_baked_there_and_gets_its_keys_back(live_file, of_bones, arranged):
+    (obj, targets), (other, _) = moving(of_bones, name="A"), moving(of_bones, "pga_lerp", "B", seed=1)
+    ARRANGED[arranged](obj, other)
+    bpy.context.view_layer.update()
+    frames, actions = np.arange(1.0, 90.0), set(bpy.data.actions)
+    before, keys = shown_of(obj, frames), list(map(keys_in, actions))
+    for act in (bake, unbake):
+        act(targets)
+        bpy.context.view_layer.update()
+        assert np.abs(shown_of(obj, frames) - before).max() < 2e-5
+        assert (list(map(keys_in, actions)) == keys) == (act == unbake)
+    assert set(bpy.data.actions) == actions
+
+
+def keys_in(action: bpy.types.Action) -> list[int]:
+    """How many keys each F-curve of an Action has."""
+    return [len(fcurve.keyframe_points) for bag in action.layers[0].strips[0].channelbags for fcurve in bag.fcurves]
+
+
+def clips_of(obj: bpy.types.Object, folder: Path) -> tuple[set[str], set[bytes]]:
+    """The names of what Blender's exporters write with their default settings."""
+    path = str(folder / obj.name)
+    with enabled("io_scene_gltf2", "io_scene_fbx"):
+        bpy.ops.export_scene.gltf(filepath=f"{path}.gltf", export_format="GLTF_SEPARATE")
+        bpy.ops.export_scene.fbx(filepath=f"{path}.fbx")
+    animations = json.loads((folder / f"{obj.name}.gltf").read_text())["animations"]
+    stacks = re.findall(rb"([\w|. ]+)\x00\x01AnimStack", (folder / f"{obj.name}.fbx").read_bytes())
+    return {animation["name"] for animation in animations}, set(stacks)
+
+
+@OF_BOTH
+def test_what_is_kept_is_no_clip_of_an_export(live_file, tmp_path, of_bones):
+    obj, targets = moving(of_bones)
+    before = clips_of(obj, tmp_path)
+    bake(targets)
+    reduce_keys_of(targets, "dq_sclerp", 0.1)
+    assert len(bpy.data.actions) == 3
+    assert clips_of(obj, tmp_path) == before

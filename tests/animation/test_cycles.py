@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import Refused, problem_of, repeat, set_mode, write_channel
+from rigid_motion.animation.actions.modifiers import add_cycles
+from rigid_motion.animation.fcurves.keys import Cycles
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, key_frames, rotation_path, snapshot
@@ -21,78 +23,61 @@ from tests.animation.scenes import key, new_object, random_values
 CYCLES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")
 FRAMES = (31.0, 35.0, 42.0)
 
+MIRRORED = np.array((FRAMES[:-1], (FRAMES[0], FRAMES[0] + FRAMES[2] - FRAMES[1])))
+"""The frames of keys, but for the last one, in rounds that run forwards and backwards."""
+
 AROUND = np.arange(0.0, 76.0, 0.25)
 """The frames of the scene, and quarters: more than two rounds on both sides."""
 
 
-def keyed(order: str, interpolation: str = "LINEAR") -> bpy.types.Object:
-    """An object with three keys, turned on the last as on the first."""
+def cyclic(
+    order: str = "QUATERNION", before: str = "REPEAT", after: str = "REPEAT", count: int = 0, how: str = "LINEAR"
+) -> bpy.types.Object:
+    """An object with three keys, turned on the last as on the first, and Cycles."""
     obj = new_object("Tool", order)
     for path in ("location", rotation_path(obj)):
         values = random_values(obj, path, 3)
         if path != "location":
             values[2] = values[0]
-        write_channel(obj, path, np.array(FRAMES), values, interpolation=interpolation)
+        write_channel(obj, path, np.array(FRAMES), values, interpolation=how)
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 75
-    return obj
-
-
-def cyclic(order: str, interpolation: str = "LINEAR", **settings: object) -> bpy.types.Object:
-    obj = keyed(order, interpolation)
     for fcurve in curves_of(obj).values():
-        cycles = fcurve.modifiers.new("CYCLES")
-        for name, value in settings.items():
-            setattr(cycles, name, value)
+        add_cycles(fcurve, Cycles(before, after, count, count))
         fcurve.update()
     return obj
 
 
-def unrolled(obj: bpy.types.Object, before: str, after: str, before_count: int, after_count: int) -> np.ndarray:
-    """Where a cyclic object has to be on the frames around: in each round as if the round's keys were real ones.
+def unrolled(
+    obj: bpy.types.Object, before: str, after: str, count: int, frames: np.ndarray = AROUND, *, seams: bool = False
+) -> np.ndarray:
+    """Where a cyclic object has to be on frames: in each round where it is in the first, which may run backwards, or go
+    on from where the one before has ended.
 
-    On the seams, and where the rounds are used up, there is nothing but Blender's own.
+    On the seams, unless they are asked for, and where the rounds are used up, there is nothing but Blender's own.
     """
     first, last = key_frames(obj)[[0, -1]]
-    result = expected_bases(obj, AROUND, keys=np.empty(0))
-    for number in range(-4, 5):
-        kind, count = (after, after_count) if number > 0 else (before, before_count)
-        if number and (kind == "NONE" or (count and abs(number) > count)):
-            continue
-        since = AROUND - first - number * (last - first)
-        inside = (since > 0.0) & (since < last - first)
-        if not inside.any():
-            continue
-        spare = one_round(obj, kind if number else "NONE", number)
-        result[inside] = expected_bases(spare, AROUND[inside])
-        discard(spare)
+    rounds = (frames - first) / (last - first)
+    number = np.floor(rounds)
+    kind = np.where(number > 0, after, np.where(number < 0, before, "NONE"))
+    is_used = (number == 0) | ((kind != "NONE") & ((count == 0) | (np.abs(number) <= count)))
+    chosen = np.flatnonzero(is_used & (seams | (rounds != number)))
+    share = np.where((kind == "MIRROR") & (number % 2 == 1), 1.0 - (rounds - number), rounds - number)[chosen]
+    times, places = np.unique(first + share * (last - first), return_inverse=True)
+    plain = obj.copy()
+    plain.animation_data.action = obj.animation_data.action.copy()
+    for fcurve in curves_of(plain).values():
+        fcurve.modifiers.remove(fcurve.modifiers[0])
+    ends, bases = expected_bases(plain, (first, last)), expected_bases(plain, times)[places]
+    bpy.data.actions.remove(plain.animation_data.action)
+    bpy.data.objects.remove(plain)
+    for row, index in enumerate(chosen):
+        if kind[index] == "REPEAT_OFFSET":
+            turn = np.linalg.matrix_power(ends[1][:3, :3] @ ends[0][:3, :3].T, int(number[index]))
+            bases[row, :3, :3] = turn @ bases[row, :3, :3]
+            bases[row, :3, 3] += number[index] * (ends[1] - ends[0])[:3, 3]
+    result = expected_bases(obj, frames, keys=np.empty(0))
+    result[chosen] = bases
     return result
-
-
-def discard(spare: bpy.types.Object) -> None:
-    bpy.data.actions.remove(spare.animation_data.action)
-    bpy.data.objects.remove(spare)
-
-
-def one_round(obj: bpy.types.Object, kind: str, number: int) -> bpy.types.Object:
-    """A copy out of the scene, with the keys of one round. Mirrored ones need straight lines between keys."""
-    first, last = key_frames(obj)[[0, -1]]
-    spare = obj.copy()
-    spare.animation_data.action = obj.animation_data.action.copy()
-    for fcurve in curves_of(spare).values():
-        for modifier in list(fcurve.modifiers):
-            fcurve.modifiers.remove(modifier)
-        points = fcurve.keyframe_points
-        rise = number * (points[-1].co.y - points[0].co.y) if kind == "REPEAT_OFFSET" else 0.0
-        values = [point.co.y for point in points]
-        times = [point.co.x for point in points]
-        if kind == "MIRROR" and number % 2:
-            values.reverse()
-            times = [first + last - time for time in reversed(times)]
-        for point, time, value in zip(points, times, values, strict=True):
-            shift = time + number * (last - first) - point.co.x, value + rise - point.co.y
-            for part in ("co", "handle_left", "handle_right"):
-                setattr(point, part, [a + b for a, b in zip(getattr(point, part), shift, strict=True)])
-    return spare
 
 
 def assert_unrolled(obj: bpy.types.Object, *cycles: object) -> None:
@@ -101,41 +86,36 @@ def assert_unrolled(obj: bpy.types.Object, *cycles: object) -> None:
     assert error.max() < 1e-5, f"off by {error.max():.3g} on frame {AROUND[error.argmax()]}"
 
 
-@pytest.mark.parametrize(("sides", "count"), in_turn(itertools.product(CYCLES, repeat=2), [0, 1, 2]))
-def test_cycles_repeat_the_rigid_motion_on_both_sides(live_file, sides, count):
-    before, after = sides
-    obj = cyclic("QUATERNION", mode_before=before, mode_after=after, cycles_before=count, cycles_after=count)
+CASES = [
+    *itertools.product(CYCLES, CYCLES, (0, 1, 2), ["dq_sclerp"]),
+    *((kind, kind, 0, mode) for kind in CYCLES[1:3] for mode, one in KEYFRAME_MODES.items() if not one.is_smooth),
+    *(("REPEAT", "REPEAT", 0, mode) for mode, one in KEYFRAME_MODES.items() if one.is_smooth),
+]
+"""What cycles are on either side, how often, and the mode; flowing on is another test's."""
+
+
+@pytest.mark.parametrize(
+    ("case", "how"),
+    in_turn(CASES, [("QUATERNION", "BEZIER"), ("YZX", "SINE"), ("AXIS_ANGLE", "LINEAR")]),
+)
+def test_cycles_repeat_the_rigid_motion_with_the_easing_of_its_keys(live_file, case, how):
+    (before, after, count, mode), (order, interpolation) = case, how
+    obj = cyclic(order, before, after, count, interpolation)
     keys = snapshot(obj)
-    set_mode(obj, "dq_sclerp")
-    assert snapshot(obj) == keys
-    assert_unrolled(obj, before, after, count, count)
-
-
-@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ("QUATERNION", "YZX", "AXIS_ANGLE")))
-@pytest.mark.parametrize("kind", CYCLES[1:3])
-def test_cycles_repeat_every_mode_with_the_easing_of_its_keys(live_file, mode, kind, order):
-    obj = cyclic(order, "BEZIER" if kind == "REPEAT" else "SINE", mode_before=kind, mode_after=kind)
     set_mode(obj, mode)
-    if kind == "REPEAT" or not KEYFRAME_MODES[mode].is_smooth:
-        assert_unrolled(obj, kind, kind, 0, 0)
+    assert snapshot(obj) == keys
+    assert_unrolled(obj, before, after, count)
 
 
 @pytest.mark.parametrize("kind", ["REPEAT_OFFSET", "MIRROR"])
 def test_a_smooth_mode_flows_on_from_round_to_round(live_file, kind):
-    obj = cyclic("QUATERNION", mode_before=kind, mode_after=kind)
+    obj = cyclic("QUATERNION", kind, kind)
     set_mode(obj, "motor_spline")
     shown = shown_worlds([obj], AROUND)[0]
-    times, values = [], []
-    for number in range(-4, 6):
-        spare = one_round(obj, kind, number)
-        curves = curves_of(spare)
-        channels = [curves["location", index] for index in range(3)]
-        channels += [curves["rotation_quaternion", index] for index in range(4)]
-        times += key_frames(spare)[:-1].tolist()
-        values += [[fcurve.evaluate(frame) for fcurve in channels] for frame in key_frames(spare)[:-1]]
-        discard(spare)
-    positions, quaternions = np.split(np.array(values), (3,), axis=1)
-    expected = interpolate(times, Poses(positions, quaternions), AROUND, "motor_spline")
+    rounds, keys = np.arange(-4, 6)[:, None], np.array(FRAMES[:-1])
+    times = (rounds * (FRAMES[-1] - FRAMES[0]) + (keys if kind != "MIRROR" else MIRRORED[rounds[:, 0] % 2])).ravel()
+    poses = Poses.from_matrices(unrolled(obj, kind, kind, 0, times, seams=True))
+    expected = interpolate(times, poses, AROUND, "motor_spline")
     placed = matrices(expected.positions, expected.quaternions, np.ones((len(AROUND), 3)))
     assert np.abs(shown - placed).max() < 1e-5 * np.abs(placed).max()
 
@@ -148,36 +128,15 @@ def test_a_wheel_rolls_on(live_file):
     set_mode(obj, "dq_sclerp")
     repeat(obj, "REPEAT_OFFSET")
     assert problem_of(obj) == ""
-    assert_unrolled(obj, "REPEAT_OFFSET", "REPEAT_OFFSET", 0, 0)
+    assert_unrolled(obj, "REPEAT_OFFSET", "REPEAT_OFFSET", 0)
 
 
-@pytest.mark.parametrize("kind", ["REPEAT", "MIRROR"])
-def test_cycles_come_in_front_of_what_there_is(live_file, kind):
-    obj = keyed("QUATERNION")
-    set_mode(obj, "dq_sclerp")
-    repeat(obj, kind)
-    assert {fcurve.modifiers[0].type for fcurve in curves_of(obj).values()} == {"CYCLES"}
-    assert_unrolled(obj, kind, kind, 0, 0)
-    repeat(obj, kind)
-    assert_unrolled(obj, kind, kind, 0, 0)
-
-
-def test_what_does_not_go_round_together_is_refused_with_the_way_out(live_file):
-    obj = cyclic("QUATERNION")
-    curves_of(obj)["location", 1].modifiers[0].mute = True
-    with pytest.raises(Refused, match=r"Tool repeats, but not all of it together.*Add Cycles"):
-        set_mode(obj, "dq_sclerp")
-    repeat(obj)
-    set_mode(obj, "dq_sclerp")
-    assert_unrolled(obj, "REPEAT", "REPEAT", 0, 0)
+def test_what_cannot_go_on_from_its_end_is_refused_with_the_way_out(live_file):
     turned = key(new_object("Turned"), FRAMES)
     set_mode(turned, "dq_sclerp")
     with pytest.raises(Refused, match=r"Turned ends turned or scaled otherwise.*choose Repeat"):
         repeat(turned, "REPEAT_OFFSET")
     for fcurve in curves_of(turned).values():
-        for term in list(fcurve.modifiers):
-            fcurve.modifiers.remove(term)
-        cycles = fcurve.modifiers.new("CYCLES")
-        cycles.mode_before = cycles.mode_after = "REPEAT_OFFSET"
+        add_cycles(fcurve, Cycles("REPEAT_OFFSET", "REPEAT_OFFSET", 0, 0))
     bpy.context.view_layer.update()
     assert problem_of(turned).startswith("Turned ends turned or scaled otherwise")

@@ -6,10 +6,9 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion import animation
-from rigid_motion.animation import key_frames, modes_of, problem_of, read_poses, set_mode
-from tests.animation.keyed import curves_of, snapshot
-from tests.animation.oracle import assert_shown
+from rigid_motion.animation import key_frames, modes_of, problem_of, set_mode
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import assert_shown, shown_worlds
 from tests.animation.scenes import FRAMES, key, new_object
 
 PLAYED = np.arange(-2.0, 44.0)
@@ -32,26 +31,6 @@ def test_linear_extrapolation_goes_on_to_where_a_scene_ends_that_was_made_anew(l
     assert_shown(bpy.context.scene.objects, np.arange(71.0))
 
 
-def test_three_slots_of_one_action_have_modes_and_keys_of_their_own(live_file):
-    objects = [new_object(name, order) for name, order in (("A", "QUATERNION"), ("B", "XYZ"), ("C", "ZYX"))]
-    action = bpy.data.actions.new("Shared")
-    for seed, obj in enumerate(objects):
-        obj.animation_data_create().action = action
-        obj.animation_data.action_slot = action.slots.new("OBJECT", obj.name)
-        key(obj, (1.0 + seed, 10.0, 30.0 + seed), seed=seed)
-    for obj, mode in zip(objects, ("dq_sclerp", "pga_lerp", "BLENDER"), strict=True):
-        set_mode(obj, mode)
-    assert [any(fcurve.modifiers for fcurve in curves_of(obj).values()) for obj in objects] == [True, True, False]
-    assert_shown(objects, PLAYED)
-    before = [snapshot(obj) for obj in objects]
-    set_mode(objects[2], "lerp_slerp", [10.0])
-    assert [snapshot(obj) for obj in objects] == before
-    assert_shown(objects, PLAYED)
-    action.slots.remove(objects[0].animation_data.action_slot)
-    bpy.context.view_layer.update()
-    assert_shown(objects[1:], PLAYED)
-
-
 def test_a_mode_that_was_chosen_before_there_were_keys_waits_for_them(live_file):
     obj = new_object()
     obj.rigid_motion.mode = "pga_lerp"
@@ -66,19 +45,6 @@ def test_a_mode_that_was_chosen_before_there_were_keys_waits_for_them(live_file)
         key(waiting, seed=3)
         bpy.context.view_layer.update()
         assert modes_of(waiting, np.array(FRAMES[:1])) == ["BLENDER"], "it was for the first Action"
-
-
-def test_many_objects_get_a_mode_at_once_and_what_refuses_is_named(live_file):
-    objects = [key(new_object(f"Tool {number}"), seed=number) for number in range(4)]
-    curves_of(objects[2])["location", 0].modifiers.new("ENVELOPE")
-    with pytest.raises(animation.Refused, match="Tool 2: Location X has an Envelope"):
-        set_mode(objects, "dq_sclerp")
-    assert {obj.rigid_motion.mode for obj in objects} == {"BLENDER"}
-    refused: list = []
-    set_mode(objects, "dq_sclerp", refused=refused)
-    assert [str(refusal)[:6] for refusal in refused] == ["Tool 2"]
-    assert [obj.rigid_motion.mode for obj in objects] == ["dq_sclerp", "dq_sclerp", "BLENDER", "dq_sclerp"]
-    assert_shown(objects[:2], PLAYED)
 
 
 def test_what_is_deleted_with_an_edit_of_it_still_to_be_seen_is_asked_for_nothing_more(live_file):
@@ -99,7 +65,7 @@ def test_two_keys_on_one_frame_leave_a_mode_to_the_object(live_file, mode):
     """As Shift D does it, until they are moved apart."""
     obj = key(new_object("Tool", "QUATERNION"), interpolation="LINEAR")
     set_mode(obj, mode)
-    before = read_poses(obj, np.arange(1.0, 41.0))
+    (before,) = shown_worlds([obj], PLAYED)
     for fcurve in curves_of(obj).values():
         if fcurve.keyframe_points:
             keys = fcurve.keyframe_points
@@ -110,6 +76,4 @@ def test_two_keys_on_one_frame_leave_a_mode_to_the_object(live_file, mode):
     bpy.context.view_layer.update()
     assert problem_of(obj) == ""
     assert key_frames(obj).tolist() == [1.0, 11.0, 24.0, 40.0]
-    after = read_poses(obj, np.arange(1.0, 41.0))
-    np.testing.assert_allclose(after.positions, before.positions, atol=1e-5)
-    np.testing.assert_allclose(after.quaternions, before.quaternions, atol=1e-5)
+    np.testing.assert_allclose(shown_worlds([obj], PLAYED)[0], before, atol=1e-5)

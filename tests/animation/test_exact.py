@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import bpy
 import numpy as np
 import pytest
@@ -29,39 +31,23 @@ def errors(obj: bpy.types.Object, frames: np.ndarray, owns: dict) -> np.ndarray:
     return np.linalg.norm(shown - expected, axis=2).max(axis=(1, 2))
 
 
-@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
+@pytest.mark.parametrize(("how", "mode"), in_turn(zip(cycle(ORDERS), TIMINGS, strict=False), list(KEYFRAME_MODES)))
 @pytest.mark.parametrize("shift", SHIFTS)
 @pytest.mark.parametrize("placed", [False, True], ids=["", "with a parent and delta transforms"])
-def test_every_mode_is_exact_at_any_time(live_file, mode, order, shift, placed):
-    obj, owns = new_object("Tool", order), {}
+def test_every_mode_is_exact_at_any_time_with_any_timing(live_file, how, mode, shift, placed):
+    (order, timing), owns = how, {}
+    obj = new_object("Tool", order)
     if placed and order != "AXIS_ANGLE":
         owns["Tool"] = give_own_deltas(obj)
         obj.parent = new_object("Parent", "XYZ")
         obj.parent.location, obj.parent.rotation_euler = (1.0, 2.0, -0.5), (0.3, -0.4, 1.0)
-    key(obj, np.array(FRAMES) + shift, interpolation="BEZIER" if placed else "LINEAR")
+    key(obj, np.array(FRAMES) + shift, interpolation=timing)
     set_mode(obj, mode)
     bpy.context.view_layer.update()
     off = errors(obj, EIGHTHS + shift, owns)
     assert off.max() < BETWEEN
     assert off[::8].max() < ON_FRAMES
     assert refresh() == 0
-
-
-@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
-@pytest.mark.parametrize("timing", TIMINGS)
-def test_every_timing_is_exact(live_file, timing, mode):
-    obj = key(new_object("Tool", "XYZ"), interpolation=timing)
-    set_mode(obj, mode)
-    off = errors(obj, EIGHTHS, {})
-    assert off[::8].max() < ON_FRAMES
-    assert off.max() < BETWEEN
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_channels_have_what_is_seen(live_file, order):
-    obj = key(new_object("Tool", order))
-    set_mode(obj, "dq_sclerp")
-    for frame in (1.0, 7.375, 17.0, 39.5):
-        live_file.scene.frame_set(int(frame), subframe=frame % 1.0)
-        expected = expected_worlds(obj, [frame])[0]
-        assert np.abs(np.array(obj.matrix_basis) - expected).max() < ON_FRAMES
+    frame = 7.375 + shift
+    live_file.scene.frame_set(int(np.floor(frame)), subframe=frame % 1.0)
+    np.testing.assert_allclose(obj.matrix_world, expected_worlds(obj, [frame], owns)[0], rtol=0.0, atol=ON_FRAMES)

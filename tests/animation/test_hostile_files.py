@@ -7,85 +7,170 @@ object there is always a whole one, which gets its in-betweens whatever is wrong
 from __future__ import annotations
 
 import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import channelbag_of, problem_of, set_mode
-from tests.animation.hostile import (
-    INF,
-    LARGEST,
-    LOCATION_Y,
-    NAN,
-    SEEN,
-    TRANSFORMS,
-    TURN_W,
-    Damage,
-    each,
-    everywhere,
-    make,
-    marks,
-    numbers,
-    reopened,
-    soon,
-    terms,
-    use,
-)
+from rigid_motion import animation
+from rigid_motion.animation import MODE_IDS, channelbag_of, modes_of, problem_of, set_mode
+from rigid_motion.animation.actions.marks import write_marks
+from rigid_motion.animation.fcurves.keys import ELASTIC
 from tests.animation.keyed import WIDTHS, curves_of, snapshot
 from tests.animation.modified import is_term
 from tests.animation.oracle import assert_shown, shown_worlds
+from tests.animation.scenes import FRAMES, key, new_object
+from tests.blank import blank
 from tests.thoroughness import sample
 
-pytestmark = pytest.mark.usefixtures("following")
+SEEN = range(-2, 46)
+
+NAN, INF = float("nan"), float("inf")
+LARGEST = float(np.finfo(np.float32).max)
+
+TRANSFORMS = ("location", "rotation_quaternion", "scale")
+LOCATION_Y, TURN_W = ("location", 1), ("rotation_quaternion", 0)
+
+Damage = Callable[[bpy.types.Object], object]
 
 
-def easing_setting(name: str, interpolation: str, value: float) -> Damage:
-    code = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items[interpolation].value
-    return each(numbers(LOCATION_Y, "interpolation", code), numbers(LOCATION_Y, name, value, 1))
+def make(damage: Damage, mode: str = "dq_sclerp") -> None:
+    """A new file with an object that gets damaged, and one that does not."""
+    animation.set_enabled(True)
+    blank()
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 40
+    broken, whole = key(new_object("Broken"), seed=1, scale="even"), key(new_object("Whole"), seed=2)
+    set_mode(broken, mode)
+    set_mode(whole, mode, FRAMES)
+    animation.set_enabled(False)
+    damage(broken)
 
 
-def nowhere(obj: bpy.types.Object) -> None:
-    obj.delta_scale.y = NAN
+def reopened(folder: Path, *, followed: bool = True) -> tuple[bpy.types.Object, bpy.types.Object]:
+    """The damaged and the whole object of the file, saved and opened again; followed by the extension or not."""
+    path = str(folder / "scene.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    animation.set_enabled(followed)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    bpy.context.view_layer.update()
+    whole = bpy.data.objects["Whole"]
+    return next(obj for obj in bpy.data.objects if obj != whole), whole
 
 
+@pytest.fixture(autouse=True)
+def soon(live_file) -> Iterator[None]:
+    """All is done in far less time than an animator would wait for."""
+    began = time.process_time()
+    yield
+    assert time.process_time() - began < 10.0
+
+
+def use(obj: bpy.types.Object) -> None:
+    """What an animator does next, and what the panel asks for."""
+    for (path, _), fcurve in curves_of(obj).items():
+        if path == "location" and len(fcurve.keyframe_points):
+            fcurve.keyframe_points[-1].select_control_point = True
+            fcurve.keyframe_points[-1].co_ui.y += 1.0
+            fcurve.update()
+    bpy.context.view_layer.update()
+    obj.location.x += 1.0
+    bpy.context.view_layer.update()
+    for frame in (5, 30, 12):
+        bpy.context.scene.frame_set(frame)
+    assert set(modes_of(obj, np.array(FRAMES))) <= set(MODE_IDS)
+    problem_of(obj)
+    animation.refresh()
+
+
+# Damage
+
+
+def numbers(channel: tuple[str, int], field: str, value: float, *at: int) -> Damage:
+    """One number of these keys of a channel is another, of all without any; nothing else follows."""
+    name, _, axis = field.partition(".")
+
+    def damage(obj: bpy.types.Object) -> None:
+        points = curves_of(obj)[channel].keyframe_points
+        width, dtype = (2, np.float32) if axis else (1, np.int32 if name in ("interpolation", "easing") else np.float32)
+        result = np.empty(width * len(points), dtype)
+        points.foreach_get(name, result)
+        result.reshape(-1, width)[list(at) or slice(None), int(axis == "y")] = value
+        points.foreach_set(name, result)
+
+    return damage
+
+
+def everywhere(field: str, value: float, *at: int, paths: tuple[str, ...] = TRANSFORMS) -> Damage:
+    """The same in all channels of these properties."""
+    return each(*(numbers((path, index), field, value, *at) for path in paths for index in range(WIDTHS[path])))
+
+
+def each(*damages: Damage) -> Damage:
+    return lambda obj: [damage(obj) for damage in damages]
+
+
+def marks(*of_keys: int) -> Damage:
+    """The keys of all channels say these, of which those above the modes that there are mean nothing."""
+    return lambda obj: [write_marks(fcurve, np.array(of_keys)) for fcurve in curves_of(obj).values()]
+
+
+def terms(change: Callable[[bpy.types.FCurve, bpy.types.FModifierGenerator], object]) -> Damage:
+    """The terms of all channels are changed, one after the other."""
+    return lambda obj: [
+        change(fcurve, term) for fcurve in curves_of(obj).values() for term in list(fcurve.modifiers) if is_term(term)
+    ]
+
+
+def called(name: str) -> Damage:
+    def damage(obj: bpy.types.Object) -> None:
+        obj.name = obj.animation_data.action.name = obj.animation_data.action_slot.name_display = name
+
+    return damage
+
+
+# What cannot move rigidly
+
+NAMES = ('"', "\\", '["x"]', "a\nb", "\N{PILE OF POO}" * 15, "rigid_motion.mode")
 NUMBERS: dict[str, tuple[Damage, str]] = {
-    f"{value} in {field} of {path} {index}, key {at}": (numbers((path, index), field, value, at), "not a finite number")
-    for value in (NAN, INF)
-    for field in ("co.x", "co.y")
-    for path, index in (LOCATION_Y, TURN_W, ("scale", 2))
-    for at in (0, 2, 3)
-}
-NUMBERS |= {
-    f"{value} in {field}, key {at}": (numbers(LOCATION_Y, field, value, at), "handle of key .* not a finite number")
-    for value in (NAN, -INF)
-    for field in ("handle_left.x", "handle_left.y", "handle_right.x", "handle_right.y")
-    for at in (0, 1)
+    f"{value} in {field} of {path} {index}, key {at}": (
+        numbers((path, index), field, value, at),
+        f"key {at + 1} of {label} has a",
+    )
+    for field in ("co.x", "co.y", "handle_left.x", "handle_left.y", "handle_right.x", "handle_right.y")
+    for value in (NAN, INF if field.startswith("co") else -INF)
+    for (path, index), label in (
+        (LOCATION_Y, "Location Y"),
+        (TURN_W, "Quaternion Rotation W"),
+        (("scale", 2), "Scale Z"),
+    )
+    for at in (0, 1, 2, 3)
 }
 REFUSED: dict[str, tuple[Damage, str]] = {
-    "no frame is a number": (everywhere("co.x", NAN), "not a finite number"),
-    "no value is a number": (everywhere("co.y", NAN), "not a finite number"),
-    "a period that is no number": (easing_setting("period", "ELASTIC", INF), "easing of key 2 .* not a finite number"),
+    "a period that is no number": (
+        each(numbers(LOCATION_Y, "interpolation", ELASTIC), numbers(LOCATION_Y, "period", INF, 1)),
+        "key 2 of Location Y has a frame, value, handle or easing",
+    ),
     "a last key far ahead": (numbers(LOCATION_Y, "co.x", 1e9, 3), "delete the keys that are far off"),
-    "a last key at the end of numbers": (
-        numbers(LOCATION_Y, "co.x", LARGEST, 3),
-        "key 4 of Location Y has the frame 3.4.*no motion can be computed from: delete it",
-    ),
-    "keys out of order everywhere": (
-        each(*(numbers((path, i), "co.x", 30.0, 1) for path in TRANSFORMS for i in range(WIDTHS[path]))),
-        "not in the order",
-    ),
+    "keys out of order everywhere": (everywhere("co.x", 30.0, 1), "key 3 of Location X has a.*or move it and back"),
     "values at the end of numbers": (
         each(numbers(LOCATION_Y, "co.y", LARGEST, 0, 2), numbers(LOCATION_Y, "co.y", -LARGEST, 1, 3)),
-        "key 1 of Location Y has the value 3.4.*no motion can be computed from: delete it",
+        "key 1 of Location Y has a.*no motion can be computed from: delete it",
     ),
-}
-REFUSED |= {
     "a mode that there is not": (
         marks(3, 15, 3, 3),
         "keys have a mode that this version does not know: choose another",
     ),
-    "a delta transform that is no number": (nowhere, "delta transform is not a finite number: set it anew"),
+    "a delta transform that is no number": (
+        lambda obj: setattr(obj, "delta_scale", (1.0, NAN, 1.0)),
+        "delta transform is not a finite number: set it anew",
+    ),
+    **{
+        f"{name!r}": (each(called(name), numbers(LOCATION_Y, "co.y", NAN, 1)), "key 2 of Location Y has a")
+        for name in NAMES
+    },
 }
 
 
@@ -94,11 +179,10 @@ def test_what_cannot_move_rigidly_keeps_blenders_motion_and_says_why(tmp_path, w
     damage, reason = (NUMBERS | REFUSED)[what]
     make(damage, "BLENDER")
     broken, _ = reopened(tmp_path, followed=False)
-    native = shown_worlds([broken], SEEN)[0]
+    native, keys = shown_worlds([broken], SEEN)[0], repr(snapshot(broken))
     make(damage)
-    keys = repr(snapshot(bpy.data.objects["Broken"]))
     broken, whole = reopened(tmp_path)
-    assert re.match(f"Broken.*{reason}", problem_of(broken)), problem_of(broken)
+    assert re.match(f"{re.escape(broken.name)}.*{reason}", problem_of(broken)), problem_of(broken)
     assert repr(snapshot(broken)) == keys
     np.testing.assert_array_equal(shown_worlds([broken], SEEN)[0], native)
     assert_shown([whole], SEEN)
@@ -118,37 +202,6 @@ def test_choosing_a_mode_mends_keys_with_one_that_there_is_not(tmp_path):
 # What can be mended, or never mattered
 
 
-def without_terms(obj: bpy.types.Object) -> None:
-    terms(lambda fcurve, term: fcurve.modifiers.remove(term))(obj)
-
-
-def with_term(**settings: object) -> Damage:
-    """The terms have other settings."""
-
-    def change(_: bpy.types.FCurve, term: bpy.types.FModifierGenerator) -> None:
-        for name, value in settings.items():
-            setattr(term, name, value)
-
-    return terms(change)
-
-
-def doubled(fcurve: bpy.types.FCurve, term: bpy.types.FModifierGenerator) -> None:
-    copy = fcurve.modifiers.new("GENERATOR")
-    copy.mode, copy.poly_order = term.mode, term.poly_order
-    for name in ("coefficients", "use_additive", "use_restricted_range", "frame_start", "frame_end", "influence"):
-        setattr(copy, name, getattr(term, name))
-
-
-def scaled(_: bpy.types.FCurve, term: bpy.types.FModifierGenerator) -> None:
-    term.coefficients = [*term.coefficients[:-1], NAN]
-
-
-def a_thousand_terms(obj: bpy.types.Object) -> None:
-    fcurve = curves_of(obj)[LOCATION_Y]
-    for _ in range(1000):
-        doubled(fcurve, next(item for item in fcurve.modifiers if is_term(item)))
-
-
 def curves_that_mean_nothing(obj: bpy.types.Object) -> None:
     channelbag = channelbag_of(obj)
     for path, index in (("location", 7), ("]][[", 0), ("rigid_motion.nothing", 3), ('["\n"]', 2), ("scale", 90)):
@@ -158,29 +211,26 @@ def curves_that_mean_nothing(obj: bpy.types.Object) -> None:
 
 
 MENDED: dict[str, Damage] = {
-    "no terms": without_terms,
-    "terms twice": terms(doubled),
-    "a thousand terms": a_thousand_terms,
+    "no terms": terms(lambda fcurve, term: fcurve.modifiers.remove(term)),
     "F-curves that mean nothing": curves_that_mean_nothing,
     "an interpolation that there is not": numbers(LOCATION_Y, "interpolation", 77, 1),
     "an easing that there is not": each(numbers(LOCATION_Y, "interpolation", 5), numbers(LOCATION_Y, "easing", 77, 1)),
-    "a quaternion without length": each(*(numbers((TURN_W[0], index), "co.y", 0.0, 1) for index in range(4))),
-    "no quaternion with a length": each(*(numbers((TURN_W[0], index), "co.y", 0.0) for index in range(4))),
-    "a scale of zero": each(*(numbers(("scale", index), "co.y", 0.0, 1) for index in range(3))),
-    "no scale but zero": each(*(numbers(("scale", index), "co.y", 0.0) for index in range(3))),
+    "a quaternion without length": everywhere("co.y", 0.0, 1, paths=TRANSFORMS[1:2]),
+    "no quaternion with a length": everywhere("co.y", 0.0, paths=TRANSFORMS[1:2]),
+    "a scale of zero": everywhere("co.y", 0.0, 1, paths=TRANSFORMS[2:]),
+    "no scale but zero": everywhere("co.y", 0.0, paths=TRANSFORMS[2:]),
     "handles far off": each(
         numbers(LOCATION_Y, "handle_right.x", 1e9, 0), numbers(LOCATION_Y, "handle_left.x", -1e9, 1)
     ),
+    "no layer": lambda obj: obj.animation_data.action.layers.remove(obj.animation_data.action.layers[0]),
+    "no slot": lambda obj: obj.animation_data.action.slots.remove(obj.animation_data.action_slot),
+    "no Action": lambda obj: bpy.data.actions.remove(obj.animation_data.action),
+    **{f"{name!r}": called(name) for name in NAMES},
 }
-
-
 LATER: dict[str, Damage] = {
-    "terms that are no numbers": terms(scaled),
-    "terms at the wrong time": with_term(frame_end=1e6),
-    "terms of a range that is none": with_term(frame_end=NAN),
-    "terms that are muted": with_term(mute=True),
-    "terms in part": with_term(use_influence=True, influence=0.3),
-    "terms that blend in": with_term(blend_in=4.0, blend_out=2.0),
+    "terms that are no numbers": terms(lambda _, term: setattr(term, "coefficients", [*term.coefficients[:-1], NAN])),
+    "terms at the wrong time": terms(lambda _, term: setattr(term, "frame_end", 1e6)),
+    "terms of a range that is none": terms(lambda _, term: setattr(term, "frame_end", NAN)),
 }
 """What nobody sees before the next edit of a key."""
 
@@ -196,88 +246,21 @@ def test_what_can_be_mended_moves_rigidly(tmp_path, what):
     assert_shown(objects, SEEN)
 
 
-# Actions without what an Action has
+# Too much
 
 
-def action_without_layers(obj: bpy.types.Object) -> None:
-    action = obj.animation_data.action
-    action.layers.remove(action.layers[0])
+def test_a_million_keys_are_refused_soon(tmp_path):
+    def damage(obj: bpy.types.Object) -> None:
+        points, frames = curves_of(obj)[LOCATION_Y].keyframe_points, 1.0 + np.arange(1e6)
+        points.clear()
+        points.add(len(frames))
+        points.foreach_set("co", np.stack((frames, np.sin(0.01 * frames)), axis=1).astype(np.float32).ravel())
+        # Blender itself takes its time where they are not all alike.
+        points.foreach_set("interpolation", np.ones(len(frames), np.int32))
 
-
-def slot_gone(obj: bpy.types.Object) -> None:
-    obj.animation_data.action.slots.remove(obj.animation_data.action_slot)
-
-
-def keys_gone(obj: bpy.types.Object) -> None:
-    for fcurve in curves_of(obj).values():
-        if len(fcurve.keyframe_points):
-            fcurve.keyframe_points.clear()
-
-
-def action_gone(obj: bpy.types.Object) -> None:
-    bpy.data.actions.remove(obj.animation_data.action)
-
-
-@pytest.mark.parametrize("damage", [action_without_layers, slot_gone, keys_gone, action_gone])
-def test_without_keys_there_is_nothing_to_say(tmp_path, damage):
     make(damage)
     broken, whole = reopened(tmp_path)
-    assert problem_of(broken) == ""
-    assert_shown([whole], SEEN)
-    use(broken)
-
-
-# Names and masses
-
-
-@pytest.mark.parametrize(
-    "name", sample(['"', "\\", '["x"]', "a\nb", "\N{PILE OF POO}" * 15, "rigid_motion.mode"]), ids=repr
-)
-def test_odd_names_change_nothing(tmp_path, name):
-    def rename(obj: bpy.types.Object) -> None:
-        obj.animation_data.action.name = obj.animation_data.action_slot.name_display = name
-
-    make(rename, name=name)
-    objects = reopened(tmp_path)
-    assert objects[0].name == name
-    assert_shown(objects, SEEN)
-    use(objects[0])
-    assert_shown(objects, SEEN)
-    numbers(LOCATION_Y, "co.y", NAN, 1)(objects[0])
-    assert problem_of(objects[0]).startswith(name)
-
-
-def set_keys(fcurve: bpy.types.FCurve, frames: np.ndarray) -> None:
-    points = fcurve.keyframe_points
-    points.clear()
-    points.add(len(frames))
-    points.foreach_set("co", np.stack((frames, np.sin(0.01 * frames)), axis=1).astype(np.float32).ravel())
-    # Blender itself takes its time where they are not all alike.
-    points.foreach_set("interpolation", np.ones(len(frames), np.int32))
-
-
-def over_a_million_frames(obj: bpy.types.Object) -> None:
-    set_keys(curves_of(obj)[LOCATION_Y], 1.0 + np.arange(1e6))
-
-
-def goes_on_for_a_million_frames(obj: bpy.types.Object) -> None:
-    bpy.context.scene.frame_end = 1_000_000
-    for fcurve in curves_of(obj).values():
-        fcurve.extrapolation = "LINEAR"
-
-
-@pytest.mark.parametrize(
-    ("damage", "reason"),
-    [
-        (over_a_million_frames, " has keys over 999999 frames, at most 250000 can be filled in"),
-        (goes_on_for_a_million_frames, " goes on outside of its keys"),
-    ],
-)
-def test_what_is_too_long_is_refused_soon(tmp_path, damage, reason):
-    make(damage)
-    broken, whole = reopened(tmp_path)
-    with soon():
-        assert re.match(f"Broken{reason}", problem_of(broken)), problem_of(broken)
+    assert problem_of(broken).startswith("Broken is to be filled in over 999999 frames, and at most 250000 can be: ")
     assert not any(is_term(item) for fcurve in curves_of(broken).values() for item in fcurve.modifiers)
     assert_shown([whole], SEEN)
     use(broken)

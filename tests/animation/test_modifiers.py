@@ -5,18 +5,20 @@ Blender itself says what they do: to an object with a linear key on every eighth
 
 from __future__ import annotations
 
+import itertools
+
 import bpy
 import numpy as np
 import pytest
 
 from rigid_motion.animation import problem_of, refresh, repeat, set_mode
+from rigid_motion.animation.actions.modifiers import set_settings
 from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, rotation_path, snapshot
-from tests.animation.modified import is_term
 from tests.animation.oracle import shown_worlds, world_now
 from tests.animation.scenes import key, key_densely, new_object
 
-PLAYED = np.arange(1.0, 40.0, 0.25)
+PLAYED, IN_ROUNDS = np.arange(1.0, 40.0, 0.25), np.arange(-60.0, 120.0, 0.5)
 RANGE = {"use_restricted_range": True, "frame_start": 7.0, "frame_end": 31.0, "blend_in": 5.0}
 PART = {"use_influence": True, "influence": 0.5}
 
@@ -36,11 +38,9 @@ MODIFIERS: dict[str, tuple[str, dict[str, object]]] = {
 }
 
 
-def modify(fcurves, kind: str, settings: dict[str, object]) -> None:
-    for fcurve in fcurves:
-        modifier = fcurve.modifiers.new(kind)
-        for name, value in settings.items():
-            setattr(modifier, name, value)
+def modify(fcurves, *modifiers: tuple[str, dict[str, object]]) -> None:
+    for fcurve, (kind, settings) in itertools.product(fcurves, modifiers):
+        set_settings(fcurve.modifiers.new(kind), settings)
     bpy.context.view_layer.update()
 
 
@@ -50,32 +50,38 @@ def some_of(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
     return [curves["location", 1], curves["location", 2], curves[rotation_path(obj), 1], curves["scale", 0]]
 
 
-@pytest.mark.parametrize(("what", "order"), in_turn(MODIFIERS, ("QUATERNION", "ZXY", "AXIS_ANGLE")))
-@pytest.mark.parametrize("before", [False, True], ids=["after the mode", "before the mode"])
-def test_a_modifier_acts_on_what_is_seen(live_file, what, order, before):
+@pytest.mark.parametrize(
+    ("what", "order"), in_turn([*MODIFIERS, "twos, then noise"], ("QUATERNION", "ZXY", "AXIS_ANGLE"))
+)
+@pytest.mark.parametrize("when", ["after the mode", "before the mode", "before the mode, in rounds"])
+def test_a_modifier_acts_on_what_is_seen(live_file, what, order, when):
     obj, dense = (key(new_object(name, order), seed=4, scale="even") for name in ("Tool", "Dense"))
-    keys = snapshot(obj)
+    keys, in_rounds = snapshot(obj), when.endswith("rounds")
+    modifiers = [MODIFIERS[name] for name in what.split(", then ")]
     set_mode(dense, "cga_slerp")
     key_densely(dense)
     for moved in (obj, dense):
-        if moved is dense or before:
-            modify(some_of(moved), *MODIFIERS[what])
+        if moved is dense or when != "after the mode":
+            modify(some_of(moved), *modifiers)
+        if in_rounds:
+            repeat(moved, "MIRROR")
     set_mode(obj, "cga_slerp")
-    if not before:
-        modify(some_of(obj), *MODIFIERS[what])
+    if when == "after the mode":
+        modify(some_of(obj), *modifiers)
     assert problem_of(obj) == ""
     assert refresh() == 0
-    shown, expected = shown_worlds([obj, dense], PLAYED)
+    shown, expected = shown_worlds([obj, dense], IN_ROUNDS if in_rounds else PLAYED)
     assert np.abs(shown - expected).max() < 2e-5 * max(1.0, np.abs(expected).max())
-    for fcurve in some_of(obj):
-        kept = next(item for item in fcurve.modifiers if item.type == MODIFIERS[what][0] and not is_term(item))
-        for name, value in MODIFIERS[what][1].items():
-            got = getattr(kept, name)
-            assert (tuple(got) if name == "coefficients" else got) == pytest.approx(value), name
     set_mode(obj, "BLENDER")
-    assert {len(fcurve.modifiers) for fcurve in some_of(obj)} == {1}
     for fcurve in some_of(obj):
-        fcurve.modifiers.remove(fcurve.modifiers[0])
+        for kept, (kind, settings) in zip(list(fcurve.modifiers)[in_rounds:], modifiers, strict=True):
+            assert kept.type == kind
+            for name, value in settings.items():
+                got = getattr(kept, name)
+                assert (tuple(got) if name == "coefficients" else got) == pytest.approx(value), name
+    for fcurve in curves_of(obj).values():
+        for modifier in list(fcurve.modifiers):
+            fcurve.modifiers.remove(modifier)
     assert snapshot(obj) == keys
 
 
@@ -86,7 +92,7 @@ def test_a_key_in_between_has_what_is_seen_and_the_noise_once_more_as_in_blender
     key_densely(twin)
     for moved in (obj, twin):
         curves = curves_of(moved)
-        modify([curves["location", 1], curves["rotation_quaternion", 3]], *MODIFIERS["noise"])
+        modify([curves["location", 1], curves["rotation_quaternion", 3]], MODIFIERS["noise"])
     live_file.scene.frame_set(17)
     seen = obj.location.y
     for moved in (obj, twin):
@@ -97,16 +103,3 @@ def test_a_key_in_between_has_what_is_seen_and_the_noise_once_more_as_in_blender
     np.testing.assert_allclose(world_now("Tool"), world_now("Twin"), atol=1e-5)
     (added,) = (point.co.y for point in curves_of(obj)["location", 1].keyframe_points if point.co.x == 17.0)
     assert added == pytest.approx(seen, abs=1e-5)
-
-
-def test_cycles_steps_and_noise_act_one_after_the_other(live_file):
-    obj, dense = (key(new_object(name), seed=4) for name in ("Tool", "Dense"))
-    for moved in (dense, obj):
-        set_mode(moved, "dq_sclerp")
-        if moved is dense:
-            key_densely(dense)
-        modify(curves_of(moved).values(), *MODIFIERS["twos"])
-        modify([curves_of(moved)["location", 0]], *MODIFIERS["noise"])
-        repeat(moved, "MIRROR")
-    shown, expected = shown_worlds([obj, dense], np.arange(-60.0, 120.0, 0.5))
-    assert np.abs(shown - expected).max() < 2e-5 * max(1.0, np.abs(expected).max())

@@ -12,12 +12,11 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import modes_of, problem_of, refresh, set_mode
+from rigid_motion.animation import bake, is_baked, modes_of, problem_of, refresh, set_mode, unbake
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones import rigs
-from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, names_of
-from tests.animation.bones.rigs import INHERIT_SCALES, PLAYED, key_all, moving_rig, new_rig
-from tests.animation.bones.test_bone_files import save
+from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, shown_poses
+from tests.animation.bones.rigs import key_all, moving_rig, new_rig
 from tests.animation.farm import SAVE, on_a_farm, played_on_a_farm
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.oracle import Own, assert_shown, expected_worlds, shown_worlds
@@ -28,6 +27,21 @@ from tests.thoroughness import sample
 ORDERS = ("QUATERNION", "XYZ", "ZYX", "AXIS_ANGLE")
 ANY_TIME = np.arange(-2.0, 44.0, 0.625)
 
+LIBRARY_CHANGES = """
+rig = bpy.data.objects["Puppet"]
+bpy.context.view_layer.objects.active = rig
+bpy.ops.object.mode_set(mode="EDIT")
+rig.data.edit_bones["Upper"].tail = (0.2, 0.5, 1.9)
+rig.data.edit_bones.new("Finger").tail = (0.1, 0.2, 0.3)
+bpy.ops.object.mode_set(mode="OBJECT")
+bpy.ops.wm.save_as_mainfile(filepath=found)
+"""
+
+
+def save(path: Path) -> Path:
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
 
 def assert_same(worlds: Sequence[np.ndarray], expected: Sequence[np.ndarray], tolerance: float = 1e-6) -> None:
     """To this share of the size."""
@@ -36,79 +50,48 @@ def assert_same(worlds: Sequence[np.ndarray], expected: Sequence[np.ndarray], to
 
 
 def every_mode_and_kind() -> tuple[list[bpy.types.Object], dict[str, Own]]:
-    """An object for each mode, rotation order and kind of trouble, and the delta transforms of their own."""
+    """An object for each mode and rotation order, and the delta transforms of their own that some have."""
     objects, owns = [], {}
-    parent = key(new_object("Arm", "XYZ"), (1.0, 30.0), seed=99)
     for seed, (mode, order) in enumerate((mode, order) for mode in KEYFRAME_MODES for order in ORDERS):
         obj = new_object(f"{mode} {order}", order)
         scale = (None, "even", "uneven")[seed % 3]
         if seed % 2 and order != "AXIS_ANGLE":
             owns[obj.name] = give_own_deltas(obj, seed)
-        if seed % 5 in (1, 2):
-            obj.parent, obj.matrix_parent_inverse = parent, np.eye(4) + 0.1 * np.eye(4, k=3)
         key(obj, seed=seed, scale=scale, interpolation=("BEZIER", "LINEAR", "BOUNCE", "CONSTANT")[seed % 4])
         set_mode(obj, mode, None if seed % 4 < 2 else FRAMES[:2])
         objects.append(obj)
-    set_mode(parent, "dq_sclerp")
-    return [*objects, parent], owns
-
-
-def named(rig: bpy.types.Object, poses: np.ndarray) -> dict[str, np.ndarray]:
-    """Matrices of the bones of a rig (bones, ...) by their names."""
-    return dict(zip(names_of(rig), poses, strict=True))
+    return objects, owns
 
 
 @pytest.mark.parametrize("order", sample(rigs.ORDERS))
-def test_every_mode_plays_alike_in_a_blender_without_the_extension(live_file, tmp_path, order):
+def test_every_mode_plays_alike_in_a_blender_without_the_extension_and_comes_back_whole(live_file, tmp_path, order):
     objects, owns = every_mode_and_kind()
     rig = key_all(new_rig(rotation_mode=order), scale="even")
-    for place, (mode, bone) in enumerate(zip(list(KEYFRAME_MODES) * 2, rig.pose.bones, strict=False)):
-        bone.bone.inherit_scale = INHERIT_SCALES[place]
+    for mode, bone in zip(list(KEYFRAME_MODES) * 2, rig.pose.bones, strict=False):
         set_mode(bone, mode)
     set_mode(rig.pose.bones["Lower"], "motor_spline", [FRAMES[1]])
     assert_shown(objects, ANY_TIME, owns)
-    shown, posed = shown_worlds(objects, ANY_TIME), expected_poses(rig, ANY_TIME)
-    played = played_on_a_farm(save(tmp_path / "shot.blend"), [obj.name for obj in (*objects, rig)], ANY_TIME)
+    shown, posed, carriers = shown_worlds(objects, ANY_TIME), expected_poses(rig, ANY_TIME), [*objects, *rig.pose.bones]
+    names, keys = [obj.name for obj in (*objects, rig)], [snapshot(carrier) for carrier in carriers]
+    modes = [modes_of(carrier, np.array(FRAMES[:3])) for carrier in carriers]
+    path = save(tmp_path / "shot.blend")
+    played = played_on_a_farm(path, names, ANY_TIME)
     assert_same(played.worlds[:-1], shown)
-    assert_same_poses(rig, ANY_TIME, named(rig, played.poses), posed)
-    for obj in objects:
-        set_mode(obj, "BLENDER")
+    assert_same_poses(rig, ANY_TIME, dict(zip(rig.pose.bones.keys(), played.poses, strict=True)), posed)
+    on_a_farm(SAVE, path, tmp_path / "farm.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "farm.blend"))
+    *objects, rig = (bpy.data.objects[name] for name in names)
+    carriers = [*objects, *rig.pose.bones]
+    assert [snapshot(carrier) for carrier in carriers] == keys
+    assert [modes_of(carrier, np.array(FRAMES[:3])) for carrier in carriers] == modes
+    assert {problem_of(carrier) for carrier in carriers} == {""}
+    assert refresh() == 0, "the in-betweens that are there are those of these keys"
+    assert {obj.name: own_deltas(obj) for obj in objects if obj.name in owns} == owns
+    set_mode(carriers, "BLENDER")
+    assert not any(fcurve.modifiers for carrier in carriers for fcurve in curves_of(carrier).values())
     native = shown_worlds(objects, ANY_TIME)
     differing = [np.abs(one - other).max() > 1e-2 for one, other in zip(native, shown, strict=True)]
     assert np.mean(differing) > 0.7, "in most of these the modes are to be seen, or this test says nothing"
-
-
-def tool_and_rig(mode: str, order: str = "QUATERNION", own: bool = True, **settings: object):
-    """An object and a rig that have a mode, and the object's delta transforms of its own."""
-    obj = new_object("Tool", order)
-    owns = {"Tool": give_own_deltas(obj)} if own else {}
-    key(obj, **settings)
-    rig = moving_rig(mode, **settings)
-    set_mode(obj, mode)
-    return obj, rig, owns
-
-
-@pytest.mark.parametrize(
-    ("order", "own"), sample([(order, own) for order in ("ZXY", "QUATERNION") for own in (True, False)])
-)
-def test_what_a_farm_saves_again_comes_back_whole(live_file, tmp_path, order, own):
-    obj, rig, owns = tool_and_rig("cga_slerp", order, own, scale="even")
-    set_mode([obj, rig.pose.bones["Hand"]], "dq_sclerp", [11.0])
-    keys = [snapshot(obj), snapshot(rig)]
-    on_a_farm(SAVE, save(tmp_path / "shot.blend"), tmp_path / "farm.blend")
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "farm.blend"))
-    obj, rig = bpy.data.objects["Tool"], bpy.data.objects["Rig"]
-    assert [snapshot(obj), snapshot(rig)] == keys
-    for carrier in (obj, rig.pose.bones["Hand"]):
-        assert modes_of(carrier, np.array(FRAMES[:3])) == ["cga_slerp", "dq_sclerp", "cga_slerp"]
-    assert {problem_of(carrier) for carrier in (obj, *rig.pose.bones)} == {""}
-    assert refresh() == 0, "the in-betweens that are there are those of these keys"
-    assert_shown([obj], PLAYED, owns)
-    assert_posed(rig, PLAYED)
-    set_mode([obj, *rig.pose.bones], "BLENDER")
-    assert not any(fcurve.modifiers for carrier in (obj, *rig.pose.bones) for fcurve in curves_of(carrier).values())
-    assert own_deltas(obj) == owns.get("Tool", Own())
-    assert_posed(rig, PLAYED)
 
 
 def test_the_numbers_of_modes_in_files_stay_what_they_are(live_file):
@@ -145,7 +128,8 @@ WAYS = {
 
 @pytest.mark.parametrize("way", WAYS)
 def test_what_comes_from_another_file_moves_as_it_does_there(live_file, tmp_path, way):
-    obj, _, _ = tool_and_rig("motor_spline", own=False)
+    obj = key(new_object("Tool"))
+    set_mode(obj, "motor_spline")
     expected = expected_worlds(obj, ANY_TIME)
     path = save(tmp_path / "library.blend")
     blank()
@@ -156,3 +140,41 @@ def test_what_comes_from_another_file_moves_as_it_does_there(live_file, tmp_path
     other = obj.copy()
     bpy.context.scene.collection.objects.link(other)
     assert_same(shown_worlds([other], ANY_TIME), [expected], 1e-5)
+
+
+def test_rigs_that_are_linked_and_overridden_keep_their_modes_through_files_and_changes_of_the_library(
+    live_file, tmp_path
+):
+    moved = expected_poses(moving_rig("dq_sclerp"), ANY_TIME)
+    new_rig("Puppet")
+    library, shot = save(tmp_path / "library.blend"), tmp_path / "shot.blend"
+    blank()
+    arm, rig = linked(library, "Rig"), linked(library, "Puppet").override_create(remap_local_usages=True)
+    with pytest.raises(ValueError, match="linked from another file"):
+        set_mode(list(arm.pose.bones), "pga_lerp")
+    assert_same_poses(arm, ANY_TIME, shown_poses([arm], ANY_TIME)[0], moved)
+    rig.override_library.is_system_override = False
+    bpy.context.view_layer.update()
+    set_mode(list(key_all(rig).pose.bones), "dq_sclerp")
+    assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
+    expected, names = expected_poses(rig, ANY_TIME), rig.pose.bones.keys()
+    assert_posed(rig, ANY_TIME)
+    played = played_on_a_farm(save(shot), [rig.name], ANY_TIME).poses
+    assert_same_poses(rig, ANY_TIME, dict(zip(names, played, strict=True)), expected)
+    bake(rig.pose.bones["Body"])
+    save(shot)
+    for changed in (False, True):
+        bpy.ops.wm.open_mainfile(filepath=str(shot))
+        rig, arm = bpy.data.objects["Puppet"], bpy.data.objects["Rig"]
+        assert_same_poses(arm, ANY_TIME, shown_poses([arm], ANY_TIME)[0], moved)
+        assert rig.override_library is not None
+        assert ("Finger" in rig.pose.bones) == changed
+        assert [bone.name for bone in rig.pose.bones if is_baked(bone)] == ["Body"]
+        assert_posed(rig, ANY_TIME)
+        unbake(rig.pose.bones["Body"])
+        assert_posed(rig, ANY_TIME)
+        assert {modes_of(rig.pose.bones[name], np.array(FRAMES[:1]))[0] for name in names} == {"dq_sclerp"}
+        on_a_farm(LIBRARY_CHANGES, library, library)
+    curves_of(rig.pose.bones["Hand"])["location", 0].keyframe_points[1].co_ui.y += 1.0
+    bpy.context.view_layer.update()
+    assert_posed(rig, ANY_TIME)

@@ -4,6 +4,7 @@ channels that have the motion.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import bpy
@@ -11,130 +12,99 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import key_frames, problem_of, refresh, set_mode
-from tests.animation.bones.rigs import in_turn
-from tests.animation.keyed import curves_of
-from tests.animation.oracle import expected_bases, shown_worlds
+from tests.animation.bones.poses import expected_poses, shown_of
+from tests.animation.bones.rigs import ORDERS, in_turn, key_all, new_rig
+from tests.animation.keyed import Carrier, curves_of
+from tests.animation.oracle import expected_bases
 from tests.animation.scenes import key, key_densely, new_object, new_strip, push_down, tweak
 
 KEYS = (1.0, 11.0, 21.0, 41.0)
 LENGTH = KEYS[-1] - KEYS[0]
-ACTION_FRAMES = np.arange(KEYS[0], KEYS[-1] + 1.0)
-ORDERS = ("QUATERNION", "ZYX")
-ALIKE = 1e-5
+ACTION_FRAMES = np.append(np.arange(KEYS[0], KEYS[-1], 0.375), KEYS[-1])
+KINDS = ("object", "rig")
 
 
-def assert_at(obj: bpy.types.Object, scene_frames: np.ndarray, expected: np.ndarray) -> None:
-    shown = shown_worlds([obj], scene_frames)[0]
-    error = np.abs(shown - expected).max(axis=(1, 2)) / max(1.0, np.abs(expected).max())
-    assert error.max() < ALIKE, f"off by {error.max():.3g} on frame {scene_frames[error.argmax()]}"
+def new(kind: str, order: str = "QUATERNION") -> bpy.types.Object:
+    return new_object("Tool", order) if kind == "object" else new_rig("Tool", rotation_mode=order)
 
 
-def filled(name: str = "Tool", order: str = "QUATERNION", mode: str = "dq_sclerp", seed: int = 0) -> bpy.types.Object:
-    obj = key(new_object(name, order), KEYS, seed=seed)
-    set_mode(obj, mode)
+def carriers_of(obj: bpy.types.Object) -> list[Carrier]:
+    return list(obj.pose.bones) if obj.pose else [obj]
+
+
+def key_anew(obj: bpy.types.Object, mode: str = "dq_sclerp", seed: int = 0, **how: str) -> bpy.types.Object:
+    """Key it, or its bones, in this mode."""
+    (key_all if obj.pose else key)(obj, frames=KEYS, seed=seed, **how)
+    set_mode(carriers_of(obj), mode, KEYS)
     return obj
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize(
-    ("start", "scale", "repeat", "reverse"),
-    [
-        *((1, 1.0, 1.0, False), (101, 1.0, 1.0, False), (31, 4.0, 1.0, False), (7, 0.5, 1.0, False)),
-        *((11, 1.0, 2.5, False), (-300, 1.7, 3.0, False), (21, 1.0, 1.0, True), (21, 4.0, 2.0, True)),
-    ],
-)
-def test_a_strip_shows_the_in_betweens_of_its_action(live_file, order, start, scale, repeat, reverse):
-    obj = filled(order=order)
-    eighths = np.arange(0.0, LENGTH * repeat * scale, 0.125)
-    place = eighths / scale % LENGTH
-    # On seams it is the strip's affair which of both ends it shows.
-    inside = np.minimum(place, LENGTH - place) > 1e-3
-    expected = expected_bases(obj, KEYS[0] + (LENGTH - place if reverse else place)[inside])
-    strip = push_down(obj, start, scale=scale, repeat=repeat, use_reverse=reverse)
-    assert_at(obj, start + eighths[inside], expected)
-    outside = np.array((strip.frame_start - 5.0, strip.frame_end + 5.0))
-    assert_at(obj, outside, shown_worlds([obj], np.array((strip.frame_start, strip.frame_end)))[0])
+def expected_of(obj: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
+    """Where it has to be, or where its bones have to be in its space, shape (k, m, 4, 4)."""
+    return np.stack([*expected_poses(obj, frames).values()]) if obj.pose else expected_bases(obj, frames)[None]
 
 
-# -- blending ---------------------------------------------------------------------------------------------------------
-
-How = Callable[[bpy.types.NlaStrip], None]
-
-
-def animated(*points: tuple[float, float]) -> How:
-    def animate(strip: bpy.types.NlaStrip) -> None:
-        strip.use_animated_influence = True
-        fcurve = strip.fcurves.find("influence")
-        fcurve.keyframe_points.clear()
-        for point in points:
-            fcurve.keyframe_points.insert(*point)
-
-    return animate
+def assert_at(obj: bpy.types.Object, scene_frames: np.ndarray, expected: np.ndarray) -> None:
+    error = np.abs(shown_of(obj, scene_frames) - expected).max(axis=(0, 2, 3)) / max(1.0, np.abs(expected).max())
+    assert error.max() < 1e-5, f"off by {error.max():.3g} on frame {scene_frames[error.argmax()]}"
 
 
-def blends(*, into: float = 0.0, out: float = 0.0) -> How:
-    def blend(strip: bpy.types.NlaStrip) -> None:
-        strip.use_auto_blend = False
-        strip.blend_in, strip.blend_out = into, out
+PLACES = [
+    *((1, 1.0, 1.0, False), (101, 1.0, 1.0, False), (31, 4.0, 1.0, False), (7, 0.5, 1.0, False)),
+    *((-57, 1.0, 1.0, False), (11, 1.0, 2.5, False), (11, 2.0, 3.0, False), (-300, 3.0, 3.0, False)),
+    *((21, 1.0, 1.0, True), (21, 0.5, 2.0, True), (21, 4.0, 2.0, True)),
+]
+"""Where a strip starts, how it is scaled, how often it repeats, and whether it runs backwards."""
 
-    return blend
+
+def animate(strip: bpy.types.NlaStrip, *points: tuple[float, float]) -> None:
+    """Key the strip's influence, on frames since its start."""
+    strip.use_animated_influence = True
+    fcurve = strip.fcurves.find("influence")
+    fcurve.keyframe_points.clear()
+    for since, influence in points:
+        fcurve.keyframe_points.insert(strip.frame_start + since, influence)
 
 
-INFLUENCES: dict[str, How] = {
+def blend_in_and_out(strip: bpy.types.NlaStrip) -> None:
+    strip.use_auto_blend = False
+    strip.blend_in, strip.blend_out = 10.0, 7.0
+
+
+INFLUENCES: dict[str, Callable[[bpy.types.NlaStrip], None]] = {
     "whole": lambda _: None,
-    "half": animated((1.0, 0.5)),
-    "animated": animated((10.0, 0.2), (45.0, 1.0)),
-    "blending in and out": blends(into=20.0, out=15.0),
+    "half": lambda strip: animate(strip, (0.0, 0.5)),
+    "animated": lambda strip: animate(strip, (0.0, 0.2), (35.0, 1.0)),
+    "blending in and out": blend_in_and_out,
 }
 BLENDS = ("REPLACE", "COMBINE", "ADD", "SUBTRACT", "MULTIPLY")
 
 
-def blended(order: str, blend: str, how: How, *, dense: bool) -> np.ndarray:
-    """Where an object is on quarters of frames, with a strip in part over another: with modes, or keyed densely."""
-    obj = new_object(f"Tool {dense}", order)
-    for seed, mode in enumerate(("cga_slerp", "dq_sclerp")):
-        key(obj, KEYS, seed=seed, scale="even")
-        set_mode(obj, mode, KEYS)
-        if dense:
-            key_densely(obj)
-        strip = push_down(obj, 1 + 9 * seed, scale=1.0 + seed)
-    strip.blend_type = blend
-    how(strip)
-    bpy.context.view_layer.update()
-    assert refresh() == 0
-    return shown_worlds([obj], np.arange(1.0, 95.0, 0.25))[0]
-
-
-@pytest.mark.parametrize(("blend", "order"), in_turn(BLENDS, (*ORDERS, "AXIS_ANGLE")))
-@pytest.mark.parametrize("how", INFLUENCES)
-def test_a_strip_in_part_shows_what_dense_keys_would(live_file, blend, order, how):
-    shown, expected = (blended(order, blend, INFLUENCES[how], dense=dense) for dense in (False, True))
-    assert np.abs(shown - expected).max() < 2.0 * ALIKE * max(1.0, np.abs(expected).max())
-
-
-# -- several strips ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("one_track", [True, False], ids=["one track", "two tracks"])
-@pytest.mark.parametrize("modes", [("dq_sclerp", "pga_lerp"), ("dq_sclerp", "BLENDER"), ("BLENDER", "cga_slerp")])
-def test_two_strips_each_have_the_mode_that_is_keyed_in_their_action(live_file, modes, one_track):
-    obj, actions, expected = new_object(), [], []
-    data = obj.animation_data_create()
-    for seed, mode in enumerate(modes):
-        data.action = None
-        set_mode(key(obj, KEYS, seed=seed), mode, KEYS)
-        actions.append((data.action, data.action_slot))
-        expected.append(expected_bases(obj, ACTION_FRAMES))
-    data.action, track = None, data.nla_tracks.new()
-    for start, (action, slot) in zip((1, 101), actions, strict=True):
-        strip = track.strips.new("Strip", start, action)
-        strip.action_slot, strip.extrapolation = slot, "HOLD" if start == 1 else "HOLD_FORWARD"
-        track = track if one_track else data.nla_tracks.new()
-    bpy.context.view_layer.update()
-    assert refresh() == 0
-    for start, worlds in zip((1, 101), expected, strict=True):
-        assert_at(obj, ACTION_FRAMES + start - 1, worlds)
-    assert_at(obj, np.array((60.0, 90.0)), expected[0][[-1, -1]])
+@pytest.mark.parametrize(
+    ("case", "place"),
+    in_turn(itertools.product(KINDS, INFLUENCES, BLENDS), [*zip(PLACES, itertools.cycle(ORDERS), strict=False)]),
+)
+def test_a_strip_over_another_shows_what_dense_keys_would(live_file, case, place):
+    (kind, how, blend), ((start, scale, repeat, reverse), order) = case, place
+    # Eighths of frames in both Actions, before and after the strip, too.
+    frames = start + np.arange(-9.0, LENGTH * repeat * scale + 9.0, max(scale, 1.0) / 8.0)
+    shown = []
+    for dense in (False, True):
+        obj = new(kind, order)
+        for seed, mode in enumerate(("cga_slerp", "dq_sclerp")):
+            key_anew(obj, mode, seed, scale="even")
+            for carrier in carriers_of(obj) if dense else ():
+                key_densely(carrier)
+            assert dense != any(len(fcurve.modifiers) for fcurve in curves_of(obj).values())
+            strip = push_down(obj)
+        strip.frame_start_ui, strip.scale, strip.repeat, strip.use_reverse = start, scale, repeat, reverse
+        strip.blend_type = blend
+        INFLUENCES[how](strip)
+        bpy.context.view_layer.update()
+        assert refresh() == 0
+        shown.append(shown_of(obj, frames))
+    assert np.ptp(shown[0], axis=1).max() > 0.1
+    assert np.abs(shown[0] - shown[1]).max() < 1e-5 * max(1.0, np.abs(shown[1]).max())
 
 
 def test_an_action_that_is_in_two_strips_and_cycles_moves_as_far_as_either_shows_it(live_file):
@@ -142,47 +112,47 @@ def test_an_action_that_is_in_two_strips_and_cycles_moves_as_far_as_either_shows
     for fcurve in curves_of(obj).values():
         fcurve.modifiers.new("CYCLES")
     set_mode(obj, "dq_sclerp")
-    expected = expected_bases(obj, ACTION_FRAMES)[:-1]
-    first = push_down(obj, 1)
+    frames = np.arange(1.0, LENGTH)
+    expected = expected_of(obj, KEYS[0] + frames)
+    first = push_down(obj)
     first.action_frame_end = 41.0
     second = new_strip(obj, 201, first.action, first.action_slot, last=121)
     second.extrapolation = "HOLD_FORWARD"
     bpy.context.view_layer.update()
     refresh()
-    assert_at(obj, ACTION_FRAMES[:-1], expected)
-    for start in (201.0, 241.0, 281.0):
-        assert_at(obj, start + np.arange(1.0, 40.0), expected[1:])
+    for start in (1.0, 201.0, 241.0, 281.0):
+        assert_at(obj, start + frames, expected)
 
 
-# -- edits ------------------------------------------------------------------------------------------------------------
-
-
-def test_a_mode_is_chosen_for_an_action_that_is_in_a_strip_already(live_file):
-    obj = key(new_object(), KEYS)
-    action = obj.animation_data.action
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_mode_is_chosen_for_an_action_that_is_in_a_strip_already(live_file, kind):
+    obj = key_anew(new(kind), "BLENDER")
+    action, carriers = obj.animation_data.action, carriers_of(obj)
     push_down(obj, 101)
-    with pytest.raises(ValueError, match=r"Tool.*enter a strip"):
-        set_mode(obj, "dq_sclerp", KEYS)
-    set_mode(obj, "pga_slerp")
-    assert problem_of(obj) == ""
+    with pytest.raises(ValueError, match=r"^Tool.*enter a strip"):
+        set_mode(carriers, "dq_sclerp", KEYS)
+    set_mode(carriers, "pga_slerp")
+    assert {problem_of(carrier) for carrier in carriers} == {""}
     obj.animation_data.action = action
-    expected = expected_bases(obj, ACTION_FRAMES)
+    expected = expected_of(obj, ACTION_FRAMES)
     obj.animation_data.action = None
-    assert_at(obj, np.arange(101.0, 142.0), expected)
+    assert_at(obj, 100.0 + ACTION_FRAMES, expected)
 
 
 @pytest.mark.parametrize(("start", "scale"), [(101, 1.0), (31, 2.0)])
 @pytest.mark.parametrize("influence", [1.0, 0.6])
-def test_in_tweak_mode_a_key_inserted_in_between_keeps_the_pose_on_the_screen(live_file, start, scale, influence):
-    obj = filled()
+@pytest.mark.parametrize("kind", KINDS)
+def test_in_tweak_mode_a_key_inserted_in_between_keeps_the_pose_on_the_screen(live_file, kind, start, scale, influence):
+    obj = key_anew(new(kind))
     strip = push_down(obj, start, scale=scale)
-    strip.influence = influence
+    animate(strip, (0.0, influence))
     tweak(obj, strip)
-    now = np.array((float(start + int(15 * scale)),))
+    now = np.array((start + 15.0 * scale,))
     live_file.scene.frame_set(int(now[0]))
-    before = shown_worlds([obj], now)[0]
-    for path in ("location", "rotation_quaternion"):
-        obj.keyframe_insert(path)
-    bpy.context.view_layer.update()
-    assert 16.0 in key_frames(obj)
+    before = shown_of(obj, now)
+    for carrier in carriers_of(obj):
+        carrier.keyframe_insert("location")
+        carrier.keyframe_insert("rotation_quaternion")
+        bpy.context.view_layer.update()
+        assert 16.0 in key_frames(carrier)
     assert_at(obj, now, before)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
@@ -18,7 +17,7 @@ def progress(curves: Curves, first: float, last: float, frames: np.ndarray, turn
     done, whole = np.zeros(len(frames)), 0.0
     for (path, _), fcurve in curves.items():
         weight = 4.0 if path == "rotation_quaternion" else 1.0
-        begin, end, *values = timing(fcurve, [first, last, *frames])
+        begin, end, *values = (evaluated(fcurve, frame) for frame in (first, last, *frames))
         done += weight * (end - begin) * (np.array(values) - begin)
         whole += weight * (end - begin) ** 2
     if whole > 0.0:
@@ -29,9 +28,9 @@ def progress(curves: Curves, first: float, last: float, frames: np.ndarray, turn
 def _counted(curves: Curves, first: float, last: float, frames: np.ndarray) -> np.ndarray:
     """The same where the body spins and no channel changes: of a value that goes up by one from key to key.
 
-    It has the keys of the first channel that turns, with flat handles.
+    It has the keys of the first channel, with flat handles.
     """
-    like = min(curves.items(), key=lambda item: ("rotation" not in item[0][0], item[0]))[1]
+    like = next(iter(curves.values()))
     with spare_curve() as fcurve:
         fcurve.extrapolation = like.extrapolation
         fcurve.keyframe_points.add(len(like.keyframe_points))
@@ -48,30 +47,6 @@ def _counted(curves: Curves, first: float, last: float, frames: np.ndarray) -> n
     return (np.array(values) - begin) / (end - begin)
 
 
-def timing(fcurve: bpy.types.FCurve, frames: Sequence[float]) -> list[float]:
-    """The channel's values; elastic segments as a curve from 0 to 1 with the same keys has them, stretched."""
-    values = [fcurve.evaluate(frame) for frame in frames]
-    keys = fcurve.keyframe_points
-    for first, last in itertools.pairwise(keys):
-        if first.interpolation == "ELASTIC":
-            inside = [place for place, frame in enumerate(frames) if first.co[0] <= frame <= last.co[0]]
-            share = _elastic(first, last.co[0], [frames[place] for place in inside])
-            for place, part in zip(inside, share, strict=True):
-                values[place] = first.co[1] + part * (last.co[1] - first.co[1])
-    return values
-
-
-def _elastic(key: bpy.types.Keyframe, end: float, frames: Sequence[float]) -> list[float]:
-    """Blender's own elastic easing from 0 to 1."""
-    with spare_curve() as fcurve:
-        fcurve.keyframe_points.insert(key.co[0], 0.0)
-        fcurve.keyframe_points.insert(end, 1.0)
-        start = fcurve.keyframe_points[0]
-        for field in ("interpolation", "easing", "back", "amplitude", "period"):
-            setattr(start, field, getattr(key, field))
-        return [fcurve.evaluate(frame) for frame in frames]
-
-
 @contextmanager
 def spare_curve() -> Iterator[bpy.types.FCurve]:
     """An F-curve of an Action that nothing uses."""
@@ -79,3 +54,28 @@ def spare_curve() -> Iterator[bpy.types.FCurve]:
     strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
     yield strip.channelbag(action.slots.new("OBJECT", "Timing"), ensure=True).fcurves.new("location")
     bpy.data.actions.remove(action)
+
+
+def evaluated(fcurve: bpy.types.FCurve, frame: float) -> float:
+    """What `FCurve.evaluate` has in single precision, with the digits that slopes need where it is a Bezier segment."""
+    value, keys = fcurve.evaluate(frame), fcurve.keyframe_points
+    behind = next((number for number, key in enumerate(keys) if key.co[0] > frame), 0)
+    if not behind or keys[behind - 1].interpolation != "BEZIER":
+        return value
+    first, last = keys[behind - 1], keys[behind]
+    x, y = np.array((first.co, first.handle_right, last.handle_left, last.co), dtype=np.float64).T
+    # Handles that overlap are shortened.
+    reach = max(abs(x[1] - x[0]) + abs(x[3] - x[2]), x[3] - x[0])
+    for ends in (x, y) if reach > x[3] - x[0] else ():
+        ends[1:3] += (1.0 - (x[3] - x[0]) / reach) * (ends[[0, 3]] - ends[1:3])
+    low, high, frames = 0.0, 1.0, x.tolist()
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _bezier(*frames, middle) < frame else (low, middle)
+    exact = _bezier(*y.tolist(), low)
+    return exact if abs(exact - value) <= 1e-5 * max(1.0, abs(value)) else value
+
+
+def _bezier(first: float, second: float, third: float, fourth: float, t: float) -> float:
+    left = 1.0 - t
+    return left**3 * first + 3.0 * left * t * (left * second + t * third) + t**3 * fourth

@@ -1,7 +1,8 @@
-"""What animators do with tools on top of modes, as steps of a machine that edits: breakdowns, modifiers, samples."""
+"""What animators do with tools on top of modes, as steps of a machine that edits: breakdowns, modifiers, bakes."""
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from contextlib import suppress
 
 import bpy
@@ -10,18 +11,26 @@ from hypothesis import strategies as st
 from hypothesis.stateful import precondition, rule
 
 from rigid_motion import animation
-from tests.animation.body_oracle import Own, bodies_of
-from tests.animation.edit_steps import LAST
-from tests.animation.editing import Editing, seeds, shares
-from tests.animation.keyed import WIDTHS, curves_of, key_frames, moving_curves, snapshot
-from tests.animation.oracle import assert_shown, expected_bases
+from tests.animation.editing import ORDERS, Editing
+from tests.animation.keyed import (
+    WIDTHS,
+    curve_of,
+    curves_of,
+    key_frames,
+    mode_at,
+    moving_curves,
+    snapshot,
+    transform_paths,
+)
+from tests.animation.machine import LAST, frames_in, goes_on, seeds, shares, while_on
+from tests.animation.oracle import expected_bases
+from tests.animation.scenes import random_values
 
 
 class WithTools(Editing):
     """An animator who also has these tools."""
 
-    @precondition(lambda self: self.on)
-    @rule(
+    @while_on(
         who=shares,
         kind=st.sampled_from(("BREAKDOWN", "BREAKDOWN", "PUSH", "RELAX")),
         factor=st.sampled_from((0.0, 1.0)) | st.floats(-0.2, 1.2),
@@ -30,7 +39,7 @@ class WithTools(Editing):
     def key_a_breakdown(self, who, kind, factor, cancelled):
         name, frame = self._named(who), bpy.context.scene.frame_current_final
         obj, done = self._found(name), []
-        keys, before, is_even = key_frames(obj), snapshot(obj), len(bodies_of(obj, Own())) == 1
+        keys, before = key_frames(obj), snapshot(obj)
         others = keys[np.abs(keys - frame) >= 0.01]
         fits = len(others) > 1 and others[0] < frame < others[-1]
         ends = others[np.searchsorted(others, frame) - 1 :][:2] if fits else None
@@ -53,14 +62,15 @@ class WithTools(Editing):
             return
         rest = keys[np.abs(key_frames(obj)[:, None] - keys).min(axis=0) >= 0.01]
         assert not len(rest), "a key went"
-        # Parts with keys of their own go from each of these to the next, and what is muted gets no key.
-        is_whole = is_even and not any(curve.mute for curve in curves_of(obj).values())
+        # What has no key on the keys around changes there, too; and what is muted gets no key.
+        frames = [{key.co[0] for key in curve.keyframe_points} for curve in moving_curves(obj)]
+        is_whole = not any(curve.mute for curve in curves_of(obj).values())
+        is_whole = is_whole and all(of_one.issuperset(ends) for of_one in frames)
         if kind == "BREAKDOWN" and factor in (0.0, 1.0) and is_whole:
             now, then = expected_bases(obj, [frame, ends[int(factor)]], self.owns.get(name))
             assert np.abs(now - then).max() < 2e-5 * max(1.0, np.abs(then).max()), f"{name}: {now}\nis not\n{then}"
 
-    @precondition(lambda self: self.on)
-    @rule(
+    @while_on(
         who=shares,
         step=st.sampled_from((None, 2.0, 3.0, 7.0)),
         offset=st.sampled_from((0.0, 1.0, 30.0)),
@@ -77,7 +87,7 @@ class WithTools(Editing):
                 if step is not None:
                     added.append((fcurve, fcurve.modifiers.new("STEPPED")))
                     added[-1][1].frame_step, added[-1][1].frame_offset = step, offset
-                if other is not None and (fcurve.data_path, fcurve.array_index) == ("location", seed % 3):
+                if other is not None and fcurve == curve_of(obj, "location", seed % 3):
                     modifier = fcurve.modifiers.new(other)
                     added.append((fcurve, modifier))
                     if other == "NOISE":
@@ -88,17 +98,13 @@ class WithTools(Editing):
                         modifier.use_additive = blend != "REPLACE"
             bpy.context.view_layer.update()
             assert animation.problem_of(obj) == ""
-            carried_by = [obj]
-            while (parent := carried_by[-1].parent) is not None:
-                carried_by.append(parent)
-            assert_shown([obj], self._frames_that_are_seen(carried_by), self.owns)
+            self._assert_shown([name], self._frames_that_are_seen(self._carrying(name)))
             for fcurve, modifier in added:
                 fcurve.modifiers.remove(modifier)
 
         self._edit(change)
 
-    @precondition(lambda self: self.on)
-    @rule(who=shares, mode=st.sampled_from(("REPEAT", "MIRROR")))
+    @while_on(who=shares, mode=st.sampled_from(("REPEAT", "MIRROR")))
     def let_it_repeat_for_a_while(self, who, mode):
         name = self._named(who)
         curves = moving_curves(self._found(name))
@@ -117,24 +123,13 @@ class WithTools(Editing):
             frames = np.round(8.0 * np.random.default_rng(8).uniform(first, last, 8)) / 8.0
             frames = frames[(frames > first) & (frames < last)]
             again = frames + last - first if mode == "REPEAT" else 2.0 * last - frames
-            error = np.abs(self._bases(name, again) - self._bases(name, frames)).max(initial=0.0)
-            assert error < 1e-4 * max(1.0, np.abs(self._bases(name, frames)).max(initial=0.0)), (
-                f"{name} is off by {error}"
-            )
+            first_time, again = (self._bases([name], some)[name] for some in (frames, again))
+            error = np.abs(again - first_time).max(initial=0.0)
+            assert error < 1e-4 * max(1.0, np.abs(first_time).max(initial=0.0)), f"{name} is off by {error}"
             for fcurve in moving_curves(self._found(name)):
                 fcurve.modifiers.remove(next(item for item in fcurve.modifiers if item.type == "CYCLES"))
 
         self._edit(change)
-
-    def _bases(self, name, frames: np.ndarray) -> np.ndarray:
-        """How something is shown on frames."""
-        scene, result = bpy.context.scene, []
-        before = scene.frame_current, scene.frame_subframe
-        for frame in frames:
-            scene.frame_set(int(frame // 1), subframe=frame % 1)
-            result.append(self._basis(self._found(name)))
-        scene.frame_set(before[0], subframe=before[1])
-        return np.array(result)
 
     @precondition(lambda self: self.on and self.place >= 0)
     @rule(who=shares, back=st.booleans())
@@ -146,7 +141,7 @@ class WithTools(Editing):
         if not curves or self._sharing(name) != {name}:
             return
         frames = np.arange(first, last, 7.0)
-        before = self._bases(name, frames)
+        before = self._bases([name], frames)[name]
 
         def change() -> None:
             for fcurve in moving_curves(self._found(name)):
@@ -158,8 +153,143 @@ class WithTools(Editing):
                         fcurve.convert_to_keyframes(first, last)
 
         self._edit(change, lambda made, after: None)
-        assert np.abs(self._bases(name, frames) - before).max() < 1e-5 * max(1.0, np.abs(before).max())
+        assert np.abs(self._bases([name], frames)[name] - before).max() < 1e-5 * max(1.0, np.abs(before).max())
         bpy.ops.ed.undo()
         self.place -= 1
         self._is_as_remembered()
         self._edit(lambda: None)
+
+    @while_on(
+        which=st.sets(st.integers(0, 5), min_size=1),
+        step=st.sampled_from((1.0, 0.5, 3.0)),
+        interpolation=st.sampled_from(("LINEAR", "CONSTANT")),
+    )
+    def bake(self, which, step, interpolation):
+        names = [name for name in self._several(which) if self._sharing(name) == {name}]
+        live, keyed = [name for name in names if self._is_live(name)], self._keyed()
+        every = np.arange(-2.0, LAST + 6.0, 0.25) + self.shift
+        before = {name: expected_bases(self._found(name), every, self.owns.get(name)) for name in live}
+        keys, baked = {name: key_frames(self._found(name)) for name in live}, []
+        refused: list[animation.Refused] = []
+
+        def change() -> None:
+            carriers = list(map(self._found, names))
+            baked.extend(animation.bake(carriers, step=step, interpolation=interpolation, refused=refused))
+
+        self._edit(change)
+        assert len(refused) == len(names) - len(live)
+        for name in names:
+            assert animation.is_baked(self._found(name)) == (name in live or name in self.before_bake)
+        for name in live:
+            self.before_bake.setdefault(name, keyed[name])
+            begin, end = baked if len(live) == 1 else keys[name][[0, -1]]
+            is_step = (every >= np.ceil(begin)) & (every <= np.floor(end)) & ((every - begin) % step == 0.0)
+            # What goes on is baked from elsewhere on.
+            kept = np.isin(every, keys[name]) | (is_step & (len(live) == 1 or not goes_on(self._found(name))))
+            now, then = expected_bases(self._found(name), every[kept], self.owns.get(name)), before[name][kept]
+            error = np.abs(now - then).max(axis=(1, 2), initial=0.0) / max(1.0, np.abs(then).max(initial=0.0))
+            assert error.max() < 2e-5, f"{name} is baked otherwise on {every[kept][error.argmax()]}"
+        self.history[self.place] = self._remembered()
+
+    def _is_live(self, name: Hashable) -> bool:
+        keys = key_frames(self._found(name))
+        return any(mode_at(self._found(name), frame) != "BLENDER" for frame in keys[:-1])
+
+    @while_on(who=shares, order=st.sampled_from(ORDERS), rekeyed=st.booleans(), seed=seeds)
+    def turn_in_another_way(self, who, order, rekeyed, seed):
+        name = self._named(who)
+        if self._sharing(name) != {name} or name in self.before_bake:
+            return
+
+        def change() -> None:
+            obj = self._found(name)
+            keys = key_frames(obj)
+            obj.rotation_mode = order
+            path = transform_paths(obj)[1]
+            for frame, values in zip(keys, random_values(obj, path, len(keys), seed), strict=True) if rekeyed else ():
+                setattr(obj, path, values)
+                obj.keyframe_insert(path, frame=frame)
+
+        self._edit(change)
+
+    def _carrying(self, name: Hashable) -> list[Hashable]:
+        """The names of what something moves with, itself first."""
+        return [name]
+
+    @while_on(who=shares, which=shares, at=shares, seed=seeds)
+    def edit_while_nothing_is_followed(self, who, which, at, seed):
+        animation.set_enabled(False)
+        try:
+            fcurve = self._curve(self._found(self._named(who)), which)
+            if fcurve is not None:
+                self._set_a_value(fcurve, at, seed)
+            bpy.context.view_layer.update()
+        finally:
+            animation.set_enabled(True)
+        self._edit(animation.refresh)
+
+    # Actions that go and come, and are shared
+
+    def _animated(self, name: Hashable) -> bpy.types.Object:
+        """The object whose Action moves what has this name."""
+        return self._found(name).id_data
+
+    def _users(self, obj: bpy.types.Object) -> set[bpy.types.Object]:
+        """The objects that move by the same slot as this one, itself among them."""
+        action, slot = self._linked(obj)
+        return {obj} | {
+            one for one in map(self._animated, self.names) if action and self._linked(one) == (action, slot)
+        }
+
+    def _is_free(self, obj: bpy.types.Object) -> bool:
+        """Whether its Action may be exchanged without losing a bake's way back, or leaving others behind."""
+        return self._users(obj) == {obj} and obj not in map(self._animated, self.before_bake)
+
+    def _copy(self, obj: bpy.types.Object, new: str, copied: bool) -> None:
+        """The same object once more, with the same Action or with a copy of it."""
+        made = obj.copy()
+        made.name, made.data = new, obj.data and obj.data.copy()
+        bpy.context.scene.collection.objects.link(made)
+        if copied:
+            self._make_single_user(made)
+        self.names += [new] if made.pose is None else [(new, bone.name) for bone in made.pose.bones]
+
+    def _make_single_user(self, obj: bpy.types.Object) -> None:
+        action, slot = self._linked(obj)
+        if action is not None:
+            action = action.copy()
+            self._link(obj, action, action.slots[slot.identifier])
+
+    @precondition(lambda self: self.on and len(self.names) < 5)
+    @rule(who=shares, copied=st.booleans())
+    def copy_an_object(self, who, copied):
+        obj = self._animated(self._named(who))
+        name, new, self.fresh = obj.name, f"Copy {self.fresh}", self.fresh + 1
+        if self._is_free(obj):
+            self._edit(lambda: self._copy(bpy.data.objects[name], new, copied))
+
+    @while_on(who=shares)
+    def make_it_single_user(self, who):
+        name = self._named(who)
+        if len(self._users(self._animated(name))) > 1:
+            self._edit(lambda: self._make_single_user(self._animated(name)))
+
+    @while_on(who=shares, cleared=st.booleans(), there=frames_in)
+    def take_the_animation_away_for_a_while(self, who, cleared, there):
+        """It stays where it is seen, and goes on as before with its Action."""
+        name = self._named(who)
+        obj = self._animated(name)
+        action, slot = self._linked(obj)
+        if action is None or not self._is_free(obj):
+            return
+        bpy.context.view_layer.update()
+        seen = {name: self._basis(self._found(name))}
+        if cleared:
+            obj.animation_data_clear()
+        else:
+            self._link(obj, None, None)
+        self._assert_in_place(seen)
+        bpy.context.scene.frame_set(int(there + self.shift))
+        self._assert_in_place(seen)
+        self._link(obj, action, slot)
+        bpy.context.view_layer.update()

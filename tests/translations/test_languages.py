@@ -38,7 +38,6 @@ UNSEEN = {
     "The paths could not be drawn",
     "What came over the network cannot be shown",
     "What is selected cannot be sent",
-    "a mode for keyframes can look one key behind and ahead of a segment: see with_neighbours",
     " frames do not fit poses of shape ",
     "interpolation: LINEAR or CONSTANT, not ",
     "list[FewerKeys] | Refused",

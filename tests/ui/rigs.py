@@ -11,6 +11,7 @@ from rigid_motion.ui.overlay.kinds import space_of_bone
 from rigid_motion.ui.overlay.points import Path
 from tests.animation.bones import rigs
 from tests.animation.bones.rigs import Rest, select_bones
+from tests.animation.scenes import key
 
 FRAMES = np.array((1.0, 11.0, 21.0, 41.0))
 CHAIN = (
@@ -31,7 +32,7 @@ def new_rig(name: str = "Rig", **settings: object) -> bpy.types.Object:
 
 def key_bone(bone: bpy.types.PoseBone, **how: object) -> bpy.types.PoseBone:
     """Key a bone of this rig at random, which turns by less than half a turn from key to key."""
-    return rigs.key_bone(bone, FRAMES, seed=343, **how)
+    return key(bone, FRAMES, seed=1743, **how)
 
 
 def keyed_rig(name: str = "Rig") -> bpy.types.Object:

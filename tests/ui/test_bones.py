@@ -136,7 +136,7 @@ def test_the_tolerance_to_begin_with_is_one_of_the_rigs_size(body):
     body.scale = (100.0, 100.0, 100.0)
     bpy.context.view_layer.update()
     operators.reduce_keys()
-    largest = animation.total_reduction(list(body.pose.bones)).largest_error
+    largest = animation.reduction_of(list(body.pose.bones)).largest_error
     assert 0.001 * max(body.dimensions) < largest < 0.0031 * max(body.dimensions)
 
 

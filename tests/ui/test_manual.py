@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from bl_operators.wm import WM_OT_doc_view_manual, _wm_doc_get_id
 
-from rigid_motion.animation.properties import BoneMotion, ObjectMotion
+from rigid_motion.animation.properties import RigidMotion
 from rigid_motion.ui import manual, operators
 from rigid_motion.ui.overlay.settings import RigidMotionOverlay
 from rigid_motion.ui.preferences import RigidMotionPreferences
@@ -29,7 +29,7 @@ def test_every_operator_has_a_page(cls, extension):
 
 @pytest.mark.parametrize(
     "cls",
-    [ObjectMotion, BoneMotion, RigidMotionOverlay, RigidMotionPreferences],
+    [RigidMotion, RigidMotionOverlay, RigidMotionPreferences],
     ids=lambda cls: cls.__name__,
 )
 def test_every_property_that_is_drawn_has_a_page(cls, extension):

@@ -11,15 +11,14 @@ from rigid_motion.animation import (
     key_frames,
     modes_of,
     problem_of,
-    read_poses,
-    reduction_of,
     set_mode,
     write_channel,
 )
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion.motion import MODES, Poses, interpolate, shell_error
+from rigid_motion.motion import Poses, interpolate, shell_error
 from rigid_motion.ui import CLASSES, gltf_export, live
 from rigid_motion.ui.operators import axis_of_turns
+from rigid_motion_batch.recordings.world_poses import read_poses
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.scenes import new_object
 from tests.ui.conftest import FRAMES, keyed, select_keys
@@ -145,19 +144,17 @@ def test_a_mode_that_waits_for_keys_can_be_cleared_and_has_nothing_to_bake(exten
     assert "choose a mode" in refusal_of("bake")
 
 
-def test_modes_are_copied_key_by_key_where_keys_are_on_the_same_frames(extension):
+def test_keys_get_the_modes_that_the_active_one_has_on_their_frames(extension):
     alike, other, model = keyed("Alike"), keyed("Other"), keyed("Model")
     for fcurve in curves_of(other).values():
         fcurve.keyframe_points[1].co_ui.x += 3.0
     other.animation_data.action.update_tag()
     set_mode(model, "pga_lerp", FRAMES[1:2])
     set_mode(model, "dq_sclerp", FRAMES[2:3])
-    bpy.context.scene.frame_set(25)
     assert operators.copy_mode() == {"FINISHED"}
     assert modes(alike) == modes(model) == ["BLENDER", "pga_lerp", "dq_sclerp"]
-    assert modes_of(other, key_frames(other)) == ["dq_sclerp"] * 4
+    assert modes_of(other, key_frames(other)) == ["BLENDER", "pga_lerp", "dq_sclerp", "BLENDER"]
     set_mode(model, "BLENDER")
-    bpy.context.scene.frame_set(100)
     operators.copy_mode()
     assert modes(alike) == modes(other) == ["BLENDER"] * 3
     model.select_set(False)
@@ -187,7 +184,7 @@ def test_cycles_are_on_all_channels_and_in_front(tool, kind):
     assert operators.add_cycles(mode=kind) == {"FINISHED"}
     assert problem_of(tool) == ""
     curves_of(tool)["location", 0].keyframe_points.insert(50.0, 3.0)
-    with pytest.raises(RuntimeError, match="on the same frames to repeat"):
+    with pytest.raises(RuntimeError, match="first and last keys on the same frames"):
         operators.add_cycles(mode=kind)
 
 
@@ -212,19 +209,13 @@ def recorded(name: str = "Tool", size: float = 1.0) -> bpy.types.Object:
     return obj
 
 
-def test_the_best_mode_of_each_segment_is_said_and_is_one_step_to_undo(extension, capfd):
+def test_a_reduction_is_one_step_to_undo(extension):
     obj = recorded()
     before = snapshot(obj)
     bpy.ops.ed.undo_push(message="recording")
-    assert operators.reduce_keys(mode="lerp_slerp", tolerance=0.1, radius=0.5, best_of=True) == {"FINISHED"}
+    assert operators.reduce_keys(mode="lerp_slerp", tolerance=0.1, radius=0.5) == {"FINISHED"}
     bpy.ops.ed.undo_push(message="reduction")
-    segments = reduction_of(obj).segments
-    assert sum(segments.values()) == len(key_frames(obj)) - 1
-    assert len(segments) > 1
-    said = capfd.readouterr().out
-    assert "; segments: " in said
-    for mode, count in segments.items():
-        assert f"{count} {MODES[mode].label}" in said
+    assert snapshot(obj) != before
     bpy.ops.ed.undo()
     assert snapshot(bpy.data.objects["Tool"]) == before
 

@@ -70,7 +70,7 @@ def test_where_a_component_is_keyed_alone_its_frames_are_noted(tool):
     set_mode(tool, "dq_sclerp")
     curves_of(tool)["location", 1].keyframe_points[1].co_ui.x = 15.0
     ((text,), mode) = notes_on(tool)
-    assert text.startswith("Keyed alone on frame 11, 15: not all of Location has a key there")
+    assert text.startswith("Key all of Location (I) at 11, 15: only a part of it has a key there")
     assert mode == "dq_sclerp"
     set_mode(tool, "BLENDER")
     assert notes_on(tool) == ([], "BLENDER")

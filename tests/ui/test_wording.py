@@ -62,5 +62,5 @@ def test_lines_are_as_full_as_they_fit_and_lose_no_word():
 def test_a_reduction_is_summed_up_in_the_units_of_the_scene(empty_file, system, scale, said):
     settings = bpy.context.scene.unit_settings
     settings.system, settings.scale_length = system, scale
-    reduction = Reduction(before=251, after=18, largest_error=0.00093, segments={"motor_spline": 17})
+    reduction = Reduction(before=251, after=18, largest_error=0.00093)
     assert reduction_summary(bpy.context.scene, reduction) == f"251 keys became 18, largest error {said}"

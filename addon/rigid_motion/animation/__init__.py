@@ -11,12 +11,11 @@ edits       what is done to motions: choosing modes, turns, breakdowns
 baking      other keys for the same motion
 properties  what is kept in files
 
-Data flows from Blender through actions, evaluation and terms back to Blender. Each room imports only those above it;
-`handlers` belongs to none, and imports none.
+Data flows from Blender through actions, evaluation and terms back to Blender. Each room imports only those above it.
 """
 
 from . import properties
-from .actions.channels import channelbag_of, read_poses, write_channel
+from .actions.channels import channelbag_of, write_channel
 from .baking.bake import bake, bake_poses, is_baked, unbake
 from .baking.fewer_keys import NeedsItsKeys
 from .baking.reducing import (
@@ -27,7 +26,6 @@ from .baking.reducing import (
     reduce_keys_of,
     reduction_of,
     restore_keys,
-    total_reduction,
 )
 from .edits.breakdowns import Breakdowns, breakdown
 from .edits.mode_keys import copy_modes, repeat, set_mode, set_turns
@@ -59,7 +57,6 @@ __all__ = [
     "modes_of",
     "problem_of",
     "radius_of",
-    "read_poses",
     "reduce_keys_of",
     "reduction_of",
     "refresh",
@@ -69,7 +66,6 @@ __all__ = [
     "set_enabled",
     "set_mode",
     "set_turns",
-    "total_reduction",
     "unbake",
     "unregister",
     "write_channel",

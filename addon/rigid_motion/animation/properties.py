@@ -7,22 +7,15 @@ chosen from Python and by a button.
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Any
 
 import bpy
-from bpy.props import (
-    CollectionProperty,
-    EnumProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from bpy.props import CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
 from ..motion import KEYFRAME_MODES
 from .actions.refusals import MOST_TURNS
 from .baking.originals import BAKED, REDUCED
 from .edits import mode_keys
-from .evaluation.components import MODE_NUMBERS
+from .evaluation.components import MODE_NAMES, MODE_NUMBERS
 from .evaluation.sources import SCREW_AXIS
 from .following import follower
 from .queries.keyed import mode_shown
@@ -39,7 +32,6 @@ MODE_ITEMS = [
     ),
 ]
 """The modes as items of an enumeration. Files have the numbers."""
-
 
 TURN_AXIS_ITEMS = [
     (
@@ -71,38 +63,33 @@ class ChangedKeys(bpy.types.PropertyGroup):
     reduction: StringProperty(options={"HIDDEN"})
 
 
-def _get_mode(motion: _Motion) -> int:
+def _get_mode(motion: RigidMotion) -> int:
     return MODE_NUMBERS[mode_shown(_transform_with(motion))]
 
 
-def _set_mode(motion: _Motion, number: int) -> None:
+def _set_mode(motion: RigidMotion, number: int) -> None:
     # What refuses says so in the panel.
     with suppress(Refused):
-        mode_keys.set_mode(_transform_with(motion), next(name for name, one in MODE_NUMBERS.items() if one == number))
+        mode_keys.set_mode(_transform_with(motion), MODE_NAMES[number])
 
 
-def _on_turns(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
+def _on_turns(motion: RigidMotion, _context: bpy.types.Context) -> None:
     if not follower.follower.busy:
         # What refuses to turn says so in the panel.
         with suppress(Refused):
             mode_keys.on_turns(_transform_with(motion))
 
 
-def _transform_with(motion: ObjectMotion | BoneMotion) -> Transform:
-    """Return what has these properties."""
+def _transform_with(motion: RigidMotion) -> Transform:
+    """Return what has these properties: Blender has no way from them to their bone."""
     obj = motion.id_data
-    if isinstance(motion, BoneMotion):
-        # Blender has no way from it to its bone.
-        return transform_of(next(bone for bone in obj.pose.bones if bone.rigid_motion == motion))
-    return transform_of(obj)
+    if obj.rigid_motion == motion:
+        return transform_of(obj)
+    return transform_of(next(bone for bone in obj.pose.bones if bone.rigid_motion == motion))
 
 
-KEPT: Any = {"options": {"HIDDEN"}, "override": {"LIBRARY_OVERRIDABLE"}}
-"""How what is kept of something is declared."""
-
-
-class _Motion:
-    """What all that is moved has."""
+class RigidMotion(bpy.types.PropertyGroup):
+    """What all that is moved has: objects, and the bones of rigs."""
 
     mode: EnumProperty(
         name="Mode",
@@ -128,26 +115,18 @@ class _Motion:
         update=_on_turns,
     )
     # The mode that was chosen before there was an Action to keep it.
-    awaited: EnumProperty(items=MODE_ITEMS, **KEPT)
+    awaited: EnumProperty(items=MODE_ITEMS, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
     bakes: CollectionProperty(type=ChangedKeys, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
 
 
-class BoneMotion(_Motion, bpy.types.PropertyGroup):
-    pass
-
-
-class ObjectMotion(_Motion, bpy.types.PropertyGroup):
-    pass
-
-
-CLASSES = (ChangedKeys, BoneMotion, ObjectMotion)
+CLASSES = (ChangedKeys, RigidMotion)
 
 
 def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.Object.rigid_motion = PointerProperty(type=ObjectMotion, override={"LIBRARY_OVERRIDABLE"})
-    bpy.types.PoseBone.rigid_motion = PointerProperty(type=BoneMotion, override={"LIBRARY_OVERRIDABLE"})
+    bpy.types.Object.rigid_motion = PointerProperty(type=RigidMotion, override={"LIBRARY_OVERRIDABLE"})
+    bpy.types.PoseBone.rigid_motion = PointerProperty(type=RigidMotion, override={"LIBRARY_OVERRIDABLE"})
 
 
 def unregister() -> None:

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import bpy
 from bpy.app.handlers import persistent
 
-from ..animation.handlers import append_handlers, remove_handlers
+from ..handlers import append_handlers, remove_handlers
 
 log = logging.getLogger(__package__)
 

@@ -33,10 +33,8 @@ PAGES = (
     ("bpy.ops.rigid_motion.*", f"{ANIMATORS}#choose-a-mode"),
     ("bpy.types.livesettings.*", LIVE),
     ("bpy.types.livebone.*", LIVE),
-    ("bpy.types.objectmotion.mode", MODES),
-    ("bpy.types.objectmotion.*", EDIT),
-    ("bpy.types.bonemotion.mode", f"{ANIMATORS}#rigs"),
-    ("bpy.types.bonemotion.*", EDIT),
+    ("bpy.types.rigidmotion.mode", MODES),
+    ("bpy.types.rigidmotion.*", EDIT),
     ("bpy.types.rigidmotionoverlay.*", f"{ANIMATORS}#see-the-motion"),
     ("bpy.types.rigidmotionpreferences.*", f"{ANIMATORS}#install"),
 )

@@ -18,7 +18,7 @@ from ..animation.actions.refusals import MOST_TURNS
 from ..animation.baking.originals import BAKED
 from ..animation.evaluation.sources import SCREW_AXIS, TURN_AXES
 from ..animation.properties import MODE_ITEMS, TURN_AXIS_ITEMS
-from ..animation.queries.keyed import active_binding_alone
+from ..animation.queries.keyed import active_binding
 from ..animation.queries.polls import with_in_betweens, with_modes, with_more_keys_than
 from ..animation.transforms import OWN_WORDS, Refused, Transform
 from .preferences import DEFAULT_MODE, default_mode
@@ -87,7 +87,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
 
 def axis_of_turns(target: Transform) -> str:
     """Return the one of `TURN_AXES` that the turns of a target are about."""
-    binding = active_binding_alone(target)
+    binding = active_binding(target)
     fcurve = None if binding is None else binding.curves.get(target.turns_channel)
     marks = read_marks(fcurve) if fcurve is not None else ()
     return TURN_AXES[(marks[0] - 1) % len(TURN_AXES)] if len(marks) and marks[0] else SCREW_AXIS
@@ -202,8 +202,8 @@ class RIGID_MOTION_OT_copy_mode(OnTargets, bpy.types.Operator):
     bl_idname = "rigid_motion.copy_mode"
     bl_label = "Copy Mode to Selected"
     bl_description = (
-        "Give the rest of the selection the modes of the active one: key by key where both have keys on the same "
-        "frames, otherwise all the mode that it has at the playhead"
+        "Give the rest of the selection the modes of the active one: each key that which the active one has on its "
+        "frame"
     )
     nothing_to_do = n_("Select what is to have the mode, and last what has it")
 
@@ -227,7 +227,8 @@ class RIGID_MOTION_OT_add_cycles(OnTargets, bpy.types.Operator):
     bl_label = "Add Cycles"
     bl_description = (
         "Have the motion repeat before its first keys and behind its last ones, in all channels together: "
-        "Blender adds no Cycles to channels with in-betweens"
+        "Blender adds no Cycles to channels with in-betweens. Clear Cyclic (F-Modifier) in the Graph Editor (Channel > "
+        "Extrapolation Mode) takes them off again"
     )
     nothing_to_do = n_("Nothing here has two keys to repeat")
     with_work = staticmethod(partial(with_more_keys_than, count=1))

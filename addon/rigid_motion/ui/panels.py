@@ -13,12 +13,11 @@ from ..animation.actions.reading import planned_from
 from ..animation.evaluation.components import LOCATION, PART_OF, ROTATION
 from ..animation.evaluation.sources import Source
 from ..animation.properties import TURN_AXIS_ITEMS
-from ..animation.queries.keyed import active_binding_alone, source_of
+from ..animation.queries.keyed import active_binding, source_of
 from ..animation.queries.segments import SegmentFacts, frame_in_action, is_up_to_date, segment_at
 from ..animation.transforms import OWN_WORDS, Transform, transform_of
 from . import overlay
 from .operators import axis_of_turns
-from .reducing import reduction_of
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_key_editor, modes_meant, with_keyed_bones
 from .wording import (
     BAKED,
@@ -92,7 +91,7 @@ def _read(target: Transform) -> tuple[Source | None, str]:
         return None, str(refusal)
     if source is None:
         return None, animation.problem_of(target)
-    binding = active_binding_alone(target)
+    binding = active_binding(target)
     depends_on = (*target.identity, source.digest, binding and planned_from(binding))
     if _problem[0] != depends_on:
         _problem = depends_on, animation.problem_of(target)
@@ -113,7 +112,7 @@ def _moved_alone(source: Source) -> Iterator[str]:
 
 def _most_modifiers(target: Transform) -> int:
     """Return the largest number of modifiers that a channel of a target has."""
-    binding = active_binding_alone(target)
+    binding = active_binding(target)
     return 0 if binding is None else max((len(fcurve.modifiers) for fcurve in binding.curves.values()), default=0)
 
 
@@ -210,7 +209,7 @@ def _draw_reduction(context: bpy.types.Context, layout: bpy.types.UILayout, targ
     row = layout.row(align=True)
     row.operator("rigid_motion.reduce_keys", text="Reduce Keys", text_ctxt=OWN_WORDS)
     row.operator("rigid_motion.restore_keys", text="Restore Keys", text_ctxt=OWN_WORDS)
-    reduction = reduction_of(with_keyed_bones(target))
+    reduction = animation.reduction_of(with_keyed_bones(target))
     if reduction is not None:
         row.operator("rigid_motion.discard_dense_keys", text="", icon="TRASH")
         text = reduced_to(context.scene, reduction)

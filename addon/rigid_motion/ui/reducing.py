@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 
 import bpy
@@ -11,7 +11,7 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from .. import animation
-from ..animation import Reduction, Refused
+from ..animation import Refused
 from ..animation.baking.originals import REDUCED
 from ..animation.properties import MODE_ITEMS
 from ..animation.queries.polls import with_more_keys_than
@@ -19,11 +19,6 @@ from ..animation.transforms import OWN_WORDS, Transform
 from ..animation.transforms.sizes import first_tolerance
 from .targets import OnChanged, OnTargets, each_target, with_bones_of_rigs
 from .wording import labelled, reduction_rows, reduction_summary, split
-
-
-def reduction_of(targets: Sequence[Transform]) -> Reduction | None:
-    """Return what became of the keys of a target, with its modes, or of those of several together."""
-    return animation.reduction_of(targets[0]) if len(targets) == 1 else animation.total_reduction(targets)
 
 
 class _OfRigsToo:
@@ -102,14 +97,6 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         default="motor_spline",
         translation_context=OWN_WORDS,
     )
-    best_of: BoolProperty(
-        name="Best per Segment",
-        description=(
-            "Then key each segment with the mode that comes closest to the recording there, within the tolerance. "
-            "Where one mode meets another the path may turn a corner"
-        ),
-    )
-
     shared: BoolProperty(
         name="Key Poses",
         description="Give all bones of a rig keys on the same frames. Otherwise each has its own: fewer keys in all",
@@ -132,10 +119,10 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
             layout.prop(self, "tolerance")
         # So many key poses are shared as it is.
         of_rigs = ("hold",) if self.by == "NUMBER" else ("shared", "hold")
-        for name in ("radius", "mode", "best_of", *(of_rigs if rigs else ())):
+        for name in ("radius", "mode", *(of_rigs if rigs else ())):
             layout.prop(self, name)
         column = layout.column(align=True)
-        for label, text in reduction_rows(context.scene, reduction_of(targets)):
+        for label, text in reduction_rows(context.scene, animation.reduction_of(targets)):
             labelled(column, label).label(text=text, translate=False)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -153,14 +140,13 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
             self.mode,
             self.tolerance,
             self.radius or None,
-            best_of=self.best_of,
             shared=self.shared,
             hold=self.hold,
             count=self.count if self.by == "NUMBER" else None,
             refused=refused,
         )
         reduced = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]
-        return reduction_summary(context.scene, reduction_of(reduced)) if reduced else ""
+        return reduction_summary(context.scene, animation.reduction_of(reduced)) if reduced else ""
 
 
 class RIGID_MOTION_OT_restore_keys(_OfRigsToo, OnChanged, bpy.types.Operator):

@@ -7,7 +7,7 @@ labels two fifths of the width, and cuts the names of modes off in a sidebar as 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import blf
 import bpy
@@ -36,9 +36,7 @@ BAKED = n_("Baked to keys. Un-Bake brings its own keys back")
 OUT_OF_DATE = n_("The keys have changed since: Live Update is off, in the preferences")
 NO_BONE = n_("No Bone Active")
 PARTS = {LOCATION: n_("Location"), ROTATION: n_("Rotation")}
-MOVED_ALONE = n_(
-    "Keyed alone on frame {frames}: not all of {part} has a key there, so the motion is not rigid. Key all of it (I)"
-)
+MOVED_ALONE = n_("Key all of {part} (I) at {frames}: only a part of it has a key there, so the motion is not rigid")
 DENSE = n_(
     "{count} modifiers on a channel: with so many segments Blender plays slower. Reduce the keys, or clear the modes"
 )
@@ -126,11 +124,9 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
         summary += rpt_(", keys on {frames} frames").format(frames=reduction.rig.frames)
         if (feet := _slides(scene, reduction.rig)) is not None:
             summary += rpt_(", feet that stand slide {distance}").format(distance=feet)
-        if followers := reduction.rig.not_promised.followers:
+        if bones := reduction.rig.not_promised:
             text = rpt_("; not promised for what follows constraints or drivers, and hangs on it: {bones}")
-            summary += text.format(bones=listed(followers))
-    if len(reduction.segments) > 1:
-        summary += rpt_("; segments: {modes}").format(modes=", ".join(_counted_modes(reduction.segments)))
+            summary += text.format(bones=listed(bones))
     return summary
 
 
@@ -161,11 +157,9 @@ def reduction_rows(scene: bpy.types.Scene, reduction: Reduction | None) -> list[
         rows.insert(1, (iface_("Frames", OWN_WORDS), iface_("{frames} with keys").format(frames=reduction.rig.frames)))
         if (feet := _slides(scene, reduction.rig)) is not None:
             rows.append((iface_("Feet", OWN_WORDS), iface_("slide {distance}").format(distance=feet)))
-        if followers := reduction.rig.not_promised.followers:
+        if bones := reduction.rig.not_promised:
             # What follows constraints or drivers is somewhere else than its keys say.
-            rows.append((iface_("Not Promised", OWN_WORDS), listed(followers)))
-    if len(reduction.segments) > 1:
-        rows += [("", line) for line in _counted_modes(reduction.segments)]
+            rows.append((iface_("Not Promised", OWN_WORDS), listed(bones)))
     return rows
 
 
@@ -175,14 +169,6 @@ def _slides(scene: bpy.types.Scene, rig: WholeRig) -> str | None:
         return None
     before, after = (length(scene, slide, precision=2) for slide in (rig.slide_before, rig.slide_after))
     return iface_("{after}, recorded {before}").format(after=after, before=before)
-
-
-def _counted_modes(segments: Mapping[str, int]) -> list[str]:
-    """Return each mode with how many segments have it, most of them first."""
-    return [
-        f"{count} {iface_(LABELS[mode], OWN_WORDS)}"
-        for mode, count in sorted(segments.items(), key=lambda item: -item[1])
-    ]
 
 
 def listed(items: Sequence[str], most: int = 3) -> str:

@@ -13,7 +13,8 @@ import rigid_motion
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.fbx import ADDON as FBX_ADDON
 from rigid_motion_batch.recordings.fbx import refuse_damaged
-from rigid_motion_batch.recordings.importing import enabled, refuse_too_large, told
+from rigid_motion_batch.recordings.importing import enabled, told
+from rigid_motion_batch.recordings.scene_bodies import refuse_too_large
 from rigid_motion_batch.silencing import silenced
 
 from .blend_files import missing_data, open_file

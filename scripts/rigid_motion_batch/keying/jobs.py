@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import bpy
 
-from rigid_motion.animation.transforms import BoneTransform, Transform, transform_of
+from rigid_motion.animation.transforms import Transform, transform_of
 from rigid_motion_batch.keying.blend_files import (
     HERE,
     missing_data,
@@ -92,7 +92,7 @@ def _do_targets(doing: Doing, action: Action, targets: Sequence[Transform]) -> N
     for name, reason, count in result.refusals():
         doing.refuse(name, reason, count)
     if result.done:
-        bones = sum(isinstance(target, BoneTransform) for target in result.done)
+        bones = sum(target.is_part for target in result.done)
         doing.outcome.bones += bones
         doing.outcome.objects += len(result.done) - bones
         between = " " if len(result.done) > 1 else ": "

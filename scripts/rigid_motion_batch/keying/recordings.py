@@ -16,10 +16,7 @@ from rigid_motion.motion import reduce_keys
 from rigid_motion_batch.analysis.choices import RIGID
 from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
-from rigid_motion_batch.keying.blend_files import write_file
-from rigid_motion_batch.keying.exporting import export_glb
 from rigid_motion_batch.keying.gltf_files import reduce_gltf
-from rigid_motion_batch.keying.keyed_files import key_body, key_densely, key_object, new_file
 from rigid_motion_batch.keying.planning import ALL
 from rigid_motion_batch.keying.records import FileProblem, Unreadable
 from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, name_of, off
@@ -99,6 +96,8 @@ class _Clip:
         made = Reconstruction(clip, tolerance, {mode: (keys,)}, np.array([self.radius]))
         largest = float(made.shell(mode).max())
         if frames is not None:
+            from .keyed_files import key_object
+
             key_object(clip, keys, frames, mode, self.name)
         error = off(tolerance, largest, clip.metres_per_unit, by_number=count is not None)
         self.doing.say(f"{self.doing.would}reduced, {len(clip.times)} -> {len(keys)} keys{error}")
@@ -112,6 +111,8 @@ class _Clip:
             self._save(scene)
 
     def _body(self, scene: Path) -> None:
+        from .keyed_files import key_body
+
         doing = self.doing
         doing.require_free(scene)
         result = key_body(self.clip, self._new_file(), self.how, self.name)
@@ -129,12 +130,17 @@ class _Clip:
         doing.outcome.bones += len(result.done)
 
     def _glb(self, path: Path) -> None:
+        from .exporting import export_glb
+        from .keyed_files import key_densely
+
         self.doing.require_free(path)
         key_densely(self.clip, self._new_file(), self.name)
         how = self.how if self.clip.rest_body else replace(self.how, radius=self.radius)
         reduce_gltf(self.doing, how, path, export_glb, self.clip.metres_per_unit)
 
     def _new_file(self) -> np.ndarray:
+        from .keyed_files import new_file
+
         return new_file(self.clip, self.tolerance.tolerance(self.clip), self.how.fps)
 
     def _note(self, *clips: ClipNumbers) -> None:
@@ -143,6 +149,8 @@ class _Clip:
         numbers.clips += clips
 
     def _save(self, scene: Path) -> None:
+        from .blend_files import write_file
+
         if not self.doing.work.dry_run:
             write_file(scene, self.doing.record)
         self.doing.tell_written(scene)

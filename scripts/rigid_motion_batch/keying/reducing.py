@@ -8,7 +8,7 @@ from typing import Any, cast
 import bpy
 
 from rigid_motion import animation
-from rigid_motion.animation import NeedsItsKeys, Reduction, Refused, WholeRig
+from rigid_motion.animation import NeedsItsKeys, Reduction, Refused
 from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
 from rigid_motion.animation.transforms.sizes import first_tolerance, metres_per_unit, rig_size
@@ -61,7 +61,7 @@ def reduced(targets: Sequence[Transform], how: Reductions) -> Result:
     left = {target for target, refusal in problems.items() if isinstance(refusal, NeedsItsKeys)}
     reasons = {target: _reason(target, refusal) for target, refusal in problems.items()}
     by_number = how.count is not None
-    reduction = animation.total_reduction(done)
+    reduction = animation.reduction_of(done)
     summary = f"{_described(reduction, tolerance, unit, by_number=by_number)}{doubt}" if reduction else ""
     if how.discard and done:
         animation.discard_dense_keys(done)
@@ -90,17 +90,11 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_nu
     if rig and rig.slide_before > 0.0:
         slid, slides = (tolerance.alike(slide * unit, unit) for slide in (rig.slide_before, rig.slide_after))
         summary += f"; feet slide {slides}, and {slid} before"
-    return summary + not_promised(rig) if rig else summary
-
-
-def not_promised(rig: WholeRig) -> str:
-    """Return which bones the tolerance is not promised for, and why; nothing where it is for all."""
-    followers, below = rig.not_promised.followers, rig.not_promised.below
-    if not followers:
-        return ""
-    names = f"{', '.join(followers)} follow{'s' if len(followers) == 1 else ''} constraints or drivers"
-    hanging = f", and what hangs on {'it' if len(followers) == 1 else 'them'} ({', '.join(below)})" if below else ""
-    return f"; not promised: {names}{hanging}"
+    if rig and rig.not_promised:
+        summary += (
+            f"; not promised for what follows constraints or drivers, and hangs on it: {', '.join(rig.not_promised)}"
+        )
+    return summary
 
 
 def _doubt(targets: Sequence[Transform], tolerance: Tolerance | None, unit: float) -> str:

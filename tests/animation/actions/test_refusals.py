@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import re
+from operator import itemgetter
 
 import bpy
 import numpy as np
 import pytest
 
 from rigid_motion.animation import Refused, problem_of, refresh, set_mode
+from rigid_motion.animation.actions.modifiers import add_cycles
+from rigid_motion.animation.fcurves.keys import Cycles
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.modified import is_term
 from tests.animation.oracle import assert_shown, shown_worlds
-from tests.animation.scenes import FRAMES, give_own_deltas, key, linked, new_object
+from tests.animation.scenes import FRAMES, give_own_deltas, key, linked, new_object, own_deltas
 
 PLAYED = np.arange(-2.0, 44.0)
 DELTAS = ("delta_location", "delta_rotation_quaternion", "delta_rotation_euler", "delta_scale")
@@ -32,70 +35,66 @@ def state_of(obj: bpy.types.Object) -> tuple:
     )
 
 
-def enveloped(obj: bpy.types.Object) -> None:
-    curves_of(obj)["location", 1].modifiers.new("ENVELOPE")
-
-
 def all_driven(obj: bpy.types.Object) -> None:
-    for path, index in (("location", 0), ("location", 1), ("location", 2), ("rotation_quaternion", 3), ("scale", 1)):
+    for path, index in curves_of(obj):
         obj.driver_add(path, index).driver.expression = "0.1 * frame"
 
 
-def sampled(obj: bpy.types.Object) -> None:
-    curves_of(obj)["location", 2].convert_to_samples(1, 41)
-
-
-def turning_on_top(obj: bpy.types.Object) -> None:
-    obj.keyframe_insert("delta_rotation_quaternion", frame=7)
-
-
-def cyclic_alone(obj: bpy.types.Object) -> None:
-    curves_of(obj)["location", 2].modifiers.new("CYCLES")
-
-
 HINDRANCES = {
-    "envelope": (enveloped, "Location Y has an Envelope.*mute or remove it, or bake the channel"),
+    "envelope": (
+        lambda obj: curves_of(obj)["location", 1].modifiers.new("ENVELOPE"),
+        "Location Y has an Envelope.*mute or remove it, or bake the channel",
+    ),
     "all driven": (all_driven, "Location X is driven: remove the driver, or bake it"),
-    "sampled keys": (sampled, "Location Z is sampled and has no keys.*Samples to Keys"),
-    "moving delta": (turning_on_top, "Delta Rotation Quaternion W is animated, on top of.*to a parent"),
-    "cycles": (cyclic_alone, "repeats, but not all of it together"),
+    "all sampled": (
+        lambda obj: [fcurve.convert_to_samples(1, 41) for fcurve in curves_of(obj).values()],
+        "Location X is muted, or has samples.*Samples to Keys",
+    ),
+    "moving delta": (
+        lambda obj: obj.keyframe_insert("delta_rotation_quaternion", frame=7),
+        r"Delta Rotation \(Quaternion\) W is animated, on top of.*to a parent",
+    ),
+    "cycles": (
+        lambda obj: add_cycles(curves_of(obj)["location", 2], Cycles("REPEAT", "REPEAT", 0, 0)),
+        "repeats, but not all of it together",
+    ),
 }
 """What to do to an object, and what it is told."""
+
+
+def hindered(name: str, mode: str = "") -> tuple[bpy.types.Object, bpy.types.Object, str]:
+    """Two objects, of which one has a hindrance, in its mode or without one, and what it is told."""
+    other, obj = key(new_object("Other"), scale="even"), new_object()
+    give_own_deltas(obj)
+    key(obj, scale="even")
+    if mode:
+        set_mode(obj, mode)
+    hinder, message = HINDRANCES[name]
+    hinder(obj)
+    bpy.context.view_layer.update()
+    return other, obj, f"^Tool.*{message}"
 
 
 @pytest.mark.parametrize("frames", [None, FRAMES[:2]], ids=["whole object", "keys"])
 @pytest.mark.parametrize("hindrance", HINDRANCES)
 def test_a_mode_that_cannot_work_is_refused_by_name_and_nothing_changes(live_file, hindrance, frames):
-    obj = new_object()
-    give_own_deltas(obj)
-    key(obj, scale="even")
-    hinder, message = HINDRANCES[hindrance]
-    hinder(obj)
-    bpy.context.view_layer.update()
-    before = state_of(obj)
-    with pytest.raises(Refused, match=f"^Tool.*{message}"):
-        set_mode(obj, "dq_sclerp", frames)
-    assert state_of(obj) == before
+    other, obj, message = hindered(hindrance)
+    before = [state_of(other), state_of(obj)]
+    for targets in (obj, [other, obj]):
+        with pytest.raises(Refused, match=message):
+            set_mode(targets, "dq_sclerp", frames)
+    assert [state_of(other), state_of(obj)] == before
     set_mode(obj, "BLENDER")
-    assert state_of(obj) == before, "Blender's own mode is always to be had"
+    assert state_of(obj) == before[1], "Blender's own mode is always to be had"
 
 
-@pytest.mark.parametrize("hindrance", HINDRANCES)
+@pytest.mark.parametrize("hindrance", sorted(HINDRANCES.keys() - {"all sampled"}))  # without keys it says no mode
 def test_what_comes_in_the_way_later_gives_blenders_own_motion_and_a_reason(live_file, hindrance):
-    other, obj = key(new_object("Other"), scale="even"), new_object()
-    give_own_deltas(obj)
-    key(obj, scale="even")
-    set_mode(obj, "dq_sclerp")
-    for fcurve in curves_of(obj).values():
-        for term in list(fcurve.modifiers) if hindrance == "cycles" else ():
-            fcurve.modifiers.remove(term)
-    hinder, message = HINDRANCES[hindrance]
-    hinder(obj)
+    other, obj, message = hindered(hindrance, "dq_sclerp")
     keys = repr(snapshot(obj))
-    bpy.context.view_layer.update()
     refresh()
-    assert not any(is_term(item) for fcurve in curves_of(obj).values() for item in fcurve.modifiers)
-    assert re.match(f"Tool.*{message}", problem_of(obj))
+    assert not any(map(is_term, (item for fcurve in curves_of(obj).values() for item in fcurve.modifiers)))
+    assert re.match(message, problem_of(obj))
     assert repr(snapshot(obj)) == keys
     set_mode(other, "dq_sclerp")
     assert_shown([other], PLAYED)
@@ -115,41 +114,34 @@ def test_deltas_that_move_themselves_are_on_top_of_the_mode(live_file):
             assert tuple(getattr(obj, path)) == pytest.approx(tuple(getattr(plain, path)), abs=1e-5)
 
 
-def turn_by_eulers(obj: bpy.types.Object) -> None:
-    obj.rotation_mode = "XYZ"
-
-
-def turn_its_delta(obj: bpy.types.Object) -> None:
-    obj.delta_rotation_quaternion = (1.0, 2.0, 3.0, 0.0)
-
-
-DIFFERENCES = {"rotation mode": turn_by_eulers, "delta transform": turn_its_delta}
-
-
-def twins() -> tuple[bpy.types.Object, bpy.types.Object]:
-    """Two objects that move by the same slot."""
+@pytest.mark.parametrize("leaves", ["its Action", "its slot"])
+@pytest.mark.parametrize("first", ["the mode", "the difference"])
+@pytest.mark.parametrize(
+    "difference", [("rotation_mode", "XYZ"), ("delta_rotation_quaternion", (1.0, 2.0, 3.0, 0.0))], ids=itemgetter(0)
+)
+def test_of_objects_that_share_a_slot_and_differ_one_leads_and_the_other_is_told_until_it_leaves(
+    live_file, difference, first, leaves
+):
     obj, twin = key(new_object("One")), new_object("Twin")
     twin.animation_data_create().action = obj.animation_data.action
     twin.animation_data.action_slot = obj.animation_data.action_slot
-    return obj, twin
-
-
-@pytest.mark.parametrize("first", ["the mode", "the difference"])
-@pytest.mark.parametrize("difference", DIFFERENCES)
-def test_of_objects_that_share_a_slot_and_differ_one_leads_and_the_other_is_told(live_file, difference, first):
-    obj, twin = twins()
     if first == "the mode":
         set_mode(obj, "dq_sclerp")
         bpy.context.view_layer.update()
-    DIFFERENCES[difference](twin)
+    setattr(twin, *difference)
     bpy.context.view_layer.update()
     set_mode(obj, "dq_sclerp")
     assert_shown([obj], PLAYED)
     assert problem_of(obj) == ""
     assert re.match("Twin moves by the same Action slot as One.*an Action of its own", problem_of(twin))
-    twin.animation_data.action = obj.animation_data.action.copy()
+    if leaves == "its Action":
+        obj.animation_data.action = None
+    else:
+        obj.animation_data.action_slot = obj.animation_data.action.slots.new("OBJECT", "Other")
     bpy.context.view_layer.update()
     assert problem_of(twin) == ""
+    assert_shown([twin], PLAYED, {"Twin": own_deltas(twin)})
+    assert any(map(is_term, (item for curve in curves_of(twin).values() for item in curve.modifiers)))
 
 
 @pytest.mark.parametrize("is_local", [False, True], ids=["linked", "with a linked Action"])

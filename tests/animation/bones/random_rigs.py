@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from rigid_motion.animation import write_channel
 from rigid_motion.motion.quaternions import normalise
-from tests.animation.bones.rigs import INHERIT_SCALES, ORDERS
-from tests.animation.scenes import new_object
+from tests.animation.bones.rigs import INHERIT_SCALES, ORDERS, Rest, new_rig
+from tests.animation.scenes import new_object, push_down, write
 
 LAST = 30
 """Keys are on frames from 1 to this."""
@@ -48,37 +48,30 @@ RIGS = st.builds(
     mode=st.sampled_from(("motor_spline", "lerp_slerp", "dq_sclerp", "cga_lerp")),
     shared=st.booleans(),
     hold=st.booleans(),
-    best_of=st.booleans(),
     tolerance=st.sampled_from((0.003, 0.01, 0.05)),
 )
-
-
-def name_of(number: int) -> str:
-    return f"Bone {number}"
 
 
 def build(case: SimpleNamespace, name: str = "Rig") -> bpy.types.Object:
     """The rig of a case, in the open file."""
     random = np.random.default_rng(case.seed)
-    rig = new_object(name, data=bpy.data.armatures.new(name))
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    edited: list[bpy.types.EditBone] = []
+    rests: list[Rest] = []
     for number, settings in enumerate(case.bones):
-        bone = rig.data.edit_bones.new(name_of(number))
-        parent = edited[number - settings.parent] if 0 < settings.parent <= number else None
-        bone.parent = parent
+        parent = rests[number - settings.parent] if 0 < settings.parent <= number else None
         shift = random.normal(size=3) * (0.0 if settings.connected else 0.1)
-        bone.head = np.array(parent.tail) + shift if parent else random.normal(size=3)
-        bone.tail = np.array(bone.head) + 0.3 * normalise(random.normal(size=3)) * random.uniform(0.4, 1.0)
-        bone.roll = random.uniform(-3.0, 3.0)
-        bone.use_connect = settings.connected and parent is not None
-        bone.use_inherit_rotation, bone.inherit_scale = settings.inherit_rotation, settings.inherit_scale
-        bone.use_local_location = settings.local_location
-        edited.append(bone)
-    bpy.ops.object.mode_set(mode="OBJECT")
-    for number, settings in enumerate(case.bones):
-        _key(rig.pose.bones[name_of(number)], settings)
+        head = parent.tail + shift if parent else random.normal(size=3)
+        tail = head + 0.3 * normalise(random.normal(size=3)) * random.uniform(0.4, 1.0)
+        inherits = {
+            "use_connect": settings.connected and parent is not None,
+            "use_inherit_rotation": settings.inherit_rotation,
+            "inherit_scale": settings.inherit_scale,
+            "use_local_location": settings.local_location,
+        }
+        above, roll = parent.name if parent else "", random.uniform(-3.0, 3.0)
+        rests.append(Rest(f"Bone {number}", head, tail, above, roll, tuple(inherits.items())))
+    rig = new_rig(name, rests)
+    for bone, settings in zip(rig.pose.bones, case.bones, strict=True):
+        _key(bone, settings)
     for number, settings in enumerate(case.bones):
         if settings.follows:
             _constrain(rig, number, settings)
@@ -98,7 +91,6 @@ def _waves(random: np.random.Generator, frames: np.ndarray, count: int) -> np.nd
 def _key(bone: bpy.types.PoseBone, settings: SimpleNamespace) -> None:
     random = np.random.default_rng(settings.seed)
     bone.rotation_mode = settings.rotation_mode
-    path = f"{bone.path_from_id()}."
     frames = frames_of(settings.step) if settings.step else np.array((1.0,))
     turned = 0.7 * _waves(random, frames, 3)
     rows = {"rotation_euler": turned}
@@ -116,11 +108,11 @@ def _key(bone: bpy.types.PoseBone, settings: SimpleNamespace) -> None:
         if not settings.step or (name == "scale" and settings.scale == "still"):
             setattr(bone, name, values[0])
         else:
-            write_channel(bone.id_data, path + name, frames, values, interpolation=settings.interpolation)
+            write(bone, name, frames, values, settings.interpolation)
 
 
 def _constrain(rig: bpy.types.Object, number: int, settings: SimpleNamespace) -> None:
-    bone, other = rig.pose.bones[name_of(number)], name_of((number + 1) % len(rig.pose.bones))
+    bone, other = rig.pose.bones[number], rig.pose.bones[(number + 1) % len(rig.pose.bones)].name
     if settings.follows == "DRIVER":
         driver = bone.driver_add("location", 1).driver
         driver.type, driver.expression = "SCRIPTED", "0.01 * frame"
@@ -151,8 +143,5 @@ def _move(rig: bpy.types.Object, case: SimpleNamespace, random: np.random.Genera
             write_channel(rig, path, frames, values, interpolation=eased)
     data = rig.animation_data
     if case.strip and data is not None and data.action is not None:
-        action, slot = data.action, data.action_slot
-        data.action = None
-        strip = data.nla_tracks.new().strips.new("Strip", 1, action)
-        strip.action_slot, strip.scale = slot, case.strip
+        push_down(rig, scale=case.strip)
     bpy.context.view_layer.update()

@@ -7,18 +7,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import bpy
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from rigid_motion.animation import set_mode, write_channel
-from tests.animation.keyed import WIDTHS, rotation_path
-from tests.animation.oracle import expected_bases
+from rigid_motion.animation import set_mode
+from tests.animation.scenes import key
 from tests.thoroughness import THOROUGH
 
-FRAMES = (1.0, 11.0, 24.0, 40.0)
 PLAYED = np.arange(-2.0, 44.0)
 """From before the first key until after the last."""
 
@@ -29,18 +25,13 @@ ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "AXIS_ANGLE")
 INHERIT_SCALES = ("FULL", "FIX_SHEAR", "ALIGNED", "AVERAGE", "NONE", "NONE_LEGACY")
 
 
-Case, Other = TypeVar("Case"), TypeVar("Other")
-
-THIS_BLENDER = 10 * bpy.app.version[0] + bpy.app.version[1]
-
-
-def in_turn(cases: Iterable[Case], others: Sequence[Other]) -> list[tuple[Case, Other]]:
+def in_turn(cases: Iterable, others: Sequence) -> list[tuple]:
     """Each case with one of the others by default, which is another one on each Blender, and with half of them in
     thorough runs: every second of all pairs, of each case and of each of the others.
     """
-    step = 2 if THOROUGH else len(others)
+    step, this_blender = 2 if THOROUGH else len(others), 10 * bpy.app.version[0] + bpy.app.version[1]
     pairs = itertools.product(enumerate(cases), enumerate(others))
-    return [(case, other) for (i, case), (j, other) in pairs if (i + j + THIS_BLENDER) % step == 0]
+    return [(case, other) for (i, case), (j, other) in pairs if (i + j + this_blender) % step == 0]
 
 
 @dataclass(frozen=True)
@@ -63,6 +54,13 @@ ARM = (
 )
 """A body and three bones that hang on it, one behind the other."""
 
+HANDS = (
+    Rest("Body", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    Rest("Hand.L", (0.5, 0.0, 1.0), (1.0, 0.1, 1.0), "Body", roll=0.3),
+    Rest("Hand.R", (-0.5, 0.0, 1.0), (-1.0, 0.1, 1.0), "Body", roll=-0.3),
+)
+"""Two bones that mirror each other."""
+
 
 def new_rig(
     name: str = "Rig", bones: Sequence[Rest] = ARM, rotation_mode: str = "QUATERNION", **settings: object
@@ -70,19 +68,19 @@ def new_rig(
     """An armature in the scene. `settings` are properties of the last bone, such as `use_connect`."""
     rig = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     bpy.context.scene.collection.objects.link(rig)
-    with_edit_bones(rig, lambda edit_bones: _build(edit_bones, bones, settings))
+
+    def build(edit_bones: bpy.types.ArmatureEditBones) -> None:
+        for rest in bones:
+            made = edit_bones.new(rest.name)
+            made.head, made.tail, made.roll = rest.head, rest.tail, rest.roll
+            made.parent = edit_bones[rest.parent] if rest.parent else None
+            for setting, value in (dict(rest.settings) | (settings if rest is bones[-1] else {})).items():
+                setattr(made, setting, value)
+
+    with_edit_bones(rig, build)
     for pose_bone in rig.pose.bones:
         pose_bone.rotation_mode = rotation_mode
     return rig
-
-
-def _build(edit_bones: bpy.types.ArmatureEditBones, bones: Sequence[Rest], last: dict[str, object]) -> None:
-    for rest in bones:
-        made = edit_bones.new(rest.name)
-        made.head, made.tail, made.roll = rest.head, rest.tail, rest.roll
-        made.parent = edit_bones[rest.parent] if rest.parent else None
-        for setting, value in (dict(rest.settings) | (last if rest is bones[-1] else {})).items():
-            setattr(made, setting, value)
 
 
 def with_edit_bones(rig: bpy.types.Object, edit: Callable[[bpy.types.ArmatureEditBones], None]) -> None:
@@ -127,93 +125,15 @@ def own_clipboard(folder: str | Path) -> Iterator[None]:
         filepaths.temporary_directory = before
 
 
-def key_bone(
-    pose_bone: bpy.types.PoseBone,
-    frames: Sequence[float] = FRAMES,
-    *,
-    seed: int = 0,
-    scale: str | None = None,
-    interpolation: str = "BEZIER",
-    location: bool = True,
-    amount: float = 1.0,
-) -> bpy.types.PoseBone:
-    """Key location, rotation and (with scale "even" or "uneven") scale at random. `amount`: 0 is the pose at rest."""
-    random = np.random.default_rng((seed, sum(map(ord, pose_bone.name))))
-    values = {"location": 0.3 * amount * random.normal(size=(len(frames), 3))} if location else {}
-    turned = amount * random.normal(size=(len(frames), WIDTHS[rotation_path(pose_bone)]))
-    if pose_bone.rotation_mode == "QUATERNION" and amount < 1.0:
-        turned += (1.0, 0.0, 0.0, 0.0)
-        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-    values[rotation_path(pose_bone)] = turned
-    if scale:
-        grown = random.normal(size=(len(frames), 3))
-        values["scale"] = np.exp(0.3 * amount * (np.repeat(grown[:, :1], 3, axis=1) if scale == "even" else grown))
-    for path, rows in values.items():
-        write_bone(pose_bone, path, np.array(frames), rows, interpolation)
-    return pose_bone
-
-
-def write_bone(
-    pose_bone: bpy.types.PoseBone, path: str, frames: np.ndarray, values: np.ndarray, interpolation: str = "LINEAR"
-) -> None:
-    """Replace a property's channels, which the Dope Sheet lists under the bone as it does those keyed by hand."""
-    write_channel(
-        *(pose_bone.id_data, f"{pose_bone.path_from_id()}.{path}", frames, values),
-        interpolation=interpolation,
-        group=pose_bone.name,
-    )
-
-
-def key_all(rig: bpy.types.Object, frames: Sequence[float] = FRAMES, **settings: object) -> bpy.types.Object:
+def key_all(rig: bpy.types.Object, **settings: object) -> bpy.types.Object:
     """Key every bone at random."""
     for pose_bone in rig.pose.bones:
-        key_bone(pose_bone, frames, **settings)
+        key(pose_bone, **settings)
     return rig
 
 
-def moving_rig(
-    mode: str = "dq_sclerp", rotation_mode: str = "QUATERNION", name: str = "Rig", **settings: object
-) -> bpy.types.Object:
+def moving_rig(mode: str = "dq_sclerp", name: str = "Rig", seed: int = 0) -> bpy.types.Object:
     """The arm with keys on all bones, all of one mode."""
-    rig = key_all(new_rig(name, ARM, rotation_mode), **settings)
+    rig = key_all(new_rig(name), seed=seed)
     set_mode(list(rig.pose.bones), mode)
     return rig
-
-
-def twin_of(rig: bpy.types.Object, frames: np.ndarray) -> bpy.types.Object:
-    """The same rig once more, with real keys on all of these frames, of where each bone has to be by its channels.
-
-    Constraints that aim at the rig aim at its twin.
-    """
-    twin = rig.copy()
-    twin.name = f"{rig.name} twin"
-    bpy.context.scene.collection.objects.link(twin)
-    twin.animation_data_clear()
-    for pose_bone in twin.pose.bones:
-        for constraint in pose_bone.constraints:
-            for name in ("target", "pole_target"):
-                if getattr(constraint, name, None) == rig:
-                    setattr(constraint, name, twin)
-    for pose_bone in rig.pose.bones:
-        _write_basis(twin.pose.bones[pose_bone.name], frames, expected_bases(pose_bone, frames))
-    return twin
-
-
-def _write_basis(pose_bone: bpy.types.PoseBone, frames: np.ndarray, bases: np.ndarray) -> None:
-    """Key a bone so that its matrices in the space of its channels are these (m, 4, 4), without shear."""
-    scale = np.linalg.norm(bases[:, :3, :3], axis=1)
-    write_bone(pose_bone, "location", frames, bases[:, :3, 3])
-    write_bone(pose_bone, "scale", frames, scale)
-    turned = _as_channels(bases[:, :3, :3] / scale[:, None, :], pose_bone.rotation_mode)
-    write_bone(pose_bone, rotation_path(pose_bone), frames, turned)
-
-
-def _as_channels(rotations: np.ndarray, rotation_mode: str) -> np.ndarray:
-    """Rotation matrices (m, 3, 3) as quaternions, an angle and an axis, or angles about X, Y and Z, by SciPy."""
-    turned = Rotation.from_matrix(rotations)
-    if rotation_mode == "QUATERNION":
-        return np.roll(turned.as_quat(), 1, axis=1)
-    if rotation_mode == "AXIS_ANGLE":
-        return np.column_stack((turned.magnitude(), turned.as_rotvec()))
-    # Blender's orders name the turns about resting axes, the first one first, as SciPy's small letters do.
-    return turned.as_euler(rotation_mode.lower())[:, [rotation_mode.index(axis) for axis in "XYZ"]]

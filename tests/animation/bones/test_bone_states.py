@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 import numpy as np
-from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 
 from rigid_motion import animation
-from tests.animation.bones.poses import TOLERANCE
-from tests.animation.bones.rig_editing import BONES, Name, RigEditing
-from tests.animation.bones.rigs import ORDERS, new_rig, own_clipboard, pose_mode, write_bone
-from tests.animation.editing import LAST, frames_in, seeds, shares
-from tests.animation.keyed import MODE_IDS, key_frames, mode_at, transform_paths
-from tests.animation.machine import goes_on
-from tests.animation.oracle import expected_bases
-from tests.animation.scenes import key, random_values
-from tests.thoroughness import THOROUGH
+from tests.animation.bones.rigs import ORDERS, Rest, new_rig, with_edit_bones
+from tests.animation.keyed import MODE_IDS, transform_paths
+from tests.animation.machine import LAST, SETTINGS, seeds, shares, while_on
+from tests.animation.oracle import assert_there, expected_bases
+from tests.animation.scenes import key, random_values, write
+from tests.animation.tool_steps import WithTools
+
+BONES = (
+    Rest("Body", (0.1, -0.2, 0.9), (0.15, -0.1, 1.4), roll=0.4),
+    Rest("Arm", (0.3, 0.0, 1.4), (0.6, 0.1, 1.3), "Body", roll=-1.1, settings=(("use_local_location", False),)),
+    Rest("Prop", (-0.5, 0.3, 0.2), (-0.4, 0.3, 0.6), roll=0.9),
+)
+"""A chain of two bones, and one that nothing moves but its keys."""
+
+Name = tuple[str, str]
+"""Of a rig, and of a bone of it."""
 
 
-class EditingBones(RigEditing):
-    """An animator at work on the bones of rigs."""
+class EditingBones(WithTools):
+    """An animator at work on the bones of rigs, by the names of both, and on armatures."""
 
     @initialize(
         orders=st.lists(st.sampled_from(ORDERS), min_size=3, max_size=3),
@@ -44,135 +52,109 @@ class EditingBones(RigEditing):
             bone.rotation_mode = order
             for path in transform_paths(bone)[: 3 if scale else 2]:
                 values = random_values(bone, path, len(frames), seed + number, scale == "even")
-                write_bone(bone, path, frames, values, "BEZIER")
+                write(bone, path, frames, values, "BEZIER")
             animation.set_mode(bone, mode)
         self.names = [(rig.name, bone.name) for bone in rig.pose.bones]
         if second is not None:
-            self._copy(rig.name, "Second", copied=second == "with a copy of it")
+            self._copy(rig, "Second", copied=second == "with a copy of it")
         bpy.context.view_layer.update()
         self._start_history()
 
-    # Modes
+    def _found(self, name: Name) -> bpy.types.PoseBone:
+        rig, bone = name
+        return bpy.data.objects[rig].pose.bones[bone]
 
-    @precondition(lambda self: self.on)
-    @rule(which=st.sets(st.integers(0, 5), min_size=1), mode=st.sampled_from(MODE_IDS), by_property=st.booleans())
-    def set_the_mode_of_several_bones(self, which, mode, by_property):
-        names = [self.names[number % len(self.names)] for number in sorted(which)]
+    def _basis(self, bone: bpy.types.PoseBone) -> np.ndarray:
+        """What its channels make of it, as it is evaluated. What its parents make of that is Blender's."""
+        rig = bone.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        return np.array(rig.pose.bones[bone.name].matrix_basis, dtype=np.float64)
 
-        def change() -> None:
-            bones = [self._found(name) for name in names]
-            if not by_property:
-                animation.set_mode(bones, mode)
-            for bone in bones if by_property else ():
-                bone.rigid_motion.mode = mode
+    def _sharing(self, name: Name) -> set[Name]:
+        users = {obj.name for obj in self._users(self._animated(name))}
+        return {other for other in self.names if other[0] in users and other[1] == name[1]}
 
-        self._edit(change)
-        for name in names:
-            assert {mode_at(self._found(name), frame) for frame in key_frames(self._found(name))} <= {mode}
+    def _assert_shown(self, names: Sequence[Name], frames: np.ndarray) -> None:
+        for name, bases in self._bases(names, frames).items():
+            assert_there(self._found(name), frames, bases, expected_bases(self._found(name), frames))
 
-    # Keys
+    # Bones and rigs that come and go
 
-    @precondition(lambda self: self.on)
-    @rule(who=shares, order=st.sampled_from(ORDERS), rekeyed=st.booleans(), seed=seeds)
-    def turn_in_another_way(self, who, order, rekeyed, seed):
-        name = self._named(who)
-        if self._sharing(name) != {name} or name in self.before_bake:
+    @while_on(who=shares, other=st.none() | shares, in_edit_mode=st.booleans())
+    def rename_a_bone_or_swap_names(self, who, other, in_edit_mode):
+        """Whatever is baked, all at once."""
+        rig, one = self._named(who)
+        others = [bone for owner, bone in self.names if owner == rig and bone != one]
+        if len(self._users(bpy.data.objects[rig])) > 1 or (other is not None and not others):
             return
+        names, self.fresh, keyed = {one: f'Renamed "{self.fresh}"'}, self.fresh + 1, self._keyed()
+        if other is not None:
+            two = others[int(other * len(others))]
+            names = {one: two, two: one}
 
-        def change() -> None:
-            bone = self._found(name)
-            keys = key_frames(bone)
-            bone.rotation_mode = order
-            if rekeyed and len(keys):
-                path = transform_paths(bone)[1]
-                for frame, values in zip(keys, random_values(bone, path, len(keys), seed), strict=True):
-                    setattr(bone, path, values)
-                    bone.keyframe_insert(path, frame=frame)
-
-        self._edit(change)
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares, which=shares, at=shares, seed=seeds)
-    def edit_while_nothing_is_followed(self, who, which, at, seed):
-        animation.set_enabled(False)
-        try:
-            fcurve = self._curve(self._found(self._named(who)), which)
-            if fcurve is not None:
-                point = fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))]
-                point.co_ui.y = np.random.default_rng(seed).normal()
-                fcurve.update()
+        def rename(bones: bpy.types.ArmatureBones | bpy.types.ArmatureEditBones) -> None:
             bpy.context.view_layer.update()
-        finally:
-            animation.set_enabled(True)
-        self._edit(lambda: animation.refresh() and None)
+            given = [(bones[old], new) for old, new in names.items()]
+            for number, (bone, _) in enumerate(given):
+                bone.name = f"Between {number}"
+            for bone, new in given:
+                bone.name = new
 
-    @precondition(lambda self: self.on)
-    @rule(who=shares, to=frames_in, keyed=st.booleans())
-    def copy_a_pose_and_paste_it(self, who, to, keyed):
-        name, frame = self._named(who), round(to + self.shift)
-        if self._sharing(name) != {name}:
+        def change() -> None:
+            obj = bpy.data.objects[rig]
+            if in_edit_mode:
+                with_edit_bones(obj, rename)
+            else:
+                rename(obj.data.bones)
+            self.names = [self._now(name, rig, names) for name in self.names]
+            self.before_bake = {self._now(name, rig, names): kept for name, kept in self.before_bake.items()}
+
+        self._edit(change)
+        assert self._keyed() == {self._now(name, rig, names): kept for name, kept in keyed.items()}
+
+    @staticmethod
+    def _now(name: Name, rig: str, names: dict[str, str]) -> Name:
+        return (rig, names.get(name[1], name[1])) if name[0] == rig else name
+
+    @precondition(lambda self: self.on and 2 < len(self.names) < 8)
+    @rule(who=shares, deleted=st.booleans())
+    def duplicate_or_delete_a_bone(self, who, deleted):
+        rig, bone = self._named(who)
+        before = set(bpy.data.objects[rig].pose.bones.keys())
+        if not self._is_free(bpy.data.objects[rig]) or len(before) < 2:
             return
-        bpy.context.view_layer.update()
-        seen = {name: self._basis(self._found(name))}
-        with own_clipboard(self.folder.name):
-            self._in_pose_mode(name, bpy.ops.pose.copy)
-            bpy.context.scene.frame_set(frame)
-            self._in_pose_mode(name, bpy.ops.pose.paste)
-        self._assert_in_place(seen)
-        if not keyed or name in self.before_bake:
-            return
 
-        def insert() -> None:
-            for path in transform_paths(self._found(name)):
-                self._found(name).keyframe_insert(path, frame=frame)
+        def act(edit_bones: bpy.types.ArmatureEditBones) -> None:
+            if deleted:
+                edit_bones.remove(edit_bones[bone])
+                return
+            for edit_bone in edit_bones:
+                edit_bone.select = edit_bone.select_head = edit_bone.select_tail = edit_bone.name == bone
+            bpy.ops.armature.duplicate()
 
-        self._edit(insert, self._completes(frame))
-        self._assert_in_place(seen)
+        def change() -> None:
+            with_edit_bones(bpy.data.objects[rig], act)
+            there = bpy.data.objects[rig].pose.bones.keys()
+            self.names = [name for name in self.names if name[0] != rig or name[1] in there]
+            self.names += [(rig, made) for made in sorted(set(there) - before)]
 
-    def _in_pose_mode(self, name: Name, operator: object) -> None:
-        pose_mode(bpy.data.objects[name[0]], name[1])
-        assert operator() == {"FINISHED"}
-        bpy.ops.object.mode_set(mode="OBJECT")
+        self._edit(change)
+        assert len(bpy.data.objects[rig].pose.bones) == len(before) + (-1 if deleted else 1)
 
-    # Baking
+    @while_on(who=shares)
+    def move_along_other_axes(self, who):
+        rig, bone = self._named(who)
+        rest = bpy.data.objects[rig].data.bones[bone]
+        if len(self._users(bpy.data.objects[rig])) == 1:
+            self._edit(lambda: setattr(rest, "use_local_location", not rest.use_local_location))
 
-    @precondition(lambda self: self.on)
-    @rule(which=st.sets(st.integers(0, 5), min_size=1), step=st.sampled_from((1.0, 0.5, 3.0)))
-    def bake(self, which, step):
-        names = list(dict.fromkeys(self.names[number % len(self.names)] for number in sorted(which)))
-        names = [name for name in names if self._sharing(name) == {name}]
-        keyed, frames = self._keyed(), {}
-        live = [name for name in names if self._is_live(name)]
-        for name in live:
-            keys = key_frames(self._found(name))
-            steps = () if goes_on(self._found(name)) else np.arange(keys[0], keys[-1] + 1e-6, step)
-            frames[name] = np.union1d(keys, steps)
-        before = {name: expected_bases(self._found(name), frames[name]) for name in live}
-        refused: list[animation.Refused] = []
-        self._edit(
-            lambda: animation.bake([self._found(name) for name in names], step=step, refused=refused) and None,
-            lambda made, after: None,
-        )
-        assert len(refused) == len(names) - len(live)
-        for name in live:
-            assert animation.is_baked(self._found(name))
-            self.before_bake.setdefault(name, keyed[name])
-            now = expected_bases(self._found(name), frames[name])
-            error = np.abs(now - before[name]).max(axis=(1, 2)) / max(1.0, np.abs(before[name]).max())
-            assert error.max() < 2 * TOLERANCE, f"{name} is baked otherwise on {frames[name][error.argmax()]}"
-        self.history[self.place] = self._remembered()
-
-    def _is_live(self, name: Name) -> bool:
-        bone = self._found(name)
-        return any(mode_at(bone, frame) != "BLENDER" for frame in key_frames(bone)[:-1])
+    @while_on(who=shares)
+    def flip_the_action(self, who):
+        """All values are mirrored, and all that there are names of two sides for goes to the other side."""
+        rig = self._animated(self._named(who))
+        action, _ = self._linked(rig)
+        if self._is_free(rig) and action is not None:
+            self._edit(lambda: action.flip_with_pose(rig))
 
 
-EditingBones.TestCase.settings = settings(
-    max_examples=40 if THOROUGH else 6,
-    stateful_step_count=25,
-    deadline=None,
-    derandomize=True,
-    database=None,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
-)
+EditingBones.TestCase.settings = SETTINGS
 TestBoneEdits = EditingBones.TestCase

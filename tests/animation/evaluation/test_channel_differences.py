@@ -1,39 +1,98 @@
-"""What is added to channels, against the same worked out frame by frame from matrices."""
+"""What is added to channels, in the channels themselves. Every channel is a list of keys, with one interpolation."""
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rigid_motion.animation.evaluation.components import LOCATION, MODE_NUMBERS, REST, ROTATION, ROWS, SCALE
-from rigid_motion.animation.evaluation.differences import channel_differences, in_betweens
+from rigid_motion.animation.evaluation.components import (
+    LOCATION,
+    MODE_NUMBERS,
+    PART_OF,
+    REST,
+    ROTATION,
+    ROWS,
+    SCALE,
+)
+from rigid_motion.animation.evaluation.differences import channel_differences
 from rigid_motion.animation.evaluation.sources import Marks, Source
 from rigid_motion.animation.evaluation.spans import spans
-from rigid_motion.animation.fcurves.keys import Cycles
+from rigid_motion.animation.fcurves.keys import CODE, INTERPOLATIONS, Cycles, Keys
 from rigid_motion.motion import Poses, interpolate
-from tests.animation.evaluation.by_frame import (
-    Track,
-    channels,
-    inside,
-    keys_of,
-    matrix,
-    pose_of,
-    screwed,
-    segment,
-    share,
-    source_of,
-    tracks_of,
-    turned,
-    value,
-)
+from tests.animation.oracle import matrices
 
+Track = Sequence[tuple[float, float]]
+
+CODES = {name: code for code, name in INTERPOLATIONS.items()}
 FRAMES = (1.0, 13.0, 20.0, 41.0)
 ORDERS = (None, "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "AXIS_ANGLE")
 SPLINE = MODE_NUMBERS["motor_spline"]
+
+
+def keys_of(track: Track, interpolation: str = "LINEAR", **others: object) -> Keys:
+    points = np.array(track, np.float32)[None]
+    eased = interpolation not in ("LINEAR", "CONSTANT")
+    easing = {"easing": np.zeros(points.shape[:2], CODE), "easing_settings": np.zeros((3, *points.shape[:2]))}
+    codes = np.full(points.shape[:2], CODES[interpolation], CODE)
+    return Keys(points, codes, **(easing if eased else {}), **others)
+
+
+def source_of(
+    tracks: dict[int, Track], order: str | None = None, interpolation: str = "LINEAR", **others: object
+) -> Source:
+    """A source with a channel for each row, which goes on in a straight line, or round, if so given."""
+    of_keys = {name: others.pop(name) for name in ("linear", "cycles") if name in others}
+    channels = tuple(([row], keys_of(track, interpolation, **of_keys)) for row, track in tracks.items())
+    keyed = frozenset(PART_OF[row] for row in tracks)
+    return Source(
+        order, keyed, channels, **{"rest": {}, "original": REST.copy(), "mode": MODE_NUMBERS["dq_sclerp"], **others}
+    )
+
+
+def tracks_of(part: str, frames: Iterable[float], rows: np.ndarray) -> dict[int, Track]:
+    """Tracks of all components of a part, from values (., n)."""
+    frames = list(frames)
+    return {ROWS[part].start + row: list(zip(frames, values, strict=True)) for row, values in enumerate(rows.tolist())}
+
+
+def turned(rows: Sequence[float], order: str | None) -> Rotation:
+    """The rotation that channels (4,) make."""
+    if order is None:
+        return Rotation.from_quat(np.roll(rows, -1))
+    if order == "AXIS_ANGLE":
+        length = np.linalg.norm(rows[1:])
+        return Rotation.from_rotvec(rows[0] * np.asarray(rows[1:]) / length if length else np.zeros(3))
+    return Rotation.from_euler(order.lower(), [rows["XYZ".index(axis)] for axis in order])
+
+
+def posed(rows: np.ndarray, order: str | None, original: np.ndarray) -> Poses:
+    """The poses of channels (10, n) after the object's own delta transforms."""
+    own = Rotation.from_quat(np.roll(original[ROWS[ROTATION]], -1))
+    quaternions = [np.roll((own * turned(row, order)).as_quat(), 1) for row in rows[ROWS[ROTATION]].T]
+    return Poses(rows[ROWS[LOCATION]].T + original[ROWS[LOCATION]], np.array(quaternions))
+
+
+def placed(poses: Poses) -> np.ndarray:
+    return matrices(poses.positions, poses.quaternions, np.ones((len(poses), 3)))
+
+
+def inside(source: Source, count: int = 23) -> np.ndarray:
+    """Frames inside of all spans."""
+    steps = np.arange(1, count) / count
+    return np.unique(np.concatenate([span.first + (span.last - span.first) * steps for span in spans(source)]))
+
+
+def channels(source: Source, frames: np.ndarray) -> np.ndarray:
+    """The values that channels are to have, (10, m)."""
+    ((difference, native),) = channel_differences([source], [frames])
+    unfilled = [row for row in range(10) if row not in source.filled_rows]
+    assert not difference[unfilled].any()
+    assert SCALE in source.keyed or not difference[ROWS[SCALE]].any()
+    return difference + native
 
 
 def rotations(order: str | None, count: int, seed: int = 0) -> np.ndarray:
@@ -61,42 +120,27 @@ def at_keys(tracks: dict[int, Track], frame: float) -> np.ndarray:
     return rows
 
 
-def expected_pose(
-    tracks: dict[int, Track], order: str | None, frame: float, interpolation: str, original: np.ndarray = REST
-) -> tuple[np.ndarray, float, tuple[float, float]]:
-    """The pose on a frame, the progress there, and the keys around."""
-    keys = [at for at, _ in tracks[3]]
-    index = segment(keys, frame)
-    ends = keys[index], keys[index + 1]
-    now = {row: value(track, frame, interpolation) for row, track in tracks.items()}
-    progress = share(tracks.values(), order, tracks, ends, now)
-    first, second = (pose_of(at_keys(tracks, end), order, original) for end in ends)
-    return screwed(first, second, progress), progress, ends
-
-
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("interpolation", ["LINEAR", "QUAD"])
 def test_channels_move_the_body_as_the_screw_does(order, interpolation):
+    """Quaternions are as long as those of the keys, in the sign of the first."""
     own = np.array((0.4, -1.0, 2.0, 0.5, 0.5, -0.5, 0.5, 1.0, 1.0, 1.0))
+    passed = np.arange(1.0, 23.0) / 23.0
+    share = passed if interpolation == "LINEAR" else passed**2
     for seed, original in enumerate((REST, own, REST)):
         tracks, source = moving(order, seed, interpolation=interpolation, original=original)
-        frames = inside(source)
-        for frame, rows in zip(frames, channels(source, frames).T, strict=True):
-            expected, _, _ = expected_pose(tracks, order, frame, interpolation, original)
-            np.testing.assert_allclose(pose_of(rows, order, original), expected, atol=1e-7)
-
-
-def test_quaternions_are_as_long_as_those_of_the_keys_and_in_the_sign_of_the_first():
-    tracks, source = moving(seed=5, interpolation="QUAD")
-    frames = inside(source)
-    for frame, rows in zip(frames, channels(source, frames).T, strict=True):
-        pose, progress, ends = expected_pose(tracks, None, frame, "QUAD")
-        first, last = (at_keys(tracks, end)[ROWS[ROTATION]] for end in ends)
-        unit = np.roll(Rotation.from_matrix(pose[:3, :3]).as_quat(), 1)
-        length = (1.0 - progress) * np.linalg.norm(first) + progress * np.linalg.norm(last)
-        # Less than half a turn from the first key, so on its side.
-        sign = 1.0 if unit @ first > 0.0 else -1.0
-        np.testing.assert_allclose(rows[ROWS[ROTATION]], sign * length * unit, atol=1e-7)
+        for span in spans(source):
+            ends = np.stack((at_keys(tracks, span.first), at_keys(tracks, span.last)), axis=1)
+            expected = interpolate((0.0, 1.0), posed(ends, order, original), share, "dq_sclerp")
+            rows = channels(source, span.first + (span.last - span.first) * passed)
+            found = posed(rows, order, original)
+            np.testing.assert_allclose(placed(found), placed(expected), atol=1e-7)
+            if order is None:
+                (first, last), made = ends[ROWS[ROTATION]].T, rows[ROWS[ROTATION]]
+                lengths = (1.0 - share) * np.linalg.norm(first) + share * np.linalg.norm(last)
+                np.testing.assert_allclose(np.linalg.norm(made, axis=0), lengths, atol=1e-7)
+                # Less than half a turn from the first key, so on its side.
+                assert np.all(first @ made > 0.0)
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -119,8 +163,7 @@ def test_values_are_continuous_from_the_first_key_on_whichever_frames_are_asked_
 def test_keys_at_gimbal_lock_begin_alike_whichever_frames_are_asked_for(order):
     angles = rotations(order, len(FRAMES), 3)
     angles["XYZ".index(order[1])] = np.pi / 2.0, np.pi / 2.0, -np.pi / 2.0, np.pi / 2.0
-    tracks, _ = moving(order, 3)
-    source = source_of(tracks | tracks_of(ROTATION, FRAMES, angles), order, mode=SPLINE)
+    source = source_of(moving(order, 3)[0] | tracks_of(ROTATION, FRAMES, angles), order, mode=SPLINE)
     frames = inside(source, 60)
     rows = channels(source, frames)
     for some in (frames[::7], frames[[10]], frames[[100, 130]]):
@@ -141,21 +184,6 @@ def test_angles_that_turn_far_are_what_they_are_without_a_mode(order, turns):
         np.testing.assert_allclose(difference, 0.0, atol=1e-9)
 
 
-def test_axes_that_differ_or_have_no_length_turn_the_shortest_way():
-    rows = np.array(((0.0, 7.0), (0.0, 1.0), (1.0, 1.0), (0.0, 0.0)))
-    for first in ((0.0, 0.0, 1.0, 0.0), (2.0, 0.0, 0.0, 0.0)):
-        rows[:, 0] = first
-        source = source_of(tracks_of(ROTATION, (1, 11), rows), "AXIS_ANGLE")
-        frames = inside(source)
-        for frame, made in zip(frames, channels(source, frames).T, strict=True):
-            now = dict(zip(range(3, 7), rows[:, 0] + (rows[:, 1] - rows[:, 0]) * (frame - 1.0) / 10.0, strict=True))
-            tracks = tracks_of(ROTATION, (1, 11), rows)
-            progress = share(tracks.values(), "AXIS_ANGLE", tracks, (1, 11), now)
-            second = matrix(np.zeros(3), turned(rows[:, 1], "AXIS_ANGLE"))
-            expected = screwed(np.eye(4), second, progress)
-            np.testing.assert_allclose(pose_of(made, "AXIS_ANGLE"), expected, atol=1e-7)
-
-
 def test_lengths_of_axes_run_evenly():
     rows = np.array(((0.2, 1.5), (0.0, 0.0), (1.0, 4.0), (0.0, 0.0)))
     source = source_of(tracks_of(ROTATION, (1, 11), rows), "AXIS_ANGLE")
@@ -164,133 +192,13 @@ def test_lengths_of_axes_run_evenly():
     np.testing.assert_allclose(made[3], 0.2 + 0.13 * np.arange(1.0, 10.0), atol=1e-6)
 
 
-@pytest.mark.parametrize("order", [None, "YZX", "AXIS_ANGLE"])
-@pytest.mark.parametrize("interpolation", ["LINEAR", "CUBIC"])
-def test_parts_run_between_their_own_keys(order, interpolation):
-    places, turns, sizes = (1.0, 18.0, 40.0, 60.0), (4.0, 18.0, 31.0, 60.0), (1.0, 33.0)
-    tracks = tracks_of(LOCATION, places, np.random.default_rng(3).normal(size=(3, 4)))
-    turning = tracks_of(ROTATION, turns, rotations(order, 4, 7))
-    growing = tracks_of(SCALE, sizes, np.tile((1.0, 1.6), (3, 1)))
-    source = source_of(tracks | turning | growing, order, interpolation)
-    assert source.is_uneven
-    assert {(span.rows[0], span.first, span.last) for span in spans(source)} == {
-        *((0, *pair) for pair in itertools.pairwise(places)),
-        *((3, *pair) for pair in itertools.pairwise(turns)),
-        (7, *sizes),
-    }
-
-    def seen_turn(frame: float) -> np.ndarray:
-        frame = min(max(frame, turns[0]), turns[-1])
-        index = segment(turns, frame)
-        ends = turns[index], turns[index + 1]
-        now = {row: value(track, frame, interpolation) for row, track in turning.items()}
-        first, second = (turned(at_keys(turning, end)[ROWS[ROTATION]], order) for end in ends)
-        progress = share(turning.values(), order, turning, ends, now)
-        return screwed(matrix(np.zeros(3), first), matrix(np.zeros(3), second), progress)[:3, :3]
-
-    frames = np.arange(1.5, 60.0, 0.75)
-    rows = channels(source, frames)
-    for frame, made in zip(frames, rows.T, strict=True):
-        index = segment(places, frame)
-        ends = places[index], places[index + 1]
-        now = {row: value(track, frame, interpolation) for row, track in tracks.items()}
-        progress = share(tracks.values(), order, tracks, ends, now)
-        keys = [np.eye(4), np.eye(4)]
-        for key, end in zip(keys, ends, strict=True):
-            key[:3, :3], key[:3, 3] = seen_turn(end), at_keys(tracks, end)[ROWS[LOCATION]]
-        np.testing.assert_allclose(made[:3], screwed(*keys, progress)[:3, 3], atol=1e-6)
-        np.testing.assert_allclose(pose_of(made, order)[:3, :3], seen_turn(frame), atol=1e-7)
-    grown = value(growing[7], 20.0, interpolation)
-    np.testing.assert_allclose(channels(source, np.array((20.0,)))[7:, 0], 1.6 ** ((grown - 1.0) / 0.6), atol=1e-6)
-    # On a key of one part the others go on.
-    ((difference, _),) = channel_differences([source], [np.array((4.0, 18.0, 31.0, 40.0))])
-    assert (difference[3:7, 0] == 0.0).all()
-    assert (difference[:7, 1] == 0.0).all()
-    assert (difference[3:7, 2] == 0.0).all()
-    assert difference[:3, 2].all()
-    assert (difference[:3, 3] == 0.0).all()
-
-
 @pytest.mark.parametrize("extra", [{4: [(1, 0.0), (9, 0.0), (20, 0.0)]}, {7: [(5, 2.0)]}])
 def test_constant_keys_elsewhere_change_nothing(extra):
     tracks, _ = moving(frames=(1.0, 20.0))
     others = {row: track for row, track in tracks.items() if row < 3}
     plain, more = source_of(others), source_of(others | extra)
-    assert not more.is_uneven
     frames = np.arange(1.5, 20.0, 0.5)
     np.testing.assert_array_equal(channels(plain, frames)[:3], channels(more, frames)[:3])
-
-
-def test_location_turns_far_where_its_keys_are_those_of_the_rotation():
-    """Half a turn in the sense of the angle: either sense is the shortest."""
-    for sense in (-1.0, 1.0):
-        turning = tracks_of(ROTATION, (1, 11), np.array(((0, 0), (0, 0), (0, sense * np.pi))))
-        even = source_of(turning | tracks_of(LOCATION, (1, 11), np.array(((0, 2), (0, 0), (0, 0)))), "XYZ")
-        tracks = tracks_of(LOCATION, (1, 11, 20), np.array(((0, 2, 2), (0, 0, 1), (0, 0, 0))))
-        uneven = source_of(turning | tracks, "XYZ")
-        assert uneven.is_uneven
-        frames = np.arange(2.0, 11.0)
-        places = channels(even, frames)[:3], channels(uneven, frames)[:3]
-        assert np.abs(places[0][1]).max() > 0.9
-        np.testing.assert_allclose(*places, atol=1e-6)
-
-
-@pytest.mark.parametrize("order", [None, "XYZ", "AXIS_ANGLE"])
-def test_it_goes_on_at_its_slope_where_it_is_seen(order):
-    tracks, source = moving(order, 2, frames=(1.0, 21.0), linear=True, seen=(-9, 40))
-    assert [(span.first, span.last, span.first_is_key, span.last_is_key) for span in spans(source)] == [
-        (-9.0, 1.0, False, True),
-        (1.0, 21.0, True, True),
-        (21.0, 40.0, True, False),
-    ]
-    frames = np.setdiff1d(np.arange(-9.0, 41.0), FRAMES)
-    for frame, rows in zip(frames, channels(source, frames).T, strict=True):
-        np.testing.assert_allclose(pose_of(rows, order), expected_pose(tracks, order, frame, "LINEAR")[0], atol=2e-6)
-
-
-@pytest.mark.parametrize("after", ["REPEAT", "REPEAT_OFFSET", "MIRROR"])
-def test_rounds_are_the_first_one_again(after):
-    tracks, _ = moving(None, 4, frames=(1.0, 8.0, 21.0, 31.0))
-    for row in range(3, 7):
-        tracks[row][-1] = 31.0, tracks[row][0][1]
-    source = source_of(tracks, cycles=Cycles("NONE", after, 0, 0))
-    plain = source_of(tracks)
-    assert source.is_repeatable
-    assert [(span.first, span.last) for span in spans(source)] == [(1.0, 8.0), (8.0, 21.0), (21.0, 31.0)]
-    first = np.arange(1.0, 31.5, 0.5)
-    poses = in_betweens(plain, first).desired
-    np.testing.assert_allclose(in_betweens(source, first).desired.positions, poses.positions, atol=1e-12)
-    later = first[1:-1] + 30.0
-    found = in_betweens(source, later).desired
-    way = slice(-2, 0, -1) if after == "MIRROR" else slice(1, -1)
-    change = [tracks[row][-1][1] - tracks[row][0][1] if after == "REPEAT_OFFSET" else 0.0 for row in range(3)]
-    np.testing.assert_allclose(found.positions, poses.positions[way] + change, atol=1e-5)
-    np.testing.assert_allclose(np.abs(np.einsum("mi,mi->m", found.quaternions, poses.quaternions[way])), 1.0, atol=1e-9)
-
-
-@pytest.mark.parametrize("mode", ["REPEAT_OFFSET", "MIRROR"])
-def test_smooth_modes_look_over_the_seam_of_rounds(mode):
-    keys = np.array((1.0, 8.0, 21.0, 31.0))
-    tracks, _ = moving(None, 4, frames=tuple(keys))
-    for row in range(3, 7):
-        tracks[row][-1] = 31.0, tracks[row][0][1]
-    # What does not move evenly in time shapes the tangents.
-    source = source_of(tracks, cycles=Cycles("NONE", mode, 0, 3), mode=SPLINE)
-    rows = np.array([[at for _, at in tracks[row]] for row in range(7)], np.float32).astype(np.float64)
-    rounds, change = [], np.where(np.arange(7) < 3, rows[:, -1] - rows[:, 0], 0.0)
-    for number in range(-1, 2):
-        if mode == "MIRROR":
-            backwards = number % 2 == 1
-            times, values = (32.0 - keys[::-1], rows[:, ::-1]) if backwards else (keys, rows)
-        else:
-            times, values = keys, rows + number * change[:, None]
-        rounds.append((times + 30.0 * number, values))
-    times = np.concatenate([at[:-1] for at, _ in rounds])
-    values = np.concatenate([of_round[:, :-1] for _, of_round in rounds], axis=1).T
-    poses = Poses(values[:, :3], values[:, 3:] / np.linalg.norm(values[:, 3:], axis=1, keepdims=True))
-    frames = np.setdiff1d(np.arange(1.5, 31.0, 0.5), keys)
-    expected = interpolate(times, poses, frames, "motor_spline")
-    np.testing.assert_allclose(channels(source, frames)[:3].T, expected.positions, atol=1e-6)
 
 
 @pytest.mark.parametrize("order", [None, "XYZ", "AXIS_ANGLE"])
@@ -307,7 +215,6 @@ def test_parts_with_keys_of_their_own_go_round_as_if_all_rounds_had_keys(order, 
         rolled_out[row] = [(at + 30.0 * n, now + n * change) for n in range(-2, 3) for at, now in track[:-1]]
     frames = np.arange(1.5, 31.0, 0.5)
     expected = channels(source_of(rolled_out, order, **others), frames)
-    assert source.is_uneven
     np.testing.assert_allclose(channels(source, frames), expected, atol=2e-6)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -11,8 +10,10 @@ import numpy as np
 from hypothesis import strategies as st
 
 from rigid_motion.animation.actions.channels import read_keys
+from rigid_motion.animation.actions.modifiers import add_cycles
 from rigid_motion.animation.fcurves.evaluation import evaluate
 from rigid_motion.animation.fcurves.keys import EASINGS, ELASTIC, INTERPOLATIONS, Cycles, Keys
+from tests.animation.modified import spare_fcurve
 
 CODES = {name: code for code, name in INTERPOLATIONS.items()}
 MODES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")
@@ -21,11 +22,7 @@ MODES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")
 @contextmanager
 def as_fcurve(keys: Keys, *, update: bool = True) -> Iterator[bpy.types.FCurve]:
     """The only curve of `keys` as an F-curve of Blender's. Without an update handles stay as they are given."""
-    action = bpy.data.actions.new("Measured")
-    slot = action.slots.new("OBJECT", "Measured")
-    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
-    fcurve = strip.channelbag(slot, ensure=True).fcurves.new("location", index=0)
-    try:
+    with spare_fcurve() as fcurve:
         points, count = fcurve.keyframe_points, len(keys.times)
         points.add(count)
         free = bpy.types.Keyframe.bl_rna.properties["handle_left_type"].enum_items["FREE"].value
@@ -48,41 +45,24 @@ def as_fcurve(keys: Keys, *, update: bool = True) -> Iterator[bpy.types.FCurve]:
         if keys.linear:
             fcurve.extrapolation = "LINEAR"
         if keys.cycles is not None:
-            modifier = fcurve.modifiers.new("CYCLES")
-            modifier.mode_before, modifier.mode_after = keys.cycles.before, keys.cycles.after
-            modifier.cycles_before, modifier.cycles_after = keys.cycles.before_count, keys.cycles.after_count
+            add_cycles(fcurve, keys.cycles)
         yield fcurve
-    finally:
-        bpy.data.actions.remove(action)
 
 
 def read_one(fcurve: bpy.types.FCurve) -> Keys:
-    (((places, keys, _),),) = read_keys([[fcurve]])
+    ((places, keys, _),) = read_keys([fcurve])
     assert places == [0]
     return keys
 
 
-def evaluate_one(keys: Keys, frames: np.ndarray, **options: bool) -> np.ndarray:
+def evaluate_one(keys: Keys, frames: np.ndarray) -> np.ndarray:
     """The values of the only curve of these keys, shape (m,)."""
-    ((values,),) = evaluate([keys], [frames], **options)
+    ((values,),) = evaluate([keys], [frames])
     return values
 
 
-def joined(curves: Sequence[Keys]) -> Keys:
-    """Curves that are keyed together, as one."""
-    rows = {
-        field.name: None
-        if getattr(curves[0], field.name) is None
-        else np.concatenate(
-            [getattr(keys, field.name) for keys in curves], axis=1 if field.name == "easing_settings" else 0
-        )
-        for field in dataclasses.fields(Keys)[:6]
-    }
-    return dataclasses.replace(curves[0], **rows)
-
-
-def assert_as_blender(keys: Keys, frames: np.ndarray, *, update: bool = True, tolerance: float = 1e-5) -> None:
-    """The values are Blender's, within `tolerance` of the size of the curve, its handles and its swings."""
+def assert_as_blender(keys: Keys, frames: np.ndarray, *, update: bool = True) -> None:
+    """The values are Blender's, within 2e-6 of the size of the curve, its handles and its swings."""
     with as_fcurve(keys, update=update) as fcurve:
         read = read_one(fcurve)
         result = evaluate_one(read, frames)
@@ -93,7 +73,7 @@ def assert_as_blender(keys: Keys, frames: np.ndarray, *, update: bool = True, to
     size = max(
         1e-30, np.abs(expected).max(), *(np.abs(rows[..., 1]).max() for rows in (read.points, *handles)), *swings
     )
-    np.testing.assert_allclose(result, expected, rtol=0.0, atol=tolerance * size)
+    np.testing.assert_allclose(result, expected, rtol=0.0, atol=2e-6 * size)
 
 
 def keys_of(
@@ -101,13 +81,9 @@ def keys_of(
 ) -> Keys:
     names = [interpolation] * len(times) if isinstance(interpolation, str) else interpolation
     codes = np.array([CODES[name] for name in names], dtype=np.int32)
-    for name, rows in others.items():
-        if name in ("left", "right"):
-            others[name] = np.asarray(rows, np.float32)[None]
-        elif name == "easing":
-            others[name] = rows[None]
-        elif name == "easing_settings":
-            others[name] = np.asarray(rows, np.float32)[:, None]
+    for name in others.keys() & {"left", "right", "easing", "easing_settings"}:
+        rows = np.asarray(others[name], np.int32 if name == "easing" else np.float32)
+        others[name] = np.expand_dims(rows, -2 if name == "easing_settings" else 0)
     return Keys(np.column_stack((times, values)).astype(np.float32)[None], codes[None], **others)
 
 

@@ -12,44 +12,34 @@ from mathutils import Euler, Matrix
 from rigid_motion.animation import key_frames, repeat, set_mode, write_channel
 from rigid_motion.animation.evaluation import source_cache
 from rigid_motion.animation.queries.keyed import source_of
-from tests.animation.keyed import curves_of, rotation_path
+from tests.animation.bones.rigs import select_only
+from tests.animation.keyed import curves_of, rotation_path, transform_paths
 from tests.animation.oracle import shown_worlds, world_now
 from tests.animation.scenes import key, new_object, push_down, random_values, tweak
-
-
-@pytest.fixture
-def tool(live_file) -> bpy.types.Object:
-    """An object that moves by screws, in the middle of a segment."""
-    obj = key(new_object())
-    set_mode(obj, "dq_sclerp")
-    bpy.context.scene.frame_set(15)
-    return obj
-
 
 ORDERS = ("QUATERNION", "XYZ", "ZXY", "AXIS_ANGLE")
 
 
-@pytest.fixture(params=ORDERS)
-def shown(request, live_file) -> bpy.types.Object:
-    """An object of each kind of rotation, with a parent, on a frame in the middle of a segment."""
-    parent = key(new_object("Arm", "YXZ"), (1.0, 40.0), seed=9)
-    obj = key(new_object("Tool", request.param))
-    obj.parent = parent
+def moving(order: str = "QUATERNION") -> bpy.types.Object:
+    """An object that moves by screws, in the middle of a segment."""
+    obj = key(new_object("Tool", order))
     set_mode(obj, "dq_sclerp")
     bpy.context.scene.frame_set(15)
     return obj
 
 
-def key_pose(obj: bpy.types.Object, *, every: bool) -> None:
-    obj.keyframe_insert("location")
-    if every:
-        obj.keyframe_insert(rotation_path(obj))
-        obj.keyframe_insert("scale")
+def insert(obj: bpy.types.Object) -> None:
+    """Key all of it as it is."""
+    for path in transform_paths(obj):
+        obj.keyframe_insert(path)
 
 
-def test_a_pose_pasted_by_copy_global_transform_with_auto_key_is_where_it_lands(shown, live_file):
-    live_file.view_layer.objects.active = shown
-    shown.select_set(True)
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_pose_pasted_by_copy_global_transform_with_auto_key_is_where_it_lands(live_file, order):
+    obj = moving(order)
+    obj.parent = key(new_object("Arm", "YXZ"), (1.0, 40.0), seed=9)
+    live_file.view_layer.update()
+    select_only(obj)
     matrix = Matrix.LocRotScale((1.0, 5.0, -2.0), Euler((0.3, 0.2, 0.1)), (1.0, 1.0, 1.0))
     live_file.scene.tool_settings.use_keyframe_insert_auto = True
     # What the operator does, which has no clipboard to paste from without a window.
@@ -57,7 +47,7 @@ def test_a_pose_pasted_by_copy_global_transform_with_auto_key_is_where_it_lands(
     in_blender = "bl_operators." if bpy.app.version >= (5, 0) else ""
     importlib.import_module(f"{in_blender}copy_global_transform").set_matrix(live_file, matrix)
     assert np.abs(world_now() - np.array(matrix)).max() < 2e-5
-    assert 15.0 in key_frames(shown)
+    assert 15.0 in key_frames(obj)
 
 
 @pytest.mark.parametrize("keyed", ["location", "rotation"])
@@ -75,20 +65,38 @@ def test_a_key_keeps_the_pose_also_where_it_is_the_first_of_a_property(live_file
     set_mode(obj, "dq_sclerp")
     bpy.context.scene.frame_set(15)
     before, motion = world_now(), shown_worlds([obj], np.arange(1.0, 26.0))[0]
-    key_pose(obj, every=True)
+    insert(obj)
     assert np.abs(world_now() - before).max() < 1e-5
     if keyed == "location":
         assert np.abs(shown_worlds([obj], np.arange(1.0, 26.0))[0] - motion).max() < 1e-3
 
 
-def test_sources_that_are_kept_for_comparison_are_few_bytes_and_go_with_the_file(tool, monkeypatch):
-    monkeypatch.setattr(source_cache, "MOST_BYTES", 3 * source_cache.size_of(source_of(tool)))
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_key_of_one_component_keys_all_of_the_body_there_and_on_the_keys_around(live_file, order, mode):
+    obj = new_object("Tool", order)
+    for path, frames in (("location", (1.0, 40.0)), (rotation_path(obj), (1.0, 20.0, 40.0))):
+        write_channel(obj, path, np.array(frames), random_values(obj, path, len(frames), 3))
+    set_mode(obj, mode)
+    keys = [1.0, 10.0, 20.0, 40.0]
+    before = shown_worlds([obj], keys)[0]
+    bpy.context.scene.frame_set(10)
+    obj.keyframe_insert("location", index=1)
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(shown_worlds([obj], keys)[0], before, atol=1e-5)
+    for fcurve in curves_of(obj).values():
+        assert [point.co.x for point in fcurve.keyframe_points] == keys
+
+
+def test_sources_that_are_kept_for_comparison_are_few_and_go_with_the_file(live_file, monkeypatch):
+    tool = moving()
+    monkeypatch.setattr(source_cache, "MOST_KEYS", 3 * source_of(tool).key_count)
     fcurve = curves_of(tool)["location", 0]
     for value in range(5):
         fcurve.keyframe_points[1].co_ui.y = value
         bpy.context.view_layer.update()
     known = source_cache.known
-    assert 0 < known.size == sum(map(source_cache.size_of, known.values())) <= source_cache.MOST_BYTES
+    assert 0 < known.size == sum(source.key_count for source in known.values()) <= source_cache.MOST_KEYS
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     assert (len(known), known.size) == (0, 0)
 
@@ -103,13 +111,9 @@ def test_a_key_of_another_user_of_a_slot_has_the_pose_of_that_one(live_file):
     bpy.context.scene.frame_set(17)
     bpy.context.view_layer.objects.active = second
     before = np.array(second.matrix_world)
-    second.keyframe_insert("location")
-    second.keyframe_insert("rotation_quaternion")
+    insert(second)
     bpy.context.view_layer.update()
     assert np.abs(np.array(second.matrix_world) - before).max() < 1e-5
-
-
-# -- outside of the keys ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
@@ -128,6 +132,5 @@ def test_a_key_outside_of_the_keys_keeps_the_pose_where_the_motion_goes_on(live_
     bpy.context.view_layer.update()
     live_file.scene.frame_set(frame)
     before = world_now()
-    obj.keyframe_insert("location")
-    obj.keyframe_insert("rotation_quaternion")
+    insert(obj)
     assert np.abs(world_now() - before).max() < 2e-5 * max(1.0, np.abs(before).max())

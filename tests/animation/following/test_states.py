@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import initialize, invariant, precondition, rule
+from hypothesis.stateful import initialize, precondition, rule
 from mathutils import Euler, Matrix
 
 from rigid_motion import animation
-from tests.animation.edit_steps import TakenAway
-from tests.animation.editing import LAST, ORDERS, seeds, shares
-from tests.animation.following.exchanging import Exchanging
-from tests.animation.keyed import MODE_IDS, WIDTHS, curves_of, key_frames, mode_at, snapshot, transform_paths
-from tests.animation.oracle import (
-    Own,
-    as_quaternion,
-    assert_shown,
-    expected_bases,
-    expected_worlds,
-    shown_worlds,
-    unit,
-)
-from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, random_values
-from tests.thoroughness import THOROUGH
+from tests.animation.editing import ORDERS
+from tests.animation.keyed import MODE_IDS, WIDTHS, curves_of, key_frames, snapshot, transform_paths
+from tests.animation.machine import LAST, SETTINGS, goes_on, seeds, shares, while_on
+from tests.animation.oracle import Own, assert_shown, expected_bases
+from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, push_down, tweak
+from tests.animation.tool_steps import WithTools
 
 
-class EditingObjects(TakenAway, Exchanging):
+class EditingObjects(WithTools):
     """An animator at work on a few objects, by their names."""
 
     @initialize(
@@ -47,8 +37,8 @@ class EditingObjects(TakenAway, Exchanging):
         parent = None
         for number, (order, scale) in enumerate(zip(orders, scales, strict=False)):
             obj = new_object(f"Tool {number}", order)
-            self.owns[obj.name] = give_own_deltas(obj, seed + number) if with_own else own_deltas(obj)
-            self.turned[obj.name] = tuple(obj.delta_rotation_quaternion), tuple(obj.delta_rotation_euler)
+            if with_own:
+                give_own_deltas(obj, seed + number)
             key(obj, np.array((1.0, 13.0, 26.0, 37.0)) + shift, seed=seed + number, scale=scale)
             animation.set_mode(obj, mode)
             if parented and parent is not None:
@@ -61,143 +51,51 @@ class EditingObjects(TakenAway, Exchanging):
     def _found(self, name: str) -> bpy.types.Object:
         return bpy.data.objects[name]
 
-    def _animated(self, name: str) -> bpy.types.Object:
-        return self._found(name)
-
-    def _is_exact(self, name: str) -> bool:
-        # Blender itself bakes the delta transforms of Euler angles wrongly.
-        is_turned = np.abs(np.abs(self.owns[name].quaternion) - (1.0, 0.0, 0.0, 0.0)).max() > 1e-6
-        return self._found(name).rotation_mode == "QUATERNION" or not is_turned
-
     def _basis(self, obj: bpy.types.Object) -> np.ndarray:
         return np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_basis)
 
-    @precondition(lambda self: self.on)
-    @rule(who=shares, seed=seeds)
+    def _sharing(self, name: str) -> set[str]:
+        return {obj.name for obj in self._users(self._found(name))}
+
+    @property
+    def owns(self) -> dict[str, Own]:
+        return {name: own_deltas(self._found(name)) for name in self.names}
+
+    def _assert_shown(self, names: Sequence[str], frames: np.ndarray) -> None:
+        assert_shown(list(map(self._found, names)), frames, self.owns)
+
+    def _carrying(self, name: str) -> list[str]:
+        parent = self._found(name).parent
+        return [name] if parent is None else [name, *self._carrying(parent.name)]
+
+    @while_on(who=shares, seed=seeds)
     def change_its_own_deltas(self, who, seed):
-        name = self._object(who).name
-        if len(self._sharing(name)) > 1:
-            return
+        name = self._named(who)
         random = np.random.default_rng(seed)
-        location, scale = random.normal(size=3), np.full(3, np.exp(0.3 * random.normal()))
 
         def change() -> None:
-            obj = bpy.data.objects[name]
-            obj.delta_location, obj.delta_scale = location, scale
+            self._found(name).delta_location = random.normal(size=3)
+            self._found(name).delta_scale = np.full(3, np.exp(0.3 * random.normal()))
 
-        self.owns[name] = Own(
-            tuple(np.float32(location).tolist()), self.owns[name].quaternion, tuple(np.float32(scale).tolist())
-        )
-        self._edit(change)
+        if self._sharing(name) == {name}:
+            self._edit(change)
 
-    @precondition(lambda self: self.on)
-    @rule(
-        who=shares,
-        step=st.sampled_from((1.0, 0.5, 3.0)),
-        interpolation=st.sampled_from(("LINEAR", "CONSTANT")),
-    )
-    def bake(self, who, step, interpolation):
-        obj = self._object(who)
-        if len(self._sharing(obj.name)) > 1:
-            return
-        name, keyed, keys = obj.name, snapshot(obj), key_frames(obj)
-        live = any(mode_at(obj, frame) != "BLENDER" for frame in keys[:-1])
-        # Between whole frames a parent's own in-betweens are not quite what they have to be.
-        every = np.arange(-2.0, LAST + 6.0, 0.5 if obj.parent is None else 1.0) + self.shift
-        before = expected_worlds(obj, every, self.owns)
-        baked: list = []
-
-        def change() -> None:
-            with suppress(animation.Refused):
-                result = bpy.data.objects[name]
-                baked.extend(animation.bake(result, step=step, interpolation=interpolation))
-
-        self._edit(change)
-        obj = bpy.data.objects[name]
-        assert bool(baked) == live
-        if not baked:
-            assert snapshot(obj) == keyed
-            return
-        self.before_bake.setdefault(name, keyed)
-        self.history[self.place] = self._remembered()
-        assert animation.is_baked(obj)
-        begin, end = baked
-        # Up to a baked key off whole frames, what is left of the segment before it blends into that key's pose.
-        kept = (every >= np.ceil(begin)) & (every <= np.floor(end)) & ((every - begin) % step == 0.0)
-        shown, expected = shown_worlds([obj], every[kept])[0], before[kept]
-        size = max(1.0, np.abs(expected).max(initial=0.0))
-        for frame, now, then in zip(every[kept], shown, expected, strict=True):
-            assert np.abs(now - then).max() < 2e-5 * size, (
-                f"{name} is baked otherwise on frame {frame} (keys on {keys}, step {step}):\n{now}\ninstead of\n{then}"
-            )
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares, count=st.integers(2, 8))
+    @while_on(who=shares, count=st.integers(2, 8))
     def reduce_to_a_number_and_restore(self, who, count):
-        name = self._object(who).name
-        if len(self._sharing(name)) > 1 or name in self.before_bake:
+        name = self._named(who)
+        if self._sharing(name) != {name} or name in self.before_bake:
             return
-        keyed, before = snapshot(bpy.data.objects[name]), len(key_frames(bpy.data.objects[name]))
+        keyed, before = snapshot(self._found(name)), len(key_frames(self._found(name)))
         refused: list[animation.Refused] = []
-        self._edit(lambda: animation.reduce_keys_of(bpy.data.objects[name], count=count, refused=refused))
-        if refused:
-            assert snapshot(bpy.data.objects[name]) == keyed
-            return
-        assert len(key_frames(bpy.data.objects[name])) < before
-        self._edit(lambda: animation.restore_keys(bpy.data.objects[name]))
-        assert snapshot(bpy.data.objects[name]) == keyed
+        self._edit(lambda: animation.reduce_keys_of(self._found(name), count=count, refused=refused))
+        if not refused:
+            assert len(key_frames(self._found(name))) < before
+            self._edit(lambda: animation.restore_keys(self._found(name)))
+        assert snapshot(self._found(name)) == keyed
 
-    @precondition(lambda self: self.on)
-    @rule(who=shares, order=st.sampled_from(ORDERS), rekeyed=st.booleans(), seed=seeds)
-    def turn_in_another_way(self, who, order, rekeyed, seed):
-        obj = self._object(who)
-        name = obj.name
-        if not self._is_free(name):
-            return
-
-        def change() -> None:
-            obj = bpy.data.objects[name]
-            obj.rotation_mode = order
-            path = transform_paths(obj)[1]
-            keys = key_frames(obj)
-            if rekeyed and len(keys):
-                for index, values in enumerate(random_values(obj, path, len(keys), seed).T):
-                    fcurve = curves_of(obj).get((path, index)) or animation.channelbag_of(obj).fcurves.new(
-                        path, index=index
-                    )
-                    for frame, value in zip(keys, values, strict=True):
-                        fcurve.keyframe_points.insert(frame, value)
-
-        quaternion, angles = self.turned[name]
-        turned = unit(quaternion) if order == "QUATERNION" else (1.0, 0.0, 0.0, 0.0)
-        if order not in ("QUATERNION", "AXIS_ANGLE"):
-            turned = as_quaternion(angles, order)
-        self.owns[name] = Own(self.owns[name].location, turned, self.owns[name].scale)
-        self._edit(change)
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares)
-    def rename_an_object_and_its_action(self, who):
-        old = self._object(who).name
-        if old in self.before_bake or bpy.data.objects[old].children or bpy.data.objects[old].parent:
-            return
-        new, self.fresh = f"Renamed {self.fresh}", self.fresh + 1
-        for kept in (self.owns, self.turned):
-            kept[new] = kept.pop(old)
-        self.names[self.names.index(old)] = new
-
-        def rename() -> None:
-            obj = bpy.data.objects[old]
-            obj.name = new
-            if obj.animation_data is not None and obj.animation_data.action is not None:
-                obj.animation_data.action.name = f"{new} moves"
-
-        self._edit(rename)
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares, seed=seeds)
+    @while_on(who=shares, seed=seeds)
     def set_a_matrix_and_key_it_in_one_go(self, who, seed):
-        obj, scene = self._object(who), bpy.context.scene
+        obj, scene = self._found(self._named(who)), bpy.context.scene
         frame, name = scene.frame_current_final, obj.name
         if obj.parent is not None or obj.matrix_world.is_negative:
             return
@@ -226,36 +124,61 @@ class EditingObjects(TakenAway, Exchanging):
     @precondition(lambda self: not self.on)
     @rule(who=shares)
     def unlink_an_action_while_the_extension_is_off(self, who):
-        obj = self._object(who)
-        if self._is_free(obj.name) and obj.animation_data is not None:
+        obj = self._found(self._named(who))
+        if self._is_free(obj) and obj.animation_data is not None:
             self.playing = None
             self._link(obj, None, None)
             bpy.context.view_layer.update()
 
-    # What holds all the time
+    @precondition(lambda self: self.on and len(self.names) > 1)
+    @rule(who=shares, other=shares)
+    def swap_the_actions_of_two(self, who, other):
+        names = [self._named(who), self._named(other)]
+        objects = list(map(self._found, names))
+        if len({obj.rotation_mode for obj in objects}) > 1 or not all(map(self._is_free, objects)):
+            return
 
-    @precondition(lambda self: self.on and self.history)
-    @invariant()
-    def everything_is_where_it_has_to_be(self):
-        objects = [bpy.data.objects[name] for name in self.names]
-        assert_shown(objects, self._frames_that_are_seen(objects), self.owns)
+        def swap() -> None:
+            objects = list(map(self._found, names))
+            for obj, linked in zip(objects, reversed(list(map(self._linked, objects))), strict=True):
+                self._link(obj, *linked)
 
-    @precondition(lambda self: self.history)
-    @invariant()
-    def channels_are_all_that_moves_it(self):
-        for name in self.names:
-            obj = bpy.data.objects[name]
-            assert np.abs(np.subtract(obj.delta_location, self.owns[name].location)).max() < 1e-6
-            assert np.abs(np.subtract(obj.delta_scale, self.owns[name].scale)).max() < 1e-6
-            assert not obj.constraints
+        self._edit(swap)
+
+    @while_on(
+        who=shares,
+        start=st.integers(1, 60),
+        scale=st.sampled_from((1.0, 2.0, 4.0)),
+        which=st.none() | shares,
+        seed=seeds,
+    )
+    def push_down_tweak_and_delete_the_strip(self, who, start, scale, which, seed):
+        """In a strip it moves as it did, and as its keys are edited there."""
+        obj = self._found(self._named(who))
+        name, (action, slot) = obj.name, self._linked(obj)
+        if action is None or not self._is_free(obj) or not len(key_frames(obj)) or goes_on(obj):
+            return
+        strip = push_down(obj, start)
+        strip.scale = scale
+        # Only in tweak mode the Action is the object's.
+        tweak(obj, strip)
+        fcurve = None if which is None else self._curve(obj, which)
+        if fcurve is not None:
+            self._set_a_value(fcurve, 0.0, seed)
+            bpy.context.view_layer.update()
+        own = np.round(8.0 * np.linspace(strip.action_frame_start, strip.action_frame_end, 9)[1:-1]) / 8.0
+        expected = expected_bases(obj, own, self.owns[name])
+        frames = strip.frame_start + scale * (own - strip.action_frame_start)
+        obj.animation_data.use_tweak_mode = False
+        bpy.context.view_layer.update()
+        error = np.abs(self._bases([name], frames)[name] - expected).max()
+        assert error < 1e-4 * max(1.0, np.abs(expected).max()), f"{name} is off by {error:.3g} in a strip"
+        obj.animation_data.nla_tracks.remove(obj.animation_data.nla_tracks[0])
+        self._link(obj, action, slot)
+        bpy.context.view_layer.update()
+        # What was edited needs an undo step of its own.
+        self._edit(lambda: None)
 
 
-EditingObjects.TestCase.settings = settings(
-    max_examples=40 if THOROUGH else 6,
-    stateful_step_count=25,
-    deadline=None,
-    derandomize=True,
-    database=None,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
-)
+EditingObjects.TestCase.settings = SETTINGS
 TestEdits = EditingObjects.TestCase

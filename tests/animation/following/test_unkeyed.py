@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import set_mode
-from tests.animation.keyed import curve_of, curves_of, rotation_path
+from tests.animation.keyed import curve_of, rotation_path
 from tests.animation.oracle import assert_shown, world_now
 from tests.animation.scenes import key, new_object, random_values
 
@@ -29,58 +29,46 @@ def posed(order: str) -> bpy.types.Object:
 
 
 @pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("part", range(3))
-def test_what_is_not_keyed_stays_until_the_next_frame(live_file, order, part):
+@pytest.mark.parametrize(("part", "index"), [(0, -1), (1, -1), (2, -1), (0, 1)])
+def test_what_is_not_keyed_stays_until_the_next_frame(live_file, order, part, index):
     obj = posed(order)
     paths = ["location", rotation_path(obj), "scale"]
-    pose, seen = {path: tuple(getattr(obj, path)) for path in paths}, world_now()
-    obj.keyframe_insert(paths[part])
+    pose, seen = {path: np.array(getattr(obj, path)) for path in paths}, world_now()
+    obj.keyframe_insert(paths[part], index=index)
     assert np.abs(world_now() - seen).max() < 1e-6
-    assert {path: tuple(getattr(obj, path)) for path in paths} == pose
+    assert all(np.array_equal(getattr(obj, path), pose[path]) for path in paths)
     assert obj["speed"] == 5.0
     live_file.scene.frame_set(16)
     live_file.scene.frame_set(15)
-    assert np.abs(np.subtract(getattr(obj, paths[part]), pose[paths[part]])).max() < 1e-5
-    assert all(
-        np.abs(np.subtract(getattr(obj, path), pose[path])).max() > 0.01 for path in paths if path != paths[part]
-    )
+    for path in paths:
+        error = np.abs(np.subtract(getattr(obj, path), pose[path]))
+        is_keyed = np.isin(np.arange(len(error)), index if index >= 0 else range(4)) & (path == paths[part])
+        # Fellows of what was keyed have keys there, too, with the values that the motion had.
+        assert error[is_keyed].max(initial=0.0) < 1e-5
+        assert is_keyed.all() or error[~is_keyed].max() > 0.01
+    assert {len(curve_of(obj, paths[part], each).keyframe_points) for each in range(3)} == {5}
     assert obj["speed"] == 1.0
     assert_shown([obj], np.arange(1.0, 41.0, 1.375))
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_one_component_that_is_keyed_leaves_its_fellows_as_they_are_posed(live_file, order):
-    obj = posed(order)
-    seen, kept = world_now(), tuple(obj.location)
-    obj.keyframe_insert("location", index=1)
-    assert np.abs(world_now() - seen).max() < 1e-6
-    live_file.scene.frame_set(15)
-    # The others have keys there, too, with the values that the motion had.
-    assert obj.location.y == pytest.approx(kept[1], abs=1e-6)
-    assert {len(curve_of(obj, "location", index).keyframe_points) for index in range(3)} == {5}
-
-
-def test_what_is_edited_goes_where_it_has_it(live_file):
-    obj = posed("QUATERNION")
-    scale = tuple(obj.scale)
-    for fcurve in (curve_of(obj, "location", index) for index in range(3)):
-        fcurve.keyframe_points[1].co_ui.y += 2.0
-        fcurve.update()
-    bpy.context.view_layer.update()
-    assert list(obj.location) == pytest.approx(
-        [curves_of(obj)["location", i].evaluate(15.0) for i in range(3)], abs=1e-5
-    )
-    assert tuple(obj.scale) == scale
-
-
-def test_poses_of_other_users_of_the_action_stay(live_file):
+def test_what_is_edited_goes_where_it_has_it_and_poses_of_other_users_of_the_action_stay(live_file):
     obj = posed("QUATERNION")
     other = new_object("Other")
     other.animation_data_create().action = obj.animation_data.action
     other.animation_data.action_slot = obj.animation_data.action_slot
     bpy.context.view_layer.update()
-    other.scale = (3.0, 3.0, 3.0)
+    for one, size in ((obj, 2.0), (other, 3.0)):
+        one.scale = (size, size, size)
     bpy.context.view_layer.update()
+    for index in range(3):
+        fcurve = curve_of(obj, "location", index)
+        fcurve.keyframe_points[1].co_ui.y += 2.0
+        fcurve.update()
+    bpy.context.view_layer.update()
+    assert list(obj.location) == pytest.approx(
+        [curve_of(obj, "location", index).evaluate(15.0) for index in range(3)], abs=1e-5
+    )
     obj.keyframe_insert("location")
     bpy.context.view_layer.update()
+    assert tuple(obj.scale) == (2.0, 2.0, 2.0)
     assert tuple(other.scale) == (3.0, 3.0, 3.0)

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from rigid_motion.animation.evaluation.spans import Span
 from rigid_motion.animation.terms import planning
-from rigid_motion.animation.terms.carriers import Term, evaluate
+from rigid_motion.animation.terms.carriers import Term
+from tests.animation.terms.test_carriers import error, evaluate
 
 LOCATION, ROTATION = 0, 4
 
@@ -25,7 +26,6 @@ class Written:
     spans: list[Span]
     difference: Callable[[np.ndarray], np.ndarray]
     native: float = 0.0
-    order: str | None = None
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -57,96 +57,78 @@ def planned(*spans: Span, difference, native: float = 0.0) -> dict[int, list[Ter
     return terms
 
 
-def frames_in(first: float, last: float, step: float) -> np.ndarray:
-    """The frames strictly inside, in single precision."""
-    frames = np.unique(np.float32(np.arange(np.ceil(first / step), last / step) * step)).astype(float)
-    return frames[(frames > first) & (frames < last)]
-
-
-def error(terms: list[Term], difference, first: float, last: float, step: float = 1 / 16) -> float:
-    frames = frames_in(first, last, step)
-    return abs(evaluate(terms, frames) - difference(frames)).max()
+def off(terms: list[Term], difference, first: float = 1.0, last: float = 21.0, step: float = 1 / 16) -> float:
+    """How far off terms are, at most, on frames strictly inside."""
+    frames = np.float32(np.arange(np.ceil(first / step), last / step) * step)
+    return error(terms, difference, frames[(frames > first) & (frames < last)])
 
 
 def hump(frames: np.ndarray) -> np.ndarray:
     return 0.3 * np.sin(np.pi * (frames - 1.0) / 20.0)
 
 
-def test_smooth_differences_take_two_terms_a_row():
-    terms = planned(span(1.0, 21.0, rows=(LOCATION, ROTATION)), difference=hump)
-    assert {row: len(of_row) for row, of_row in terms.items()} == {LOCATION: 2, ROTATION: 2}
-    assert error(terms[LOCATION], hump, 1.0, 21.0) <= planning.LOCATION_TOLERANCE
-    assert error(terms[ROTATION], hump, 1.0, 21.0) <= planning.TOLERANCE
-
-
-def test_rows_below_the_tolerance_are_left_out():
+def test_values_need_no_more_than_their_own_precision_and_rows_below_the_tolerance_nothing():
+    large, fine = (planned(span(1.0, 21.0), difference=hump, native=native)[LOCATION] for native in (1000.0, 0.0))
+    assert 1e-7 < off(large, hump) <= 1e-4
+    assert len(large[0].coefficients) < len(fine[0].coefficients)
     assert planned(span(1.0, 21.0), difference=lambda frames: 1e-5 * hump(frames)) == {}
     assert planned(span(1.0, 21.0), difference=lambda frames: 1e-3 * hump(frames), native=4000.0) == {}
     assert planned(difference=hump) == {}
     assert planning.plan([]) == []
 
 
-def test_large_values_need_no_more_than_their_own_precision():
-    terms = planned(span(1.0, 21.0), difference=hump, native=1000.0)
-    fine = planned(span(1.0, 21.0), difference=hump)
-    assert 1e-7 < error(terms[LOCATION], hump, 1.0, 21.0) <= 1e-4
-    assert len(terms[LOCATION][0].coefficients) < len(fine[LOCATION][0].coefficients)
-
-
 def bounce(frames: np.ndarray) -> np.ndarray:
     return hump(frames) * abs(frames - 7.28)
 
 
-def test_a_span_is_split_at_its_breaks():
-    terms = planned(span(1.0, 21.0, (7.28,)), difference=bounce)[LOCATION]
-    assert error(terms, bounce, 1.0, 21.0) <= planning.LOCATION_TOLERANCE
-    assert sorted({round(term.first, 2) for term in terms}) == [1.0, 7.28]
-    assert len(terms) <= 6
+EIGHTHS, SIXTEENTHS = 1 / 8, 1 / 16
+FOLLOWED: dict[str, tuple] = {
+    "smooth": (hump, (), SIXTEENTHS, 2),
+    "breaks that are none": (hump, (7.28, 9.0), SIXTEENTHS, 2),
+    "a break": (bounce, (7.28,), SIXTEENTHS, 6),
+    "a break that is not told": (bounce, (), EIGHTHS, 99),
+    "a steep beginning": (lambda frames: np.sqrt(abs(frames - 1.0)) * (21.0 - frames) / 20, (), EIGHTHS, 99),
+    "a steep end": (lambda frames: np.sqrt(abs(21.0 - frames)) * (frames - 1.0) / 20, (), EIGHTHS, 99),
+    "steep between": (lambda frames: np.cbrt(frames - 11.0) * hump(frames), (), EIGHTHS, 99),
+    "fast waves": (lambda frames: 0.1 * np.sin(3.0 * frames) + 0.1, (), EIGHTHS, 99),
+}
+"""A difference and its breaks, on which frames terms have to follow it, and how many may be taken for that."""
 
 
-def test_breaks_that_are_none_split_nothing():
-    assert len(planned(span(1.0, 21.0, (7.28, 9.0)), difference=hump)[LOCATION]) == 2
-
-
-@pytest.mark.parametrize(
-    "steep",
-    [
-        bounce,
-        lambda frames: np.sqrt(abs(frames - 1.0)) * (21.0 - frames) / 20,
-        lambda frames: np.sqrt(abs(21.0 - frames)) * (frames - 1.0) / 20,
-        lambda frames: np.cbrt(frames - 11.0) * hump(frames),
-        lambda frames: 0.1 * np.sin(3.0 * frames) + 0.1,
-    ],
-)
 @pytest.mark.parametrize("ends", [(1.0, 21.0), (1.25, 20.6)])
-def test_what_no_polynomial_follows_is_exact_on_eighths_of_frames(steep, ends):
-    terms = planned(span(*ends), difference=steep)[LOCATION]
-    assert error(terms, steep, *ends, step=0.125) <= planning.LOCATION_TOLERANCE
-    inner = {term.first for term in terms if term.first > ends[0] + 0.01}
-    assert all(
-        np.float32(first) == np.nextafter(np.float32(round(8.0 * first) / 8.0), np.float32(np.inf)) for first in inner
-    )
+@pytest.mark.parametrize("what", FOLLOWED)
+def test_differences_are_followed_by_pieces_in_order_of_time_whatever_is_planned_along_with_them(what, ends):
+    difference, breaks, step, most = FOLLOWED[what]
+    sources = [Written([span(*ends, breaks)], difference), *(Written([span(1.0, 22.0)], hump, n) for n in range(2))]
+    terms, *others = [plan[LOCATION] for plan in planning.plan(sources)]
+    assert [terms, *others] == [plan[LOCATION] for plan in planning.plan(sources)]
+    ranges = [term[:2] for term in terms]
+    assert ranges == [term[:2] for term in planned(*sources[0].spans, difference=difference)[LOCATION]]
+    assert off(terms, difference, *ends, step=step) <= planning.LOCATION_TOLERANCE
+    assert len(terms) <= most
+    assert ranges == sorted(ranges)
+    for (_, last), (first, _) in pairwise(sorted(set(ranges))):
+        assert first == after(last), "the earlier of two pieces has the frame between"
+        assert last in np.float32(breaks) or 8.0 * last % 1.0 == 0.0
 
 
-def test_each_row_is_split_on_its_own():
+def after(frame: float) -> np.float32:
+    return np.nextafter(np.float32(frame), np.float32(np.inf))
+
+
+def test_parts_are_split_at_breaks_each_on_its_own():
+    """Several values of all angles turn alike, and one row's must be of the same as the others' are."""
+
     def difference(frames: np.ndarray) -> np.ndarray:
-        return np.stack([hump(frames), bounce(frames)])
+        return np.stack([hump(frames), hump(frames), bounce(frames), np.zeros_like(frames)])
 
-    terms = planned(span(1.0, 21.0, (7.28,), rows=(LOCATION, ROTATION)), difference=difference)
+    rows = (LOCATION, ROTATION, ROTATION + 1, ROTATION + 2)
+    terms = planned(span(1.0, 21.0, (7.28,), rows=rows), difference=difference)
     assert len(terms[LOCATION]) == 2
-    assert len({term.first for term in terms[ROTATION]}) == 2
-
-
-def test_angles_are_split_together():
-    """Several of them turn alike, and one row's must be of the same as the others' are."""
-
-    def difference(frames: np.ndarray) -> np.ndarray:
-        return np.stack([hump(frames), bounce(frames), np.zeros_like(frames)])
-
-    angles = (ROTATION, ROTATION + 1, ROTATION + 2)
-    terms = planning.plan([Written([span(1.0, 21.0, (7.28,), rows=angles)], difference, order="XYZ")])[0]
-    assert len({term.first for term in terms[ROTATION]}) == 2
-    assert error(terms[ROTATION], hump, 1.0, 21.0) <= planning.TOLERANCE
+    for row, wanted in ((ROTATION, hump), (ROTATION + 1, bounce)):
+        assert off(terms[row], wanted) <= planning.TOLERANCE
+        assert sorted({round(term.first, 2) for term in terms[row]}) == [1.0, 7.28]
+        assert len(terms[row]) <= 6
     assert ROTATION + 2 not in terms
 
 
@@ -167,43 +149,9 @@ def test_nothing_is_added_at_keys_and_no_more_than_once_between():
     assert beside(3000.0) == [1.0, 1.0, 0.0]
 
 
-def test_the_earlier_of_two_pieces_has_the_frame_between():
-    terms = planned(span(1.0, 21.0), difference=bounce)[LOCATION]
-    ranges = sorted({term[:2] for term in terms})
-    for (_, last), (first, _) in pairwise(ranges):
-        assert np.float32(first) == np.nextafter(np.float32(last), np.float32(np.inf))
-
-
-def test_terms_are_in_order_of_time():
-    terms = planned(*(span(20.0 * n + 1, 20.0 * n + 21) for n in range(6)), difference=bounce)[LOCATION]
-    assert [term.first for term in terms] == sorted(term.first for term in terms)
-
-
-def test_spans_of_other_rows_may_lie_across():
-    spans = [span(1.0, 21.0), span(5.0, 12.0, rows=(ROTATION,)), span(12.0, 30.0, rows=(ROTATION,))]
-    terms = planned(*spans, difference=hump)
-    assert error(terms[LOCATION], hump, 1.0, 21.0) <= planning.LOCATION_TOLERANCE
-    for first, last in ((5.0, 12.0), (12.0, 30.0)):
-        assert error(terms[ROTATION], hump, first, last) <= planning.TOLERANCE
-
-
-def test_plans_do_not_depend_on_other_sources():
-    sources = [Written([span(1.0, 21.0 + n)], difference, n) for n in range(3) for difference in (hump, bounce)]
-    together = planning.plan(sources)
-    assert together == planning.plan(sources)
-    for source, terms in zip(sources, together, strict=True):
-        (alone,) = planning.plan([source])
-        assert [term[:2] for term in alone[LOCATION]] == [term[:2] for term in terms[LOCATION]]
-
-
-@pytest.mark.parametrize(
-    "ends", [(2e6, 3e6), (-3e6, -2e6), (5.0, float(np.nextafter(np.float32(5.0), np.float32(6.0))))]
-)
-def test_spans_where_there_is_no_frame_take_no_terms(ends):
-    assert planned(span(*ends), difference=np.ones_like) == {}
-
-
-def test_ranges_end_where_those_of_blender_do():
+def test_spans_take_terms_on_frames_that_blender_has():
+    for ends in ((2e6, 3e6), (-3e6, -2e6), (5.0, float(np.nextafter(np.float32(5.0), np.float32(6.0))))):
+        assert planned(span(*ends), difference=np.ones_like) == {}
     terms = planned(span(1048500.0, 2e6), difference=lambda frames: 1e-3 * np.ones_like(frames))[LOCATION]
     assert max(term.last for term in terms) <= planning.LAST_FRAME
 
@@ -222,4 +170,4 @@ def test_waves_of_up_to_ten_radians_a_frame_are_followed(first, length, rate, ph
         return 0.2 * np.sin(rate * (frames - begin) / length + phase)
 
     terms = planned(span(begin, end), difference=wave)[LOCATION]
-    assert error(terms, wave, begin, end) <= planning.LOCATION_TOLERANCE
+    assert off(terms, wave, begin, end) <= planning.LOCATION_TOLERANCE

@@ -64,7 +64,7 @@ def scenario(hand: Hand) -> Steps[None]:
     own = keys()
     yield from hand.picture("redo-panel", places.box(view))
 
-    yield from hand.click(places.redo_row(redo, 5, across=0.5))
+    yield from hand.click(places.redo_row(redo, 4, across=0.5))
     yield from hand.wait_until(lambda: len(set(keys())) == 1, "Key Poses gives all bones keys on the same frames")
     assert max(keys()) < len(FRAMES)
     yield from hand.picture("key-poses")

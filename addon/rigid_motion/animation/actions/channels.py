@@ -7,18 +7,16 @@ precision.
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ...motion import Poses
 from ..fcurves.keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
 from .marks import marks_of
-from .modifiers import is_term, read_cycles
+from .modifiers import copy_modifier, is_term, read_cycles, set_settings, settings_of
 
 KEY_FIELDS = {
     "co": (2, np.float32),
@@ -101,18 +99,10 @@ def replace_keys(
     handle_type: str | None = None,
     selected: np.ndarray | None = None,
 ) -> None:
-    """Give an F-curve these keys in place of those it has.
+    """Give an F-curve these keys in place of those it has: frames that rise, and values, shape (n,) each.
 
-    Parameters
-    ----------
-    fcurve : bpy.types.FCurve
-    frames, values : array, shape (n,)
-        Frames rise. They need not be whole.
-    interpolation, key_type, handle_type : str
-        What every key gets; the names are those of `bpy.types.Keyframe`. Handles are Blender's default without. Codes
-        are each key's own interpolation, shape (n,).
-    selected : array of bool, shape (n,), optional
-        Which keys are selected; Blender's default, otherwise.
+    What every key gets, see `write_channel`; codes are each key's own interpolation (n,). Handles and selection are
+    Blender's default without a type, or without a mask (n,) of keys that are selected.
     """
     points = np.empty((len(frames), 2), dtype=np.float32)
     points[:, 0], points[:, 1] = frames, values
@@ -189,49 +179,14 @@ def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag
         copy.modifiers.remove(modifier)
     set_key_fields(copy, key_fields(fcurve.keyframe_points))
     for modifier in itertools.filterfalse(is_term, fcurve.modifiers):
-        _copy_settings(modifier, copied := copy.modifiers.new(modifier.type))
-        if modifier.type == "ENVELOPE":
-            for point in modifier.control_points:
-                _copy_settings(point, copied.control_points.add(point.frame))
-    _copy_settings(fcurve, copy)
-    copy.data_path = path
+        copy_modifier(modifier, copy)
+    set_settings(copy, settings_of(fcurve) | {"data_path": path})
     return copy
-
-
-def _copy_settings(source: bpy.types.bpy_struct, target: bpy.types.bpy_struct) -> None:
-    """Set all plain properties of one as another of the same type has them."""
-    for prop in source.bl_rna.properties:
-        if not prop.is_readonly and prop.type not in ("POINTER", "COLLECTION"):
-            value = getattr(source, prop.identifier)
-            is_array = getattr(prop, "is_array", False)
-            setattr(target, prop.identifier, tuple(value) if is_array else value)
 
 
 def code_of(name: str, value: str) -> int:
     """Return the number that stands for a value of one of the enumerations of `bpy.types.Keyframe`."""
     return bpy.types.Keyframe.bl_rna.properties[name].enum_items[value].value
-
-
-def read_poses(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
-    """Return the world poses of `obj` as the scene evaluates them: parents, constraints, drivers, deltas and all.
-
-    The scene steps through `frames` (shape (n,), sub-frames allowed) and returns to the frame it was on. Scales are
-    kept where the object is not of its own size; they are the mean of the three axes.
-    """
-    scene = bpy.context.scene
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    before, subframe = scene.frame_current, scene.frame_subframe
-    positions, quaternions = np.empty((len(frames), 3)), np.empty((len(frames), 4))
-    scales = np.empty(len(frames))
-    try:
-        for row, frame in enumerate(frames):
-            whole = int(np.floor(frame))
-            scene.frame_set(whole, subframe=float(frame - whole))
-            location, rotation, scale = obj.evaluated_get(depsgraph).matrix_world.decompose()
-            positions[row], quaternions[row], scales[row] = location, rotation, sum(scale) / 3.0
-    finally:
-        scene.frame_set(before, subframe=subframe)
-    return Poses(positions, quaternions, None if np.allclose(scales, 1.0, atol=1e-6) else scales)
 
 
 class Read(NamedTuple):
@@ -246,101 +201,53 @@ class Read(NamedTuple):
     """The marks of the keys, shape (n,): see `marks`."""
 
 
-def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[Read]]:
-    """Return the keys of F-curves, and the Cycles modifier that each begins with; none of their other modifiers.
-
-    Parameters
-    ----------
-    fcurves : sequence of sequences of bpy.types.FCurve
-        Those of each owner, with keys: of a sampled curve there are none. Many owners are read quicker at once.
-
-    Returns
-    -------
-    list of lists of Read
-        For each owner those together that are keyed together.
+def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[Read]:
+    """Return the keys of F-curves that have some, those together that are keyed together, and the Cycles modifier that
+    each begins with; none of their other modifiers.
     """
-    batches: dict[tuple, list[tuple]] = {}
-    for owner, curves in enumerate(fcurves):
-        for index, fcurve in enumerate(curves):
-            keys = fcurve.keyframe_points
-            cycles = read_cycles(fcurve)
-            batches.setdefault((len(keys), fcurve.extrapolation, cycles), []).append((owner, index, keys))
-    result: list[list[Read]] = [[] for _ in fcurves]
-    for (_, extrapolation, cycles), batch in batches.items():
-        owners, indices, channels = zip(*batch, strict=True)
-        for rows, keys, marks in _read_batch(owners, channels, extrapolation == "LINEAR", cycles):
-            result[owners[rows[0]]].append(Read([indices[row] for row in rows], keys, marks))
-    for reads in result:
-        reads.sort(key=lambda read: read.numbers)
+    points, together = [key_points(fcurve) for fcurve in fcurves], dict[tuple, list[int]]()
+    for number, fcurve in enumerate(fcurves):
+        key = points[number][:, 0].tobytes(), fcurve.extrapolation, read_cycles(fcurve)
+        together.setdefault(key, []).append(number)
+    result = []
+    for (_, extrapolation, cycles), numbers in together.items():
+        channels = [fcurves[number].keyframe_points for number in numbers]
+        stacked = np.stack([points[number] for number in numbers])
+        result.append(Read(numbers, *_read_together(channels, stacked, extrapolation == "LINEAR", cycles)))
     return result
 
 
-def _read_batch(
-    owners: Sequence[int], channels: Sequence, linear: bool, cycles: Cycles | None
-) -> Iterator[tuple[list[int], Keys, np.ndarray]]:
-    """Yield the rows of channels that are keyed together, of such with equally many `keyframe_points` each, and what
-    `Read` has of them.
-    """
-    points = _read_property("co", channels, np.float32, 2)
-    groups = _keyed_together(owners, points[..., 0])
-    order = [row for rows in groups for row in rows]
-    if order != list(range(len(order))):
-        channels, points = [channels[row] for row in order], points[order]
-    sizes = np.array([len(rows) for rows in groups])
-    bounds = np.concatenate(((0,), np.cumsum(sizes)))
-
-    def any_in_group(of_keys: np.ndarray) -> np.ndarray:
-        return np.logical_or.reduceat(of_keys.any(axis=1), bounds[:-1])
-
+def _read_together(
+    channels: Sequence, points: np.ndarray, linear: bool, cycles: Cycles | None
+) -> tuple[Keys, np.ndarray]:
+    """Return the keys of several `keyframe_points` with these frames and values (c, n, 2), and their marks (n,)."""
     interpolation = _read_property("interpolation", channels, CODE)
     _replace_unknown(interpolation, INTERPOLATIONS, CONSTANT)
-    bezier = interpolation == BEZIER
-    eased = any_in_group(~(bezier | (interpolation == LINEAR) | (interpolation == CONSTANT)))
-    curved = any_in_group(bezier) | (eased & linear)
-    rows = np.flatnonzero(curved.repeat(sizes)).tolist()
-    left, right = (_read_property(name, channels, np.float32, 2, rows=rows) for name in ("handle_left", "handle_right"))
-    rows = np.flatnonzero(eased.repeat(sizes)).tolist()
-    easing = _read_property("easing", channels, CODE, rows=rows)
-    _replace_unknown(easing, EASINGS, AUTO)
+    used = set(np.unique(interpolation).tolist())
+    is_eased = bool(used - {BEZIER, LINEAR, CONSTANT})
     back, amplitude = (_read_property(name, channels, np.float32) for name in ("back", "amplitude"))
-    settings = [back, amplitude, _read_property("period", channels, np.float32, rows=rows)]
-    marks = marks_of(back, amplitude)
-    # A key that is no breakdown in the first of the channels that are keyed together is none.
-    breakdowns = _read_property("type", channels, CODE, rows=bounds[:-1].tolist()) == BREAKDOWN
-    rows = np.flatnonzero(any_in_group(breakdowns).repeat(sizes)).tolist()
-    breakdowns = _read_property("type", channels, CODE, rows=rows) == BREAKDOWN
-    numbers = np.concatenate([array.reshape(len(points), -1) for array in (points, left, right, *settings)], axis=1)
+    left = right = easing = settings = None
+    if BEZIER in used or (is_eased and linear):
+        left, right = (_read_property(name, channels, np.float32, 2) for name in ("handle_left", "handle_right"))
+    if is_eased:
+        easing = _read_property("easing", channels, CODE)
+        _replace_unknown(easing, EASINGS, AUTO)
+        settings = np.stack((back, amplitude, _read_property("period", channels, np.float32)))
+    breakdowns = (_read_property("type", channels, CODE) == BREAKDOWN).all(axis=0)
+    numbers = (np.abs(part).max(initial=0.0) for part in (points, left, right, settings) if part is not None)
     # What is no number is not smaller, either.
-    sound = ~any_in_group(~(np.abs(numbers) < LARGEST)) & ~any_in_group(~(points[:, 1:, 0] >= points[:, :-1, 0]))
-    slices = itertools.starmap(slice, itertools.pairwise(bounds))
-    for number, (rows, at) in enumerate(zip(groups, slices, strict=True)):
-        handles = (left[at], right[at]) if curved[number] else (None, None)
-        easings = (easing[at], np.stack([values[at] for values in settings])) if eased[number] else (None, None)
-        marked = breakdowns[at].all(axis=0)
-        marked = marked if marked.any() else None
-        others = {"linear": linear, "cycles": cycles, "breakdowns": marked, "is_sound": bool(sound[number])}
-        yield rows, Keys(points[at], interpolation[at], *handles, *easings, **others), marks[at].max(axis=0)
+    is_sound = all(number < LARGEST for number in numbers) and bool(np.all(np.diff(points[0, :, 0]) >= 0.0))
+    marked = breakdowns if breakdowns.any() else None
+    keys = Keys(points, interpolation, left, right, easing, settings, linear, cycles, marked, is_sound)
+    return keys, marks_of(back, amplitude).max(axis=0)
 
 
-def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]]:
-    """Return the rows of channels with keys on these frames (c, n), those together that one owner keys together."""
-    raw, width = frames.tobytes(), frames.shape[1] * frames.itemsize
-    groups: dict[tuple[int, bytes], list[int]] = {}
-    for row, owner in enumerate(owners):
-        groups.setdefault((owner, raw[row * width : (row + 1) * width]), []).append(row)
-    return list(groups.values())
-
-
-def _read_property(
-    name: str, channels: Sequence, dtype: type, *width: int, rows: Sequence[int] | None = None
-) -> np.ndarray:
-    """Return a property of the n keys of each of c channels, (c, n) or (c, n, width); zero but for these rows."""
-    values = np.zeros((len(channels), len(channels[0]) * math.prod(width)), dtype)
-    read_all = rows is None or len(rows) == len(channels)
-    pairs = zip(channels, values, strict=True) if read_all else ((channels[row], values[row]) for row in rows)
-    for keys, buffer in pairs:
-        keys.foreach_get(name, buffer)
-    return values.reshape(len(values), -1, *width) if width else values
+def _read_property(name: str, channels: Sequence, dtype: type, *width: int) -> np.ndarray:
+    """Return a property of the n keys of each of c channels, (c, n) or (c, n, width)."""
+    values = np.empty((len(channels), len(channels[0]), *width), dtype)
+    for keys, buffer in zip(channels, values, strict=True):
+        keys.foreach_get(name, buffer.ravel())
+    return values
 
 
 def _replace_unknown(codes: np.ndarray, names: dict[int, str], replacement: int) -> None:

@@ -39,10 +39,8 @@ def read_marks(fcurve: bpy.types.FCurve) -> np.ndarray:
 
 
 def has_marks(fcurve: bpy.types.FCurve) -> bool:
-    """Return whether any of the keys of an F-curve has a mark, sooner than reading them where none has."""
-    backs = np.empty(len(fcurve.keyframe_points), np.float32)
-    fcurve.keyframe_points.foreach_get("back", backs)
-    return bool(((backs.view(np.int32) & LOW & ~MOST) == CHECK).any() and read_marks(fcurve).any())
+    """Return whether any of the keys of an F-curve has a mark."""
+    return bool(read_marks(fcurve).any())
 
 
 def write_marks(fcurve: bpy.types.FCurve, marks: np.ndarray) -> None:

@@ -6,22 +6,12 @@ product of linear factors in a restricted range, of which the last factor is con
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import bpy
-import numpy as np
 
 from ..fcurves.keys import Cycles
-
-CODES = {item.identifier: item.value for item in bpy.types.FModifier.bl_rna.properties["type"].enum_items}
-"""The numbers of the types of modifiers."""
-
-
-def has_type(fcurve: bpy.types.FCurve, kind: str) -> bool:
-    """Return whether an F-curve has a modifier of a type, without a look at each of them."""
-    types = np.empty(len(fcurve.modifiers), np.int32)
-    fcurve.modifiers.foreach_get("type", types)
-    return bool((types == CODES[kind]).any())
 
 
 def is_term(modifier: bpy.types.FModifier) -> bool:
@@ -64,43 +54,58 @@ def read_cycles(fcurve: bpy.types.FCurve) -> Cycles | None:
 def add_cycles(fcurve: bpy.types.FCurve, cycles: Cycles) -> None:
     """Give an F-curve Cycles like these, in front of all its other modifiers."""
     modifiers = fcurve.modifiers
-    first = modifiers[0] if modifiers and modifiers[0].type == "CYCLES" else None
-    if first is None:
-        behind = list(modifiers)
-        if not behind:
-            first = modifiers.new("CYCLES")
-        else:
-            # Blender adds one behind others as no more than a wish, or not at all.
-            copies = [(modifier.type, _settings_of(modifier)) for modifier in behind]
-            for modifier in behind:
-                modifiers.remove(modifier)
-            first = modifiers.new("CYCLES")
-            for kind, settings in copies:
-                if kind != "CYCLES":
-                    set_settings(modifiers.new(kind), settings)
+    if not modifiers or modifiers[0].type != "CYCLES":
+        # Blender adds one behind others as no more than a wish, or not at all.
+        behind = [_settings_of(modifier) for modifier in modifiers if modifier.type != "CYCLES"]
+        for modifier in list(modifiers):
+            modifiers.remove(modifier)
+        modifiers.new("CYCLES")
+        for settings in behind:
+            _add(fcurve, settings)
+    first = modifiers[0]
     first.mute = False
     first.mode_before, first.mode_after = cycles.before, cycles.after
     first.cycles_before, first.cycles_after = cycles.before_count, cycles.after_count
 
 
+def copy_modifier(modifier: bpy.types.FModifier, fcurve: bpy.types.FCurve) -> None:
+    """Add a copy of a modifier to an F-curve, behind all others."""
+    _add(fcurve, _settings_of(modifier))
+
+
 def put_behind(fcurve: bpy.types.FCurve, modifier: bpy.types.FModifier) -> None:
     """Have one of the modifiers of an F-curve be the last. Blender has no way but to make it anew."""
-    kind, settings = modifier.type, _settings_of(modifier)
+    settings = _settings_of(modifier)
     fcurve.modifiers.remove(modifier)
-    set_settings(fcurve.modifiers.new(kind), settings)
+    _add(fcurve, settings)
 
 
-def _settings_of(modifier: bpy.types.FModifier) -> dict[str, object]:
-    """Return all plain properties of a modifier."""
+def _add(fcurve: bpy.types.FCurve, settings: Mapping[str, Any]) -> None:
+    modifier = fcurve.modifiers.new(settings["type"])
+    set_settings(modifier, settings)
+    for point in settings.get("control_points", ()):
+        set_settings(modifier.control_points.add(point["frame"]), point)
+
+
+def _settings_of(modifier: bpy.types.FModifier) -> dict[str, Any]:
+    settings = {"type": modifier.type, **settings_of(modifier)}
+    if modifier.type == "ENVELOPE":
+        settings["control_points"] = [settings_of(point) for point in modifier.control_points]
+    return settings
+
+
+def settings_of(item: bpy.types.bpy_struct) -> dict[str, Any]:
+    """Return all plain properties of an F-curve or a modifier that can be set."""
     result = {}
-    for prop in modifier.bl_rna.properties:
+    for prop in item.bl_rna.properties:
         if not prop.is_readonly and prop.type not in ("POINTER", "COLLECTION"):
-            value = getattr(modifier, prop.identifier)
+            value = getattr(item, prop.identifier)
             result[prop.identifier] = tuple(value) if getattr(prop, "is_array", False) else value
     return result
 
 
-def set_settings(modifier: bpy.types.FModifier, settings: dict[str, object]) -> None:
-    """Set properties of a modifier, those first that others depend on."""
-    for name in sorted(settings, key=lambda name: (name != "mode", name != "poly_order", name != "frame_start")):
-        setattr(modifier, name, settings[name])
+def set_settings(item: bpy.types.bpy_struct, settings: Mapping[str, Any]) -> None:
+    """Set plain properties, those first that others depend on."""
+    names = (name for name in settings if name not in ("type", "control_points"))
+    for name in sorted(names, key=lambda name: (name != "mode", name != "poly_order", name != "frame_start")):
+        setattr(item, name, settings[name])

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -15,36 +14,22 @@ import numpy as np
 from ..evaluation.components import MODE_NAMES, PART_OF, ROTATION, ROWS, UNKNOWN, rows_left_to
 from ..evaluation.differences import seen_values
 from ..evaluation.sources import SAME_FRAME, TURN_AXES, Marks, Source
-from ..transforms import WIDTHS, Channel, Refused, Transform
+from ..transforms import Channel, Refused, Transform
 from .channels import Read, read_keys
 from .marks import carried_on, has_marks
 from .modifiers import is_term, on_top
-from .refusals import refuse_channel, refuse_drivers, refuse_linked, refuse_moving_deltas, refuse_numbers
+from .refusals import refuse_drivers, refuse_envelope, refuse_linked, refuse_moving_deltas, refuse_numbers
 from .slots import Binding
 
 FRACTIONS = 2**24
 """The number of digests that a term can keep as its influence, which is in single precision."""
 
 
-def read(binding: Binding, mode: int | None = None) -> Source:
-    """Return what is keyed of a transform in a slot.
-
-    Parameters
-    ----------
-    binding : Binding
-    mode : int, optional
-        Read it as if it had the mode of this number throughout.
-
-    Raises
-    ------
-    Refused
-        Where there can be no in-betweens of it.
-    """
+def read(binding: Binding) -> Source:
+    """Return what is keyed of a transform in a slot. `Refused` where there can be no in-betweens of it."""
     (source,) = keyed_in([binding])
     if isinstance(source, Refused):
         raise source
-    if mode is not None:
-        source = replace(source, mode=mode)
     refuse_numbers(binding.name, source)
     return source
 
@@ -52,13 +37,16 @@ def read(binding: Binding, mode: int | None = None) -> Source:
 def keyed_in(bindings: Sequence[Binding]) -> list[Source | Refused]:
     """Return what is keyed in each of several bindings, or why there can be no in-betweens of it.
 
-    Where several users of a slot differ in what in-betweens depend on, it is what the leading one of them has: that
-    which the terms that are there were planned from, or else the first one that the channels turn.
+    Where several users of a slot differ in what in-betweens depend on, it is what the leading one of them has.
 
     Numbers and modes are as they are, which may be any in a damaged file: see `refuse_numbers`.
     """
-    result = sources_of_users(bindings)
-    return [leading(binding, users) for binding, users in zip(bindings, result, strict=True)]
+    return list(map(leading, sources_of_users(bindings)))
+
+
+def leading(users: list[Source | Refused]) -> Source | Refused:
+    """Return the source of the user that most parts of a slot move, or the first of these."""
+    return max(users, key=lambda source: len(source.keyed) if isinstance(source, Source) else -1)
 
 
 def planned_from(binding: Binding) -> int | None:
@@ -82,92 +70,40 @@ def influence_for(source: Source, count: int) -> float:
     return (source.digest24 + count) % FRACTIONS / FRACTIONS
 
 
-def differing_users(binding: Binding, sources: list[Source | Refused]) -> list[Transform]:
-    """Return the users of a slot that another one's in-betweens do not fit.
-
-    `sources` is what is keyed as each of the users has it.
-    """
-    leader = leading(binding, sources)
-    if isinstance(leader, Refused):
-        return []
-    return [
-        user
-        for user, source in zip(binding.users, sources, strict=True)
-        if isinstance(source, Refused) or source.digest != leader.digest
-    ]
-
-
 def sources_of_users(bindings: Sequence[Binding]) -> list[list[Source | Refused]]:
     """Return what is keyed in each of the bindings as each of its users has it."""
-    result: list[list[_Keyed | Refused]] = []
     drivers: dict[bpy.types.ID, set[Channel]] = {}
-    for binding in bindings:
-        users: list[_Keyed | Refused] = []
-        for user in binding.users:
-            if user.animated not in drivers:
-                data = user.animated.animation_data
-                driving = () if data is None else data.drivers
-                drivers[user.animated] = {(item.data_path, item.array_index) for item in driving if not item.mute}
-            try:
-                users.append(_keyed_for(user, binding, drivers[user.animated]))
-            except Refused as problem:
-                users.append(problem)
-        result.append(users)
-    readable = [keyed for users in result for keyed in users if isinstance(keyed, _Keyed)]
-    channels = iter(read_keys([list(keyed.channels.values()) for keyed in readable]))
-    turns = iter(read_keys([keyed.turns for keyed in readable]))
-    return [
-        [
-            _source(keyed, binding, next(channels), next(turns)) if isinstance(keyed, _Keyed) else keyed
-            for keyed in users
-        ]
-        for binding, users in zip(bindings, result, strict=True)
-    ]
+
+    def source_of(user: Transform, binding: Binding) -> Source | Refused:
+        if user.animated not in drivers:
+            data = user.animated.animation_data
+            driving = () if data is None else data.drivers
+            drivers[user.animated] = {(item.data_path, item.array_index) for item in driving if not item.mute}
+        try:
+            return _source(user, binding, drivers[user.animated])
+        except Refused as problem:
+            return problem
+
+    return [[source_of(user, binding) for user in binding.users] for binding in bindings]
 
 
-def leading(binding: Binding, users: list[Source | Refused]) -> Source | Refused:
-    """Return the source of the leading user: see `keyed_in`."""
-    if len(users) == 1:
-        return users[0]
-    digest = planned_from(binding)
-    readable = [source for source in users if isinstance(source, Source)]
-    if not readable:
-        return users[0]
-
-    def precedence(source: Source) -> tuple[bool, int]:
-        return source.digest24 == digest, len(source.keyed)
-
-    return max(readable, key=precedence)
-
-
-class _Keyed(NamedTuple):
-    """Which channels of a slot one of its users is moved by."""
-
-    channels: dict[int, bpy.types.FCurve]
-    """The channels with keys, by the rows of their components."""
-
-    turns: list[bpy.types.FCurve]
-    """The channel of turns, if there is one with keys."""
-
-    others: dict[str, Any]
-    """What else a `Source` has of it."""
-
-
-def _keyed_for(user: Transform, binding: Binding, drivers: Collection[Channel]) -> _Keyed:
-    """Return what of a slot moves one of its users. `Refused` where there can be no in-betweens of it."""
+def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> Source:
+    """Return what is keyed in a slot as one of its users has it. `Refused` where there can be no in-betweens of it."""
     refuse_linked(user, binding)
     refuse_moving_deltas(user, binding, drivers)
     channels = user.channels
-    curves = {row: binding.curves.get(channel) for row, channel in channels.items()}
+    curves = {row: fcurve for row, channel in channels.items() if (fcurve := binding.curves.get(channel)) is not None}
     driven = {row for row, channel in channels.items() if channel in drivers}
-    muted = {row for row, fcurve in curves.items() if fcurve is not None and fcurve.mute}
-    left = rows_left_to(driven | muted)
-    some = {row: fcurve for row, fcurve in curves.items() if fcurve is not None and row not in left}
-    keyed = {row: fcurve for row, fcurve in some.items() if _has_say(user, fcurve)}
+    driven |= {row for row, fcurve in curves.items() if not fcurve.keyframe_points and fcurve.sampled_points}
+    still = driven | {row for row, fcurve in curves.items() if fcurve.mute}
+    left = rows_left_to(still)
+    keyed = {row: fcurve for row, fcurve in curves.items() if row not in left and fcurve.keyframe_points}
+    for fcurve in keyed.values():
+        refuse_envelope(user.name, fcurve)
     if not keyed:
-        refuse_drivers(user, binding, driven)
+        refuse_drivers(user, binding, still)
     curve = binding.curves.get(user.turns_channel)
-    turns = [curve] if curve is not None and _has_say(user, curve) else []
+    turns = [curve] if curve is not None and not curve.mute and curve.keyframe_points else []
     names = frozenset(map(PART_OF.__getitem__, keyed))
     if keyed and turns and ROWS[ROTATION].start not in left and any(key.co.y for key in turns[0].keyframe_points):
         names |= {ROTATION}  # It turns, with keys of its rotation or without.
@@ -176,28 +112,21 @@ def _keyed_for(user: Transform, binding: Binding, drivers: Collection[Channel]) 
         for row, (path, index) in channels.items()
         if row not in keyed and PART_OF[row] in names
     }
-    others = {
-        "order": user.order,
-        "keyed": names,
-        "rest": rest,
-        "original": user.original(),
-        "location_axes": user.location_axes,
-        "driven": frozenset(driven | muted),
-    }
-    return _Keyed(keyed, turns, others)
-
-
-def _source(keyed: _Keyed, binding: Binding, channels: list[Read], turns: list[Read]) -> Source:
-    """Return what is keyed in a slot, as one of its users has it, from the keys that were read of its channels."""
-    rows, goes_on = list(keyed.channels), any(read.keys.linear or read.keys.cycles is not None for read in channels)
-    axes = _said_by(turns)
+    channels, of_turns = read_keys(list(keyed.values())), read_keys(turns)
+    rows, goes_on = list(keyed), any(read.keys.linear or read.keys.cycles is not None for read in channels)
+    axes = _said_by(of_turns)
     return Source(
         channels=tuple(([rows[number] for number in read.numbers], read.keys) for read in channels),
         mode=_modes_in(channels),
-        turns=turns[0].keys if turns else None,
+        turns=of_turns[0].keys if of_turns else None,
         turns_axis=TURN_AXES[0] if axes is None else replace(axes, numbers=axes.numbers % len(TURN_AXES)),
         seen=binding.slot.seen if goes_on else None,
-        **keyed.others,
+        order=user.order,
+        keyed=names,
+        rest=rest,
+        original=user.original(),
+        location_axes=user.location_axes,
+        driven=frozenset(still),
     )
 
 
@@ -222,38 +151,20 @@ def _said_by(reads: list[Read]) -> Marks | None:
     order = np.lexsort((marks == 0, frames))
     frames, marks = frames[order], marks[order]
     # What is no number is no frame that there was, either.
-    first = ~(np.diff(frames, prepend=-np.inf) <= SAME_FRAME)
+    with np.errstate(invalid="ignore"):
+        first = ~(np.diff(frames, prepend=-np.inf) <= SAME_FRAME)
     return Marks(frames[first], carried_on(marks[first]) - 1)
-
-
-def _has_say(user: Transform, fcurve: bpy.types.FCurve) -> bool:
-    """Return whether a channel has keys that count. `Refused` where there is no way to put in-betweens into it."""
-    if fcurve.mute:
-        return False
-    has_keys = len(fcurve.keyframe_points) > 0
-    if fcurve.modifiers or not has_keys:
-        refuse_channel(user.name, fcurve)
-    return has_keys
 
 
 def is_marked(binding: Binding) -> bool:
     """Return whether the keys of a slot say a mode, Blender's own among them."""
-    return any(map(has_marks, _moving(binding)))
+    return any(fcurve.keyframe_points and has_marks(fcurve) for fcurve in binding.moving.values())
 
 
 def modes_said(binding: Binding) -> int | Marks:
     """Return the modes that the keys of a slot say, as a `Source` has them."""
-    (reads,) = read_keys([[fcurve for fcurve in _moving(binding) if not fcurve.mute]])
-    return _modes_in(reads)
-
-
-def _moving(binding: Binding) -> list[bpy.types.FCurve]:
-    """Return the channels of location, rotation and scale in a slot that have keys."""
-    return [
-        fcurve
-        for (path, _), fcurve in binding.curves.items()
-        if path.removeprefix(binding.prefix) in WIDTHS and fcurve.keyframe_points
-    ]
+    keyed = [fcurve for fcurve in binding.moving.values() if fcurve.keyframe_points and not fcurve.mute]
+    return _modes_in(read_keys(keyed))
 
 
 def added_values(binding: Binding, user: Transform, source: Source, frames: np.ndarray) -> np.ndarray:

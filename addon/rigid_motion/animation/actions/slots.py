@@ -6,9 +6,8 @@ A slot may have several users, and moves transforms of each: the object itself, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
 
 import bpy
 import numpy as np
@@ -44,7 +43,7 @@ class Slot:
 
     @property
     def channelbag(self) -> bpy.types.ActionChannelbag | None:
-        slot = slot_with(self.action, self.handle)
+        slot = next((slot for slot in self.action.slots if slot.handle == self.handle), None)
         return None if slot is None else action_get_channelbag_for_slot(self.action, slot)
 
     @property
@@ -73,21 +72,14 @@ class Binding:
     prefix: str
     """From the user to what is moved, in data paths: none for the user itself."""
 
-    channelbag: bpy.types.ActionChannelbag | None
-    """The channelbag with the F-curves of the slot."""
-
     users: tuple[Transform, ...]
-    find: Callable[[], Mapping[str, Curves]]
-    """Looks for the F-curves under its prefix, and those under others along with them."""
 
-    @cached_property
-    def curves(self) -> Curves:
-        """Its F-curves; looked for when they are first asked for."""
-        return self.find()[self.prefix]
+    curves: Curves
+    """Its F-curves, those that were made meanwhile included."""
 
     @property
-    def kind(self) -> type[Transform]:
-        return type(self.users[0])
+    def channelbag(self) -> bpy.types.ActionChannelbag | None:
+        return self.slot.channelbag
 
     @property
     def name(self) -> str:
@@ -119,64 +111,19 @@ class Binding:
 
 def bindings_in_slot(slot: Slot, prefixes: Collection[str] | None = None) -> list[Binding]:
     """Return what a slot moves, transform by transform: these, or all that it has something of."""
-    channelbag = slot.channelbag
-    if prefixes is not None:
-        return _bindings(slot, channelbag, prefixes, cache(partial(_curves_under, channelbag, prefixes)))
-    curves: dict[str, Curves] = {"": {}}
+    curves: dict[str, Curves] = {prefix: {} for prefix in (("",) if prefixes is None else prefixes)}
     for fcurve in slot.fcurves:
         path = fcurve.data_path
         prefix, prop = split_path(path)
-        if prefix in curves or prop in WIDTHS or prop == TURNS_PROPERTY:
-            curves.setdefault(prefix, {})[path, fcurve.array_index] = fcurve
-    return bindings_with(slot, channelbag, curves)
-
-
-def read_again(bindings: Sequence[Binding]) -> list[Binding]:
-    """Return these bindings with the F-curves that there are by now."""
-    prefixes: dict[Slot, dict[str, None]] = {}
-    for binding in bindings:
-        prefixes.setdefault(binding.slot, {})[binding.prefix] = None
-    result = {
-        (slot, binding.prefix): binding
-        for slot, of_slot in prefixes.items()
-        for binding in bindings_in_slot(slot, of_slot)
-    }
-    return [result[binding.slot, binding.prefix] for binding in bindings]
-
-
-def bindings_with(
-    slot: Slot, channelbag: bpy.types.ActionChannelbag | None, curves: Mapping[str, Curves]
-) -> list[Binding]:
-    """Return what a slot moves by these F-curves, transform by transform: all there are of each prefix."""
-    return _bindings(slot, channelbag, curves, lambda: curves)
-
-
-def _bindings(
-    slot: Slot,
-    channelbag: bpy.types.ActionChannelbag | None,
-    prefixes: Iterable[str],
-    find: Callable[[], Mapping[str, Curves]],
-) -> list[Binding]:
-    bindings = (Binding(slot, prefix, channelbag, _users_of(slot, prefix), find) for prefix in prefixes)
-    return [binding for binding in bindings if binding.users]
-
-
-def _curves_under(channelbag: bpy.types.ActionChannelbag | None, prefixes: Iterable[str]) -> dict[str, Curves]:
-    curves: dict[str, Curves] = {prefix: {} for prefix in prefixes}
-    for fcurve in () if channelbag is None else channelbag.fcurves:
-        path = fcurve.data_path
-        if (of_prefix := curves.get(split_path(path)[0])) is not None:
-            of_prefix[path, fcurve.array_index] = fcurve
-    return curves
-
-
-def _users_of(slot: Slot, prefix: str) -> tuple[Transform, ...]:
-    """Return what a prefix stands for in each of the users of a slot that has it."""
-    return tuple(user for obj in slot.users if (user := transform_in(obj, prefix)) is not None)
-
-
-def slot_with(action: bpy.types.Action, handle: int) -> bpy.types.ActionSlot | None:
-    return next((slot for slot in action.slots if slot.handle == handle), None)
+        if prefixes is None and (prop in WIDTHS or prop == TURNS_PROPERTY):
+            curves.setdefault(prefix, {})
+        if prefix in curves:
+            curves[prefix][path, fcurve.array_index] = fcurve
+    result = []
+    for prefix, of_prefix in curves.items():
+        if users := tuple(user for obj in slot.users if (user := transform_in(obj, prefix)) is not None):
+            result.append(Binding(slot, prefix, users, of_prefix))
+    return result
 
 
 def bindings_of(transforms: Iterable[Transform]) -> list[Binding]:
@@ -204,33 +151,25 @@ def bindings_for(transform: Transform) -> list[Binding]:
 
 def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
     """Return the slots that move these objects, in Actions of their own and in NLA strips; each once."""
-    known = {obj: slots_alone(obj) for obj in objects}
-    desired = {slot.key for slots in known.values() for slot in slots}
-    return _slots({action for action, _ in desired}, lambda slot: slot.key in desired, known)
+    desired = {slot.key for obj in objects for slot in slots_alone(obj)}
+    return [slot for slot in slots_in(action for action, _ in desired) if slot.key in desired]
 
 
 def slots_in(actions: Iterable[bpy.types.Action]) -> list[Slot]:
-    """Return the slots of these Actions that move an object."""
-    actions = set(actions)
-    return _slots(actions, lambda slot: slot.action in actions, {})
+    """Return the slots of these Actions that move an object.
 
-
-def _slots(
-    actions: set[bpy.types.Action],
-    is_desired: Callable[[Slot], bool],
-    known: Mapping[bpy.types.Object, list[Slot]],
-) -> list[Slot]:
-    """Return slots of these Actions, by the names of their users, and of one user from the bottom of its NLA to the
-    top: what depends on the order comes out the same whichever was edited.
+    They are ordered by the names of their users, and those of one user from the bottom of its NLA to the top: what
+    depends on the order comes out the same whichever was edited.
     """
+    actions = set(actions)
     if not actions:
         return []
     # A slot's own list of users may have some that are gone, which crashes Blender 5.2.
     owners = bpy.data.user_map(subset=actions, key_types={"ACTION"}, value_types={"OBJECT"})
     same: dict[tuple[bpy.types.Action, int], list[Slot]] = {}
     for obj in sorted(set().union(*owners.values()), key=lambda obj: obj.name_full):
-        for slot in known[obj] if obj in known else slots_alone(obj):
-            if is_desired(slot):
+        for slot in slots_alone(obj):
+            if slot.action in actions:
                 same.setdefault(slot.key, []).append(slot)
     return [
         Slot(*key, tuple(slot.users[0] for slot in slots), frozenset().union(*(slot.strips for slot in slots)))
@@ -247,30 +186,21 @@ def slots_alone(obj: bpy.types.Object) -> list[Slot]:
     # Some of Blender's operators leave the handle of a slot that is no longer there.
     if data.action is not None and (slot := data.action_slot) is not None:
         result[data.action, slot.handle] = {None}
-    if len(data.nla_tracks):
-        for strip in strips_of(obj):
-            if (action := strip.action) is not None and (slot := strip.action_slot) is not None:
-                span = int(np.floor(strip.action_frame_start)), int(np.ceil(strip.action_frame_end))
-                result.setdefault((action, slot.handle), set()).add(span)
+    for strip in strips_in(data.nla_tracks):
+        if (action := strip.action) is not None and (slot := strip.action_slot) is not None:
+            span = int(np.floor(strip.action_frame_start)), int(np.ceil(strip.action_frame_end))
+            result.setdefault((action, slot.handle), set()).add(span)
     return [Slot(*key, (obj,), frozenset(strips)) for key, strips in result.items()]
 
 
-def active_fcurves(animated: bpy.types.Object) -> bpy.types.bpy_prop_collection | tuple:
-    """Return the F-curves of an object's slot. Looks at nothing else in the file, for it is asked of many objects."""
-    data = animated.animation_data
-    if data is None or data.action is None or data.action_slot is None:
-        return ()
-    channelbag = action_get_channelbag_for_slot(data.action, data.action_slot)
-    return () if channelbag is None else channelbag.fcurves
+def active_fcurves(animated: bpy.types.Object) -> Iterable[bpy.types.FCurve]:
+    """Return the F-curves of an object's slot, without a look at anything else in the file."""
+    return next((slot.fcurves for slot in slots_alone(animated) if slot.plays_in(animated)), ())
 
 
-def strips_of(obj: bpy.types.Object) -> Iterator[bpy.types.NlaStrip]:
-    """Return the strips in the NLA of an object, those in strips of strips among them."""
-    return with_inner_strips(strip for track in obj.animation_data.nla_tracks for strip in track.strips)
-
-
-def with_inner_strips(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
-    """Yield strips, and those in strips of strips."""
-    for strip in strips:
-        yield strip
-        yield from with_inner_strips(strip.strips)
+def strips_in(owners: Iterable[bpy.types.NlaTrack | bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
+    """Yield the strips in NLA tracks, and those in strips of strips."""
+    for owner in owners:
+        for strip in owner.strips:
+            yield strip
+            yield from strips_in((strip,))

@@ -6,6 +6,8 @@ and `unbake` puts the keys back that there were.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
@@ -19,10 +21,10 @@ from ..actions.slots import Binding
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable
 from ..edits.mode_keys import set_mode_in
 from ..evaluation.components import PART_OF, SCALE
-from ..evaluation.sources import SAME_FRAME, Source, distinct
-from ..transforms import WIDTHS, Channel, ObjectTransform, Refused, Transform, transform_of
-from .motions import continuous_values, rotation_values
-from .originals import BAKED, Originals, has_original, put_back, refuse_without_original
+from ..evaluation.sources import Source, distinct
+from ..transforms import WIDTHS, Channel, Refused, Transform, transform_of
+from .motions import continuous_values, rotation_values, without
+from .originals import BAKED, Originals, last_change, put_back, refuse_without_original
 
 POINTS = ("co", "handle_left", "handle_right")
 """What a key has of frame and value."""
@@ -31,25 +33,12 @@ POINTS = ("co", "handle_left", "handle_right")
 def bake_poses(obj: bpy.types.Object, frames: np.ndarray, poses: Poses, *, key_type: str = "GENERATED") -> None:
     """Key `obj` with one pose per frame, straight lines between them.
 
-    Parameters
-    ----------
-    obj : bpy.types.Object
-        Its location, rotation and (where poses have scales) scale channels are replaced.
-    frames : array, shape (n,)
-        Rising; sub-frames allowed.
-    poses : Poses, shape (n,)
-        In the object's parent space: the channels' own.
-    key_type : str
-        GENERATED, as Blender has it for keys that a program made and may remove again.
-
-    Raises
-    ------
-    ValueError
-        Where frames and poses differ in number.
+    Its location, rotation and (where poses have scales) scale channels are replaced. Frames (n,) rise, poses (n,) are
+    those of the channels. A ValueError says where they differ in number.
     """
     if poses.shape != np.shape(frames):
         raise ValueError(f"{obj.name}: {np.shape(frames)} frames do not fit poses of shape {poses.shape}")
-    order, rotation = ObjectTransform(obj).order, ObjectTransform(obj).rotation
+    order, rotation = Transform(obj).order, Transform(obj).rotation
     turns = rotation_values(poses.quaternions, np.zeros(4), order)[: WIDTHS[rotation]].T
     channels = [("location", poses.positions), (rotation, turns)]
     if poses.scales is not None:
@@ -105,42 +94,42 @@ def unbake(targets: Targets, *, refused: list[Refused] | None = None) -> None:
     go_back(targets, BAKED, refused)
 
 
-def go_back(targets: Targets, kind: str, refused: list[Refused] | None) -> None:
-    """Give targets, and all that moves by the same Actions, the keys back from before they were changed so."""
-    apply_edit(
-        targets,
-        lambda transform, readings: bindings_with_original(transform, kind, readings),
-        lambda transform, bindings: put_back(transform, kind, bindings),
-        refused,
-    )
+def go_back(
+    targets: Targets,
+    kind: str,
+    refused: list[Refused] | None,
+    by: Callable[[Transform, str, Iterable[Binding]], None] = put_back,
+) -> None:
+    """Give targets, and all that moves by the same Actions, the keys back from before they were changed so.
 
+    Or do something else to what is kept of these, `by` a function.
+    """
 
-def bindings_with_original(transform: Transform, kind: str, readings: Readings) -> list[Binding]:
-    """Return what moves something. `Refused` where its keys are not of this kind, or belong to another file."""
-    refuse_without_original(transform, kind)
-    for binding, _ in readings:
-        refuse_linked(transform, binding)
-    return [binding for binding, _ in readings]
+    def plan(transform: Transform, readings: Readings) -> list[Binding]:
+        refuse_without_original(transform, kind)
+        for binding, _ in readings:
+            refuse_linked(transform, binding)
+        return [binding for binding, _ in readings]
+
+    apply_edit(targets, plan, lambda transform, bindings: by(transform, kind, bindings), refused)
 
 
 def is_baked(target: Target) -> bool:
     """Return whether something moves by baked keys, and those from before are still in the file."""
-    return has_original(transform_of(target), BAKED)
+    return last_change(transform_of(target)) == BAKED
 
 
 def _range(transform: Transform, binding: Binding, source: Source) -> tuple[float, float]:
-    """Return the first and the last frame to bake: of the keys, or of all that is seen where those go on."""
+    """Return the first and the last frame to bake: of the keys, or of all that is seen where anything goes on."""
     modifiers = _modifiers(transform, binding, source)
     if source.cyclic is not None and not modifiers:
         # Cycles go on from the outermost keys.
         begin, end = source.cyclic.times[[0, -1]].tolist()
         return begin, end
-    if source.goes_on:
-        return tuple(map(float, source.seen_range))
-    # Holds show what is between keys behind these, too.
-    (begin, end), holds = source.keyed_range, [item for item in modifiers if item.type == "STEPPED"]
-    longest = max((hold.frame_step for hold in holds), default=0.0)
-    return begin - (longest if any(begin < hold.frame_offset for hold in holds) else 0.0), end + longest
+    begin, end = source.keyed_range
+    if source.goes_on or modifiers:
+        begin, end = min(begin, binding.slot.seen[0]), max(end, binding.slot.seen[1])
+    return begin, end
 
 
 def _modifiers(transform: Transform, binding: Binding, source: Source) -> list[bpy.types.FModifier]:
@@ -160,12 +149,7 @@ def _frames(source: Source, begin: float, end: float, step: float) -> np.ndarray
     """Return every step from begin to end, and the keys in between."""
     keys = distinct(source.keyed_frames)
     frames = np.append(begin + step * np.arange(np.floor((end - begin) / step + 1e-9) + 1), end)
-    return distinct(np.union1d(_without(frames, keys), keys))
-
-
-def _without(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the frames that are none of the others; both rise."""
-    return frames[np.searchsorted(others, frames - SAME_FRAME) == np.searchsorted(others, frames + SAME_FRAME)]
+    return distinct(np.union1d(without(frames, keys), keys))
 
 
 def _bake_place(transform: Transform, binding: Binding, source: Source, frames: np.ndarray, interpolation: str) -> None:
@@ -189,7 +173,7 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     """Put keys on these frames, all of this interpolation, beside those that there are."""
     old, code = key_fields(fcurve.keyframe_points), code_of("interpolation", interpolation)
     at = old["co"][:, 0]
-    added = _without(frames, at)
+    added = without(frames, at)
     new = empty_key_fields(len(added))
     new["type"][:] = code_of("type", "GENERATED")
     for name in POINTS:

@@ -1,16 +1,12 @@
-"""How transforms and whole rigs move as their channels say: poses for the search for keys, affine maps for its proof.
+"""How objects and their bones move as their channels say: poses for the search for keys, affine maps for its proof.
 
-Bones are numbered as the rig has them. Moments are the frames that are looked at, those between and around samples
-among them. Poses are those that the channels give: constraints and drivers have no part in it, and of the bones that
-follow these it is told which they are.
+Constraints and drivers have no part in it: of the bones that follow these it is told which they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from copy import copy
-from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -18,21 +14,18 @@ import numpy as np
 from ...motion import Poses
 from ...motion.affine import AffineMaps, ball_displacement, displacement_over, largest_displacement
 from ...motion.quaternions import align_signs, matrices, multiply
-from ..actions.modifiers import on_top
-from ..actions.reading import sources_of_users
-from ..actions.refusals import refuse_numbers
-from ..actions.slots import Slot, bindings_in_slot, slots_alone
+from ..actions.slots import Slot, slots_alone
 from ..evaluation.bodies import turn_into_quaternions
 from ..evaluation.channel_values import channel_values
 from ..evaluation.components import LOCATION, REST, ROTATION, ROWS, SCALE
 from ..evaluation.differences import channel_differences, seen_values
-from ..evaluation.sources import Source
+from ..evaluation.sources import SAME_FRAME, Source
 from ..fcurves.keys import LARGEST
-from ..transforms import WIDTHS, Channel, Refused, Transform, is_part, split_path, transform_of
+from ..transforms import WIDTHS, Channel, Transform
 from ..transforms.posing import Hierarchy
-from ..transforms.sizes import into_scene, reaches_of, scale_in_scene
+from ..transforms.sizes import into_scene, radius_of, reaches_of, scale_in_scene
 
-MOVING = {*WIDTHS, "rotation_axis_angle", "rotation_mode"}
+MOVING = {*WIDTHS, "rotation_mode"}
 """Properties of bones that a driver moves them by."""
 
 CHAINS = ("IK", "SPLINE_IK")
@@ -41,29 +34,17 @@ CHAINS = ("IK", "SPLINE_IK")
 SMALLEST = 1e-6
 """Errors of single precision, relative to how far something gets."""
 
+LEAST_SCALE = 1e-6
+"""The scale that the search takes for one of zero."""
 
 AT_ONCE = 2**17
 """Transforms times frames that are worked out in one go."""
 
 
-class NotPromised(NamedTuple):
-    """The names of the bones that a tolerance is not promised for."""
-
-    followers: tuple[str, ...] = ()
-    """Those that follow constraints or drivers."""
-
-    below: tuple[str, ...] = ()
-    """Those that hang on these."""
-
-    def __bool__(self) -> bool:
-        return bool(self.followers)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.followers or name in self.below
-
-
-def not_promised(rig: bpy.types.Object) -> NotPromised:
-    """Return the bones of a rig whose motion is not that of their channels, and of those above them, alone."""
+def not_promised(rig: bpy.types.Object) -> tuple[str, ...]:
+    """Return the names of the bones that a tolerance is not promised for: they follow constraints or drivers, or hang
+    on what does.
+    """
     drivers = () if rig.animation_data is None else list(rig.animation_data.drivers)
     driven = {driver.data_path for driver in drivers if not driver.mute}
     animated = {fcurve.data_path for slot in slots_alone(rig) for fcurve in slot.fcurves}
@@ -81,11 +62,12 @@ def not_promised(rig: bpy.types.Object) -> NotPromised:
                     count = constraint.chain_count - getattr(constraint, "use_tail", True)
                     above = bone.parent_recursive[:count] if constraint.chain_count else bone.parent_recursive
                     followers |= {parent.name for parent in above}
-    below = {bone.name for bone in bones if any(parent.name in followers for parent in bone.parent_recursive)}
-    names = [bone.name for bone in bones]
-    return NotPromised(
-        tuple(name for name in names if name in followers), tuple(name for name in names if name in below - followers)
-    )
+    return tuple(bone.name for bone in bones if any(item.name in followers for item in (bone, *bone.parent_recursive)))
+
+
+def without(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return the frames that are none of the others, which rise, to Blender."""
+    return frames[np.searchsorted(others, frames - SAME_FRAME) == np.searchsorted(others, frames + SAME_FRAME)]
 
 
 def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Poses, AffineMaps]:
@@ -122,17 +104,15 @@ def shown_together(
 def evaluated(
     transform: Transform, curves: Mapping[Channel, bpy.types.FCurve], frames: np.ndarray
 ) -> tuple[Poses, AffineMaps]:
-    """Return what `shown` does as Blender evaluates F-curves, for what makes no source or has more to it than keys."""
+    """Return what `shown` does as Blender evaluates F-curves, whatever these are."""
     rest = transform.components()
     rows = np.tile(rest[:, None], (1, len(frames)))
     for row, channel in transform.channels.items():
         fcurve = curves.get(channel)
         if fcurve is not None and not fcurve.mute and not fcurve.is_empty:
             rows[row] = [fcurve.evaluate(frame) for frame in frames.tolist()]
-    for part in ROWS.values():
-        if not (np.abs(rows[part]) < LARGEST).all():
-            rows[part] = rest[part, None]
-    return _placed(transform, rows, REST)
+    rows = np.where(np.abs(rows) < LARGEST, rows, rest[:, None])
+    return _placed(transform, rows, transform.original())
 
 
 def _placed(transform: Transform, rows: np.ndarray, delta: np.ndarray) -> tuple[Poses, AffineMaps]:
@@ -173,172 +153,151 @@ def rotation_values(quaternions: np.ndarray, first: np.ndarray, order: str | Non
     return channel_values(poses, np.array([count]), progress, ends, REST[:, None], order)[ROWS[ROTATION]]
 
 
-class RigMotion:
-    """The bones of a rig on frames (m,) of an Action, as they were recorded and as they are by now.
+class BodyMotion:
+    """An object and bones of it on frames (m,) of an Action, as they were recorded and as they are by now.
 
-    `sources` is what is keyed of bones, by their numbers, where that is read already. The radius is that of the ball
-    around every bone's head, in the scene's units; as far as each bone reaches where None.
+    They are *joints*: the object is number 0, and carries the bones. Its parents are where they are now.
+
+    Parameters
+    ----------
+    joints : sequence of Transform
+        The object, alone or with all bones that it has.
+    slot : Slot
+        What moves them.
+    sources : mapping
+        What is keyed of those that may get other keys, by their numbers.
+    frames : array, shape (m,)
+    radius : float, optional
+        Of the ball around each bone's head, or around the origin of an object alone, in the scene's units. As far as
+        each of them reaches where None.
     """
 
     def __init__(
-        self, rig: bpy.types.Object, slot: Slot, sources: Mapping[int, Source], frames: np.ndarray, radius: float | None
+        self,
+        joints: Sequence[Transform],
+        slot: Slot,
+        sources: Mapping[int, Source],
+        frames: np.ndarray,
+        radius: float | None,
     ) -> None:
-        self.rig, self.bones = rig, list(rig.pose.bones)
-        self.transforms = [transform_of(bone) for bone in self.bones]
-        self.hierarchy, scale = Hierarchy(self.bones), scale_in_scene(transform_of(rig))
-        reaches = {} if radius else reaches_of(rig)
-        self.radii = np.array([radius / scale if radius else reaches[bone.name] for bone in self.bones])
-        keyed, self._curves = _keyed_in(rig, slot)
-        self._recorded = {
-            number: source
-            for number, transform in enumerate(self.transforms)
-            if (source := sources.get(number) or keyed.get(transform.prefix)) is not None
-        }
-        self._carrier = self._recorded_carrier = keyed.get("")
+        self.joints, self._sources = joints, sources
+        (obj, *bones), size = [joint.carrier for joint in joints], scale_in_scene(joints[0])
+        self.hierarchy = Hierarchy(bones)
+        self.parents = np.append(-1, self.hierarchy.parents + 1)
+        if bones:
+            reaches = {} if radius else reaches_of(obj)
+            self.radii = np.array([0.0, *(radius / size if radius else reaches[bone.name] for bone in bones)])
+        else:
+            self.radii = np.array([(radius or radius_of(obj)) / size])
+        self._curves = {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in slot.fcurves}
+        self._parent = AffineMaps(into_scene(joints[0]), np.zeros(3))
         self.poses = self._look_at(frames)
-        """Poses of each bone's channels, each of shape (m,)."""
-        self.unit = float(np.linalg.norm(self.world.axes, 2, axis=(-2, -1)).max()) or 1.0
-        """The length of the rig's unit of length in the scene, at most."""
-        sizes = np.sqrt(np.einsum("...ij,...ij->...j", self._posed.axes, self._posed.axes).max(axis=-1))
-        away = np.linalg.norm(self._posed.origins, axis=-1) + self.radii[:, None] * sizes
-        self.extent = float(away.max())
-        """The distance that any bone's ball gets from the rig's origin, in its unit."""
-        self.rounding = SMALLEST * self.unit * self.extent
+        """Poses of each joint's channels, each of shape (m,)."""
+        sizes = np.maximum(self.poses[0].scales / (self.poses[0].scales[0] or 1.0), LEAST_SCALE)
+        self.unit = float((np.linalg.norm(self.truth.axes[0], 2, axis=(-2, -1)) / sizes).max()) or 1.0
+        """The length of the unit of bones, and of an object at its first size, in the scene, at most."""
+        sizes = np.sqrt(np.einsum("...ij,...ij->...j", self.truth.axes, self.truth.axes).max(axis=-1))
+        away = np.linalg.norm(self.truth.origins - self.truth.origins[0], axis=-1) + self.radii[:, None] * sizes
+        self.extent = float(away.max()) / self.unit
+        """The distance that any ball gets from the object's origin, in that unit."""
+        moved = float(np.abs(self.truth.origins[0]).max()) if 0 in sources else 0.0
+        self.rounding = SMALLEST * (moved + float(away.max()))
 
     def _look_at(self, frames: np.ndarray) -> list[Poses]:
-        """Have all bones be as they were recorded on these frames, and return the poses of their channels."""
+        """Have all joints be as they were recorded on these frames, and return the poses of their channels."""
         self.frames = frames
         self._shown: dict[int, Source | None] = {}
-        recorded = [self.transforms[number] for number in self._recorded]
-        known = dict(zip(recorded, shown_together(recorded, [*self._recorded.values()], frames), strict=True))
-        result = [
-            known.get(transform) or evaluated(transform, self._curves.get(transform.prefix, {}), frames)
-            for transform in self.transforms
-        ]
-        self._channels = AffineMaps(
-            np.stack([maps.axes for _, maps in result]), np.stack([maps.origins for _, maps in result])
-        )
-        self._recorded_channels = self._channels.copy()
-        self._posed = self.hierarchy.posed(self._channels)
-        self.world = self._carried_by(self._recorded_carrier)
-        """The place of the rig, shape (m,) or (1,)."""
-        self._carried = self._carried_by(self._carrier)
-        self.truth = self.world @ self._posed
-        """The positions of the bones in the scene, shape (bones, m)."""
+        keyed = shown_together([self.joints[number] for number in self._sources], [*self._sources.values()], frames)
+        known = dict(zip(self._sources, keyed, strict=True))
+        result = [known.get(n) or evaluated(joint, self._curves, frames) for n, joint in enumerate(self.joints)]
+        axes, origins = (np.stack([getattr(maps, name) for _, maps in result]) for name in ("axes", "origins"))
+        self._recorded = AffineMaps(axes, origins)
+        self._channels, self._posed = self._recorded.copy(), self._recorded.copy()
+        self._pose(range(len(result)))
+        self.truth = self.now()
+        """Where the joints are in the scene as recorded, shape (joints, m)."""
         return [poses for poses, _ in result]
 
-    def at(self, frames: np.ndarray) -> RigMotion:
-        """Return the same rig on other frames, its bones as they were recorded."""
+    def at(self, frames: np.ndarray) -> BodyMotion:
+        """Return the same joints on other frames, as they were recorded."""
         result = copy(self)
-        result.poses = []
-        result._look_at(frames)
+        result.poses = result._look_at(frames)
         return result
 
-    def _carried_by(self, source: Source | None) -> AffineMaps:
-        """Return where the rig itself is, by its own keys or as it stands. Its parents are where they are now."""
-        transform = transform_of(self.rig)
-        if source is None:
-            world = np.array(self.rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
-            return AffineMaps(world[None, :3, :3], world[None, :3, 3])
-        return AffineMaps(into_scene(transform), np.zeros(3)) @ shown(transform, source, self.frames)[1]
-
-    def carry(self, source: Source) -> None:
-        """Let the rig itself be moved by other keys."""
-        self._carrier, self._carried = source, self._carried_by(source)
-
-    def among(self, moments: np.ndarray) -> RigMotion:
-        """Return the same rig at some of its moments, by a mask (m,)."""
-        result = copy(self)
-        result.poses, result.frames, result._shown = [], self.frames[moments], dict(self._shown)
-        for name in ("_channels", "_recorded_channels", "_posed", "truth", "world", "_carried"):
-            maps = getattr(self, name)
-            setattr(result, name, maps if maps.axes.shape[-3] == 1 else maps[..., moments])
-        return result
+    def _pose(self, numbers: Collection[int]) -> None:
+        """Have these joints, and all that hang on them, be where their channels put them: bones in the rig's space."""
+        if 0 in numbers:
+            self._posed[0] = self._parent @ self._channels[0]
+        self.hierarchy.pose([number - 1 for number in numbers if number], self._channels[1:], self._posed[1:])
 
     def show(self, sources: Mapping[int, Source | None]) -> None:
-        """Let bones be moved by other keys, or as they were where it is None."""
+        """Let joints be moved by other keys, or as they were where it is None."""
         changed = {number: source for number, source in sources.items() if source is not self._shown.get(number)}
         now = {number: source for number, source in changed.items() if source is not None}
-        shown_now = shown_together([self.transforms[number] for number in now], [*now.values()], self.frames)
-        for number, (_, maps) in zip(now, shown_now, strict=True):
-            self._channels[number] = maps
-        for number in changed.keys() - now.keys():
-            self._channels[number] = self._recorded_channels[number]
+        shown_now = shown_together([self.joints[number] for number in now], [*now.values()], self.frames)
+        maps_now = {number: maps for number, (_, maps) in zip(now, shown_now, strict=True)}
+        for number in changed:
+            self._channels[number] = maps_now.get(number) or self._recorded[number]
         self._shown |= changed
-        self.hierarchy.pose(changed, self._channels, self._posed)
+        self._pose(changed)
 
-    def now(self, number: int | slice = slice(None)) -> AffineMaps:
-        """Return where a bone, or all of them, are in the scene by now, shape (m,) or (bones, m)."""
-        return self._carried @ self._posed[number]
-
-    def passes_zero(self, number: int) -> bool:
-        """Return whether the scale of a bone's channels changes, and is zero or another way round at times."""
-        volumes = np.linalg.det(self._recorded_channels[number].axes)
-        return bool(np.ptp(volumes) > 0.0 and volumes.min() <= 0.0 <= volumes.max())
+    def now(self) -> AffineMaps:
+        """Return where all joints are in the scene by now, shape (joints, m)."""
+        result = self._posed[0] @ self._posed
+        result[0] = self._posed[0]
+        return result
 
     def above(self, number: int) -> Iterator[int]:
-        """Yield a bone and all that it hangs on."""
+        """Yield a joint and all that it hangs on."""
         while number >= 0:
             yield number
-            number = int(self.hierarchy.parents[number])
+            number = int(self.parents[number])
 
     def over(self, allowed: float, weights: np.ndarray) -> list[tuple[float, int, int]]:
-        """Return where errors are over what is allowed: weighted error, bone and moment, the largest first.
+        """Return where errors are over what is allowed: weighted error, joint and moment, the largest first.
 
-        `weights` are of shape (bones, m).
+        `weights` are of shape (joints, m).
         """
-        result = []
-        for number, (radius, weight) in enumerate(zip(self.radii, weights, strict=True)):
-            errors = displacement_over(self.now(number), self.truth[number], radius, allowed / weight.max()) * weight
-            at = np.flatnonzero(~(errors <= allowed))
-            result += [(error, number, moment) for error, moment in zip(errors[at].tolist(), at.tolist(), strict=True)]
-        return sorted(result, reverse=True)
+        now = self.now()
+        of_joints = (
+            displacement_over(now[number], self.truth[number], radius, allowed / weight.max()) * weight
+            for number, (radius, weight) in enumerate(zip(self.radii, weights, strict=True))
+        )
+        errors = np.stack([*of_joints])
+        at = np.nonzero(~(errors <= allowed))
+        return sorted(zip(errors[at].tolist(), *(part.tolist() for part in at), strict=True), reverse=True)
+
+    def largest_errors(self) -> np.ndarray:
+        """Return the largest displacement of any point in each joint's ball, in the scene's units, shape (joints,)."""
+        now, truth = self.now(), self.truth
+        return np.array([largest_displacement(now[n], truth[n], radius) for n, radius in enumerate(self.radii)])
 
     def to_blame(self, number: int, moment: int, among: Iterable[int], share: float) -> list[int]:
-        """Return which of these bones, as they were recorded, would take a bone's error at a moment to a share of it.
+        """Return which of these joints, as they were recorded, would take a joint's error at a moment to a share of it.
 
         They are few: that which helps most is the first, and so on. None where all of them would not.
         """
         chain, left, result = [*self.above(number)][::-1], list(among), []
-        now, recorded = self._channels[chain, moment], self._recorded_channels[chain, moment]
-        truth, world = self.truth[number, moment], self._carried[moment if len(self._carried.axes) > 1 else 0]
-        least = share * ball_displacement(self.now(number)[moment], truth, self.radii[number])
+        least = share * self._displaced(number, moment, self._channels[chain, moment, None])[0]
         while left:
-            above = None
-            for row, item in enumerate(chain):
-                restored = np.isin(left, item) | (item in result)
-                axes = np.where(restored[:, None, None], recorded.axes[row], now.axes[row])
-                channels = AffineMaps(axes, np.where(restored[:, None], recorded.origins[row], now.origins[row]))
-                above = self.hierarchy.placed(item, channels, above)
-            assert above is not None  # the bone itself is the last of its chain
-            errors = ball_displacement(world @ above, truth[None], np.full(len(left), self.radii[number]))
+            restored = np.array([np.isin(left, item) | (item in result) for item in chain])
+            both = [maps[chain, moment, None] for maps in (self._recorded, self._channels)]
+            axes = np.where(restored[..., None, None], both[0].axes, both[1].axes)
+            channels = AffineMaps(axes, np.where(restored[..., None], both[0].origins, both[1].origins))
+            errors = self._displaced(number, moment, channels)
             best = int(np.argmin(errors))
             result.append(left.pop(best))
             if errors[best] <= least:
                 return result
         return []
 
-    def largest_errors(self) -> np.ndarray:
-        """Return the largest displacement of any point in each bone's ball, in the scene's units, shape (bones,)."""
-        numbers = range(len(self.bones))
-        return np.array([largest_displacement(self.now(n), self.truth[n], self.radii[n]) for n in numbers])
-
-
-def _keyed_in(
-    rig: bpy.types.Object, slot: Slot
-) -> tuple[dict[str, Source], dict[str, dict[Channel, bpy.types.FCurve]]]:
-    """Return what a slot has of a rig and its bones, by the prefixes of their data paths: sources, and all F-curves."""
-    sources: dict[str, Source] = {}
-    bindings = bindings_in_slot(slot)
-    for binding, of_users in zip(bindings, sources_of_users(bindings), strict=True):
-        source = next((one for user, one in zip(binding.users, of_users, strict=True) if user.animated == rig), None)
-        has_more = is_part(binding.prefix) and any(any(on_top(fcurve)) for fcurve in binding.curves.values())
-        if isinstance(source, Source) and source.channels and not source.driven and not has_more:
-            with suppress(Refused):
-                refuse_numbers(binding.name, source)
-                sources[binding.prefix] = source
-    curves: dict[str, dict[Channel, bpy.types.FCurve]] = {}
-    for fcurve in slot.fcurves:
-        path = fcurve.data_path
-        curves.setdefault(split_path(path)[0], {})[path, fcurve.array_index] = fcurve
-    return sources, curves
+    def _displaced(self, number: int, moment: int, channels: AffineMaps) -> np.ndarray:
+        """Return how far a joint is off at a moment (n,) with these channels of its chain (k, n), the object first."""
+        chain, above = [*self.above(number)][-2::-1], None
+        for row, item in enumerate(chain, 1):
+            above = self.hierarchy.placed(item - 1, channels[row], above)
+        world = self._parent @ channels[0]
+        placed = world if above is None else world @ above
+        return ball_displacement(
+            placed, self.truth[number, moment, None], np.full(len(placed.axes), self.radii[number])
+        )

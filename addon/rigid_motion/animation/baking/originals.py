@@ -16,7 +16,7 @@ from bpy.app.translations import pgettext_n as n_
 
 from ..actions.channels import copy_fcurve
 from ..actions.slots import Binding, Curves, slots_alone
-from ..transforms import TURNS_PROPERTY, WIDTHS, Refused, Transform
+from ..transforms import TURNS_PROPERTY, Refused, Transform
 
 BAKED, REDUCED = "BAKED", "REDUCED"
 """The change that was made to the keys."""
@@ -38,13 +38,7 @@ Note = Any
 
 
 class Originals:
-    """Keeps what there is before keys are changed, in one keeper for all that is done to an Action in one go.
-
-    Parameters
-    ----------
-    kind : str
-        What is to be done to keys, `BAKED` or `REDUCED`.
-    """
+    """Keeps what there is before keys are `BAKED` or `REDUCED`, in one keeper for all that is done to an Action."""
 
     def __init__(self, kind: str) -> None:
         self._kind = kind
@@ -103,14 +97,14 @@ def notes_in_use(transform: Transform) -> Iterator[Note]:
                     last[key] = note.kind
 
 
-def has_original(transform: Transform, kind: str) -> bool:
-    """Return whether something moves by keys of this kind, and those from before are still in the file."""
-    return any(note.kind == kind and note.original is not None for note in notes_in_use(transform))
+def last_change(transform: Transform) -> str | None:
+    """Return what was done last to the keys that something moves by, if those from before are still in the file."""
+    return next((note.kind for note in notes_in_use(transform) if note.original is not None), None)
 
 
 def refuse_without_original(transform: Transform, kind: str) -> None:
     """Raise `Refused` where keys of this kind are not what something was given last, or the original is gone."""
-    latest = next((note.kind for note in notes_in_use(transform) if note.original is not None), None)
+    latest = last_change(transform)
     if latest is None or not any(note.kind == kind and note.original is not None for note in transform.motion.bakes):
         raise Refused(NOT_DONE[kind], name=transform.name)
     if latest != kind:
@@ -157,10 +151,8 @@ def discard_originals(transform: Transform, kind: str, bindings: Iterable[Bindin
 
 def _moving(binding: Binding) -> Curves:
     """Return the channels of location, rotation, scale and turns."""
-    names = (*WIDTHS, TURNS_PROPERTY)
-    return {
-        channel: curve for channel, curve in binding.curves.items() if channel[0].removeprefix(binding.prefix) in names
-    }
+    turns = {channel: curve for channel, curve in binding.curves.items() if channel[0].endswith(TURNS_PROPERTY)}
+    return binding.moving | turns
 
 
 def _on(transform: Transform, binding: Binding) -> list[Note]:
@@ -170,13 +162,9 @@ def _on(transform: Transform, binding: Binding) -> list[Note]:
 
 def _kept_by(note: Note) -> Curves:
     """Return the channels that a note says are kept, by their paths from what is moved on."""
-    fcurves = note.original.layers[0].strips[0].channelbags[0].fcurves
-    return {
-        (path, index): fcurve
-        for path, width in {**WIDTHS, TURNS_PROPERTY: 1}.items()
-        for index in range(width)
-        if (fcurve := fcurves.find(note.kept_as + path, index=index)) is not None
-    }
+    fcurves, prefix = note.original.layers[0].strips[0].channelbags[0].fcurves, note.kept_as
+    kept = (fcurve for fcurve in fcurves if fcurve.data_path.startswith(prefix))
+    return {(fcurve.data_path.removeprefix(prefix), fcurve.array_index): fcurve for fcurve in kept}
 
 
 def _forget_from(first: Note, binding: Binding) -> None:

@@ -10,12 +10,14 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import TypeVar
 
 import bpy
+from bpy.app.translations import pgettext_n as n_
 
 from ..actions.reading import sources_of_users
-from ..actions.refusals import refuse_numbers
+from ..actions.refusals import refuse_linked, refuse_numbers
 from ..actions.slots import Binding, bindings_of
 from ..evaluation.sources import Source
 from ..following import follower
+from ..queries.keyed import active_binding
 from ..transforms import Refused, Transform, transform_of
 
 Target = bpy.types.Object | bpy.types.PoseBone | Transform
@@ -44,28 +46,14 @@ def apply_edit(
     refused: list[Refused] | None,
     survey: Callable[[Mapping[Transform, Readings]], None] | None = None,
 ) -> dict[Transform, Result]:
-    """Do something to each target.
+    """Do something to each target, and return what `act` returned for each of those that did not refuse.
 
-    Parameters
-    ----------
-    targets
-    plan
-        Says for one what there is to do, without doing any of it. May raise `Refused`.
-    act
-        Does it.
-    survey
-        Is shown all readings before the first plan, where plans depend on one another.
-
-    Returns
-    -------
-    dict
-        What `act` returned for each of those that did not refuse.
+    `plan` says for one what there is to do, without doing any of it, and may raise `Refused`; `act` does it. `survey`
+    is shown all readings before the first plan, where plans depend on one another.
     """
-    transforms = transforms_of(targets)
-    readings: dict[Transform, Readings] = {transform: [] for transform in transforms}
-    bindings = bindings_of(transforms)
-    of_users = sources_of_users(bindings)
-    for binding, sources in zip(bindings, of_users, strict=True):
+    readings: dict[Transform, Readings] = {transform: [] for transform in transforms_of(targets)}
+    bindings = bindings_of(readings)
+    for binding, sources in zip(bindings, sources_of_users(bindings), strict=True):
         for user, source in zip(binding.users, sources, strict=True):
             if user in readings:
                 readings[user].append((binding, source))
@@ -94,3 +82,13 @@ def readable(transform: Transform, readings: Readings) -> list[tuple[Binding, So
             raise source
         refuse_numbers(transform.name, source)
     return list(readings)
+
+
+def editable_binding(transform: Transform, bindings: Iterable[Binding]) -> Binding:
+    """Return the slot whose keys the editors show. `Refused` where there is none, or it belongs to another file."""
+    binding = active_binding(transform, bindings)
+    if binding is None:
+        text = n_("{name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)")
+        raise Refused(text, name=transform.name)
+    refuse_linked(transform, binding)
+    return binding

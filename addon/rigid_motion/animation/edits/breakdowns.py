@@ -9,17 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
 from ...motion import Poses, interpolate
-from ..actions.channels import KeyFields, key_fields, set_key_fields
+from ..actions.channels import key_fields, set_key_fields
 from ..actions.reading import added_values, read
-from ..actions.refusals import refuse_linked
-from ..actions.slots import Binding, read_again
 from ..evaluation.bodies import body_poses
 from ..evaluation.channel_values import channel_values
 from ..evaluation.components import AXIS_ANGLE, DEPENDS_ON_KEYS, MODE_NAMES, MODE_NUMBERS, ROWS, SCALE
@@ -30,16 +28,12 @@ from ..following import follower
 from ..following.inserted import set_key
 from ..following.kept_timing import nearest_key
 from ..following.shared_turns import share_out_turns
-from ..queries.keyed import active_binding
 from ..queries.segments import frame_in_action
-from ..transforms import Channel, Refused, Transform
-from .apply import Readings, Targets, apply_edit, readable
+from ..transforms import WIDTHS, Refused, Transform
+from .apply import Readings, Targets, apply_edit, editable_binding, readable
 
 BREAKDOWN, PUSH, RELAX = KINDS = ("BREAKDOWN", "PUSH", "RELAX")
 """From the key before to the key after; away from the in-between of the mode; towards it."""
-
-LIKE_BLENDER = "lerp_slerp"
-"""The mode that does what Blender's Breakdowner does to location and quaternion."""
 
 
 def breakdown(
@@ -47,10 +41,10 @@ def breakdown(
 ) -> None:
     """Key a pose on the current frame that is a share of the way from the key before to the key after it.
 
+    For targets, and what is refused, see `apply`.
+
     Parameters
     ----------
-    targets, refused
-        See `apply`.
     factor : float
         For BREAKDOWN 0 is the pose of the key before, 1 that of the key after, and beyond that the motion goes on. For
         RELAX 0 is the pose that is seen and 1 the in-between of the mode; PUSH goes as far in the other direction.
@@ -60,30 +54,35 @@ def breakdown(
     Breakdowns(targets, kind, refused=refused).apply(factor)
 
 
-@dataclass(frozen=True, eq=False)
 class _Between:
-    """A transform, and what it is between on a frame."""
+    """A transform, and what it is between on a frame of the scene. `Refused` where it is between no keys."""
 
-    transform: Transform
-    binding: Binding
-
-    source: Source
-    """The keys without those of this frame."""
-
-    frame: float
-    """The frame of the Action."""
-
-    ends: tuple[float, float]
-    """The frames of the keys before and after."""
-
-    seen: np.ndarray
-    """Its components as it is seen, shape (10,)."""
-
-    properties: dict[str, tuple[float, ...]]
-    """Its properties as they were, keyed or not."""
-
-    keys: dict[Channel, KeyFields | None]
-    """The keys of its channels as they were, and of that of turns; None where there is none."""
+    def __init__(self, transform: Transform, readings: Readings, frame: float) -> None:
+        self.transform = transform
+        self.binding = binding = editable_binding(transform, [binding for binding, _ in readings])
+        self.frame = frame = frame_in_action(transform.animated, frame)
+        whole = next(source for one, source in readable(transform, readings) if one is binding)
+        self.source = _without(whole, frame)
+        """The keys without those of this frame."""
+        # Copies of keys in cycles are none to set others between.
+        first, last = self.source.keyed_range if self.source.channels else (np.inf, -np.inf)
+        if not first < frame < last:
+            text = n_("{name} needs a key before and a key after frame {frame:g}: go to a frame between two keys")
+            raise Refused(text, name=transform.name, frame=frame)
+        keys = self.source.key_frames
+        after = int(np.searchsorted(keys, frame))
+        self.ends = float(keys[after - 1]), float(keys[after])
+        """The frames of the keys before and after."""
+        self.posed = transform.components()
+        self.seen = self.posed - added_values(binding, transform, whole, np.array([frame]))[:, 0]
+        """Its components as it is seen, shape (10,)."""
+        keyed = [
+            *(transform.channels[row] for rows, _ in self.source.channels for row in rows),
+            transform.turns_channel,
+        ]
+        curves = {channel: binding.curves.get(channel) for channel in keyed}
+        self.keys = {channel: fcurve and key_fields(fcurve.keyframe_points) for channel, fcurve in curves.items()}
+        """The keys of its channels as they were, and of that of turns; None where there is none."""
 
     @property
     def mode(self) -> str:
@@ -91,21 +90,18 @@ class _Between:
 
     def pose(self, kind: str, factor: float) -> np.ndarray:
         """Return the components to be keyed, shape (10,)."""
+        at = np.array([0.5 * sum(self.ends) if kind == BREAKDOWN else self.frame])
         if kind == BREAKDOWN:
             first, last = self.source.values_at(np.array(self.ends)).T
             straight = first + factor * (last - first)
-            if self.mode == "BLENDER" and self.source.order is not None:
+            if self.mode == "BLENDER":
                 return straight
-            mode = LIKE_BLENDER if self.mode == "BLENDER" else None
-            middle = np.array([0.5 * sum(self.ends)])
-            return _components_near(
-                self.source, in_betweens(self.source, middle, mode, np.array([factor])).desired, straight
-            )
+            passed = in_betweens(self.source, at, progress=np.array([factor])).desired
+            return _components_near(self.source, passed, straight)
         share = -factor if kind == PUSH else factor
-        native = self.source.values_at(np.array([self.frame]))[:, 0]
-        towards = in_betweens(self.source, np.array([self.frame])).desired
+        towards, native = in_betweens(self.source, at).desired, self.source.values_at(at)[:, 0]
         straight = self.seen + share * (_components_near(self.source, towards, native) - self.seen)
-        if self.mode == "BLENDER" and self.source.order is not None:
+        if self.mode == "BLENDER":
             return straight
         original, axes = self.source.original[:, None, None], self.source.location_axes
         now = body_poses(self.seen[:, None, None], original, None if axes is None else axes[None], self.source)[0]
@@ -114,10 +110,8 @@ class _Between:
             np.concatenate((now.quaternions, towards.quaternions)),
             None if now.scales is None else np.append(now.scales * self.source.original[7:].mean(), towards.scales),
         )
-        mode = LIKE_BLENDER if self.mode == "BLENDER" else self.mode
-        return _components_near(
-            self.source, interpolate((0.0, 1.0), ways, np.array([share]), mode, extrapolate=True), straight
-        )
+        passed = interpolate((0.0, 1.0), ways, np.array([share]), self.mode, extrapolate=True)
+        return _components_near(self.source, passed, straight)
 
     def put_back(self) -> None:
         """Give its channels the keys that they had."""
@@ -143,24 +137,20 @@ class _Between:
                 if len(fcurve.keyframe_points) > before:
                     fcurve.keyframe_points[nearest_key(fcurve, self.frame)[0]].type = key_type
         if needs_turning(self.source):
-            binding = read_again([self.binding])[0]
-            share_out_turns(binding, read(binding), self.source, factor if kind == BREAKDOWN else None)
-            self.binding.curves.update(binding.curves)
+            share_out_turns(self.binding, read(self.binding), self.source, factor if kind == BREAKDOWN else None)
 
 
 class Breakdowns:
-    """Targets with keys before and after the current frame, of which poses in between are tried until one is good.
-
-    Parameters
-    ----------
-    targets, kind, refused
-        As `breakdown` has them.
-    """
+    """Targets with keys before and after the current frame, of which poses in between are tried until one is good."""
 
     def __init__(self, targets: Targets, kind: str = BREAKDOWN, *, refused: list[Refused] | None = None) -> None:
         self.kind = kind
-        self._frame = bpy.context.scene.frame_current_final
-        self._between = list(apply_edit(targets, self._plan, lambda _, between: between, refused).values())
+        frame = bpy.context.scene.frame_current_final
+
+        def plan(transform: Transform, readings: Readings) -> _Between:
+            return _Between(transform, readings, frame)
+
+        self._between = list(apply_edit(targets, plan, lambda _, between: between, refused).values())
 
     def __len__(self) -> int:
         return len(self._between)
@@ -177,8 +167,8 @@ class Breakdowns:
             pass
         bpy.context.view_layer.update()
         for between in self._between:
-            for name, values in between.properties.items():
-                setattr(between.transform.carrier, name, values)
+            for part, prop in between.transform.properties.items():
+                setattr(between.transform.carrier, prop, between.posed[ROWS[part]][: WIDTHS[prop]])
 
     @contextmanager
     def _edit(self) -> Iterator[None]:
@@ -190,40 +180,6 @@ class Breakdowns:
         follower.refresh([between.transform for between in self._between])
         for between in self._between:
             between.binding.slot.action.update_tag()
-
-    def _plan(self, transform: Transform, readings: Readings) -> _Between:
-        binding = active_binding(transform, [binding for binding, _ in readings])
-        if binding is None:
-            raise Refused(
-                n_("{name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)"),
-                name=transform.name,
-            )
-        refuse_linked(transform, binding)
-        frame = frame_in_action(transform.animated, self._frame)
-        whole = next(source for one, source in readable(transform, readings) if one is binding)
-        source, added = _without(whole, frame), added_values(binding, transform, whole, np.array([frame]))[:, 0]
-        # Copies of keys in cycles are none to set others between.
-        first, last = source.keyed_range if source.channels else (np.inf, -np.inf)
-        if not first < frame < last:
-            raise Refused(
-                n_("{name} needs a key before and a key after frame {frame:g}: go to a frame between two keys"),
-                name=transform.name,
-                frame=frame,
-            )
-        keys = source.key_frames
-        after = int(np.searchsorted(keys, frame))
-        keyed = [*(transform.channels[row] for rows, _ in source.channels for row in rows), transform.turns_channel]
-        curves = {channel: binding.curves.get(channel) for channel in keyed}
-        return _Between(
-            transform,
-            binding,
-            source,
-            frame,
-            (float(keys[after - 1]), float(keys[after])),
-            transform.components() - added,
-            {name: tuple(getattr(transform.carrier, name)) for name in transform.properties.values()},
-            {channel: fcurve and key_fields(fcurve.keyframe_points) for channel, fcurve in curves.items()},
-        )
 
 
 def _without(source: Source, frame: float) -> Source:

@@ -17,15 +17,16 @@ import numpy as np
 
 from ...motion import Poses, twists
 from ...motion.quaternions import multiply, rotate
+from .bodies import between
 
 GRID = np.linspace(-0.25, 1.25, 49)
 """Progress at which a path is first compared with a key: an easing may pass both ends."""
 
-STEPS = 14
-"""Steps of the search from there, for more digits than single precision has."""
+FINER = np.linspace(-1.0, 1.0, 9)
+"""Around the best of these it is compared on nine more, in the distance of two of them, over and over."""
 
-DIFFERENCE = 1e-4
-"""The progress on either side that slopes are measured over."""
+ROUNDS = 14
+"""How often: to more digits than single precision has."""
 
 PosesAt = Callable[[np.ndarray, np.ndarray], Poses]
 """From counts (P,) and progress (m,) to the poses (m,) on paths."""
@@ -51,21 +52,10 @@ class Passages:
     """True if it changes without a corner, shape (S,)."""
 
     @classmethod
-    def of(
-        cls, passed: np.ndarray, keys: Poses, poses_at: PosesAt, smooth: np.ndarray, counting: np.ndarray
-    ) -> Passages:
-        """Find where keys are on their paths.
+    def of(cls, passed: np.ndarray, keys: Poses, poses_at: PosesAt, smooth: np.ndarray) -> Passages:
+        """Find where keys (S, 2) at both ends of segments are on their paths.
 
-        Parameters
-        ----------
-        passed : array of bool, shape (S,)
-            Which of the segments from key to key start with a key that lies on a path.
-        keys : Poses, shape (S, 2)
-            At both ends of each.
-        poses_at : PosesAt
-        smooth : array of bool, shape (P,)
-        counting : array of bool, shape (7, S)
-            What of the twist and the growth to a key says how far that is.
+        `passed` (S,) says which of the segments start with a key that lies on a path, `smooth` (P,) is that of paths.
         """
         first = np.append(np.flatnonzero(~passed), len(passed))
         owners = np.repeat(np.arange(len(first) - 1), np.diff(first))
@@ -73,11 +63,11 @@ class Passages:
         progress, offs = np.zeros((2, len(passed))), np.zeros((2, 7, len(passed)))
         progress[1] = 1.0
         many = np.bincount(owners[inner], minlength=len(first) - 1)
-        at, off = _nearest(keys[inner, 0], many, poses_at, counting[:, inner])
+        at, off = _nearest(keys[inner, 0], many, poses_at)
         progress[0, inner] = progress[1, inner - 1] = at
         offs[0][:, inner] = offs[1][:, inner - 1] = off
         offsets, ends = (_moved(offset) for offset in offs)
-        changes = np.concatenate((_between(offsets, ends)[:6], offs[1, 6:] - offs[0, 6:]))
+        changes = np.concatenate((between(offsets, ends)[:6], offs[1, 6:] - offs[0, 6:]))
         return cls(first, progress, offsets, changes, smooth[owners])
 
     def along(self, counts: np.ndarray, progress: np.ndarray) -> tuple[np.ndarray, Poses]:
@@ -99,7 +89,7 @@ def moved_by(poses: Poses, moves: Poses) -> Poses:
     )
 
 
-def _nearest(keys: Poses, counts: np.ndarray, poses_at: PosesAt, counting: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _nearest(keys: Poses, counts: np.ndarray, poses_at: PosesAt) -> tuple[np.ndarray, np.ndarray]:
     """Return where paths are nearest to keys (k,), and the twists and log scale (7, k) from there to the keys.
 
     `counts` are those of the keys on each path.
@@ -109,39 +99,17 @@ def _nearest(keys: Poses, counts: np.ndarray, poses_at: PosesAt, counting: np.nd
     def off(progress: np.ndarray) -> np.ndarray:
         each = progress.shape[1]
         flat = np.arange(len(many)).repeat(each)
-        return _between(poses_at(counts * each, progress.ravel()), keys[flat]).reshape(7, -1, each)
+        return between(poses_at(counts * each, progress.ravel()), keys[flat]).reshape(7, -1, each)
 
-    everywhere = np.where(counting[..., None], off(np.broadcast_to(GRID, (len(many), len(GRID)))), 0.0)
-    squared = np.einsum("rke,rke->ke", everywhere, everywhere)
+    def nearest(tried: np.ndarray) -> np.ndarray:
+        misses = off(tried)
+        return np.take_along_axis(tried, np.einsum("rke,rke->ke", misses, misses).argmin(axis=1)[:, None], axis=1)
 
-    def slopes(progress: np.ndarray) -> np.ndarray:
-        three = np.where(counting[..., None], off(progress[:, None] + (-DIFFERENCE, 0.0, DIFFERENCE)), 0.0)
-        before, here, behind = np.moveaxis(three, 2, 0)
-        return np.einsum("rk,rk->k", behind - before, here)
-
-    # Where the distance has no slope, by the Illinois method.
-    nearest = GRID[np.argmin(squared, axis=1)]
-    low, high = nearest - (GRID[1] - GRID[0]), nearest + (GRID[1] - GRID[0])
-    at_low, at_high = slopes(low), slopes(high)
-    result = np.where(at_low > 0.0, low, high)
-    crosses = (at_low < 0.0) & (at_high > 0.0)
-    for _ in range(STEPS):
-        span = np.where(at_high > at_low, at_high - at_low, 1.0)
-        result = np.where(crosses, (low * at_high - high * at_low) / span, result)
-        here = slopes(result)
-        falls = here < 0.0
-        low, high = np.where(falls, result, low), np.where(falls, high, result)
-        at_low, at_high = np.where(falls, here, 0.5 * at_low), np.where(falls, 0.5 * at_high, here)
-    return result, off(result[:, None])[..., 0]
-
-
-def _between(first: Poses, second: Poses) -> np.ndarray:
-    """Return the twists from poses (n,) to others, and the growth of log scale, shape (7, n)."""
-    rows = np.zeros((7, len(first.positions)))
-    rows[:6] = twists.between(first.positions, first.quaternions, second.positions, second.quaternions)
-    if first.scales is not None:
-        rows[6] = np.log(second.scales / first.scales)
-    return rows
+    best, step = nearest(np.tile(GRID, (len(many), 1))), GRID[1] - GRID[0]
+    low, high = best - step, best + step
+    for number in range(ROUNDS):
+        best = nearest(np.clip(best + 0.25**number * step * FINER, low, high))
+    return best[:, 0], off(best)[..., 0]
 
 
 def _moved(rows: np.ndarray) -> Poses:

@@ -21,9 +21,6 @@ AXIS_ANGLE = "AXIS_ANGLE"
 PART_OF = tuple(name for name, rows in ROWS.items() for _ in range(rows.start, rows.stop))
 """The one of them that each row is a component of."""
 
-TWISTS = {None: slice(0, 7), LOCATION: slice(0, 7), ROTATION: slice(0, 3), SCALE: slice(6, 7)}
-"""What of a twist and the growth of log scale counts where a part of a body runs by itself: a location with all."""
-
 REST = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)
 """The components of something that is not moved. Rotations are quaternions where they are not channels."""
 

@@ -2,14 +2,10 @@
 
 Arrays alone, many sources at once: the ten components of location, rotation and scale are rows, and the samples (or
 segments, or keys) of all sources stand one behind the other along the last axis. A segment runs from one frame that has
-a key in any channel to the next. How far the object has come in it is what Blender's own in-betweens say: their share
-of the chord over all channels, a radian counting as much as a unit of length. So a segment follows the easing, the
-handles and the overshoot of its keys, whatever its mode. A smooth mode has a timing of its own, even from key to key,
-and that is kept where keys are not eased: handles shape single channels, and it is in their place.
-
-Where location, rotation and scale have keys on different frames, each of them runs between its own, and follows what
-its own channels say in all segments that are not joint. The poses at the keys of the location then have the rotation
-and the scale that are seen there.
+a key in any channel that modes change to the next. How far the object has come in it is what Blender's own in-betweens
+say: their share of the chord over all of these. So a segment follows the easing, the handles and the overshoot of its
+keys, whatever its mode. A smooth mode has a timing of its own, even from key to key, and that is kept where keys are
+not eased: handles shape single channels, and it is in their place.
 
 What is added to channels repeats with them: it is worked out for the first round of cycles.
 """
@@ -18,39 +14,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ...motion import KEYFRAME_MODES, Poses
+from ...motion import Poses
 from ...motion.piecewise import combine
-from .bodies import LEAST_SCALE, are_idle, body_poses, channels_at_ends, location_axes, measured_in, progress_weights
+from .bodies import body_poses, channels_at_ends, idle_progress, location_axes, progress_weights
 from .breakdowns import Passages, moved_by
 from .channel_values import channel_values, steps_of
-from .components import LOCATION, MODE_NAMES, MODE_NUMBERS, ROTATION, ROWS, SCALE, SMOOTH
-from .ends import MEASURED, Ends, corrected, packed, twists_counting
+from .components import MODE_NAMES, MODE_NUMBERS, ROWS, SCALE, SMOOTH
+from .ends import MEASURED, Ends, corrected, packed
 from .sources import Source, each, sampled, values_of
 
-if any(mode.behind > 1 or mode.ahead > 1 for mode in KEYFRAME_MODES.values()):
-    raise NotImplementedError(
-        "a mode for keyframes can look one key behind and ahead of a segment: see with_neighbours"
-    )
 
-
-@dataclass(frozen=True, eq=False)
-class InBetweens:
-    """The motion of one source as a body, with the delta transforms that the object has anyway.
+class InBetweens(NamedTuple):
+    """The motion of one source as a body, with the delta transforms that the object has anyway; poses are (m,).
 
     It is in the space of the channels; but where location runs along other axes than the body's at rest, in those.
     """
 
-    frames: np.ndarray
-    """Shape (m,)."""
-
     native: Poses
-    """Poses that Blender's own in-betweens make of the keys, shape (m,)."""
+    """What Blender's own in-betweens make of the keys."""
 
     desired: Poses
-    """Poses that the modes make of them, shape (m,)."""
+    """What the modes make of them."""
 
 
 def in_betweens(
@@ -78,7 +66,7 @@ def in_betweens(
             scales = source.original[ROWS[SCALE]] @ rows[ROWS[SCALE]] / 3.0
         return replace(poses, scales=scales)
 
-    return InBetweens(frames, moved(native), moved(native + difference))
+    return InBetweens(moved(native), moved(native + difference))
 
 
 def seen_values(source: Source, frames: np.ndarray) -> np.ndarray:
@@ -95,40 +83,35 @@ def _both(source: Source, frames: np.ndarray, progress: np.ndarray | None = None
         order = np.argsort(folded, kind="stable")
     difference = np.empty((10, len(frames)))
     given = None if progress is None else progress[order]
-    ((difference[:, order], _),) = _differences([source], [folded[order]], given)
+    ((difference[:, order], _),) = channel_differences([source], [folded[order]], given)
     return native, difference
 
 
 def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Return how far along its segment of the path, 0 to 1, each source is on rising frames of its own, (m,).
-
-    Where parts have keys of their own, the location; or else the rotation.
-    """
-    parts = []
-    for source in sources:
-        of_source = _parts(source) if source.is_uneven else {}
-        parts.append(of_source.get(LOCATION) or of_source.get(ROTATION) or source)
+    """Return how far along its segment of the path, 0 to 1, each source is on rising frames of its own, (m,)."""
     result: dict[int, np.ndarray] = {}
-    for numbers in _alike(parts):
-        motion = _Motion.of([parts[number] for number in numbers])
-        moments = motion.moments([np.asarray(frames[number], dtype=np.float64) for number in numbers], None)
-        along = moments.progress
+    for numbers in _alike(sources):
+        motion = _Motion.of([sources[number] for number in numbers])
+        _, counts, along, _ = motion.moments([frames[number] for number in numbers], None)
         if motion.passages is not None:
-            along, _ = motion.passages.along(moments.counts, along)
+            along, _ = motion.passages.along(counts, along)
         ends = np.cumsum([len(frames[number]) for number in numbers])[:-1]
         result.update(zip(numbers, np.split(along, ends), strict=True))
     return [result[number] for number in range(len(sources))]
 
 
-def channel_differences(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+def channel_differences(
+    sources: Sequence[Source], frames: Sequence[np.ndarray], given: np.ndarray | None = None
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return what is to be added to the channels of each source, and the values that they have by themselves.
 
     Parameters
     ----------
     sources : sequence of Source
     frames : sequence of array, shape (m,)
-        Rising ones for each, taken as they are and not in single precision. Those that are not inside of `spans` have
-        no difference.
+        Rising doubles for each. Those that are not inside of `spans` have no difference.
+    given : array, shape (m,), optional
+        How far the body of the only source has come in its segment.
 
     Returns
     -------
@@ -137,61 +120,21 @@ def channel_differences(sources: Sequence[Source], frames: Sequence[np.ndarray])
         one to the other, continuous in each span and in the sign that the key at its beginning has; angles
         continuous, and nearest to those of the key at the beginning. Rows that are not filled have no difference.
     """
-    return _differences(sources, [np.asarray(times, dtype=np.float64) for times in frames], None)
-
-
-def _differences(
-    sources: Sequence[Source], frames: Sequence[np.ndarray], given: np.ndarray | None
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return what `channel_differences` does, with the `given` progress (m,) of the only source."""
     differences = [np.zeros((10, len(times))) for times in frames]
     natives: dict[int, np.ndarray] = {}
-    jobs: list[tuple[Source, int, list[int]]] = []
-    for number, source in enumerate(sources):
-        if source.is_live and source.is_repeatable:
-            jobs.extend((part, number, rows) for rows, part in filled_parts(source))
-    for portion in _alike([part for part, _, _ in jobs]):
-        some = [jobs[job] for job in portion]
-        times = [frames[number] for _, number, _ in some]
-        values, native, live = _Motion.of([part for part, _, _ in some]).values(times, given)
-        for (part, number, rows), (_, span) in zip(
-            some, each([part for part, _, _ in some], map(len, times)), strict=True
-        ):
+    acting = [number for number, source in enumerate(sources) if source.is_live and source.is_repeatable]
+    for portion in _alike([sources[number] for number in acting]):
+        numbers = [acting[place] for place in portion]
+        some, times = [sources[number] for number in numbers], [frames[number] for number in numbers]
+        values, native, live = _Motion.of(some).values(times, given)
+        for number, (source, span) in zip(numbers, each(some, map(len, times)), strict=True):
+            rows = source.filled_rows
             differences[number][rows] = np.where(live[span], values[rows, span] - native[rows, span], 0.0)
-            if part.cyclic is None:
-                natives[number] = native[:, span]
+            natives[number] = native[:, span]
     rest = [number for number in range(len(sources)) if number not in natives]
-    others = values_of([sources[number] for number in rest], [frames[number] for number in rest], exact=True)
+    others = values_of([sources[number] for number in rest], [frames[number] for number in rest])
     natives.update(zip(rest, others, strict=True))
     return [(difference, natives[number]) for number, difference in enumerate(differences)]
-
-
-def filled_parts(source: Source) -> list[tuple[list[int], Source]]:
-    """Return the rows that the modes change, with the source that each of them is worked out from."""
-    parts = _parts(source).values() if source.is_uneven else [source]
-    return [(part.filled_rows, part) for part in parts if part.filled_rows]
-
-
-def _parts(source: Source) -> dict[str, Source]:
-    """Return the parts of a source that is uneven, and of its location what is beside it."""
-    parts, endless = dict(source.parts), source.endless
-    others = [part for name, part in parts.items() if name != LOCATION and part.is_live and part.filled_rows]
-
-    def beside(frames: np.ndarray) -> np.ndarray:
-        moments, places = np.unique(frames, return_inverse=True)
-        folded = endless.folded(moments)
-        order = np.argsort(folded, kind="stable")
-        rows = endless.values_at(moments)
-        several = _differences(others, [folded[order]] * len(others), None)
-        for part, (difference, _) in zip(others, several, strict=True):
-            rows[np.ix_(part.filled_rows, order)] += difference[part.filled_rows]
-        # A body grows by factors; what overshoots has none.
-        np.maximum(rows[ROWS[SCALE]], LEAST_SCALE, out=rows[ROWS[SCALE]])
-        return rows[3:, places]
-
-    if LOCATION in parts:
-        parts[LOCATION] = replace(parts[LOCATION], beside=beside)
-    return parts
 
 
 def _alike(sources: Sequence[Source]) -> list[list[int]]:
@@ -202,23 +145,6 @@ def _alike(sources: Sequence[Source]) -> list[list[int]]:
     for number, source in enumerate(sources):
         alike.setdefault((source.order, source.uniform_scale, bool(source.passed.any())), []).append(number)
     return [*alike.values()]
-
-
-@dataclass(frozen=True, eq=False)
-class _Moments:
-    """Frames of sources as moments in their segments."""
-
-    native: np.ndarray
-    """What the channels have there, shape (10, m)."""
-
-    counts: np.ndarray
-    """The number of them in each segment, shape (S,)."""
-
-    progress: np.ndarray
-    """Progress in the segment, shape (m,)."""
-
-    live: np.ndarray
-    """Whether a mode acts there, shape (m,): not on keys, in holds, or where channels stand still outside of keys."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,47 +185,39 @@ class _Motion:
         modes = np.concatenate([source.modes for source in paths])
         smooth = np.isin(modes, SMOOTH)
         ends, lacks = Ends.of(*bounds, segments, smooth), None
-        weights, offsets = _weights(segments, bounds)
+        weights, offsets = progress_weights(*bounds, sources[0])
         idle = np.zeros(len(modes), dtype=bool)
         if ends.turning is not None:
-            idle = are_idle(weights, ends.turning.spins.turns)
+            idle = (ends.turning.spins.turns != 0.0) & ~weights.any(axis=0)
         has_handles = smooth & np.concatenate([source.has_handles for source in paths]) if smooth.any() else smooth
         if has_handles.any():
-            measured = measured_in(ends.times, segments, MEASURED)
+            at = (ends.times[:, :1] + np.diff(ends.times) * MEASURED).ravel()
+            of_each = [at[span.start * len(MEASURED) : span.stop * len(MEASURED)] for _, span in segments]
+            measured = sampled(each(paths, map(len, of_each)), of_each).reshape(10, -1, len(MEASURED))
             progress = np.einsum("rs,rsk->sk", weights, measured) - offsets[:, None]
-            for segment in np.flatnonzero(idle & has_handles).tolist():
-                moments = ends.times[segment, 0] + np.ptp(ends.times[segment]) * MEASURED
-                progress[segment] = ends.idle_progress(segment, moments, paths)
-            plain = 1.0 if ends.tangents is None else ends.tangents
+            if idle.any():
+                uniform = np.concatenate([idle_progress(*one) for one in zip(paths, of_each, strict=True)])
+                progress[idle] = uniform.reshape(progress.shape)[idle]
             tangents, lacks = ends.at_keys(progress, measured, paths[0])
-            ends = replace(ends, tangents=np.where(has_handles, tangents, plain))
+            ends = replace(ends, tangents=np.where(has_handles, tangents, 1.0))
             lacks = np.where(has_handles, lacks, 0.0)
         if all(path is source for path, source in zip(paths, sources, strict=True)):
             return cls(sources, modes, ends, np.stack(bounds), weights, offsets, lacks, idle, None)
-        return cls._passing(sources, paths, modes, ends, lacks)
+        return cls._passing(sources, modes, ends, lacks)
 
     @classmethod
-    def _passing(
-        cls, sources: list[Source], paths: list[Source], modes: np.ndarray, ends: Ends, lacks: np.ndarray | None
-    ) -> _Motion:
+    def _passing(cls, sources: list[Source], modes: np.ndarray, ends: Ends, lacks: np.ndarray | None) -> _Motion:
         """Return the motion of sources with keys that their paths, whose segments have these modes and ends, pass."""
         segments = _segments(sources)
         bounds = channels_at_ends(segments)
         passed = np.concatenate([source.passed[:-1] for source in sources])
         keys = Ends.of(*bounds, segments, np.zeros(len(passed), dtype=bool)).keys
         many = np.diff(np.append(np.flatnonzero(~passed), len(passed)))
-        # A smooth path depends on the segments beside it.
-        joint, beside = (
-            np.concatenate(both) for both in zip(*((p.joint, p.is_joint_beside) for p in paths), strict=True)
-        )
-        joint = np.where(np.isin(modes, SMOOTH), joint & beside, joint).repeat(many)
-        joint &= np.concatenate([source.is_common[:-1] for source in sources])
-        counting = twists_counting([sources[owner] for owner in ends.owners.repeat(many)], joint)
-        passages = Passages.of(passed, keys, lambda *at: _poses(ends, modes, *at), np.isin(modes, SMOOTH), counting)
+        passages = Passages.of(passed, keys, lambda *at: _poses(ends, modes, *at), np.isin(modes, SMOOTH))
         if lacks is not None:
             lacks = np.where(many > 1, 0.0, lacks).repeat(many, axis=1)
         idle = np.zeros(len(passed), dtype=bool)
-        channels, weights = np.stack(bounds), _weights(segments, bounds)
+        channels, weights = np.stack(bounds), progress_weights(*bounds, sources[0])
         return cls(sources, modes.repeat(many), ends, channels, *weights, lacks, idle, passages)
 
     @property
@@ -307,24 +225,25 @@ class _Motion:
         """The number of the source of each segment, shape (S,)."""
         return self.ends.owners if self.passages is None else self.ends.owners.repeat(np.diff(self.passages.first))
 
-    def moments(self, frames: Sequence[np.ndarray], given: np.ndarray | None) -> _Moments:
-        """Return where the segments are on rising frames of each source, with `given` progress (m,) instead."""
+    def moments(
+        self, frames: Sequence[np.ndarray], given: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return what channels have on rising frames of each source, (10, m), how many frames segments have, (S,), how
+        far these have come, (m,), and whether a mode acts, (m,): not on keys, in holds, or where channels stand still.
+        """
         sources, samples = self.sources, each(self.sources, map(len, frames))
         every_frame = np.concatenate(frames)
-        native = timing = sampled(samples, frames)
-        if any(source.is_elastic for source in sources):
-            timing = sampled(samples, frames, unit_elastic=True)
+        native = sampled(samples, frames)
         counts, live = _counts(sources, frames)
         live &= (self.modes != 0).repeat(counts)
         if given is not None:
-            return _Moments(native, counts, given, live)
+            return native, counts, given, live
         progress = np.empty((1, len(every_frame)))
-        combine(self.weights[None], timing, counts, progress)
+        combine(self.weights[None], native, counts, progress)
         progress = progress[0] - self.offsets.repeat(counts)
-        begins = np.cumsum(counts) - counts
-        for number in np.flatnonzero(self.idle & (counts > 0)).tolist():
-            span = slice(begins[number], begins[number] + counts[number])
-            progress[span] = self.ends.idle_progress(number, every_frame[span], sources)
+        if self.idle.any():
+            uniform = np.concatenate([idle_progress(*one) for one in zip(sources, frames, strict=True)])
+            progress = np.where(self.idle.repeat(counts), uniform, progress)
         if self.lacks is not None:
             times = (
                 self.ends.times
@@ -334,7 +253,7 @@ class _Motion:
             first, last = times.T.repeat(counts, axis=1)
             elapsed = (every_frame - first) / np.where(last > first, last - first, np.inf)
             progress = corrected(progress, elapsed, self.lacks.repeat(counts, axis=1))
-        return _Moments(native, counts, progress, live)
+        return native, counts, progress, live
 
     def values(
         self, frames: Sequence[np.ndarray], given: np.ndarray | None
@@ -343,13 +262,12 @@ class _Motion:
 
         And where a mode acts, (m,).
         """
-        moments, order = self.moments(frames, given), self.sources[0].order
-        live = np.flatnonzero(moments.live)
-        values = np.zeros((10, len(moments.live)))
+        native, every, progress, acts = self.moments(frames, given)
+        order, live, values = self.sources[0].order, np.flatnonzero(acts), np.zeros((10, len(acts)))
         if not len(live):
-            return values, moments.native, moments.live
-        segment = np.arange(len(moments.counts)).repeat(moments.counts)[live]
-        counts, progress = np.bincount(segment, minlength=len(moments.counts)), moments.progress[live]
+            return values, native, acts
+        segment = np.arange(len(every)).repeat(every)[live]
+        counts, progress = np.bincount(segment, minlength=len(every)), progress[live]
         turns = np.zeros(len(counts))
         if self.ends.turning is not None and self.passages is None:
             turns = self.ends.turning.spins.turns
@@ -367,7 +285,7 @@ class _Motion:
         places = np.empty(len(rising), dtype=int)
         places[rising] = np.arange(len(rising))
         values[:, live] = rows[:, places[len(at_steps) :]]
-        return values, moments.native, moments.live
+        return values, native, acts
 
     def _poses(self, counts: np.ndarray, progress: np.ndarray) -> Poses:
         """Return the poses (m,) in segments, counts[i] in the i-th, at this progress (m,)."""
@@ -392,16 +310,6 @@ def _poses(ends: Ends, modes: np.ndarray, counts: np.ndarray, progress: np.ndarr
 
 def _segments(sources: Sequence[Source]) -> list[tuple[Source, slice]]:
     return each(sources, (len(source.key_frames) - 1 for source in sources))
-
-
-def _weights(
-    segments: list[tuple[Source, slice]], bounds: tuple[np.ndarray, np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return `progress_weights` of segments whose channels have these values at both ends, (10, S) each."""
-    if any(source.is_elastic for source, _ in segments):
-        bounds = channels_at_ends(segments, unit_elastic=True)
-    counting = np.concatenate([source.counting for source, _ in segments], axis=1)
-    return progress_weights(*bounds, segments[0][0].order, counting)
 
 
 def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

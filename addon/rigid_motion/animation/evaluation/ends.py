@@ -16,19 +16,18 @@ along the last axis.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
-from ...motion import KEYFRAME_MODES, Poses, prepare, twists
+from ...motion import KEYFRAME_MODES, Poses
 from ...motion.curves import twist_shares
 from ...motion.poses import beyond
 from ...motion.segments import prepare_within
-from .bodies import LEAST_SCALE, body_poses, idle_progress, location_axes
-from .components import LOCATION, ROTATION, SCALE, TWISTS
+from .bodies import between, body_poses, location_axes
 from .sources import Source
 from .turning import Turning, needs_turning, turning_of, without_spins
 
@@ -50,9 +49,6 @@ Source: Fritsch and Carlson, "Monotone piecewise cubic interpolation", 1980."""
 
 SHORTEST = 0.1
 """The length of a tangent from which on progress is not corrected any further to make up for it."""
-
-POSED = (LOCATION,) * 3 + (ROTATION,) * 4 + (SCALE,)
-"""The parts that the columns of `packed` poses are of."""
 
 SMALL = 0.01
 """The least part that the mean has of the squared speeds that it is made of: where the motion turns back on itself
@@ -105,18 +101,11 @@ def spins_of_neighbours(
     return Poses(around.positions, quaternions, around.scales), beside
 
 
-def meeting(
-    owners: np.ndarray, times: np.ndarray, keys: Poses, sources: Sequence[Source]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the segments (p,) before and after each key at which two of them meet: both have the same pose there.
-
-    It is one as far as it is that of the part between whose keys they run.
-    """
+def meeting(owners: np.ndarray, times: np.ndarray, keys: Poses) -> tuple[np.ndarray, np.ndarray]:
+    """Return the segments (p,) before and after each key at which two of them meet: both have the same pose there."""
     rows, lasts = packed(keys), np.flatnonzero(times[:, 1] > times[:, 0])
     left, right = lasts[:-1], lasts[1:]
-    own = np.array([[source.part in (None, LOCATION, part) for part in POSED] for source in sources])
-    same = rows[right, 0] == rows[left, 1]
-    meet = (owners[right] == owners[left]) & np.all(same | ~own[owners[left], : rows.shape[-1]], axis=1)
+    meet = (owners[right] == owners[left]) & np.all(rows[right, 0] == rows[left, 1], axis=1)
     return left[meet], right[meet]
 
 
@@ -131,18 +120,11 @@ def native_twists(keys: Poses, measured: Poses) -> np.ndarray:
 
     From the poses at both keys (S, 2) and those of Blender's own in-betweens at the moments `MEASURED` (S, 6).
     """
-    ends = np.zeros(6, dtype=int)
-    ends[3:] = 1
-    result = np.zeros((7, len(keys.positions), 6))
-    result[:6] = twists.between(
-        keys.positions[:, ends].reshape(-1, 3),
-        keys.quaternions[:, ends].reshape(-1, 4),
-        measured.positions.reshape(-1, 3),
-        measured.quaternions.reshape(-1, 4),
-    ).reshape(6, -1, 6)
-    if keys.scales is not None:
-        # Blender's own in-betweens may pass 0.
-        result[6] = np.log(np.maximum(measured.scales, LEAST_SCALE) / keys.scales[:, ends])
+    count = len(keys.positions)
+    ends = keys[np.arange(count).repeat(6), np.tile((0, 0, 0, 1, 1, 1), count)]
+    scales = None if measured.scales is None else measured.scales.ravel()
+    flat = Poses(measured.positions.reshape(-1, 3), measured.quaternions.reshape(-1, 4), scales)
+    result = between(ends, flat).reshape(7, -1, 6)
     return np.stack((result[..., :3] @ SLOPES, -(result[..., :2:-1] @ SLOPES)))
 
 
@@ -152,56 +134,33 @@ def tangents_and_lacks(
     screws: np.ndarray,
     times: np.ndarray,
     pairs: tuple[np.ndarray, np.ndarray],
-    counting: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the lengths of tangents at both ends of S segments, and what the slopes of progress lack there, (2, S).
 
-    Where no segment meets another these are 1 and 0.
-
-    Parameters
-    ----------
-    slopes : array, shape (2, S)
-        Of progress, in unit time.
-    native : array, shape (2, 7, S)
-        As `native_twists` has them.
-    screws : array, shape (2, 7, S)
-        The twists that lead from key to key in unit time, as they are at both ends: spins turn about axes of their own.
-        And the growth of log scale, which counts where nothing else changes.
-    times : array, shape (S, 2)
-        The frames of both keys.
-    pairs : tuple of array of int, shape (p,)
-        The segments that meet at a key: those before it, and those after it.
-    counting : array of bool, shape (7, p)
-        What of a twist counts where they meet.
+    From the slopes of progress (2, S), and as (2, 7, S) Blender's own twists and those from key to key, at both ends in
+    unit time. The growth of log scale counts where nothing else changes. Where none of the segments in `pairs`, before
+    a key and after it (p,), meet there, tangents are 1 and nothing lacks.
     """
     tangents, lacks = np.ones(slopes.shape), np.zeros(slopes.shape)
     durations = times[:, 1] - times[:, 0]
     speeds = screws / np.where(durations > 0.0, durations, np.inf)
     before, after = pairs
-    twists_there = np.where(counting[:6], np.stack((screws[1][:6, before], screws[0][:6, after])), 0.0)
-    moves = np.abs(twists_there).max(axis=(0, 1), initial=0.0) > AT_REST
-    counting = np.concatenate((counting[:6], counting[6:] & ~moves))
-    of_before, of_after = (np.where(counting, speeds[side][:, pairs[1 - side]], 0.0) for side in (1, 0))
+    moves = np.abs(np.stack((screws[1][:6, before], screws[0][:6, after]))).max(axis=(0, 1), initial=0.0) > AT_REST
+    counting = np.ones((7, len(before)))
+    counting[6] = ~moves
+    of_before, of_after = (counting * speeds[side][:, pairs[1 - side]] for side in (1, 0))
     share = twist_shares(durations[before], durations[after])
     parts = share * of_before, (1.0 - share) * of_after
     mean = parts[0] + parts[1]
     squared = np.maximum(_dot(mean, mean), SMALL * sum(_dot(part, part) for part in parts))
     for side, segments, of_side, alone in ((1, before, of_before, share == 1.0), (0, after, of_after, share == 0.0)):
         length = _ratio(_dot(of_side, mean), squared)
-        speed = _ratio(_dot(np.where(counting, native[side][:, segments], 0.0), mean), durations[segments] * squared)
+        speed = _ratio(_dot(counting * native[side][:, segments], mean), durations[segments] * squared)
         slope = speed / np.copysign(np.maximum(np.abs(length), SHORTEST), length)
         tangents[side, segments] = length
         lack = np.clip(slope, -FASTEST, FASTEST) - np.clip(slopes[side, segments], -FASTEST, FASTEST)
         lacks[side, segments] = np.where(alone, 0.0, lack)
     return tangents, lacks
-
-
-def twists_counting(sources: Sequence[Source], joint: np.ndarray) -> np.ndarray:
-    """Return what of twists and growths counts (7, k) for parts, all of it where that is joint (k,)."""
-    counting = np.zeros((7, len(joint)), dtype=bool)
-    for number, source in enumerate(sources):
-        counting[TWISTS[source.part], number] = True
-    return counting | joint
 
 
 def corrected(progress: np.ndarray, elapsed: np.ndarray, lacks: np.ndarray) -> np.ndarray:
@@ -242,9 +201,6 @@ class Ends:
     pairs: tuple[np.ndarray, np.ndarray] | None = None
     """For smooth modes the segments that meet at a key, before it and after it."""
 
-    counting: np.ndarray | None = None
-    """For smooth modes what of twists counts where they meet, shape (7, p): the part's own where not both are joint."""
-
     around: tuple[np.ndarray, Poses] | None = None
     """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
 
@@ -279,45 +235,23 @@ class Ends:
         ends = cls(owners, times, keys, axes, original, turning=turned, whole=whole)
         if not smooth.any():
             return ends
-        holds, pairs = np.concatenate([source.holds for source in sources]), meeting(owners, times, keys, sources)
+        holds, pairs = np.concatenate([source.holds for source in sources]), meeting(owners, times, keys)
         (frames, around), spins = with_neighbours(times, keys, holds, pairs), None
         if whole is not None:
             signs = np.where(np.einsum("si,si->s", whole.second, keys.quaternions[:, 1]) < 0.0, -1.0, 1.0)
             around, spins = spins_of_neighbours(signs, whole.twists, around, holds, pairs)
-        joint = np.concatenate([source.joint for source in sources])
-        counting = twists_counting([sources[owner] for owner in owners[pairs[0]]], joint[pairs[0]] & joint[pairs[1]])
-        ends = replace(ends, pairs=pairs, counting=counting, around=(frames, around), spins=spins)
-        return ends if counting.all() else replace(ends, tangents=ends._of_parts())
-
-    def _of_parts(self) -> np.ndarray:
-        """Return the lengths of tangents (2, S): none at keys before or after which what counts there rests."""
-        assert self.pairs is not None
-        assert self.counting is not None
-        tangents, (before, after) = np.ones((2, len(self.times))), self.pairs
-        turns = np.stack((self.screws[1][:, before], self.screws[0][:, after]))
-        rests = np.any(np.abs(np.where(self.counting, turns, 0.0)).max(axis=1) < AT_REST, axis=0)
-        rests &= ~self.counting.all(axis=0)
-        tangents[1, before[rests]] = tangents[0, after[rests]] = 0.0
-        return tangents
+        return replace(ends, pairs=pairs, around=(frames, around), spins=spins)
 
     @cached_property
     def screws(self) -> np.ndarray:
         """The twists from key to key with spins, as they are at both ends, and the growths of log scale, (2, 7, S)."""
         first, second = self.keys[:, 0], self.keys[:, 1]
         turned = second.quaternions if self.whole is None else self.whole.second
-        screws = twists.between(
-            first.positions, first.quaternions, second.positions, turned, shortest=self.whole is None
-        )
-        growth = np.zeros(len(first.positions)) if first.scales is None else np.log(second.scales / first.scales)
-        screws = np.stack(2 * (np.concatenate((screws, growth[None])),))
+        second = replace(second, quaternions=turned)
+        screws = np.stack(2 * (between(first, second, shortest=self.whole is None),))
         if self.whole is not None:
             screws[:, :3] += np.moveaxis(self.whole.twists, 1, 0)
         return screws
-
-    def idle_progress(self, segment: int, frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
-        """Return the progress on frames (m,) of a segment that turns although no channel changes in it."""
-        first, last = (np.full(len(frames), end) for end in self.times[segment])
-        return idle_progress(sources[self.owners[segment]], frames, first, last)
 
     def at_keys(self, progress: np.ndarray, measured: np.ndarray, source: Source) -> tuple[np.ndarray, np.ndarray]:
         """Return `tangents_and_lacks`, from progress (S, 6) and the channels (., S, 6) at the moments `MEASURED`."""
@@ -328,11 +262,9 @@ class Ends:
             poses = without_spins(poses, self.whole.by_angles, progress)
         native = native_twists(self.keys, poses)
         assert self.pairs is not None
-        assert self.counting is not None
         if self.whole is not None:
             native[:, :3] += slopes[:, None] * np.moveaxis(self.whole.twists, 1, 0)
-        tangents, lacks = tangents_and_lacks(slopes, native, self.screws, self.times, self.pairs, self.counting)
-        return tangents if self.tangents is None else tangents * self.tangents, lacks
+        return tangents_and_lacks(slopes, native, self.screws, self.times, self.pairs)
 
     def poses(self, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
         """Return what a mode makes of the segments, each with so many samples (S,) of this progress (m,).
@@ -350,16 +282,13 @@ class Ends:
 
     def _prepare(self, mode: str) -> Callable[..., Poses]:
         curves: Callable[..., Any] = KEYFRAME_MODES[mode].curves
-        turned = self.turning
-        if not KEYFRAME_MODES[mode].is_smooth:
+        if KEYFRAME_MODES[mode].is_smooth:
+            assert self.around is not None
+            times, keys = self.around
+            tangents = None if self.tangents is None else self.tangents[..., None]
+            curves = partial(curves, tangents=tangents, spins=self.spins)
+        else:
             times, keys = np.broadcast_to((0.0, 1.0), self.times.shape), self.keys
-            if turned is None:
-                return prepare(times, keys, mode)
-            quaternions = np.stack((turned.first, turned.second), axis=1)
-            return prepare_within(curves, times, replace(keys, quaternions=quaternions), is_aligned=True)
-        assert self.around is not None
-        if self.tangents is None and turned is None:
-            return prepare(*self.around, mode)
-        tangents = None if self.tangents is None else self.tangents[..., None]
-        curves = partial(curves, tangents=tangents, spins=self.spins)
-        return prepare_within(curves, *self.around, is_aligned=turned is not None)
+            if self.turning is not None:
+                keys = replace(keys, quaternions=np.stack((self.turning.first, self.turning.second), axis=1))
+        return prepare_within(curves, times, keys, is_aligned=self.turning is not None)

@@ -6,24 +6,21 @@ They are kept by their digests, which terms keep too, so that undo and redo find
 from __future__ import annotations
 
 from collections import OrderedDict
-from dataclasses import fields
-
-import numpy as np
 
 from .sources import Source
 
-MOST_BYTES = 32 * 2**20
-"""Hundreds of undo steps of an ordinary file."""
+MOST_KEYS = 2**20
+"""Of all that are kept: some 32 MB, hundreds of undo steps of an ordinary file."""
 
 
 class _Sources(OrderedDict[int, Source]):
-    """Those used last come last; what is too much in bytes is dropped."""
+    """Those used last come last; what is too much in keys is dropped."""
 
     size = 0
 
     def drop(self, digest: int) -> None:
         if (source := self.pop(digest, None)) is not None:
-            self.size -= size_of(source)
+            self.size -= source.key_count
 
 
 known = _Sources()
@@ -33,8 +30,8 @@ def cache_source(source: Source) -> None:
     """Keep a source; those that were not used for longest go where there is no room."""
     known.drop(source.digest24)
     known[source.digest24] = source
-    known.size += size_of(source)
-    while known.size > MOST_BYTES and len(known) > 1:
+    known.size += source.key_count
+    while known.size > MOST_KEYS and len(known) > 1:
         known.drop(next(iter(known)))
 
 
@@ -47,10 +44,3 @@ def clear() -> None:
     """Forget the sources of a file that is no longer open."""
     known.clear()
     known.size = 0
-
-
-def size_of(source: Source) -> int:
-    """Return about how many bytes a source has."""
-    # What is worked out of keys later comes and goes.
-    arrays = (getattr(keys, field.name) for keys in source.curves for field in fields(keys))
-    return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))

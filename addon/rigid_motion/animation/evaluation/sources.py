@@ -3,129 +3,172 @@
 A source is read, never written. Its digest tells whether anything changed that its motion depends on. Frames are those
 of the Action; values are in the channels' own units.
 
-Location, rotation and scale may have keys on frames of their own: then each of them runs between its own keys. A
-segment that has its ends in common with all of them is *joint*: how far it has come is what all channels say together.
+A key of any part that modes fill is one of the whole body: what has no key of its own there has the value of its curve.
 """
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..fcurves.evaluation import evaluate
-from ..fcurves.keys import BEZIER, CONSTANT, LINEAR, cycled
-from .components import (
-    AXIS_ANGLE,
-    DEPENDS_ON_KEYS,
-    LOCATION,
-    PART_OF,
-    REST,
-    ROTATION,
-    ROWS,
-    SCALE,
+from ..fcurves.keys import BEZIER, CONSTANT, LINEAR, Keys, cycled
+from .components import AXIS_ANGLE, DEPENDS_ON_KEYS, PART_OF, REST, ROTATION, ROWS, SCALE, SMOOTH
+from .marks import (
+    FULL_TURN,
+    HALF_TURN,
+    SAME_FRAME,
+    SCREW_AXIS,
+    TURN_AXES,
+    WHOLE_TURN,
+    Marks,
+    distinct,
+    sweeps,
+    turns_at,
+    vary,
 )
-from .keyed import Keyed
-from .marks import HALF_TURN, SAME_FRAME, SCREW_AXIS, TURN_AXES, WHOLE_TURN, Marks, distinct, sweeps, turns_at
-from .rounds import endless, repeat
 
 __all__ = ["SAME_FRAME", "SCREW_AXIS", "TURN_AXES", "WHOLE_TURN", "Marks", "Source", "distinct"]
 
 
 @dataclass(frozen=True, eq=False)
-class Source(Keyed):
-    """The keys of one slot, and the segments that run between them."""
+class Source:
+    """The keys of one slot, the values that what it does not key rests at, and the segments between keys."""
+
+    order: str | None
+    """The order of Euler angles, AXIS_ANGLE, or None for quaternions."""
+
+    keyed: frozenset[str]
+    """The parts of location, rotation and scale that are keyed, in one of their components at least, or turned."""
+
+    channels: tuple[tuple[list[int], Keys], ...]
+    """The channels with keys, those together that are keyed together: their rows among the components, and keys."""
+
+    rest: dict[int, float]
+    """The values of components that have no keys, of what is keyed, by their rows."""
+
+    original: np.ndarray
+    """An object's own delta transforms, as components, shape (10,): modes act on what is seen with them."""
+
+    mode: int | Marks
+    """The number of the mode of all segments, or of those from frames on. 0 is Blender's own."""
+
+    turns: Keys | None = None
+    """The channel of whole turns more, of segments from the frames of its keys on; None where it has no say."""
+
+    turns_axis: str | Marks = SCREW_AXIS
+    """One of `TURN_AXES`, or their numbers there."""
+
+    location_axes: np.ndarray | None = None
+    """The axes that location runs along, as columns (3, 3) in those of the body at rest; None where they are one."""
+
+    seen: tuple[int, int] | None = None
+    """First and last frame that are seen of it, in scenes and strips."""
+
+    driven: frozenset[int] = frozenset()
+    """The rows of components that drivers move, or whose channels are muted: to the others they are still."""
 
     shaping: np.ndarray | None = None
     """The frames of the keys that segments run between, where they are not those of the channels."""
 
-    part: str | None = None
-    """The part whose keys segments run between, where the others have keys on frames of their own."""
-
-    whole: Source | None = None
-    """The source that it is a part of."""
-
-    beside: Callable[[np.ndarray], np.ndarray] | None = None
-    """From frames (m,) to how a body turns and grows of which this is the location: what its channels are to have."""
-
     @cached_property
-    def is_together(self) -> bool:
-        """Return whether all channels have their keys on the same frames, and go through them once."""
-        return len(self.channels) == 1 and self.cyclic is None and self.shaping is None and self.part is None
-
-    @cached_property
-    def frames_of(self) -> dict[str, np.ndarray]:
-        """The frames of the keys of each part that changes and has two at least, without keys that are one."""
-        if self.is_together:
-            return dict.fromkeys(self.changing, self.curves[0].times)
-        times: dict[str, list[np.ndarray]] = {}
+    def digest(self) -> str:
+        """Differs wherever anything differs that the motion depends on."""
+        summary = hashlib.blake2b(digest_size=16)
         for rows, keys in self.channels:
-            for part in {PART_OF[row] for row in rows} & self.changing:
-                times.setdefault(part, []).append(keys.times)
-        frames = {part: distinct(np.unique(np.concatenate(several))) for part, several in times.items()}
-        frames = {part: of_part for part, of_part in frames.items() if len(of_part) > 1}
-        if frames and ROTATION in self.changing:
-            # What only turns of the channel move goes along with the others.
-            frames.setdefault(ROTATION, next(frames[part] for part in (LOCATION, SCALE, ROTATION) if part in frames))
-        return frames
-
-    @cached_property
-    def is_uneven(self) -> bool:
-        """Return whether the parts that change have keys on different frames: each then runs between its own."""
-        first, *others = self.frames_of.values() or [np.empty(0)]
-        differs = (len(first) != len(other) or np.abs(first - other).max() > SAME_FRAME for other in others)
-        return self.part is None and any(differs)
-
-    @cached_property
-    def parts(self) -> dict[str, Source]:
-        """The source between the keys of each of the parts that change, of one that is uneven."""
-        return {part: replace(self, part=part, whole=self) for part in self.frames_of}
-
-    @cached_property
-    def joint(self) -> np.ndarray:
-        """Return which segments all parts that change have, shape (n - 1,): on a `path` those of all paths."""
-        moments = self._starts[0]
-        result = np.ones(len(moments), dtype=bool)
-        if self.whole is not None:
-            parts = self.whole.parts.values()
-            frames = [part.key_frames if self.shaping is None else part.path.key_frames for part in parts]
-            ends = [(keys, np.clip(np.searchsorted(keys, moments), 1, len(keys) - 1)) for keys in frames]
-            bounds = np.array([(keys[at - 1], keys[at]) for keys, at in ends])
-            result = np.all(np.ptp(bounds, axis=0) <= SAME_FRAME, axis=0)
-            if self.is_linear:
-                # It goes on outside of its keys, where others may have keys of theirs.
-                result[[0, -1]] &= [np.ptp([keys[end] for keys in frames]) <= SAME_FRAME for end in (0, -1)]
-        return result
+            summary.update(bytes(rows))
+            summary.update(keys.raw)
+        # Where something stands that is not keyed does not change how it moves.
+        rest = {row: value for row, value in self.rest.items() if row >= ROWS[ROTATION].start}
+        seen = self.seen if self.goes_on and self.cyclic is None else None
+        summary.update(repr((self.order, sorted(self.keyed), rest, self.mode, sorted(self.driven), seen)).encode())
+        summary.update(self.original[ROWS[ROTATION]].tobytes())
+        if self.location_axes is not None:
+            summary.update(self.location_axes.tobytes())
+        if self.turns is not None:
+            summary.update(self.turns.raw + repr(self.turns_axis).encode())
+        return summary.hexdigest()
 
     @property
-    def is_joint_beside(self) -> np.ndarray:
-        """Return whether the segments before and behind each are joint, as far as there are any, shape (n - 1,)."""
-        around = np.concatenate(((True,), self.joint, (True,)))
-        return around[:-2] & around[2:]
+    def digest24(self) -> int:
+        """The first 24 bits of the digest."""
+        return int(self.digest[:6], 16)
 
     @cached_property
-    def counting(self) -> np.ndarray:
-        """Which components say how far a segment has come, shape (10, n - 1)."""
-        own = np.array([self.part in (None, part) for part in PART_OF])
-        return own[:, None] | self.joint
+    def curves(self) -> list[Keys]:
+        """The keys of all channels that have any."""
+        return [keys for _, keys in self.channels]
+
+    @cached_property
+    def key_count(self) -> int:
+        """The number of keys that its channels have."""
+        return sum(keys.interpolation.size for keys in self.curves)
+
+    @cached_property
+    def changing(self) -> frozenset[str]:
+        """The parts that turns, or channels with more than one value, change."""
+        parts = {
+            PART_OF[row]
+            for rows, keys in self.channels
+            for row, varies in zip(rows, vary(keys).tolist(), strict=True)
+            if varies
+        }
+        if ROTATION in self.keyed and self.turns is not None and self.turns.values.any():
+            parts.add(ROTATION)
+        return frozenset(parts)
+
+    @cached_property
+    def keyed_frames(self) -> np.ndarray:
+        """Frames on which any of the channels has a key of the animator's, shape (k,)."""
+        return np.unique(np.concatenate([np.empty(0), *(keys.times for keys in self.curves)]))
+
+    @cached_property
+    def keyed_range(self) -> tuple[float, float]:
+        """The first and the last frame with a key."""
+        return min(float(keys.times[0]) for keys in self.curves), max(float(keys.times[-1]) for keys in self.curves)
+
+    @cached_property
+    def goes_on(self) -> bool:
+        """Return whether any channel goes on outside of its keys, by cycles or at its slope."""
+        return any(keys.linear or keys.cycles is not None for keys in self.curves)
+
+    @cached_property
+    def is_linear(self) -> bool:
+        """Return whether it goes on at its slope outside of its keys."""
+        return self.cyclic is None and any(keys.linear for keys in self.curves)
+
+    @cached_property
+    def is_smooth(self) -> bool:
+        """Return whether a mode in it looks at the keys around a segment."""
+        return bool(np.isin(self.mode.numbers if isinstance(self.mode, Marks) else self.mode, SMOOTH).any())
+
+    @cached_property
+    def cyclic(self) -> Keys | None:
+        """The first of the channels that change and repeat."""
+        return next((keys for keys in self.curves if keys.cycles is not None and vary(keys).any()), None)
 
     @cached_property
     def key_frames(self) -> np.ndarray:
-        """Frames of the keys of the parts that change, or else of all, without keys that are one to Blender, (n,).
+        """Frames of the keys that segments run between, without keys that are one to Blender, (n,).
 
-        Segments run between them; on a `path` only between those that shape it.
+        They are those of what the modes change, or else all; on a `path` only those that shape it.
         """
         if self.shaping is not None:
             return self.shaping
-        if self.is_together:
-            return self.curves[0].times
-        if self.part is not None:
-            return self.frames_of[self.part]
-        return distinct(np.unique(np.concatenate([*self.frames_of.values()] or [self.keyed_frames])))
+        frames = distinct(np.unique(np.concatenate([np.empty(0), *(keys.times for keys in self.filled_curves)])))
+        return frames if len(frames) > 1 else distinct(self.keyed_frames)
+
+    @cached_property
+    def filled_curves(self) -> list[Keys]:
+        """The keys of the channels that the modes change, with those that are keyed together with them."""
+        filled = set(self.filled_rows)
+        return [keys for rows, keys in self.channels if not filled.isdisjoint(rows)]
 
     @cached_property
     def is_repeatable(self) -> bool:
@@ -133,19 +176,18 @@ class Source(Keyed):
         return self.cyclic is None or repeat(self.channels, self.cyclic, self.order)
 
     @cached_property
-    def endless(self) -> Source:
-        """Source with cycles that have no end."""
-        return self if self.cyclic is None else replace(self, channels=endless(self.channels))
-
-    @cached_property
     def looped(self) -> Source:
         """Source with a segment more on either side, where a mode looks over the seam of endless rounds."""
         if self.cyclic is None or self.cyclic.cycles is None or not self.is_smooth or len(self.key_frames) < 2:
             return self
+        endless = tuple(
+            (rows, keys if keys.cycles is None else replace(keys, cycles=keys.cycles.endless))
+            for rows, keys in self.channels
+        )
         keys, cycles = self.key_frames, self.cyclic.cycles.endless
         first, last = keys[1] - keys[0], keys[-1] - keys[-2]
         before, after = first if cycles.before == "MIRROR" else last, last if cycles.after == "MIRROR" else first
-        return replace(self.endless, shaping=np.array((keys[0] - before, *keys, keys[-1] + after)))
+        return replace(self, channels=endless, shaping=np.array((keys[0] - before, *keys, keys[-1] + after)))
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -197,22 +239,12 @@ class Source(Keyed):
         return np.full(len(self._starts[0]), self.turns_axis)
 
     @cached_property
-    def turns_with_keys(self) -> np.ndarray:
-        """Return whether both ends of a segment are neighbouring keys of the rotation, shape (n - 1,)."""
-        if self.part in (None, ROTATION) or ROTATION not in self.frames_of:
-            return np.full(len(self._starts[0]), self.part in (None, ROTATION))
-        keys = self.frames_of[ROTATION]
-        at = np.searchsorted(keys, self.key_frames - SAME_FRAME)
-        hits = np.abs(keys[np.minimum(at, len(keys) - 1)] - self.key_frames) <= SAME_FRAME
-        return hits[:-1] & hits[1:] & (np.diff(at) == 1)
-
-    @cached_property
     def segment_turns(self) -> np.ndarray:
         """The turns more of each segment that is not Blender's own, whole ones but for inserted keys, (n - 1,)."""
-        if self.turns is None:
+        if self.turns is None or ROTATION not in self.keyed:
             return np.zeros(len(self._starts[0]))
         turns = turns_at(self.turns, self._starts[0])
-        return np.where((self.modes == 0) | ~self.turns_with_keys, 0.0, turns)
+        return np.where(self.modes == 0, 0.0, turns)
 
     @property
     def run_backwards(self) -> np.ndarray:
@@ -221,43 +253,30 @@ class Source(Keyed):
 
     @cached_property
     def has_half_turns(self) -> bool:
-        """Return whether an angle goes by half a turn or more from one of its keys to the next."""
-        if self.order is None:
+        """Return whether an angle goes by half a turn or more from one key to the next."""
+        if self.order is None or len(self.key_frames) < 2:
             return False
-        if self.order == AXIS_ANGLE:
-            angles = self.values_at(self.frames_of.get(ROTATION, self.key_frames))[ROWS[ROTATION]]
-            return bool(np.abs(sweeps(angles[:, :-1], angles[:, 1:])).max(initial=0.0) >= HALF_TURN)
-        return any(
-            3 <= row < 6 and np.abs(np.diff(values)).max(initial=0.0) >= HALF_TURN
-            for rows, keys in self.channels
-            for row, values in zip(rows, keys.values, strict=True)
-        )
+        angles = self.values_at(self.key_frames)[ROWS[ROTATION]]
+        first, second = angles[:, :-1], angles[:, 1:]
+        by = sweeps(first, second) if self.order == AXIS_ANGLE else (second - first)[:3]
+        return bool(np.abs(by).max() >= HALF_TURN)
 
     @cached_property
     def passed(self) -> np.ndarray:
         """Return which keys lie on the path between the keys around them instead of shaping it, shape (n,).
 
-        Breakdowns in all channels that have a key there, that is, between others with the same mode, where a path
-        depends on its keys and goes the shortest way round.
+        Breakdowns in all channels to be filled that have a key there, that is, between others with the same mode, where
+        a path depends on its keys and goes the shortest way round.
         """
         passed = np.zeros(len(self.key_frames), dtype=bool)
         goes_the_shortest_way = self.turns is None and not self.has_half_turns
         if self.cyclic is None and goes_the_shortest_way and any(keys.breakdowns is not None for keys in self.curves):
             modes = self.modes
             passed[1:-1] = np.isin(modes[1:], DEPENDS_ON_KEYS) & (modes[1:] == modes[:-1])
-            for keys in self.curves:
+            for keys in self.filled_curves:
                 shaping = keys.times if keys.breakdowns is None else keys.times[~keys.breakdowns]
                 passed &= ~np.isin(self.key_frames, shaping)
         return passed
-
-    @cached_property
-    def is_common(self) -> np.ndarray:
-        """Return which keys all parts that change have, shape (n,)."""
-        result, parts = np.ones(len(self.key_frames), dtype=bool), {} if self.whole is None else self.whole.frames_of
-        for frames in parts.values():
-            near = np.clip(np.searchsorted(frames, self.key_frames - SAME_FRAME), 0, len(frames) - 1)
-            result &= np.abs(frames[near] - self.key_frames) <= SAME_FRAME
-        return result
 
     @cached_property
     def path(self) -> Source:
@@ -286,17 +305,16 @@ class Source(Keyed):
     def filled_rows(self) -> list[int]:
         """The rows of the components that the modes change."""
         parts = (self.keyed & self.changing) - (frozenset() if self.uniform_scale else {SCALE})
-        parts = parts if self.part is None else parts & {self.part}
         has_six = self.order in (None, AXIS_ANGLE)
         rows = (row for row in range(10) if PART_OF[row] in parts and (row != 6 or has_six))
         return [row for row in rows if row not in self.driven]
 
     @cached_property
     def uniform_scale(self) -> bool:
-        """Return whether the scale is animated, at every key the same along all axes and positive: else it is left."""
-        if SCALE not in self.keyed or SCALE not in self.frames_of:
+        """Return whether the scale is animated, on every key the same along all axes and positive: else it is left."""
+        if SCALE not in self.keyed & self.changing:
             return False
-        x, y, z = self.values_at(self.frames_of[SCALE])[ROWS[SCALE]]
+        x, y, z = self.values_at(self.keyed_frames)[ROWS[SCALE]]
         return bool(np.allclose(x, y) and np.allclose(x, z) and np.all(x > 0.0) and np.ptp(x) > 0.0)
 
     def values_at(self, frames: np.ndarray) -> np.ndarray:
@@ -306,24 +324,47 @@ class Source(Keyed):
     @cached_property
     def holds(self) -> np.ndarray:
         """Return whether all channels hold their value throughout a segment, shape (n - 1,)."""
-        codes, counts = self._interpolations
-        return np.all((codes == CONSTANT) | ~counts, axis=0)
+        return np.all(self._interpolations == CONSTANT, axis=0)
 
     @cached_property
     def has_handles(self) -> np.ndarray:
         """Return whether handles shape a segment, and no easing does nor a hold, shape (n - 1,)."""
-        codes, counts = self._interpolations
-        is_bezier = counts & (codes == BEZIER)
-        return np.all((codes == LINEAR) | is_bezier | ~counts, axis=0) & np.any(is_bezier, axis=0)
+        is_bezier = self._interpolations == BEZIER
+        return np.all(is_bezier | (self._interpolations == LINEAR), axis=0) & np.any(is_bezier, axis=0)
 
     @cached_property
-    def _interpolations(self) -> tuple[np.ndarray, np.ndarray]:
-        """The codes of keys that segments run on from, and which of them have a say, (channels, n - 1) each."""
-        starts, codes = self.key_frames[:-1] + SAME_FRAME, []
-        for keys in self.curves:
+    def _interpolations(self) -> np.ndarray:
+        """The codes of the keys of what the modes change, or else of all, that segments run on from, (., n - 1)."""
+        starts, codes = self.key_frames[:-1] + SAME_FRAME, dict[int, np.ndarray]()
+        for rows, keys in self.channels:
             at = starts if keys.cycles is None else cycled(keys, starts)[0]
-            codes.append(keys.interpolation[:, np.clip(np.searchsorted(keys.times, at, side="right") - 1, 0, None)])
-        return np.concatenate(codes), self.counting[[row for rows, _ in self.channels for row in rows]]
+            at = np.clip(np.searchsorted(keys.times, at, side="right") - 1, 0, None)
+            codes.update(zip(rows, keys.interpolation[:, at], strict=True))
+        return np.stack([codes[row] for row in self.filled_rows if row in codes] or [*codes.values()])
+
+
+def repeat(channels: tuple[tuple[list[int], Keys], ...], cyclic: Keys, order: str | None) -> bool:
+    """Return whether the motion in every round is that in the first, where one of the channels that change is `cyclic`.
+
+    So it is where all of them go round together, and in rounds with an offset turn and grow by nothing, or turn about
+    one and the same axis.
+    """
+    cycles, ends = cyclic.cycles, cyclic.times[[0, -1]].tolist()
+    assert cycles is not None
+    changing = [(rows, keys) for rows, keys in channels if vary(keys).any()]
+    if any(keys.cycles != cycles or keys.times[[0, -1]].tolist() != ends for _, keys in changing):
+        return False
+    if "REPEAT_OFFSET" not in (cycles.before, cycles.after):
+        return True
+    change, turning = np.zeros(10), 0
+    for rows, keys in changing:
+        change[rows] = keys.values[:, -1] - keys.values[:, 0]
+        turning += int(np.count_nonzero(vary(keys)[[3 <= row < 7 for row in rows]]))
+    if order is not None:
+        # Angles of other axes stand still where a single one changes.
+        angles = slice(3, 4) if order == AXIS_ANGLE else slice(3, 6)
+        change[angles] -= FULL_TURN * np.rint(change[angles] / FULL_TURN) if turning > 1 else change[angles]
+    return bool(np.abs(change[3:]).max() < 1e-6)
 
 
 def each(sources: Sequence[Source], counts: Iterable[int]) -> list[tuple[Source, slice]]:
@@ -332,17 +373,8 @@ def each(sources: Sequence[Source], counts: Iterable[int]) -> list[tuple[Source,
     return [(source, slice(*span)) for source, span in zip(sources, itertools.pairwise(bounds), strict=True)]
 
 
-def sampled(
-    samples: list[tuple[Source, slice]],
-    frames: Sequence[np.ndarray],
-    *,
-    unit_elastic: bool = False,
-    exact: bool = True,
-) -> np.ndarray:
-    """Return the channels' own values at the frames of each source, m in all, (10, m). What it does not key rests.
-
-    Frames are taken as they are where `exact`, otherwise as Blender does.
-    """
+def sampled(samples: list[tuple[Source, slice]], frames: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the channels' own values at the frames of each source, m in all, (10, m). What it does not key rests."""
     rows = np.empty((10, samples[-1][1].stop if samples else 0))
     curves, times, out, apart = [], [], [], []
     for (source, span), at in zip(samples, frames, strict=True):
@@ -352,9 +384,6 @@ def sampled(
         for row, value in source.rest.items():
             rows[row, span] = value
         for keyed_rows, keys in source.channels:
-            if at is source.key_frames and source.is_together:
-                rows[keyed_rows, span] = keys.values
-                continue
             curves.append(keys)
             times.append(at)
             if keyed_rows[-1] - keyed_rows[0] < len(keyed_rows):
@@ -362,14 +391,14 @@ def sampled(
             else:
                 out.append(np.empty((len(keyed_rows), len(at))))
                 apart.append((keyed_rows, span, out[-1]))
-    evaluate(curves, times, unit_elastic=unit_elastic, exact=exact, out=out)
+    evaluate(curves, times, out=out)
     for keyed_rows, span, values in apart:
         rows[keyed_rows, span] = values
     return rows
 
 
-def values_of(sources: Sequence[Source], frames: Sequence[np.ndarray], *, exact: bool = False) -> list[np.ndarray]:
+def values_of(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Return what the channels of each source alone have on frames of its own, shape (10, m)."""
     samples = each(sources, map(len, frames))
-    rows = sampled(samples, frames, exact=exact)
+    rows = sampled(samples, frames)
     return [rows[:, span] for _, span in samples]

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..fcurves.keys import BEZIER, EASINGS, ELASTIC, INTERPOLATIONS, Keys
-from .differences import filled_parts
 from .sources import Source
 
 BOUNCE = {name: code for code, name in INTERPOLATIONS.items()}["BOUNCE"]
@@ -37,27 +36,26 @@ class Span:
 
 
 def spans(source: Source) -> list[Span]:
-    """Return the stretches in which the modes act, in order of time for each group of rows.
+    """Return the stretches in which the modes act, in order of time.
 
     Of cycles those between the first key and the last: what is added repeats with the channels.
     """
-    if not (source.is_live and source.is_repeatable):
+    rows = tuple(source.filled_rows)
+    if not (source.is_live and source.is_repeatable and rows):
         return []
-    result = []
-    for rows, part in filled_parts(source):
-        keys, breaks = part.key_frames, np.unique(np.concatenate([np.empty(0), *map(_breaks, part.curves)]))
-        acts = part.modes != 0
-        inside = acts & ~part.holds
-        ends = [(first, last, True, True) for first, last in zip(keys[:-1][inside], keys[1:][inside], strict=True)]
-        if part.is_linear and part.seen is not None:
-            if acts[0] and part.seen[0] < keys[0]:
-                ends.insert(0, (float(part.seen[0]), keys[0], False, True))
-            if acts[-1] and part.seen[1] > keys[-1]:
-                ends.append((keys[-1], float(part.seen[1]), True, False))
-        for first, last, first_is_key, last_is_key in ends:
-            kinks = breaks[(breaks > first) & (breaks < last)].tolist()
-            result.append(Span(tuple(rows), float(first), float(last), first_is_key, last_is_key, tuple(kinks)))
-    return result
+    keys, breaks = source.key_frames, np.unique(np.concatenate([np.empty(0), *map(_breaks, source.filled_curves)]))
+    acts = source.modes != 0
+    inside = acts & ~source.holds
+    ends = [(first, last, True, True) for first, last in zip(keys[:-1][inside], keys[1:][inside], strict=True)]
+    if source.is_linear and source.seen is not None:
+        if acts[0] and source.seen[0] < keys[0]:
+            ends.insert(0, (float(source.seen[0]), keys[0], False, True))
+        if acts[-1] and source.seen[1] > keys[-1]:
+            ends.append((keys[-1], float(source.seen[1]), True, False))
+    return [
+        Span(rows, float(first), float(last), at_first, at_last, tuple(breaks[(breaks > first) & (breaks < last)]))
+        for first, last, at_first, at_last in ends
+    ]
 
 
 def _breaks(keys: Keys) -> np.ndarray:

@@ -82,28 +82,12 @@ def turning(
     turns: np.ndarray,
     axes: np.ndarray,
     backwards: np.ndarray,
-    counts: np.ndarray,
 ) -> Turning:
     """Return how S segments turn.
 
-    Parameters
-    ----------
-    start, end : array, shape (., S)
-        The channels at both ends.
-    keys : Poses, shape (S, 2)
-        What they make of the body.
-    original : array, shape (S, 4)
-        The rotations of the objects' own delta transforms, which the channels' are turned by.
-    order : str or None
-        Of the Euler angles, AXIS_ANGLE, or None for quaternions.
-    turns : array, shape (S,)
-        What the channel of turns has. What is not whole of it is a part of the turn to the second key.
-    axes : array of str, shape (S,)
-        Of `TURN_AXES`, what they are about.
-    backwards : array of bool, shape (S,)
-        Whether time runs backwards.
-    counts : array of bool, shape (S,)
-        Whether angles say which way round it turns, and how far.
+    From the channels (., S) at both ends, the poses (S, 2) that they make, and the rotations (S, 4) of the objects' own
+    delta transforms. `turns` (S,) is what the channel of turns has: what is not whole of it is a part of the turn to
+    the second key. `axes` (S,), of `TURN_AXES`, are what they are about, `backwards` (S,) whether time runs backwards.
     """
     first, count = keys.quaternions[:, 0], len(turns)
     second, turn = _shortest(first, keys.quaternions[:, 1])
@@ -111,7 +95,7 @@ def turning(
     result, senses = Turning(spins, spins, first, second, turn), np.zeros(count)
     parts = turns - np.rint(turns)
     if order is not None:
-        senses = _add_angles(result, start[ROWS[ROTATION]], end[ROWS[ROTATION]], original, order, parts, counts)
+        senses = _add_angles(result, start[ROWS[ROTATION]], end[ROWS[ROTATION]], original, order, parts)
     result = replace(result, by_angles=replace(spins, turns=spins.turns.copy()))
     _add_channel(result, turns, senses, axes, backwards)
     return result
@@ -127,40 +111,25 @@ def turning_of(
     turns = np.concatenate([source.segment_turns for source in sources])
     backwards = np.concatenate([source.run_backwards for source in sources])
     axes = np.concatenate([source.axes_of_turns for source in sources])
-    others = axes, backwards, np.concatenate([source.turns_with_keys for source in sources])
     given = (start, end, keys, original[ROWS[ROTATION]].T, sources[0].order)
-    result = turning(*given, turns, *others)
+    result = turning(*given, turns, axes, backwards)
     if np.all(turns == np.rint(turns)):
         return result, result
     # What is not whole goes by the shortest way between the keys, as without what the channel has.
-    by_angles, spins = turning(*given, np.zeros_like(turns), *others), result.spins
+    by_angles, spins = turning(*given, np.zeros_like(turns), axes, backwards), result.spins
     lacking = result.about - np.einsum("ks,ks->s", by_angles.turn, result.axes_in_body)
     whole = np.where(spins.turns == np.rint(spins.turns), spins.turns, np.rint(lacking / FULL_TURN))
     return result, replace(by_angles, spins=replace(spins, turns=whole))
 
 
 def turning_in(source: Source, segment: int, turns: float | None = None) -> Turning:
-    """Return how one of the segments of a source turns, with other turns than those of its channel if so given.
-
-    Where its rotation has keys of its own, how that turns between the two around the middle of the segment.
-    """
-    rotation, at = source, segment
-    ends = middle = source.key_frames[segment : segment + 2]
-    if source.is_uneven:
-        middle = np.full(2, middle.mean())
-        # Outside of its own keys it stands still.
-        rotation, ends = source.parts.get(ROTATION, source), middle
-        at = int(np.searchsorted(rotation.key_frames, middle[0])) - 1
-        if ROTATION in source.parts and 0 <= at < len(rotation.key_frames) - 1:
-            ends = rotation.key_frames[at : at + 2]
-    rows, original = rotation.values_at(ends), source.original[:, None]
-    start, end = rows[:, :1], rows[:, 1:]
+    """Return how one of the segments of a source turns, with other turns than those of its channel if so given."""
+    rows, original, one = values_at_ends(source, segment), source.original[:, None], slice(segment, segment + 1)
     poses = body_poses(rows[:, None], original[..., None], None, source)
-    one, is_turned = slice(max(at, 0), at + 1), ends[0] < ends[1]
-    channel = rotation.segment_turns[one] if turns is None else np.array([turns])
-    channel, axes = (channel, rotation.axes_of_turns[one]) if is_turned else (np.zeros(1), np.array([SCREW_AXIS]))
-    backwards, counts = np.zeros(1, dtype=bool), np.ones(1, dtype=bool)
-    return turning(start, end, poses, original[ROWS[ROTATION]].T, source.order, channel, axes, backwards, counts)
+    channel = source.segment_turns[one] if turns is None else np.array([turns])
+    own = original[ROWS[ROTATION]].T
+    axes, backwards = source.axes_of_turns[one], np.zeros(1, dtype=bool)
+    return turning(rows[:, :1], rows[:, 1:], poses, own, source.order, channel, axes, backwards)
 
 
 def values_at_ends(source: Source, segment: int) -> np.ndarray:
@@ -196,7 +165,6 @@ def _add_angles(
     original: np.ndarray,
     order: str,
     parts: np.ndarray,
-    counts: np.ndarray,
 ) -> np.ndarray:
     """Add the turns that angles (4, S) at both ends say, and have half turns go in their sense; in place.
 
@@ -210,7 +178,7 @@ def _add_angles(
         change = (end - start)[:3]
         furthest = np.abs(change).argmax(axis=0)
         by = np.take_along_axis(change, furthest[None], axis=0)[0]
-    some = np.flatnonzero(counts & ((np.abs(by) >= HALF_TURN) | (parts != 0.0)))
+    some = np.flatnonzero((np.abs(by) >= HALF_TURN) | (parts != 0.0))
     if order == AXIS_ANGLE:
         some = some[by[some] != 0.0]
     if not len(some):

@@ -1,4 +1,4 @@
-"""F-curves as arrays: their keys, what their codes mean, and the modifiers that say which frame of them is shown.
+"""F-curves as arrays: their keys, what these make of the time between them, and Cycles, which say what frame is shown.
 
 Frames and values are Blender's, in its single precision.
 """
@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+
+from .solvers import bezier_cubics
 
 _EASED = ("BACK", "BOUNCE", "CIRC", "CUBIC", "ELASTIC", "EXPO", "QUAD", "QUART", "QUINT", "SINE")
 
@@ -97,6 +99,34 @@ class Keys:
         """Values of the keys, shape (c, n)."""
         return self.points[..., 1]
 
+    @cached_property
+    def rates(self) -> np.ndarray:
+        """One over the frames from each key to the next, 0 where there are none, shape (n,)."""
+        durations = np.diff(self.times, append=self.times[-1:])
+        return np.divide(1.0, durations, out=np.zeros_like(durations), where=durations != 0.0)
+
+    @cached_property
+    def cubics(self) -> tuple[np.ndarray, np.ndarray | None]:
+        """Value and time from each key to the next as cubics of a parameter from 0 to 1.
+
+        Values (4, c, n) are coefficients of 1, t, t^2 and t^3, or (2, c, n) where no segment is BEZIER; what eases runs
+        straight here. Times, from 0 to 1, are coefficients of t, t^2 and t^3, shape (3, c, n), or (3, 1, n) where all
+        curves have them in common; None where time itself is the parameter.
+        """
+        following = np.roll(self.points, -1, axis=1)
+        is_moving = (self.rates != 0.0) & (self.interpolation != CONSTANT)
+        values, times = np.zeros((4, *is_moving.shape)), np.zeros((3, *is_moving.shape))
+        values[0], values[1] = self.values, np.where(is_moving, following[..., 1] - self.values, 0.0)
+        curved = is_moving & (self.interpolation == BEZIER)
+        if self.left is None or self.right is None or not curved.any():
+            return values[:2], None
+        ends = self.points, self.right, np.roll(self.left, -1, axis=1), following
+        cubics = bezier_cubics(*(points[curved] for points in ends))
+        times[0] = 1.0
+        times[:, curved] = cubics[..., 0] * self.rates[np.nonzero(curved)[1]]
+        values[1:, curved] = cubics[..., 1]
+        return values, times[:, :1] if (times == times[:, :1]).all() else times
+
     def only(self, channels: Sequence[int]) -> Keys:
         """Return the keys of these channels alone."""
         return self._part((channels,))
@@ -122,30 +152,16 @@ class Keys:
 
 
 def cycled(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return times folded back into the range of the keys by the curve's cycles.
+    """Return times (m,) folded back into the range of the keys by their Cycles, and whether time runs backwards there.
 
-    Parameters
-    ----------
-    keys : Keys
-        The curve. Without cycles times stay what they are.
-    times : array, shape (m,)
-        Frames.
-
-    Returns
-    -------
-    folded : array, shape (m,)
-        In the range of the keys, or as they were where no cycle reaches.
-    backwards : array of bool, shape (m,)
-        Whether time runs backwards there.
+    Where no cycle reaches they are what they were.
     """
-    with np.errstate(all="ignore"):
-        folded, backwards, _ = fold(keys, np.asarray(times))
-    return folded, backwards
+    return fold(keys, np.asarray(times))[:2]
 
 
+@np.errstate(all="ignore")
 def fold(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return times folded, whether they run backwards, and how many times the change from first to
-    last key is to be added.
+    """Return what `cycled` does, and how many times the change from the first to the last key is to be added.
 
     Outside of the keys in single precision and in Blender's order of steps: it decides on which side of a key a frame
     falls. Between them times stay what they are.

@@ -134,18 +134,6 @@ def fit_together(times: np.ndarray, values: np.ndarray, shares: np.ndarray, nati
     return others if error < 0.5 * least and least > GOOD else best
 
 
-def cubics_in_time(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the handles (..., 2, 2) of segments that are cubics in time, as most are, and their largest errors (...).
-
-    They run from (0, 0) to (1, 1), nearest to values (..., m) at times (m,).
-    """
-    handles = np.stack((3.0 * times * (1.0 - times) ** 2, 3.0 * times * times * (1.0 - times)))
-    desired = values - times**3
-    y = desired @ np.linalg.pinv(handles)
-    result = np.stack((np.broadcast_to(IN_TIME, y.shape), y), axis=-1)
-    return result, np.abs(y @ handles - desired).max(axis=-1)
-
-
 def _nearest(x: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the handles (c, 2, 2) at these times (c, 2), and the largest error of their mean."""
     cubics = np.stack((3.0 * x[:, 0], 3.0 * (x[:, 1] - 2.0 * x[:, 0]), 1.0 + 3.0 * (x[:, 0] - x[:, 1])))

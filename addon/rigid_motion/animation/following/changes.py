@@ -7,9 +7,8 @@ of its keys is kept and compared.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from itertools import pairwise
 
 import bpy
 import numpy as np
@@ -27,31 +26,29 @@ OF_OBJECTS = (
 BlockKey = tuple[str, str | None]
 """The key that a data-block is found by in the file: its name, and the file that it is linked from."""
 
-OFTEN = ("co", "handle_left", "handle_right", "interpolation")
-"""What of a key is edited most: it is looked at first, and the rest where nothing of it has changed."""
+OFTEN = ("co", "handle_left", "handle_right")
+"""What of keys is dragged: it is looked at first."""
 
-SELDOM = ("easing", "back", "amplitude", "period", "type")
-"""What else in-betweens depend on of a key."""
+SELDOM = ("interpolation", "easing", "back", "amplitude", "period", "type")
+"""What else in-betweens depend on of keys."""
 
 
 def key_of(block: bpy.types.ID) -> BlockKey:
     return block.name, block.library and block.library.filepath
 
 
-def edited_actions(depsgraph: bpy.types.Depsgraph | None) -> set[bpy.types.Action]:
-    """Return the Actions that wait to be evaluated in a dependency graph, or just were."""
-    if depsgraph is None or not depsgraph.id_type_updated("ACTION"):
-        return set()
-    keys = [key_of(update.id) for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
+def edited_actions(*graphs: bpy.types.Depsgraph) -> set[bpy.types.Action]:
+    """Return the Actions that wait to be evaluated in dependency graphs, or just were."""
+    updates = [update.id for graph in graphs if graph.id_type_updated("ACTION") for update in graph.updates]
+    keys = {key_of(block) for block in updates if isinstance(block, bpy.types.Action)}
     return set(map(bpy.data.actions.get, keys)) - {None}
 
 
-def edited_objects(depsgraph: bpy.types.Depsgraph | None) -> set[bpy.types.Object]:
-    """Return the objects that wait to be evaluated in a dependency graph, or just were, with the rigs of armatures."""
-    if depsgraph is None or not (depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("ARMATURE")):
-        return set()
-    updates = [update.id for update in depsgraph.updates]
-    keys = [key_of(block) for block in updates if isinstance(block, bpy.types.Object)]
+def edited_objects(*graphs: bpy.types.Depsgraph) -> set[bpy.types.Object]:
+    """Return the objects that wait to be evaluated in dependency graphs, or just were, with the rigs of armatures."""
+    graphs = [graph for graph in graphs if graph.id_type_updated("OBJECT") or graph.id_type_updated("ARMATURE")]
+    updates = [update.id for graph in graphs for update in graph.updates]
+    keys = {key_of(block) for block in updates if isinstance(block, bpy.types.Object)}
     result = set(map(bpy.data.objects.get, keys)) - {None}
     # A setting of a bone at rest is the armature's alone, until that was evaluated.
     alone = {key_of(block) for block in updates if isinstance(block, bpy.types.Armature)}
@@ -75,77 +72,34 @@ def add_action(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, added: set
         obj.instance_type = obj.instance_type
 
 
-def graphs_of(scene: bpy.types.Scene) -> Iterator[bpy.types.Depsgraph | None]:
-    return (layer.depsgraph for layer in scene.view_layers)
-
-
-class _Reader:
-    """Reads these properties of the keys of many F-curves, into memory that it keeps."""
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self._kinds = {name: (width * np.dtype(kind).itemsize, kind) for name, (width, kind) in KEY_FIELDS.items()}
-        self._names = names
-        self._counts: list[int] = []
-        self._buffer, self._views, self._bounds = np.empty(0, np.uint8), [], [0]
-
-    def read(self, curves: Iterable[bpy.types.FCurve], counts: list[int]) -> list[bytes]:
-        """Return what the keys of F-curves have, of which each has so many."""
-        if counts != self._counts:
-            self._make_room(counts)
-        for fcurve, views in zip(curves, self._views, strict=True):
-            points = fcurve.keyframe_points
-            for name, view in zip(self._names, views, strict=True):
-                points.foreach_get(name, view)
-        raw = self._buffer.tobytes()
-        return [raw[begin:end] for begin, end in pairwise(self._bounds)]
-
-    def _make_room(self, counts: list[int]) -> None:
-        sizes = sum(self._kinds[name][0] for name in self._names)
-        self._counts, self._bounds = counts, [0, *np.cumsum(np.array(counts) * sizes).tolist()]
-        self._buffer, self._views = np.zeros(self._bounds[-1], np.uint8), []
-        for count, at in zip(counts, self._bounds, strict=False):
-            views = []
-            for size, kind in (self._kinds[name] for name in self._names):
-                views.append(self._buffer[at : at + count * size].view(kind))
-                at += count * size
-            self._views.append(views)
+def graphs_of(scene: bpy.types.Scene) -> list[bpy.types.Depsgraph]:
+    return [layer.depsgraph for layer in scene.view_layers if layer.depsgraph is not None]
 
 
 class Snapshot:
     """The keys of a slot as they were when it was looked at last."""
 
     def __init__(self, slot: Slot) -> None:
-        self._often, self._seldom = _Reader(OFTEN), _Reader(SELDOM)
         curves = _curves_in(slot)
-        flags = list(map(_flags_of, curves.values()))
-        counts = [count for count, *_ in flags]
-        self._shown = dict(zip(curves, zip(flags, self._often.read(curves.values(), counts), strict=True), strict=True))
-        self._rest = dict(zip(curves, self._seldom.read(curves.values(), counts), strict=True))
+        self._often, self._seldom = _often_in(curves), _seldom_in(curves)
 
     def look(self, slot: Slot) -> set[Channel]:
         """Look at a slot again, and return the F-curves that are other than before, or not there before or now."""
         curves = _curves_in(slot)
-        flags = list(map(_flags_of, curves.values()))
-        counts = [count for count, *_ in flags]
-        before, of_keys = self._shown, self._often.read(curves.values(), counts)
-        self._shown = dict(zip(curves, zip(flags, of_keys, strict=True), strict=True))
-        changed = _differing(before, self._shown)
-        if not changed:
-            rest = self._rest
-            self._rest = dict(zip(curves, self._seldom.read(curves.values(), counts), strict=True))
-            changed = _differing(rest, self._rest)
+        often = _often_in(curves)
+        changed, self._often = _differing(self._often, often), often
+        # Of one transform an edit is of this. Of several, or of none so far, others may have got other marks.
+        if len({split_path(path)[0] for path, _ in changed}) != 1:
+            seldom = _seldom_in(curves)
+            changed |= _differing(self._seldom, seldom)
+            self._seldom = seldom
         return changed
 
-    def note_modifiers(self, curves: Mapping[Channel, bpy.types.FCurve]) -> bool:
-        """Take note of the modifiers that these F-curves have by now.
-
-        Returns whether they are those that there were, with as many keys.
-        """
-        flags = {channel: _flags_of(fcurve) for channel, fcurve in curves.items() if _matters(channel[0])}
-        if any(channel not in self._shown or self._shown[channel][0][0] != now[0] for channel, now in flags.items()):
-            return False
-        self._shown |= {channel: (now, self._shown[channel][1]) for channel, now in flags.items()}
-        return True
+    def note(self, curves: Mapping[Channel, bpy.types.FCurve]) -> None:
+        """Take note of what these F-curves have by now, so that it is no change later."""
+        curves = {channel: fcurve for channel, fcurve in curves.items() if _matters(channel[0])}
+        self._often |= _often_in(curves)
+        self._seldom |= _seldom_in(curves)
 
 
 def _differing(before: Mapping[Channel, object], now: Mapping[Channel, object]) -> set[Channel]:
@@ -164,56 +118,58 @@ def _matters(path: str) -> bool:
     return prop in WIDTHS or prop == TURNS_PROPERTY
 
 
-def _flags_of(fcurve: bpy.types.FCurve) -> tuple[int, int, bool, bool]:
-    """Return the number of keys and of modifiers, whether it is muted, and whether it goes on at its slope."""
-    is_linear = fcurve.extrapolation == "LINEAR"
-    return len(fcurve.keyframe_points), len(fcurve.modifiers), fcurve.mute, is_linear
+def _often_in(curves: Mapping[Channel, bpy.types.FCurve]) -> dict[Channel, tuple[bool, str, bytes]]:
+    """Return whether F-curves are muted, how they go on, and `OFTEN` of their keys."""
+    return {channel: (one.mute, one.extrapolation, _keys_of(one, OFTEN)) for channel, one in curves.items()}
+
+
+def _seldom_in(curves: Mapping[Channel, bpy.types.FCurve]) -> dict[Channel, tuple[int, bytes]]:
+    """Return the number of modifiers of F-curves, and `SELDOM` of their keys."""
+    return {channel: (len(one.modifiers), _keys_of(one, SELDOM)) for channel, one in curves.items()}
+
+
+def _keys_of(fcurve: bpy.types.FCurve, names: tuple[str, ...]) -> bytes:
+    points = fcurve.keyframe_points
+    raw, views = _room(names, len(points))
+    for name, view in views:
+        points.foreach_get(name, view)
+    return raw.tobytes()
+
+
+@lru_cache(maxsize=256)
+def _room(names: tuple[str, ...], count: int) -> tuple[np.ndarray, list[tuple[str, np.ndarray]]]:
+    """Return memory to read these properties of so many keys into, and the part of each."""
+    sizes = [count * KEY_FIELDS[name][0] * np.dtype(KEY_FIELDS[name][1]).itemsize for name in names]
+    raw, ends = np.zeros(sum(sizes), np.uint8), np.cumsum(sizes)
+    parts = zip(names, sizes, ends, strict=True)
+    return raw, [(name, raw[end - size : end].view(KEY_FIELDS[name][1])) for name, size, end in parts]
+
+
+def settings_of(obj: bpy.types.Object, slots: Sequence[Slot]) -> tuple:
+    """Return what in-betweens of an object depend on beside its keys in these slots: its properties, drivers and
+    strips, and the axes that location runs along where these are other bones'.
+    """
+    values = [tuple(getattr(obj, name)) for name in OF_OBJECTS]
+    driver_count = 0 if obj.animation_data is None else len(obj.animation_data.drivers)
+    return obj.rotation_mode, *values, driver_count, tuple(slots), _axes_in(obj) if slots and obj.pose else None
+
+
+def _axes_in(rig: bpy.types.Object) -> bytes:
+    """Return the bones at rest, as far as these say along which axes others move."""
+    bones = rig.data.bones
+    is_local = np.empty(len(bones), bool)
+    bones.foreach_get("use_local_location", is_local)
+    at_rest = np.zeros((len(bones), 16), np.float32)
+    if not is_local.all():
+        bones.foreach_get("matrix_local", at_rest.ravel())
+    return is_local.tobytes() + at_rest.tobytes()
 
 
 def bones_in(rig: bpy.types.Object) -> np.ndarray:
-    """Return what in-betweens depend on of the bones of a rig beside their keys, a row each: how they turn, what
-    rotation and scale they have, and whether they move along the axes of their parents.
-    """
-    bones, data = rig.pose.bones, rig.data.bones
-    columns = []
-    for name, width in {**WIDTHS, "rotation_mode": 0}.items():
-        values = np.empty(len(bones) * max(width, 1), np.float32 if width else np.int32)
-        bones.foreach_get(name, values)
-        columns.append(values.view(np.int32).reshape(len(bones), -1))
-    is_local = np.empty(len(data), bool)
-    data.foreach_get("use_local_location", is_local)
-    at_rest = np.empty((len(data), 16), np.float32)
-    if not is_local.all():
-        data.foreach_get("matrix_local", at_rest.ravel())
-    else:
-        at_rest[:] = 0.0
-    if len(data) != len(bones):  # It is being edited.
-        return np.column_stack(columns[1:])
-    return np.column_stack((*columns[1:], is_local, at_rest.view(np.int32)))
-
-
-def object_bits(obj: bpy.types.Object) -> tuple:
-    """Return what in-betweens of an object depend on beside its keys."""
-    data = obj.animation_data
-    values = [tuple(getattr(obj, name)) for name in OF_OBJECTS]
-    if data is None:
-        return obj.rotation_mode, *values
-    strips = [
-        (
-            track.mute,
-            strip.mute,
-            strip.action,
-            strip.action_slot_handle,
-            strip.action_frame_start,
-            strip.action_frame_end,
-        )
-        for track in data.nla_tracks
-        for strip in track.strips
-    ]
-    return obj.rotation_mode, *values, data.action, data.action_slot_handle, len(data.drivers), *strips
-
-
-def slots_by(bits: tuple) -> set[tuple[bpy.types.Action, int]]:
-    """Return the Actions that move an object by its `object_bits`, each with the handle of a slot."""
-    own, strips = bits[1 + len(OF_OBJECTS) :][:2], bits[4 + len(OF_OBJECTS) :]
-    return {pair for pair in (own, *(strip[2:4] for strip in strips)) if pair and pair[0] is not None}
+    """Return how the bones of a rig turn, and what rotation and scale they have, a row each."""
+    bones, columns = rig.pose.bones, []
+    for name, width in {**WIDTHS, "rotation_mode": 1}.items():
+        values = np.empty((len(bones), width), np.float32 if name in WIDTHS else np.int32)
+        bones.foreach_get(name, values.ravel())
+        columns.append(values.view(np.int32))
+    return np.column_stack(columns[1:])

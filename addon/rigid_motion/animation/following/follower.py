@@ -9,18 +9,19 @@ from __future__ import annotations
 import functools
 import logging
 import threading
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
+from ...handlers import append_handlers, remove_handlers
 from ..actions.marks import has_marks
 from ..actions.modifiers import has_terms
-from ..actions.reading import is_marked
 from ..actions.slots import (
     Binding,
+    Curves,
     Slot,
     bindings_in,
     bindings_in_slot,
@@ -30,16 +31,12 @@ from ..actions.slots import (
     slots_of,
 )
 from ..evaluation import source_cache
-from ..handlers import append_handlers, remove_handlers
 from ..transforms import WIDTHS, Channel, Transform, let_override_be_read, split_path, transform_of
-from .changes import Snapshot, add_action, bones_in, edited_actions, edited_objects, graphs_of, object_bits, slots_by
+from .changes import Snapshot, add_action, bones_in, edited_actions, edited_objects, graphs_of, settings_of
 from .refreshing import is_keying_safe, refresh_bindings
 from .unkeyed import Poses
 
 log = logging.getLogger(__package__)
-
-DENSE = 1000
-"""Keys of an F-curve that are not looked at with every edit of an Action without modes."""
 
 Targets = Iterable[bpy.types.Object | bpy.types.PoseBone | Transform]
 
@@ -65,10 +62,8 @@ class Follower:
 
     def begin_file(self) -> None:
         """Know nothing of the file that is open."""
-        self.unseen = True
-        """True if the file has yet to be looked through."""
-        self.ranges: dict[int, tuple[int, int]] = {}
-        """First and last frame of each scene when last seen, by session id."""
+        self.ranges: dict[int, tuple[int, int]] | None = None
+        """First and last frame of each scene, by session id, when the file was looked through; None before."""
         self.followed: set[int] = set()
         """The Actions, by session id, that were followed before Blender evaluated them."""
         self.added: set[tuple[int, int]] = set()
@@ -78,12 +73,11 @@ class Follower:
         self.forget_snapshots()
 
     def forget_snapshots(self) -> None:
-        self.snapshots: dict[tuple[int, int], Snapshot] = {}
-        """The keys of slots with modes, by the Action's session id and the slot's handle."""
-        self.plain: dict[tuple[int, int], int] = {}
-        """The number of keys of slots without modes, likewise."""
-        self.bits: dict[int, tuple[tuple, np.ndarray | None]] = {}
-        """What objects and their bones had beside their keys, by session id."""
+        self.snapshots: dict[tuple[int, int], Snapshot | int] = {}
+        """The keys of slots, where there are no modes their number, by the Action's session id and the slot's handle.
+        """
+        self.bits: dict[int, tuple[tuple, list[Slot], np.ndarray | None]] = {}
+        """What objects and their bones had beside their keys, and the slots that moved them, by session id."""
 
     def _handler(self, method: Callable) -> Callable:
         """Return a handler that stays quiet while edits are not followed, and never raises into Blender."""
@@ -111,121 +105,103 @@ class Follower:
             self.busy = before
 
     def refresh(self, targets: Targets | None = None) -> int:
-        """Bring the in-betweens of these up to date, or of all in the file: see the function of this name."""
-        slots = None if targets is None else bindings_of([transform_of(target) for target in targets])
-        bindings = self._all() if slots is None else slots
+        """Bring the in-betweens of these up to date, or of all in the file.
+
+        Returns how much had to be changed, counted in transforms of slots.
+        """
+        if targets is not None:
+            bindings = bindings_of(map(transform_of, targets))
+        else:
+            slots = slots_of(obj for obj in bpy.data.objects if obj.animation_data is not None)
+            bindings = [binding for slot in slots if not self._is_plain(slot) for binding in bindings_in_slot(slot)]
         with self.turn():
             count = refresh_bindings(bindings, may_key=is_keying_safe())
-        for slot in dict.fromkeys(binding.slot for binding in bindings):
-            self._remember(slot)
+        self._remember(bindings)
         return count
-
-    def _all(self) -> list[Binding]:
-        """Return all that is moved in the file, but what is known to have no modes."""
-        slots = slots_of(obj for obj in bpy.data.objects if obj.animation_data is not None)
-        return [binding for slot in slots if not self._is_plain(slot) for binding in bindings_in_slot(slot)]
 
     def _is_plain(self, slot: Slot) -> bool:
         """Return whether a slot had no modes when it was looked at last, and has as many keys since."""
-        return self.plain.get(_key_of(slot)) == _count_keys(slot)
+        number = self.snapshots.get(_key_of(slot))
+        return isinstance(number, int) and number == _count_keys(slot)
 
-    def _remember(self, slot: Slot) -> None:
-        """Keep what a slot has by now."""
-        key = _key_of(slot)
-        if any(map(has_modes, bindings_in_slot(slot))):
-            self.snapshots[key] = Snapshot(slot)
-            self.plain.pop(key, None)
-        else:
-            self.snapshots.pop(key, None)
-            self.plain[key] = _count_keys(slot)
+    def _remember(self, bindings: Iterable[Binding]) -> None:
+        """Keep what these have by now."""
+        by_slot: dict[Slot, list[Binding]] = {}
+        for binding in bindings:
+            by_slot.setdefault(binding.slot, []).append(binding)
+        for slot, of_slot in by_slot.items():
+            snapshot = self.snapshots.get(_key_of(slot))
+            if not has_modes(slot):
+                self.snapshots[_key_of(slot)] = _count_keys(slot)
+            elif isinstance(snapshot, Snapshot):
+                snapshot.note({channel: curve for item in of_slot for channel, curve in item.curves.items()})
+            else:
+                self.snapshots[_key_of(slot)] = Snapshot(slot)
 
     def follow(self, actions: Collection[bpy.types.Action], frame: float) -> None:
         """Refresh what these Actions, which were edited, move."""
-        for slot in slots_in(actions) if actions else ():
-            if slot.is_editable and (not self._is_plain(slot) or _says_modes(slot)):
-                self._follow_slot(slot, frame)
+        for slot in slots_in(actions):
+            if slot.is_editable and (not self._is_plain(slot) or has_modes(slot)):
+                snapshot = self.snapshots.get(_key_of(slot))
+                changed = snapshot.look(slot) if isinstance(snapshot, Snapshot) else None
+                prefixes = None if changed is None else dict.fromkeys(split_path(path)[0] for path, _ in changed)
+                bindings = bindings_in_slot(slot, prefixes)
+                self._refresh(bindings, changed, frame, may_key=is_keying_safe(), is_doubtful=changed is not None)
 
-    def _follow_slot(self, slot: Slot, frame: float) -> None:
-        snapshot = self.snapshots.get(_key_of(slot))
-        changed = None if snapshot is None else snapshot.look(slot)
-        if changed is not None and not changed:
-            return
-        prefixes = None if changed is None else dict.fromkeys(split_path(path)[0] for path, _ in changed)
-        bindings = bindings_in_slot(slot, prefixes)
-
-        def keep_poses(stale: Collection[Binding]) -> None:
-            self._keep_poses(slot, changed, stale, frame)
-
-        is_doubtful = changed is not None
-        refresh_bindings(bindings, may_key=is_keying_safe(), is_doubtful=is_doubtful, before_writing=keep_poses)
-        curves = {channel: fcurve for binding in bindings for channel, fcurve in binding.curves.items()}
-        if snapshot is None or not snapshot.note_modifiers(curves):
-            self._remember(slot)
-
-    def _keep_poses(
-        self, slot: Slot, edited: Collection[Channel] | None, stale: Iterable[Binding], frame: float
+    def _refresh(
+        self, bindings: Sequence[Binding], edited: Collection[Channel] | None, frame: float, **options: bool
     ) -> None:
-        """Keep the poses of a slot that have no keys, before what is stale in it is written.
+        """Refresh these bindings, and keep the poses that have no keys.
 
-        Where it is not known what was edited, all of that may be.
+        Where it is not known which channels were edited, all that are written may be.
         """
-        written = {channel for binding in stale for channel in binding.curves}
-        self.unkeyed.append(Poses(slot, written if edited is None else edited, written, frame))
+
+        def keep_poses(stale: Iterable[Binding]) -> None:
+            written: dict[Slot, Curves] = {}
+            for binding in stale:
+                written.setdefault(binding.slot, {}).update(binding.curves)
+            for slot, curves in written.items():
+                self.unkeyed.append(Poses(slot, curves if edited is None else edited, curves, frame))
+
+        if bindings:
+            refresh_bindings(bindings, before_writing=keep_poses, **options)
+            self._remember(bindings)
 
     def follow_objects(self, objects: Collection[bpy.types.Object], frame: float) -> None:
         """Refresh what moves these objects where it depends on something of theirs that is not as it was."""
         edited: list[Transform] = []
         left: set[bpy.types.Action] = set()
         for obj in objects:
-            slots = slots_alone(obj)
-            bones = bones_in(obj) if slots and obj.pose is not None else None
-            before, now = self.bits.get(obj.session_uid), (object_bits(obj), bones)
-            self.bits[obj.session_uid] = now
-            if before is not None and before[0] != now[0]:
-                left |= {action for action, _ in slots_by(before[0]) - slots_by(now[0])}
+            slots, pose = slots_alone(obj), obj.pose
+            settings, bones = settings_of(obj, slots), bones_in(obj) if slots and pose is not None else None
+            settings_before, slots_before, bones_before = self.bits.get(obj.session_uid, (None, [], None))
+            self.bits[obj.session_uid] = settings, slots, bones
+            left |= {slot.action for slot in slots_before if slot.key not in {now.key for now in slots}}
             if not slots or all(map(self._is_plain, slots)):
                 continue
-            if before is None or before[0] != now[0] or (bones is not None and np.shape(before[1]) != bones.shape):
-                edited += [transform_of(obj), *(map(transform_of, obj.pose.bones) if obj.pose is not None else ())]
+            if settings != settings_before or np.shape(bones) != np.shape(bones_before):
+                edited += map(transform_of, (obj, *(() if pose is None else pose.bones)))
             elif bones is not None:
-                numbers = np.flatnonzero((bones != before[1]).any(axis=1)).tolist()
-                edited += [transform_of(obj.pose.bones[number]) for number in numbers]
+                numbers = np.flatnonzero((bones != bones_before).any(axis=1)).tolist()
+                edited += [transform_of(pose.bones[number]) for number in numbers]
         # What others move by may have been planned for those that move by it no longer.
-        of_others = bindings_in(left & set(bpy.data.actions)) if left else []
-        if edited or of_others:
-            bindings = list(
-                {(item.slot.key, item.prefix): item for item in (*of_others, *bindings_of(edited))}.values()
-            )
-
-            def keep_poses(stale: Collection[Binding]) -> None:
-                for slot in dict.fromkeys(binding.slot for binding in stale):
-                    self._keep_poses(slot, (), [binding for binding in stale if binding.slot == slot], frame)
-
-            refresh_bindings(bindings, before_writing=keep_poses)
-            for slot in dict.fromkeys(binding.slot for binding in bindings):
-                snapshot = self.snapshots.get(_key_of(slot))
-                if snapshot is None:
-                    self._remember(slot)
-                else:
-                    of_slot = (binding.curves for binding in bindings if binding.slot == slot)
-                    snapshot.note_modifiers(
-                        {channel: fcurve for curves in of_slot for channel, fcurve in curves.items()}
-                    )
+        bindings = (*bindings_in(left & set(bpy.data.actions)), *bindings_of(edited))
+        self._refresh([*{(item.slot.key, item.prefix): item for item in bindings}.values()], (), frame)
 
     def look_through(self) -> None:
         """Refresh all there is in the file."""
-        self.unseen = False
-        self.ranges = {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
+        self.ranges = _ranges()
         self.refresh()
 
     def before_update(self, scene: bpy.types.Scene, *_: object) -> None:
-        actions = set().union(*map(edited_actions, graphs_of(scene)))
+        graphs = graphs_of(scene)
+        actions = edited_actions(*graphs)
         self.followed = {action.session_uid for action in actions}
         self.follow(actions, scene.frame_current_final)
-        self.follow_objects(set().union(*map(edited_objects, graphs_of(scene))), scene.frame_current_final)
+        self.follow_objects(edited_objects(*graphs), scene.frame_current_final)
 
     def after_update(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-        if self.unseen:
+        if self.ranges is None or (depsgraph.id_type_updated("SCENE") and self.ranges != _ranges()):
             self.look_through()
         actions = {action for action in edited_actions(depsgraph) if action.session_uid not in self.followed}
         self.followed = set()
@@ -236,20 +212,14 @@ class Follower:
             for obj in edited:
                 add_action(obj, depsgraph, self.added)
             self.follow_objects(added, scene.frame_current_final)
-        if depsgraph.id_type_updated("SCENE") and self._ranges_changed():
-            self.look_through()
         unkeyed, self.unkeyed = self.unkeyed, []
         if sum(poses.set_again() for poses in unkeyed):
             bpy.context.view_layer.update()
 
-    def _ranges_changed(self) -> bool:
-        now = {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
-        return now != self.ranges
-
     def before_frame(self, scene: bpy.types.Scene, *_: object) -> None:
-        if self.unseen:
+        if self.ranges is None:
             self.look_through()
-        self.follow(set().union(*map(edited_actions, graphs_of(scene))), scene.frame_current_final)
+        self.follow(edited_actions(*graphs_of(scene)), scene.frame_current_final)
         self.unkeyed.clear()
 
     def after_undo(self, *_: object) -> None:
@@ -269,22 +239,18 @@ class Follower:
                 let_override_be_read(obj)
 
 
-def has_modes(binding: Binding) -> bool:
+def has_modes(slot: Slot) -> bool:
     """Return whether the keys of a slot say a mode, or it has terms."""
-    return is_marked(binding) or any(map(has_terms, binding.moving.values()))
+    curves = (fcurve for fcurve in slot.fcurves if split_path(fcurve.data_path)[1] in WIDTHS)
+    return any(has_marks(fcurve) or has_terms(fcurve) for fcurve in curves)
+
+
+def _ranges() -> dict[int, tuple[int, int]]:
+    return {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
 
 
 def _key_of(slot: Slot) -> tuple[int, int]:
     return slot.action.session_uid, slot.handle
-
-
-def _says_modes(slot: Slot) -> bool:
-    """Return whether keys of a slot say modes, such as those that were pasted in place of others that did not.
-
-    Recordings with thousands of keys are left out: there it takes longer than the edit.
-    """
-    curves = (fcurve for fcurve in slot.fcurves if split_path(fcurve.data_path)[1] in WIDTHS)
-    return any(len(fcurve.keyframe_points) < DENSE and has_marks(fcurve) for fcurve in curves)
 
 
 def _count_keys(slot: Slot) -> int:
@@ -292,27 +258,17 @@ def _count_keys(slot: Slot) -> int:
 
 
 follower = Follower()
+refresh = follower.refresh
 
 
 def set_enabled(enabled: bool) -> None:
     """Follow edits at once, or else only when `refresh` is called."""
-    follower.enabled, follower.unseen = enabled, enabled
+    follower.enabled, follower.ranges = enabled, None
 
 
 def is_enabled() -> bool:
     """Return whether edits are followed at once."""
     return follower.enabled
-
-
-def refresh(targets: Targets | None = None) -> int:
-    """Bring the in-betweens of these up to date, or of all in the file.
-
-    Returns
-    -------
-    int
-        How much had to be changed, counted in transforms of slots.
-    """
-    return follower.refresh(targets)
 
 
 def first_look() -> None:

@@ -15,7 +15,7 @@ from ..actions.marks import read_marks, write_marks
 from ..actions.modifiers import add_cycles, has_terms, terms_in
 from ..actions.reading import is_marked, keyed_in, planned_from
 from ..actions.refusals import refuse_numbers
-from ..actions.slots import Binding, read_again
+from ..actions.slots import Binding
 from ..evaluation.components import MODE_NUMBERS
 from ..evaluation.source_cache import cache_source, cached_source
 from ..evaluation.sources import Source
@@ -23,7 +23,7 @@ from ..fcurves.keys import Cycles
 from ..terms.apply import apply, remove_terms
 from ..terms.planning import plan
 from ..transforms import WIDTHS, Refused
-from .inserted import divided, key_fellows, key_other_parts
+from .inserted import divided, key_fellows
 from .kept_timing import keep_timing
 from .shared_turns import share_out_turns
 
@@ -42,7 +42,7 @@ def refresh_bindings(
     Parameters
     ----------
     bindings
-        Of editable Actions.
+        Those of Actions that are not editable are left alone.
     may_key
         Whether keys that were inserted on in-betweens may be completed.
     is_doubtful
@@ -59,26 +59,23 @@ def refresh_bindings(
     for binding in bindings:
         _tidy(binding)
     _adopt(bindings)
-    marked, dropped = [], []
-    for binding in bindings:
-        (marked if is_marked(binding) else dropped).append(binding)
+    marked = [binding for binding in bindings if is_marked(binding)]
     stale: list[Reading] = []
-    current: list[Source] = []
+    current: dict[Binding, Source] = {}
     for binding, source in zip(marked, keyed_in(marked), strict=True):
-        if not _is_desired(binding, source):
-            dropped.append(binding)
-        elif is_doubtful or source.digest24 != planned_from(binding):
-            stale.append((binding, source))
-        else:
-            current.append(source)
-    dropped = [binding for binding in dropped if any(map(has_terms, binding.moving.values()))]
+        if _is_desired(binding, source):
+            current[binding] = source
+            if is_doubtful or source.digest24 != planned_from(binding):
+                stale.append((binding, current.pop(binding)))
+    kept = {*current, *(binding for binding, _ in stale)}
+    dropped = [item for item in bindings if item not in kept and any(map(has_terms, item.moving.values()))]
     if stale or dropped:
         before_writing([*dropped, *(binding for binding, _ in stale)])
     for binding in dropped:
         remove_terms(binding)
     stale = _completed(stale) if stale and may_key else stale
     # Not before: what has the same keys as something else had is no edit of that which was followed.
-    for source in current:
+    for source in current.values():
         cache_source(source)
     return len(dropped) + (sum(_apply(stale)) if stale else 0)
 
@@ -135,8 +132,7 @@ def _completed(stale: Sequence[Reading]) -> list[Reading]:
     def known() -> Iterator[tuple[Binding, Source, Source]]:
         return ((*reading, old) for reading, old in zip(result, olds, strict=True) if old is not None)
 
-    for complete in (key_fellows, key_other_parts):
-        result = _read_anew(result, {binding for binding, now, old in known() if complete(binding, now, old)})
+    result = _read_anew(result, {binding for binding, now, old in known() if key_fellows(binding, now, old)})
     insertions = {binding: one for binding, now, old in known() if (one := divided(binding, now, old)) is not None}
     keep_timing(insertions.values())
     result = _read_anew(result, insertions)
@@ -146,12 +142,8 @@ def _completed(stale: Sequence[Reading]) -> list[Reading]:
 def _read_anew(readings: Sequence[Reading], changed: Collection[Binding]) -> list[Reading]:
     """Return readings with what is keyed by now in those of them that were changed."""
     old = [binding for binding, _ in readings if binding in changed]
-    fresh = read_again(old)
-    by_binding = dict(zip(old, zip(fresh, keyed_in(fresh), strict=True), strict=True))
-    return [
-        (binding, source) if isinstance((now := by_binding.get(binding, (binding, source)))[1], Refused) else now
-        for binding, source in readings
-    ]
+    fresh = dict(zip(old, keyed_in(old), strict=True))
+    return [(binding, now if isinstance(now := fresh.get(binding), Source) else source) for binding, source in readings]
 
 
 def _apply(stale: Sequence[Reading]) -> list[bool]:

@@ -12,7 +12,7 @@ from ...motion.spins import FULL_TURN
 from ..actions.channels import ensure_group, key_points, replace_keys, selected_keys
 from ..actions.marks import read_marks, write_marks
 from ..actions.slots import Binding
-from ..evaluation.components import LOCATION, MODE_NAMES, ROTATION, ROWS
+from ..evaluation.components import LOCATION, MODE_NAMES, ROWS
 from ..evaluation.differences import in_betweens
 from ..evaluation.marks import WHOLE_TURN
 from ..evaluation.sources import SAME_FRAME, TURN_AXES, Source
@@ -29,40 +29,27 @@ def set_turns_in(
 
     Where there are no turns in any segment, the channel goes.
     """
-    chosen, keyed = np.asarray(frames, dtype=np.float64), frames_in(binding)
-    is_chosen = is_among(chosen, keyed)
-    desired = turns_in(binding, keyed)
-    desired[is_chosen] = turns
-    channel = binding.users[0].turns_channel
+    keyed, channel = frames_in(binding), binding.users[0].turns_channel
+    is_chosen, numbers = is_among(np.asarray(frames, dtype=np.float64), keyed), turns_in(binding, keyed)
+    numbers[is_chosen] = turns
+    if not numbers.any():
+        if channel in binding.curves:
+            binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+        return
     fcurve = binding.ensure_curve(channel)
     if fcurve.group is None:
         fcurve.group = ensure_group(binding.channelbag, bone_name(binding.prefix) or GROUP)
-    if axis is None:
-        marks = read_marks(fcurve)
-        mark = int(marks[0]) if len(marks) else 0
-    else:
-        mark = TURN_AXES.index(axis) + 1
+    mark = max(read_marks(fcurve)[:1], default=0) if axis is None else TURN_AXES.index(axis) + 1
     # Muted it has no say. Now it has, and all other segments keep the turns that they had without.
-    old = [] if fcurve.mute else list(zip(*key_points(fcurve).T.tolist(), selected_keys(fcurve).tolist(), strict=True))
+    old, selected = (
+        (np.empty(0), np.empty(0, bool)) if fcurve.mute else (key_points(fcurve)[:, 0], selected_keys(fcurve))
+    )
     fcurve.mute = False
-    keys: list[tuple[float, float, bool]] = []
-    passed = 0
-    for frame, number, meant in zip(keyed.tolist(), desired.tolist(), is_chosen.tolist(), strict=True):
-        while passed < len(old) and old[passed][0] < frame - SAME_FRAME:
-            keys.append(old[passed])
-            passed += 1
-        replaced = passed < len(old) and old[passed][0] <= frame + SAME_FRAME
-        if meant or replaced or not keys or abs(keys[-1][1] - number) > WHOLE_TURN:
-            # Selected as the key of the pose is, so that both move together.
-            keys.append((frame, number, meant or (replaced and old[passed][2])))
-        passed += replaced
-    keys += old[passed:]
-    if not any(number for _, number, _ in keys):
-        binding.channelbag.fcurves.remove(binding.curves.pop(channel))
-        return
-    times, numbers, selected = map(np.array, zip(*keys, strict=True))
-    replace_keys(fcurve, times, numbers, interpolation="CONSTANT", selected=selected)
-    write_marks(fcurve, np.full(len(times), mark))
+    kept = is_chosen | is_among(old, keyed) | ~(np.abs(np.diff(numbers, prepend=np.nan)) <= WHOLE_TURN)
+    # Selected as the key of the pose is, so that both move together.
+    selected = is_chosen | is_among(old[selected], keyed)
+    replace_keys(fcurve, keyed[kept], numbers[kept], interpolation="CONSTANT", selected=selected[kept])
+    write_marks(fcurve, np.full(np.count_nonzero(kept), mark))
 
 
 def is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -96,7 +83,6 @@ def share_out_turns(binding: Binding, source: Source, old: Source, progress: flo
     progress : float, optional
         How far the pose of the one new key is along its segment, instead of where the body was on its frame.
     """
-    source, old = _turning_part(source), _turning_part(old)
     if old.order != source.order or source.cyclic is not None or not needs_turning(old):
         return False
     if source.key_count == old.key_count:
@@ -109,11 +95,6 @@ def share_out_turns(binding: Binding, source: Source, old: Source, progress: flo
     return True
 
 
-def _turning_part(source: Source) -> Source:
-    """Return what turns a body by itself: where parts have keys of their own, those of the rotation."""
-    return source.parts.get(ROTATION, source) if source.is_uneven else source
-
-
 def _divided(old: Source, source: Source, progress: float | None) -> dict[float, float]:
     """Return the turns of the parts that keys divide segments into, by the frames that these begin on."""
     shared: dict[float, float] = {}
@@ -124,7 +105,7 @@ def _divided(old: Source, source: Source, progress: float | None) -> dict[float,
             turned = turning_in(old, segment)
             if turned.spins.turns[0]:
                 along = None if progress is None else (0.0, progress, 1.0)
-                shares, axes = _shares(old, turned, source.key_frames[[*parts, parts[-1] + 1]], along=along)
+                shares, axes = _shares(old, turned, source.key_frames[[*parts, parts[-1] + 1]], along)
                 whole = _is_enough_in_whole_turns(old, segment, turned)
                 for part, share, axis in zip(parts.tolist(), shares, axes, strict=True):
                     shared[float(source.key_frames[part])] = _turns_of(source, part, turned, share, axis, whole=whole)
@@ -139,7 +120,7 @@ def _joined(old: Source, source: Source) -> dict[float, float]:
         parts = _within(old.key_frames, *ends)
         if len(parts) > 1 and source.segment_turns[segment] == old.segment_turns[parts[0]]:
             turned = turning_in(old, int(parts[0]))
-            shares, axes = _shares(old, turned, ends, float(np.abs(old.segment_turns[parts]).sum()))
+            shares, axes = _shares(old, turned, ends)
             shared[float(ends[0])] = _turns_of(source, segment, turned, shares[0], axes[0], whole=True)
     return shared
 
@@ -160,17 +141,14 @@ def _is_enough_in_whole_turns(source: Source, segment: int, turned: Turning) -> 
 
 
 def _shares(
-    source: Source,
-    turned: Turning,
-    frames: np.ndarray,
-    turns: float | None = None,
-    along: Sequence[float] | None = None,
+    source: Source, turned: Turning, frames: np.ndarray, along: Sequence[float] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return what part of the turn of a segment is made from each of the frames (p + 1,) in it to the next, (p,); and
-    the axis of its spins as it lies in the body on each of them, (p, 3). `turns` are about as many as are made in all,
-    `along` is the progress (p + 1,) on the frames, if it is not that of the motion.
+    the axis of its spins as it lies in the body on each of them, (p, 3). `along` is the progress (p + 1,) on the
+    frames, if it is not that of the motion.
     """
-    steps = SAMPLES * (1 + int(abs(turned.spins.turns[0] if turns is None else turns)))
+    most = max(abs(float(turned.spins.turns[0])), float(np.abs(source.segment_turns).sum()))
+    steps = SAMPLES * (1 + int(most))
 
     def sampled(ends: Sequence[float]) -> np.ndarray:
         inner = [np.linspace(*pair, steps, endpoint=False) for pair in itertools.pairwise(ends)]
@@ -195,12 +173,9 @@ def _turns_of(source: Source, segment: int, of: Turning, share: float, axis: np.
     def about(result: Turning) -> float:
         return float(axis @ result.twists[:, 0, 0]) / FULL_TURN
 
-    one = turning_in(source, segment, turns=1.0)
-    sense = np.copysign(
-        1.0, about(one) - float(axis @ one.by_angles.twists(one.first, one.second)[:, 0, 0]) / FULL_TURN
-    )
+    none, one = (turning_in(source, segment, turns=turns) for turns in (0.0, 1.0))
+    sense = np.copysign(1.0, about(one) - about(none))
     if whole:
-        none = turning_in(source, segment, turns=0.0)
         return float(sense * np.rint((share * of.about[0] - float(axis @ none.turn[:, 0])) / FULL_TURN - about(none)))
     turns = share * float(of.spins.turns[0])
     part = turns - np.rint(turns)

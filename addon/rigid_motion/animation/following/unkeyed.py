@@ -8,12 +8,13 @@ terms by now.
 from __future__ import annotations
 
 from collections.abc import Collection
+from functools import lru_cache
 from typing import Any
 
 import bpy
 import numpy as np
 
-from ..actions.slots import Slot
+from ..actions.slots import Curves, Slot
 from ..transforms import WIDTHS, Channel, prefix_of, split_path
 
 SAME_VALUE = 1e-6
@@ -28,26 +29,26 @@ class Poses:
     slot : Slot
     edited : collection of Channel
         Channels that were edited: what they move goes where they have it.
-    written : collection of Channel
+    written : mapping of Channel to FCurve
         Channels that are about to be written.
     frame : float
         The frame that is shown.
     """
 
-    def __init__(self, slot: Slot, edited: Collection[Channel], written: Collection[Channel], frame: float) -> None:
+    def __init__(self, slot: Slot, edited: Collection[Channel], written: Curves, frame: float) -> None:
         # Under NLA strips there is no telling where channels have something, and Blender evaluates all in any case.
         self._users = [user for user in slot.users if slot.plays_in(user) and not len(user.animation_data.nla_tracks)]
         self._left_out, self._others = set(edited), []
         for fcurve in slot.fcurves if self._users else ():
-            channel = path, _ = fcurve.data_path, fcurve.array_index
+            path = fcurve.data_path
             if fcurve.mute:
+                self._left_out.add((path, fcurve.array_index))
+            elif not _is_of_bone(path):
+                self._others.append((path, fcurve.array_index))
+        for channel in written.keys() - self._left_out if self._users else ():
+            shown, value = written[channel].evaluate(frame), _value_of(self._users[0], channel)
+            if value is None or abs(value - shown) <= SAME_VALUE * max(1.0, abs(shown)):
                 self._left_out.add(channel)
-            elif not split_path(path)[0] or split_path(path)[1] not in WIDTHS:
-                self._others.append(channel)
-            if channel in written and channel not in self._left_out:
-                shown, value = fcurve.evaluate(frame), _value_of(self._users[0], channel)
-                if value is None or abs(value - shown) <= SAME_VALUE * max(1.0, abs(shown)):
-                    self._left_out.add(channel)
         self._before = [(_of_bones(user), [_value_of(user, other) for other in self._others]) for user in self._users]
 
     def set_again(self) -> bool:
@@ -60,8 +61,15 @@ class Poses:
                     then[prefix_of(user.pose.bones[number].name) + name, index] = float(bones[name][number, index])
             for channel, value in then.items():
                 if channel not in self._left_out and value is not None and _value_of(user, channel) != value:
-                    changed |= _set_value(user, channel, value)
+                    _set_value(user, channel, value)
+                    changed = True
         return changed
+
+
+@lru_cache(maxsize=65536)
+def _is_of_bone(path: str) -> bool:
+    prefix, prop = split_path(path)
+    return bool(prefix) and prop in WIDTHS
 
 
 def _of_bones(rig: bpy.types.Object) -> dict[str, np.ndarray]:
@@ -84,22 +92,19 @@ def _value_of(user: bpy.types.Object, channel: Channel) -> Any:
     return value if isinstance(value, int | float) else None
 
 
-def _set_value(user: bpy.types.Object, channel: Channel, value: Any) -> bool:
-    """Set what a channel moves. Returns whether that can be done."""
+def _set_value(user: bpy.types.Object, channel: Channel, value: Any) -> None:
+    """Set what a channel moves."""
     path, index = channel
     prop = user.path_resolve(path)
     if not isinstance(prop, int | float):
         prop[index] = value
-        return True
-    if path.endswith('"]'):
-        holder, _, name = path[:-2].rpartition('["')
-        (user.path_resolve(holder) if holder else user)[bpy.utils.unescape_identifier(name)] = value
+        return
+    is_custom = path.endswith('"]')
+    holder, _, name = path[:-2].rpartition('["') if is_custom else path.rpartition(".")
+    owner = user.path_resolve(holder) if holder else user
+    if is_custom:
+        owner[bpy.utils.unescape_identifier(name)] = value
         # Of a custom property Blender does not know by itself that it was set.
         user.update_tag()
-        return True
-    holder, _, name = path.rpartition(".")
-    owner = user.path_resolve(holder) if holder else user
-    if name not in owner.bl_rna.properties:
-        return False
-    setattr(owner, name, value)
-    return True
+    elif name in owner.bl_rna.properties:
+        setattr(owner, name, value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 
 import bpy
 import numpy as np
@@ -13,25 +14,17 @@ from ..actions.refusals import refuse_numbers
 from ..actions.slots import Binding, bindings_for, bindings_of
 from ..evaluation.components import MODE_NAMES, UNKNOWN
 from ..evaluation.sources import SAME_FRAME, Marks, Source, distinct
-from ..transforms import WIDTHS, Refused, Transform, transform_of
+from ..transforms import Refused, Transform, transform_of
 
 
 def active_binding(transform: Transform, bindings: Iterable[Binding] | None = None) -> Binding | None:
     """Return the slot whose keys the editors show: that of the Action, in tweak mode that of the strip.
 
-    `bindings` are those that are known already, else all of the transform's are looked up.
+    `bindings` are those that are known already, else the transform's are looked up as if nothing else used them.
     """
-    data = transform.animated.animation_data
-    if data is None or data.action is None:
-        return None
-    bindings = bindings_of([transform]) if bindings is None else bindings
+    bindings = bindings_for(transform) if bindings is None else bindings
     active = (item for item in bindings if item.slot.plays_in(transform.animated) and transform in item.users)
     return next(active, None)
-
-
-def active_binding_alone(transform: Transform) -> Binding | None:
-    """Return what `active_binding` does, as if nothing else used the slot: for polls."""
-    return active_binding(transform, bindings_for(transform))
 
 
 def active_bindings(transforms: Sequence[Transform]) -> dict[Transform, Binding]:
@@ -55,13 +48,11 @@ def sources_of(bindings: Sequence[Binding]) -> list[Source | None]:
     """Return what is keyed in each of these, None where nothing is, it is refused, or a driver moves a part of it."""
     result: list[Source | None] = []
     for binding, source in zip(bindings, keyed_in(bindings), strict=True):
-        try:
-            if isinstance(source, Source):
+        result.append(None)
+        if isinstance(source, Source) and source.channels and not source.driven:
+            with suppress(Refused):
                 refuse_numbers(binding.name, source)
-            is_whole = isinstance(source, Source) and source.channels and not source.driven
-            result.append(source if is_whole else None)
-        except Refused:
-            result.append(None)
+                result[-1] = source
     return result
 
 
@@ -70,14 +61,14 @@ def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False)
 
     Keys of the channel of turns count among the selected ones.
     """
-    binding = active_binding_alone(transform_of(carrier))
+    binding = active_binding(transform_of(carrier))
     return np.empty(0) if binding is None else frames_in(binding, selected=selected)
 
 
 def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[str]:
     """Return the modes of the segments at these frames. Without an Action, the mode that is awaited."""
     transform = transform_of(carrier)
-    binding = active_binding_alone(transform)
+    binding = active_binding(transform)
     if binding is None:
         return [transform.motion.awaited or "BLENDER"] * len(frames)
     return [MODE_NAMES[number] for number in modes_in(binding, np.asarray(frames, dtype=np.float64)).tolist()]
@@ -102,25 +93,19 @@ def segment_modes(binding: Binding) -> list[str]:
 
 def frames_in(binding: Binding, *, selected: bool = False) -> np.ndarray:
     """Return `key_frames` in a slot."""
-    result = []
-    transform = binding.users[0]
-    for channel, fcurve in binding.curves.items():
-        path = channel[0].removeprefix(binding.prefix)
-        if path in WIDTHS or (selected and channel == transform.turns_channel):
-            keyed = key_points(fcurve)[:, 0]
-            result.append(keyed[selected_keys(fcurve)] if selected else keyed)
-    frames = np.unique(np.concatenate(result)).astype(np.float64) if result else np.empty(0)
-    return distinct(frames)
+    curves, frames = [*binding.moving.values()], [np.empty(0)]
+    if selected and (turns := binding.curves.get(binding.users[0].turns_channel)) is not None:
+        curves.append(turns)
+    for fcurve in curves:
+        keyed = key_points(fcurve)[:, 0]
+        frames.append(keyed[selected_keys(fcurve)] if selected else keyed)
+    return distinct(np.unique(np.concatenate(frames)))
 
 
 def modes_in(binding: Binding, frames: np.ndarray) -> np.ndarray:
     """Return the numbers of the modes at these frames, shape (n,); Blender's own where there is what is no mode."""
     modes = modes_said(binding)
-    if isinstance(modes, Marks):
-        at = np.searchsorted(modes.frames, frames + 0.5 * SAME_FRAME, side="right") - 1
-        numbers = modes.numbers[np.clip(at, 0, None)]
-    else:
-        numbers = np.full(len(frames), modes)
+    numbers = modes.at(frames + 0.5 * SAME_FRAME) if isinstance(modes, Marks) else np.full(len(frames), modes)
     return np.where(numbers == UNKNOWN, 0, numbers)
 
 

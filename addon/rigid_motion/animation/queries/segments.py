@@ -9,18 +9,19 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..actions.reading import differing_users, is_marked, planned_from, sources_of_users
+from ..actions.reading import is_marked, leading, planned_from, sources_of_users
 from ..actions.refusals import refuse_numbers
-from ..actions.slots import Binding, bindings_of
+from ..actions.slots import bindings_of
 from ..evaluation.components import MODE_NAMES
 from ..evaluation.sources import SAME_FRAME, Source
 from ..evaluation.spans import spans
 from ..evaluation.turning import turning_in, values_at_ends
 from ..fcurves.keys import cycled
 from ..transforms import Refused, Transform, transform_of
-from .keyed import active_binding_alone
+from .keyed import active_binding
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
@@ -31,31 +32,31 @@ NEAR_HALF_TURN = np.radians(170.0)
 NEAR = 1e-6
 """Values that differ by less are the same."""
 
+DIFFERING = n_(
+    "{name} moves by the same Action slot as {leader}, but has another rotation mode, driver, delta transform or "
+    "Local Location; the in-betweens are those of {leader}: "
+    "give it an Action of its own (Object > Relations > Make Single User)"
+)
+"""Why the motion of a slot, which is that of {leader}, does not fit another one of its users, and the way out."""
+
 
 @dataclass(frozen=True)
 class SegmentFacts:
     """One segment, from one key to the next."""
 
     first: float
-    """The frame it starts on."""
-
     last: float
-    """The frame it ends on."""
+    mode: str
+    distance: float
 
     key: float
     """The frame of the key that decides its mode: its first one, or what that is a copy of where cycles repeat it."""
-
-    mode: str
-    """The name of its mode."""
 
     turn: float
     """By how much it turns, spins included."""
 
     turns: float
     """The turns among it that are more than the shortest way, by their sign: of the angles and of the channel."""
-
-    distance: float
-    """From its first position to its last."""
 
     long_way: bool
     """True if Blender's own in-betweens turn by more than half a turn where the modes turn by less: of quaternions."""
@@ -73,9 +74,7 @@ class SegmentFacts:
 def frame_in_action(obj: bpy.types.Object, frame: float) -> float:
     """Return a frame of the scene, as the keys in the editors have it: in tweak mode those of the strip."""
     data = obj.animation_data
-    if data is None or not data.use_tweak_mode:
-        return frame
-    return data.nla_tweak_strip_time_to_scene(frame, invert=True)
+    return frame if data is None else data.nla_tweak_strip_time_to_scene(frame, invert=True)
 
 
 def segment_at(source: Source, frame: float) -> SegmentFacts | None:
@@ -112,7 +111,7 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
 
 def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
     """Return whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
-    binding = active_binding_alone(transform_of(target))
+    binding = active_binding(transform_of(target))
     planned = None if binding is None else planned_from(binding)
     return planned is None or (source.is_live and planned == source.digest24)
 
@@ -131,7 +130,10 @@ def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str
             refuse_numbers(transform.name, source)
             if source.is_live:
                 spans(source)
-                _refuse_differing(transform, binding, sources)
+                leader = leading(sources)
+                if isinstance(leader, Source) and leader.digest != source.digest:
+                    name = binding.users[sources.index(leader)].name
+                    raise Refused(DIFFERING, name=transform.name, leader=name)
     except Refused as problem:
         return str(problem)
     except ValueError as problem:
@@ -139,10 +141,3 @@ def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str
             name=transform.name, problem=problem
         )
     return ""
-
-
-def _refuse_differing(transform: Transform, binding: Binding, sources: list[Source | Refused]) -> None:
-    """Raise `Refused` where the in-betweens of a slot are those of another user, which do not fit."""
-    if transform in (differing := differing_users(binding, sources)):
-        leader = next(user for user in binding.users if user not in differing)
-        raise Refused(transform.differing_text, name=transform.name, leader=leader.name)

@@ -24,7 +24,6 @@ Polynomials are Chebyshev series in x, which runs from -1 to 1 on their piece.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 from math import comb
 from typing import NamedTuple
@@ -33,8 +32,8 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
-NOTHING, BERNSTEIN, PAIR, MOST = 0, 1, 2, 4
-"""The ways to carry a polynomial; from a pair on they are the number of products in a chain."""
+PAIR, MOST = 2, 4
+"""The fewest and the most products of a chain."""
 
 MARGIN = 0.05
 """K is larger than it has to be, by this share of d, so that roots of d + K T are apart from each other."""
@@ -55,8 +54,11 @@ Bernstein polynomials is 1."""
 MOST_STEPS = 40
 """The most steps to a root; most take six."""
 
-CHUNK = 1024
+CHUNK = 512
 """How many pieces, of like degree, are worked on at once: arrays then fit the cache."""
+
+MOST_KNOWN = 16384
+"""How many pieces are remembered: those of a large rig. While one key is dragged, the others stay as they are."""
 
 
 class Term(NamedTuple):
@@ -73,64 +75,41 @@ def _single(values: ArrayLike) -> np.ndarray:
 
 
 class _Products(NamedTuple):
-    """A product of linear factors for each of S pieces; what is behind the degree of a piece are factors 1."""
+    """A product of linear factors for each of S pieces; those behind the degree of a piece are 1."""
 
     slopes: np.ndarray
-    """Shape (S, N)."""
+    """Shape (S, N), 0 behind the degree."""
 
     offsets: np.ndarray
     """Shape (S, N)."""
 
     amplitudes: np.ndarray
-    """Shape (S,)."""
+    """Shape (S,); where it is 0 there is no term."""
 
     def at(self, frames: np.ndarray) -> np.ndarray:
         """Return the values on frames (S, M), as Blender works them out."""
         slopes, offsets, amplitudes, frames = map(_single, (*self, frames))
-        values = np.ones_like(frames)
-        for factor in range(slopes.shape[1]):
-            values *= slopes[:, factor, None] * frames + offsets[:, factor, None]
-        return values * amplitudes[:, None]
+        return _multiplied(slopes, offsets, frames) * amplitudes[:, None]
 
-    def coefficients(self, rows: np.ndarray, degrees: np.ndarray) -> list[tuple[float, ...]]:
-        """Return those of the terms of some pieces, rows (S,) of booleans, which are of these degrees."""
-        count = len(degrees)
-        table = np.zeros((count, self.slopes.shape[1] + 1, 2))
-        table[:, :-1, 0], table[:, :-1, 1] = self.slopes[rows], self.offsets[rows]
-        table[np.arange(count), degrees, 0] = 0.0
-        table[np.arange(count), degrees, 1] = self.amplitudes[rows]
-        values, ends = table.reshape(count, table.shape[1] * 2).tolist(), (2 * degrees + 2).tolist()
+    def some(self, rows: np.ndarray) -> _Products:
+        return _Products(*(values[rows] for values in self))
+
+    def coefficients(self) -> list[tuple[float, ...]]:
+        """Return those of the terms."""
+        slopes, offsets, amplitudes = self
+        degrees, every = np.count_nonzero(slopes, axis=1), np.arange(len(slopes))
+        table = np.zeros((len(slopes), slopes.shape[1] + 1, 2))
+        table[:, :-1, 0], table[:, :-1, 1] = slopes, offsets
+        table[every, degrees, 1] = amplitudes
+        values, ends = table.reshape(-1, 2 * table.shape[1]).tolist(), (2 * degrees + 2).tolist()
         return [tuple(row[:end]) for row, end in zip(values, ends, strict=True)]
 
 
-def evaluate(terms: Sequence[Term], frames: np.ndarray) -> np.ndarray:
-    """Return what terms add on frames (M,), as Blender works it out; single precision, shape (M,)."""
-    frames = _single(frames)
-    total = np.zeros_like(frames)
-    for first, last, coefficients in terms:
-        inside = (frames >= first) & (frames <= last)
-        some = frames[inside]
-        values = np.ones_like(some)
-        for slope, offset in _single(coefficients).reshape(-1, 2):
-            values *= slope * some + offset
-        total[inside] += values
-    return total
-
-
-def values_of(series: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return Chebyshev series (S, N + 1) at x, (S, M) or (M,), by Clenshaw's recurrence; shape (S, M)."""
-    if x.ndim == 1:
-        return series @ chebyshev.chebvander(x, series.shape[1] - 1).T
-    return _values_and_slopes(series, x, False)[0]
-
-
-def _values_and_slopes(series: np.ndarray, x: np.ndarray, sloped: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    double, b, b_before, s, s_before = 2 * x, *np.zeros((4, *x.shape))
-    for k in range(series.shape[1] - 1, 0, -1):
-        if sloped:
-            s, s_before = double * s + 2 * b - s_before, s
-        b, b_before = double * b + series[:, k, None] - b_before, b
-    return x * b + series[:, :1] - b_before, x * s + b - s_before
+def _multiplied(slopes: np.ndarray, offsets: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return the products of factors (S, N) on frames (S, M), in the precision of these."""
+    factors = slopes.T[..., None] * frames
+    factors += offsets.T[..., None]
+    return factors.prod(axis=0)
 
 
 @lru_cache(maxsize=64)
@@ -143,106 +122,30 @@ def fit_of(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @lru_cache(maxsize=64)
-def _bernstein_from_chebyshev(degree: int) -> np.ndarray:
-    """Return the matrix (degree + 1, degree + 1) from Chebyshev series to Bernstein coefficients, as rows.
-
-    By the closed form of A. Rababah, Transformation of Chebyshev-Bernstein polynomial basis (2003).
-    """
-    matrix = np.zeros((degree + 1, degree + 1))
-    for k in range(degree + 1):
-        # T_k in its own degree, raised one by one.
-        row = [(-1) ** (k - i) * comb(2 * k, 2 * i) / comb(k, i) for i in range(k + 1)]
-        for n in range(k + 1, degree + 1):
-            row = [(i * (row[i - 1] if i else 0) + (n - i) * (row[i] if i < n else 0)) / n for i in range(n + 1)]
-        matrix[k] = row
+def _to_powers(count: int) -> np.ndarray:
+    """Return the matrix (count, count) from Chebyshev series to coefficients of powers, as rows."""
+    matrix = np.eye(count)
+    for k in range(2, count):
+        matrix[k, 1:] = 2.0 * matrix[k - 1, :-1]
+        matrix[k] -= matrix[k - 2]
     return matrix
 
 
 @lru_cache(maxsize=64)
-def _order(degree: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the roots of T of a degree by number, in the order of factors, and which of `count` factors have one.
-
-    Those from both ends take turns, so that partial products stay moderate.
-    """
-    order = np.zeros(count, int)
-    order[:degree:2] = np.arange((degree + 1) // 2)
-    order[1:degree:2] = degree - 1 - np.arange(degree // 2)
-    return order, np.arange(count) < degree
+def _to_bernstein(degree: int) -> np.ndarray:
+    """Return the matrix (degree + 1, degree + 1) from Chebyshev series to Bernstein coefficients, as rows."""
+    x, i = fit_of(degree + 1)[0][:, None], np.arange(degree + 1)
+    bernsteins = [comb(degree, k) for k in i.tolist()] * ((1 + x) / 2) ** i * ((1 - x) / 2) ** (degree - i)
+    return np.linalg.solve(bernsteins, chebyshev.chebvander(x[:, 0], degree)).T
 
 
-class _Pieces(NamedTuple):
-    """S pieces of like degree: what their products have in common."""
-
-    degrees: np.ndarray
-    """Shape (S,)."""
-
-    middles: np.ndarray
-    """Frames, shape (S, 1), as are the others."""
-
-    halves: np.ndarray
-    """Half the lengths."""
-
-    scales: np.ndarray
-    """The slopes of factors: powers of two that are between 1 and 2 over half the length."""
-
-    roots: np.ndarray
-    """Numbers of the roots of T in the order of factors, shape (S, N)."""
-
-    is_root: np.ndarray
-    """False behind the degree, shape (S, N)."""
-
-    @classmethod
-    def of(cls, degrees: np.ndarray, first: np.ndarray, last: np.ndarray) -> _Pieces:
-        length = (last - first)[:, None]
-        count = int(degrees.max())
-        tables = [np.array(table) for table in zip(*(_order(n, count) for n in range(count + 1)), strict=True)]
-        scales = np.ldexp(1.0, 2 - np.frexp(length)[1])
-        return cls(degrees, (first + last)[:, None] / 2, length / 2, scales, *(table[degrees] for table in tables))
-
-    def some(self, rows: np.ndarray) -> _Pieces:
-        return _Pieces(*(values[rows] for values in self))
-
-    def products(self, x: np.ndarray, wanted: np.ndarray) -> tuple[_Products, np.ndarray]:
-        """Return the products with roots at x (S, N) that are nearest to what is wanted, and what they are.
-
-        Values (S, N + 1) are those at the nodes of `fit_of`, without rounding but that of roots and amplitudes to
-        single precision.
-        """
-        roots = _single(self.middles + self.halves * x).astype(float)
-        slopes = np.where(self.is_root, self.scales, 0.0)
-        offsets = np.where(self.is_root, -self.scales * roots, 1.0)
-        frames = self.middles + self.halves * fit_of(x.shape[1] + 1)[0]
-        values = np.ones_like(frames)
-        for factor in range(x.shape[1]):
-            values *= slopes[:, factor, None] * frames + offsets[:, factor, None]
-        amplitudes = _single((values * wanted).sum(1) / (values * values).sum(1)).astype(float)
-        return _Products(slopes, offsets, amplitudes), values * amplitudes[:, None]
-
-    def chebyshevs(self, count: int) -> np.ndarray:
-        """Return the values of T at the nodes of `fit_of`, shape (S, count)."""
-        return np.cos(self.degrees[:, None] * np.arccos(fit_of(count)[0]))
-
-    def first_product(self, series: np.ndarray) -> tuple[_Products, np.ndarray, np.ndarray]:
-        """Return -K T for series (S, N + 1), the values of what is left, and the sign of K, shape (S, 1)."""
-        numbers = np.arange(series.shape[1])
-        turns = np.pi / self.degrees[:, None]
-        signs = np.where(numbers <= self.degrees[:, None], (-1.0) ** numbers, 0.0)
-        at_extremes = values_of(series, np.cos(turns * numbers)) * signs
-        # Of d + K T and d - K T the one with the smaller K.
-        needed = np.maximum(np.stack([-at_extremes.min(1), at_extremes.max(1)]), 0.0)
-        sides = np.where(needed[0] <= needed[1], 1.0, -1.0)[:, None]
-        sizes = sides * (needed.min(0) + MARGIN * abs(at_extremes).max(1))[:, None]
-        product, values = self.products(np.cos(turns * (self.roots + 0.5)), -sizes * self.chebyshevs(len(numbers)))
-        return product, values_of(series, fit_of(len(numbers))[0]) - values, sides
-
-    def product_of(self, values: np.ndarray, sides: np.ndarray) -> tuple[_Products, np.ndarray]:
-        """Return what has the signs of T, times those of sides, at the extremes of T as a product, and what is left."""
-        turns = np.pi / self.degrees[:, None]
-        high, low = np.cos(turns * self.roots), np.cos(turns * (self.roots + 1))
-        x = np.cos(turns * (self.roots + 0.5))
-        x = _roots(values @ fit_of(values.shape[1])[1], low, x, high, sides * (-1.0) ** self.roots)
-        product, reached = self.products(x, values)
-        return product, values - reached
+def _values_of(series: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return Chebyshev series (S, N + 1) at x, (S, M) or (M,); shape (S, M)."""
+    values = np.zeros((len(series), x.shape[-1]))
+    for coefficients in (series @ _to_powers(series.shape[1])).T[::-1, :, None]:
+        values *= x
+        values += coefficients
+    return values
 
 
 def _roots(series: np.ndarray, low: np.ndarray, x: np.ndarray, high: np.ndarray, signs: np.ndarray) -> np.ndarray:
@@ -250,8 +153,14 @@ def _roots(series: np.ndarray, low: np.ndarray, x: np.ndarray, high: np.ndarray,
 
     A step out of what is left of the bracket is to its middle instead.
     """
+    powers = (series @ _to_powers(series.shape[1])).T[::-1, :, None]
     for _ in range(MOST_STEPS):
-        value, slope = _values_and_slopes(series, x)
+        value, slope = np.zeros((2, *x.shape))
+        for coefficients in powers:
+            slope *= x
+            slope += value
+            value *= x
+            value += coefficients
         is_above = value * signs > 0
         low, high = np.where(is_above, low, x), np.where(is_above, x, high)
         step = x - value / np.where(slope, slope, 1.0)
@@ -261,62 +170,94 @@ def _roots(series: np.ndarray, low: np.ndarray, x: np.ndarray, high: np.ndarray,
     return x
 
 
-class _Bernstein(NamedTuple):
-    """Bernstein terms of one degree n for each of S pieces."""
+class _Pieces(NamedTuple):
+    """S pieces that chains are made for."""
 
-    first: np.ndarray
-    """Shape (S, 1)."""
+    middles: np.ndarray
+    """Frames, shape (S, 1)."""
 
-    last: np.ndarray
-    """Shape (S, 1)."""
+    halves: np.ndarray
+    """Half the lengths, shape (S, 1)."""
 
-    scales: np.ndarray
-    """The slopes of factors: powers of two, at most 1 over the length; shape (S, 1)."""
+    slopes: np.ndarray
+    """Those of factors, powers of two that are between 1 and 2 over half the length; 0 behind the degree, (S, N)."""
 
-    amplitudes: np.ndarray
-    """Shape (S, n + 1); 0 where there is no term."""
+    low: np.ndarray
+    """The extreme of T below each of its roots, shape (S, N): those from both ends in turns, so that partial products
+    stay moderate."""
+
+    roots: np.ndarray
+    """Shape (S, N)."""
+
+    high: np.ndarray
+    """The extreme above, shape (S, N)."""
+
+    signs: np.ndarray
+    """Those of K T there, shape (S, N)."""
+
+    spare: np.ndarray
+    """The values of T, with the sign of K, at the nodes of `fit_of`, shape (S, N + 1)."""
 
     @classmethod
-    def of(cls, series: np.ndarray, first: np.ndarray, last: np.ndarray, dropped: np.ndarray) -> _Bernstein:
-        """Return terms for series (S, n + 1), but for coefficients that are no larger than `dropped` (S,)."""
-        degree = series.shape[1] - 1
-        values = series @ _bernstein_from_chebyshev(degree)
-        values[abs(values) <= dropped[:, None]] = 0.0
-        length, exponents = np.frexp(last - first)
-        values *= [comb(degree, i) for i in range(degree + 1)] / length[:, None] ** degree
-        return cls(first[:, None], last[:, None], np.ldexp(1.0, -exponents)[:, None], _single(values))
+    def of(
+        cls, series: np.ndarray, degrees: np.ndarray, first: np.ndarray, last: np.ndarray
+    ) -> tuple[_Pieces, np.ndarray]:
+        """Return pieces for series (S, N + 1) of degrees (S, 1), from frames (S, 1), and how large K is, (S, 1)."""
+        halves, turns = (last - first) / 2, np.pi / degrees
+        extremes, factors = np.arange(series.shape[1]), np.arange(series.shape[1] - 1)
+        signs = np.where(extremes <= degrees, (-1.0) ** extremes, 0.0)
+        at_extremes = _values_of(series, np.cos(turns * extremes)) * signs
+        # Of d + K T and d - K T the one with the smaller K.
+        needed = np.maximum(np.stack([-at_extremes.min(1), at_extremes.max(1)]), 0.0)
+        sides = np.where(needed[0] <= needed[1], 1.0, -1.0)[:, None]
+        numbers = np.where(factors % 2, degrees - 1 - factors // 2, factors // 2) * (factors < degrees)
+        slopes = np.where(factors < degrees, np.ldexp(1.0, 1 - np.frexp(halves)[1]), 0.0)
+        low, roots, high = (np.cos(turns * (numbers + part)) for part in (1.0, 0.5, 0.0))
+        spare = sides * np.cos(degrees * np.arccos(fit_of(len(extremes))[0]))
+        result = cls((first + last) / 2, halves, slopes, low, roots, high, sides * (-1.0) ** numbers, spare)
+        return result, (needed.min(0) + MARGIN * abs(at_extremes).max(1))[:, None]
 
-    def at(self, frames: np.ndarray) -> np.ndarray:
-        """Return the sums on frames (S, M), as Blender works them out."""
-        first, last, scales, frames = map(_single, (*self[:3], frames))
-        rising, falling = (frames - first) * scales, (last - frames) * scales
-        total, power = np.zeros_like(frames), np.ones_like(frames)
-        degree = self.amplitudes.shape[1] - 1
-        for i in range(degree + 1):
-            values = power.copy()
-            for _ in range(degree - i):
-                values *= falling
-            total += values * self.amplitudes[:, i, None]
-            power *= rising
-        return total
+    def some(self, rows: np.ndarray) -> _Pieces:
+        return _Pieces(*(values[rows] for values in self))
 
-    def coefficients(self, row: int) -> list[tuple[float, ...]]:
-        """Return those of the terms of one piece."""
-        first, last, scale = (float(values[row, 0]) for values in self[:3])
-        degree = self.amplitudes.shape[1] - 1
-        rising, falling = (scale, -scale * first), (-scale, scale * last)
-        amplitudes = enumerate(self.amplitudes[row].tolist())
-        return [rising * i + falling * (degree - i) + (0.0, value) for i, value in amplitudes if value]
+    def product_of(self, values: np.ndarray, roots: np.ndarray | None = None) -> tuple[_Products, np.ndarray]:
+        """Return the products that are nearest to values (S, N + 1) at the nodes of `fit_of`, and what they leave.
+
+        Roots are between the extremes of T, where values have the signs of K T, if they are not given. Rounded are
+        these and amplitudes alone.
+        """
+        nodes, fit = fit_of(values.shape[1])
+        x = _roots(values @ fit, self.low, self.roots, self.high, self.signs) if roots is None else roots
+        offsets = -self.slopes * _single(self.middles + self.halves * x) + (self.slopes == 0.0)
+        reached = _multiplied(self.slopes, offsets, self.middles + self.halves * nodes)
+        amplitudes = _single((reached * values).sum(1) / (reached * reached).sum(1)).astype(float)
+        return _Products(self.slopes, offsets, amplitudes), values - reached * amplitudes[:, None]
+
+
+def _bernstein(series: np.ndarray, first: np.ndarray, last: np.ndarray, dropped: np.ndarray) -> list[_Products]:
+    """Return Bernstein terms for series (S, n + 1) on pieces, from frames (S, 1), but for what is below `dropped`."""
+    degree = series.shape[1] - 1
+    values = series @ _to_bernstein(degree)
+    values[abs(values) <= dropped] = 0.0
+    length, exponents = np.frexp(last - first)
+    values *= [comb(degree, i) for i in range(degree + 1)] / length**degree
+    # Factors s and 1 - s with powers of two, at most 1 over the length, for slopes.
+    scales, result = np.ldexp(1.0, -exponents), []
+    for i, amplitudes in enumerate(_single(values).T):
+        rises = np.arange(degree) < i
+        slopes, offsets = np.where(rises, scales, -scales), np.where(rises, -scales * first, scales * last)
+        result.append(_Products(slopes, offsets, amplitudes))
+    return result
+
+
+_known: dict[bytes, list[tuple[float, ...]]] = {}
+"""The coefficients of terms by all that they depend on."""
 
 
 def carry(
-    series: np.ndarray,
-    first: np.ndarray,
-    last: np.ndarray,
-    tolerances: np.ndarray,
-    ranges: np.ndarray | None = None,
-) -> list[list[Term]]:
-    """Return the fewest terms for each of S polynomials that follow it within its tolerance on its piece.
+    series: np.ndarray, first: np.ndarray, last: np.ndarray, tolerances: np.ndarray
+) -> list[list[tuple[float, ...]]]:
+    """Return the coefficients of few terms for each of S polynomials that follow it within its tolerance on its piece.
 
     Where none do so, those that come nearest.
 
@@ -328,8 +269,6 @@ def carry(
         The frames that pieces run between, in single precision.
     tolerances : (S,)
         How far off terms may be at any frame of the piece.
-    ranges : (S, 2), optional
-        The first and last frame of terms, where these are not those of the piece.
     """
     asked = [row.tobytes() for row in np.column_stack((series, first, last, tolerances))]
     if len(_known) > MOST_KNOWN:
@@ -343,102 +282,53 @@ def carry(
         trimmed = series[rows, : degrees[some[-1]] + 1]
         coefficients = _carried(trimmed, degrees[some], first[rows], last[rows], tolerances[rows])
         _known.update(zip([asked[row] for row in rows.tolist()], coefficients, strict=True))
-    ranges = np.stack([first, last], 1) if ranges is None else ranges
-    return [
-        [Term(begin, end, each) for each in _known[one]]
-        for one, (begin, end) in zip(asked, ranges.tolist(), strict=True)
-    ]
-
-
-MOST_KNOWN = 16384
-"""How many pieces are remembered: those of a large rig. While one key is dragged, the others stay as they are."""
-
-_known: dict[bytes, list[tuple[float, ...]]] = {}
-"""The coefficients of terms by all that they depend on."""
-
-
-class _Chains(NamedTuple):
-    """Products that belong to the chains of some pieces, if these have a number of terms from `least` to `most`."""
-
-    least: int
-    most: int
-    rows: np.ndarray
-    products: _Products
-
-
-def _chained(
-    pieces: _Pieces, series: np.ndarray, frames: np.ndarray, wanted: np.ndarray, allowed: np.ndarray
-) -> tuple[list[_Chains], np.ndarray]:
-    """Return chains in the order of their products, and how far off they are with PAIR to MOST terms.
-
-    The errors (S, MOST + 1 - PAIR) are inf where fewer terms do.
-    """
-    errors = np.full((len(series), MOST + 1 - PAIR), np.inf)
-    rows = np.arange(len(series))
-    product, values, sides = pieces.first_product(series)
-    chains = [_Chains(PAIR, MOST, rows, product)]
-    added = product.at(frames)
-    for count in range(PAIR, MOST + 1):
-        product, left = pieces.product_of(values, sides)
-        chains.append(_Chains(count, count, rows, product))
-        errors[rows, count - PAIR] = abs(added + product.at(frames[rows]) - wanted[rows]).max(1)
-        missed = errors[rows, count - PAIR] > allowed[rows]
-        if count == MOST or not missed.any():
-            break
-        rows, pieces = rows[missed], pieces.some(missed)
-        values, sides, left, added = values[missed], sides[missed], left[missed], added[missed]
-        spare = sides * LEFT * abs(left).max(1, keepdims=True) * pieces.chebyshevs(values.shape[1])
-        product, left = pieces.product_of(values - spare, sides)
-        chains.append(_Chains(count + 1, MOST, rows, product))
-        added, values = added + product.at(frames[rows]), left + spare
-    return chains, errors
+    return [_known[one] for one in asked]
 
 
 def _carried(
     series: np.ndarray, degrees: np.ndarray, first: np.ndarray, last: np.ndarray, tolerances: np.ndarray
 ) -> list[list[tuple[float, ...]]]:
     """Return coefficients of terms for pieces of rising degrees: see `carry`."""
-    pieces = _Pieces.of(degrees, first, last)
-    tried = np.cos(np.linspace(np.pi, 0, 2 * series.shape[1] + 15))
-    frames = _single(pieces.middles + pieces.halves * tried).astype(float)
-    wanted = values_of(series, (frames - pieces.middles) / pieces.halves)
+    first, last = first[:, None], last[:, None]
+    middles, halves = (first + last) / 2, (last - first) / 2
+    frames = _single(middles + halves * np.cos(np.linspace(np.pi, 0, 2 * series.shape[1] + 15))).astype(float)
+    wanted = _values_of(series, (frames - middles) / halves)
     allowed = GUARD * tolerances
-    # How many terms, and how far off they are, of each way.
-    counts = np.tile([0, 0, *range(PAIR, MOST + 1)], (len(series), 1))
-    errors = np.full(counts.shape, np.inf)
-    errors[:, NOTHING] = abs(wanted).max(1)
-    is_open = errors[:, NOTHING] > allowed
+    result: list[list[tuple[float, ...]]] = [[] for _ in degrees]
+    errors = abs(wanted).max(1)
 
-    chains: list[_Chains] = []
-    curved = np.flatnonzero(is_open & (degrees > 1))
-    if len(curved):
-        chains, errors[curved, PAIR:] = _chained(
-            pieces.some(curved), series[curved], frames[curved], wanted[curved], allowed[curved]
-        )
+    def try_out(rows: np.ndarray, products: list[_Products], most: float = np.inf) -> None:
+        """Take products for the terms of pieces, where there are no more than `most`, and they are nearer."""
+        found = abs(sum(product.at(frames[rows]) for product in products) - wanted[rows]).max(1)
+        counts = sum((product.amplitudes != 0.0).astype(int) for product in products)
+        nearer = (found < errors[rows]) & (counts <= most)
+        errors[rows[nearer]] = found[nearer]
+        terms = zip(*(product.some(nearer).coefficients() for product in products), strict=True)
+        for row, of_row in zip(rows[nearer].tolist(), terms, strict=True):
+            result[row] = [each for each in of_row if each[-1]]
 
-    bernsteins: list[tuple[np.ndarray, _Bernstein]] = []
-    is_chained = (errors[:, PAIR:] <= allowed[:, None]).any(1)
+    def try_bernstein(highest: float, most: float) -> None:
+        for degree in np.unique(degrees[(errors > allowed) & (degrees <= highest)]).tolist():
+            rows = np.flatnonzero((errors > allowed) & (degrees == degree))
+            dropped = DROPPED * tolerances[rows, None]
+            try_out(rows, _bernstein(series[rows, : degree + 1], first[rows], last[rows], dropped), most)
+
     # At keys, where polynomials are 0, there are terms for one degree less than they have.
-    rest = np.flatnonzero(is_open & ((degrees <= MOST + 1) | ~is_chained))
-    for degree in np.unique(degrees[rest]).tolist():
-        rows = rest[degrees[rest] == degree]
-        terms = _Bernstein.of(series[rows, : degree + 1], first[rows], last[rows], DROPPED * tolerances[rows])
-        errors[rows, BERNSTEIN] = abs(terms.at(frames[rows]) - wanted[rows]).max(1)
-        counts[rows, BERNSTEIN] = np.count_nonzero(terms.amplitudes, axis=1)
-        bernsteins.append((rows, terms))
-
-    is_close = errors <= allowed[:, None]
-    fewest, nearest = np.where(is_close, counts, np.inf).argmin(1), errors.argmin(1)
-    ways = np.where(is_close.any(1), fewest, nearest)
-    result: list[list[tuple[float, ...]]] = [[] for _ in ways]
-    for least, most, places, products in chains:
-        rows = curved[places]
-        chosen = (least <= ways[rows]) & (ways[rows] <= most)
-        rows = rows[chosen]
-        for row, coefficients in zip(rows.tolist(), products.coefficients(chosen, degrees[rows]), strict=True):
-            result[row].append(coefficients)
-    for rows, terms in bernsteins:
-        for number, row in enumerate(rows.tolist()):
-            if ways[row] == BERNSTEIN:
-                result[row] = terms.coefficients(number)
+    try_bernstein(PAIR + 1, PAIR)
+    rows = np.flatnonzero((errors > allowed) & (degrees > 1))
+    if len(rows):
+        pieces, size = _Pieces.of(series[rows], degrees[rows, None], first[rows], last[rows])
+        product, left = pieces.product_of(-size * pieces.spare, pieces.roots)
+        values, chain = _values_of(series[rows], fit_of(series.shape[1])[0]) + size * pieces.spare + left, [product]
+    while len(rows):
+        product, left = pieces.product_of(values)
+        try_out(rows, [*chain, product])
+        missed = errors[rows] > allowed[rows]
+        if len(chain) == MOST - 1 or not missed.any():
+            break
+        rows, pieces, values, left = rows[missed], pieces.some(missed), values[missed], left[missed]
+        spare = LEFT * abs(left).max(1, keepdims=True) * pieces.spare
+        product, left = pieces.product_of(values - spare)
+        values, chain = left + spare, [*(each.some(missed) for each in chain), product]
+    try_bernstein(np.inf, np.inf)
     return result

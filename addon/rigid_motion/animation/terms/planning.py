@@ -87,6 +87,9 @@ class _Polynomials(NamedTuple):
     tolerances: np.ndarray
     """What carriers may use up."""
 
+    def some(self, rows: np.ndarray) -> _Polynomials:
+        return _Polynomials(*(values[rows] for values in self))
+
 
 class _Spans:
     """The spans of all sources, and their differences on any frames: where planning meets evaluation."""
@@ -98,7 +101,6 @@ class _Spans:
         self.owners = np.array([number for number, _ in found], int)
         ends = np.array([(span.first, span.last) for span in self.all]).reshape(-1, 2)
         self.first, self.last = np.float32(np.clip(ends, -LAST_FRAME, LAST_FRAME)).astype(float).T
-        self.by_angles = np.array([source.order is not None for source in sources], bool)[self.owners]
         self.is_key = np.array([(span.first_is_key, span.last_is_key) for span in self.all], bool).reshape(-1, 2)
 
     def pieces(self) -> _Pieces:
@@ -129,27 +131,23 @@ def plan(sources: Sequence[Source]) -> list[dict[int, list[Term]]]:
     """
     result: list[dict[int, list[Term]]] = [{} for _ in sources]
     every = _Spans(sources)
-    finished = []
-    pieces = every.pieces()
+    finished, pieces = [], every.pieces()
     while len(pieces.spans):
         polynomials, pieces = _tried(every, pieces)
         finished.append(polynomials)
-        pieces, straight = _split(every, pieces)
-        if len(straight.spans):
-            finished.append(_straight(every, straight))
+        pieces = _split(every, pieces)
     if not finished:
         return result
     found = _Polynomials(*(np.concatenate(parts) for parts in zip(*finished, strict=True)))
-    found = _Polynomials(
-        *(values[np.lexsort((found.first, found.rows, every.owners[found.spans]))] for values in found)
-    )
+    found = found.some(np.lexsort((found.first, found.rows, every.owners[found.spans])))
     ranges = _ranges(every, found)
     is_seen = ranges[:, 0] <= ranges[:, 1]
-    found, ranges = _Polynomials(*(values[is_seen] for values in found)), ranges[is_seen]
-    terms = carry(found.series, found.first, found.last, found.tolerances, ranges)
-    for owner, row, some in zip(every.owners[found.spans].tolist(), found.rows.tolist(), terms, strict=True):
+    found, ranges = found.some(is_seen), ranges[is_seen]
+    carriers = carry(found.series, found.first, found.last, found.tolerances)
+    places = zip(every.owners[found.spans].tolist(), found.rows.tolist(), ranges.tolist(), strict=True)
+    for (owner, row, (first, last)), some in zip(places, carriers, strict=True):
         if some:
-            result[owner].setdefault(row, []).extend(some)
+            result[owner].setdefault(row, []).extend(Term(first, last, coefficients) for coefficients in some)
     return result
 
 
@@ -174,21 +172,17 @@ def _ranges(every: _Spans, found: _Polynomials) -> np.ndarray:
     return np.stack([first, np.where(closes, _before(found.last), found.last)], 1)
 
 
-def _tolerances(native: np.ndarray) -> np.ndarray:
-    """Return what is close enough where values are `native` (P, 10, M); shape (P, 10)."""
-    return np.maximum(BASE, SINGLE_PRECISION * np.abs(native).max(axis=2))
-
-
 def _tried(every: _Spans, pieces: _Pieces) -> tuple[_Polynomials, _Pieces]:
     """Return the polynomials of the rows that one follows, and the pieces with the other rows open.
 
-    A polynomial ends where the difference does, so that what is 0 at keys stays so.
+    A polynomial ends where the difference does, so that what is 0 at keys stays so. Where there is no eighth of a frame
+    inside of a piece it runs straight.
     """
     nodes, to_series = fit_of(NODES)
     middles, halves = (pieces.first + pieces.last) / 2, (pieces.last - pieces.first) / 2
     moments = middles[:, None] + halves[:, None] * np.concatenate([[-1.0], nodes, [1.0]])
     difference, native = every.differences(pieces.spans, moments)
-    tolerances = _tolerances(native)
+    tolerances = np.maximum(BASE, SINGLE_PRECISION * np.abs(native).max(axis=2))
     series = (difference[..., 1:-1].reshape(-1, NODES) @ to_series).reshape(difference[..., 1:-1].shape)
     # What each degree leaves: at most, and at both ends, where a slope may be infinite and no node sees it.
     size = np.abs(series)
@@ -199,17 +193,18 @@ def _tried(every: _Spans, pieces: _Pieces) -> tuple[_Polynomials, _Pieces]:
     missed = behind + np.maximum(np.abs(at_first), np.abs(at_last)) + unseen[..., None]
     is_close = missed[..., : MOST_DEGREE + 1] <= FITTING * tolerances[..., None]
     is_close[..., 0] = False
-    degrees = is_close.argmax(axis=2)
+    is_short = np.floor(FRACTIONS[-1] * pieces.first) + 1 >= FRACTIONS[-1] * pieces.last
     matters = pieces.rows & (size.sum(axis=2) + unseen > GUARD * tolerances)
-    followed = is_close.any(axis=2)
-    # Several values of all angles turn alike, and which of them it is hangs on the frames that are asked for.
+    followed = is_close.any(axis=2) | is_short[:, None]
+    # Near gimbal lock several values of all angles turn alike, and which it is hangs on the frames that are asked for.
     turning = ROWS[ROTATION]
-    is_torn = every.by_angles[pieces.spans] & (matters & ~followed)[:, turning].any(axis=1)
+    is_torn = (matters & ~followed)[:, turning].any(axis=1)
     followed[is_torn, turning], matters[is_torn, turning] = False, pieces.rows[is_torn, turning]
     number, row = np.nonzero(matters & followed)
-    degree = degrees[number, row]
+    degree = np.maximum(is_close.argmax(axis=2), 1)[number, row]
     chosen = np.where(np.arange(NODES) <= degree[:, None], series[number, row], 0.0)
-    chosen[:, :2] += _line(at_first[number, row, degree], at_last[number, row, degree])
+    first, last = at_first[number, row, degree], at_last[number, row, degree]
+    chosen[:, :2] += np.stack([first + last, last - first], 1) / 2
     allowed = (1.0 - FITTING) * tolerances[number, row]
     polynomials = _Polynomials(pieces.spans[number], row, pieces.first[number], pieces.last[number], chosen, allowed)
     rows = matters & ~followed
@@ -217,41 +212,20 @@ def _tried(every: _Spans, pieces: _Pieces) -> tuple[_Polynomials, _Pieces]:
     return polynomials, _Pieces(*(values[is_open] for values in pieces._replace(rows=rows)))
 
 
-def _line(first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Return the series (., 2) of what runs straight from the first value to the last."""
-    return np.stack([first + last, last - first], 1) / 2
+def _split(every: _Spans, pieces: _Pieces) -> _Pieces:
+    """Return the parts of pieces.
 
-
-def _split(every: _Spans, pieces: _Pieces) -> tuple[_Pieces, _Pieces]:
-    """Return the parts of pieces, and the pieces that cannot be split.
-
-    Parts are between breaks, or else on both sides of the whole frame that is nearest to the middle; or of the half,
-    the quarter or the eighth where no whole frame is inside.
+    They are between breaks, or else on both sides of the whole frame that is nearest to the middle; or of the half, the
+    quarter or the eighth where no whole frame is inside.
     """
     parts: list[tuple[int, float, float]] = []
-    rest: list[tuple[int, float, float]] = []
     ends = zip(pieces.spans.tolist(), pieces.first.tolist(), pieces.last.tolist(), strict=True)
     for number, (span, first, last) in enumerate(ends):
         breaks = np.float32(every.all[span].breaks).astype(float)
         between = np.unique(breaks[(first < breaks) & (breaks < last)]).tolist()
         middles = (float(np.floor(parts_of * (first + last) / 2 + 0.5)) / parts_of for parts_of in FRACTIONS)
         between = between or [middle for middle in middles if first < middle < last][:1]
-        (parts if between else rest).extend((number, *both) for both in pairwise([first, *between, last]))
-    return _parts(pieces, parts), _parts(pieces, rest)
-
-
-def _parts(pieces: _Pieces, ends: list[tuple[int, float, float]]) -> _Pieces:
-    """Return parts of pieces, given by number, first and last frame."""
-    table = np.array(ends).reshape(-1, 3)
-    numbers = table[:, 0].astype(int)
-    return _Pieces(pieces.spans[numbers], table[:, 1], table[:, 2], pieces.rows[numbers])
-
-
-def _straight(every: _Spans, pieces: _Pieces) -> _Polynomials:
-    """Return polynomials of degree 1 that are exact at both ends of pieces."""
-    difference, native = every.differences(pieces.spans, np.stack([pieces.first, pieces.last], 1))
-    number, row = np.nonzero(pieces.rows)
-    series = np.zeros((len(number), NODES))
-    series[:, :2] = _line(*difference[number, row].T)
-    allowed = (1.0 - FITTING) * _tolerances(native)[number, row]
-    return _Polynomials(pieces.spans[number], row, pieces.first[number], pieces.last[number], series, allowed)
+        parts.extend((number, *both) for both in pairwise([first, *between, last]))
+    numbers, first, last = np.array(parts).reshape(-1, 3).T
+    numbers = numbers.astype(int)
+    return _Pieces(pieces.spans[numbers], first, last, pieces.rows[numbers])

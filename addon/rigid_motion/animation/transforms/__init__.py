@@ -1,9 +1,8 @@
-"""What is moved: one small interface for whatever has location, rotation and scale, and the kinds that have it.
+"""What is moved: one small interface for whatever has location, rotation and scale: objects and pose bones.
 
 A transform knows whose Action animates it, and on which property its channels are.
 
 transform  the interface
-kinds      objects and pose bones
 sizes      how large things are, and how far they reach
 posing     where the poses of bones put them
 
@@ -12,18 +11,22 @@ Each module imports only those above it.
 
 from __future__ import annotations
 
-from .kinds import (
-    BoneTransform,
-    ObjectTransform,
+from .transform import (
+    GROUP,
+    LINKED,
+    OWN_WORDS,
+    TURNS_PROPERTY,
+    WIDTHS,
+    Channel,
+    Refused,
+    Transform,
     bone_name,
-    is_part,
     let_override_be_read,
     prefix_of,
     split_path,
     transform_in,
     transform_of,
 )
-from .transform import GROUP, LINKED, OWN_WORDS, TURNS_PROPERTY, WIDTHS, Channel, Refused, Transform
 
 __all__ = [
     "GROUP",
@@ -31,13 +34,10 @@ __all__ = [
     "OWN_WORDS",
     "TURNS_PROPERTY",
     "WIDTHS",
-    "BoneTransform",
     "Channel",
-    "ObjectTransform",
     "Refused",
     "Transform",
     "bone_name",
-    "is_part",
     "let_override_be_read",
     "prefix_of",
     "split_path",

@@ -20,13 +20,7 @@ SOME_SHEAR = 1e-4
 
 
 class Hierarchy:
-    """The bones of a rig at rest, and what each inherits from its parent.
-
-    Parameters
-    ----------
-    bones : sequence of bpy.types.PoseBone
-        All bones of the rig. They are numbered in this order.
-    """
+    """All bones of a rig at rest, numbered in this order, and what each inherits from its parent."""
 
     def __init__(self, bones: Sequence[bpy.types.PoseBone]) -> None:
         self.bones = [bone.bone for bone in bones]
@@ -86,13 +80,13 @@ def _inherited(
         if mode in ("NONE", "AVERAGE"):
             axes = without_shear(above, normalise=True)
         elif mode == "ALIGNED":
-            axes, growth = _normalised(without_shear(above))
+            axes, growth = _unit(without_shear(above), 1)
         elif mode == "NONE_LEGACY":
-            axes, _ = _normalised(above)
+            axes = _unit(above, 1)[0]
     else:
         axes = np.broadcast_to(above_at_rest, above.shape)
         if mode == "FULL":
-            axes = axes * _lengths(above)
+            axes = axes * _unit(above, 1)[1]
         elif mode == "FIX_SHEAR":
             axes = axes * _lengths_by_volume(above)
         elif mode == "ALIGNED":
@@ -112,49 +106,32 @@ def without_shear(axes: np.ndarray, *, normalise: bool = False) -> np.ndarray:
     The volume stays, unless they are to have the length 1.
     """
     x, y, z = np.moveaxis(axes, -1, 0)
-    squared = _dot(y, y)
-    safe = np.where(squared > 0.0, squared, 1.0)[:, None]
-    x, z = (axis - y * _dot(axis, y)[:, None] / safe for axis in (x, z))
-    unit_x, length_x = _unit(x)
-    unit_z, length_z = _unit(z)
+    unit_y = _unit(y)[0]
+    (unit_x, length_x), (unit_z, length_z) = (_unit(axis - unit_y * _dot(axis, unit_y)) for axis in (x, z))
     cosine = _dot(unit_x, unit_z)
     sheared = (np.abs(cosine) > SOME_SHEAR) & (np.abs(cosine) < 1.0 - np.finfo(np.float32).eps)
-    angle = np.arccos(np.where(sheared, cosine, 0.0))
-    target = 0.5 * (angle + 0.5 * np.pi)
-    across, _ = _unit(unit_x - cosine[:, None] * unit_z)
-    moved_x = np.sin(target)[:, None] * across + np.cos(target)[:, None] * unit_z
-    moved_z, _ = _unit(np.cross(np.cross(moved_x, unit_z), moved_x))
-    unit_x, unit_z = (np.where(sheared[:, None], moved, unit) for moved, unit in ((moved_x, unit_x), (moved_z, unit_z)))
+    between, across = _unit(unit_x + unit_z)[0], _unit(unit_x - unit_z)[0]
+    unit_x = np.where(sheared, (between + across) * np.sqrt(0.5), unit_x)
+    unit_z = np.where(sheared, (between - across) * np.sqrt(0.5), unit_z)
     if normalise:
-        return np.stack((unit_x, _unit(y)[0], unit_z), axis=-1)
-    shrink = np.sqrt(np.sin(angle))
-    return np.stack((unit_x * (length_x * shrink)[:, None], y, unit_z * (length_z * shrink)[:, None]), axis=-1)
-
-
-def _normalised(axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return axes (n, 3, 3) of length 1, and their lengths as a row each (n, 1, 3)."""
-    lengths = _lengths(axes)
-    return axes / np.where(lengths > 0.0, lengths, 1.0), lengths
-
-
-def _lengths(axes: np.ndarray) -> np.ndarray:
-    """Return the lengths of axes (n, 3, 3) as a row each (n, 1, 3)."""
-    return np.sqrt(np.einsum("nij,nij->nj", axes, axes))[:, None]
+        return np.stack((unit_x, unit_y, unit_z), axis=-1)
+    shrink = (1.0 - np.where(sheared, cosine, 0.0) ** 2) ** 0.25
+    return np.stack((unit_x * length_x * shrink, y, unit_z * length_z * shrink), axis=-1)
 
 
 def _lengths_by_volume(axes: np.ndarray) -> np.ndarray:
     """Return the lengths of axes (n, 3, 3) as rows (n, 1, 3) whose product is the volume, also where there is shear."""
-    lengths = _lengths(axes)
+    lengths = _unit(axes, 1)[1]
     product = lengths.prod(axis=-1, keepdims=True)
     return lengths * np.cbrt(np.abs(np.linalg.det(axes))[:, None, None] / np.where(product > 0.0, product, 1.0))
 
 
-def _unit(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return vectors (n, 3) of length 1, and the lengths (n,) that they had. Those without a length stay zero."""
-    lengths = np.sqrt(_dot(vectors, vectors))
-    return vectors / np.where(lengths > 0.0, lengths, 1.0)[:, None], lengths
+def _unit(vectors: np.ndarray, axis: int = -1) -> tuple[np.ndarray, np.ndarray]:
+    """Return vectors of length 1, and the lengths that they had. Those without a length stay zero."""
+    lengths = np.linalg.norm(vectors, axis=axis, keepdims=True)
+    return vectors / np.where(lengths > 0.0, lengths, 1.0), lengths
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the dot products of vectors (n, 3)."""
-    return np.einsum("ni,ni->n", a, b)
+    """Return the dot products of vectors (n, 3), shape (n, 1)."""
+    return np.einsum("ni,ni->n", a, b)[:, None]

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...gltf.sizes import OF_A_BODY, OF_KEY_POSES, SHELL
-from .transform import Transform
+from .transform import Transform, transform_of
 
 SOME_SIZE = 0.1
 """The radius, in metres, of what has no size."""
@@ -30,7 +30,7 @@ def reaches_of(rig: bpy.types.Object) -> dict[str, float]:
     bones = {bone.name: bone for bone in cast(bpy.types.Pose, rig.pose).bones}
     heads = {name: np.array(bone.bone.head_local) for name, bone in bones.items()}
     reaches = {name: _length(bone.bone) or _some_size() for name, bone in bones.items()}
-    least = SHELL * _extent(np.array(list(heads.values())), max(reaches.values(), default=0.0))
+    least = SHELL * _extent(rig)
     for obj in cast(bpy.types.Scene, bpy.context.scene).objects:
         if obj.parent == rig and obj.parent_type == "BONE" and obj.parent_bone in bones:
             at_bone = np.array((rig.matrix_world @ bones[obj.parent_bone].matrix).inverted_safe())
@@ -90,40 +90,6 @@ def size_of(matrix: object) -> float:
     return float(np.cbrt(abs(np.linalg.det(np.array(matrix)[:3, :3]))))
 
 
-def reach_at_rest(transform: Transform, known: dict[bpy.types.Bone, float]) -> float:
-    """Return how far a transform reaches from its origin, in the units of its channels: with all bones that hang on it,
-    as far as these stretch in one line; an object's box without its modifiers.
-
-    `known` keeps what was found of bones.
-    """
-    if transform.is_part:
-        return _reach_of_chain(transform.carrier.bone, known)
-    obj = transform.carrier
-    size = float(np.linalg.norm(np.array(obj.bound_box), axis=1).max()) or drawn_size(obj)
-    return size * max(map(abs, obj.scale)) or _some_size()
-
-
-def metres_per_channel_unit(transform: Transform) -> float:
-    """Return how many metres a unit of its channels is as it stands, 1 where its parents have no size."""
-    obj = transform.carrier.id_data
-    space = obj if transform.is_part else obj.parent
-    return metres_per_unit(bpy.context.scene) * (1.0 if space is None else size_of(space.matrix_world) or 1.0)
-
-
-def _reach_of_chain(bone: bpy.types.Bone | None, known: dict[bpy.types.Bone, float]) -> float:
-    if bone is None:  # It was just made in Edit Mode.
-        return _some_size()
-    chain = [bone]
-    for item in chain:
-        if item not in known:
-            chain += item.children
-    for item in reversed(chain):
-        if item not in known:
-            children = [(other.head_local - item.head_local).length + known[other] for other in item.children]
-            known[item] = max(children, default=0.0) or _length(item)
-    return known[bone]
-
-
 def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
     """Return how far an object or a pose bone reaches from its origin, in the scene's units.
 
@@ -132,7 +98,7 @@ def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
     cameras are as large as they are drawn; what has no size at all counts as ten centimetres.
     """
     if isinstance(obj, bpy.types.PoseBone):
-        return reaches_of(obj.id_data)[obj.name] * (size_of(_evaluated(obj.id_data).matrix_world) or 1.0)
+        return reaches_of(obj.id_data)[obj.name] * scale_in_scene(transform_of(obj))
     evaluated = _evaluated(obj)
     world = np.array(evaluated.matrix_world)
     if obj.pose is not None and len(obj.pose.bones):
@@ -151,20 +117,18 @@ def _corners(evaluated: bpy.types.Object) -> np.ndarray:
 
 
 def rig_size(rig: bpy.types.Object) -> float:
-    """Return the size of a rig in the scene's units: the largest extent of its joints along any axis, at rest.
+    """Return the size of a rig in the scene's units: the largest extent of its joints along any of its axes, at rest.
 
     Joints are the heads of bones, for importers make up where the last bones end. A rig whose heads are in one place is
     as large as the bone that reaches farthest.
     """
-    world = _evaluated(rig).matrix_world
-    heads = np.array([world @ bone.bone.head_local for bone in rig.pose.bones]).reshape(-1, 3)
-    reach = max((_length(bone.bone) or _some_size() for bone in rig.pose.bones), default=0.0) * size_of(world)
-    return _extent(heads, reach)
+    return _extent(rig) * size_of(_evaluated(rig).matrix_world)
 
 
-def _extent(heads: np.ndarray, reach: float) -> float:
-    """Return the largest extent of heads (bones, 3) along any axis; in one place, that is how far any bone reaches."""
-    extent = float(np.ptp(heads, axis=0).max()) if len(heads) else 0.0
+def _extent(rig: bpy.types.Object) -> float:
+    bones = [bone.bone for bone in rig.pose.bones]
+    reach = max((_length(bone) or _some_size() for bone in bones), default=0.0)
+    extent = float(np.ptp(np.array([bone.head_local for bone in bones]), axis=0).max()) if bones else 0.0
     return extent if extent > SAME_PLACE * reach else reach
 
 

@@ -1,22 +1,25 @@
-"""What has location, rotation and scale, and is moved: the interface of every kind, see `kinds`."""
+"""What has location, rotation and scale, and is moved: an object or a pose bone."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from functools import cache
-from typing import ClassVar
+import re
+from functools import cache, lru_cache
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...motion.eulers import ORDERS, quaternions_from_extrinsic_eulers
 from ..evaluation.components import LOCATION, REST, ROTATION, ROWS, SCALE
 
 OWN_WORDS = "Rigid Motion"
 """The context of words that Blender has another translation for, or one that is too long where they are shown."""
 
-LINKED = n_("{name} is linked from another file: make it local first (Object > Relations > Make Local)")
+LINKED = n_(
+    "{name} is linked from another file: make it local first (Object > Relations > Make Local), "
+    "or override it (Object > Library Override > Make)"
+)
 """The reason why a data-block cannot be edited, and the way out."""
 
 TURNS_PROPERTY = "rigid_motion.turns"
@@ -28,7 +31,9 @@ GROUP = "Rigid Motion"
 WIDTHS = {LOCATION: 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, SCALE: 3}
 """The properties that move something, and how many components each has."""
 
-_ROTATIONS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
+_ROTATIONS = {None: "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
+
+_BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.')
 
 Channel = tuple[str, int]
 """Data path, from what is animated on, and index."""
@@ -37,12 +42,7 @@ Channel = tuple[str, int]
 class Refused(ValueError):
     """Why rigid motion cannot act on something: names it, and the way out.
 
-    Parameters
-    ----------
-    text : str
-        In English, with placeholders.
-    facts
-        What stands for these in the user's language. Without any, the text stays as it is.
+    The text is in English, with placeholders for facts; without any of these it stays as it is.
     """
 
     def __init__(self, text: str, **facts: object) -> None:
@@ -52,32 +52,18 @@ class Refused(ValueError):
 class Transform:
     """Something with location, rotation and scale, as its animated data-block's Action moves it.
 
-    A subclass is a kind of such things. What differs from kind to kind is asked of it, never guessed from data paths.
+    What bones differ in from objects is asked of it, never guessed from data paths.
     """
 
-    is_part: ClassVar[bool]
-    """True if it is a part of its data-block, with a name that can be changed, and not the data-block itself."""
-
-    label: ClassVar[str]
-    """The name in front of its mode."""
-
-    plural: ClassVar[str]
-    """The name of several, in English."""
-
-    linked_text: ClassVar[str]
-    """Why it cannot be edited where its data-block {name} is linked, and the way out."""
-
-    differing_text: ClassVar[str]
-    """Why the motion of its slot, which is that of {leader}, does not fit it, and the way out."""
-
-    animated: bpy.types.Object
-    """The data-block whose Action it is."""
-
-    carrier: bpy.types.Object | bpy.types.PoseBone
-    """The object or bone that has the properties."""
-
-    prefix: str = ""
-    """From the data-block to the carrier, in data paths."""
+    def __init__(self, carrier: bpy.types.Object | bpy.types.PoseBone) -> None:
+        self.carrier = carrier
+        """The object or bone that has the properties."""
+        self.animated: bpy.types.Object = carrier.id_data
+        """The data-block whose Action it is."""
+        self.is_part = isinstance(carrier, bpy.types.PoseBone)
+        """True if it is a part of its data-block, with a name that can be changed, and not the data-block itself."""
+        self.prefix = prefix_of(carrier.name) if self.is_part else ""
+        """From the data-block to the carrier, in data paths."""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Transform) and (self.animated, self.prefix) == (other.animated, other.prefix)
@@ -92,12 +78,25 @@ class Transform:
 
     @property
     def name(self) -> str:
-        return self.carrier.name
+        return f"{self.animated.name}/{self.carrier.name}" if self.is_part else self.carrier.name
+
+    @property
+    def label(self) -> str:
+        """The name in front of its mode, in English."""
+        return n_("Bone", OWN_WORDS) if self.is_part else n_("Object", OWN_WORDS)
 
     @property
     def location_axes(self) -> np.ndarray | None:
-        """The axes that it is moved along, as columns (3, 3) in those that it turns about; None where they are one."""
-        return None
+        """The axes that it is moved along, as columns (3, 3) in those that it turns about; None where they are one.
+
+        Without *Local Location* a bone is moved along the axes of its parent, and still turns about its own.
+        """
+        bone = self.carrier.bone if self.is_part else None
+        # What was just made in Edit Mode has no bone before that is left.
+        if bone is None or bone.use_local_location:
+            return None
+        axes = bone.matrix_local.to_3x3().transposed()
+        return np.array(axes @ bone.parent.matrix_local.to_3x3() if bone.parent else axes)
 
     @property
     def motion(self) -> bpy.types.PropertyGroup:
@@ -107,7 +106,7 @@ class Transform:
     @property
     def rotation(self) -> str:
         """The property that turns it."""
-        return _ROTATIONS.get(self.carrier.rotation_mode, "rotation_euler")
+        return rotation_by(self.order)
 
     @property
     def order(self) -> str | None:
@@ -118,7 +117,7 @@ class Transform:
     @property
     def properties(self) -> dict[str, str]:
         """Location, rotation and scale, and which property each of them is."""
-        return properties_for(self.rotation)
+        return {LOCATION: "location", ROTATION: self.rotation, SCALE: "scale"}
 
     @property
     def channels(self) -> dict[int, Channel]:
@@ -132,32 +131,85 @@ class Transform:
     def components(self) -> np.ndarray:
         """Return its properties as they are now, as the ten components of a source."""
         result = REST.copy()
-        result[ROWS[LOCATION]], result[ROWS[SCALE]] = self.carrier.location, self.carrier.scale
-        rotation = getattr(self.carrier, self.rotation)
-        result[3 : 3 + len(rotation)] = rotation
+        for part, prop in self.properties.items():
+            result[ROWS[part].start :][: WIDTHS[prop]] = getattr(self.carrier, prop)
         return result
 
-    def set_components(self, components: np.ndarray, parts: Collection[str]) -> None:
-        """Set its properties for these of location, rotation and scale to components (10,)."""
-        for part, prop in self.properties.items():
-            if part in parts:
-                setattr(self.carrier, prop, components[ROWS[part]][: WIDTHS[prop]])
-
     def original(self) -> np.ndarray:
-        """Return what comes on top of its channels, as components (10,): rotation as a unit quaternion."""
-        return REST.copy()
+        """Return what comes on top of its channels, as components (10,): the delta transforms of an object.
+
+        The rotation is a unit quaternion.
+        """
+        obj, result = self.carrier, REST.copy()
+        if self.is_part:
+            return result
+        result[ROWS[LOCATION]], result[ROWS[SCALE]] = obj.delta_location, obj.delta_scale
+        if obj.rotation_mode in ORDERS:
+            angles = np.array([obj.delta_rotation_euler])
+            result[ROWS[ROTATION]] = quaternions_from_extrinsic_eulers(angles, obj.rotation_mode)[0]
+        elif obj.rotation_mode == "QUATERNION" and any(obj.delta_rotation_quaternion):
+            result[ROWS[ROTATION]] = obj.delta_rotation_quaternion.normalized()
+        return result
 
 
-def properties_for(rotation: str) -> dict[str, str]:
-    """Return location, rotation and scale, and which property each of them is, for what is turned by this one."""
-    return {LOCATION: "location", ROTATION: rotation, SCALE: "scale"}
+def rotation_by(order: str | None) -> str:
+    """Return the property that turns something by quaternions, None, AXIS_ANGLE, or Euler angles of an order."""
+    return _ROTATIONS.get(order, "rotation_euler")
 
 
 @cache
 def channels_under(prefix: str, rotation: str) -> dict[int, Channel]:
     """Return the channels of a transform's components whose data paths begin so, by their rows."""
     return {
-        ROWS[name].start + index: (prefix + prop, index)
-        for name, prop in properties_for(rotation).items()
+        ROWS[part].start + index: (prefix + prop, index)
+        for part, prop in ((LOCATION, "location"), (ROTATION, rotation), (SCALE, "scale"))
         for index in range(WIDTHS[prop])
     }
+
+
+@lru_cache(maxsize=65536)
+def prefix_of(name: str) -> str:
+    """Return how the data paths of a bone's properties begin, from its object."""
+    return f'pose.bones["{bpy.utils.escape_identifier(name)}"].'
+
+
+@lru_cache(maxsize=65536)
+def split_path(path: str) -> tuple[str, str]:
+    """Return the prefix of a data path, "" where it is not that of a bone's property, and the rest of it."""
+    result = _BONE.match(path)
+    return (result[0], path[result.end() :]) if result else ("", path)
+
+
+@lru_cache(maxsize=65536)
+def bone_name(prefix: str) -> str:
+    """Return the name of the bone that data paths which begin so speak of."""
+    result = _BONE.fullmatch(prefix)
+    return "" if result is None else bpy.utils.unescape_identifier(result[1])
+
+
+def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> Transform:
+    """Return the transform of something that Blender has, where it is none already."""
+    if isinstance(carrier, Transform):
+        return carrier
+    if not isinstance(carrier, bpy.types.Object | bpy.types.PoseBone):
+        raise TypeError(f"neither an object nor a pose bone: {carrier!r}")
+    return Transform(carrier)
+
+
+def transform_in(obj: bpy.types.Object, prefix: str) -> Transform | None:
+    """Return what data paths that begin so lead to in an object, None where it has no such thing."""
+    if not prefix:
+        return Transform(obj)
+    bone = None if obj.pose is None else obj.pose.bones.get(bone_name(prefix))
+    return None if bone is None else Transform(bone)
+
+
+def let_override_be_read(rig: bpy.types.Object) -> None:
+    """Have what an override keeps on bones be there when its file is opened again.
+
+    Blender 5 does not read it where the library has nothing of the kind on the bone, not even what is made when it is
+    asked for.
+    """
+    reference = rig.override_library.reference
+    for bone in () if reference is None or reference.pose is None else reference.pose.bones:
+        bone.rigid_motion  # noqa: B018

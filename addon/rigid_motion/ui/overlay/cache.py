@@ -19,9 +19,9 @@ from bpy.app.handlers import persistent
 from ...animation.actions.channels import selected_keys
 from ...animation.actions.slots import Binding
 from ...animation.evaluation.sources import Source
-from ...animation.handlers import append_handlers, remove_handlers
 from ...animation.queries.keyed import active_bindings, frames_in
 from ...animation.transforms import Transform, transform_of
+from ...handlers import append_handlers, remove_handlers
 from .ghosts import ghosts_of
 from .kinds import axis_length_of, followed
 from .parents import Carried, Parents

@@ -19,9 +19,9 @@ from bpy.app.handlers import persistent
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
-from ...animation.handlers import append_handlers, remove_handlers
 from ...animation.queries.segments import frame_in_action
 from ...animation.transforms import Transform, transform_of
+from ...handlers import append_handlers, remove_handlers
 from ..preferences import DEFAULT_LOOK, Color, preferences
 from ..targets import selected_in_view
 from . import cache

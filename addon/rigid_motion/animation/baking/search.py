@@ -1,0 +1,289 @@
+"""Which keys an object, or a rig and its bones, can do without: one plan for all that one slot moves together.
+
+Keys are searched for as if all were rigid, and proven in what Blender makes of them, between keys as well: the
+tolerance is kept at every bone, whether it gets fewer keys itself or only hangs on what does. Poses are those that the
+channels give, without constraints and drivers. Lengths are the scene's units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_n as n_
+
+from ...motion import Poses, reduce_keys, reduce_skeleton_keys
+from ...motion.contacts import slide, standing
+from ...motion.poses import placed
+from ...motion.quaternions import align_signs
+from ..actions.slots import Binding
+from ..evaluation.sources import SAME_FRAME, Source, distinct
+from ..transforms import Refused, Transform, transform_of
+from .fewer_keys import (
+    FewerKeys,
+    NeedsItsKeys,
+    WholeRig,
+    count_of,
+    moments,
+    samples_of,
+    seen_frames,
+    united,
+    values_on,
+    with_keys,
+)
+from .motions import LEAST_SCALE, SMALLEST, BodyMotion, not_promised, without
+
+NO_FEWER = n_("{name} needs its {count} keys to stay within the tolerance: allow a larger one")
+NOT_SO_MANY = n_("{name} has {count} keys: ask for fewer")
+
+HOLD = 4.0
+"""The weight of the error of what stands on the ground."""
+
+APART = 4
+"""Frames between places that are mended at once."""
+
+AT_ONCE = 2**18
+"""Joints times moments that are looked at in one go."""
+
+Members = Mapping[Transform, tuple[Binding, Source]]
+"""What one slot moves of an object and its bones, and is to have fewer keys: by what it moves, and what is keyed."""
+
+Over = list[tuple[float, int, int]]
+"""What is over the tolerance, see `BodyMotion.over`."""
+
+
+def fewer_keys(
+    obj: bpy.types.Object,
+    members: Members,
+    mode: str,
+    tolerance: float,
+    radius: float | None,
+    *,
+    shared: bool,
+    hold: bool,
+    count: int | None,
+) -> dict[Transform, FewerKeys]:
+    """Return the plans for those of an object and its bones that can have fewer keys.
+
+    With a count there are so many keys, or key poses, whatever the tolerance. What is wanted besides, see
+    `reduce_keys_of`. `Refused` where none of several can have fewer.
+    """
+    body = _Body(obj, members, math.inf if count is not None else tolerance, radius, hold=hold)
+    fewer = body.proven(body.searched(mode, count, shared=shared), mode, shared=shared or count is not None)
+    if not fewer and len(members) > 1:
+        text = NO_FEWER if count is None else NOT_SO_MANY
+        raise NeedsItsKeys(text, name=obj.name, count=np.count_nonzero(body.sampled))
+    return body.plans(fewer)
+
+
+class _Body:
+    """An object and its bones as one slot moves them: those that are to have fewer keys, and all others as they are."""
+
+    def __init__(
+        self, obj: bpy.types.Object, members: Members, tolerance: float, radius: float | None, *, hold: bool
+    ) -> None:
+        self.obj, self.tolerance, self.members = obj, tolerance, members
+        bones = obj.pose.bones if any(transform.is_part for transform in members) else ()
+        joints = [transform_of(obj), *map(transform_of, bones)]
+        self.sources = {number: members[joint][1] for number, joint in enumerate(joints) if joint in members}
+        samples = united(map(samples_of, self.sources.values()))
+        self.frames = seen_frames(samples, list(self.sources.values()))
+        self.sampled = np.isin(self.frames, samples)
+        """True for the moments that keys may be on."""
+        slot = next(binding.slot for binding, _ in members.values())
+        self.motion = BodyMotion(joints, slot, self.sources, self.frames, radius)
+        self.allowed = tolerance + self.motion.rounding
+        self.stands = np.zeros((len(joints), len(self.frames)), dtype=bool)
+        """True for the bones that stand on the ground, at each moment."""
+        if bones:
+            render = bpy.context.scene.render
+            seconds = self.frames * render.fps_base / render.fps
+            self.stands[1:] = standing(seconds, self.motion.truth.origins[1:])
+        self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
+        self.errors = np.zeros(len(joints))
+        """The largest displacement of any point in each joint's ball, as was proven last, shape (joints,)."""
+        every, step = moments(self.frames, list(self.sources.values())), max(1, AT_ONCE // len(joints))
+        self._stretches = [every[first : first + step] for first in range(0, len(every), step)]
+
+    def searched(self, mode: str, count: int | None, *, shared: bool) -> dict[int, np.ndarray]:
+        """Return the frames of the keys that joints need if all of them are rigid, by their numbers."""
+        motion, at = self.motion, np.flatnonzero(self.sampled)
+        fixed = [number not in self.sources for number in range(len(motion.joints))]
+        parents, poses, share = self._as_chains()
+        wish: dict[str, Any] = {"budget": count}
+        if count is None:
+            wish = {"tolerance": self.tolerance * share / motion.unit}
+        times, poses = self.frames[at], poses[:, at]
+        if len(fixed) == 1:
+            keys: tuple[Any, ...] = (reduce_keys(times, poses[0], mode, radius=float(motion.radii[0]), **wish),)
+        else:
+            wish |= {"radius": motion.radii, "weights": self.weights[:, at], "fixed": fixed}
+            keys = reduce_skeleton_keys(times, poses, parents, mode, shared=shared or count is not None, **wish)
+        return {
+            number: self._within_its_keys(times[rows], number) for number, rows in enumerate(keys) if not fixed[number]
+        }
+
+    def _as_chains(self) -> tuple[np.ndarray, Poses, float]:
+        """Return joints as the search has them, with even scale, in chains of bones that inherit all.
+
+        That is their parents (joints,), those of the first in chains being the object; their poses (joints, m); and the
+        part of the tolerance that each chain may take, which still moves with what it hangs on.
+        """
+        motion = self.motion
+        own, *of_bones = motion.poses
+        size = own.scales[0] or 1.0
+        local = [Poses(own.positions / size, own.quaternions, own.scales / size)]
+        grows = any(np.abs(poses.scales - 1.0).max() > SMALLEST for poses in of_bones)
+        parents = motion.parents.copy()
+        for number, poses in enumerate(of_bones, 1):
+            bone = motion.joints[number].carrier
+            settings, rest = bone.bone, bone.bone.matrix_local
+            if not settings.use_inherit_rotation or (grows and settings.inherit_scale != "FULL"):
+                parents[number] = 0
+            elif bone.parent:
+                rest = bone.parent.bone.matrix_local.inverted() @ rest
+            if settings.use_connect and bone.parent:
+                poses = replace(poses, positions=np.zeros_like(poses.positions))
+            position, turn, _ = rest.decompose()
+            local.append(placed(Poses(np.array(position), np.array(turn)), poses))
+        scales = np.maximum([poses.scales for poses in local], LEAST_SCALE)
+        positions, quaternions = (np.stack([getattr(p, name) for p in local]) for name in ("positions", "quaternions"))
+        grows = np.abs(scales - 1.0).max() > SMALLEST
+        heads = parents != motion.parents
+        chains = 1 + max(np.count_nonzero(heads[[*motion.above(number)]]) for number in range(len(heads)))
+        return parents, Poses(positions, align_signs(quaternions), scales if grows else None), chains**-0.5
+
+    def plans(self, fewer: Mapping[int, Source]) -> dict[Transform, FewerKeys]:
+        """Return the plans for joints that have fewer keys by now."""
+        joints, motion, largest, whole = self.motion.joints, self.motion, float(self.errors[0]), None
+        if fewer and len(joints) > 1:
+            excepted = not_promised(self.obj)
+            # Of what is not promised, that counts which has fewer keys.
+            counted = [n in fewer or joint.carrier.name not in excepted for n, joint in enumerate(joints)]
+            largest = float(self.errors[counted].max())
+            motion.show(fewer)
+            slides = (slide(maps.origins, self.stands) for maps in (motion.truth, motion.now()))
+            frames = united(source.keyed_frames for source in fewer.values())
+            whole = WholeRig(len(frames), *slides, excepted)
+        return {
+            joints[number]: FewerKeys(*self.members[joints[number]], source, largest, whole)
+            for number, source in fewer.items()
+        }
+
+    def _within_its_keys(self, keys: np.ndarray, number: int) -> np.ndarray:
+        """Return the frames of a joint's keys, none of them outside of those that it has: there it holds."""
+        first, last = self._ends(number)
+        inside = keys[(keys > first) & (keys < last)]
+        return keys if len(keys) == 1 else np.union1d(inside, (first, last))
+
+    def _ends(self, number: int) -> np.ndarray:
+        """Return the frames of the first and the last key that a joint has."""
+        ends = distinct(self.sources[number].keyed_frames)[[0, -1]]
+        return self.frames[np.searchsorted(self.frames, ends - SAME_FRAME)]
+
+    def proven(self, chosen: dict[int, np.ndarray], mode: str, *, shared: bool) -> dict[int, Source]:
+        """Return the joints that get fewer keys, and these, so that all of the body keeps to the tolerance.
+
+        Keys are put back in `chosen`, the frames of each joint's, where the motion of the channels is off after all.
+        What would not have fewer keys than before stays as it is.
+        """
+        fewer: dict[int, Source] = {}
+
+        def have(numbers: Iterable[int]) -> None:
+            for number in numbers:
+                source, every = self.sources[number], np.union1d(self.frames, chosen[number])
+                at = np.searchsorted(every, chosen[number])
+                values = values_on(self.motion.joints[number], source, every)
+                values = {row: column[at] for row, column in values.items()}
+                fewer[number] = with_keys(source, chosen[number], values, mode)
+                if count_of(fewer[number]) >= count_of(source):
+                    del fewer[number], chosen[number]
+
+        def mend(over: Over, motion: BodyMotion) -> bool:
+            changed = self._put_back(over, motion, chosen, shared=shared)
+            have(changed)
+            return bool(changed)
+
+        have(list(chosen))
+        self._keep_to(self.allowed, fewer, mend)
+        return fewer
+
+    def _keep_to(self, allowed: float, fewer: dict[int, Source], mend: Callable[[Over, BodyMotion], bool]) -> None:
+        """Have `fewer` mended, of which all is shown, until nothing is over what is allowed at any moment.
+
+        Of a long recording no more is looked at at once than a stretch of it.
+        """
+        settled = False
+        while not settled:
+            settled = True
+            self.errors[:] = 0.0
+            for frames in self._stretches:
+                motion = self.motion.at(frames)
+                # Between two frames the smaller of their weights counts.
+                before, behind = (np.searchsorted(self.frames, frames, side) for side in ("right", "left"))
+                weights = np.minimum(self.weights[:, before - 1], self.weights[:, behind])
+                while True:
+                    motion.show({number: fewer.get(number) for number in self.sources})
+                    over = motion.over(allowed, weights)
+                    if not over or not mend(over, motion):
+                        break
+                    settled = False
+                self.errors = np.maximum(self.errors, motion.largest_errors())
+
+    def _put_back(self, over: Over, motion: BodyMotion, chosen: dict[int, np.ndarray], *, shared: bool) -> set[int]:
+        """Put keys back where joints are off the most, and return those that got any."""
+        changed: set[int] = set()
+        for error, number, moment in _apart(over, motion):
+            able = [item for item in motion.above(number) if item in chosen]
+            blamed = motion.to_blame(number, moment, able, self.allowed / error)
+            for those in (list(chosen),) if shared else (blamed, able):
+                if added := self._with_keys_at(float(motion.frames[moment]), those, chosen):
+                    break
+            chosen.update(added)
+            changed.update(added)
+        if not changed:
+            raise Refused(
+                n_(
+                    "{name} goes on outside of its keys, and with fewer of them would go elsewhere there: "
+                    "give its channels constant extrapolation and no cycles, or cycles that all have the same range"
+                ),
+                name=motion.joints[over[0][1]].name,
+            )
+        return changed
+
+    def _with_keys_at(
+        self, frame: float, numbers: Iterable[int], chosen: dict[int, np.ndarray]
+    ) -> dict[int, np.ndarray]:
+        """Return the keys of those of these joints that get any more: on the samples around a frame, or else there."""
+        samples = self.frames[self.sampled]
+        for around in (True, False):
+            added = {}
+            for number in numbers:
+                # Before and behind its keys it stays where they leave it, or goes through them again.
+                first, last = self._ends(number)
+                places = np.clip(self.sources[number].folded(np.array((frame,))), first, last)
+                if around:
+                    at = np.concatenate(
+                        (np.searchsorted(samples, places, "right") - 1, np.searchsorted(samples, places))
+                    )
+                    places = samples[at]
+                if len(more := without(places, chosen[number])):
+                    added[number] = np.union1d(chosen[number], (first, *more, last))
+            if added:
+                return added
+        return {}
+
+
+def _apart(over: Over, motion: BodyMotion) -> Iterator[tuple[float, int, int]]:
+    """Yield those of what is over that are the worst among all that hang together, for a few frames."""
+    taken: set[tuple[int, int]] = set()
+    for error, number, moment in over:
+        # Once what it hangs on is put right, it may be, too.
+        chain, span = [*motion.above(number)], int(motion.frames[moment] // APART)
+        if taken.isdisjoint((item, near) for item in chain for near in (span - 1, span, span + 1)):
+            taken.update((item, span) for item in chain)
+            yield error, number, moment

@@ -1,0 +1,364 @@
+"""Blender's commands on an in-between of a mode do what they do on a key with the same pose.
+
+Two objects or two bones have keys on frames 1, 21 and 41, linear ones of metres and wild turns. Their twins have linear
+keys on all eighths of frames with the values that the channels show, no modes, and nobody follows their edits: what
+Blender does to the twins it has to do to the others. What is seen is compared right after a command, after another
+frame was shown, and on the keys around.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from rigid_motion import animation
+from rigid_motion.animation import modes_of, set_mode
+from tests.animation.bones.rigs import (
+    HANDS,
+    in_turn,
+    new_rig,
+    own_clipboard,
+    pose_mode,
+    select_bones,
+    select_only,
+)
+from tests.animation.keyed import Carrier, curves_of, rotation_path, transform_paths
+from tests.animation.scenes import editor, give_own_deltas, key, key_densely, new_object, push_down
+from tests.blank import blank
+
+KEYS = (1.0, 21.0, 41.0)
+IN_BETWEEN, AWAY = 11, 12
+
+KINDS = tuple((what, order) for what in ("OBJECT", "BONE") for order in ("QUATERNION", "XYZ", "AXIS_ANGLE"))
+"""What is edited, and how it turns."""
+
+
+@dataclass
+class Stage:
+    """What is edited, selected; the first of it is active, and has a parent that is turned, or is in such a rig."""
+
+    kind: str
+    carriers: list[Carrier]
+    auto: bool
+    """Whether what is done by hand is keyed."""
+
+    @property
+    def first(self) -> Carrier:
+        return self.carriers[0]
+
+    @property
+    def owner(self) -> bpy.types.Object:
+        return self.first.id_data
+
+    def key(self, carrier: Carrier, *paths: str, index: int = -1) -> None:
+        """Blender's buttons key what was typed into them; by default all."""
+        for path in (paths or transform_paths(carrier)) if self.auto else ():
+            carrier.keyframe_insert(path, index=index)
+
+
+def set_stage(kind: str, order: str, mode: str, *, auto: bool = False, of_twins: bool | None = None) -> Stage:
+    """A new file with them, on the in-between. Of those with twins that turn by quaternions, one has deltas."""
+    animation.set_enabled(True)
+    blank()
+    if kind == "OBJECT":
+        root = new_object("Root", "XYZ")
+        carriers = [new_object(name, order) for name in ("Tool", "Other")]
+        carriers[0].parent = root
+        root.scale = (1.5, 1.5, 1.5)
+        if of_twins is not None and order == "QUATERNION":
+            give_own_deltas(carriers[1])
+        select_only(*carriers)
+    else:
+        root = new_rig("Rig", HANDS, order)
+        pose_mode(root, "Hand.L", "Hand.R")
+        carriers = [root.pose.bones["Hand.L"], root.pose.bones["Hand.R"]]
+    root.location, root.rotation_euler = (0.5, -1.0, 0.3), (0.4, -0.2, 0.9)
+    for seed, carrier in enumerate(carriers):
+        key(carrier, KEYS, seed=seed, scale="even", interpolation="LINEAR")
+    set_mode(carriers, mode)
+    if of_twins:
+        for carrier in carriers:
+            key_densely(carrier)
+        animation.set_enabled(False)
+    go_to(IN_BETWEEN)
+    return Stage(kind, carriers, auto)
+
+
+def go_to(frame: int) -> None:
+    bpy.context.scene.frame_set(frame)
+    bpy.context.view_layer.update()
+
+
+def all_seen() -> np.ndarray:
+    """The world matrices of all objects and bones in the scene, and the 3D Cursor's, shape (n, 4, 4)."""
+    bpy.context.view_layer.update()
+    depsgraph, result = bpy.context.evaluated_depsgraph_get(), [bpy.context.scene.cursor.matrix]
+    for obj in sorted(bpy.context.scene.objects, key=lambda obj: obj.name):
+        shown = obj.evaluated_get(depsgraph)
+        bones = shown.pose.bones if obj.pose else ()
+        result += [shown.matrix_world, *(shown.matrix_world @ bone.matrix for bone in bones)]
+    return np.array(result)
+
+
+def channels_seen(carriers: Sequence[Carrier]) -> np.ndarray:
+    """What the channels of these have, as drivers and scripts read it."""
+    return np.concatenate(
+        [[*carrier.location, *getattr(carrier, rotation_path(carrier)), *carrier.scale] for carrier in carriers]
+    )
+
+
+CURSOR = (0.7, -0.4, 0.3)
+QUARTERS = np.arange(KEYS[0], KEYS[-1] + 0.25, 0.25)
+PLACED = Matrix.LocRotScale((1.0, 2.0, -0.5), Matrix.Rotation(0.7, 3, (1.0, 2.0, 0.5)), None)
+
+AUTO_KEYS = {"off": (False, True), "what is needed": (True, True), "all": (True, False)}
+"""Whether Auto Key is on, and whether it keys only what is needed."""
+
+Command = Callable[[Stage], object]
+
+
+def target(name: str = "Target") -> bpy.types.Object:
+    obj = new_object(name)
+    obj.location, obj.rotation_quaternion = (1.0, 1.0, 1.0), (0.9, 0.1, 0.3, 0.2)
+    return obj
+
+
+def visual(stage: Stage) -> None:
+    """Apply what a constraint makes of it."""
+    constraint = stage.first.constraints.new("COPY_LOCATION")
+    constraint.target, constraint.use_offset = target(), True
+    bpy.context.view_layer.update()
+    (bpy.ops.object if stage.kind == "OBJECT" else bpy.ops.pose).visual_transform_apply()
+    stage.first.constraints.remove(constraint)
+    stage.key(stage.first)
+
+
+def visually_keyed(_: Stage) -> None:
+    bpy.ops.anim.keyframe_insert_by_name(type="BUILTIN_KSI_VisualLocRotScale")
+    # Blender shows on the next frame what it keyed, which is in the world's space; where a mode is, it is seen at once.
+    go_to(IN_BETWEEN)
+
+
+def child_of(stage: Stage) -> None:
+    constraint = stage.first.constraints.new("CHILD_OF")
+    constraint.target = target()
+    bpy.context.view_layer.update()
+    owner = {"object": stage.owner, "active_object": stage.owner}
+    if stage.kind == "BONE":
+        owner |= {"active_pose_bone": stage.first, "pose_bone": stage.first}
+    with bpy.context.temp_override(**owner, constraint=constraint):
+        bpy.ops.constraint.apply(constraint=constraint.name, owner=stage.kind)
+    assert not stage.first.constraints
+
+
+def pasted(stage: Stage, *, flipped: bool) -> None:
+    bpy.ops.pose.copy()
+    stage.first.location.x += 1.0
+    stage.first.rotation_euler = (0.3, 0.2, 0.1)
+    bpy.ops.pose.paste(flipped=flipped)
+
+
+def not_keyed(stage: Stage) -> None:
+    stage.first.location.x += 1.0
+    bpy.context.view_layer.update()
+    bpy.ops.pose.user_transforms_clear()
+
+
+def posed_by_action(stage: Stage) -> None:
+    """As the pose library does it."""
+    asset = stage.owner.animation_data.action.copy()
+    stage.owner.pose.apply_pose_from_action(asset, evaluation_time=16.0)
+    bpy.data.actions.remove(asset)
+
+
+def typed(stage: Stage, path: str, index: int, value: float) -> None:
+    getattr(stage.first, path)[index] = value
+    stage.key(stage.first, path, index=index)
+
+
+def set_matrix(stage: Stage, number: int, name: str, matrix: Matrix) -> None:
+    setattr(stage.carriers[number], name, matrix)
+    stage.key(stage.carriers[number])
+
+
+def driven(stage: Stage) -> None:
+    driver = target().driver_add("location", 2).driver
+    variable = driver.variables.new()
+    variable.name, variable.targets[0].id = "x", stage.owner
+    of_bone = "" if stage.kind == "OBJECT" else f"{stage.first.path_from_id()}."
+    variable.targets[0].data_path = f"{of_bone}location[0]"
+    driver.expression = "2.0 * x"
+
+
+def parented(stage: Stage, parent: bpy.types.Object, *children: bpy.types.Object) -> None:
+    select_only(parent, *children)
+    bpy.ops.object.parent_set(type="OBJECT", keep_transform=parent not in stage.carriers)
+
+
+def turned(pivot: str) -> None:
+    bpy.context.scene.tool_settings.transform_pivot_point = pivot
+    bpy.ops.transform.rotate(value=0.6, orient_axis="Z", orient_type="GLOBAL")
+
+
+def baked(stage: Stage, **settings: object) -> None:
+    """As an animator does who presses the button: Blender fills in the frames, and Pose Mode the type."""
+    kind = "OBJECT" if stage.kind == "OBJECT" else "POSE"
+    assert bpy.ops.nla.bake(frame_start=1, frame_end=41, bake_types={kind}, **settings) == {"FINISHED"}
+    assert len(curves_of(stage.first)["location", 0].keyframe_points) >= 41
+
+
+def baked_above_strips(stage: Stage) -> None:
+    for obj in {carrier.id_data for carrier in stage.carriers}:
+        push_down(obj)
+    baked(stage)
+
+
+COMMANDS: dict[str, Command] = {
+    "selection to cursor": lambda _: bpy.ops.view3d.snap_selected_to_cursor(use_offset=False),
+    "selection to cursor, keeping offset": lambda _: bpy.ops.view3d.snap_selected_to_cursor(use_offset=True),
+    "selection to grid": lambda _: bpy.ops.view3d.snap_selected_to_grid(),
+    "selection to active": lambda _: bpy.ops.view3d.snap_selected_to_active(),
+    "cursor to selected": lambda _: bpy.ops.view3d.snap_cursor_to_selected(),
+    "move": lambda _: bpy.ops.transform.translate(value=(0.3, -0.2, 0.5)),
+    "move along local axis": lambda _: bpy.ops.transform.translate(value=(0.3, 0.0, 0.0), orient_type="LOCAL"),
+    "rotate about the cursor": lambda _: turned("CURSOR"),
+    "rotate about the median": lambda _: turned("MEDIAN_POINT"),
+    "rotate each": lambda _: turned("INDIVIDUAL_ORIGINS"),
+    "resize": lambda _: bpy.ops.transform.resize(value=(1.5, 1.5, 1.5)),
+    "mirror": lambda _: bpy.ops.transform.mirror(constraint_axis=(True, False, False)),
+    "one coordinate typed": lambda stage: typed(stage, "location", 1, -0.7),
+    "one quaternion component typed": lambda stage: typed(stage, "rotation_quaternion", 2, 0.4),
+    "one angle typed": lambda stage: typed(stage, "rotation_euler", 2, 0.4),
+    "a size typed": lambda stage: typed(stage, "scale", 0, 1.4),
+    "keying set Location": lambda _: bpy.ops.anim.keyframe_insert_by_name(type="Location"),
+    "keying set LocRot": lambda _: bpy.ops.anim.keyframe_insert_by_name(type="BUILTIN_KSI_LocRot"),
+    "keying set Visual LocRotScale": visually_keyed,
+    "matrix set": lambda stage: set_matrix(stage, 0, "matrix_world" if stage.kind == "OBJECT" else "matrix", PLACED),
+    "matrix_basis copied": lambda stage: set_matrix(stage, 1, "matrix_basis", stage.first.matrix_basis),
+    "visual transform": visual,
+    "Child Of applied": child_of,
+    "driver": driven,
+    "bake": baked,
+    "bake the first alone": lambda stage: [select(stage, 0), baked(stage, use_current_action=True)],
+    "bake what is seen": lambda stage: baked(stage, visual_keying=True),
+    "bake above strips": baked_above_strips,
+}
+OF_OBJECTS: dict[str, Command] = {
+    "Alt G": lambda _: bpy.ops.object.location_clear(),
+    "Alt R": lambda _: bpy.ops.object.rotation_clear(),
+    "Alt S": lambda _: bpy.ops.object.scale_clear(),
+    "parent set": lambda stage: parented(stage, target(), *stage.carriers),
+    "parent of others": lambda stage: parented(stage, stage.first, target()),
+    "parent clear": lambda _: bpy.ops.object.parent_clear(type="CLEAR_KEEP_TRANSFORM"),
+    "align": lambda _: bpy.ops.object.align(align_mode="OPT_2", relative_to="OPT_3", align_axis={"X", "Z"}),
+    "duplicate": lambda _: bpy.ops.object.duplicate(),
+    "animation to deltas": lambda _: bpy.ops.object.anim_transforms_to_deltas(),
+}
+OF_BONES: dict[str, Command] = {
+    "Alt G": lambda _: bpy.ops.pose.loc_clear(),
+    "Alt R": lambda _: bpy.ops.pose.rot_clear(),
+    "Alt S": lambda _: bpy.ops.pose.scale_clear(),
+    "clear all": lambda _: bpy.ops.pose.transforms_clear(),
+    "pose copied and pasted": lambda stage: pasted(stage, flipped=False),
+    "pose pasted flipped": lambda stage: pasted(stage, flipped=True),
+    "pose of an Action": posed_by_action,
+    "clear what is not keyed": not_keyed,
+    "breakdowner": lambda _: bpy.ops.pose.breakdown(factor=0.3, prev_frame=1, next_frame=21),
+    "push": lambda _: bpy.ops.pose.push(factor=0.6, prev_frame=1, next_frame=21),
+    "relax": lambda _: bpy.ops.pose.relax(factor=0.6, prev_frame=1, next_frame=21),
+    "blend to neighbour": lambda _: bpy.ops.pose.blend_to_neighbor(factor=0.7, prev_frame=1, next_frame=21),
+    "blend with rest": lambda _: bpy.ops.pose.blend_with_rest(factor=0.4, prev_frame=1, next_frame=21),
+}
+CASES = [
+    (command, kind, order)
+    for kind, order in KINDS
+    for command in (*COMMANDS, *(OF_OBJECTS if kind == "OBJECT" else OF_BONES))
+    if not (("quaternion" in command and order != "QUATERNION") or ("angle" in command and order != "XYZ"))
+]
+
+
+def left_by(command: str, kind: str, order: str, auto: str, *, of_twins: bool) -> list[np.ndarray]:
+    """What a command leaves on the in-between: at once, after another frame was shown, and on the keys."""
+    is_on, only_needed = AUTO_KEYS[auto]
+    stage = set_stage(kind, order, "dq_sclerp", auto=is_on, of_twins=of_twins)
+    bpy.context.scene.tool_settings.use_keyframe_insert_auto = is_on
+    bpy.context.preferences.edit.use_auto_keyframe_insert_needed = only_needed
+    bpy.context.scene.cursor.location = CURSOR
+    with editor("VIEW_3D"):
+        (COMMANDS | (OF_OBJECTS if kind == "OBJECT" else OF_BONES))[command](stage)
+    result = [all_seen(), channels_seen(stage.carriers)]
+    go_to(AWAY)
+    for frame in (IN_BETWEEN, *map(int, KEYS)):
+        go_to(frame)
+        result += [all_seen(), channels_seen(stage.carriers)]
+    return result
+
+
+@pytest.mark.parametrize(("case", "auto"), in_turn(CASES, list(AUTO_KEYS)))
+def test_a_command_does_what_it_does_on_a_key(live_file, tmp_path, case, auto):
+    with own_clipboard(tmp_path):
+        shown, expected = (left_by(*case, auto, of_twins=of_twins) for of_twins in (False, True))
+    for when, (one, other) in enumerate(zip(shown, expected, strict=True)):
+        off = np.abs(one - other).max()
+        assert off < 1e-5 * max(1.0, np.abs(other).max()), f"off by {off} at {when}"
+
+
+def test_what_is_made_deltas_stays_where_it_is_seen(live_file):
+    """Until another frame is shown: then it is moved twice, in Blender, too."""
+    stage, before = set_stage("OBJECT", "XYZ", "dq_sclerp"), all_seen()
+    bpy.ops.object.transforms_to_deltas(mode="ALL")
+    np.testing.assert_allclose(all_seen(), before, atol=1e-5)
+    assert tuple(stage.first.location) == (0.0, 0.0, 0.0)
+
+
+# Keys that are copied from in-betweens or between transforms
+
+
+@pytest.mark.parametrize("kind", KINDS[3:], ids="-".join)
+def test_a_propagated_pose_is_the_one_that_is_seen(live_file, kind):
+    stage = set_stage(*kind, "dq_sclerp")
+    before = channels_seen(stage.carriers)
+    bpy.ops.pose.propagate(mode="NEXT_KEY")
+    go_to(int(KEYS[1]))
+    np.testing.assert_allclose(channels_seen(stage.carriers), before, atol=1e-5)
+
+
+def select(stage: Stage, number: int) -> None:
+    if stage.kind == "OBJECT":
+        select_only(stage.carriers[number])
+    else:
+        select_bones(stage.owner, stage.carriers[number].name)
+
+
+@pytest.mark.parametrize("later", [0, 60])
+@pytest.mark.parametrize("how", ["DOPESHEET_EDITOR", "GRAPH_EDITOR"])
+@pytest.mark.parametrize("modes", [("pga_lerp", "pga_lerp"), ("dq_sclerp", "BLENDER")], ids="-".join)
+@pytest.mark.parametrize("kind", KINDS, ids="-".join)
+def test_copied_keys_move_what_they_are_pasted_on_as_they_moved_the_first(live_file, kind, modes, how, later):
+    stage = set_stage(*kind, "BLENDER")
+    first, other = stage.carriers
+    for mode, frame in zip(modes, KEYS, strict=False):
+        set_mode(first, mode, [frame])
+    curves = curves_of(first).items()
+    expected = {name: [curve.evaluate(frame) for frame in QUARTERS] for name, curve in curves}
+    space = bpy.ops.action if how == "DOPESHEET_EDITOR" else bpy.ops.graph
+    with editor(how, "DOPESHEET" if how == "DOPESHEET_EDITOR" else "FCURVES") as shown:
+        shown.dopesheet.show_only_selected = True
+        select(stage, 0)
+        space.select_all(action="SELECT")
+        space.copy()
+        select(stage, 1)
+        go_to(int(KEYS[0]) + later)
+        bpy.ops.anim.channels_select_all(action="SELECT")
+        space.paste(offset="START", merge="OVER_ALL" if not later else "MIX")
+    for name, curve in curves_of(other).items():
+        shown = [curve.evaluate(frame) for frame in QUARTERS + later]
+        np.testing.assert_allclose(shown, expected.pop(name), atol=1e-5)
+    assert not expected
+    assert modes_of(other, np.array(KEYS[:2]) + later) == list(modes)
+    assert any(len(fcurve.modifiers) for fcurve in curves_of(other).values())
