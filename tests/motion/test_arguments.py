@@ -132,7 +132,7 @@ BROKEN.positions[7] = np.nan
     [
         (lambda: interpolate(TIMES, POSES, 0.5), r"of a single one make a list, \[time\]"),
         (lambda: interpolate(TIMES, POSES, [1.0, np.nan, 0.0]), "times"),
-        (lambda: interpolate(TIMES, POSES, TIMES, "bezier"), "no mode 'bezier'; the modes are lerp_slerp, "),
+        (lambda: interpolate(TIMES, POSES, TIMES, "slerp"), "no mode 'slerp'; the modes are lerp_slerp, "),
         (lambda: in_betweens([0.0], POSES[:1], [], []), "at least two keys"),
         (lambda: in_betweens([0.0, 1.0], POSES[:2], [1.0], [0.5]), "whole numbers from 0 on"),
         (lambda: interpolate_by_segments(TIMES, POSES, TIMES, "dq_sclerp"), "'dq_sclerp' is a single mode"),

@@ -45,4 +45,5 @@ def test_the_numbers_that_files_store_never_change():
         "cga_slerp": 6,
         "motor_spline": 7,
         "motor_spline_causal": 8,
+        "bezier": 0,
     }

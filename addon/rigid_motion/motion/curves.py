@@ -19,7 +19,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from .channel_curves import auto_clamped_slopes
 from .poses import LIMIT
+from .quaternions import components
 from .segments import SMALLEST_ANGLE, Basis, Curves, Rows, Segments
 from .trigonometry import fill_sine_and_cosine
 
@@ -40,6 +42,35 @@ def lerp_slerp(segments: Segments) -> Curves:
         return rows, _geometric_scales(s, parameters)
 
     return _curves(segments, (segments.centre, 0.5 * segments.chord), (segments.quarter_angle,), basis)
+
+
+def bezier(segments: Segments) -> Curves:
+    """Return Blender's own curves: each number by itself, with Auto Clamped handles, and quaternions made unit."""
+
+    def basis(s: np.ndarray, parameters: list[np.ndarray], _narrow: bool) -> Rows:
+        # Outside of its keys a curve of Blender's is constant.
+        powers = np.vander(np.clip(0.5 + 0.5 * s, 0.0, 1.0), 7, increasing=True).T
+        squared, scales = np.einsum("kn,kn->n", powers, parameters[:7]), None
+        if parameters[7:]:
+            # It stays between the keys, but for rounding.
+            scales = np.maximum(np.einsum("kn,kn->n", powers[:4], parameters[7:11]), parameters[11])
+        return np.concatenate((powers[:4] / np.sqrt(squared), powers[:4])), scales
+
+    keys, desired, durations = segments.keys, segments.desired, segments.durations
+    scales = () if keys.scales is None else (keys.scales[None],)
+    values = np.concatenate((components(keys.positions), components(keys.quaternions), *scales))
+    slopes, steps = auto_clamped_slopes(durations, values), np.diff(values)
+    leaving, arriving = slopes[..., :-1] * durations, slopes[..., 1:] * durations
+    cubics = np.stack(
+        (values[..., :-1], leaving, 3.0 * steps - 2.0 * leaving - arriving, leaving + arriving - 2.0 * steps), axis=1
+    )
+    cubics = cubics[..., desired].reshape(len(values), 4, -1)
+    turning = cubics[3:7]
+    squared = np.zeros((7, turning.shape[-1]))
+    for power in range(4):
+        squared[power : power + 4] += np.einsum("ks,kbs->bs", turning[:, power], turning)
+    least = () if segments.scales is None else (segments.scales.min(axis=0)[None],)
+    return Curves(turning, cubics[:3], np.concatenate((squared, *cubics[7:], *least)), basis)
 
 
 def screw(segments: Segments) -> Curves:

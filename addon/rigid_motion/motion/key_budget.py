@@ -11,6 +11,7 @@ square some more keys are put in, moved, and as many taken out.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from .key_costs import Recording
 from .key_links import joined_keys, traded_keys
 from .key_search import ROUNDS, SHORT, Keys, Search, spaced
 from .key_spread import moved_together, spread_keys
+from .modes import MODES, interpolate
 
 SPREAD = 5, 6
 """Candidates for each key of a budget, when its keys are first laid out anew.
@@ -68,8 +70,23 @@ def fewest_keys(recording: Recording, budget: int | None, tries: int, *, rms: bo
     if len(recording.times) <= 2:
         return np.arange(len(recording.times))
     if budget is None:
-        return Search(recording, rms=rms).within(tries)
+        keys = Search(recording, rms=rms).within(tries)
+        return _mended(recording, keys, rms=rms) if MODES[recording.mode].is_reference else keys
     return BudgetSearch(recording, budget, rms=rms).least(tries)
+
+
+def _mended(recording: Recording, keys: np.ndarray, *, rms: bool) -> np.ndarray:
+    """Return keys with more of them where keys that the search does not look at have the motion pass the tolerance."""
+    times, samples = recording.times, np.arange(len(recording.times))
+    while True:
+        shown = interpolate(times[keys], recording.poses[..., keys], times, recording.mode)
+        errors = recording.errors(samples, shown)
+        errors[keys] = 0.0  # Whatever is left there is rounding.
+        if (np.sqrt(np.square(errors).mean()) if rms else errors.max()) <= 1.0:
+            return keys
+        worst = np.array([first + int(np.argmax(errors[first:second])) for first, second in pairwise(keys.tolist())])
+        of_worst = errors[worst]
+        keys = np.union1d(keys, worst[of_worst > min(1.0, 0.9 * of_worst.max())])
 
 
 class BudgetSearch(Search):
@@ -189,7 +206,7 @@ class BudgetSearch(Search):
     def _moved_together(self, samples: np.ndarray, steps: slice) -> list[np.ndarray]:
         """As many keys as the budget, these among them, and what moving them together makes of them step by step."""
         result = [self.filled(self.measured(samples)).indices]
-        for ways, part in TOGETHER[self.reach][steps]:
+        for ways, part in TOGETHER[min(self.reach, 2)][steps]:
             result.append(moved_together(self.costs, result[-1], ways, part))
         return result
 

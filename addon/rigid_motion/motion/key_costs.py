@@ -195,7 +195,10 @@ def _at(numbers: np.ndarray, samples: np.ndarray) -> np.ndarray:
 
 
 def _with_ends(recording: Recording, rows: np.ndarray, reach: int) -> tuple[np.ndarray, Poses]:
-    """Return times (s, keys) and poses (..., s, keys) of samples; beyond them the motion of the ends goes on."""
+    """Return times (s, keys) and poses (..., s, keys) of samples; beyond them the motion of the ends goes on.
+
+    Blender's curves come to rest there.
+    """
     key_times, keys = recording.times[rows], recording.truth[rows]
     if rows.min() >= 0:
         return key_times, keys
@@ -210,5 +213,7 @@ def _with_ends(recording: Recording, rows: np.ndarray, reach: int) -> tuple[np.n
         here, inward = row[some], inwards[some]
         column = outermost[some] - step * inward
         key_times[here, column] = key_times[here, outermost[some]] - step * duration[some]
-        keys[..., here, column] = beyond(keys[..., here, column + inward], keys[..., here, column + 2 * inward])
+        last = keys[..., here, column + inward]
+        goes_on = not MODES[recording.mode].is_reference
+        keys[..., here, column] = beyond(last, keys[..., here, column + 2 * inward]) if goes_on else last
     return key_times, keys

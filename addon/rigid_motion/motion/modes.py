@@ -55,13 +55,17 @@ class Mode:
     """The same motion in that algebra, for single pairs of poses."""
 
     behind: int = 0
-    """How many keys before a segment influence it."""
+    """How many keys before a segment influence it; of `is_reference` those that a search for keys looks at."""
 
     ahead: int = 0
     """How many keys after a segment influence it: a stream has to wait for them."""
 
     for_streams: bool = False
     """Whether it uses no key after the segment's own. It is for streams alone: keyframes have better modes."""
+
+    is_reference: bool = False
+    """Whether it is what there is without any mode, to compare the modes with, and none for keyframes. Keys far away
+    influence a segment a little."""
 
     is_separable: bool = False
     """Whether neither rotation nor location depends on the other, so that each can have keys of its own."""
@@ -155,10 +159,23 @@ MODES: dict[str, Mode] = {
         behind=2,
         for_streams=True,
     ),
+    "bezier": Mode(
+        0,
+        "Blender's Curves",
+        "Every number by itself, with the handles that Blender gives new keys, Auto Clamped",
+        "Algebra: none, cubics of x, y, z and the four numbers of a quaternion",
+        curves.bezier,
+        vector_quaternion.bezier,
+        behind=3,
+        ahead=3,
+        is_reference=True,
+    ),
 }
 """Every mode, by the name that functions take it by."""
 
-KEYFRAME_MODES: dict[str, Mode] = {name: mode for name, mode in MODES.items() if not mode.for_streams}
+KEYFRAME_MODES: dict[str, Mode] = {
+    name: mode for name, mode in MODES.items() if not (mode.for_streams or mode.is_reference)
+}
 """The modes for keys that are all known from the beginning."""
 
 

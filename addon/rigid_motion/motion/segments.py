@@ -169,7 +169,7 @@ class Curves:
     """What a mode makes of S segments: quaternion = Q b(s) and position = P c(s), with b and c of the mode's choice."""
 
     quaternions: np.ndarray
-    """Q, shape (4, 2, S): b has two functions."""
+    """Q, shape (4, functions in b, S)."""
 
     positions: np.ndarray
     """P, shape (3, functions in c, S)."""
@@ -189,10 +189,10 @@ class Curves:
     @cached_property
     def matrices(self) -> np.ndarray:
         """P and Q of each segment in one matrix, shape (S, ROWS, functions in b and c)."""
-        functions, segments = self.positions.shape[1:]
-        matrices = np.zeros((segments, ROWS, 2 + functions))
-        matrices[:, :3, 2:] = self.positions.transpose(2, 0, 1)
-        matrices[:, 3:7, :2] = self.quaternions.transpose(2, 0, 1)
+        turning, (_, moving, segments) = self.quaternions.shape[1], self.positions.shape
+        matrices = np.zeros((segments, ROWS, turning + moving))
+        matrices[:, :3, turning:] = self.positions.transpose(2, 0, 1)
+        matrices[:, 3:7, :turning] = self.quaternions.transpose(2, 0, 1)
         return matrices
 
 
@@ -381,8 +381,9 @@ def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray
     """
     if not is_dense(counts):
         positions, quaternions = mode.positions[..., segment], mode.quaternions[..., segment]
-        np.einsum("kbn,bn->kn", np.repeat(positions, counts, axis=2), basis[2:], out=out[:3])
-        np.einsum("kbn,bn->kn", np.repeat(quaternions, counts, axis=2), basis[:2], out=out[3:7])
+        turning = mode.quaternions.shape[1]
+        np.einsum("kbn,bn->kn", np.repeat(positions, counts, axis=2), basis[turning:], out=out[:3])
+        np.einsum("kbn,bn->kn", np.repeat(quaternions, counts, axis=2), basis[:turning], out=out[3:7])
         return
     multiply_matrices(mode.matrices[segment], basis, counts, out)
 

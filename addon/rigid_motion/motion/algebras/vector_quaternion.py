@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..poses import Poses
-from ..quaternions import conjugate, multiply
+from ..quaternions import conjugate, multiply, normalise
 
 
 def lerp_slerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
@@ -13,6 +13,20 @@ def lerp_slerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
     u = np.asarray(u)[..., None]
     turned = multiply(first.quaternions, power(multiply(conjugate(first.quaternions), second.quaternions), u))
     return Poses((1.0 - u) * first.positions + u * second.positions, turned, geometric_scales(first, second, u[..., 0]))
+
+
+def bezier(first: Poses, second: Poses, u: np.ndarray) -> Poses:
+    """Each number by itself, eased in and out: what Blender makes of two keys alone."""
+    u = np.clip(np.asarray(u), 0.0, 1.0)
+    eased = (u * u * (3.0 - 2.0 * u))[..., None]
+    position, quaternion = (
+        (1.0 - eased) * a + eased * b
+        for a, b in ((first.positions, second.positions), (first.quaternions, second.quaternions))
+    )
+    scales = None
+    if first.scales is not None and second.scales is not None:
+        scales = (1.0 - eased[..., 0]) * first.scales + eased[..., 0] * second.scales
+    return Poses(position, normalise(quaternion), scales)
 
 
 def power(q: np.ndarray, u: np.ndarray) -> np.ndarray:

@@ -1,0 +1,80 @@
+"""`bezier` is what Blender makes of the same keys: evaluated by Blender itself, on recordings and random keys."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from bpy_extras import anim_utils
+
+from rigid_motion.motion import Poses, decimate, interpolate
+from rigid_motion.motion.quaternions import align_signs, normalise
+from rigid_motion_batch.places import ASSETS
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from tests.blank import blank
+from tests.recordings import RECORDINGS
+
+PATHS = {"location": 3, "rotation_quaternion": 4, "scale": 3}
+
+EVERY = 0.125
+"""Frames are looked at so far apart: in single precision they are what they are."""
+
+
+def shown_by_blender(frames: np.ndarray, keys: Poses, at: np.ndarray) -> Poses:
+    """Return the poses that Blender shows between keys as it inserts them by default."""
+    blank()
+    obj = bpy.data.objects.new("Tool", None)
+    obj.rotation_mode = "QUATERNION"
+    bpy.context.scene.collection.objects.link(obj)
+    scales = np.ones(len(frames)) if keys.scales is None else keys.scales
+    for frame, position, quaternion, scale in zip(frames, keys.positions, keys.quaternions, scales, strict=True):
+        obj.location, obj.rotation_quaternion, obj.scale = position, quaternion, [scale] * 3
+        for path in PATHS:
+            obj.keyframe_insert(path, frame=frame)
+    data = obj.animation_data
+    curves = anim_utils.action_get_channelbag_for_slot(data.action, data.action_slot).fcurves
+    values = [
+        np.array([[curves.find(path, index=index).evaluate(frame) for index in range(width)] for frame in at])
+        for path, width in PATHS.items()
+    ]
+    return Poses(values[0], normalise(values[1]), None if keys.scales is None else values[2][:, 0])
+
+
+def assert_same(frames: np.ndarray, keys: Poses) -> None:
+    at = np.arange(frames[0], frames[-1] + EVERY, EVERY)
+    expected, found = shown_by_blender(frames, keys, at), interpolate(frames, keys, at, "bezier")
+    size = max(1.0, np.abs(keys.positions).max())
+    assert np.abs(found.positions - expected.positions).max() < 1e-6 * size
+    assert np.abs(found.quaternions - expected.quaternions).max() < 1e-6
+    if keys.scales is not None:
+        assert np.abs(found.scales - expected.scales).max() < 1e-6 * keys.scales.max()
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_keys(seed):
+    random = np.random.default_rng(seed)
+    count = int(random.integers(2, 24))
+    # Handles are a third of the way, which single precision has to a part of a millionth of the frame.
+    frames = np.cumsum(random.integers(1, 9, count)).astype(float)
+    positions = random.normal(size=(count, 3)).round(1 if seed % 3 else 9)
+    quaternions = align_signs(normalise(random.normal(size=(count, 4))))
+    keys = Poses(np.float32(positions), np.float32(quaternions), np.float32(np.exp(random.normal(size=count))))
+    assert_same(frames, Poses(keys.positions, keys.quaternions, keys.scales if seed % 2 else None))
+
+
+def recordings() -> list[str]:
+    return sorted(map(str, [*ASSETS.glob("*.csv"), *RECORDINGS.glob("*.csv"), *RECORDINGS.glob("*.tum")]))
+
+
+@pytest.mark.parametrize("rate", [2.0, 5.0, 15.0])
+@pytest.mark.parametrize("path", recordings(), ids=lambda path: path.rsplit("/", 1)[-1])
+def test_recordings(path, rate):
+    clip = read_clips([path], "blender")[0][0]
+    times = 24.0 * (clip.times - clip.times[0])
+    kept = decimate(times, rate / 24.0)
+    # As Blender has keys: frames that single precision knows, apart from one another, and not so far that it rounds.
+    kept = kept[times[kept] < 250.0]
+    frames = np.round(times[kept] / EVERY) * EVERY
+    kept, frames = kept[np.diff(frames, prepend=-1.0) > 0.0], frames[np.diff(frames, prepend=-1.0) > 0.0]
+    poses = clip.in_metres(clip.poses)[kept]
+    assert_same(frames, Poses(np.float32(poses.positions), np.float32(align_signs(poses.quaternions))))
