@@ -79,7 +79,7 @@ def reduced(document: Document, options: Options) -> Report:
         def left_alone(reason: str, size: float = 0.0, clips: Sequence[ReducedClip] = ()) -> Report:
             return Report(size, options.tolerance or 0.0, tuple(clips), document, before, before, reason, earlier)
 
-        if reason := _unread(nodes, clips):
+        if reason := unread(nodes, clips):
             return left_alone(reason)
         seen = Seen.of(nodes, clips)
         size = size_of(nodes, seen, _moved(nodes, clips, PATHS), clips)
@@ -117,7 +117,7 @@ def reduced(document: Document, options: Options) -> Report:
     return Report(size, tolerance, tuple(result), changed, before, changed.size, "", earlier)
 
 
-def _unread(nodes: Nodes, clips: Sequence[Clip]) -> str:
+def unread(nodes: Nodes, clips: Sequence[Clip]) -> str:
     """Return why nothing of a document can be reduced, or an empty text."""
     if not any(clip.tracks for clip in clips):
         return "no animation moves a node"

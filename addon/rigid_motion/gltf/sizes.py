@@ -63,9 +63,10 @@ def shells_of(nodes: Nodes, moved: np.ndarray, size: float, tolerance: float) ->
     """
     if not size:
         return np.full(len(moved), tolerance / TURN)
-    return np.array([size if _shines(nodes.document.json["nodes"][node]) else SHELL * size for node in moved])
+    return np.array([size if shines(nodes.document.json["nodes"][node]) else SHELL * size for node in moved])
 
 
-def _shines(node: dict) -> bool:
+def shines(node: dict) -> bool:
+    """Whether a node is a camera or a light, which look along their own -z."""
     extensions = node.get("extensions")
     return "camera" in node or (isinstance(extensions, dict) and "KHR_lights_punctual" in extensions)

@@ -21,9 +21,10 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.command_line import listed
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, moments_of
+from .objects import LAST_FRAME, probe
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import ALL, Selection, Trajectory, TrajectoryError, shown
-from .rigs import LAST_FRAME, armature_of, in_blender, probe, whole_body
+from .rigs import armature_of, in_blender, whole_body
 from .sampling import LEAD, OF_OBJECTS, Moments, merged, sampled
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
 
 
 def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
-    from rigid_motion.animation import read_poses
+    from .world_poses import read_poses
 
     moments, metres = _moments(path, body, scenes)
     with probe() as obj:

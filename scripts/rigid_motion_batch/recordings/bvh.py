@@ -2,9 +2,9 @@
 
 Without a name it is the whole body. The poses of joints that are named are their world poses: a joint without any
 rotation has the world's axes. Positions are in the file's unit, which BVH does not tell; angles are degrees, applied in
-the order of the channels. Position channels replace the joint's offset, as Blender's importer has it. That importer
-itself is not used: it works in single precision, needs Blender, and a file that it cannot read ends in an IndexError
-or, unnoticed, in a wrong skeleton.
+the order of the channels. Position channels replace the joint's offset, as Blender's importer has it, but where they
+are plainly meant to be added to it. That importer itself is not used: it works in single precision, needs Blender, and
+a file that it cannot read ends in an IndexError or, unnoticed, in a wrong skeleton.
 Source: Meredith and Maddock, Motion capture file formats explained, Sheffield 2001.
 """
 
@@ -26,9 +26,13 @@ from .clips import ClipWarning
 from .euler import quaternions_from_intrinsic_eulers
 from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
 from .rest_bodies import RestBody
+from .sizing import LOOKED_AT, sized
 from .tables import is_number, lines_of, parse_rows
 
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
+
+AXES = "opengl"
+"""What its files have, as a rule: a name in `axes.AXES`."""
 
 MOST_JOINTS = 3000
 """Joints of a body, three times what the most detailed rigs have. With more, what follows takes minutes."""
@@ -38,6 +42,9 @@ DEEPEST = 500
 
 MOST_POSES = 50_000_000
 """Poses of all joints together: a file may hold any number of joints and frames in little space."""
+
+NEARER = 0.5
+"""Times its distance from the OFFSET that a position is from 0, where it is meant to be added to that."""
 
 LONGEST_NAME = 100
 """Words of a joint's name."""
@@ -72,14 +79,22 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     # What is not finite in the file is not in the poses either, and no news.
     with np.errstate(invalid="ignore", over="ignore"):
         times = np.arange(len(values)) * frame_time
-        if as_body:
-            body = Trajectory(
-                path.stem, times, _local_poses(joints, values, range(len(joints))), rest_body=rest_body_of(joints)
+        if count := _add_offsets(joints, values):
+            text = (
+                f"positions of {count} joint{'s' * (count > 1)} below the root are near 0 and not near their OFFSETs: "
             )
-            return [replace(body, warnings=warnings)]
+            text += "read as added to these, where Blender would put such joints into one another"
+            warnings += (ClipWarning(text),)
+        rest_body, every = rest_body_of(joints), range(len(joints))
+        if as_body:
+            local = _local_poses(joints, values, every)
+            return [Trajectory(path.stem, times, local, rest_body=rest_body, warnings=warnings)]
         poses = world_poses(joints, values, taken)
-    first, *others = (Trajectory(name, times, poses[name]) for name in taken)
-    return [replace(first, warnings=warnings), *others]
+        some = slice(LOOKED_AT)
+        body = Trajectory(path.stem, times[some], _local_poses(joints, values[some], every), rest_body=rest_body)
+        body = sized(path, replace(body, warnings=warnings), AXES, unit_given=False)
+    first, *others = (Trajectory(name, times, poses[name], body.metres_per_unit) for name in taken)
+    return [replace(first, remark=body.remark, warnings=body.warnings), *others]
 
 
 def rest_body_of(joints: list[Joint]) -> RestBody:
@@ -127,6 +142,32 @@ def world_poses(joints: list[Joint], values: np.ndarray, requested: Iterable[str
     skeleton = Skeleton([numbers.get(joints[index].parent, -1) for index in chain])
     world = skeleton.in_root_space(_local_poses(joints, values, chain))
     return {joint.name: world[numbers[index]] for index, joint in enumerate(joints) if joint.name in names}
+
+
+def _add_offsets(joints: list[Joint], values: np.ndarray) -> int:
+    """Add their OFFSETs to positions of joints below the root, in values (n, channels), where that is meant.
+
+    It is where they are nearer to 0 than to the OFFSET in most joints. Returns how many joints have such positions.
+    """
+    column, near = 0, []
+    places: list[tuple[int, float]] = []
+    for joint in joints:
+        own = [
+            (column + number, joint.offset["XYZ".index(axis)])
+            for number, (axis, kind) in enumerate(joint.channels)
+            if kind == "position" and joint.parent is not None
+        ]
+        column += len(joint.channels)
+        if any(offset for _, offset in own):
+            places += own
+            columns, offsets = [place for place, _ in own], np.array([offset for _, offset in own])
+            away = [np.median(np.abs(values[:, columns] - some), axis=0).sum() for some in (0.0, offsets)]
+            near.append(away[0] < NEARER * away[1])
+    if 2 * sum(near) <= len(near):
+        return 0
+    for place, offset in places:
+        values[:, place] += offset
+    return len(near)
 
 
 def _local_poses(joints: list[Joint], values: np.ndarray, chosen: Sequence[int]) -> Poses:
@@ -189,7 +230,7 @@ class _Words:
             words.append(word)
             if len(words) > LONGEST_NAME:
                 self.fail("a { is missing behind a name")
-        return "_".join(words)
+        return " ".join(words)
 
     def fail(self, problem: str, way_out: str = "export the BVH again") -> NoReturn:
         raise TrajectoryError(self.path, problem, way_out, self.line)

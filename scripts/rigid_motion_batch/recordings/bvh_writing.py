@@ -31,7 +31,7 @@ def write_bvh(file: TextIO, rest_body: RestBody, sliding: np.ndarray, times: np.
     def joint_lines(joint: int, depth: int) -> None:
         tab = "\t" * depth
         kind = "ROOT" if rest_body.parents[joint] < 0 else "JOINT"
-        name = "_".join(rest_body.joints[joint].split()) or "joint"
+        name = " ".join(rest_body.joints[joint].split()) or "joint"
         offset = " ".join(f"{number:.9g}" for number in places[joint])
         file.write(f"{tab}{kind} {name}\n{tab}{{\n{tab}\tOFFSET {offset}\n")
         channels = f"6 {PLACES} {TURNS}" if sliding[joint] else f"3 {TURNS}"

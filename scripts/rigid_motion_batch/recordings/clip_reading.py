@@ -23,7 +23,7 @@ from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .reading import format_of, read_trajectories, split_source
 from .recordings import Trajectory, TrajectoryError, shown
 from .rest_bodies import in_parents, repaired
-from .sense import breaks, calibration_pose
+from .sense import breaks, calibration_pose, losses
 
 LONGEST_NAME = 80
 """Characters of a clip's name: folders below folders have to fit what file systems allow."""
@@ -31,7 +31,7 @@ LONGEST_NAME = 80
 MOST_BYTES = 240
 """Bytes of a clip's name in UTF-8, in which some characters have four: file systems allow 255."""
 
-NOT_FOLDERS = {"metrics.csv", "metrics_joints.csv", "keys_needed.csv", "report.html", "manifest.json"}
+NOT_FOLDERS = {"metrics.csv", "metrics_joints.csv", "keys_needed.csv", "slip.csv", "report.html", "manifest.json"}
 """Names that the output needs itself."""
 
 DEVICES = {"con", "prn", "aux", "nul"} | {
@@ -129,6 +129,8 @@ def make_clip(
     times, poses = times[part], poses[..., part]
     if measured:
         warnings += breaks(times, poses, rest_body, metres, begin)
+        lost, repairs = losses(repairs, len(trajectory.times))
+        warnings += lost
     notes = (*map(str, warnings), *map(str, repairs), *map(printable, drawn))
     return Clip(
         name,

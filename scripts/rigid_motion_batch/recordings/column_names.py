@@ -2,7 +2,8 @@
 
 Loggers write `t`, `timestamp_ms` and `Time (s)`, `x`, `px`, `PosX`, `pos_x_cm` and `position.x`, `qw`, `rot_w` and
 `Rotation W`; with several bodies in a row `left_pos_x` and `LeftHand.position.x`. A name is cut into words, at dots,
-dashes, blanks and capitals; words with a meaning are taken away, and what is left is the body's name.
+dashes, blanks and capitals; words with a meaning are taken away, and what is left is the body's name. Numbers stand for
+axes where they end a name of such a kind: `q0`, `position[2]`, `m03`, `R_11`.
 """
 
 from __future__ import annotations
@@ -19,9 +20,9 @@ LONGEST_NAME = 100
 
 UNITS = {
     "s": "s sec secs second seconds",
-    "ms": "ms msec msecs milli millis millisecond milliseconds",
-    "us": "us usec usecs micro micros microsecond microseconds",
-    "ns": "ns nsec nsecs nano nanos nanosecond nanoseconds",
+    "ms": "ms msec msecs millisec milli millis millisecond milliseconds",
+    "us": "us usec usecs microsec micro micros microsecond microseconds",
+    "ns": "ns nsec nsecs nanosec nano nanos nanosecond nanoseconds",
     "m": "m meter meters metre metres",
     "cm": "cm centimeter centimeters centimetre centimetres",
     "mm": "mm millimeter millimeters millimetre millimetres",
@@ -45,10 +46,16 @@ KINDS = {
     "quaternion": "q quat quats quaternion",
     "rotation": "r rot rots rotation rotations ori orient orientation att attitude",
     "euler": "euler eulers angle angles rpy",
+    "matrix": "m mat matrix transform pose tf extrinsic extrinsics",
 }
 """Kinds of axes, and how each is written. A rotation is a quaternion where it has a w, and Euler angles otherwise."""
 
-KIND_OF = {word: kind for kind, words in KINDS.items() for word in words.split()}
+KIND_OF = {word: kind for kind, words in KINDS.items() if kind != "matrix" for word in words.split()}
+NUMBERED = KIND_OF | dict.fromkeys(KINDS["matrix"].split(), "matrix")
+"""Words that a number behind them makes an axis of. Before a letter those of matrices mean nothing."""
+
+LEADING = ("p", "q", "t")
+"""Letters that tell the kind where a name begins with them. An r is rather the right side."""
 
 TURNS = ("roll", "pitch", "yaw")
 """Euler angles that do not name their axis."""
@@ -57,11 +64,11 @@ _WORDS = {
     "time": "t ts time times timestamp timestamps stamp clock elapsed realtime datetime",
     "beside time": "since start startup begin beginning launch recording session game app unity unreal system sys host "
     "unix epoch utc posix absolute relative rel abs total sample capture log header field rosbag from of in at the "
-    "real level load unscaled scaled date iso",
+    "real level load unscaled scaled date iso tracking",
     "frames": "frame frames sample samples",
     "beside frames": "index idx number num no nr count counter id",
     "devices": "device tracker controller body object node joint bone hand side role name id",
-    "beside devices": "label serial xr tracked rigid game",
+    "beside devices": "label serial xr tracked rigid game uid uuid guid",
     "without meaning": "m local world global pose transform tf field data value component",
 }
 
@@ -92,6 +99,7 @@ WORD = re.compile(rf"{_UPPER}+(?={_UPPER}[a-z])|{_UPPER}?[a-z]+|{_UPPER}+|\d+|°
 BRACKETS = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
 TIME_WITH_UNIT = re.compile(r"^(t|time|timestamp)(sec|ms|us|ns)$")
 AXIS = re.compile(rf"({'|'.join(sorted(KIND_OF, key=len, reverse=True))})?([xyzw])(mm|cm|m)?")
+ENDS_WITH_AXIS = re.compile(rf"(?:^|[\W_])(?:{AXIS.pattern})$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -102,7 +110,8 @@ class ColumnName:
     """"time", "frame", "scale", "device", or one of `KINDS`."""
 
     axis: str = ""
-    """x, y, z, w, or one of `TURNS`; of a device the word for it; "date" of a time that is called so."""
+    """x, y, z, w, one of `TURNS`, or a number: "0", or "03" of a row and a column; of a device the word for it; "date"
+    of a time that is called so."""
 
     unit: str = ""
     """One of `UNITS`, or what stood in brackets; empty where nothing is said."""
@@ -141,14 +150,15 @@ def unit_in(text: str) -> str:
 
 
 def _without_brackets(text: str) -> tuple[str, str]:
-    """Return a name without the unit in brackets, and the unit. An axis in brackets stays."""
+    """Return a name without the unit in brackets, and the unit. An axis in brackets stays, and so does a number."""
     text, unit = text.strip().replace("\u00b5", "u").replace("\u03bc", "u"), ""
     for match in BRACKETS.finditer(text):
-        content = match[1].lower()
-        if content not in ("x", "y", "z", "w"):
+        content, before = match[1].lower(), text[: match.start()]
+        numbered = content.isdecimal() and re.search(r"[\w\]]$", before) and not ENDS_WITH_AXIS.search(before)
+        if content not in ("x", "y", "z", "w") and not numbered:
             # Of what has no unit one writes [], [1] or [-].
             unit = UNIT_OF.get(content, content.strip("-1"))
-            text = text[: match.start()] + " " * len(match[0]) + text[match.end() :]
+            text = before + " " * len(match[0]) + text[match.end() :]
     return text, unit
 
 
@@ -174,9 +184,11 @@ def _pose(words: list[str], unit: str, taken: set[int]) -> ColumnName | None:
             taken.add(place)
     axes = [place for place, word in enumerate(words) if place not in taken and (AXIS.fullmatch(word) or word in TURNS)]
     if not axes:
-        return None
+        return _numbered(words, unit, taken) if words[-1:] and words[-1].isdecimal() else None
     place = axes[-1]
     of_kinds = {other for other, word in enumerate(words) if len(word) > 1 and word in KIND_OF}
+    leading = place > 1 and not of_kinds and words[0] in LEADING  # p_RS_R_x, q_wo_w
+    of_kinds |= {0} if leading else set()
     taken |= of_kinds | {place}
     if words[place] in TURNS:
         return ColumnName("euler", words[place], unit)
@@ -184,11 +196,25 @@ def _pose(words: list[str], unit: str, taken: set[int]) -> ColumnName | None:
     fused, axis, fused_unit = cast("re.Match[str]", AXIS.fullmatch(words[place])).groups()
     if fused:
         kinds.add(KIND_OF[fused])
-    elif place and len(words[place - 1]) == 1 and words[place - 1] in KIND_OF:
+    elif place and not leading and len(words[place - 1]) == 1 and words[place - 1] in KIND_OF:
         kinds.add(KIND_OF[words[place - 1]])
         taken.add(place - 1)
     kind = next((kind for kind in ("quaternion", "euler", "rotation") if kind in kinds), "position")
     return None if axis == "w" and kind in ("position", "euler") else ColumnName(kind, axis, unit or fused_unit or "")
+
+
+def _numbered(words: list[str], unit: str, taken: set[int]) -> ColumnName | None:
+    """Return what a name says that ends with one number, or with those of a row and a column."""
+    first = len(words) - 2 if len(words[-1]) == 1 and words[-2:-1] and words[-2].isdecimal() else len(words) - 1
+    kinds = {place: NUMBERED[word] for place, word in enumerate(words[:first]) if word in NUMBERED}
+    axis = "".join(words[first:])
+    if not kinds or len(axis) > 2:
+        return None
+    taken |= {*kinds, *range(first, len(words))}
+    known = [
+        kind for place, kind in kinds.items() if kind != "matrix" and (len(words[place]) > 1 or place == first - 1)
+    ]
+    return ColumnName(known[-1] if known else NUMBERED[words[max(kinds)]], axis, unit)
 
 
 def _body(text: str, words: list[str], spans: list[tuple[int, int]], taken: set[int]) -> str:

@@ -6,8 +6,9 @@ of several, which another column names (`device`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from rigid_motion_batch.command_line import listed
 
@@ -19,6 +20,11 @@ from .tables import HeaderLine, is_number
 POSITION = ("x", "y", "z")
 QUATERNION = ("qx", "qy", "qz", "qw")
 EULER = ("rx", "ry", "rz")
+MATRIX = ("m00", "m01", "m02", "m10", "m11", "m12", "m20", "m21", "m22")
+BOTTOM = ("m30", "m31", "m32")
+"""The rest of a matrix of four rows: its translation, where it is transposed."""
+
+OPTIONAL = ("scale", *BOTTOM)
 
 KNOWN = "t, time, timestamp_ms; x, px, pos_x, position.x; qw, rot_w, rotation.w"
 """Text of an error on the names that are known."""
@@ -26,25 +32,33 @@ KNOWN = "t, time, timestamp_ms; x, px, pos_x, position.x; qw, rot_w, rotation.w"
 MOST_FOUND = 12
 """Columns that an error names."""
 
+MOST_REMARKS = 3
+"""Bodies that are named as left out."""
+
+NOT_POSES = {"v", "vel", "velocity", "linear", "angular", "acc", "accel", "acceleration", "gyro", "omega", "b", "bias"}
+"""What names of columns begin with that look like positions and are none."""
+
 
 @dataclass(frozen=True)
 class Layout:
     """Layout of a row: where everything is, as indices."""
 
-    time: int
-    time_unit: str
-    """The unit as the file or the user says it, which need not be one of `TICKS`; empty where neither does."""
+    times: tuple[int, ...]
+    """The columns that may be the time; none where the rows are counted."""
 
     bodies: Mapping[str, Mapping[str, int]]
-    """The columns of each body by name, empty where its columns have none in front: `POSITION`, then `QUATERNION` or
-    `EULER`, and maybe `scale`.
+    """The columns of each body by name, empty where its columns have none in front: `POSITION`, then `QUATERNION`,
+    `MATRIX` or `EULER`, maybe some of `OPTIONAL`, and t where it has a clock of its own.
     """
 
     units: Mapping[int, str]
-    """Units of the columns that tell theirs: a name in `column_names.METRES`, "deg" or "rad"."""
+    """Units of the columns that tell theirs: a name in `TICKS` or `column_names.METRES`, "deg", "rad", or unknown."""
 
     devices: tuple[int, ...] = ()
     """Columns that may tell whose the row is, the likeliest first."""
+
+    remark: str = ""
+    """What is left out, although it looks like a body, and what is guessed."""
 
 
 Found = dict[str, list[int]]
@@ -59,8 +73,7 @@ def layout_of(header: HeaderLine, options: ReadingOptions) -> Layout:
     TrajectoryError
         Where columns are missing, or more than one could be meant.
     """
-    cells = header.cells
-    names = [column_name(cell) for cell in cells]
+    cells, names = header.cells, names_of(header)
     explicit = _explicit(header, options)
     of_kind = {
         kind: [
@@ -69,19 +82,29 @@ def layout_of(header: HeaderLine, options: ReadingOptions) -> Layout:
         for kind in ("time", "frame", "device")
     }
     bodies = _bodies(names, set(explicit.values()))
-    needed = (*POSITION, *(EULER if options.euler else QUATERNION))
-    whole = {label: result for label, result in bodies.items() if {*result, *explicit} >= {*needed}}
+    rotations = (EULER,) if options.euler else (QUATERNION, MATRIX)
+    whole: dict[str, tuple[str, ...]] = {}
+    for label, result in bodies.items():
+        for rotation in rotations:
+            if {*result, *explicit} >= {*POSITION, *rotation}:
+                whole.setdefault(label, (*POSITION, *rotation))
+    needed = (*POSITION, *rotations[0])
     if explicit.keys() >= set(needed):
-        whole = {"": {}}
+        bodies, whole = {"": {}}, {"": needed}
+    for index, label, name in _own_clocks(header, names, whole):
+        bodies[label].setdefault("t", []).append(index)
+        names[index] = name
     # A date beside a count of seconds says the same again.
     axes = [name.axis if name else "" for name in names]
     times = [index for index in of_kind["time"] if axes[index] != "date"] or of_kind["time"]
     times = (options.frame_rate and of_kind["frame"]) or times
     times = [explicit["t"]] if "t" in explicit else times
-    if whole and of_kind["frame"] and not times:
-        problem = f"no column of time, only one that counts frames ({shown(cells[of_kind['frame'][0]])})"
+    timed = bool(times or options.frame_rate) or (bool(whole) and all("t" in bodies[label] for label in whole))
+    if whole and not timed and (of_kind["frame"] or header.names):
+        frames = [shown(cells[index]) for index in of_kind["frame"][:1]]
+        problem = f"no column of time, only one that counts frames ({frames[0]})" if frames else "poses without times"
         raise header.error(problem, "say how many frames a second it has: --frame-rate 90")
-    if not times or not whole:
+    if not timed or not whole:
         raise _missing(header, names, bodies, bool(times), needed, explicit)
 
     def only(meaning: str, indices: Sequence[int]) -> int:
@@ -92,15 +115,26 @@ def layout_of(header: HeaderLine, options: ReadingOptions) -> Layout:
         raise header.error(f"two columns mean {meaning} ({both})", way_out)
 
     where = {}
-    for label, result in whole.items():
-        columns = result | {meaning: [index] for meaning, index in explicit.items()}
-        where[label] = {item: only(item, columns[item]) for item in (*needed, "scale") if item in columns}
+    for label, meant in whole.items():
+        columns = bodies[label] | {meaning: [index] for meaning, index in explicit.items()}
+        where[label] = {item: only(item, columns[item]) for item in (*meant, *OPTIONAL, "t") if item in columns}
     units = {index: name.unit for index, name in enumerate(names) if name and name.unit}
     units |= {index: unit for index in explicit.values() if (unit := unit_in(cells[index]))}
-    time = only("t", times)
     devices = sorted(of_kind["device"], key=lambda index: DEVICES.index(axes[index]))
     devices = [explicit["device"]] if "device" in explicit else devices
-    return Layout(time, options.time_unit or units.get(time, ""), where, units, tuple(devices))
+    remarks = [text for label, result in bodies.items() if label not in whole and (text := _lacking(label, result))]
+    numbered = [columns["qw"] for columns in where.values() if "qw" in columns and axes[columns["qw"]].isdecimal()]
+    remarks += [f"{shown(cells[index])} is taken for w" for index in numbered[:1]]
+    return Layout(tuple(times), where, units, tuple(devices), "; ".join(remarks[-MOST_REMARKS:]))
+
+
+def names_of(header: HeaderLine) -> list[ColumnName | None]:
+    """Return what the names of a header say, a body's name always in the same case."""
+    if header.names is not None:
+        return list(header.names)
+    labels: dict[str, str] = {}
+    names = [column_name(cell) for cell in header.cells]
+    return [name and replace(name, body=labels.setdefault(name.body.lower(), name.body)) for name in names]
 
 
 def _explicit(header: HeaderLine, options: ReadingOptions) -> dict[str, int]:
@@ -117,25 +151,93 @@ def _explicit(header: HeaderLine, options: ReadingOptions) -> dict[str, int]:
 
 
 def _bodies(names: Sequence[ColumnName | None], explicit: set[int]) -> dict[str, Found]:
-    """Return the columns of positions, rotations and scales, by the name of the body in front, whatever its case."""
+    """Return the columns of positions, rotations and scales, by the name of the body in front."""
     bodies: dict[str, Found] = {"": {}}
-    labels: dict[str, str] = {"": ""}
-    with_w = {name.body.lower() for name in names if name and name.kind == "rotation" and name.axis == "w"}
+    numbered: dict[tuple[str, str], Found] = {}
+    with_w = {name.body for name in names if name and name.kind == "rotation" and name.axis == "w"}
     for index, name in enumerate(names):
         if name is None or name.kind in ("time", "frame", "device") or index in explicit:
             continue
-        body = name.body.lower()
+        found = bodies.setdefault(name.body, {})
+        if name.axis.isdecimal():
+            numbered.setdefault((name.body, name.kind), {}).setdefault(name.axis, []).append(index)
+            continue
         if name.kind == "scale" or name.kind == "position" or name.axis in TURNS:
             meaning = name.axis or "scale"
         else:
-            meaning = f"{'q' if name.kind == 'quaternion' or body in with_w else 'r'}{name.axis}"
-        bodies.setdefault(labels.setdefault(body, name.body), {}).setdefault(meaning, []).append(index)
+            meaning = f"{'q' if name.kind == 'quaternion' or name.body in with_w else 'r'}{name.axis}"
+        found.setdefault(meaning, []).append(index)
+    for (body, kind), found in numbered.items():
+        for meaning, axis in _numbered(kind, [*found]):
+            bodies[body].setdefault(meaning, []).extend(found[axis])
+    _join_halves(bodies, names)
     return bodies
+
+
+def _numbered(kind: str, axes: list[str]) -> Iterator[tuple[str, str]]:
+    """Yield what numbers in the place of axes mean, if they are as many as there have to be, and the numbers."""
+    numbers = sorted(map(int, axes))
+    count, base = len(axes), numbers[0]
+    if count >= len(MATRIX) and all(len(axis) == 2 for axis in axes):
+        places = [(int(axis[0]) - base // 10, int(axis[1]) - base // 10) for axis in axes]
+    elif count in (9, 12, 16) and numbers == list(range(count)):
+        places = [divmod(int(axis), 3 if count == 9 else 4) for axis in axes]
+    elif (
+        numbers == list(range(base, base + count))
+        and base < 2
+        and (count, kind == "position") in ((3, True), (4, False))
+    ):
+        # q0 to q3 have w in front, as in flight, and q1 to q4 behind, as in space.
+        order = "xyz" if count == 3 else "wxyz" if kind == "quaternion" and base == 0 else "xyzw"
+        yield from (("q" * (count == 4) + order[int(axis) - base], axis) for axis in axes)
+        return
+    else:
+        return
+    for axis, (row, column) in zip(axes, places, strict=True):
+        if column < 3 and row < 4:
+            yield f"m{row}{column}", axis
+        elif column == 3 and row < 3:
+            yield "xyz"[row], axis
+
+
+def _join_halves(bodies: dict[str, Found], names: Sequence[ColumnName | None]) -> None:
+    """Make one body of a position and a rotation that are between other frames, as in p_RS_R_x and q_RS_w."""
+    units = {index: name.unit for index, name in enumerate(names) if name}
+    halves: dict[bool, list[str]] = {True: [], False: []}
+    for label, found in bodies.items():
+        turned = any({*rotation} <= {*found} for rotation in (QUATERNION, MATRIX))
+        placed = {*POSITION} <= {*found} and all(units[found[axis][0]] in ("", *METRES) for axis in POSITION)
+        if turned != placed and re.split(r"[\W_]", label.lower())[0] not in NOT_POSES:
+            halves[turned].append(label)
+    if len(halves[True]) == len(halves[False]) == 1 and not bodies[""]:
+        turned_label, placed_label = halves[True][0], halves[False][0]
+        if placed_label.startswith(turned_label) or turned_label.startswith(placed_label):
+            bodies[""] = bodies.pop(placed_label) | bodies.pop(turned_label)
+
+
+def _own_clocks(
+    header: HeaderLine, names: Sequence[ColumnName | None], labels: Mapping[str, object]
+) -> Iterator[tuple[int, str, ColumnName]]:
+    """Yield the columns whose names say a time once a body's name is taken away."""
+    for index, cell in enumerate(header.cells):
+        for label in labels if names[index] is None and header.names is None else ():
+            rest = re.sub(rf"(^|[\W_]){re.escape(label)}([\W_]|$)", " ", cell, flags=re.IGNORECASE) if label else cell
+            if rest != cell and (name := column_name(rest)) and name.kind == "time":
+                yield index, label, name
 
 
 def known_in(header: HeaderLine) -> int:
     """Return how many columns mean something: of the lines that could be the header, the one with the most is taken."""
-    return sum(column_name(cell) is not None for cell in header.cells)
+    return sum(name is not None for name in names_of(header))
+
+
+def _lacking(label: str, found: Found) -> str:
+    """Return what a body lacks that has most of what it needs; empty for what need not be one."""
+    least = min(({*POSITION, *rotation} - {*found} for rotation in (QUATERNION, EULER)), key=len)
+    if len(least) > 2 or not label:
+        return ""
+    lacks = f"it has no column {', '.join(sorted(least))}" if least else "its rotations are Euler angles, for --euler"
+    return f"{shown(label)} is left out, as {lacks}"
 
 
 def _missing(
@@ -149,13 +251,13 @@ def _missing(
     """Return what is missing to a header of which no body is whole: of the body that lacks the least."""
     cells = header.cells
     label, nearest = max(bodies.items(), key=lambda body: sum(item in body[1] for item in needed))
-    if not nearest.keys() >= set(POSITION):
+    if not nearest.keys() >= set(POSITION) and header.names is None:
         # Something by chance ends like an axis.
         label, nearest = "", bodies[""]
     missing = [item for item in ("t", *needed) if item not in explicit and item not in nearest]
     if timed:
         missing.remove("t")
-    turns = {*QUATERNION, *EULER, *TURNS}
+    turns = {*QUATERNION, *EULER, *TURNS, *MATRIX}
     positions_only = not any(turns & body.keys() for body in bodies.values()) and turns.isdisjoint(explicit)
     if timed and positions_only and set(missing) == set(needed) - set(POSITION):
         problem = f"positions only, and rotations are needed (found {columns_found(cells)})"
@@ -166,7 +268,7 @@ def _missing(
         shown_angles = ", ".join(cells[nearest[angle][0]] for angle in angles[:3])
         return header.error(
             f"rotations are Euler angles here ({shown_angles}), and their order is not said",
-            "say it: --euler ORDER, with --degrees if they are (Unity: --euler YXZ --degrees; docs/csv.md has others)",
+            "say it: --euler ORDER, with --degrees if they are (Unity: --euler YXZ --degrees; Nuke: zxy; docs/csv.md)",
         )
     if set(EULER) & set(missing) and set(TURNS) & set(angles):
         return header.error(
@@ -174,7 +276,7 @@ def _missing(
             "say which is which: --columns rx=roll,ry=pitch,rz=yaw in ROS, rx=pitch,ry=yaw,rz=roll in Unity",
         )
     others = ",".join(f"{item}=NAME" for item in missing[:3]) + ",..." * (len(missing) > 3)
-    way_out = f"known are {KNOWN}; or --columns {others}"
+    way_out = header.advice or f"known are {KNOWN}; or --columns {others}"
     if not any(names) and not explicit:
         problem = f"no column has a known name (found {columns_found(cells)})"
         if all(map(is_number, cells)):

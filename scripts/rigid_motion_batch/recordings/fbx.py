@@ -18,9 +18,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from .importing import read_imported, refuse_too_large
+from .importing import read_imported
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError
+from .scene_bodies import refuse_too_large
 from .tables import LARGEST_FILE
 
 if TYPE_CHECKING:
@@ -72,6 +73,9 @@ MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
 FIRST = len(MAGIC) + 4
 """Byte where the records begin, behind the version."""
 
+OLDEST = 7100
+"""Version that Blender's importer takes, and later ones."""
+
 SINCE_WIDE = 7500
 """Version since which places and numbers have 8 bytes each, and not 4."""
 
@@ -108,6 +112,9 @@ class _Records:
     def __init__(self, path: Path, content: mmap.mmap) -> None:
         self.path, self.content = path, content
         (version,) = struct.unpack_from("<I", content, len(MAGIC))
+        if version < OLDEST:
+            problem = f"this is FBX {version / 1000:.1f}, and Blender imports {OLDEST / 1000:.1f} and later"
+            raise TrajectoryError(path, problem, "export it as FBX 2011 or later")
         self.head = struct.Struct("<QQQB" if version >= SINCE_WIDE else "<IIIB")
         self.unpacked = 0
 

@@ -1,256 +1,284 @@
-"""glTF and GLB files by Blender's own importer: the whole skeleton as Blender shows it.
+"""glTF files as their specification has them: whole bodies, and what else moves, such as a prop or a camera.
 
-The importer gets a copy of what makes a skeleton and its skin, in a folder that is gone afterwards: no images, nor
-what extensions and extras say, and buffers only from the folder of the file. Key times are seconds; a skeleton is
-sampled as often as the keys of its densest track come, or 60 times a second where they tell no rate.
-
-The importer knows neither tangents nor even turns: it takes cubic splines without their tangents, and turns on straight
-lines of quaternions. So splines become so many keys with straight lines between them, and wide turns narrower ones, as
-the specification has them (appendix C).
+Places and axes are those that Blender's importer gives, without it: z is up, a joint has the axes of its node, and the
+axes of an object are turned as the world's are. Times begin with 0 on the first key.
 Source: the glTF 2.0 specification, Khronos 2021.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
-from rigid_motion.gltf.accessors import GrowingView, numbers
-from rigid_motion.gltf.documents import Document, FileBytes, GltfError, Json, damage_refused, objects, read_document
-from rigid_motion.gltf.nodes import Nodes
-from rigid_motion.gltf.tracks import CUBICSPLINE, LINEAR, ROTATION, STEP, TRANSLATION, WIDTHS, Track
-from rigid_motion.motion.quaternions import normalise
-from rigid_motion.motion.repair import LARGEST
+from rigid_motion.gltf.documents import FileBytes, GltfError, Json, damage_refused, entry, objects, read_document
+from rigid_motion.gltf.files import unread
+from rigid_motion.gltf.meshopt import decompressed
+from rigid_motion.gltf.nodes import Nodes, steadied
+from rigid_motion.gltf.sizes import joints_of, shines
+from rigid_motion.gltf.tracks import LINEAR, STEP, WIDTHS, Clip, Track, Tracks, read_clips
+from rigid_motion.motion import Poses
+from rigid_motion.motion.affine import AffineMaps
+from rigid_motion.motion.poses import joined
+from rigid_motion_batch.axes import AXES
+from rigid_motion_batch.command_line import listed
 
-from .bvh import MOST_JOINTS, MOST_POSES
-from .importing import read_imported, refuse_too_large
+from .bvh import MOST_JOINTS
+from .gltf_skins import skin_of
+from .key_moments import NOISE
+from .matrices import filled, rigid_of, scales_of
 from .options import AS_THE_FILE_SAYS, ReadingOptions
-from .recordings import Selection, Trajectory, TrajectoryError
+from .recordings import Selection, Trajectory, TrajectoryError, unique
+from .rest_bodies import RestBody, likely_metres, tails_of
+from .sampling import (
+    LEAD,
+    OF_JOINTS,
+    OF_OBJECTS,
+    Moments,
+    moments_between,
+    on_frames,
+    rate_of,
+    refuse_too_many,
+    sampled,
+)
+from .scene_bodies import LISTED, SceneBodies, parents_among, parents_first, refuse_too_large, with_above
 
 ENDINGS = (".glb", ".gltf", ".vrm", ".vrma")
 """Of glTF files: avatars and animations for them, VRM and VRMA, are GLB files."""
 
-ADDON = "io_scene_gltf2"
-
 WITHOUT_A_RATE = 60.0
-"""Frames a second where keys come too seldom or too often to tell."""
+"""Samples a second where keys come too seldom or too often to tell."""
 
-FPS = 120
-"""Frames a second of the scene: keys at 24, 30 or 60 a second are on whole frames of it."""
+FPS = 120.0
+"""Moments are counted in frames of so many a second: keys at 24, 30 or 60 a second are on whole ones."""
 
-PARTS = {
-    *("asset", "scene", "scenes", "nodes", "meshes", "skins", "animations", "accessors", "bufferViews", "buffers"),
-    *("extensionsUsed", "extensionsRequired"),
-}
-"""Parts of a document that make a skeleton that moves, and its skin."""
+CUT = 1e-6
+"""Frames from one key to another at the same time."""
 
-COMPRESSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_draco_mesh_compression")
-"""Extensions without which the numbers cannot be read."""
+MOST_NODES = 100_000
+"""Nodes of a file, also those that are no joints."""
 
-MOST_NODES = 10_000
-"""Nodes of a file, also those that are no joints: Blender takes seconds, four times as long for twice as many."""
+AT_ONCE = 2**16
+"""Poses of nodes that are worked out at once."""
 
-MOST_CHANNELS = 100_000
-"""Channels of all takes together: each becomes up to four F-curves."""
+HUMANOID = "VRMC_vrm_animation"
+"""The extension of a VRMA that names the joints of a body."""
+
+TO_BLENDER = AXES["opengl"]
 
 
 def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Trajectory]:
-    """Read the whole skeleton; or bones that are named, or all."""
+    """Read the largest whole body, or else the first object that moves; or what is named, or all."""
     refuse_too_large(path)
     try:
         document = read_document(path)
-        beside = {buffer.path for buffer in document.buffers if isinstance(buffer, FileBytes)} - {path}
-        refuse_too_large(path, *beside)
-        _refuse_too_many(path, document.json)
+        refuse_too_large(path, *{buffer.path for buffer in document.buffers if isinstance(buffer, FileBytes)} - {path})
         with damage_refused():
-            Nodes(document)  # Refuses those that hang on themselves, or too many on one another.
-        parts = {name: _stripped(part) for name, part in document.json.items() if name in PARTS}
-        copy, made = straightened(replace(document, json=parts))
-        name = f"copy{'.gltf' if copy.chunks is None else '.glb'}"
-        # Buffers in files of their own are written beside the copy.
-        files = replace(copy, changed=frozenset(range(len(copy.buffers)))).files(name)
+            if (count := len(objects(document.json, "nodes"))) > MOST_NODES:
+                problem = f"{count} nodes are more than the {MOST_NODES} that are read"
+                raise GltfError(problem, "export the body without the rest of its scene")
+            document = decompressed(document)
+            scene = _Scene(path, Nodes(document), read_clips(document), options.scale)
+            bodies = scene.bodies
+        return bodies.read(selection, scene)
     except GltfError as error:
         raise TrajectoryError(path, error.problem, error.way_out) from None
-    with TemporaryDirectory(prefix="rigid_motion_") as folder:
-        for file, content in files.items():
-            (Path(folder) / file).write_bytes(content)
-        importer = Path(folder) / name
-        how: dict[str, Any] = {"fps": FPS, "usual": WITHOUT_A_RATE, "made": made * FPS}
-        return read_imported(path, selection, lambda: _import(importer), ADDON, options.scale, **how)
 
 
-def _refuse_too_many(path: Path, json: Json) -> None:
-    """Raise TrajectoryError for more than Blender's importer is done with in seconds: nodes, joints or channels.
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """Nodes of a document, and what moves them."""
 
-    And for more numbers than are read: what no buffer holds is zeros, and may be any number.
-    """
-    nodes, skins, animations, accessors = (
-        objects(json, name) for name in ("nodes", "skins", "animations", "accessors")
-    )
-    counts = (accessor.get("count") for accessor in accessors)
-    numbers = sum(count for count in counts if isinstance(count, int) and count > 0)
-    joints = max((len(joints) for skin in skins if isinstance(joints := skin.get("joints"), list)), default=0)
-    channels = sum(len(objects(animation, "channels")) for animation in animations)
-    fewer = "export the skeleton alone, without the rest of its scene"
-    without = "export the skeleton without its meshes, or split the recording"
-    for count, most, kind, way_out in (
-        (numbers, MOST_POSES, "numbers, vectors and matrices", without),
-        (len(nodes), MOST_NODES, "nodes", fewer),
-        (joints, MOST_JOINTS, "joints of a skin", "export one body at a time"),
-        (channels, MOST_CHANNELS, "animated channels", "export fewer takes"),
-    ):
-        if count > most:
-            raise TrajectoryError(path, f"{count} {kind} are more than the {most} that are read", way_out)
+    path: Path
+    nodes: Nodes
+    clips: tuple[Clip, ...]
+    scale: float | None
+    """The length of the unit in metres, if the user says so."""
 
+    @cached_property
+    def names(self) -> list[str]:
+        names = [node.get("name") for node in self._described]
+        return unique([name if isinstance(name, str) and name else f"Node_{node}" for node, name in enumerate(names)])
 
-def _stripped(part: Any) -> Any:
-    """Return a part of the document without materials, extras, and extensions that do more than compress."""
-    if isinstance(part, list):
-        return [_stripped(item) for item in part]
-    if not isinstance(part, dict):
-        return part
-    kept = {name: _stripped(below) for name, below in part.items() if name not in ("extensions", "extras", "material")}
-    extensions = part.get("extensions")
-    if isinstance(extensions, dict) and (
-        known := {name: extensions[name] for name in COMPRESSIONS if name in extensions}
-    ):
-        kept["extensions"] = known
-    return kept
+    @property
+    def _described(self) -> list[Json]:
+        return objects(self.nodes.document.json, "nodes")
 
+    @cached_property
+    def _unread(self) -> str:
+        return unread(self.nodes, self.clips)
 
-def _import(copy: Path) -> None:
-    import bpy
+    def _marked(self, chosen: Iterable[int]) -> np.ndarray:
+        """Return which nodes these are, shape (nodes,)."""
+        result = np.zeros(len(self.nodes.parents), dtype=bool)
+        result[list(chosen)] = True
+        return result
 
-    bpy.ops.import_scene.gltf(
-        filepath=str(copy),
-        import_pack_images=False,
-        import_shading="SMOOTH",
-        disable_bone_shape=True,
-        import_scene_extras=False,
-        import_select_created_objects=False,
-    )
+    # -- bodies -------------------------------------------------------------------------------------------------------
 
+    @cached_property
+    def bodies(self) -> SceneBodies:
+        keyed = self._marked(track.node for clip in self.clips for track in _placing(clip))
+        human = self._marked(self._human() if keyed.any() else ())
+        moves = self._marked(track.node for clip in self.clips for track in _placing(clip) if not track.is_constant)
+        # A mesh with a skin is where its joints are.
+        aside = [number for number, node in enumerate(self._described) if "skin" in node]
+        parents = self.nodes.parents
+        return SceneBodies.of(self.path, self.names, parents, moves | human, keyed | human, self._skeletons(), aside)
 
-WIDEST = np.radians(25.0)
-"""Widest turn from key to key that gets no keys between: a line of quaternions is then off by 0.3 milliradians."""
+    def _human(self) -> list[int]:
+        """Return the joints that a VRMA names."""
+        extension = self.nodes.document.json.get("extensions", {}).get(HUMANOID, {})
+        joints = [bone["node"] for bone in extension.get("humanoid", {}).get("humanBones", {}).values()]
+        return [joint for joint in joints if entry(self.nodes.document.json, "nodes", joint) is not None]
 
-OF_A_BONE = 1e-3
-"""Part of the length of a usual bone that lines may be off from a spline of places."""
+    def _skeletons(self) -> dict[str, list[int]]:
+        """Return the joints of skins, and all between them and what carries them, by its name."""
+        bones: set[int] = set()
+        skins = [skin["joints"] for skin in objects(self.nodes.document.json, "skins")]
+        if (most := max(map(len, skins), default=0)) > MOST_JOINTS:
+            problem = f"{most} joints of a skin are more than the {MOST_JOINTS} that are read"
+            raise GltfError(problem, "export one body at a time")
+        parents = self.nodes.parents
+        for joints in {tuple(joints): list(joints) for joints in joints_of(self.nodes.document)}.values():
+            line = with_above(parents, joints)
+            carried = np.zeros(len(parents) + 1, dtype=np.int64)
+            carried[joints] = 1
+            every = np.sum(carried)
+            for node in reversed(line):
+                carried[parents[node]] += carried[node]
+            bones.update(joints, [node for node in line if carried[node] < every])
+        carriers, result = parents.copy(), dict[int, list[int]]()
+        for node in parents_first(parents):
+            if node in bones:
+                if carriers[node] in bones:
+                    carriers[node] = carriers[carriers[node]]
+                result.setdefault(int(carriers[node]), []).append(node)
+        names = unique([self.names[carrier] if carrier >= 0 else "Armature" for carrier in result])
+        return dict(zip(names, result.values(), strict=True))
 
-OF_A_TURN = 2.5e-4
-"""Distance that lines may be off from a spline of quaternions or scales."""
+    # -- motions ------------------------------------------------------------------------------------------------------
 
-MOST_PARTS = 64
-"""Parts of a segment of a spline."""
-
-MOST_KEYS = 200_000
-"""Keys of a track that is made; one with more is left to Blender."""
-
-DAMAGED = (KeyError, IndexError, TypeError, ValueError, AttributeError, ArithmeticError)
-"""Errors that damaged files lead to: Blender's importer says what is wrong with them."""
-
-
-def straightened(document: Document) -> tuple[Document, np.ndarray]:
-    """Have all tracks of a document run straight; what is new is in one more buffer.
-
-    Parameters
-    ----------
-    document : Document
-        Its JSON is changed.
-
-    Returns
-    -------
-    document : Document
-    times : array, shape (n,)
-        Seconds at which there are keys now, and no track had one before.
-    """
-    json, length = document.json, _usual_length(document.json)
-    known, made = [np.empty(0)], [np.empty(0)]
-    try:
-        view = GrowingView(json)
-    except DAMAGED:
-        return document, made[0]
-    for animation in objects(json, "animations"):
+    def whole(self, name: str, own: Sequence[int], remark: str) -> Trajectory:
+        parents, rest, skin, problem = parents_among(self.nodes.parents, own), self._resting(own), None, ""
         try:
-            channels = [channel for channel in animation["channels"] if channel["target"]]
-            turns = {(channel["target"]["path"], channel["sampler"]) for channel in channels}
-            samplers = animation["samplers"]
-        except DAMAGED:
-            continue
-        for path, number in turns:
-            try:
-                track = _track(document, samplers[number], path)
-                known.append(track.times)
-                with np.errstate(all="raise", under="ignore"):
-                    straight = _straight(track, length)
-                if straight is not track and len(straight.times) <= MOST_KEYS:
-                    made.append(straight.times)
-                    parts = (straight.times[:, None], True), (straight.values, False)
-                    times, values = (view.add(part.astype("<f4"), bounds=bounds) for part, bounds in parts)
-                    samplers[number] = {"input": times, "output": values, "interpolation": LINEAR}
-            except DAMAGED:
-                continue
-    if not view.data:
-        json["bufferViews"].pop()
-        return document, made[0]
-    view.json |= {"buffer": len(document.buffers), "byteLength": len(view.data)}
-    json["buffers"].append({"byteLength": len(view.data), "uri": "made.bin"})
-    before, moments = (np.concatenate(some).astype(np.float32) for some in (known, made))
-    result = replace(document, buffers=(*document.buffers, bytes(view.data)))
-    return result, np.setdiff1d(moments, before).astype(np.float64)
+            with damage_refused():
+                skin = skin_of(self.nodes, own, TO_BLENDER)
+        except GltfError as error:
+            problem = f"without its skin: {error.problem}"
+        rest_body = RestBody(tuple(self.names[node] for node in own), parents, rest, tails_of(rest, parents), skin)
+        metres, played = self.scale or likely_metres(parents, rest.positions), self._played(own, own)
+        seen = sampled(played.moments, played, parents, OF_JOINTS, metres)
+        remarks = filter(None, (remark, problem, played.remark))
+        return seen.as_body(name, played.moments, metres, rest_body, remark="; ".join(remarks))
+
+    def joints(self, chosen: Sequence[int], own: Sequence[int]) -> list[Trajectory]:
+        metres = self.scale or likely_metres(parents_among(self.nodes.parents, own), self._resting(own).positions)
+        played = self._played(chosen, own)
+        seen = sampled(played.moments, played, np.full(len(chosen), -1), OF_JOINTS, metres)
+        return seen.as_singles([self.names[node] for node in chosen], played.moments, metres, played.remark)
+
+    def alone(self, node: int) -> Trajectory:
+        looks = shines(self._described[node])
+        played = self._played([node], [node], turn=np.eye(3) if looks else TO_BLENDER.T)
+        seen = sampled(played.moments, played, np.array([-1]), OF_OBJECTS, self.scale or 1.0)
+        return seen.as_singles([self.names[node]], played.moments, self.scale or 1.0, played.remark)[0]
+
+    def _resting(self, own: Sequence[int]) -> Poses:
+        return filled(_poses(self.nodes.resting[list(own), None]))[:, 0]
+
+    def _played(self, chosen: Sequence[int], own: Sequence[int], turn: np.ndarray | None = None) -> _Played:
+        """Return how nodes are moved that belong to a body: of takes that move the same nodes by the first."""
+        line = with_above(self.nodes.parents, own)
+        marks, taken, left, busy = self._marked(line), [], [], set[int]()
+        for clip in self.clips:
+            moved = {track.node for track in _placing(clip) if marks[track.node]}
+            if moved and moved.isdisjoint(busy):
+                busy |= moved
+                taken.append(clip)
+            elif moved:
+                left.append(clip.name)
+        tracks = [_on_frames(track) for clip in taken for track in _placing(clip) if marks[track.node]]
+        # What does not move is looked at for as long as everything else does.
+        timing = tracks or [_on_frames(track) for clip in self.clips for track in _placing(clip)]
+        moments = _moments(self.path, len(chosen), timing)
+        names = listed([clip.name for clip in taken], LISTED)
+        takes = f"took its take {names}; others: {listed(left, LISTED)}" if left else ""
+        remark = "; ".join(filter(None, (takes, self._unread)))
+        needed = with_above(self.nodes.parents, chosen)
+        rows = {node: row for row, node in enumerate(needed)}
+        return _Played(
+            self.nodes,
+            np.array(needed),
+            [rows[node] for node in chosen],
+            steadied(tuple(tracks)),
+            moments,
+            remark,
+            turn,
+        )
 
 
-def _track(document: Document, sampler: Json, path: str) -> Track:
-    """Return what a sampler does; quaternions are x, y, z, w, as in the file. Raises ValueError for what is none."""
-    kind, times = sampler.get("interpolation", LINEAR), numbers(document, sampler["input"])[:, 0]
-    shape = (len(times), 3, WIDTHS[path]) if kind == CUBICSPLINE else (len(times), WIDTHS[path])
-    return Track(0, 0, path, kind, times, numbers(document, sampler["output"]).reshape(shape))
+def _placing(clip: Clip) -> Iterator[Track]:
+    """Yield what moves, turns or scales nodes."""
+    return (track for track in clip.all_tracks if track.path in WIDTHS)
 
 
-def _straight(track: Track, length: float) -> Track:
-    """Return a track between whose keys lines are right, which may be the same; bones are of a usual length."""
-    steps = np.diff(track.times)
-    if track.interpolation == STEP or not len(steps) or not (steps > 0.0).all():
-        return track
-    if track.interpolation == CUBICSPLINE:
-        tolerance = length * OF_A_BONE if track.path == TRANSLATION else OF_A_TURN
-        parts = np.ceil(np.sqrt(_bends(track, steps) / (8.0 * tolerance))).clip(1, MOST_PARTS)
-        track = track.keyed(_split(track.times, parts))
-    if track.path == ROTATION:
-        turns = normalise(track.values)
-        half = np.arccos(np.abs(np.sum(turns[:-1] * turns[1:], axis=-1)).clip(max=1.0))
-        parts = np.ceil(2.0 * half / WIDEST).clip(1)
-        track = track.keyed(_split(track.times, parts)) if (parts > 1).any() else track
-    return track
+def _on_frames(track: Track) -> Track:
+    """Return a track whose keys are on frames where they nearly are: files have them in single precision."""
+    frames = on_frames(FPS * track.times)
+    frames[:-1] -= CUT * (np.diff(frames) <= 0.0)
+    return replace(track, times=frames / FPS)
 
 
-def _bends(track: Track, steps: np.ndarray) -> np.ndarray:
-    """Return the largest second derivative of each segment of a spline, in its own time, shape (n - 1,)."""
-    begin, end = track.values[:-1, 1], track.values[1:, 1]
-    out, into = track.values[:-1, 2] * steps[:, None], track.values[1:, 0] * steps[:, None]
-    bends = [6.0 * (end - begin) - 4.0 * out - 2.0 * into, 6.0 * (begin - end) + 2.0 * out + 4.0 * into]
-    return np.maximum(*(np.linalg.norm(some, axis=-1) for some in bends))
+def _jumps(track: Track) -> np.ndarray:
+    """Return whether a track jumps at each of its keys but the first, shape (n - 1,)."""
+    cuts = np.diff(track.times) < 2.0 * CUT / FPS
+    if track.interpolation != STEP:
+        return cuts
+    return cuts | (np.abs(np.diff(track.points, axis=0)) > NOISE).any(axis=1)
 
 
-def _split(times: np.ndarray, parts: np.ndarray) -> np.ndarray:
-    """Return times (n,) with the segments between them in so many parts (n - 1,)."""
-    parts = parts.astype(np.int64)
-    segment = np.repeat(np.arange(len(parts)), parts)
-    share = (np.arange(len(segment)) - (np.cumsum(parts) - parts)[segment]) / parts[segment]
-    return np.append(times[segment] + share * np.diff(times)[segment], times[-1])
+def _moments(path: Path, joints: int, tracks: Sequence[Track]) -> Moments:
+    """Return when joints are looked at that tracks move."""
+    keys = [FPS * track.times for track in tracks]
+    first, last = min(own[0] for own in keys), max(own[-1] for own in keys)
+    step = FPS / (rate_of(keys, FPS) or WITHOUT_A_RATE)
+    refuse_too_many(path, joints, (last - first) / step + 1.0)
+    jumps = [own[1:][_jumps(track)] - LEAD * step for own, track in zip(keys, tracks, strict=True)]
+    straight = all(track.interpolation in (LINEAR, STEP) for track in tracks)
+    return moments_between(first, last, FPS, step, np.concatenate([*keys, *jumps]), straight=straight)
 
 
-def _usual_length(json: Json) -> float:
-    """Return how far joints are from their parents, as a rule: the median."""
-    try:
-        joints = {joint for skin in json["skins"] for joint in skin["joints"]}
-        lengths = [math.hypot(*json["nodes"][joint].get("translation", ())) for joint in joints]
-    except DAMAGED:
-        lengths = []
-    usable = [length for length in lengths if 0.0 < length < LARGEST]
-    return float(np.median(usable)) if usable else 1.0
+@dataclass(frozen=True, eq=False)
+class _Played:
+    """Nodes as tracks move them."""
+
+    nodes: Nodes
+    line: np.ndarray
+    """The nodes and all that they hang on, parents first."""
+
+    rows: list[int]
+    """Where the nodes are in that line."""
+
+    tracks: Tracks
+    moments: Moments
+    remark: str
+    turn: np.ndarray | None
+    """How the axes of objects are turned in their own space, shape (3, 3); None for joints."""
+
+    def __call__(self, frames: np.ndarray) -> Poses:
+        """Return the nodes on frames (n,), shape (nodes, n); objects with scales."""
+        count = max(AT_ONCE // len(self.line), 1)
+        blocks = (frames[first : first + count] / FPS for first in range(0, len(frames), count))
+        maps = (self.nodes.worlds(self.line, self.tracks, times)[self.rows] for times in blocks)
+        return joined([_poses(some, self.turn) for some in maps], axis=1)
+
+
+def _poses(maps: AffineMaps, turn: np.ndarray | None = None) -> Poses:
+    """Return nodes (...) in Blender's world; those of objects are turned in their own space, and have scales."""
+    axes = TO_BLENDER @ maps.axes @ (np.eye(3) if turn is None else turn)
+    poses = rigid_of(axes, maps.origins @ TO_BLENDER.T)
+    return poses if turn is None else Poses(poses.positions, poses.quaternions, scales_of(axes))

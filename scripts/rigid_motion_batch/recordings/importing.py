@@ -1,8 +1,7 @@
-"""Whole bodies of files that Blender imports: into a scene of their own, out of which all of it is taken again.
+"""Bodies of files that Blender imports: into a scene of their own, out of which all of it is taken again.
 
-What is open stays as it is. A file may hold several armatures: that one is taken which moves and has the most bones,
-unless another is named. Times begin with 0 on the first key, axes and units are those that the importer makes of the
-file's. A stranger's file is data: importers are written in Python, fail in any way there is, and may crash.
+What is open stays as it is. Times begin with 0 on the first key, axes and units are those that the importer makes of
+the file's. A stranger's file is data: importers are written in Python, fail in any way there is, and may crash.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import replace
 from pathlib import Path
@@ -23,36 +22,14 @@ from rigid_motion_batch.command_line import listed
 from rigid_motion_batch.silencing import silenced
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, keys_of, moments_of, with_parents
-from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError
-from .rigs import LAST_FRAME, armature_of, in_blender, joints_of, refuse_too_many, single_joints, whole_body
-from .sampling import LEAD, SAME, Moments, away, merged
-from .tables import LARGEST_FILE
+from .objects import body_of_objects, refuse_far_frames, single_object
+from .recordings import Selection, Trajectory, TrajectoryError
+from .rigs import armature_of, in_blender, joints_of, single_joints, whole_body
+from .sampling import LEAD, Moments, moments_between, rate_of
+from .scene_bodies import LISTED, SceneBodies, parents_among
 
 if TYPE_CHECKING:
     import bpy
-
-FASTEST, SLOWEST = 240.0, 5.0
-"""Keys a second that are taken to be the rate of the file."""
-
-ROUND = 2e-4
-"""Share by which a rate may be off a whole number that is one: 29.97 is none."""
-
-ON_A_FRAME = 1e-4
-"""Distance from a whole frame within which a key is on it."""
-
-FINE = 1e-3
-"""Share by which that is less fine for each frame from the first: F-curves keep frames in single precision."""
-
-NONE = np.empty(0)
-
-MULTIPLE = 0.05
-"""Share of the least gap between keys by which others may miss its multiples."""
-
-THINNED = 4.0
-"""Number of samples that a key may stand for where keys were thinned."""
-
-FEW = 5
-"""Names of a kind that a remark tells."""
 
 NUMBERED = re.compile(r"(?P<name>.+)\.\d{3,}", re.DOTALL)
 """A name that Blender has numbered, for there was one like it."""
@@ -61,26 +38,10 @@ LONGEST_REASON = 120
 """Characters of what an importer says."""
 
 
-def refuse_too_large(path: Path, *others: Path) -> None:
-    """Raise TrajectoryError where a file, and those that belong to it, have more bytes than are read."""
-    size = sum(item.stat().st_size for item in (path, *others))
-    if size > LARGEST_FILE:
-        problem = f"{size} bytes are more than the {LARGEST_FILE} that are read"
-        raise TrajectoryError(path, problem, "export the skeleton without its meshes, or split the recording")
-
-
 def read_imported(
-    path: Path,
-    selection: Selection,
-    importer: Callable[[], object],
-    addon: str,
-    scale: float | None,
-    *,
-    fps: int = 24,
-    usual: float = 0.0,
-    made: np.ndarray = NONE,
+    path: Path, selection: Selection, importer: Callable[[], object], addon: str, scale: float | None
 ) -> list[Trajectory]:
-    """Read the whole skeleton of a file; or bones that are named, or all.
+    """Read the largest whole body of a file, or else the first object that moves; or what is named, or all.
 
     Parameters
     ----------
@@ -92,147 +53,119 @@ def read_imported(
         The add-on of Blender that it is in.
     scale : float or None
         Metres of a unit, where the user says them.
-    fps : int
-        Frames a second of the scene to import into.
-    usual : float
-        Frames a second where keys tell no rate that is plausible; 0 for those of the scene, which are the fewest then.
-    made : array, shape (n,)
-        Frames, rising, at which curves have keys that the file has not.
 
     Raises
     ------
     TrajectoryError
-        Where there is no Blender, the file cannot be imported, or has no armature that moves.
+        Where there is no Blender, the file cannot be imported, or nothing in it moves.
     """
-    with in_blender(path, "export it again"), _imported(path, importer, addon, fps) as (scene, names):
-        rigs = {name: obj for obj, name in names.items() if obj.type == "ARMATURE" and obj.pose}
-        moving = {name: span for name, obj in rigs.items() if (span := _frames_of_keys(obj)) is not None}
-        if not moving:
-            problem = "no skeleton that moves" if rigs else "no skeleton"
-            raise NoMotion(path, f"{problem} in this file", "export the armature together with its animation")
-        bones = {name: armature_of(rig).bones.keys() for name, rig in rigs.items()}
-        selection.match([*rigs, *(bone for own in bones.values() for bone in own)])
-        selection.match(f"{name}/{bone}" for name, own in bones.items() for bone in own)
-        name, bone = _requested(rigs, moving, selection.requested)
-        rig, rate = rigs[name], scene.render.fps / scene.render.fps_base
-        first, last = moving.get(name) or next(iter(moving.values()))
-        keys = _rate_of_keys(rig, rate, made)
-        if not (abs(first) <= LAST_FRAME and abs(last) <= LAST_FRAME):
-            refuse_too_many(path, name, 1, np.array([first, last]))
-        step = rate / (keys or usual if usual else max(rate, keys or 0.0))
-        moments = _moments(rig, first, last, rate, step, made)
-        remarks = _remarks(scene, rig, name, list(rigs), several=selection.requested in (None, ALL))
-        if bone is None and selection.requested != ALL:
-            called = path.stem if selection.requested is None else name
-            body = whole_body(path, rig, called, moments, 1.0, scale, made_up=True)
-            return [_with_remarks(body, *remarks)]
-        joints = joints_of(rig)
+    with in_blender(path, "export it again"), _imported(path, importer, addon) as (scene, names):
+        found = _Scene(path, scene, names, scale)
+        return found.bodies.read(selection, found)
+
+
+class _Scene:
+    """A scene that was imported, whose nodes are its objects, and the bones of its armatures."""
+
+    def __init__(
+        self, path: Path, scene: bpy.types.Scene, names: dict[bpy.types.Object, str], scale: float | None
+    ) -> None:
+        from bpy.utils import unescape_identifier
+
+        self.path, self.scene, self.scale = path, scene, scale
+        self.nodes: list[tuple[bpy.types.Object, str | None]] = [(obj, None) for obj in names]
+        skeletons: dict[str, list[int]] = {}
+        for obj, name in names.items():
+            if obj.type == "ARMATURE" and obj.pose and (bones := joints_of(obj).names):
+                skeletons[name] = [*range(len(self.nodes), len(self.nodes) + len(bones))]
+                self.nodes += [(obj, bone) for bone in bones]
+        self.names = [bone or names[obj] for obj, bone in self.nodes]
+        numbers: dict[tuple[bpy.types.Object | None, str | None], int]
+        numbers = {node: number for number, node in enumerate(self.nodes)}
+        self.parents = np.array([numbers.get(_parent(*node), -1) for node in self.nodes], dtype=np.int64)
+        keyed, moves = np.zeros((2, len(self.nodes)), dtype=bool)
+        for obj in names:
+            for fcurve in _curves_of(obj):
+                channel = BONE_CHANNEL.match(fcurve.data_path)
+                node = numbers.get((obj, unescape_identifier(channel["name"]) if channel else None))
+                if node is not None and len((keys := keys_of(fcurve)).frames):
+                    keyed[node] = True
+                    moves[node] |= keys.varies
+        self.bodies = SceneBodies.of(path, self.names, self.parents, moves, keyed, skeletons)
+
+    def whole(self, name: str, own: Sequence[int], remark: str) -> Trajectory:
+        moments = self._moments(own)
+        obj, bone = self.nodes[own[0]]
+        if bone is not None:
+            body = whole_body(self.path, obj, name, moments, 1.0, self.scale, made_up=True)
+        else:
+            parents, names = parents_among(self.parents, own), [self.names[node] for node in own]
+            objects = [self.nodes[node][0] for node in own]
+            body = body_of_objects(self.path, objects, parents, names, name, moments, self.scale)
+        return self._with_remarks(body, own, remark)
+
+    def joints(self, chosen: Sequence[int], own: Sequence[int]) -> list[Trajectory]:
+        obj, bone = self.nodes[chosen[0]]
         if bone is None:
-            taken = selection.of(joints.names)
-            several = single_joints(path, rig, taken, moments, scale)
-            return [_with_remarks(several[0], joints.remark, *remarks), *several[1:]]
-        known = bone in joints.names or bone in joints.left_out
-        unlisted = [*joints.left_out, *([selection.requested or ""] if known else [])]
-        (requested,) = selection.of(joints.names, unlisted)
-        (motion,) = single_joints(path, rig, [bone], moments, scale)
-        return [_with_remarks(replace(motion, name=requested), *remarks)]
+            return [self.alone(node) for node in chosen]
+        bones = [self.names[node] for node in chosen]
+        first, *others = single_joints(self.path, obj, bones, self._moments(own), self.scale)
+        return [self._with_remarks(first, own), *others]
+
+    def alone(self, node: int) -> Trajectory:
+        obj = self.nodes[node][0]
+        result = single_object(self.path, obj, self.names[node], self._moments([node]), self.scale)
+        return self._with_remarks(result, [node])
+
+    def _moments(self, own: Sequence[int]) -> Moments:
+        """Return even frames from the first key of what moves these nodes to the last one, and all keys between."""
+        objects = dict.fromkeys(above for node in own for above in with_parents(self.nodes[node][0]))
+        # What does not move is looked at for as long as everything else does.
+        keys = _keys_of(objects) or _keys_of(obj for obj, bone in self.nodes if bone is None)
+        first, last = min(frames[0] for frames in keys), max(frames[-1] for frames in keys)
+        refuse_far_frames(self.path, self.names[own[0]], np.array([first, last]))
+        rate = self.scene.render.fps / self.scene.render.fps_base
+        step = rate / max(rate, rate_of(keys, rate) or 0.0)
+        looks = [moments_of(obj, LEAD * step) for obj in objects]
+        frames, straight = np.concatenate([frames for frames, _ in looks]), all(straight for _, straight in looks)
+        return moments_between(first, last, rate, step, frames, straight=straight)
+
+    def _with_remarks(self, trajectory: Trajectory, own: Sequence[int], remark: str = "") -> Trajectory:
+        """Return it with remarks on what of the file was left."""
+        obj, data = self.nodes[own[0]][0], self.nodes[own[0]][0].animation_data
+        left, takes = _other_takes(obj, data.action, self.scene) if data and data.action else [], ""
+        if data and data.action and left:
+            takes = f"took its take {data.action.name}; others: {listed(left, LISTED)}"
+        return replace(trajectory, remark="; ".join(filter(None, (trajectory.remark, remark, takes))))
 
 
-def _requested(
-    rigs: dict[str, bpy.types.Object], moving: Mapping[str, object], requested: str | None
-) -> tuple[str, str | None]:
-    """Return the armature that is meant and its bone, or None for the whole."""
-    largest = max(moving, key=lambda name: len(armature_of(rigs[name]).bones))
-    if requested in (None, ALL):
-        return largest, None
-    in_order = sorted(rigs, key=lambda name: name != largest)
-    for name in in_order:
-        if requested in armature_of(rigs[name]).bones:
-            return name, requested
-    if requested in rigs:
-        return requested, None
-    for name in in_order:
-        if requested.startswith(f"{name}/") and requested[len(name) + 1 :] in armature_of(rigs[name]).bones:
-            return name, requested[len(name) + 1 :]
-    return largest, requested
+def _parent(obj: bpy.types.Object, bone: str | None) -> tuple[bpy.types.Object | None, str | None]:
+    """Return what an object, or a bone of it, hangs on: an object, or a bone of it."""
+    if bone is None:
+        return obj.parent, (obj.parent_bone or None) if obj.parent_type == "BONE" else None
+    above = armature_of(obj).bones[bone].parent
+    return obj, above.name if above else None
 
 
-def _remarks(
-    scene: bpy.types.Scene, rig: bpy.types.Object, name: str, rigs: list[str], *, several: bool
-) -> Iterator[str]:
-    """Yield remarks on what is left of the file."""
-    if several and len(rigs) > 1:
-        others = listed([other for other in rigs if other != name], FEW)
-        yield f"took {name} of {len(rigs)} armatures; others: {others}"
-    data = rig.animation_data
-    if data and data.action and (takes := _other_takes(rig, data.action, scene)):
-        yield f"took its take {data.action.name}; others: {listed(takes, FEW)}"
+def _curves_of(obj: bpy.types.Object) -> Iterator[bpy.types.FCurve]:
+    """Yield the F-curves that move an object or its bones."""
+    if data := obj.animation_data:
+        yield from curves_that_move(data.action, data.action_slot, bones=True)
 
 
-def _with_remarks(trajectory: Trajectory, *remarks: str) -> Trajectory:
-    return replace(trajectory, remark="; ".join(filter(None, (trajectory.remark, *remarks))))
+def _keys_of(objects: Iterable[bpy.types.Object]) -> list[np.ndarray]:
+    """Return the frames of the keys, rising, of each curve that moves some objects or their bones."""
+    keys = (keys_of(fcurve).frames for obj in objects for fcurve in _curves_of(obj))
+    return [frames for frames in keys if len(frames)]
 
 
-# -- keys -------------------------------------------------------------------------------------------------------------
-
-
-def _keys_of_curves(rig: bpy.types.Object) -> list[np.ndarray]:
-    """Return the frames of the keys, rising, of each curve that moves the bones, the armature, or what it hangs on."""
-    keys = []
-    for obj in with_parents(rig):
-        if data := obj.animation_data:
-            curves = curves_that_move(data.action, data.action_slot, bones=obj == rig)
-            keys += [own.frames for fcurve in curves if len((own := keys_of(fcurve)).frames)]
-    return keys
-
-
-def _frames_of_keys(rig: bpy.types.Object) -> tuple[float, float] | None:
-    """Return the first and last frame of what moves an armature. None where nothing does."""
-    keys = _keys_of_curves(rig)
-    return (min(own[0] for own in keys), max(own[-1] for own in keys)) if keys else None
-
-
-def _rate_of_keys(rig: bpy.types.Object, fps: float, made: np.ndarray) -> float | None:
-    """Return how many keys a second the densest curve has; None where that is no rate that anything is recorded at.
-
-    A curve with even gaps, or a thinned one whose gaps are multiples of the least, goes before uneven ones.
-    """
-    rates: dict[bool, list[float]] = {True: [], False: []}
-    for keys in _keys_of_curves(rig):
-        gaps = np.diff(_less(keys, made))
-        if len(gaps := gaps[gaps > ON_A_FRAME]):
-            times = gaps / gaps.min()
-            even = np.abs(times - np.rint(times)).max() < MULTIPLE and times.mean() < THINNED
-            rate = fps / (gaps.sum() / np.rint(times).sum() if even else float(np.median(gaps)))
-            rates[bool(even)].append(float(round(rate)) if abs(rate - round(rate)) < ROUND * rate else rate)
-    of_recordings = [[rate for rate in some if SLOWEST <= rate <= FASTEST] for some in rates.values()]
-    return max(of_recordings[0] or of_recordings[1], default=None)
-
-
-def _less(keys: np.ndarray, made: np.ndarray) -> np.ndarray:
-    """Return frames of keys without those that were made."""
-    return keys[away(keys, made) > ON_A_FRAME * (1.0 + FINE * np.abs(keys))]
-
-
-def _moments(rig: bpy.types.Object, first: float, last: float, fps: float, step: float, made: np.ndarray) -> Moments:
-    """Return even frames from the first key to the last one, and all keys between."""
-    even = first + step * np.arange(int((last - first) / step + SAME) + 1)
-    if last - even[-1] > SAME * step:
-        even = np.append(even, last)
-    keys, straight = moments_of(rig, LEAD * step)
-    frames = merged(even, _less(keys, made), step)
-    whole = np.rint(frames)
-    frames = np.where(np.abs(frames - whole) < ON_A_FRAME, whole, frames)
-    return Moments(frames, fps, first, step, straight and not len(made))
-
-
-def _other_takes(rig: bpy.types.Object, own: bpy.types.Action, scene: bpy.types.Scene) -> list[str]:
-    """Return other Actions that move its bones, of those that the importer has made after the scene."""
-    import bpy
-
-    bones, result = set(armature_of(rig).bones.keys()), []
-    for action in bpy.data.actions:
-        if action != own and action.session_uid > scene.session_uid:
+def _other_takes(obj: bpy.types.Object, own: bpy.types.Action, scene: bpy.types.Scene) -> list[str]:
+    """Return other Actions that move an object, or the bones of a rig, of those that the importer has made."""
+    if obj.type != "ARMATURE":
+        return [action.name for action in _takes_of(obj, scene) if action != own]
+    bones, result = {*armature_of(obj).bones.keys()}, []
+    for action in _made(scene):
+        if action != own:
             curves = (fcurve for slot in action.slots for fcurve in fcurves_of(action, slot))
             channels = (BONE_CHANNEL.match(fcurve.data_path) for fcurve in curves)
             if any(match["name"] in bones for match in channels if match):
@@ -240,12 +173,27 @@ def _other_takes(rig: bpy.types.Object, own: bpy.types.Action, scene: bpy.types.
     return result
 
 
+def _takes_of(obj: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Action]:
+    """Return the Actions that the importer has made for an object that is no rig, after which it calls them."""
+    if obj.type == "ARMATURE":
+        return []
+    own = (action for action in _made(scene) if action.name.startswith(f"{obj.name}|") and len(action.slots))
+    return [action for action in own if any(curves_that_move(action, action.slots[0], bones=False))]
+
+
+def _made(scene: bpy.types.Scene) -> Iterator[bpy.types.Action]:
+    """Yield the Actions that the importer has made, after the scene."""
+    import bpy
+
+    return (action for action in bpy.data.actions if action.session_uid > scene.session_uid)
+
+
 # -- Blender ----------------------------------------------------------------------------------------------------------
 
 
 @contextmanager
 def _imported(
-    path: Path, importer: Callable[[], object], addon: str, fps: int
+    path: Path, importer: Callable[[], object], addon: str
 ) -> Iterator[tuple[bpy.types.Scene, dict[bpy.types.Object, str]]]:
     """Yield a scene with what was imported, and its objects with their names; all of it gone afterwards."""
     import bpy
@@ -258,13 +206,13 @@ def _imported(
     shown_scene = window.scene
     scene = bpy.data.scenes.new("Importing")
     try:
-        scene.render.fps, scene.render.fps_base = fps, 1.0
+        scene.render.fps, scene.render.fps_base = 24, 1.0
         # Importers go by what the window shows: an override is not enough for the mode that they edit bones in.
         window.scene = scene
         with enabled(path, addon):
             told(path, "import", importer)
         for obj in scene.objects:
-            _only_its_action(obj)
+            _only_its_action(obj, scene)
         yield scene, {obj: _own_name(obj.name, taken) for obj in scene.objects}
     finally:
         window.scene = shown_scene
@@ -323,8 +271,12 @@ def enabled(path: Path, addon: str) -> Iterator[None]:
             addon_utils.disable(addon, default_set=False)
 
 
-def _only_its_action(obj: bpy.types.Object) -> None:
-    """Keep the Action that an object has, or else that of its first strip, and nothing else of its NLA."""
+def _only_its_action(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Keep the Action that an object has, or else that of its first strip, and nothing else of its NLA.
+
+    Blender writes the Actions of all objects for each of them into an FBX: of these it gets that which is called after
+    it, as Blender calls new ones.
+    """
     data = obj.animation_data
     if data is None:
         return
@@ -333,6 +285,10 @@ def _only_its_action(obj: bpy.types.Object) -> None:
         action, slot = strips[0].action, strips[0].action_slot
         data.action = action
         data.action_slot = slot
+    for action in _takes_of(obj, scene):
+        if action.name.rpartition("|")[2].partition(".")[0] == f"{obj.name.partition('.')[0]}Action":
+            data.action = action
+            data.action_slot = action.slots[0]
     for track in list(data.nla_tracks):
         data.nla_tracks.remove(track)
 

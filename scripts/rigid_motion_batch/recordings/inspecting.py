@@ -20,6 +20,7 @@ from .column_names import METRES
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .reading import Format, format_of, read_trajectories, split_source
 from .recordings import ALL, Recording, Trajectory, TrajectoryError
+from .sizing import axis_up, leading
 
 UNIT_NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches", "ft": "feet"}
 
@@ -66,12 +67,12 @@ class Timing:
 
 @dataclass(frozen=True)
 class Size:
-    """Size of a motion; of a whole body, that of all its joints, and the turns of its first root."""
+    """Size of a motion; of a whole body, that of all its joints, and the way and the turns of what carries it about."""
 
     lowest: tuple[float, float, float]
     highest: tuple[float, float, float]
     path: float
-    """Metres that the body, or the first root, goes."""
+    """Metres that the body goes."""
 
     speed: float
     """Metres a second, which 95 % of the speeds are below."""
@@ -179,7 +180,7 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
     taken = _axes(recording, axes, next(iter(ups)) if len(ups) == 1 else "")
     size = path.stat().st_size
     # Of the bodies, and not of the others, which are listed.
-    note = "; ".join(trajectory.remark for trajectory in recording.trajectories if trajectory.remark)
+    note = "; ".join(dict.fromkeys(item.remark for item in recording.trajectories if item.remark))
     return Inspection(source, result.label, size, bodies, taken, tuple(contents), tuple(unreadable), note)
 
 
@@ -204,7 +205,7 @@ def _unit(clip: Clip, trajectory: Trajectory, result: Format, options: ReadingOp
     name = UNIT_NAMES.get(short, f"units of {metres:.4g} m")
     if options.scale is not None:
         return Unit(metres, name, "as --scale says")
-    if clip.rest_body is not None and not result.in_metres:
+    if not result.in_metres:
         guessed = "taken for" in trajectory.remark
         return Unit(metres, name, "guessed from the size of the body" if guessed else "they make a body of usual size")
     if metres != 1.0:
@@ -232,7 +233,7 @@ def _timing(clip: Clip, recorded: int) -> Timing:
 
 
 def _size(clip: Clip) -> Size:
-    root = clip.poses if clip.rest_body is None else clip.poses[0]
+    root = clip.poses if clip.rest_body is None else leading(clip.rest_body, clip.poses)
     places, steps = root.positions * clip.metres_per_unit, np.diff(clip.times)
     lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1)
     turns = np.degrees(angle_between(root.quaternions[1:], root.quaternions[:-1]))
@@ -251,10 +252,7 @@ def _size(clip: Clip) -> Size:
 def _up(clip: Clip) -> str:
     """Return the axis that is up, by where people are above the floor, or how they stand; empty if unclear."""
     if clip.rest_body is not None:
-        places = clip.rest_body.skeleton.in_root_space(clip.poses[:, :1]).positions[:, 0]
-        extents = np.ptp(places, axis=0)
-        largest = int(np.argmax(extents))
-        return "xyz"[largest] if extents[largest] > 1.5 * np.delete(extents, largest).max() else ""
+        return axis_up(clip.rest_body, clip.rest_body.skeleton.in_root_space(clip.poses[:, :1]).positions[:, 0])
     low, high = np.percentile(clip.poses.positions * clip.metres_per_unit, (1.0, 99.0), axis=0)
     above = (low > ABOVE_THE_FLOOR[0]) & (high < ABOVE_THE_FLOOR[1])
     around = (low < 0.0) & (high > 0.0)

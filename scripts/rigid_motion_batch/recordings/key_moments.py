@@ -45,6 +45,9 @@ class Keys:
     straight: bool
     """True if there are straight lines or constant values between them."""
 
+    varies: bool
+    """True if their values differ."""
+
 
 def fcurves_of(action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> Iterator[bpy.types.FCurve]:
     """Yield the F-curves that an Action has for one of its slots."""
@@ -75,7 +78,7 @@ def keys_of(fcurve: bpy.types.FCurve) -> Keys:
     frames, values, kinds = frames[order], values[order], kinds[order]
     changes = np.abs(np.diff(values)) > NOISE * np.abs(values).max(initial=1.0)
     jumps = np.append(False, (kinds[:-1] == CONSTANT) & changes)[: len(frames)]
-    return Keys(frames, jumps, bool(np.isin(kinds, (CONSTANT, LINEAR)).all()))
+    return Keys(frames, jumps, bool(np.isin(kinds, (CONSTANT, LINEAR)).all()), bool(changes.any()))
 
 
 def with_parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:

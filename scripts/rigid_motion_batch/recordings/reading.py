@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
-import numpy as np
+from rigid_motion_batch.command_line import did_you_mean
 
-from rigid_motion.motion import Poses, Skeleton
-from rigid_motion.motion.repair import LARGEST
-
-from . import aframe, blend, bvh, euroc, fbx, gltf, motive, named_csv, tum
-from .clips import ClipWarning
+from . import blend, bvh, cameras, fbx, gltf, headless, json_logs, named_csv, optical
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
-from .rest_bodies import NOTHING, PLAUSIBLE, size_of, sureness, unit_of
 from .sense import doubts
+from .sizing import sized
 from .tables import encoding_of
-
-LOOKED_AT = 64
-"""Samples at once among which the first without damage is looked for."""
 
 HEAD = 65536
 """Bytes of a file that are looked at to tell its format."""
@@ -56,25 +51,49 @@ class Format:
     """True if it has a unit for lengths, or its files always say theirs."""
 
 
+TEXT = (".csv", ".tsv", ".txt", ".tum", ".chan", ".g2o")
+"""How the names of tables may end. What is in them says which one it is."""
+
+JSON = (".json",)
+
+COUNTED = ("time_unit", "frame_rate", "euler", "degrees")
+TABLE = ("columns", *COUNTED)
+
 # Of the formats that share an extension the first that recognises the content reads it. The last one needs not: it
 # takes the rest, and says what is wrong with it.
 FORMATS = (
-    Format("Motive CSV", (".csv",), motive.read, motive.recognises),
-    Format("EuRoC CSV", (".csv",), euroc.read, euroc.recognises),
-    Format("TUM", (".csv", ".txt", ".tum"), tum.read, tum.recognises, ("time_unit", "frame_rate")),
-    Format(
-        "CSV with named columns",
-        (".csv", ".tsv", ".txt"),
-        named_csv.read,
-        honours=("columns", "time_unit", "frame_rate", "euler", "degrees"),
-        says_unit=False,
-    ),
-    Format("A-Frame recording", (".json",), aframe.read),
-    Format("BVH", (".bvh",), bvh.read, axes="opengl", in_metres=False),
+    Format("Motive CSV", TEXT, optical.read_motive, optical.recognises_motive),
+    Format("Vicon CSV", TEXT, optical.read_vicon, optical.recognises_vicon, COUNTED),
+    Format("Qualisys TSV", TEXT, optical.read_qualisys, optical.recognises_qualisys, COUNTED),
+    Format("COLMAP images", TEXT, cameras.read_images, cameras.recognises_images, COUNTED, says_unit=False),
+    Format("g2o graph", TEXT, cameras.read_graph, cameras.recognises_graph, COUNTED, says_unit=False),
+    Format("rows of numbers (TUM, KITTI)", TEXT, headless.read, headless.recognises, TABLE, says_unit=False),
+    Format("CSV with named columns", TEXT, named_csv.read, honours=TABLE, says_unit=False),
+    Format("JSON", JSON, json_logs.read, honours=TABLE, says_unit=False),
+    Format("BVH", (".bvh",), bvh.read, axes=bvh.AXES, in_metres=False),
     Format("FBX", (".fbx",), fbx.read, honours=("scale",), measured=False),
     Format("glTF", gltf.ENDINGS, gltf.read, honours=("scale",), measured=False),
     Format("Blender file", (".blend",), blend.read, honours=("scale",), measured=False),
 )
+
+ENDINGS = tuple(dict.fromkeys(extension for known in FORMATS for extension in known.extensions))
+
+INSTEAD = {
+    ".abc .usd .usda .usdc .usdz": "open it in Blender, and name the .blend",
+    ".amc .asf .mvnx": "convert it to BVH or FBX",
+    ".bag": "export the poses: rostopic echo -b FILE -p /TOPIC > poses.csv",
+    ".bin": "of COLMAP, export text: colmap model_converter --output_type TXT",
+    ".c3d .trc": "it holds markers: export bodies or a skeleton, as CSV, BVH or FBX",
+    ".dat .log": "if it is a table or rows of numbers, call it .txt",
+    ".db3 .mcap": "export the poses as CSV, such as by PlotJuggler",
+    ".h5 .hdf5 .mat .npy .npz .pkl": "write the poses as a table: t,x,y,z,qx,qy,qz,qw",
+    ".ods .xls .xlsx": "save the sheet as CSV",
+    ".ulg": "make tables of it: ulog2csv FILE",
+}
+"""What to do with files that others write, and that are not read, by how they end."""
+
+MOST_NAMES = 10_000
+"""Names in a folder among which one is looked for that is like another."""
 
 
 def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> Recording:
@@ -84,8 +103,8 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
     ----------
     source : str
         A path; with `:BODY` behind it for one body by name, with `:*` for all bodies. A path alone asks for the first
-        body, such as the first animated object of a .blend, or for the whole skeleton: of a BVH, an FBX or a glTF, and
-        of an armature whose bones move.
+        body, such as the first animated object of a .blend, an FBX or a glTF, or for the whole skeleton: of a BVH, an
+        FBX or a glTF, and of an armature whose bones move.
     options : ReadingOptions
         What the file does not say of itself.
 
@@ -103,7 +122,7 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
     Notes
     -----
     Tables take memory for their numbers and not for their text, JSON up to 30 times its size. Files beyond the limits
-    in `tables`, `bvh` and `aframe` are refused. Blender itself reads .blend, FBX and glTF files, and may crash on a
+    in `tables`, `bvh` and `json_logs` are refused. Blender itself reads .blend and FBX files, and may crash on a
     damaged one: where that must not happen, read them in a process of their own.
     """
     path, body = split_source(source)
@@ -123,54 +142,18 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
 def _read(result: Format, path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     for name in options.given:
         if name not in ("scale", "start", "end") and name not in result.honours:
-            labels = " and ".join(known.label for known in FORMATS if name in known.honours)
-            problem = f"--{name.replace('_', '-')} is for {labels}, and this is {result.label}"
-            raise TrajectoryError(path, problem, "leave it out; its files say that themselves")
+            problem = f"--{name.replace('_', '-')} means nothing to {result.label}"
+            raise TrajectoryError(path, problem, "leave it out, as its files say that themselves")
     trajectories = result.read(path, selection, options) if result.honours else result.read(path, selection)
     if options.scale is not None:
         trajectories = [replace(trajectory, metres_per_unit=options.scale) for trajectory in trajectories]
     else:
-        trajectories = [_sized(path, trajectory, unit_given=result.in_metres) for trajectory in trajectories]
+        trajectories = [sized(path, item, result.axes, unit_given=result.in_metres) for item in trajectories]
     if not result.measured:
         return trajectories
     takes_unit = "time_unit" in result.honours
     found = [doubts(trajectory, time_unit=takes_unit and not trajectory.dated) for trajectory in trajectories]
     return [replace(item, warnings=(*item.warnings, *more)) for item, more in zip(trajectories, found, strict=True)]
-
-
-def _sized(path: Path, trajectory: Trajectory, *, unit_given: bool) -> Trajectory:
-    """Return a whole body in the unit that it is likely to be in by its size, where that is not given or cannot be."""
-    if trajectory.rest_body is None:
-        return trajectory
-    places = _first_whole(trajectory.rest_body.skeleton, trajectory.poses)
-    if places is None:
-        return trajectory
-    size = size_of(trajectory.rest_body.parents, places) * trajectory.metres_per_unit
-    unit, length = unit_of(size)
-    metres = size * length
-    if size < NOTHING or (unit_given and length == 1.0):
-        return trajectory
-    remark, warnings = trajectory.remark, trajectory.warnings
-    if length != 1.0:
-        taken = f"{shown(path.name)} is {size:.4g} units large, which are taken for {unit}: {metres:.3g} m"
-        taken += f", {sureness(size, length)} (otherwise: --scale METRES)"
-        remark = "; ".join(filter(None, (taken, remark)))
-    if not PLAUSIBLE[0] <= metres <= PLAUSIBLE[1]:
-        doubt = f"it is {metres:.3g} m large if its unit, which the file does not tell, is that of {unit}"
-        warnings += (ClipWarning(doubt, "if not, say how long it is: --scale METRES"),)
-    return replace(trajectory, metres_per_unit=trajectory.metres_per_unit * length, remark=remark, warnings=warnings)
-
-
-def _first_whole(skeleton: Skeleton, poses: Poses) -> np.ndarray | None:
-    """Return where the joints of a body (joints, n) are in the first sample without damage, shape (joints, 3)."""
-    for first in range(0, poses.shape[1], LOOKED_AT):
-        # What is not finite, or far beyond all measure, is for the repair to say.
-        with np.errstate(invalid="ignore", over="ignore"):
-            places = skeleton.in_root_space(poses[:, first : first + LOOKED_AT]).positions
-        whole = np.flatnonzero((np.abs(places) < LARGEST).all(axis=(0, 2)))
-        if len(whole):
-            return places[:, whole[0]]
-    return None
 
 
 def files_of(source: str) -> list[str]:
@@ -181,8 +164,7 @@ def files_of(source: str) -> list[str]:
         names = sorted(entry.name for entry in os.scandir(source) if entry.is_file())
     except (OSError, ValueError):
         return [source]  # What is wrong with it is said when it is read.
-    known = tuple(extension for known in FORMATS for extension in known.extensions)
-    return [os.path.join(source, name) for name in names if name.lower().endswith(known)] or [source]
+    return [os.path.join(source, name) for name in names if name.lower().endswith(ENDINGS)] or [source]
 
 
 def split_source(source: str) -> tuple[Path, str | None]:
@@ -202,7 +184,16 @@ def split_source(source: str) -> tuple[Path, str | None]:
     for end in [len(source), *reversed(colons)]:
         if result := _what_is_no_file(source[:end]):
             raise TrajectoryError(source[:end], *result)
-    raise TrajectoryError(source, "no such file", "check the path")
+    raise TrajectoryError(source, f"no such file{_near(source)}", "check the path")
+
+
+def _near(source: str) -> str:
+    """Return what may have been meant by the name of a file that is not there, if it or its body is much like one."""
+    folder, name = os.path.split(source)
+    with suppress(OSError, ValueError), os.scandir(folder or ".") as entries:
+        names = [entry.name for entry in islice(entries, MOST_NAMES) if entry.name.lower().endswith(ENDINGS)]
+        return did_you_mean(name, names) or did_you_mean(name.partition(":")[0], names)
+    return ""
 
 
 def _what_is_no_file(path: str) -> tuple[str, str] | None:
@@ -220,9 +211,9 @@ def format_of(path: Path) -> Format:
     """Return the format that reads a file, by its name and, where several share that, by how it begins."""
     candidates = [known for known in FORMATS if path.suffix.lower() in known.extensions]
     if not candidates:
-        extensions = dict.fromkeys(extension for known in FORMATS for extension in known.extensions)
         problem = f"unknown extension {shown(path.suffix)}"
-        raise TrajectoryError(path, problem, f"known are {', '.join(extensions)}")
+        ways = [way for endings, way in INSTEAD.items() if path.suffix.lower() in endings.split()]
+        raise TrajectoryError(path, problem, ways[0] if ways else f"known are {', '.join(ENDINGS)}")
     if len(candidates) > 1:
         with path.open("rb") as file:
             head = file.read(HEAD)

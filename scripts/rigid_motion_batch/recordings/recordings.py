@@ -137,7 +137,7 @@ class Selection:
         return [self.requested]
 
     def match(self, names: Iterable[str]) -> None:
-        """Take the name in the file for the one that is requested, where they differ in their case alone.
+        """Take the name in the file for the one that is requested, where they differ in case and underscores alone.
 
         Raises
         ------
@@ -147,7 +147,7 @@ class Selection:
         requested, names = self.requested or ALL, tuple(names)
         if requested == ALL or requested in names:
             return
-        alike = list(dict.fromkeys(name for name in names if name.casefold() == requested.casefold()))
+        alike = list(dict.fromkeys(name for name in names if _folded(name) == _folded(requested)))
         if len(alike) > 1:
             problem = f"no body named {shown(requested)}, and {len(alike)} that differ from it in their case alone"
             raise TrajectoryError(self.path, problem, f"name one of {listed(alike)}")
@@ -157,7 +157,7 @@ class Selection:
         """Return the result, with what there is to say about the bodies that were taken, and those that were not."""
         taken = {trajectory.name for trajectory in trajectories}
         others = tuple(name for name in self.names if name not in taken)
-        notes = [trajectory.remark for trajectory in trajectories if trajectory.remark]
+        notes = list(dict.fromkeys(trajectory.remark for trajectory in trajectories if trajectory.remark))
         if others and self.requested is None:
             notes.append(
                 f"{self.path} holds {len(self.names)} bodies; took {self.names[0]}; others: {listed(others)}; "
@@ -165,6 +165,11 @@ class Selection:
             )
         named = "" if self.requested in (None, ALL) else self.requested
         return Recording(self.path, tuple(trajectories), others, printable("; ".join(notes)), named)
+
+
+def _folded(name: str) -> str:
+    """Return a name in small letters, with the underscores that Blender has for spaces in BVH files."""
+    return name.casefold().replace(" ", "_")
 
 
 def unique(names: Sequence[str]) -> list[str]:

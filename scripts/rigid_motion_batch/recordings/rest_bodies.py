@@ -13,6 +13,7 @@ import numpy as np
 
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.motion.poses import inverse, placed
+from rigid_motion.motion.quaternions import conjugate, rotate
 from rigid_motion.motion.repair import LARGEST
 
 UNITS = (
@@ -32,6 +33,9 @@ IN_METRES = 0.2, 5.0
 GROWN_UP = 0.9, 2.3
 """Metres that most bodies measure: a unit that makes a body as large is taken to be the file's."""
 
+HIGHEST_HIPS = 1.3
+"""Metres above the floor, beyond which the lowest joint of a body that stands on it is not."""
+
 TYPICAL = 1.7
 """Metres; where no unit makes a body that large, that is taken which comes nearest."""
 
@@ -40,6 +44,15 @@ PLAUSIBLE = 0.5, 2.5
 
 MOST_NAMED = 5
 """Joints that are named of one kind of fault."""
+
+MOST_VERTICES = 200_000
+"""A body with more is shown without its skin."""
+
+CARRIERS = 4
+"""Joints that carry a vertex; more are left out, the weaker ones."""
+
+BESIDE = 0.3
+"""How far a root is from its body, of the size of that, up to which it is a part of it."""
 
 NOTHING = 1e-9
 """The size of what has none, in any unit."""
@@ -118,17 +131,41 @@ def repaired(rest_body: RestBody) -> tuple[RestBody, tuple[str, ...]]:
     return rest_body, tuple(done)
 
 
-def carrying(parents: np.ndarray) -> np.ndarray:
-    """Return which joints are roots that carry a single child about, shape (joints,): they may be anywhere."""
-    children = np.bincount(parents[parents >= 0], minlength=len(parents))
-    return (parents < 0) & (children == 1)
+def tails_of(rest: Poses, parents: np.ndarray) -> np.ndarray:
+    """Return ends of bones that nothing tells, as `RestBody` has them, of joints at rest in the world (joints,).
+
+    They are in the middle of a joint's children; at one without any, along y as far as its parent is, or as the
+    farthest of all, or 1 where all are in one place.
+    """
+    hanging = np.flatnonzero(parents >= 0)
+    arms, lengths = np.zeros((len(parents), 3)), np.zeros(len(parents))
+    steps = rest.positions[hanging] - rest.positions[parents[hanging]]
+    np.add.at(arms, parents[hanging], steps)
+    lengths[hanging] = np.linalg.norm(steps, axis=1)
+    lengths = np.where(lengths > 0.0, lengths, np.max(lengths) or 1.0)
+    children = np.bincount(parents[hanging], minlength=len(parents))
+    tails = rotate(conjugate(rest.quaternions), arms / np.maximum(children, 1)[:, None])
+    return np.where((children > 0)[:, None], tails, lengths[:, None] * (0.0, 1.0, 0.0))
 
 
-def size_of(parents: np.ndarray, places: np.ndarray) -> float:
-    """Return the largest extent along any axis of joints at these places (joints, 3).
+def carrying(parents: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return which joints are roots that carry a body about, shape (joints,), by their places (joints, 3).
 
-    Joints that only carry the rest of the body about, from the ground or from wherever they were left, are no part of
-    it: it begins where a joint first has several children.
+    They may be anywhere. One that is near to the only joint that hangs on it is a part of the body, as hips without
+    legs are.
+    """
+    result = (parents < 0) & ~part_of_body(parents)
+    for root in np.flatnonzero(result).tolist():
+        away = np.linalg.norm(places[parents == root] - places[root])
+        result[root] = away > BESIDE * np.ptp(places[~result], axis=0).max()
+    return result
+
+
+def part_of_body(parents: np.ndarray) -> np.ndarray:
+    """Return which joints are part of a body, shape (joints,).
+
+    Joints that only carry the rest of it about, from the ground or from wherever they were left, are none: a body
+    begins where a joint first has several children.
     """
     children = np.bincount(parents[parents >= 0], minlength=len(parents))
     body = np.ones(len(parents), dtype=bool)
@@ -138,7 +175,12 @@ def size_of(parents: np.ndarray, places: np.ndarray) -> float:
             chain.append(int(np.flatnonzero(parents == chain[-1])[0]))
         if children[chain[-1]] > 1:
             body[chain[:-1]] = False
-    return float(np.ptp(places[body], axis=0).max())
+    return body
+
+
+def size_of(parents: np.ndarray, places: np.ndarray) -> float:
+    """Return the largest extent along any axis of the joints of a body at these places (joints, 3)."""
+    return float(np.ptp(places[part_of_body(parents)], axis=0).max())
 
 
 def unit_of(size: float) -> tuple[str, float]:
@@ -149,6 +191,31 @@ def unit_of(size: float) -> tuple[str, float]:
         if GROWN_UP[0] <= size * length <= GROWN_UP[1]:
             return name, length
     return min(UNITS, key=lambda unit: abs(np.log(size * unit[1] / TYPICAL)))
+
+
+def unit_above_floor(size: float, lowest: float, highest: float) -> tuple[str, float, str]:
+    """Return the unit that a body is likely to be in, its length in metres, and what else than its size speaks for it.
+
+    The body is so large, and its joints are so high above the floor. Where by its size all of it would be higher than
+    the hips of giants, it is a part of a body, such as the upper half: then its height is that of a grown-up.
+    """
+    usual, length = unit_of(size)
+    if length == 1.0 or lowest * length <= HIGHEST_HIPS:
+        return usual, length, ""
+    for name, metres in UNITS:
+        if GROWN_UP[0] <= highest * metres <= GROWN_UP[1] and lowest * metres <= HIGHEST_HIPS:
+            why = (
+                f"guessed from its height of {highest * metres:.3g} m above the floor: in {usual}, all of it would be "
+            )
+            return name, metres, f"{why}more than {lowest * length:.3g} m up"
+    return usual, length, ""
+
+
+def likely_metres(parents: np.ndarray, places: np.ndarray, metres_per_unit: float = 1.0) -> float:
+    """Return the length of the unit that a body with joints at these places (joints, 3) is likely to be in."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        size = size_of(parents, places) * metres_per_unit
+    return metres_per_unit * (unit_of(size)[1] if np.isfinite(size) else 1.0)
 
 
 def sureness(size: float, length: float) -> str:

@@ -1,8 +1,6 @@
 """Armatures of the open Blender: their bones as the joints of a body, where Blender shows them.
 
-Matrices of Blender are in single precision, and may scale and shear. Of a joint the position is kept as it is, and of
-its axes the direction of the bone (y); x is made square to it, z square to both, and all of length 1. The
-surface that an armature carries is that of all of its meshes together, where its bones are at rest.
+The surface that an armature carries is that of all of its meshes together, where its bones are at rest.
 """
 
 from __future__ import annotations
@@ -10,33 +8,26 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.motion.quaternions import align_signs, conjugate, from_matrices, rotate
+from rigid_motion.motion.quaternions import conjugate, rotate
 
-from .bvh import MOST_POSES
+from .matrices import filled, rigid
+from .objects import matrix_of, poses_on, probe
 from .recordings import Trajectory, TrajectoryError, shown
-from .rest_bodies import RestBody, Skin, in_parents, size_of, unit_of
+from .rest_bodies import CARRIERS, MOST_VERTICES, RestBody, Skin, likely_metres
 from .sampling import OF_JOINTS, Moments, sampled
 
 if TYPE_CHECKING:
     import bpy
 
-LAST_FRAME = 1048574
-"""Last frame that Blender has; a damaged file could, and would keep it at work for hours."""
-
-BLOCK = 256
-"""Frames whose matrices are kept at once."""
-
 AT_CHILD = 0.01
 """The part of its length within which a bone ends where its child begins."""
-
-SHORTEST_AXIS = 1e-12
-"""Length below which an axis has no direction: bones are hidden by scaling them to nothing."""
 
 
 @contextmanager
@@ -56,24 +47,6 @@ def in_blender(path: Path, again: str) -> Iterator[None]:
         raise TrajectoryError(path, "a name in this file is no text", again) from None
     except MemoryError:
         raise TrajectoryError(path, "this file needs more memory than there is", "split the recording") from None
-
-
-@contextmanager
-def probe() -> Iterator[bpy.types.Object]:
-    """Yield an object that is shown in the current scene, which is new; whatever its constraints follow is evaluated.
-
-    Blender evaluates what is hidden only for the sake of what is shown. Both are gone afterwards.
-    """
-    import bpy
-
-    stage, obj = bpy.data.scenes.new("Reading"), bpy.data.objects.new("Probe", None)
-    try:
-        stage.collection.objects.link(obj)
-        with bpy.context.temp_override(scene=stage, view_layer=stage.view_layers[0]):
-            yield obj
-    finally:
-        bpy.data.objects.remove(obj)
-        bpy.data.scenes.remove(stage)
 
 
 @dataclass(frozen=True)
@@ -154,10 +127,7 @@ def whole_body(
     # What a damaged file has beyond all measure is for the repair to say.
     with np.errstate(invalid="ignore", over="ignore"):
         rest_body = _rest_body(rig, joints, look.first, meshes, made_up=made_up)
-        local = in_parents(_filled(seen.poses), joints.parents)
-        poses = Poses(local.positions, align_signs(local.quaternions))
-    body = Trajectory(name, moments.times(seen.frames), poses, metres_per_unit, joints.remark, rest_body=rest_body)
-    return seen.described(body, moments, metres)
+    return seen.as_body(name, moments, metres, rest_body, metres_per_unit, joints.remark)
 
 
 def single_joints(
@@ -167,22 +137,15 @@ def single_joints(
     metres = scale or _metres(rig, 1.0)
     with looking(path, rig, bones) as look:
         seen = sampled(moments, look, np.full(len(bones), -1), OF_JOINTS, metres)
-    times, poses = moments.times(seen.frames), _filled(seen.poses)
-    rate = moments.fps / moments.step
-    first, *others = (
-        Trajectory(name, times, Poses(poses.positions[joint], align_signs(poses.quaternions[joint])), rate=rate)
-        for joint, name in enumerate(bones)
-    )
-    return [seen.described(first, moments, metres), *others]
+    return seen.as_singles(bones, moments, metres)
 
 
 def _metres(rig: bpy.types.Object, metres_per_unit: float) -> float:
     """Return the length of the unit that a rig is likely to be in, from where its joints rest."""
-    joints, there = joints_of(rig), _matrix(rig)
+    joints, there = joints_of(rig), matrix_of(rig)
     with np.errstate(invalid="ignore", over="ignore"):
         heads = np.array([armature_of(rig).bones[name].head_local for name in joints.names]) @ there[:3, :3].T
-        size = size_of(joints.parents, heads) * metres_per_unit
-    return metres_per_unit * (unit_of(size)[1] if np.isfinite(size) else 1.0)
+    return likely_metres(joints.parents, heads, metres_per_unit)
 
 
 @contextmanager
@@ -213,6 +176,16 @@ class _Look:
     first: dict[bpy.types.Object, np.ndarray] = field(default_factory=dict)
     """Matrices of the armature and of what else is followed, as they were at first, shape (4, 4) each."""
 
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """Where the bones are in the list of the pose, which has an order of its own."""
+        import bpy
+
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        for item in (self.rig, *self.followed):
+            self.first[item] = matrix_of(item.evaluated_get(depsgraph))
+        return _rows(self.path, self.rig.evaluated_get(depsgraph), self.bones)
+
     def __call__(self, frames: np.ndarray) -> Poses:
         """Return the bones on some frames (n,), shape (bones, n): NaN is the quaternion of one that has no direction.
 
@@ -221,81 +194,23 @@ class _Look:
         TrajectoryError
             Where that is too much, or beyond where Blender goes, or where the pose of the armature lacks a bone.
         """
-        import bpy
+        poses = poses_on(self.path, self.rig.name, len(self.bones), frames, self._matrices)
+        return Poses(poses.positions, poses.quaternions)
 
-        refuse_too_many(self.path, self.rig.name, len(self.bones), frames)
-        count = len(self.bones)
-        poses = Poses(np.empty((count, len(frames), 3)), np.empty((count, len(frames), 4)))
-        matrices = np.empty((min(BLOCK, len(frames)), count, 4, 4))
-        scene, depsgraph = cast("bpy.types.Scene", bpy.context.scene), bpy.context.evaluated_depsgraph_get()
-        rows = None
-        for number, frame in enumerate(frames.tolist()):
-            whole = int(np.floor(frame))
-            scene.frame_set(whole, subframe=frame - whole)
-            seen = self.rig.evaluated_get(depsgraph)
-            pose = cast("bpy.types.Pose", seen.pose)  # Where there is none, `_rows` says so.
-            if rows is None:
-                rows = _rows(self.path, seen, self.bones)
-                raw = np.empty(16 * len(pose.bones), dtype=np.float32)
-                for item in (self.rig, *self.followed):
-                    self.first.setdefault(item, _matrix(item.evaluated_get(depsgraph)))
-            pose.bones.foreach_get("matrix", raw)
-            row = number % BLOCK
-            # They come column by column.
-            columns = raw.reshape(-1, 4, 4)[rows].astype(np.float64)
-            with np.errstate(invalid="ignore", over="ignore"):
-                matrices[row] = _matrix(seen) @ columns.transpose(0, 2, 1)
-            if row == BLOCK - 1 or number == len(frames) - 1:
-                poses[:, number - row : number + 1] = rigid(matrices[: row + 1].transpose(1, 0, 2, 3))
-        return poses
-
-
-def _matrix(obj: bpy.types.Object) -> np.ndarray:
-    """Return where an object is in the world, shape (4, 4), in double precision: NumPy takes it as Blender has it."""
-    return np.array(obj.matrix_world, dtype=np.float64)
-
-
-def refuse_too_many(path: Path, name: str, joints: int, frames: np.ndarray) -> None:
-    """Raise TrajectoryError for more than can be kept, or where Blender does not go."""
-    if not (np.abs(frames) <= LAST_FRAME).all():
-        problem = f"{shown(name)} moves from frame {frames.min():g} to {frames.max():g}, where Blender does not go"
-        raise TrajectoryError(path, problem, "delete the keys that are far off")
-    if joints * len(frames) > MOST_POSES:
-        problem = f"{joints} joints in {len(frames)} frames are more than {MOST_POSES} poses"
-        raise TrajectoryError(path, problem, f"name one joint with {path}:NAME, or split the recording")
-
-
-def rigid(matrices: np.ndarray) -> Poses:
-    """Return the rigid poses of matrices (..., 4, 4). NaN is the quaternion of one whose x or y axis is nothing."""
-    x, y = matrices[..., :3, 0], matrices[..., :3, 1]
-    with np.errstate(invalid="ignore", over="ignore"):
-        y = _unit(y)
-        x = _unit(x)
-        x = _unit(x - np.sum(x * y, axis=-1, keepdims=True) * y)
-        return Poses(matrices[..., :3, 3], from_matrices(np.stack([x, y, np.cross(x, y)], axis=-1)))
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(lengths > SHORTEST_AXIS, lengths, np.nan)
-
-
-def _filled(poses: Poses) -> Poses:
-    """Return poses (bones, n), each missing quaternion being the last before, else the first after, or no turn."""
-    for own in poses.quaternions:
-        good = np.isfinite(own).all(axis=-1)
-        if good.all():
-            continue
-        if not good.any():
-            own[:] = (1.0, 0.0, 0.0, 0.0)
-            continue
-        last = np.maximum.accumulate(np.where(good, np.arange(len(own)), -1))
-        own[:] = own[np.where(last >= 0, last, np.argmax(good))]
-    return poses
+    def _matrices(self, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
+        """Return where Blender has the bones now, shape (bones, 4, 4)."""
+        seen, rows = self.rig.evaluated_get(depsgraph), self.rows
+        pose = cast("bpy.types.Pose", seen.pose)  # Where there is none, `_rows` says so.
+        raw = np.empty(16 * len(pose.bones), dtype=np.float32)
+        pose.bones.foreach_get("matrix", raw)
+        # They come column by column.
+        columns = raw.reshape(-1, 4, 4)[rows].astype(np.float64)
+        with np.errstate(invalid="ignore", over="ignore"):
+            return matrix_of(seen) @ columns.transpose(0, 2, 1)
 
 
 def _rows(path: Path, seen: bpy.types.Object, bones: Sequence[str]) -> np.ndarray:
-    """Return where these bones are in the list of the pose, which has an order of its own."""
+    """Return where these bones are in the list of the pose."""
     places = {bone.name: row for row, bone in enumerate(seen.pose.bones)} if seen.pose else {}
     if missing := [bone for bone in bones if bone not in places]:
         problem = f"the pose of {shown(seen.name)} lacks the bone {shown(missing[0])}"
@@ -313,7 +228,7 @@ def _rest_body(
 ) -> RestBody:
     bones, there = armature_of(rig).bones, matrices[rig]
     rest = rigid(there @ np.array([bones[name].matrix_local for name in joints.names]))
-    rest = _filled(Poses(rest.positions[:, None], rest.quaternions[:, None]))[:, 0]
+    rest = filled(Poses(rest.positions[:, None], rest.quaternions[:, None]))[:, 0]
     ends = np.array([bones[name].tail_local for name in joints.names]) @ there[:3, :3].T + there[:3, 3]
     tails = rotate(conjugate(rest.quaternions), ends - rest.positions)
     largest = 0.0 if made_up else float(np.ptp(rest.positions, axis=0).max())
@@ -345,13 +260,6 @@ def _shortened(tails: np.ndarray, heads: np.ndarray, parents: np.ndarray, larges
     lengths = np.linalg.norm(tails, axis=-1)
     longer = (reach > 0.0) & (lengths > np.maximum(reach, largest))
     return np.where(longer[:, None], tails * (reach / np.where(longer, lengths, 1.0))[:, None], tails)
-
-
-MOST_VERTICES = 200_000
-"""A body with more is shown without its skin."""
-
-CARRIERS = 4
-"""Joints that carry a vertex; more are left out, the weaker ones."""
 
 
 def carried_by(rig: bpy.types.Object) -> list[bpy.types.Object]:

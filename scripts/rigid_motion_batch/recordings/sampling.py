@@ -7,8 +7,9 @@ and its halves again. Everyday recordings, with a key on every frame, stay as th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -20,8 +21,9 @@ from rigid_motion.motion.quaternions import align_signs, angle_between
 
 from .bvh import MOST_POSES
 from .clips import ClipWarning
-from .recordings import Trajectory
-from .rest_bodies import in_parents
+from .matrices import filled, growing
+from .recordings import Trajectory, TrajectoryError
+from .rest_bodies import RestBody, in_parents
 
 WITHIN = 1e-3
 """Metres that what lies between two samples may be off."""
@@ -52,6 +54,21 @@ LEAD = 2.0 * CLOSEST
 
 SAME = 2e-3
 """Steps by which gaps may differ that are the same: F-curves keep frames in single precision."""
+
+FASTEST, SLOWEST = 240.0, 5.0
+"""Keys a second that are taken to be the rate of a file."""
+
+ROUND = 2e-4
+"""Share by which a rate may be off a whole number that is one: 29.97 is none."""
+
+ON_A_FRAME = 1e-4
+"""Distance from a whole frame within which a key is on it."""
+
+MULTIPLE = 0.05
+"""Share of the least gap between keys by which others may miss its multiples."""
+
+THINNED = 4.0
+"""Number of samples that a key may stand for where keys were thinned."""
 
 FLIP = np.radians(60.0)
 """Turn between two frames, and back, beyond which angles have jumped by a whole turn."""
@@ -100,6 +117,46 @@ def merged(even: np.ndarray, keys: np.ndarray, step: float) -> np.ndarray:
     return np.sort(np.concatenate((even, kept)))
 
 
+def moments_between(first: float, last: float, fps: float, step: float, keys: np.ndarray, *, straight: bool) -> Moments:
+    """Return even frames from the first key to the last one, and all keys (n,) between, in any order."""
+    even = first + step * np.arange(int((last - first) / step + SAME) + 1)
+    if last - even[-1] > SAME * step:
+        even = np.append(even, last)
+    frames = on_frames(merged(even, keys, step))
+    return Moments(frames, fps, float(frames[0]), step, straight)
+
+
+def on_frames(frames: np.ndarray) -> np.ndarray:
+    """Return frames, those on whole ones that nearly are."""
+    whole = np.rint(frames)
+    return np.where(np.abs(frames - whole) < ON_A_FRAME, whole, frames)
+
+
+def rate_of(keys: Iterable[np.ndarray], fps: float) -> float | None:
+    """Return how many keys a second the densest curve has; None where that is no rate that anything is recorded at.
+
+    `keys` are the frames of those of each curve, rising, and there are `fps` frames a second. A curve with even gaps,
+    or a thinned one whose gaps are multiples of the least, goes before uneven ones.
+    """
+    rates: dict[bool, list[float]] = {True: [], False: []}
+    for frames in keys:
+        gaps = np.diff(frames)
+        if len(gaps := gaps[gaps > ON_A_FRAME]):
+            times = gaps / gaps.min()
+            even = np.abs(times - np.rint(times)).max() < MULTIPLE and times.mean() < THINNED
+            rate = fps / (gaps.sum() / np.rint(times).sum() if even else float(np.median(gaps)))
+            rates[bool(even)].append(float(round(rate)) if abs(rate - round(rate)) < ROUND * rate else rate)
+    of_recordings = [[rate for rate in some if SLOWEST <= rate <= FASTEST] for some in rates.values()]
+    return max(of_recordings[0] or of_recordings[1], default=None)
+
+
+def refuse_too_many(path: Path, joints: int, frames: float) -> None:
+    """Raise TrajectoryError for more poses than can be kept."""
+    if joints * frames > MOST_POSES:
+        problem = f"{joints} joints in {frames:.0f} frames are more than {MOST_POSES} poses"
+        raise TrajectoryError(path, problem, f"name one joint with {path}:NAME, or split the recording")
+
+
 def away(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return how far the nearest of others, which rise, is from each of some frames; shape of the frames."""
     return np.abs(frames - others[nearest(others, frames)]) if len(others) else np.full(len(frames), np.inf)
@@ -126,6 +183,30 @@ class Sampled:
 
     flips: int = 0
     """Gaps in which something turns over and back."""
+
+    def as_body(
+        self,
+        name: str,
+        moments: Moments,
+        metres: float,
+        rest_body: RestBody,
+        metres_per_unit: float = 1.0,
+        remark: str = "",
+    ) -> Trajectory:
+        """Return the joints as a whole body, each in its parent's space; otherwise as `described`."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            local = in_parents(filled(self.poses), rest_body.parents)
+        poses = Poses(local.positions, align_signs(local.quaternions))
+        body = Trajectory(name, moments.times(self.frames), poses, metres_per_unit, remark, rest_body=rest_body)
+        return self.described(body, moments, metres)
+
+    def as_singles(self, names: Sequence[str], moments: Moments, metres: float, remark: str = "") -> list[Trajectory]:
+        """Return a trajectory in the world for each joint, or object; what there is to say is of the first."""
+        times, poses, rate = moments.times(self.frames), filled(self.poses), moments.fps / moments.step
+        first, *others = (
+            Trajectory(name, times, growing(own), rate=rate) for name, own in zip(names, poses, strict=True)
+        )
+        return [self.described(replace(first, remark=remark), moments, metres), *others]
 
     def described(self, trajectory: Trajectory, moments: Moments, metres: float) -> Trajectory:
         """Return a trajectory of these samples with its rate and what there is to say; its unit has so many metres."""

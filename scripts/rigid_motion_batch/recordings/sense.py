@@ -11,13 +11,13 @@ sample, as the options `--start` and `--end` do.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.motion.repair import LARGEST, rising
+from rigid_motion.motion.repair import LARGEST, Repair
 
 from .clips import ClipWarning
 from .recordings import Trajectory, TrajectoryError, shown
@@ -120,14 +120,6 @@ def _of_times(times: np.ndarray, time_unit: bool) -> Iterator[ClipWarning]:
         )
     if interval < 1.0 / FASTEST:
         yield ClipWarning(f"{1.0 / interval:.3g} samples a second, more than any device has", way_out)
-    lost = np.count_nonzero(~rising(times))
-    if lost > MIXED * len(times):
-        row = 1 + np.flatnonzero(np.diff(times) < 0.0)[0]
-        yield ClipWarning(
-            f"its time runs backwards at row {row}, and {lost} of {len(times)} rows are lost to that: these are "
-            "several recordings or devices",
-            "split the file, or name the column of devices, --columns device=NAME",
-        )
 
 
 def _of_lengths(times: np.ndarray, positions: np.ndarray) -> Iterator[ClipWarning]:
@@ -135,7 +127,7 @@ def _of_lengths(times: np.ndarray, positions: np.ndarray) -> Iterator[ClipWarnin
         return
     steps = np.diff(times)
     forward = steps > 0.0
-    speeds = np.linalg.norm(np.diff(positions, axis=0)[forward], axis=-1) / steps[forward]
+    speeds = np.linalg.norm(np.diff(positions, axis=0)[forward], axis=-1) / _lasting(steps[forward])
     fast = float(np.percentile(speeds, 95.0)) if len(speeds) else 0.0
     low, high = np.percentile(positions, (1.0, 99.0), axis=0)
     extent, away = float(np.linalg.norm(high - low)), float(np.linalg.norm(low + high)) / 2.0
@@ -173,6 +165,9 @@ BROAD, FLAT = 0.75, 0.4
 
 GAP = 0.2
 """Seconds: the longest time between keys of a comparison at 5 keys a second. In a longer gap there is no key at all."""
+
+LOST = 0.25
+"""The share of rows from which on it is no repair to leave them out."""
 
 ISOLATED = 10.0
 """Factor by which a jump goes farther than the samples around it."""
@@ -238,6 +233,23 @@ def _kind(places: np.ndarray, rest_body: RestBody, size: float) -> str:
     return "the pose at rest" if np.abs(away - away[0]).max() < AT_REST * size else ""
 
 
+def losses(repairs: Sequence[Repair], count: int) -> tuple[list[ClipWarning], list[Repair]]:
+    """Return warnings of repairs that cost a good part of so many rows of a recording, and the other repairs."""
+    costly = [repair for repair in repairs if repair.fault.startswith("dropped") and len(repair.rows) >= LOST * count]
+    warnings = []
+    for repair in costly:
+        way_out = "if tracking was lost there, take a part without it: --start and --end"
+        if "comes again" in repair.fault:
+            way_out = "if its rows come in packets with one time, number them in a column and add --frame-rate"
+        elif "runs backwards" in repair.fault:
+            way_out = (
+                "these are several recordings or devices: split the file, or name the column of devices, --columns "
+            )
+            way_out += "device=NAME"
+        warnings.append(ClipWarning(f"{len(repair.rows)} of {count} rows are lost: {repair}", way_out))
+    return warnings, [repair for repair in repairs if repair not in costly]
+
+
 def breaks(
     times: np.ndarray, poses: Poses, rest_body: RestBody | None, metres: float, begin: float
 ) -> list[ClipWarning]:
@@ -261,6 +273,7 @@ def _gaps(times: np.ndarray, steps: np.ndarray, begin: float) -> Iterator[ClipWa
 
 
 def _jumps(times: np.ndarray, steps: np.ndarray, lengths: np.ndarray, begin: float) -> Iterator[ClipWarning]:
+    steps = _lasting(steps)
     fast = np.flatnonzero(lengths > HIGHEST_SPEED * steps)
     if len(fast) > MOST_JUMPS * len(steps):
         return
@@ -272,6 +285,11 @@ def _jumps(times: np.ndarray, steps: np.ndarray, lengths: np.ndarray, begin: flo
         text = f"a jump at {first - begin:.2f} s{_of(jumps, 'jumps')}: {lengths[row]:.2g} m in one sample, at "
         text += f"{lengths[row] / steps[row]:.3g} m/s, where tracking was lost or takes were joined"
         yield ClipWarning(text, LEAVE_OUT, first, last)
+
+
+def _lasting(steps: np.ndarray) -> np.ndarray:
+    """Return steps forward of which none is far shorter than the others: stamps that come late do not make speed."""
+    return np.maximum(steps, np.median(steps) / 2.0) if len(steps) else steps
 
 
 def _lengths(poses: Poses, rest_body: RestBody | None) -> Iterator[np.ndarray]:

@@ -14,7 +14,7 @@ import codecs
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -23,9 +23,17 @@ from pathlib import Path
 
 import numpy as np
 
+from .clips import ClipWarning
+from .column_names import UNIT_OF, ColumnName
 from .recordings import TrajectoryError, shown
 
 SEPARATORS = (",", ";", "\t")
+
+NOTHING = " \t,;\r\v\f"
+"""What a row without a number consists of."""
+
+UNITS_BELOW = {"", "-", "1", *UNIT_OF}
+"""What the cells of a row of units are, where it stands below the names."""
 
 LARGEST_FILE = 1 << 30
 """Bytes. Files beyond are refused: an hour of a hundred bodies at 90 Hz has half as many."""
@@ -44,6 +52,9 @@ PIECE = 1 << 18
 
 BLOCK = 1 << 14
 """Rows that are parsed at once."""
+
+DAMAGED = "delete this line if it is damaged, as the last one of a recording that was cut off"
+"""The way out of a line that is not like the others."""
 
 MOST_COMMENTS = 100
 """Lines. Behind so many no header is looked for."""
@@ -77,9 +88,10 @@ class Table:
 
     def rows(self) -> Iterator[tuple[int, str]]:
         """Yield the lines of the rows with their numbers, without blank ones and comments."""
-        for number, line in lines_of(self.header.path, after=self.header.number):
+        lines = lines_of(self.header.path, after=self.header.number)
+        for number, line in self.header.rows(lines) if self.header.rows else lines:
             line = line.strip(" ")
-            if line and not line.isspace() and line[0] != "#":
+            if line.strip(NOTHING) and line[0] != "#":
                 yield number, flattened(line, self.header.separator) if self.header.vectors else line
 
 
@@ -174,6 +186,23 @@ class HeaderLine:
     vectors: bool = False
     """True if cells of the rows hold vectors, and the names of the header are those of their numbers."""
 
+    names: Sequence[ColumnName | None] | None = None
+    """What the columns mean, where the format says so and not the cells."""
+
+    rows: Callable[[Iterator[tuple[int, str]]], Iterable[tuple[int, str]]] | None = None
+    """A function that makes rows of the lines below, where not every line is one."""
+
+    inverted: bool = False
+    """True if the poses are those of the world, as a camera sees it."""
+
+    advice: str = ""
+    """The way out where columns are missing, if it is not to name them."""
+
+    remark: str = ""
+    """What there is to say of how the file is read."""
+
+    warnings: tuple[ClipWarning, ...] = ()
+
     @classmethod
     def of(cls, path: Path, number: int, text: str) -> HeaderLine:
         """Return the cells of a line, which may be a comment."""
@@ -186,9 +215,13 @@ class HeaderLine:
         return TrajectoryError(self.path, problem, way_out, self.number)
 
     def of_rows(self) -> HeaderLine:
-        """Return the header as the first row below it has it."""
-        below = (line.strip() for _, line in islice(lines_of(self.path, after=self.number), MOST_COMMENTS))
-        row = next((line for line in below if line and not line.startswith("#")), "")
+        """Return the header as the first row below it has it, or with the units of a row that holds nothing else."""
+        below = ((number, line.strip()) for number, line in islice(lines_of(self.path, self.number), MOST_COMMENTS))
+        number, row = next(((number, line) for number, line in below if line and line[0] != "#"), (0, ""))
+        units = [cell.strip().strip("[]()") for cell in split_row(row, self.separator)]
+        if len(units) == len(self.cells) and any(units) and all(unit in UNITS_BELOW for unit in units):
+            cells = [f"{cell} [{unit}]" if unit else cell for cell, unit in zip(self.cells, units, strict=True)]
+            return replace(self, number=number, cells=cells)
         names = expanded(self.cells, row, self.separator)
         return self if names is None else replace(self, cells=names, vectors=True)
 
@@ -212,24 +245,12 @@ def header_lines(path: Path) -> Iterator[HeaderLine]:
     yield HeaderLine(path, number, None, [])
 
 
-def lines_above_numbers(path: Path) -> Iterator[HeaderLine]:
-    """Yield lines near the beginning that a row of numbers with as many cells follows, and that hold none themselves.
-
-    A row is one of numbers where more than half of the cells that are not empty are some. Blank lines are skipped.
-    """
-    above: HeaderLine | None = None
-    for number, line in islice(lines_of(path), MOST_METADATA):
-        if not (text := line.strip().lstrip("# \t")):
-            continue
-        if above:
-            cells = cells_of(path, number, text, above.separator)
-            filled = [cell if above.separator == "," else cell.replace(",", ".") for cell in cells if cell]
-            if sum(map(is_number, filled)) > len(filled) / 2:
-                if len(cells) == len(above.cells) and not any(map(is_number, above.cells)):
-                    yield above
-                above = None
-                continue
-        above = HeaderLine.of(path, number, text)
+def lines_of_words(path: Path, after: int) -> Iterator[HeaderLine]:
+    """Yield lines behind one, near the beginning, that hold no numbers. Blank lines are skipped."""
+    for number, line in islice(lines_of(path, after=after), max(MOST_METADATA - after, 0)):
+        header = HeaderLine.of(path, number, line.strip())
+        if header.cells and not any(map(is_number, header.cells)):
+            yield header
 
 
 def split_row(line: str, separator: str | None) -> list[str]:
@@ -292,10 +313,11 @@ def parse_rows(
             cells = split_row(line, separator)
             if len(cells) > width and any(cell.strip() for cell in cells[width:]):
                 problem = f"{len(cells)} columns where {width} have a name"
-                raise TrajectoryError(path, problem, "correct the line", number)
+                way_out = "give all columns a name, or delete this line where it alone has more"
+                raise TrajectoryError(path, problem, way_out, number)
             if len(cells) < needed:
                 problem = f"{len(cells)} columns where {needed} are needed"
-                raise TrajectoryError(path, problem, "correct or delete the line", number)
+                raise TrajectoryError(path, problem, DAMAGED, number)
             try:
                 if "_" in line:
                     raise ValueError("Python's own way of writing numbers")
@@ -317,7 +339,7 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
         return float(cell.replace(",", "."))
     except ValueError:
         problem = f"{name} is {shown(cell.strip())}, not a number"
-        raise TrajectoryError(path, problem, "correct or delete the line", line) from None
+        raise TrajectoryError(path, problem, DAMAGED, line) from None
 
 
 CELL = re.compile(r'"?[(\[{]([^()\[\]{}"]*)[)\]}]"?|"([^"]*)"')

@@ -1,4 +1,4 @@
-"""Times as seconds: in the unit that a file or a user says, and refused where neither does and seconds cannot be.
+"""Times as seconds: in the unit that a file or a user says, or that makes a rate of devices where seconds cannot be.
 
 Dates and clock times are exact to the nanosecond, as seconds since the earliest of them. Dates are those of ISO 8601 in
 its extended format, with `T` or a blank before the clock time, and with or without an offset from UTC:
@@ -20,7 +20,7 @@ from rigid_motion.motion.repair import LARGEST
 
 from .options import TICKS
 from .recordings import TrajectoryError, shown
-from .tables import Table, is_number
+from .tables import DAMAGED, HeaderLine, Table, is_number
 
 SLOWEST = 5.0
 """Samples a second. Of poses there are hardly ever fewer: the slowest recordings of people that are known have 15."""
@@ -33,6 +33,9 @@ TOO_SLOW = 0.5
 
 ENOUGH = 2
 """Steps of time that tell a unit. A file of two samples says nothing of it."""
+
+SINCE_1970 = 1e9, 4e9
+"""Seconds from 1970 to 2001 and to 2096, between which clocks are that count from there."""
 
 EXACT = 2.0**53
 """Number beyond which a float64 leaves out whole numbers, such as nanoseconds since 1970."""
@@ -60,32 +63,25 @@ def _steps_forward(times: np.ndarray) -> np.ndarray:
     return steps[steps > 0.0]
 
 
-def seconds_of(table: Table, ticks: np.ndarray, unit: str) -> np.ndarray:
-    """Return the times of a table as seconds.
-
-    Parameters
-    ----------
-    table : Table
-        With a column t, which is read again where a float64 cannot hold its numbers.
-    ticks : array, shape (n,)
-        That column.
-    unit : str
-        A name in `TICKS`, or empty for seconds.
-
-    Returns
-    -------
-    array, shape (n,)
-        Seconds as they are in the file; of other units those since the earliest time, wild ones not counted: of a
-        clock that counts from 1970 nothing is lost.
-    """
-    if TICKS.get(unit, 1.0) == 1.0 or not np.isfinite(ticks).any():
-        return ticks
-    if EXACT < np.nanmax(np.abs(ticks)) < LARGEST_WHOLE:
+def whole_ticks(table: Table, ticks: np.ndarray) -> np.ndarray:
+    """Return the column t of a table as whole numbers where a float64 cannot hold it, and as it is otherwise."""
+    if EXACT < np.nanmax(np.abs(ticks), initial=0.0) < LARGEST_WHOLE:
         # With fractions, or without a number in some row, they are not whole, and as near as floats are.
         with suppress(ValueError, OverflowError):
-            ticks = np.fromiter((int(cell) for _, cell in table.cells("t")), np.int64)
+            return np.fromiter((int(cell) for _, cell in table.cells("t")), np.int64)
+    return ticks
+
+
+def seconds_of(ticks: np.ndarray, a_second: float) -> np.ndarray:
+    """Return times (n,), of which there are so many in a second, as seconds.
+
+    They are as in the file where they are seconds, and otherwise those since the earliest time, wild ones not counted:
+    of a clock that counts from 1970 nothing is lost.
+    """
+    if a_second == 1.0 or not np.isfinite(ticks).any():
+        return ticks.astype(float)
     with np.errstate(over="ignore", invalid="ignore"):
-        return (ticks - earliest(ticks)) / TICKS[unit]
+        return (ticks - earliest(ticks)) / a_second
 
 
 def earliest(ticks: np.ndarray) -> float:
@@ -97,28 +93,36 @@ def earliest(ticks: np.ndarray) -> float:
     return usable[away <= WILD * np.median(away)].min(initial=usable[np.argmin(away)])
 
 
-def require_seconds(table: Table, times: np.ndarray, time_unit: str) -> None:
-    """Refuse times whose unit nothing says, and that cannot be seconds.
+def unit_by_rate(header: HeaderLine, ticks: np.ndarray) -> tuple[str, str]:
+    """Return the unit of times (n,) of one body that nothing says, and what to say of it; empty where they are seconds.
 
-    Parameters
-    ----------
-    table : Table
-    times : array, shape (n,)
-        Of one body.
-    time_unit : str
-        What the file or the user says; empty for nothing.
+    Some clocks count from 1970. Otherwise hardly ever more than one of milliseconds, microseconds and nanoseconds makes
+    a rate that devices have.
+
+    Raises
+    ------
+    TrajectoryError
+        Where the times are in none of these, or numbers of rows.
     """
-    interval = typical_interval(times)
-    if time_unit or len(_steps_forward(times)) < ENOUGH or interval <= 1.0 / TOO_SLOW:
-        return
-    likely = [unit for unit in LONG_NAMES if SLOWEST <= TICKS[unit] / interval <= FASTEST]
-    problem = f"t goes in steps of {interval:.4g}: as seconds that is one sample in {interval:.3g} s"
-    if likely:
-        unit, rate = likely[0], TICKS[likely[0]] / interval
-        way_out = f"these look like {LONG_NAMES[unit]} ({rate:.3g} samples a second): --time-unit {unit}"
-        raise table.header.error(problem, f"{way_out}, or --time-unit s if they are seconds")
-    way_out = f"say what it counts: --time-unit {', '.join(TICKS)}"
-    raise table.header.error(problem, way_out)
+    interval = typical_interval(ticks)
+    if len(_steps_forward(ticks)) < ENOUGH:
+        return "", ""
+    usual = abs(float(np.nanmedian(ticks)))
+    if interval <= 1.0 / TOO_SLOW and usual < EXACT:
+        return "", ""
+    if np.all(np.diff(ticks) == 1):
+        problem = f"t counts up by 1 from {ticks[0]:.0f}: these are numbers of rows or keys, not times"
+        raise header.error(problem, "say how many rows a second there are, --frame-rate 90, or name a column of times")
+    dated = [unit for unit in TICKS if SINCE_1970[0] < usual / TICKS[unit] < SINCE_1970[1]]
+    likely = dated or [unit for unit in LONG_NAMES if SLOWEST <= TICKS[unit] / interval <= FASTEST]
+    if likely == ["s"]:
+        return "", ""
+    if not likely:
+        problem = f"t goes in steps of {interval:.4g}: as seconds that is one sample in {interval:.3g} s"
+        raise header.error(problem, f"say what it counts: --time-unit {', '.join(TICKS)}")
+    rate = TICKS[likely[0]] / interval
+    said = f"times are taken for {LONG_NAMES[likely[0]]}, {rate:.3g} samples a second"
+    return likely[0], f"{said}, as seconds would be {interval:.3g} s apart (otherwise: --time-unit)"
 
 
 MOMENT = re.compile(
@@ -205,7 +209,6 @@ def seconds_of_dates(table: Table, kind: str) -> np.ndarray:
 
 def _moments(table: Table, kind: str) -> Iterator[tuple[int, int]]:
     """Yield the seconds of every row since some midnight in UTC, and the nanoseconds besides."""
-    way_out = "correct or delete the line"
     for number, cell in table.cells("t"):
         match = MOMENT.fullmatch(cell)
         if match is None and _is_missing(cell):
@@ -220,10 +223,10 @@ def _moments(table: Table, kind: str) -> Iterator[tuple[int, int]]:
                 raise ValueError(second)
         except ValueError:
             problem = f"t is {shown(cell, LONGEST_SHOWN)}, not {kind.partition(' with')[0]}"
-            raise TrajectoryError(table.header.path, problem, way_out, number) from None
+            raise TrajectoryError(table.header.path, problem, DAMAGED, number) from None
         if _kind(match) != kind:
             problem = f"t is {shown(cell, LONGEST_SHOWN)}, not {kind} as before"
-            raise TrajectoryError(table.header.path, problem, way_out, number)
+            raise TrajectoryError(table.header.path, problem, DAMAGED, number)
         yield seconds, int((fraction or "").ljust(9, "0"))
 
 

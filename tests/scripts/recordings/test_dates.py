@@ -52,7 +52,7 @@ def test_a_row_without_a_time_is_kept_for_the_repair(write) -> None:
 @pytest.mark.parametrize(
     ("second", "problem"),
     [
-        ("2026-13-22T10:00:00", "t is '2026-13-22T10:00:00', not a date; correct or delete the line"),
+        ("2026-13-22T10:00:00", "t is '2026-13-22T10:00:00', not a date; delete this line if it is damaged"),
         ("2026-11-22T10:00:61", "t is '2026-11-22T10:00:61', not a date"),
         ("2026-11-22T10:00:00.1234567891", "t is '2026-11-22T10:00:00.1234567891', not a date"),
         ("2026-11-22T10:00:00\u0661", "t is '2026-11-22T10:00:00\u0661', not a date"),

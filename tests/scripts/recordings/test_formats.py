@@ -120,6 +120,16 @@ def test_the_rigid_bodies_are_found_among_markers_and_bones(write, labels: bool,
     np.testing.assert_array_equal(head.poses.quaternions[2], [-0.5, 0.5, 0.5, 0.5])
 
 
+def test_bones_are_taken_by_name_beside_rigid_bodies_and_where_there_are_no_others(write) -> None:
+    path = write("take.csv", motive())
+    (hip,) = read_trajectories(f"{path}:Hip").trajectories
+    np.testing.assert_array_equal(hip.poses.positions, np.full((3, 3), 8.0))
+    bones = read_trajectories(write("take.csv", motive().replace("Rigid Body", "Marker"))).trajectories
+    assert [bone.name for bone in bones] == ["Hip"]
+    local = motive().replace("Space,Global", "Space,Local")
+    assert "Coordinate Space: Global" in str(read_trajectories(write("take.csv", local)).trajectories[0].warnings)
+
+
 TUM_COMMENTS = "# ground truth trajectory\n# file: 'dataset.bag'\n# timestamp tx ty tz qx qy qz qw\n"
 TUM_ROWS = "1305031098.6659 1.3 0.6 1.6 0.6132 0.5962 -0.3311 -0.3986\n1305031098.6758 1.4 0.7 1.7 0.1 0.2 0.3 0.4\n"
 
@@ -147,22 +157,49 @@ WRONG = {
     "take.csv": [
         (MOTIVE_SETTINGS, 1, "the rows that say what the columns are end too early"),
         (
-            motive().replace("Rigid Body Marker", "Marker").replace("Rigid Body", "Bone"),
+            motive().replace("Rigid Body Marker", "Marker").replace("Rigid Body", "Marker").replace("Bone", "Marker"),
             None,
-            "no rigid body, only Marker, Bone",
+            "no rigid body, only Marker",
         ),
         (motive(MOTIVE_SETTINGS.replace("Millimeters", "Cubits")), 1, "Length Units is 'Cubits'"),
         (motive(MOTIVE_SETTINGS.replace("Quaternion", "Matrix")), 1, "Rotation Type is 'Matrix'"),
         (
             motive(MOTIVE_SETTINGS.replace("Quaternion", "XYZ")).replace("X,Y,Z,W", "X,Y,Q,W"),
             7,
-            "'Drill' has no column rotat",
+            "no column named rx, ry, rz for 'Drill'",
         ),
         (motive() + "3,0.025" + ",1" * 99 + "\n", 11, "101 columns where 31 have a name"),
         (motive().replace("Head, left", "x" * 200_000), 4, "this line is no header"),
     ],
-    "data.csv": [(f"{EUROC_HEADER}\x1c{EUROC_HEADER}\n{EUROC_ROWS}", 1, "two columns mean x")],
+    "vicon.csv": [
+        (
+            "Trajectories\n100\n,,a:b\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n",
+            None,
+            "no table of Objects or Segments in it",
+        ),
+        ("Objects\nfast\n", 1, "no column has a known name (found Objects)"),
+        ("Objects\n0\n,,A\nFrame,Sub Frame,RX,RY,RZ,RW,TX,TY,TZ\n", 2, "the rate is '0'; say it: --frame-rate 100"),
+    ],
+    "body.tsv": [
+        ("NO_OF_FRAMES\t9\nNO_OF_BODIES\t1\n", None, "no line names the columns X, Y, Z; export 6D data with Include"),
+        ("NO_OF_FRAMES\t9\nNO_OF_BODIES\t1\nX\tY\tZ\n", 1, "the rate is ''; say it: --frame-rate 100"),
+    ],
+    "poses.json": [
+        ('[{"t": 0, "position": [1, 2, 3]}]', None, "positions only, and rotations are needed (found "),
+        (
+            '[{"t": 0, "pos": [1, 2, 3], "quat": [1, 0, 0, 0]}, {"t": 1}]',
+            None,
+            "pose 1 of 'poses' has no number pos[0]",
+        ),
+        (
+            '{"frames": [{"file_path": "a.png", "transform_matrix": 1}]}',
+            None,
+            "this JSON holds no poses; it takes a list",
+        ),
+    ],
+    "images.txt": [("#   POINTS2D[] as (X, Y)\n", None, "no column of time, only one that counts frames")],
     "walk.tum": [
+        ("0 1 2 3 4 5 6\n", 1, "7 numbers in a row, which are no poses that are known; write a first line of names"),
         (f"{TUM_COMMENTS}0 1 2 3 0 0 0 1\n0.1 1 2\n", 5, "3 columns where 8 are needed"),
         (f"{TUM_COMMENTS}0 1 2 3 0 0 0 1 9\n", 4, "9 columns where 8 have a name"),
         ("0 1 2 3\n0.1 1 2 3\n", 1, "positions only, and rotations are needed; write t x y z qx qy qz qw"),

@@ -21,12 +21,15 @@ from rigid_motion.motion import MODES, interpolate, measure, reduce_keys
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.analysis.results import measured
-from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
+from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS
+from tests.scripts.recordings.layouts import LAYOUTS
 from tests.scripts.recordings.mutations import in_place, mutated
+from tests.scripts.recordings.optical_layouts import OPTICAL
 from tests.scripts.recordings.seeds import SEEDS
-from tests.thoroughness import tried
+from tests.thoroughness import sample, tried
 
 CASES = int(os.environ.get("RIGID_MOTION_FUZZ", tried(400)))
 BLENDS = int(os.environ.get("RIGID_MOTION_FUZZ", "40"))
@@ -50,9 +53,9 @@ WHAT_IS_WRONG = re.compile(rf"(:\d+|:\*|{BONE})?: .+; .+")
 ROOT = Path(__file__).parents[3]
 
 
-def read_and_fill_in(source: str, number: int) -> bool:
+def read_and_fill_in(source: str, number: int, options: ReadingOptions = AS_THE_FILE_SAYS) -> bool:
     """Whether there is a recording; anything but that and a refusal in one line is an error."""
-    clips = clips_or_refusal(source)
+    clips = clips_or_refusal(source, options)
     if clips is None:
         return False
     if number % FILLED_IN:
@@ -75,10 +78,10 @@ def read_and_fill_in(source: str, number: int) -> bool:
     return True
 
 
-def clips_or_refusal(source: str) -> list[Clip] | None:
+def clips_or_refusal(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Clip] | None:
     """What is in a file; None where that is refused, in one line. Anything else is an error."""
     try:
-        recording = read_trajectories(source)
+        recording = read_trajectories(source, options)
         clips = [make_clip(trajectory, source, trajectory.name, "blender") for trajectory in recording.trajectories]
     except TrajectoryError as error:
         assert_is_one_line(str(error), source)
@@ -95,7 +98,9 @@ def assert_is_one_line(message: str, source: str) -> None:
     assert len(message) < LONGEST_ERROR + 3 * len(path)
 
 
-def fuzz(folder: Path, ending: str, seeds: tuple[bytes, ...], cases: int) -> int:
+def fuzz(
+    folder: Path, ending: str, seeds: tuple[bytes, ...], cases: int, options: ReadingOptions = AS_THE_FILE_SAYS
+) -> int:
     """Read damaged files, and return how many could be read nevertheless."""
     path, readable = folder / f"take{ending}", 0
     for number in range(FIRST, FIRST + cases):
@@ -104,7 +109,7 @@ def fuzz(folder: Path, ending: str, seeds: tuple[bytes, ...], cases: int) -> int
         source = f"{path}{chance.choice(('', ':*'))}"
         started = time.process_time()
         try:
-            readable += read_and_fill_in(source, number)
+            readable += read_and_fill_in(source, number, options)
         except Exception as error:
             error.add_note(f"case {number} of {ending}: {path}")
             raise
@@ -116,6 +121,12 @@ def fuzz(folder: Path, ending: str, seeds: tuple[bytes, ...], cases: int) -> int
 def test_damaged_text_is_refused_in_one_line_or_can_be_filled_in(tmp_path: Path, ending: str) -> None:
     readable = fuzz(tmp_path, ending, tuple(seed.encode() for seed in SEEDS[ending]), CASES)
     assert 0 < readable < CASES or CASES < 100, "damage that is always or never noticed tells little"
+
+
+@pytest.mark.parametrize("name", sample([*LAYOUTS, *OPTICAL]))
+def test_damage_to_any_layout_is_refused_in_one_line_or_can_be_filled_in(tmp_path: Path, name: str) -> None:
+    layout = (LAYOUTS | OPTICAL)[name]
+    fuzz(tmp_path, f".{layout.name}", (layout.text.encode(),), CASES // 10, ReadingOptions(**layout.said))
 
 
 READER = """

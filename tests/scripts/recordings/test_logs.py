@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
+from rigid_motion_batch.recordings import ReadingOptions, read_clips, read_trajectories
 from tests.scripts.recordings import logs
 from tests.scripts.recordings.logs import MOTIONS, assert_is_the_motion, log, names, spellings
 from tests.thoroughness import tried
@@ -110,7 +110,7 @@ def test_a_column_that_is_named_for_devices_and_is_none_is_refused(write, refusa
         ("when,a,b,c,d,e,f,g", {}, "no column has a known name (found when, a, b, c, d, e, f, g); known are t, time, "),
         ("frame,x,y,z,qx,qy,qz,qw", {}, "no column of time, only one that counts frames ('frame'); say how many frame"),
         ("t,left_x,left_y,left_z,button", {}, "positions only, and rotations are needed (found t, left_x, left_y, lef"),
-        ("t,time,x,y,z,qx,qy,qz,qw", {}, "two columns mean t ('t', 'time'); say which with --columns t=NAME, or"),
+        ("t,x,x,y,z,qx,qy,qz,qw", {}, "two columns mean x ('x'); say which with --columns x=NAME, or rename or"),
         ("t,x,y,z,rx,ry,rz", {}, "rotations are Euler angles here (rx, ry, rz), and their order is not said; say it:"),
         ("t,x,y,z,qx,qy,qz,qw", {"euler": "XYZ"}, "no column named rx, ry, rz (found t, x, y, z, qx, qy, qz, qw); kn"),
         ("t,x,y,z,qx,qy,qz,qw", {"columns": [("t", "when")]}, "no column is named 'when'; --columns t=NAME takes one "),
@@ -139,15 +139,56 @@ def test_angles_that_are_no_radians_are_refused(write, refusal) -> None:
 @pytest.mark.parametrize(
     ("given", "name"),
     [
-        ({"columns": [("t", "t")]}, "--columns is for CSV with named columns, and this is TUM"),
-        ({"euler": "XYZ"}, "--euler is for CSV with named columns, and this is TUM"),
+        ({"columns": [("t", "t")]}, "take.bvh"),
+        ({"euler": "XYZ"}, "take.bvh"),
+        ({"time_unit": "ms"}, "take.csv"),
     ],
 )
 def test_an_option_that_means_nothing_to_a_format_is_refused(write, refusal, given: dict, name: str) -> None:
-    assert (
-        refusal(write("take.tum", "0 0 0 0 0 0 0 1\n"), **given)[1]
-        == f"{name}; leave it out; its files say that themselves"
-    )
+    option, label = next(iter(given)).replace("_", "-"), "BVH" if name.endswith("bvh") else "Motive CSV"
+    text = f"--{option} means nothing to {label}; leave it out, as its files say that themselves"
+    assert refusal(write(name, "Format Version,1.23\n"), **given)[1] == text
+
+
+def test_clocks_that_run_at_different_speeds_are_asked_for(write, refusal) -> None:
+    rows = "".join(f"{row / 90},{row / 45},0,0,0,0,0,0,1\n" for row in range(9))
+    source = write("take.csv", f"time,clock,x,y,z,qx,qy,qz,qw\n{rows}")
+    _, message = refusal(source)
+    assert message.startswith("two columns mean t and disagree ('time' lasts ")
+    assert message.endswith("say which with --columns t=NAME")
+    np.testing.assert_allclose(read_one(source, columns=[("t", "clock")]).times, np.arange(9) / 45.0)
+
+
+@pytest.mark.parametrize("stuck", ["-1", "", "0.5"])
+def test_a_clock_that_stands_still_is_not_taken(write, stuck: str) -> None:
+    rows = "".join(f"{stuck},{row / 90},0,0,0,0,0,0,1\n" for row in range(9))
+    one = read_one(write("take.csv", f"utc_ns,t,x,y,z,qx,qy,qz,qw\n{rows}"))
+    np.testing.assert_allclose(one.times, np.arange(9) / 90.0)
+    assert one.remark == "times are those of 't' and not of 'utc_ns': of 9 rows the time changes in 8, and not in 0"
+
+
+def test_a_steady_clock_is_taken_before_one_that_trembles(write) -> None:
+    rows = "".join(f"{row / 90 + 0.003 * (row % 3 == 1)},{row / 90},0,0,0,0,0,0,1\n" for row in range(30))
+    one = read_one(write("take.csv", f"receive_time,stamp,x,y,z,qx,qy,qz,qw\n{rows}".replace("receive_", "host ")))
+    np.testing.assert_allclose(one.times, np.arange(30) / 90.0)
+
+
+def test_a_body_whose_rotations_are_angles_is_named(write) -> None:
+    header = "t,x,y,z,qx,qy,qz,qw,left_x,left_y,left_z,left_rx,left_ry,left_rz"
+    one = read_one(write("take.csv", header + "\n0,0,0,0,0,0,0,1,0,0,0,0,0,0\n.1,0,0,0,0,0,0,1,0,0,0,0,0,0\n"))
+    assert one.remark == "'left' is left out, as its rotations are Euler angles, for --euler"
+
+
+def test_bodies_that_share_no_rows_have_their_own_and_nothing_is_lost(write) -> None:
+    header = names("t", "{}", "q{}", prefixes=[f"{side}_" for side in MOTIONS])
+    rows = [log(names("t", "{}", "q{}"), side=side).splitlines()[1:] for side in MOTIONS]
+    lines = [
+        line for left, right in zip(*rows, strict=True) for line in (left + "," * 7, right.replace(",", "," * 8, 1))
+    ]
+    source = write("take.csv", "\n".join([",".join(header), *lines]))
+    for clip in read_clips([f"{source}:*"])[0]:
+        assert len(clip.times) == logs.COUNT
+        assert clip.repairs == ()
 
 
 @st.composite

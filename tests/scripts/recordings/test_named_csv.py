@@ -39,6 +39,7 @@ SPELLINGS = {
     "commas at the line ends": f"{HEADER},\n{ROWS}".replace("\n0", ",\n0").replace("0.4\n", "0.4,\n"),
     "a line that tells spreadsheets the separator": f"sep=,\n{HEADER}\n{ROWS}",
     "units in the names": "Time [s],X [m],Y [m],Z [m],qx,qy,qz,qw\n" + ROWS,
+    "units below the names": f"{HEADER}\ns,m,m,m,,-,[1],\n{ROWS}",
     "quotes": (
         '"t","x","y","z","qx","qy","qz","qw"\n"0.0","1","2","3","0.1","0.2","0.3","0.9"\n0.1,4,5,6,0.4,0.5,0.6,0.4\n'
     ),
@@ -70,7 +71,7 @@ def test_what_is_broken_in_the_recording_is_kept_for_the_repair(write) -> None:
         ("", None, "the file is empty"),
         (f"{HEADER.removesuffix(',qw')}\n{ROWS}", 1, "no column named qw"),
         ("# about\n\nt,x,y,z\n0,1,2,3\n", 3, "positions only, and rotations are needed (found t, x, y, z); record"),
-        (f"{HEADER},time\n{ROWS}", 1, "two columns mean t"),
+        (f"{HEADER},x\n{ROWS}", 1, "two columns mean x"),
         (f"{HEADER}\n{ROWS}0.2,1,2\n", 4, "3 columns where 8 are needed"),
         (f"{HEADER}\n0,1,2,3,0,0,0,1,5\n{ROWS}", 2, "9 columns where 8 have a name"),
         (f"{HEADER}\n{ROWS}{'9' * 100_000},{'x' * 100_000},2,3,0,0,0,1\n", 4, f"x is '{'x' * 24}...', not a number"),
@@ -113,7 +114,7 @@ def test_a_header_behind_other_lines_may_have_columns_without_numbers_and_a_row_
         ),
         (f"Recorder v1.2\na,b,c\n{ROWS}", 1, "no column has a known name (found Recorder, v1.2)"),
         (f"Recorder\n{HEADER}\n{ROWS}{HEADER}\n{ROWS}", 2, "lines 2 and 5 both name columns"),
-        ("Recorder\n" * 49 + f"{HEADER}\n{ROWS}", 1, "no column has a known name (found Recorder)"),
+        ("Recorder\n" * 50 + f"{HEADER}\n{ROWS}", 1, "no column has a known name (found Recorder)"),
         (f"Recorder\n{HEADER}\n{ROWS}0.2,1,2,three,0,0,0,1\n", 5, "z is 'three', not a number"),
     ],
 )

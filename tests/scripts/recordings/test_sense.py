@@ -8,7 +8,8 @@ import pytest
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings import ReadingOptions, Trajectory, TrajectoryError, read_trajectories
-from rigid_motion_batch.recordings.sense import doubts, require_one_body
+from rigid_motion_batch.recordings.clip_reading import make_clip
+from rigid_motion_batch.recordings.sense import breaks, doubts, require_one_body
 from rigid_motion_batch.recordings.times import typical_interval
 
 COUNT = 90
@@ -80,13 +81,42 @@ def test_what_stays_far_from_its_origin_may_be_in_another_unit(shift: float, sca
     assert all("--scale 0.01, if inches, --scale 0.0254" in item.way_out for item in result)
 
 
-def test_recordings_one_behind_the_other_are_said() -> None:
-    one = hand()
+LOSSES = {
+    "these are several recordings": (
+        np.tile(np.arange(COUNT) / 90.0, 2),
+        "89 of 180 rows are lost: dropped rows whose",
+    ),
+    "number them in a column": (
+        np.repeat(np.arange(45) / 20.0, 4),
+        "135 of 180 rows are lost: dropped rows whose time c",
+    ),
+    "tracking was lost": (np.where(np.arange(180) % 3, np.arange(180) / 90.0, np.nan), "60 of 180 rows are lost: drop"),
+}
+
+
+@pytest.mark.parametrize("way_out", LOSSES)
+def test_a_quarter_of_the_rows_that_is_lost_is_a_warning_and_no_repair(way_out: str) -> None:
+    one, (times, told) = hand(), LOSSES[way_out]
     poses = Poses(np.tile(one.poses.positions, (2, 1)), np.tile(one.poses.quaternions, (2, 1)))
-    (said,) = doubts(Trajectory("two", np.tile(one.times, 2), poses))
-    assert str(said).startswith(
-        "its time runs backwards at row 90, and 89 of 180 rows are lost to that: these are several"
-    )
+    clip = make_clip(Trajectory("two", times, poses), "two.csv", "two", "blender")
+    (warning,) = (item for item in clip.warnings if " lost: " in item.text)
+    assert warning.text.startswith(told)
+    assert way_out in warning.way_out
+    assert clip.repairs.count(str(warning)) == 1
+    assert not any(sentence.startswith(warning.text.partition(": ")[2]) for sentence in clip.repairs)
+
+
+@pytest.mark.parametrize("late", [1e-6, 1e-4])
+def test_a_stamp_that_is_too_early_or_too_late_is_no_jump(late: float) -> None:
+    one = hand(rate=1000.0)
+    times = np.arange(1000) / 1000.0
+    times[500] = times[499] + late
+    poses = Poses(np.tile(one.poses.positions, (12, 1))[:1000], np.tile(one.poses.quaternions, (12, 1))[:1000])
+    smooth = Poses(np.sin(times)[:, None] * np.ones(3), poses.quaternions)
+    assert breaks(times, smooth, None, 1.0, 0.0) == []
+    jump = smooth.positions.copy()
+    jump[500:] += 1.0
+    assert "a jump at" in str(breaks(times, Poses(jump, poses.quaternions), None, 1.0, 0.0)[0])
 
 
 @pytest.mark.parametrize("row", [0, 40, COUNT - 1])
@@ -108,19 +138,57 @@ def csv_of(times: list[str]) -> str:
 @pytest.mark.parametrize(
     ("unit", "ticks", "told"),
     [
-        ("ms", 1_000, "t goes in steps of 11: as seconds that is one sample in 11 s; these look like milliseconds (90"),
-        ("us", 10**6, "t goes in steps of 1.1e+04: as seconds that is one sample in 1.1e+04 s; these look like micros"),
-        ("ns", 10**9, "t goes in steps of 1.1e+07: as seconds that is one sample in 1.1e+07 s; these look like nanose"),
+        ("ms", 1_000, "times are taken for milliseconds, 90.9 samples a second, as seconds would be 11 s apart"),
+        ("us", 10**6, "times are taken for microseconds, 90.9 samples a second, as seconds would be 1.1e+04 s apart"),
+        ("ns", 10**9, "times are taken for nanoseconds, 90.9 samples a second, as seconds would be 1.1e+07 s apart"),
     ],
 )
-def test_times_that_are_no_seconds_are_refused_with_their_unit(write, refusal, name, start, unit, ticks, told):
+def test_times_that_cannot_be_seconds_are_in_the_unit_of_a_rate_that_devices_have(
+    write, name, start, unit, ticks, told
+):
     text = csv_of([str(start * ticks + row * 11 * ticks // 1000) for row in range(9)])
     source = write(name, text if name.endswith(".csv") else "# " + text.replace(",", " "))
-    line, message = refusal(source)
-    assert line == 1
-    assert message.startswith(told)
-    assert message.endswith(f"--time-unit {unit}, or --time-unit s if they are seconds")
-    (trajectory,) = read_trajectories(source, ReadingOptions(time_unit=unit)).trajectories
-    np.testing.assert_array_equal(trajectory.times - trajectory.times[0], [row * 11 / 1000 for row in range(9)])
+    (trajectory,) = read_trajectories(source).trajectories
+    assert trajectory.remark.startswith(told)
+    assert trajectory.remark.endswith("(otherwise: --time-unit)")
+    (said,) = read_trajectories(source, ReadingOptions(time_unit=unit)).trajectories
+    for one in (trajectory, said):
+        np.testing.assert_array_equal(one.times - one.times[0], [row * 11 / 1000 for row in range(9)])
     (trajectory,) = read_trajectories(source, ReadingOptions(time_unit="s")).trajectories
     assert typical_interval(trajectory.times) == pytest.approx(11 * ticks / 1000, rel=0.05)
+
+
+@pytest.mark.parametrize(("ticks", "unit"), [(1, ""), (1000, "milliseconds"), (10**9, "nanoseconds")])
+def test_a_clock_that_counts_from_1970_tells_its_unit_at_any_rate(write, ticks: int, unit: str) -> None:
+    source = write("slow.csv", csv_of([str((1_700_000_000 + 3 * row) * ticks) for row in range(9)]))
+    (trajectory,) = read_trajectories(source).trajectories
+    np.testing.assert_array_equal(np.diff(trajectory.times), 3.0)
+    assert unit in trajectory.remark
+    assert bool(trajectory.remark) == bool(unit)
+
+
+@pytest.mark.parametrize("wild", ["", "1e25", "-5"])
+@pytest.mark.parametrize("row", [0, 5])
+def test_a_row_without_its_time_changes_no_unit(write, wild: str, row: int) -> None:
+    times = [repr(0.3 * place) for place in range(9)]
+    times[row] = wild
+    (trajectory,) = read_trajectories(write("take.csv", csv_of(times))).trajectories
+    assert trajectory.remark == ""
+    assert trajectory.times[8] == 0.3 * 8
+
+
+def test_times_that_make_no_rate_in_any_unit_are_refused(write, refusal) -> None:
+    _, message = refusal(write("take.csv", csv_of([repr(3e9 * row) for row in range(9)])))
+    assert message.startswith("t goes in steps of 3e+09: as seconds that is one sample in 3e+09 s")
+    assert message.endswith("say what it counts: --time-unit s, ms, us, ns")
+
+
+@pytest.mark.parametrize("start", [10**9, 18295873486192640])
+def test_keys_of_rows_are_no_times(write, refusal, start: int) -> None:
+    source = write("take.csv", csv_of([str(start + row) for row in range(9)]))
+    if start > 2**53:
+        assert refusal(source)[1].startswith(
+            f"t counts up by 1 from {start}: these are numbers of rows or keys, not ti"
+        )
+    (counted,) = read_trajectories(source, ReadingOptions(frame_rate=90.0)).trajectories
+    np.testing.assert_allclose(counted.times - counted.times[0], np.arange(9) / 90.0, atol=1e-8)

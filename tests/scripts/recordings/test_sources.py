@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
-from rigid_motion_batch.recordings.reading import FORMATS, files_of, split_source
+from rigid_motion_batch.recordings.reading import ENDINGS, FORMATS, INSTEAD, files_of, split_source
 from rigid_motion_batch.recordings.recordings import unique
 
 CSV = "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,1\n"
@@ -73,6 +73,14 @@ def test_a_missing_file_is_told(folder: Path, source: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("source", ["han.csv", "Hand.CVS", "{folder}/hand.cvs", "hnad.csv:left"])
+def test_a_file_that_is_nearly_there_is_named(folder: Path, source: str) -> None:
+    (folder / "hand.csv").write_text(CSV)
+    (folder / "hand.cvs.txt~").write_text(CSV)
+    with pytest.raises(TrajectoryError, match=r"no such file: did you mean hand\.csv\?; check the path"):
+        read_trajectories(source.replace("{folder}", str(folder)))
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no such files there")
 @pytest.mark.parametrize("body", ["", ":left", ":*"])
 def test_what_is_no_file_is_told_and_never_opened(folder: Path, body: str) -> None:
@@ -94,9 +102,13 @@ def test_what_is_no_file_is_told_and_never_opened(folder: Path, body: str) -> No
 
 
 def test_an_unknown_extension_is_answered_with_the_known_ones(write, refusal) -> None:
-    _, message = refusal(write("take.usd", "PXR-USDC"))
-    assert message.startswith("unknown extension '.usd'; known are .csv, ")
+    _, message = refusal(write("take.mov", "moov"))
+    assert message.startswith("unknown extension '.mov'; known are .csv, ")
     assert all(extension in message for known in FORMATS for extension in known.extensions)
+    assert (
+        refusal(write("take.USD", "PXR-USDC"))[1] == "unknown extension '.USD'; open it in Blender, and name the .blend"
+    )
+    assert not {*" ".join(INSTEAD).split()} & {*ENDINGS}
 
 
 def test_a_name_from_a_file_cannot_reach_the_terminal(write) -> None:

@@ -1,0 +1,189 @@
+"""Rows of numbers without names: TUM, KITTI, pose matrices, the rows of EuRoC, VINS and OpenVINS, Nuke's .chan.
+
+Where a comment names the columns (`# timestamp tx ty tz qx qy qz qw`), the names are used. Otherwise what is where is
+seen by the numbers: a matrix has right angles, a quaternion the length 1. Columns may be named by their place,
+`--columns t=1,x=2`. At which end of a quaternion w is no number says: at the last, as in TUM, unless the first rotation
+is 1 0 0 0; in rows with commas, as of EuRoC and VINS, at the one that is larger in the first row. A guess is a warning.
+Sources: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats,
+https://www.cvlibs.net/datasets/kitti/eval_odometry.php.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from .clips import ClipWarning
+from .column_names import ColumnName
+from .columns import layout_of
+from .options import ReadingOptions
+from .recordings import Selection, Trajectory, TrajectoryError
+from .tables import HeaderLine, Table, header_lines, is_number, lines_of
+from .tracks import read_below
+
+FEWEST = 3
+"""Numbers in a row that is one of a recording."""
+
+LOOKED_AT = 500
+"""Rows that tell what the columns are."""
+
+MOST = 0.9
+"""The share of them that have to be alike."""
+
+NEAR = 0.02
+"""How far from 1 lengths may be, and from 0 the products of axes, in files of few digits."""
+
+TUM = 8
+"""Numbers in a row of TUM."""
+
+UNSURE = 0.75
+"""The share of rows in which the first number of four is larger than the last, from which on it may be w."""
+
+EXACTLY = 1e-6
+"""How far from 1 the w of a body may be that has not turned yet, as trackers begin."""
+
+POSITIONS_ONLY = 4
+"""Numbers in a row of a time and a position."""
+
+REDWOOD = ("source", "target", "frame")
+"""What stands in front of each matrix in files of Redwood and Open3D."""
+
+SMALLEST = 1e-12
+"""Length that axes have at least."""
+
+NINE = [0, 1, 2, 4, 5, 6, 8, 9, 10]
+"""The axes in the rows of a matrix."""
+
+POSITION = [ColumnName("position", axis) for axis in "xyz"]
+TIME = [ColumnName("time")]
+MATRIX = [ColumnName("matrix", f"{row}{column}") for row in range(4) for column in range(4)]
+CHAN = [ColumnName("frame"), *POSITION, *(ColumnName("euler", axis, "deg") for axis in "xyz")]
+
+
+def recognises(head: list[str]) -> bool:
+    """Return whether the first row, comments aside, consists of numbers."""
+    row = next((line for line in head if line.strip() and not line.lstrip().startswith("#")), "")
+    cells = _cells(row)
+    return len(cells) >= FEWEST and all(map(is_number, cells))
+
+
+def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
+    """Read the one body of the file, which has the file's name."""
+    return read_below(selection, options, _header(path, options), "write a file for each")
+
+
+def _header(path: Path, options: ReadingOptions) -> HeaderLine:
+    """Return the line that names the columns, or one before the first row with what its numbers look like."""
+    *comments, row = header_lines(path)
+    for line in comments:
+        with suppress(TrajectoryError):
+            layout_of(line, options)
+            return replace(line, separator=row.separator) if len(row.cells) == len(line.cells) else line
+    text = next(lines_of(path, after=row.number - 1))[1]
+    cells = [str(place) for place, _ in enumerate(_cells(text), 1)]
+    header = HeaderLine(path, row.number - 1, _separator(text), cells)
+    if len(cells) in (len(REDWOOD), POSITIONS_ONLY):
+        blocks = replace(header, cells=[str(place) for place in range(1, len(MATRIX) + 1)], rows=_blocks)
+        header = blocks if _names(blocks)[0] else header
+        cells = header.cells
+    names, warnings = _names(header)
+    warnings = () if "qw" in dict(options.columns) else warnings
+    if not names and not options.columns:
+        if len(cells) == POSITIONS_ONLY:
+            problem = "positions only, and rotations are needed"
+            raise TrajectoryError(path, problem, "write t x y z qx qy qz qw in every line", row.number)
+        problem = f"{len(cells)} numbers in a row, which are no poses that are known"
+        way_out = "write a first line of names, or say which is which by its place: --columns t=1,x=2,..."
+        raise TrajectoryError(path, problem, way_out, row.number)
+    return replace(header, names=[*names, *[None] * len(cells)][: len(cells)], warnings=warnings)
+
+
+def _separator(row: str) -> str | None:
+    """Return what separates numbers, which may have decimal commas beside other separators; None for white space."""
+    return next((mark for mark in ";\t," if mark in row.strip()), None)
+
+
+def _cells(row: str) -> list[str]:
+    """Return the cells of a row, of which empty ones at the end do not count."""
+    separator = _separator(row)
+    return (row if separator == "," else row.replace(",", ".")).strip().rstrip(separator).split(separator)
+
+
+def _blocks(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    """Yield matrices that have a line for each of their rows as a row, without the three numbers in front of some."""
+    rows = [(number, line) for number, line in lines if len(line.split()) not in (0, len(REDWOOD))]
+    for first in range(0, len(rows), 4):
+        yield rows[first][0], " ".join(line for _, line in rows[first : first + 4])
+
+
+def _names(header: HeaderLine) -> tuple[list[ColumnName], tuple[ClipWarning, ...]]:
+    """Return what the columns below a header are, as far as they matter; none where that cannot be seen."""
+    if header.path.suffix.lower() == ".chan":
+        return CHAN, ()
+    table = _numbers(header)
+    width = table.shape[1]
+    for first in (1, 0):
+        if width - first >= 12 and _mostly(_is_rotation, table[:, first:][:, NINE]):
+            return [*TIME[:first], *MATRIX[: 16 if width - first >= 16 else 12]], ()
+    for first in (1, 0) if width >= TUM else (0,) if width == TUM - 1 else ():
+        before, block = TIME[:first], table[:, first:]
+        if _mostly(_is_unit, block[:, 3:7]) or (width == TUM and not _mostly(_is_unit, block[:, :4])):
+            order, warnings = _order(header, block[:, 3:7], 4 + first)
+            return [*before, *POSITION, *order], warnings
+        if _mostly(_is_unit, block[:, :4]):
+            return [*before, *_quaternion("xyzw"), *POSITION], ()
+    return [], ()
+
+
+def _numbers(header: HeaderLine) -> np.ndarray:
+    """Return the numbers of the first rows, NaN where there is none."""
+    width = len(header.cells)
+    table = np.full((LOOKED_AT, width), np.nan)
+    for row, (_, line) in enumerate(islice(Table(header, {}).rows(), LOOKED_AT)):
+        cells = _cells(line)[:width]
+        table[row, : len(cells)] = [float(cell) if is_number(cell) else np.nan for cell in cells]
+    return table
+
+
+def _mostly(fits: Callable[[np.ndarray], np.ndarray], rows: np.ndarray) -> bool:
+    """Return whether nearly all rows, those aside that are empty or nothing but zeros, are of a kind."""
+    known = rows[np.isfinite(rows).all(axis=1) & rows.any(axis=1)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return len(known) > 0 and bool(fits(known).mean() >= MOST)
+
+
+def _is_unit(rows: np.ndarray) -> np.ndarray:
+    return np.abs(np.linalg.norm(rows, axis=1) - 1.0) < NEAR
+
+
+def _is_rotation(rows: np.ndarray) -> np.ndarray:
+    """Return which rows of nine numbers are axes at right angles, of one length."""
+    axes = rows.reshape(-1, 3, 3)
+    axes = axes / np.maximum(np.linalg.norm(axes, axis=2).mean(axis=1), SMALLEST)[:, None, None]
+    return np.abs(axes @ axes.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < NEAR
+
+
+def _quaternion(order: str) -> list[ColumnName]:
+    return [ColumnName("quaternion", axis) for axis in order]
+
+
+def _order(header: HeaderLine, four: np.ndarray, place: int) -> tuple[list[ColumnName], tuple[ClipWarning, ...]]:
+    """Return which of four numbers is w, the first of which is in that place, and a warning where that is a guess."""
+    first, last = np.abs(four[np.isfinite(four).all(axis=1)])[:, [0, 3]].T
+    if header.path.suffix.lower() == ".tum" or not len(first):
+        return _quaternion("xyzw"), ()
+    commas = header.separator == ","
+    at_first = bool(first[0] >= last[0] if commas else first[0] > 1.0 - EXACTLY)
+    if not commas and not at_first and np.mean(first > last) < UNSURE:
+        return _quaternion("xyzw"), ()
+    taken, other = ("wxyz", "xyzw") if at_first else ("xyzw", "wxyz")
+    columns = ",".join(f"q{axis}={place + number}" for number, axis in enumerate(other))
+    text = (
+        f"its columns have no names, and the {'first' if at_first else 'last'} of the four of a rotation is taken for w"
+    )
+    return _quaternion(taken), (ClipWarning(text, f"if it is the other way round: --columns {columns}"),)

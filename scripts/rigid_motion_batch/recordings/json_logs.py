@@ -1,0 +1,200 @@
+"""Poses in JSON: lists of objects that have a position and a rotation, or a matrix, under names that columns may have.
+
+What an object holds becomes columns, named by its keys (`position.x`, `rotation[3]`), and several lists are several
+bodies. Known besides are some orders: A-Frame's `avatar-recorder` and `motion-capture-recorder` have degrees that it
+applies in the order Y X Z, or quaternions x, y, z, w in recordings of January 2017; axes are right-handed, y up, -z
+forward. nuScenes has w first. NeRF's `transforms.json` has no times: the names of its images are counted. Record3D's
+`metadata.json` has lists of seven numbers, and their rate.
+Sources: https://github.com/dmarcos/aframe-motion-capture-components, https://www.nuscenes.org/nuscenes#data-format.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import cache, partial
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from .cameras import in_order, number_in
+from .column_names import column_name
+from .columns import Layout, known_in, layout_of
+from .options import ReadingOptions
+from .recordings import Selection, Trajectory, TrajectoryError, shown
+from .tables import HeaderLine, is_number, read_text
+from .times import FASTEST
+from .tracks import read_below
+
+LARGEST_FILE = 1 << 28
+"""Bytes: two hours of a headset and two controllers at 90 Hz. All of a file is in memory, at ten times its size."""
+
+DEEPEST = 4
+"""Objects inside of objects that are looked into."""
+
+LOOKED_AT = 16
+"""Poses of a list that tell what each of them holds."""
+
+MOST_VALUES = 1000
+"""Values of a pose that are looked at."""
+
+VECTORS = (3, 4, 9, 12, 16)
+"""Numbers of a list that is a vector, a quaternion or a matrix."""
+
+RECORD3D = ("qx", "qy", "qz", "qw", "x", "y", "z")
+
+EXPECTED = (
+    "it takes a list of objects with a time, a position and a rotation, named as columns are (docs/csv.md), or a "
+    "recording of A-Frame, nuScenes, Record3D or NeRF's transforms.json"
+)
+
+LONGEST_TEXT = 100
+"""Characters of a time, or the name of a body."""
+
+Objects = list[dict[str, Any]]
+
+Key = tuple[str | int, ...]
+"""The way to a value inside of a pose."""
+
+
+def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
+    """Read the bodies that have any poses. One without a name has the file's."""
+    text = read_text(path, LARGEST_FILE)
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError as error:
+        problem = f"this is not JSON ({error.msg})"
+        raise TrajectoryError(path, problem, "save the recording again", error.lineno) from None
+    except (RecursionError, ValueError):
+        raise TrajectoryError(path, "this JSON cannot be a recording", "save the recording again") from None
+    rate = content.get("fps") if isinstance(content, dict) else None
+    found: dict[tuple[str, ...], Objects] = {}
+    problems: list[TrajectoryError] = []
+    for way, poses in _lists(content):
+        header, _, said = _header(path, poses, options, rate)
+        try:
+            layout_of(header, said)
+            found[way] = poses
+        except TrajectoryError as error:
+            # Lists of events and the like are none of poses.
+            problems += [error] * (known_in(header) > len(header.cells) / 2)
+    if not found:
+        raise problems[0] if problems else TrajectoryError(path, "this JSON holds no poses", EXPECTED)
+    header, keys, said = _header(path, next(iter(found.values())), options, rate)
+    # What is last on the way to all of them, such as "poses", is no name.
+    last = len({way[-1:] for way in found}) == 1
+    lists = {".".join(way[: len(way) - last]): poses for way, poses in found.items()}
+    rows = cache(partial(_rows, header, keys, layout_of(header, said), lists))
+    header = replace(header, rows=lambda _: rows())
+    if len(lists) > 1:
+        said = replace(said, columns=(("device", "device"), *(pair for pair in said.columns if pair[0] != "device")))
+    return read_below(selection, said, header, "write a list for each")
+
+
+def _lists(content: Any, way: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Objects]]:
+    """Yield the lists of objects, and the keys on the way to each."""
+    if isinstance(content, list):
+        if content and all(isinstance(item, list) and len(item) == len(RECORD3D) for item in content):
+            content = [dict(zip(RECORD3D, item, strict=True)) for item in content]
+        if any(isinstance(item, dict) for item in content[:LOOKED_AT]):
+            yield way, content
+    elif isinstance(content, dict) and len(way) < DEEPEST:
+        columns = {key: item for key, item in content.items() if isinstance(item, list) and len(item) > 1}
+        if len(columns) > 1 and len({*map(len, columns.values())}) == 1:
+            # Columns of numbers are poses, too.
+            yield way, [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        for key, item in content.items():
+            yield from _lists(item, (*way, key))
+
+
+def _header(
+    path: Path, poses: Objects, options: ReadingOptions, rate: Any
+) -> tuple[HeaderLine, list[Key], ReadingOptions]:
+    """Return the columns that the poses of a list make, where they are in one, and what is known by their program."""
+    first = [pose for pose in poses[:LOOKED_AT] if isinstance(pose, dict)]
+    keys = list(dict.fromkeys(key for pose in first for key in islice(_keys(pose), MOST_VALUES)))
+    cells = ["device", "frame", *map(_cell, keys)]
+    names = [column_name(cell) for cell in cells]
+    held = {key[0] for key in keys}
+    if {"timestamp", "position", "rotation"} <= held and ("rotation", "w") not in keys:
+        names = [name and replace(name, unit="deg" if name.kind == "rotation" else name.unit) for name in names]
+        if ("rotation", "x") in keys and not options.euler:
+            options = replace(options, euler="YXZ")
+    elif {"translation", "rotation"} <= held:
+        names = [name and replace(name, kind="quaternion" if name.kind == "rotation" else name.kind) for name in names]
+    timed = any(name and name.kind == "time" for name in names) or options.frame_rate
+    if not timed and isinstance(rate, int | float) and 0.0 < rate < FASTEST:
+        options = replace(options, frame_rate=float(rate), time_unit=None)
+    return HeaderLine(path, 0, "\t", cells, names=names), keys, options
+
+
+def _keys(value: Any, way: Key = ()) -> Iterator[Key]:
+    """Yield the ways to all values of a pose that can be those of columns."""
+    if isinstance(value, dict) and len(way) < DEEPEST:
+        for key, item in value.items():
+            yield from _keys(item, (*way, key))
+    elif isinstance(value, list) and len(value) in VECTORS:
+        for place, item in enumerate(value):
+            rows = enumerate(item) if isinstance(item, list) and len(item) in (3, 4) else [(None, item)]
+            for column, number in rows:
+                if number is None or isinstance(number, int | float):
+                    yield (*way, place) if column is None else (*way, place, column)
+    elif way and (value is None or isinstance(value, int | float | str)):
+        yield way
+
+
+def _cell(key: Key) -> str:
+    """Return the name of a column."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in key).lstrip(".")
+
+
+def _rows(header: HeaderLine, keys: list[Key], layout: Layout, lists: Mapping[str, Objects]) -> list[tuple[int, str]]:
+    """Return a row for each pose: its body, its number or that of its image, and what it holds.
+
+    Raises
+    ------
+    TrajectoryError
+        Where a pose lacks a number that is needed.
+    """
+    needed = {index for body in layout.bodies.values() for index in body.values()}
+    needed |= set(layout.times) if len(layout.times) == 1 else set()
+    texts = {*layout.devices, *layout.times}
+    rows = []
+    for name, poses in lists.items():
+        images = [str(pose.get("file_path", "")) if isinstance(pose, dict) else "" for pose in poses]
+        order = (
+            sorted(range(len(poses)), key=lambda place: in_order(images[place])) if any(images) else range(len(poses))
+        )
+        for place in order:
+            cells = [name, number_in(images[place], place)]
+            for index, key in enumerate(keys, len(cells)):
+                cell = _text(poses[place], key) if index in needed or index in texts else ""
+                if cell is None or (cell and index not in texts and not is_number(cell)):
+                    if index in needed:
+                        problem = (
+                            f"pose {place} of {shown(name or header.path.stem)} has no number {header.cells[index]}"
+                        )
+                        raise TrajectoryError(header.path, problem, EXPECTED)
+                    cell = ""
+                cells.append(cell)
+            rows.append((place + 1, "\t".join(cells)))
+    return rows
+
+
+def _text(value: Any, key: Key) -> str | None:
+    """Return what is in a pose, as the cell of a table: empty for null, JavaScript's NaN, and None for nothing."""
+    for part in key:
+        try:
+            value = value[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    if isinstance(value, str):
+        return " ".join(value.split())[:LONGEST_TEXT]
+    if isinstance(value, bool) or not isinstance(value, int | float | None):
+        return None
+    try:
+        float(value or 0)
+    except OverflowError:
+        return None
+    return "" if value is None else str(value)

@@ -1,0 +1,215 @@
+"""Bodies of a file that holds a scene: whole ones of joints, objects that move alone, and which of them is requested.
+
+A whole body is the bones of a skeleton, or without one at least `FEWEST` nodes that move and hang on one another. What
+else moves, such as a prop or a camera, is a single rigid body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from rigid_motion_batch.command_line import listed
+
+from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError, unique
+from .tables import LARGEST_FILE
+
+FEWEST, GENERATIONS = 5, 3
+"""Nodes that move, and how many of them hang on one another, that are a body: a car and its wheels are none."""
+
+LISTED = 5
+"""Names that a remark tells."""
+
+
+def refuse_too_large(path: Path, *others: Path) -> None:
+    """Raise TrajectoryError where a file, and those that belong to it, have more bytes than are read."""
+    size = sum(item.stat().st_size for item in (path, *others))
+    if size > LARGEST_FILE:
+        problem = f"{size} bytes are more than the {LARGEST_FILE} that are read"
+        raise TrajectoryError(path, problem, "export the skeleton without its meshes, or split the recording")
+
+
+class Scene(Protocol):
+    """Nodes that can be looked at."""
+
+    def whole(self, name: str, own: Sequence[int], remark: str) -> Trajectory:
+        """Return a whole body of some nodes under a name."""
+
+    def joints(self, chosen: Sequence[int], own: Sequence[int]) -> list[Trajectory]:
+        """Return chosen ones of the nodes of a whole body, each alone, in the world."""
+
+    def alone(self, node: int) -> Trajectory:
+        """Return a node that is of no whole body, in the world."""
+
+
+@dataclass(frozen=True, eq=False)
+class SceneBodies:
+    """Bodies of a scene, which is made of nodes: objects, bones and what else hangs on one another."""
+
+    path: Path
+    names: Sequence[str]
+    """Of the nodes."""
+
+    wholes: Mapping[str, Sequence[int]]
+    """The joints of whole bodies, parents first."""
+
+    moving: Sequence[str]
+    """Whole bodies that move, the largest first."""
+
+    alone: Sequence[int]
+    """Other nodes that move."""
+
+    others: Sequence[int]
+    """Other nodes, to be had by their names."""
+
+    @classmethod
+    def of(
+        cls,
+        path: Path,
+        names: Sequence[str],
+        parents: np.ndarray,
+        moves: np.ndarray,
+        keyed: np.ndarray,
+        skeletons: Mapping[str, Sequence[int]],
+        aside: Iterable[int] = (),
+    ) -> SceneBodies:
+        """Tell apart the bodies of a scene.
+
+        Parameters
+        ----------
+        path : Path
+        names : sequence of str
+            Of the nodes.
+        parents : array of int, shape (nodes,)
+            The number of what each hangs on, -1 for nothing; in any order.
+        moves, keyed : array of bool, shape (nodes,)
+            Whether a node moves by itself, and whether it has keys, which may all be the same.
+        skeletons : mapping of str to sequence of int
+            The joints of those bodies that have a skeleton.
+        aside : iterable of int
+            Nodes that count for nothing.
+        """
+        free = np.ones(len(names), dtype=bool)
+        free[[*chain.from_iterable(skeletons.values()), *aside]] = False
+        swings = moves & free
+        loose = jointed(parents, swings, swings | (keyed & free & (nearest_above(parents, swings) >= 0)))
+        called = [names[parents[own[0]]] if parents[own[0]] >= 0 else "Body" for own in loose]
+        wholes = dict(zip(unique([*skeletons, *called]), [*skeletons.values(), *loose], strict=True))
+        lines = {name: with_above(parents, own) for name, own in wholes.items()}
+        free[[*chain.from_iterable(lines.values())]] = False
+        alone = np.flatnonzero(moves & free).tolist()
+        moving = [name for name, line in lines.items() if moves[line].any()]
+        if not (moving or alone):
+            moving = [name for name, line in lines.items() if keyed[line].any()]
+        taken = {*alone, *chain.from_iterable(wholes.values())}
+        others = [node for node in range(len(names)) if node not in taken]
+        return cls(path, names, wholes, sorted(moving, key=lambda name: -len(wholes[name])), alone, others)
+
+    def read(self, selection: Selection, scene: Scene) -> list[Trajectory]:
+        """Return what is requested; where nothing is named, the largest whole body, or else the first node that moves.
+
+        Raises
+        ------
+        TrajectoryError
+            Where it is not in the file, or nothing moves.
+        """
+        if not (self.moving or self.alone):
+            problem = "nothing moves in this file"
+            raise NoMotion(self.path, problem, "export what moves, a skeleton or objects, together with its animation")
+        largest, alone = next(iter(self.moving), None), self._called(self.alone)
+        if selection.requested is None and largest is not None:
+            others = listed([*self.moving[1:], *alone], LISTED)
+            remark = f"took {largest} of {len(self.moving) + len(alone)} bodies; others: {others}" if others else ""
+            return [scene.whole(self.path.stem, self.wholes[largest], remark)]
+        joints = self.wholes[largest] if largest is not None else ()
+        nodes = self._by_name(largest)
+        selection.match([*self.wholes, *nodes])
+        name = selection.requested or ALL
+        if name in self.wholes and (name not in nodes or nodes[name][0] is None):
+            return [scene.whole(name, self.wholes[name], "")]
+        if name in nodes:
+            whole, node = nodes[name]
+            selection.of(alone if whole is None else self._called(self.wholes[whole]), [name])
+            single = scene.alone(node) if whole is None else scene.joints([node], self.wholes[whole])[0]
+            return [replace(single, name=name)]
+        taken = selection.of([*self._called(joints), *alone], self._called(self.others))
+        singles = [scene.alone(node) for node in self.alone[: len(taken)]]
+        return [*(scene.joints(joints, joints) if joints else ()), *singles]
+
+    def _called(self, nodes: Iterable[int]) -> list[str]:
+        return [self.names[node] for node in nodes]
+
+    def _by_name(self, largest: str | None) -> dict[str, tuple[str | None, int]]:
+        """Return nodes by what they may be called, WHOLE/JOINT too, each with the whole body that it is of."""
+        wholes = sorted(self.wholes.items(), key=lambda item: item[0] != largest)
+        joints = [(self.names[node], (whole, node)) for whole, own in wholes for node in own]
+        others = [(self.names[node], (None, node)) for node in (*self.alone, *self.others)]
+        paths = [(f"{whole}/{name}", (whole, node)) for name, (whole, node) in joints]
+        return dict(reversed([*joints, *others, *paths]))
+
+
+def jointed(parents: np.ndarray, moves: np.ndarray, belongs: np.ndarray) -> list[list[int]]:
+    """Return the nodes of each body that has no skeleton, parents first.
+
+    Parameters
+    ----------
+    parents : array of int, shape (nodes,)
+        The number of what each hangs on, -1 for nothing; in any order.
+    moves, belongs : array of bool, shape (nodes,)
+        Whether a node moves by itself, and whether it may be a joint.
+    """
+    groups: dict[int, list[int]] = {}
+    above = nearest_above(parents, belongs)
+    top, depth = np.arange(len(parents)), np.ones(len(parents), dtype=np.int64)
+    for node in parents_first(above):
+        if belongs[node]:
+            if above[node] >= 0:
+                top[node], depth[node] = top[above[node]], depth[above[node]] + int(moves[node])
+            groups.setdefault(int(top[node]), []).append(node)
+    return [
+        own for own in groups.values() if np.count_nonzero(moves[own]) >= FEWEST and np.max(depth[own]) >= GENERATIONS
+    ]
+
+
+def with_above(parents: np.ndarray, chosen: Iterable[int]) -> list[int]:
+    """Return nodes and all that they hang on, parents first."""
+    result: dict[int, None] = {}
+    for node in chosen:
+        line = [node]
+        while (above := int(parents[line[-1]])) >= 0 and above not in result:
+            line.append(above)
+        result |= dict.fromkeys(reversed(line))
+    return list(result)
+
+
+def nearest_above(parents: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Return the nearest chosen node that each node hangs on, shape (nodes,), -1 for none."""
+    result = np.full(len(parents), -1, dtype=np.int64)
+    for node in parents_first(parents):
+        if (parent := parents[node]) >= 0:
+            result[node] = parent if chosen[parent] else result[parent]
+    return result
+
+
+def parents_among(parents: np.ndarray, own: Sequence[int]) -> np.ndarray:
+    """Return which of some nodes each of these hangs on, by their places, shape (own,), -1 for none."""
+    places = np.full(len(parents) + 1, -1, dtype=np.int64)
+    places[[*own]] = np.arange(len(own))
+    return places[nearest_above(parents, places[:-1] >= 0)[[*own]]]
+
+
+def parents_first(parents: np.ndarray) -> list[int]:
+    """Return the numbers of nodes, each followed by all that hangs on it."""
+    children: list[list[int]] = [[] for _ in range(len(parents) + 1)]
+    for node, parent in enumerate(parents.tolist()):
+        children[parent].append(node)
+    result, waiting = [], children[-1][::-1]
+    while waiting:
+        result.append(node := waiting.pop())
+        waiting += children[node][::-1]
+    return result

@@ -1,0 +1,96 @@
+"""How large a body is, and which unit and which axis up that speaks for, where its file does not say them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion.humanoid import humanoid_bones
+from rigid_motion.motion.repair import LARGEST
+from rigid_motion_batch.axes import AXES
+
+from .clips import ClipWarning
+from .recordings import Trajectory, shown
+from .rest_bodies import NOTHING, PLAUSIBLE, RestBody, part_of_body, sureness, unit_above_floor
+
+LOOKED_AT = 64
+"""Samples at once among which the first without damage is looked for."""
+
+STILL = 1e-6
+"""Share by which numbers differ that are the same: single precision."""
+
+TALLER = 1.5
+"""Times the other extents that a body has along the axis that is up."""
+
+
+def sized(path: Path, trajectory: Trajectory, axes: str, *, unit_given: bool) -> Trajectory:
+    """Return a whole body in the unit that it is likely to be in by its size, where that is not given or cannot be.
+
+    `axes` are those of the file: a name in `axes.AXES`.
+    """
+    body = trajectory.rest_body
+    if body is None or (places := _first_whole(body.skeleton, trajectory.poses)) is None:
+        return trajectory
+    places = places[part_of_body(body.parents)] * trajectory.metres_per_unit
+    size, heights = float(np.ptp(places, axis=0).max()), places @ AXES[axes][2]
+    unit, length, why = unit_above_floor(size, float(heights.min()), float(heights.max()))
+    metres = size * length
+    if size < NOTHING or (unit_given and length == 1.0):
+        return trajectory
+    remark, warnings = trajectory.remark, trajectory.warnings
+    if length != 1.0:
+        taken = f"{shown(path.name)} is {size:.4g} units large, which are taken for {unit}: {metres:.3g} m"
+        taken += f", {why or sureness(size, length)} (otherwise: --scale METRES)"
+        remark = "; ".join(filter(None, (taken, remark)))
+    if not PLAUSIBLE[0] <= metres <= PLAUSIBLE[1]:
+        doubt = f"it is {metres:.3g} m large if its unit, which the file does not tell, is that of {unit}"
+        warnings += (ClipWarning(doubt, "if not, say how long it is: --scale METRES"),)
+    return replace(trajectory, metres_per_unit=trajectory.metres_per_unit * length, remark=remark, warnings=warnings)
+
+
+def _first_whole(skeleton: Skeleton, poses: Poses) -> np.ndarray | None:
+    """Return where the joints of a body (joints, n) are in the first sample without damage, shape (joints, 3)."""
+    for first in range(0, poses.shape[1], LOOKED_AT):
+        # What is not finite, or far beyond all measure, is for the repair to say.
+        with np.errstate(invalid="ignore", over="ignore"):
+            places = skeleton.in_root_space(poses[:, first : first + LOOKED_AT]).positions
+        whole = np.flatnonzero((np.abs(places) < LARGEST).all(axis=(0, 2)))
+        if len(whole):
+            return places[:, whole[0]]
+    return None
+
+
+def axis_up(body: RestBody, places: np.ndarray) -> str:
+    """Return which of x, y and z is up for a body with joints at these places (joints, 3); empty if that is unclear.
+
+    The head is above the hips, and these above the feet. A body whose joints have other names stands on its end.
+    """
+    bones = humanoid_bones(body.joints)
+    feet = [bones[name] for name in ("LeftFoot", "RightFoot") if name in bones]
+    if "Hips" in bones and "Head" in bones:
+        hips = places[bones["Hips"]]
+        along = [places[bones["Head"]] - hips, *([hips - places[feet].mean(axis=0)] if feet else [])]
+        best = {int(np.argmax(vector)) for vector in along}
+        return "xyz"[best.pop()] if len(best) == 1 else ""
+    extents = np.ptp(places[part_of_body(body.parents)], axis=0)
+    largest = int(np.argmax(extents))
+    return "xyz"[largest] if extents[largest] > TALLER * np.delete(extents, largest).max() else ""
+
+
+def leading(body: RestBody, poses: Poses) -> Poses:
+    """Return the motion (n,) of what carries a body about: its first root, or what hangs on that where it stands still.
+
+    `poses` are those of the joints (joints, n) in their parents' space.
+    """
+    joint, sizes = 0, body.skeleton.sizes
+    while _stands(poses[joint]) and len(children := np.flatnonzero(body.parents == joint)):
+        joint = int(children[np.argmax(sizes[children])])
+    return body.skeleton.in_root_space(poses)[0 if _stands(poses[joint]) else joint]
+
+
+def _stands(poses: Poses) -> bool:
+    parts = poses.positions, poses.quaternions
+    return all(np.ptp(part, axis=0).max() <= STILL * np.abs(part).max(initial=1.0) for part in parts)

@@ -1,0 +1,221 @@
+"""From the columns of a table to the trajectories of its bodies: the way that all tables go, whatever wrote them.
+
+Units in names are honoured: times become seconds, and the unit of the positions is `Trajectory.metres_per_unit`. Euler
+angles need their order from the user. A matrix may be transposed, and a position and its rotation in different rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import takewhile
+
+import numpy as np
+
+from rigid_motion.motion import Poses, interpolate, repair
+from rigid_motion.motion.poses import inverse
+from rigid_motion.motion.quaternions import from_matrices
+
+from .clips import ClipWarning
+from .clocks import clock_of
+from .columns import BOTTOM, EULER, MATRIX, POSITION, QUATERNION, Layout, layout_of, metres_of
+from .euler import quaternions_from_intrinsic_eulers
+from .options import ReadingOptions
+from .recordings import Selection, Trajectory, unique
+from .sense import require_one_body
+from .tables import HeaderLine, Table
+
+MOST_LABELS = 0.5
+"""The share of the rows up to which different texts in a column can be names of devices. Running numbers are not."""
+
+MOST_DEVICES = 1000
+"""Different texts in a column beyond are no names of devices."""
+
+LARGEST_RADIANS = 4.0 * np.pi
+"""Two turns. Angles beyond, of which nothing says that they are radians, are degrees."""
+
+SMALLEST_DEGREES = np.pi
+"""Angles that are all below this, and said to be degrees, may be radians."""
+
+SKEWED = 0.02
+"""How far from right angles, as a sine, axes may be that are those of a rotation, in files of few digits."""
+
+RIGID = 1e-3
+"""Part by which a matrix may scale and does not."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """One body of the file: its columns, and its rows."""
+
+    name: str
+    prefix: str
+    """The prefix of its columns."""
+
+    columns: Mapping[str, int]
+    rows: np.ndarray | slice
+
+    def label(self, meaning: str) -> str:
+        """Return what errors call a column."""
+        return f"{self.prefix} {meaning}".strip()
+
+
+def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine, way_out: str) -> list[Trajectory]:
+    """Read the requested bodies of the rows below a header; `way_out` is what to do with devices that are mixed."""
+    layout = layout_of(header, options)
+    bodies = _bodies(header, layout, "device" in dict(options.columns))
+    taken = set(selection.of([body.name for body in bodies]))
+    requested = [body for body in bodies if body.name in taken]
+    columns = {body.label(one): index for body in requested for one, index in body.columns.items() if one != "t"}
+    numbers = dict(zip(columns, Table(header, columns).parse([*columns]).T, strict=True))
+    count = len(next(iter(numbers.values())))
+    clocks, trajectories = {}, []
+    for body in requested:
+        times = (body.columns["t"],) if "t" in body.columns else layout.times
+        if times not in clocks:
+            clocks[times] = clock_of(header, times, layout, options, count, body.rows)
+        clock = clocks[times]
+        held = {one: numbers[body.label(one)][body.rows] for one in body.columns if one != "t"}
+        seconds = clock.seconds[body.rows]
+        if header.names is None and len(layout.bodies) > 1:
+            # Topics of a log share its rows, and need not be in every one.
+            there = ~np.isnan([*held.values()]).all(axis=0)
+            seconds, held = seconds[there], {one: column[there] for one, column in held.items()}
+        trajectory = _trajectory(header, body, seconds, held, layout, options)
+        remarks = (trajectory.remark, header.remark, layout.remark, clock.remark)
+        trajectory = replace(trajectory, remark="; ".join(filter(None, remarks)), dated=clock.dated)
+        require_one_body(trajectory, header.path, way_out, header.number)
+        trajectories.append(trajectory)
+    return trajectories
+
+
+def _bodies(header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
+    """Return all bodies in the order of columns and rows; `named` is whether the user named their column."""
+    columns = {f"device {index}": index for index in layout.devices}
+    groups = _devices(Table(header, columns), named)
+    bodies = [
+        (f"{device} {prefix}".strip() or header.path.stem, prefix, columns, rows)
+        for device, rows in groups.items()
+        for prefix, columns in layout.bodies.items()
+    ]
+    names = unique([name for name, *_ in bodies])
+    return [_Body(name, prefix, columns, rows) for name, (_, prefix, columns, rows) in zip(names, bodies, strict=True)]
+
+
+def _devices(table: Table, named: bool) -> dict[str, np.ndarray | slice]:
+    """Return the rows of each device, by the first column that tells several apart, or else that tells one."""
+    only = ""
+    for column in table.columns:
+        codes, of_rows = _codes(table.cells(column))
+        if len(codes) > MOST_DEVICES and named:
+            problem = f"more than {MOST_DEVICES} different values in the column of devices"
+            raise table.header.error(problem, "name another with --columns device=NAME")
+        if len(codes) > min(max(MOST_LABELS * len(of_rows), 1), MOST_DEVICES) and not named:
+            continue
+        if len(codes) > 1:
+            order = np.argsort(of_rows, kind="stable")
+            rows = np.split(order, np.flatnonzero(np.diff(of_rows[order])) + 1)
+            return dict(zip(codes, rows, strict=True))
+        only = only or next(iter(codes), "")
+    return {only: slice(None)}
+
+
+def _codes(cells: Iterator[tuple[int, str]]) -> tuple[dict[str, int], np.ndarray]:
+    """Return a number for each text, of up to so many as there may be devices and one more, and those of the rows."""
+    codes: dict[str, int] = {}
+    rows = takewhile(lambda _: len(codes) <= MOST_DEVICES, cells)
+    return codes, np.fromiter((codes.setdefault(text, len(codes)) for _, text in rows), np.int64)
+
+
+def _trajectory(
+    header: HeaderLine,
+    body: _Body,
+    times: np.ndarray,
+    held: Mapping[str, np.ndarray],
+    layout: Layout,
+    options: ReadingOptions,
+) -> Trajectory:
+    metres = metres_of(header, layout, body.columns, options)
+    positions = np.column_stack([held[axis] for axis in POSITION])
+    warnings: tuple[ClipWarning, ...] = header.warnings
+    scales = held["scale"] if np.any(held.get("scale", 1.0) != 1.0) else None
+    if "qw" in held:
+        quaternions = np.column_stack([held[item] for item in ("qw", *QUATERNION[:3])])
+    elif "m00" in held:
+        positions, quaternions, scales = _of_matrices(header, positions, held)
+    else:
+        angles = np.column_stack([held[f"r{axis.lower()}"] for axis in options.intrinsic_order])
+        units = [layout.units.get(body.columns[item], "") for item in EULER]
+        angles, more = _radians(header, angles, units, options)
+        quaternions, warnings = quaternions_from_intrinsic_eulers(angles, options.intrinsic_order), warnings + more
+    if len(set(metres)) > 1:
+        positions, metres = positions * metres, [1.0]
+    times, poses, remark = _together(times, Poses(positions, quaternions, scales))
+    if header.inverted:
+        with np.errstate(invalid="ignore", over="ignore"):
+            poses = inverse(poses)
+    return Trajectory(body.name, times, poses, metres[0], remark, warnings)
+
+
+def _of_matrices(
+    header: HeaderLine, positions: np.ndarray, held: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Return positions (n, 3), quaternions and scales of matrices, whichever way round; NaN where one is no pose."""
+    rotations = np.stack([held[item] for item in MATRIX], axis=-1).reshape(-1, 3, 3)
+    bottom = np.column_stack([held.get(item, np.zeros(len(positions))) for item in BOTTOM])
+    if np.any(np.nan_to_num(bottom)) and not np.any(np.nan_to_num(positions)):
+        rotations, positions = rotations.transpose(0, 2, 1), bottom
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        scales = np.cbrt(np.linalg.det(rotations))
+        rotations = rotations / scales[:, None, None]
+        squares = np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+        good = (scales > 0.0) & (squares < 2.0 * SKEWED)
+        if len(good) and not good.any():
+            raise header.error(
+                "the nine numbers of each row are no rotation", "its columns have to be three axes, right-handed"
+            )
+        quaternions = np.full((len(rotations), 4), np.nan)
+        quaternions[good] = from_matrices(rotations[good])
+    scaled = bool(np.any(np.abs(scales[good] - 1.0) > RIGID))
+    return positions, quaternions, np.where(good, scales, np.nan) if scaled else None
+
+
+def _together(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, str]:
+    """Return times (n,) and poses with a rotation beside each position, also where they stand in different rows.
+
+    Of the one of which there is more every row is left, and the other is filled in. The text is what to say of that.
+    """
+    there = np.isfinite(times)
+    placed, turned = (np.isfinite(part).all(axis=-1) & there for part in (poses.positions, poses.quaternions))
+    fewest, most = sorted((placed, turned), key=np.count_nonzero)
+    if 2 * np.count_nonzero(placed & turned) >= np.count_nonzero(fewest):
+        return times, poses, ""
+    filled = Poses(
+        np.where(placed[:, None], poses.positions, 0.0),
+        np.where(turned[:, None], poses.quaternions, (1.0, 0.0, 0.0, 0.0)),
+    )
+    parts = [repair(times[rows], filled[rows])[:2] for rows in (placed, turned)]
+    within = [(times >= own.min(initial=np.inf)) & (times <= own.max(initial=-np.inf)) for own, _ in parts]
+    at = times[most & within[0] & within[1]]
+    if len(at) < 2:
+        return times, poses, ""
+    places, turns = (interpolate(own, known, at, "lerp_slerp") for own, known in parts)
+    remark = "positions and rotations stand in different rows: each is filled in between its own"
+    return at, Poses(places.positions, turns.quaternions), remark
+
+
+def _radians(
+    header: HeaderLine, angles: np.ndarray, units: Sequence[str], options: ReadingOptions
+) -> tuple[np.ndarray, tuple[ClipWarning, ...]]:
+    """Return angles of shape (n, 3) as radians, and what is hard to believe of them."""
+    largest = float(np.nanmax(np.abs(angles), initial=0.0, where=np.isfinite(angles)))
+    warnings: tuple[ClipWarning, ...] = ()
+    if options.degrees and len(angles) and 0.0 < largest <= SMALLEST_DEGREES:
+        text = f"its angles are all within {largest:.3g} degrees"
+        warnings = (ClipWarning(text, "radians need no --degrees"),)
+    if options.degrees or "deg" in units:
+        return np.radians(angles), warnings
+    if "rad" not in units and largest > LARGEST_RADIANS:
+        way_out = "say so: --degrees; or name the columns of radians rx_rad, ry_rad, rz_rad"
+        raise header.error(f"angles go up to {largest:.4g}, which are no radians", way_out)
+    return angles, ()

@@ -1,0 +1,95 @@
+"""One motion in the exports of Motive, Vicon and Qualisys."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tests.scripts.recordings.layouts import LEFT, NUMBERS, RIGHT, SECONDS, Layout, flat, quaternions, rows
+from tests.scripts.recordings.logs import COUNT, Motion
+
+MOTIVE = (
+    "Format Version;1.23;Take Name;T;Export Frame Rate;90.0;Rotation Type;{};Length Units;{}\n\n"
+    ";Type;{};Marker\n;Name;{};M\n;ID;{};2\n;;{};Position\nFrame;Time (Seconds);{};X\n"
+)
+
+
+def motive(kind: str, turns: np.ndarray, axes: str, units: str = "Meters", asset: str = "Rigid Body") -> str:
+    count = len(axes) + 3
+    header = MOTIVE.format(
+        *(kind, units, ";".join([asset] * count), ";".join(["Tool"] * count), ";".join("1" * count)),
+        *(";".join(["Rotation"] * len(axes) + ["Position"] * 3), ";".join([*axes, *"XYZ"])),
+    )
+    metres = {"Meters": 1.0, "Millimeters": 1e-3}[units]
+    return header + rows(NUMBERS, SECONDS, turns, LEFT.positions / metres, [""] * COUNT, separator=";")
+
+
+_six = "RX;RY;RZ;TX;TY;TZ"
+
+
+def vicon(turns: Callable[[Motion], np.ndarray], axes: str, unit: str, title: str = "Objects") -> str:
+    header = [title, "50", ";;Tool:Tool" + ";" * len(axes.split(";")) + "Cup:Cup", f"Frame;Sub Frame;{axes};{axes}"]
+    units = ";".join([unit] * axes.count("R") + ["mm"] * 3)
+    table = [column for motion in (LEFT, RIGHT) for column in (turns(motion), 1e3 * motion.positions)]
+    return "\n".join([*header, f";;{units};{units}", rows(NUMBERS + 1, 0 * NUMBERS, *table, separator=";")])
+
+
+def qualisys(nine: Callable[[np.ndarray], np.ndarray], timed: bool, euler: str = "XYZ") -> str:
+    columns = ["X", "Y", "Z", "Roll", "Pitch", "Yaw", "Residual", *(f"Rot[{place}]" for place in range(9))]
+    table = [
+        column
+        for motion in (LEFT, RIGHT)
+        for column in (
+            1e3 * motion.positions,
+            motion.turns.as_euler(euler, degrees=True),
+            0.1 + 0.0 * SECONDS,
+            flat(nine(motion.turns.as_matrix())),
+        )
+    ]
+    settings = (
+        "NO_OF_FRAMES\t24\nNO_OF_CAMERAS\t8\nNO_OF_BODIES\t2\nFREQUENCY\t50\nDATA_INCLUDED\t6D\nBODY_NAMES\tTool\tCup\n"
+    )
+    names = "\t".join([*(["Frame", "Time"] if timed else []), *columns, *columns])
+    return settings + names + "\n" + rows(*((NUMBERS + 1, SECONDS) if timed else ()), *table, separator="\t")
+
+
+TWO = ("Tool", "Cup")
+OPTICAL: dict[str, Layout] = {
+    "Motive": Layout("take.csv", motive("Quaternion", quaternions(), "XYZW").replace(";", ","), bodies=("Tool",)),
+    "Motive with semicolons and decimal commas": Layout(
+        "take.csv", motive("Quaternion", quaternions(), "XYZW", "Millimeters").replace(".", ","), bodies=("Tool",)
+    ),
+    "Motive with tabs": Layout(
+        "take.tsv", motive("Quaternion", quaternions(), "XYZW").replace(";", "\t"), bodies=("Tool",)
+    ),
+    "Motive's bones": Layout("take.csv", motive("Quaternion", quaternions(), "XYZW", asset="Bone"), bodies=("Tool",)),
+    "Motive's angles": Layout(
+        "take.csv", motive("YXZ", LEFT.turns.as_euler("YXZ", degrees=True), "YXZ"), bodies=("Tool",)
+    ),
+    "Vicon": Layout(
+        "take.csv",
+        vicon(lambda motion: quaternions(motion=motion), "RX;RY;RZ;RW;TX;TY;TZ", "").replace(";", ","),
+        bodies=("Tool:Tool", "Cup:Cup"),
+        counted=True,
+    ),
+    "Vicon's angles": Layout(
+        "take.csv",
+        vicon(lambda motion: motion.turns.as_euler("XYZ"), _six, "rad", "Segments"),
+        {"euler": "XYZ"},
+        ("Tool:Tool", "Cup:Cup"),
+        True,
+    ),
+    "Vicon behind trajectories": Layout(
+        "take.csv",
+        "Trajectories\n50\n;;A:B\nFrame;Sub Frame;X;Y;Z\n;;mm;mm;mm\n1;0;1;2;3\n\n"
+        + vicon(lambda motion: motion.turns.as_euler("XYZ", degrees=True), _six, "deg")
+        + "\nDevices\n1000\n",
+        *({"euler": "XYZ"}, ("Tool:Tool", "Cup:Cup"), True),
+    ),
+    "Qualisys": Layout("take.tsv", qualisys(lambda table: table.transpose(0, 2, 1), True), bodies=TWO),
+    "Qualisys with angles of its own": Layout(
+        "take.tsv", qualisys(lambda table: table.transpose(0, 2, 1), True, "ZXY"), bodies=TWO
+    ),
+    "Qualisys row by row, without times": Layout(
+        "take.tsv", qualisys(lambda table: table, False), bodies=TWO, counted=True
+    ),
+}

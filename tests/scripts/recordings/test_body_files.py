@@ -1,0 +1,124 @@
+"""Files of bodies as people have them: units, roots that stand, positions beside OFFSETs, names with spaces."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.recordings import ReadingOptions, Trajectory, read_clips, read_trajectories
+from rigid_motion_batch.recordings.bvh_writing import write_bvh
+from rigid_motion_batch.recordings.inspecting import inspect
+from rigid_motion_batch.recordings.rest_bodies import carrying, part_of_body, unit_above_floor
+
+FILES = Path(__file__).parent / "bodies"
+
+
+def whole(name: str) -> tuple[Trajectory, np.ndarray]:
+    """A body, and where its joints are, shape (joints, n, 3)."""
+    (body,) = read_trajectories(str(FILES / name)).trajectories
+    return body, body.rest_body.skeleton.in_root_space(body.poses).positions
+
+
+def test_a_rigid_prop_without_a_skin_is_a_body() -> None:
+    (content,) = inspect(str(FILES / "rigid_prop.gltf")).contents
+    assert (content.name, content.joints, content.timing.samples, content.timing.rate) == ("Prop", (), 40, 20.0)
+    assert content.size.extent == pytest.approx((0.506, 0.25, 0.4), abs=1e-3)
+    assert content.unit.name == "metres"
+
+
+def test_a_root_that_stands_still_is_not_what_is_measured() -> None:
+    (content,) = inspect(str(FILES / "static_root.bvh")).contents
+    assert content.up == "y"
+    assert content.unit.name == "centimetres"
+    assert content.size.path == pytest.approx(3.51, abs=0.01), "of the hips, 3.51 m in a row"
+    assert content.size.speed == pytest.approx(1.8, abs=0.02)
+    for name, roots in (("static_root.bvh", [0]), ("upper_body_cm.bvh", [])):
+        body, places = whole(name)
+        assert np.flatnonzero(carrying(body.rest_body.parents, places[:, 0])).tolist() == roots
+
+
+def test_the_upper_half_of_a_body_is_not_in_inches_where_its_hips_would_be_higher_than_those_of_giants() -> None:
+    body, _ = whole("upper_body_cm.bvh")
+    assert body.metres_per_unit == 0.01
+    assert "in inches, all of it would be more than 2.24 m up" in body.remark
+    (hand,) = read_trajectories(f"{FILES / 'upper_body_cm.bvh'}:LeftHand").trajectories
+    assert (hand.metres_per_unit, hand.remark) == (0.01, body.remark), "a joint is in the unit of its body"
+    assert (
+        inspect(f"{FILES / 'upper_body_cm.bvh'}:LeftHand").contents[0].unit.known_from
+        == "guessed from the size of the body"
+    )
+    (scaled,) = read_trajectories(f"{FILES / 'upper_body_cm.bvh'}:LeftHand", ReadingOptions(scale=0.1)).trajectories
+    assert scaled.metres_per_unit == 0.1
+
+
+@pytest.mark.parametrize(
+    ("size", "lowest", "highest", "unit"),
+    [
+        (69.67, 88, 156, "centimetres"),
+        (50, 90, 140, "centimetres"),
+        (170, 0, 170, "centimetres"),
+        (170, 500, 670, "centimetres"),
+        (68, 0, 68, "inches"),
+        (68, 2, 70, "inches"),
+        (68, -34, 34, "inches"),
+        (1.7, 8, 9.7, "metres"),
+        (30, 0, 30, "units of CMU's motion capture, 1/0.45 inch"),
+    ],
+)
+def test_what_is_above_the_floor_has_a_say_in_the_unit(size: float, lowest: float, highest: float, unit: str) -> None:
+    assert unit_above_floor(size, lowest, highest)[0] == unit
+
+
+def test_positions_that_are_meant_to_be_added_to_offsets_are() -> None:
+    body, places = whole("zero_positions.bvh")
+    assert str(body.warnings[0]).startswith(
+        "positions of 3 joints below the root are near 0 and not near their OFFSETs"
+    )
+    lengths = np.linalg.norm(places[1:] - places[[0, 1, 0]], axis=-1)
+    np.testing.assert_allclose(lengths, np.repeat([[40.0], [35.0], [np.hypot(9, 45)]], 40, axis=1))
+    assert body.metres_per_unit == 0.01
+    body, places = whole("positions_additive.bvh")
+    np.testing.assert_allclose(np.linalg.norm(places[1] - places[0], axis=-1), 50.0)
+    assert inspect(str(FILES / "positions_additive.bvh")).contents[0].up == "y"
+
+
+def with_positions(text: str, rows: np.ndarray) -> str:
+    """The file of three joints with six channels each with other positions below the root (frames, 3 joints, 3)."""
+    head, _, frames = text.partition("Frame Time:")
+    first, *lines = frames.strip().splitlines()
+    values = np.array([line.split() for line in lines], dtype=float)
+    for joint in range(rows.shape[1]):
+        values[:, 6 * joint + 6 : 6 * joint + 9] = rows[:, joint]
+    return "\n".join([f"{head}Frame Time: {first}", *(" ".join(f"{value:.4f}" for value in row) for row in values), ""])
+
+
+@pytest.mark.parametrize("added", [True, False])
+def test_positions_are_read_either_way_by_where_most_of_them_are(write, added: bool) -> None:
+    text, (_, before) = (FILES / "zero_positions.bvh").read_text(), whole("zero_positions.bvh")
+    offsets = np.array([[0, 40, 0], [0, 35, 0], [9, -45, 0]])
+    stretched = np.random.default_rng(1).uniform(-3, 3, (40, 3, 3))
+    rows = stretched + (0 if added else offsets)
+    (body,) = read_trajectories(write("some.bvh", with_positions(text, rows))).trajectories
+    places = body.poses.positions[1:]
+    np.testing.assert_allclose(places, (stretched + offsets).swapaxes(0, 1), atol=1e-4)
+    assert bool(body.warnings) == added
+    assert before.shape == (4, 40, 3)
+
+
+def test_a_name_with_spaces_finds_its_joint_and_is_written_as_it_is(tmp_path: Path) -> None:
+    source = str(FILES / "names_with_spaces.bvh")
+    for name in ("Bip01 Neck", "bip01 neck", "Bip01_Neck"):
+        (neck,) = read_trajectories(f"{source}:{name}").trajectories
+        assert neck.name == "Bip01 Neck"
+    (clip,), _ = read_clips([source])
+    with (tmp_path / "again.bvh").open("w") as file:
+        write_bvh(file, clip.rest_body, np.array([True, False]), clip.times, clip.poses)
+    (again,), _ = read_clips([str(tmp_path / "again.bvh")])
+    assert again.rest_body.joints == clip.rest_body.joints == ("Bip01 Pelvis", "Bip01 Neck")
+    np.testing.assert_allclose(again.poses.positions, clip.poses.positions, atol=1e-5)
+    np.testing.assert_allclose(again.poses.quaternions, clip.poses.quaternions, atol=1e-7)
+
+
+def test_a_body_begins_where_it_branches() -> None:
+    parents = np.array([-1, 0, 1, 1, -1, 4])
+    assert part_of_body(parents).tolist() == [False, True, True, True, True, True], "a chain is a body as it is"
