@@ -20,8 +20,8 @@ import numpy as np
 ASSETS = Path(__file__).resolve().parent
 sys.path[:0] = [str(ASSETS.parent / folder) for folder in ("addon", "scripts")]
 
-from research.making.motions import MOTIONS
-from research.making.tracking import table, tick, track
+from research.making.motions import GRIP, HOLD, HOLDING, MOTIONS, held_in
+from research.making.tracking import STAMP_ERROR, noisy, table, table_of_devices, tick, track
 
 SEED = 2021
 MODELS_BLENDER = (4, 5)
@@ -30,9 +30,14 @@ DRILL_TRIANGLES = 1500
 
 def clip(name: str) -> str:
     """The text of a clip: seconds, metres, and quaternions with the scalar last."""
-    motion = MOTIONS[name]
+    motion = HOLDING if name == HOLD else MOTIONS[name]
     rng = np.random.default_rng((SEED, zlib.crc32(name.encode())))
     times = tick(rng, motion.duration)
+    if name == HOLD:
+        # One system sees both markers at one moment, each with a noise of its own.
+        hand = motion.poses(rng, times + STAMP_ERROR * rng.standard_normal(len(times)))
+        devices = {"hand": hand, "tool": held_in(hand, GRIP)}
+        return table_of_devices(times, {name: noisy(rng, poses, times) for name, poses in devices.items()})
     poses = track(rng, motion.poses, times)
     return table(times, poses)
 
@@ -53,7 +58,7 @@ def main(arguments: list[str] | None = None) -> None:
     output = parser.parse_args(arguments).output
     output.mkdir(parents=True, exist_ok=True)
 
-    for name in MOTIONS:
+    for name in (*MOTIONS, HOLD):
         text = clip(name)
         write(output / f"{name}.csv", lambda path, text=text: path.write_text(text, encoding="utf-8", newline="\n"))
 

@@ -78,7 +78,8 @@ DRAWING = "paper"
 """Needs Blender for its --help too."""
 
 GLTF = (".glb", ".gltf", ".vrm", ".vrma")
-"""Endings of the inputs that reduce needs none for."""
+TABLES = (".csv", ".tsv", ".txt", ".tum", ".chan", ".g2o", ".json")
+"""Endings of the inputs that reduce needs none for, of tables only where no other files are made of them."""
 
 
 def main(arguments: list[str]) -> int:
@@ -107,7 +108,8 @@ def main(arguments: list[str]) -> int:
         del rest[place : place + 2]
         if blender not in here:
             return _fail(f"--blender takes one of {', '.join(here)} with Python {PYTHON}")
-    alone = (command != DRAWING and bool({"--help", "-h"} & {*rest})) or (command == "reduce" and _is_gltf_alone(rest))
+    alone = command != DRAWING and bool({"--help", "-h"} & {*rest})
+    alone = alone or (command == "reduce" and _is_without_blender(rest))
     if alone and not (blender and _folder(blender).exists()):
         blender = None
     needed = not (alone or command in WITHOUT_BLENDER or (command in FILMING and NOT_FILMING & {*rest}))
@@ -156,8 +158,8 @@ def _is_program(arguments: list[str]) -> bool:
     return bool(named) and not named[0].replace(".", "").isdecimal()
 
 
-def _is_gltf_alone(arguments: list[str]) -> bool:
-    """Return whether all inputs of reduce are glTF files that stay such.
+def _is_without_blender(arguments: list[str]) -> bool:
+    """Return whether all inputs of reduce are glTF files that stay such, or tables that become tables.
 
     What follows an option is its value, unless it is there as a file: better a Blender too many than one too few.
     """
@@ -167,7 +169,8 @@ def _is_gltf_alone(arguments: list[str]) -> bool:
         if not argument.startswith("-")
         and (not before.startswith("-") or (before != "--output" and _is_there(argument)))
     ]
-    return bool(inputs) and all(name.lower().endswith(GLTF) for name in inputs) and "--blend" not in arguments
+    endings = GLTF if "--glb" in arguments else (*GLTF, *TABLES)
+    return bool(inputs) and all(name.lower().endswith(endings) for name in inputs) and "--blend" not in arguments
 
 
 def _is_there(source: str) -> bool:

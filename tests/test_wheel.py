@@ -82,7 +82,7 @@ def test_the_main_job_runs_on_the_motions_that_come_along(installed: Path, tmp_p
     assert report == tmp_path / "renders" / "comparison" / "report.html"
     assert "rigid-motion compare --no-video --rates 5" in report.read_text(encoding="utf-8")
     rows = (report.parent / "metrics.csv").read_text(encoding="utf-8").splitlines()
-    clips = {path.stem for path in (CHECKOUT / "assets").glob("*.csv")}
+    clips = {path.stem for path in (CHECKOUT / "assets").glob("*.csv")} - {"hold"} | {"hold-hand", "hold-tool"}
     assert {row.split(",")[0] for row in rows[1:]} == clips
 
 
@@ -116,4 +116,4 @@ def test_without_blender_a_command_says_what_brings_it(wheel: Path, tmp_path: Pa
     done = run(sys.executable, "-c", code, tmp_path, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith("rigid-motion bake: ")
-    assert "pip install 'rigid-motion[blender]'" in done.stderr
+    assert "pip install '.[blender]'" in done.stderr

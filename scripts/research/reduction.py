@@ -19,6 +19,7 @@ import numpy as np
 
 from research import body_reduction
 from research.decimating import FREE, Decimations, Left
+from research.making.motions import MOTIONS
 from research.studies import EXTENSIONS, files_in, publish, study_parser
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, shell_error
@@ -27,6 +28,7 @@ from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.world_poses import read_poses
 from rigid_motion_batch.scenes.body_scene import registered
 
 ROTATION_MODES = ("QUATERNION", "XYZ")
@@ -74,7 +76,7 @@ def outcome(obj: bpy.types.Object, clip: Clip, radius: float) -> Left:
     ]
     frames, count = len(set().union(*curves)), sum(map(len, curves))
     numbers = frames * (1 + len(curves)) if animation.is_reduced(obj) else FREE * count
-    error = shell_error(animation.read_poses(obj, frames_of(clip)), clip.poses, radius)
+    error = shell_error(read_poses(obj, frames_of(clip)), clip.poses, radius)
     return Left(frames, count / len(curves), numbers, float(error.max()))
 
 
@@ -109,7 +111,8 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         others = files_in([options.recordings], EXTENSIONS - {".blend"}) if options.recordings else []
-        recordings = [read(path, options.fps) for path in [*sorted(ASSETS.glob("*.csv")), *others]]
+        generated = [path for path in sorted(ASSETS.glob("*.csv")) if path.stem in MOTIONS]
+        recordings = [read(path, options.fps) for path in [*generated, *others]]
         bodies = files_in(options.bodies, (".bvh", ".fbx"))
     except (TrajectoryError, OSError) as error:
         parser.error(str(error))

@@ -17,6 +17,7 @@ import numpy as np
 from .analysis.metrics import NOTHING
 
 MODE_COLOURS: dict[str, str] = {
+    "bezier": "#E4FCF0",
     "lerp_slerp": "#D55E00",
     "dq_sclerp": "#56B4E9",
     "pga_lerp": "#E69F00",

@@ -19,6 +19,13 @@ MANIFEST = (CHECKOUT or EXTENSION) / "blender_manifest.toml"
 LICENSE = (CHECKOUT or EXTENSION) / "LICENSE"
 
 
+def brings(extra: str, command: str) -> str:
+    """Return what installs an extra: in a checkout a command does by itself, and elsewhere pip from the source."""
+    return (
+        f"`python scripts/bootstrap.py {command}`" if CHECKOUT else f"`pip install '.[{extra}]'` in the source's folder"
+    )
+
+
 def output_folder(name: str) -> Path:
     """Return where a command writes unless requested otherwise: `renders/` of the checkout,
     or of the current folder.

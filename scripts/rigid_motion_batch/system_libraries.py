@@ -7,7 +7,7 @@ import re
 import sys
 
 from rigid_motion_batch.command_line import program_of
-from rigid_motion_batch.places import CHECKOUT
+from rigid_motion_batch.places import CHECKOUT, brings
 from rigid_motion_batch.silencing import silenced
 from rigid_motion_batch.supervising import ended_at_once
 
@@ -57,13 +57,13 @@ def way_out(error: str, script: str = "compare.py") -> str:
         )
     module = re.search(r"No module named '([\w.]+)'", error)
     if module and module[1] != "bpy":
-        brings = "pip install rigid-motion" if CHECKOUT is None else "python scripts/bootstrap.py, as in the README,"
-        return f"{brings} brings it. A Blender that lacks it can run compare.py, which looks for it elsewhere."
+        way = "python scripts/bootstrap.py, as in the README," if CHECKOUT else "pip install . in the source's folder"
+        return f"{way} brings it. A Blender that lacks it can run compare.py, which looks for it elsewhere."
     here = ".".join(map(str, sys.version_info[:2]))
     fitting = f"Python {' or '.join(BLENDER_PYTHONS)}"
     lines = [f"Blender has no wheel for Python {here}: use {fitting}."] if here not in BLENDER_PYTHONS else []
     if CHECKOUT is None:
-        lines.append(f"`pip install 'rigid-motion[blender]'` brings it, with {fitting}.")
+        lines.append(f"{brings('blender', 'compare')} brings it, with {fitting}.")
     else:
         lines.append("Run this by `python scripts/bootstrap.py`, which installs it,")
         lines.append(f"or inside Blender: blender --background --python scripts/{script} -- INPUT")
@@ -74,10 +74,9 @@ def without_blender(what: str, *, films: bool) -> str:
     """Return what to say where a comparison needs Blender ("Videos are made by") and there is none, in a few lines."""
     here = ".".join(map(str, sys.version_info[:2]))
     fits = here in BLENDER_PYTHONS
-    python = f"Python {' or '.join(BLENDER_PYTHONS)}"
-    brings = "python scripts/bootstrap.py compare" if CHECKOUT else "pip install 'rigid-motion[blender]'"
+    where = "" if fits else f" with Python {' or '.join(BLENDER_PYTHONS)}"
     lines = [
         f"{what} Blender, which is not here{'' if fits else f', and has no wheel for Python {here}'}.",
-        f"  `{brings}`{'' if fits else f' with {python}'} brings it; --blender PROGRAM uses one that is installed.",
+        f"  {brings('blender', 'compare')}{where} brings it; --blender PROGRAM uses one that is installed.",
     ]
     return "\n".join([*lines, *(["  --no-video does without: numbers and report."] if films else [])])

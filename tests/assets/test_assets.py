@@ -7,9 +7,10 @@ import pytest
 from numpy.typing import ArrayLike
 
 from assets import make_assets
-from research.making.motions import MOTIONS, PITCH, SITE, TIP
+from research.making.motions import GRIP, HOLD, MOTIONS, PITCH, SITE, TIP
 from rigid_motion.motion import Poses
-from rigid_motion.motion.quaternions import rotate
+from rigid_motion.motion.quaternions import conjugate, multiply, rotate
+from rigid_motion_batch.recordings.reading import read_trajectories
 
 ASSETS = Path(make_assets.__file__).parent
 
@@ -17,6 +18,14 @@ ASSETS = Path(make_assets.__file__).parent
 def recorded(name: str) -> tuple[np.ndarray, Poses]:
     t, x, y, z, qx, qy, qz, qw = np.loadtxt(ASSETS / f"{name}.csv", delimiter=",", skiprows=1).T
     return t, Poses(np.stack((x, y, z), axis=1), np.stack((qw, qx, qy, qz), axis=1))
+
+
+def recorded_in_hand() -> tuple[np.ndarray, Poses, Poses]:
+    """The times, the hand and the tool of the recording of both."""
+    hand, tool = read_trajectories(f"{ASSETS / HOLD}.csv:*").trajectories
+    assert (hand.name, tool.name) == ("hand", "tool")
+    np.testing.assert_array_equal(hand.times, tool.times)
+    return hand.times, hand.poses, tool.poses
 
 
 def place_of(point: ArrayLike, poses: Poses) -> np.ndarray:
@@ -27,10 +36,10 @@ def place_of(point: ArrayLike, poses: Poses) -> np.ndarray:
 
 
 def test_the_folder_holds_the_clips_that_the_script_makes_and_no_other_table():
-    assert {path.stem for path in ASSETS.glob("*.csv")} == set(MOTIONS)
+    assert {path.stem for path in ASSETS.glob("*.csv")} == {*MOTIONS, HOLD}
 
 
-@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("name", [*MOTIONS, HOLD])
 def test_the_script_makes_the_kept_clip_again(name):
     assert make_assets.clip(name) == (ASSETS / f"{name}.csv").read_text(encoding="utf-8")
 
@@ -49,9 +58,9 @@ def test_a_failure_while_writing_leaves_the_old_file_whole(tmp_path):
     assert list(tmp_path.iterdir()) == [old]
 
 
-@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("name", [*MOTIONS, HOLD])
 def test_a_clip_has_the_timer_of_a_90_hz_device(name):
-    times, _ = recorded(name)
+    times = recorded(name)[0] if name in MOTIONS else recorded_in_hand()[0]
     steps = np.diff(times)
     assert times[0] == 0.0
     assert 4.0 <= times[-1] <= 5.0
@@ -81,6 +90,15 @@ def test_the_screw_advances_by_its_pitch_with_every_turn():
     advance = (tip - tip[0]) @ forward
     assert advance[-1] == pytest.approx(PITCH * (turns[-1] - turns[0]), abs=1e-3)
     assert np.polyfit(turns, advance, 1)[0] == pytest.approx(PITCH, rel=0.15)
+
+
+def test_the_tool_stays_where_the_hand_holds_it_but_for_the_noise_of_both_devices():
+    _, hand, tool = recorded_in_hand()
+    off = np.linalg.norm(tool.positions - place_of(GRIP.positions, hand), axis=1)
+    assert 0.2e-3 < off.mean() < off.max() < 2.5e-3
+    assert np.ptp(hand.positions, axis=0).min() > 0.1
+    turned = multiply(conjugate(multiply(hand.quaternions, GRIP.quaternions)), tool.quaternions)
+    assert np.degrees(2.0 * np.linalg.norm(turned[:, 1:], axis=1).max()) < 0.6
 
 
 # ---- models ----------------------------------------------------------------------------------------------------------

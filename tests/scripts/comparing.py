@@ -16,7 +16,8 @@ ROOT = Path(__file__).resolve().parents[2]
 COLUMNS = (
     "clip,mode,rate_hz,keys,samples,duration_s,bytes_per_s,rms_shell_m,p95_shell_m,max_shell_m,"
     "rms_position_m,rms_rotation_deg,rms_velocity_m_s,decimation,tolerance_m,keys_per_s,"
-    "joints,key_frames,worst_joint,foot_slide_m,recorded_slide_m"
+    "joints,key_frames,worst_joint,foot_slide_m,recorded_slide_m,"
+    "still_point_m"
 )
 SMALL = ["--resolution", "160x90", "--fps", "6"]
 

@@ -43,7 +43,7 @@ REFUSED = {
     "Bent": "Location X has an Envelope",
     "Crane": "Location X is driven: remove the driver",
     "Future": "its keys have a mode that this version does not know",
-    "Huge": "key 2 of Location X has the value 3e+38, which no motion can be computed from: delete it",
+    "Huge": "key 2 of Location X has a frame, value, handle or easing that no motion can be computed from",
     "Prop": "it is linked from //library.blend: use --in-place on that file, or make it local",
 }
 """Objects of the shot that cannot be baked, and what is said of them."""

@@ -10,6 +10,7 @@ import pytest
 
 from rigid_motion_batch.cli.commands import COMMANDS
 from rigid_motion_batch.recordings.gltf import ENDINGS
+from rigid_motion_batch.recordings.reading import JSON, TEXT
 from rigid_motion_batch.system_libraries import DEBIAN, way_out
 from scripts import bootstrap
 
@@ -103,15 +104,18 @@ def test_commands_say_what_they_do_where_there_is_no_blender():
         ("walk.glb --tolerance 2mm --output small b.GLTF avatar.vrm --shared wave.vrma", False),
         ("--json walk.glb walk.glb", False),
         ("walk.glb shot.blend", True),
-        ("walk.glb --shared hand.csv", True),
+        ("walk.glb --shared hand.csv", False),
+        ("hand.csv --tolerance 2mm", False),
+        ("hand.csv --blend", True),
+        ("hand.csv --glb", True),
         ("walk.glb --shared hand.csv:left", True),
-        ("walk.glb gone.csv", True),
+        ("walk.glb gone.fbx", True),
         ("walk.glb --blend", True),
         ("folder", True),
         ("", True),
     ],
 )
-def test_gltf_files_are_reduced_without_a_blender(installed, monkeypatch, tmp_path, arguments, is_needed):
+def test_gltf_files_and_tables_are_reduced_without_a_blender(installed, monkeypatch, tmp_path, arguments, is_needed):
     monkeypatch.chdir(tmp_path)
     for name in ("small", "folder"):
         (tmp_path / name).mkdir()
@@ -120,6 +124,7 @@ def test_gltf_files_are_reduced_without_a_blender(installed, monkeypatch, tmp_pa
     assert bootstrap.main(["reduce", *arguments.split()]) == 0
     assert [blender is not None for blender in installed] == [is_needed]
     assert bootstrap.GLTF == ENDINGS
+    assert (*TEXT, *JSON) == bootstrap.TABLES
 
 
 @pytest.mark.parametrize("kind", ["", "ImportError: "])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rigid_motion.motion import KEYFRAME_MODES
+from rigid_motion_batch.analysis.modes import COMPARED
 from rigid_motion_batch.cli import compare, tasks
 from rigid_motion_batch.pipeline.steps import OWN
 from rigid_motion_batch.scenes import film
@@ -43,6 +43,18 @@ def measured(tmp_path_factory) -> Path:
     return output
 
 
+def recordings_in_assets() -> dict[str, dict[str, np.ndarray]]:
+    """The columns of each body of each file, by the names of the clips."""
+    bodies: dict[str, list[dict[str, str]]] = {}
+    for path in (ROOT / "assets").glob("*.csv"):
+        for row in rows_of(path):
+            device = row.pop("device", "")
+            bodies.setdefault(f"{path.stem}-{device}" if device else path.stem, []).append(row)
+    return {
+        clip: {name: np.array([float(row[name]) for row in rows]) for name in rows[0]} for clip, rows in bodies.items()
+    }
+
+
 def errors_of(filled: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """By SciPy: offsets of the origin (n, 3), turns in radians (n,) and shell errors (n,) between two tables."""
     offset = poses_of(filled).positions - poses_of(truth).positions
@@ -56,12 +68,12 @@ def errors_of(filled: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> di
 
 def test_every_number_can_be_had_again_from_the_tables_and_the_recording(measured):
     rows = rows_of(measured / "metrics.csv")
-    clips = [path.stem for path in sorted((ROOT / "assets").glob("*.csv"))]
-    expected = [(clip, rate, mode) for clip in clips for rate in ("5", "20") for mode in KEYFRAME_MODES]
+    clips = recordings_in_assets()
+    expected = [(clip, rate, mode) for clip in clips for rate in ("5", "20") for mode in COMPARED]
     assert sorted((row["clip"], row["rate_hz"], row["mode"]) for row in rows) == sorted(expected)
     assert (measured / "metrics.csv").read_text().splitlines()[0] == COLUMNS
     for row in rows:
-        recording = table(ROOT / "assets" / f"{row['clip']}.csv")
+        recording = clips[row["clip"]]
         folder = measured / row["clip"] / row["rate_hz"]
         filled, keys = table(folder / f"{row['mode']}.csv"), table(folder / "keys.csv")
         compared = (recording["t"] >= keys["t"][0]) & (recording["t"] <= keys["t"][-1])
@@ -110,7 +122,7 @@ def test_all_numbers_are_in_the_report_before_the_first_frame_is_rendered(short_
     assert pages
     assert all('src="toss/5/comparison.mp4"' in page and "Smooth Screw" in page for page in pages)
     files = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
-    tables = {f"toss/{rate}/{name}.csv" for rate in (5, 10) for name in ("keys", *KEYFRAME_MODES)}
+    tables = {f"toss/{rate}/{name}.csv" for rate in (5, 10) for name in ("keys", *COMPARED)}
     shown = {f"toss/5/comparison.{ending}" for ending in ("mp4", "blend")}
     assert {str(path) for path in files if path.parts[0] != OWN} == tables | shown | {"metrics.csv", "report.html"}
     said = capsys.readouterr()
@@ -124,8 +136,8 @@ def test_all_numbers_are_in_the_report_before_the_first_frame_is_rendered(short_
 @pytest.mark.parametrize(
     ("asked", "names", "distinct"),
     [
-        ((), tuple(KEYFRAME_MODES), True),
-        (("--modes", "all"), tuple(KEYFRAME_MODES), False),
+        ((), tuple(COMPARED), True),
+        (("--modes", "all"), tuple(COMPARED), False),
         (("--modes", "dq_sclerp,pga_slerp"), ("dq_sclerp", "pga_slerp"), False),
     ],
 )
@@ -257,9 +269,9 @@ def test_the_best_of_each_segment_is_compared_with_the_modes_it_is_made_of(short
     asked = ("--decimate", "adaptive", "--tolerance", "5mm", "--rates", "8", "--modes", "best_of, all")
     assert run(short_clip, "--no-video", "--output", tmp_path, *asked) == 0
     rows = rows_of(tmp_path / "metrics.csv")
-    assert [row["mode"] for row in rows] == [*KEYFRAME_MODES, "best_of"] * 2
+    assert [row["mode"] for row in rows] == [*COMPARED, "best_of"] * 2
     keys = rows_of(tmp_path / "toss" / "8" / "best_of.keys.csv")
-    assert {row["mode"] for row in keys[:-1]} <= set(KEYFRAME_MODES)
+    assert {row["mode"] for row in keys[:-1]} <= set(COMPARED)
     assert keys[-1]["mode"] == ""
     # Which keys a mode needs is a question to single modes.
     assert "best_of" not in {row["mode"] for row in rows_of(tmp_path / "keys_needed.csv")}

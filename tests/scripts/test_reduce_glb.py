@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion_batch.keying import exporting, recordings
+from rigid_motion_batch.keying import exporting
 from rigid_motion_batch.recordings.clip_reading import read_source
 from tests.animation.farm import played_on_a_farm
 from tests.gltf.player import File, off
@@ -28,8 +28,7 @@ def exported(monkeypatch, tmp_path) -> Path:
         export(path)
         shutil.copy2(path, copy)
 
-    for module in (exporting, recordings):
-        monkeypatch.setattr(module, "export_glb", export_and_copy)
+    monkeypatch.setattr(exporting, "export_glb", export_and_copy)
     return copy
 
 

@@ -1,6 +1,8 @@
 """reduce.py on recordings: how near tables, objects and rigs are to what was recorded."""
 
 import re
+import subprocess
+import sys
 
 import bpy
 import numpy as np
@@ -164,3 +166,19 @@ def test_what_is_far_away_is_refused_where_blender_could_not_hold_it(tmp_path, c
     assert run(path) == 0
     assert run(path, "--blend", "--overwrite") == 1
     assert f"{path}: this is up to 1e+06 m from its origin" in capsys.readouterr().err
+
+
+WITHOUT_BLENDER = """
+import sys
+sys.modules["bpy"] = None
+from rigid_motion_batch.cli.reduce import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_a_table_becomes_a_table_without_blender(tmp_path):
+    write_csv(tmp_path / "hand.csv")
+    command = [sys.executable, "-c", WITHOUT_BLENDER, tmp_path / "hand.csv"]
+    assert subprocess.run(command, timeout=120).returncode == 0
+    assert (tmp_path / "hand-keys.csv").exists()
+    assert subprocess.run([*command, "--blend"], timeout=120).returncode == 2

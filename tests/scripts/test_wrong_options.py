@@ -7,7 +7,7 @@ import pytest
 REFUSED = {
     "compare": [
         (["--rates", "0"], "rate"),
-        (["--modes", "bezier"], "lerp_slerp"),
+        (["--modes", "hermite"], "lerp_slerp"),
         (["--radius", "-1"], "above 0"),
         (["--resolution", "161x90"], "even"),
         (["--fps", "0"], "1 to 240"),

@@ -253,6 +253,44 @@ def screw(rng: np.random.Generator, times: np.ndarray) -> Poses:
     return held_by(TIP, SITE + depth[:, None] * rotate(aim, Y), chain(aim, turn(lean), about(Y, roll)))
 
 
+# ---- a tool in a hand ------------------------------------------------------------------------------------------------
+
+GRIP = Poses(np.array((0.02, 0.26, 0.07)), turn(np.radians((20.0, -8.0, 35.0))))
+"""Where the marker of a long tool is, seen from that of the hand which holds it."""
+
+
+def hold(rng: np.random.Generator, times: np.ndarray) -> Poses:
+    """Return the hand that swings a long tool over the site, turns it over and back, and shakes it off."""
+    #         onset, duration, sideways, forward, up in metres, then swing, tilt, roll in degrees
+    table = np.array(
+        (
+            (0.30, 0.80, -0.22, 0.12, 0.10, 60.0, 15.0, -20.0),
+            (1.05, 0.55, 0.30, 0.04, -0.12, -95.0, -30.0, 40.0),
+            (1.60, 0.70, -0.10, -0.06, 0.20, 40.0, 45.0, 110.0),
+            (2.30, 0.40, 0.12, 0.05, -0.18, -20.0, -55.0, -70.0),
+            (2.68, 0.30, -0.10, 0.00, 0.10, 15.0, 35.0, -30.0),
+            (2.96, 0.30, 0.10, 0.00, -0.10, -15.0, -35.0, 30.0),
+            (3.30, 0.90, -0.10, -0.15, 0.00, 15.0, 25.0, -60.0),
+        )
+    )
+    moved = strokes(times, table[:, :1], table[:, 1:2], table[:, 2:])
+    sway = unsteadiness(rng, times, 6)
+    swing, tilt, roll = np.radians(moved[:, 3:] + 0.35 * sway[:, 3:]).T
+    quaternions = chain(about(Z, swing), about(X, np.radians(-20.0) + tilt), about(Y, roll))
+    return Poses(np.array((0.12, 0.30, 1.10)) + moved[:, :3] + 0.8e-3 * sway[:, :3], quaternions)
+
+
+def held_in(hand: Poses, grip: Poses) -> Poses:
+    """Return the poses (n,) of what a hand holds in that grip."""
+    places = hand.positions + rotate(hand.quaternions, grip.positions)
+    return Poses(places, multiply(hand.quaternions, grip.quaternions))
+
+
+HOLD = "hold"
+"""The recording of two devices: a hand, and the tool that it holds."""
+
+HOLDING = Motion(4.6, hold)
+
 MOTIONS = {
     "reach": Motion(4.7, reach),
     "pivot": Motion(4.7, pivot),

@@ -7,7 +7,7 @@ wanders), and the 8 to 12 Hz tremor that every outstretched hand has (Elble and 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -69,11 +69,14 @@ def track(
 ) -> Poses:
     """Return the poses of `motion` as a device would report them at `times`.
 
-    Each is of a moment a little beside the time it is stamped with, has noise that wanders, and noise that is new with
-    every frame.
+    Each is of a moment a little beside the time it is stamped with, and noisy.
     """
+    return noisy(rng, motion(rng, times + STAMP_ERROR * rng.standard_normal(len(times))), times)
+
+
+def noisy(rng: np.random.Generator, poses: Poses, times: np.ndarray) -> Poses:
+    """Return poses at `times` with noise that wanders, and noise that is new with every frame."""
     count = len(times)
-    poses = motion(rng, times + STAMP_ERROR * rng.standard_normal(count))
     position_noise = POSITION_WANDER * wander(rng, times, 3, (0.2, 12.0), slope=1.0)
     position_noise += POSITION_WHITE * rng.standard_normal((count, 3))
     rotation_noise = ROTATION_WANDER * wander(rng, times, 3, (0.2, 12.0), slope=1.0)
@@ -89,5 +92,16 @@ def turn(rotation_vectors: np.ndarray) -> np.ndarray:
 
 def table(times: np.ndarray, poses: Poses) -> str:
     """Return a clip as text: seconds (n,), metres, and quaternions with the scalar last."""
+    return "\n".join([HEADER, *_rows(times, poses), ""])
+
+
+def table_of_devices(times: np.ndarray, devices: Mapping[str, Poses]) -> str:
+    """Return what several devices recorded at the same times, by their names, as one text: a row of each in turn."""
+    rows = zip(*(_rows(times, poses) for poses in devices.values()), strict=True)
+    lines = (f"{name},{row}" for together in rows for name, row in zip(devices, together, strict=True))
+    return "\n".join([f"device,{HEADER}", *lines, ""])
+
+
+def _rows(times: np.ndarray, poses: Poses) -> list[str]:
     rows = np.column_stack((times, poses.positions, np.roll(poses.quaternions, -1, axis=1)))
-    return "\n".join([HEADER, *(",".join(f"{value:.6f}" for value in row) for row in rows), ""])
+    return [",".join(f"{value:.6f}" for value in row) for row in rows]

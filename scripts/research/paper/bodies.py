@@ -15,7 +15,7 @@ import numpy as np
 
 from rigid_motion_batch.analysis.choices import JOINT, Uniform
 from rigid_motion_batch.analysis.metrics import geometric_mean
-from rigid_motion_batch.analysis.modes import REFERENCE
+from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
 from rigid_motion_batch.analysis.needed import DECIMATIONS, RATES, Ways, keys_needed, part_of
 from rigid_motion_batch.analysis.reconstructions import moving, reconstruct
 from rigid_motion_batch.analysis.results import measured
@@ -60,7 +60,7 @@ def needed_of(clip: Clip) -> dict[str, dict[str, list[float]]]:
     """Return the key poses that every mode needs, by mode and decimation: `shares_of` the reference's at `RATES`."""
     radii = np.full(len(clip.rest_body.joints), JOINT)
     searched = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SEARCHED, side="right")) - 1)
-    return shares_of(clip, keys_needed(Ways(searched, radii), MODES))
+    return shares_of(clip, keys_needed(Ways(searched, radii), MODES, REFERENCE))
 
 
 def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from research.making.motions import MOTIONS
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.places import ASSETS, from_here
@@ -26,8 +27,8 @@ Read = TypeVar("Read")
 
 
 def assets() -> dict[str, Clip]:
-    """Read the motions in assets/, by name."""
-    return {path.stem: read_motion(path) for path in sorted(from_here(ASSETS).glob("*.csv"))}
+    """Read the motions of single bodies in assets/, by name."""
+    return {name: read_motion(from_here(ASSETS) / f"{name}.csv") for name in sorted(MOTIONS)}
 
 
 def read_all(paths: Iterable[Path], read: Callable[[Path], Read]) -> tuple[list[Read], dict[str, str]]:

@@ -15,7 +15,7 @@ import numpy as np
 from research.live_streams.packings import STAMP
 from rigid_motion.motion import decimate
 from rigid_motion_batch.analysis.metrics import geometric_mean
-from rigid_motion_batch.analysis.modes import REFERENCE
+from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
 from rigid_motion_batch.analysis.needed import Ways, part_of
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming.measuring import HEADERS, measure

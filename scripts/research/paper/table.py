@@ -22,7 +22,7 @@ import numpy as np
 
 from rigid_motion.motion import decimate, interpolate
 from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
-from rigid_motion_batch.analysis.modes import REFERENCE
+from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
 from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, Ways, keys_needed
 from rigid_motion_batch.recordings.clips import Clip
 
@@ -70,7 +70,7 @@ def shares_of(clip: Clip, result: KeysNeeded) -> dict[str, dict[str, list[float]
 
 def needed(clip: Clip) -> dict[str, list[float]]:
     """Return by name, of `WAYS`, what is needed of the updates of the state of the art at `UPDATES`, as shares."""
-    shares = shares_of(clip, keys_needed(Ways(clip, RADIUS), MODES))
+    shares = shares_of(clip, keys_needed(Ways(clip, RADIUS), MODES, REFERENCE))
     return {name: shares[mode][way][: len(UPDATES)] for name, (mode, way) in WAYS.items()}
 
 

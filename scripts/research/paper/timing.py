@@ -22,7 +22,7 @@ from research.in_betweens import Case
 from research.studies import interleaved_seconds
 from rigid_motion.motion import MODES, Poses, decimate
 from rigid_motion.motion.quaternions import align_signs
-from rigid_motion_batch.analysis.modes import REFERENCE
+from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
 from rigid_motion_batch.recordings.clips import Clip
 
 from .table import PAPER, UPDATES

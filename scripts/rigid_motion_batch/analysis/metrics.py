@@ -92,6 +92,10 @@ class Metrics:
     recorded_slide_m: float | None = None
     """The same in the recording itself."""
 
+    still_point_m: float | None = None
+    """The farthest that the point which stays in the recording, such as a pivot, gets from where it was; empty of whole
+    bodies, and where no point stays."""
+
 
 @dataclass(frozen=True)
 class JointMetrics:
@@ -167,6 +171,7 @@ def row_of(made: Reconstruction, mode: str, errors: MotionErrors, ground: Ground
         worst_joint=clip.whole_body.joints[errors.worst[0]] if whole else None,
         foot_slide_m=errors.slide if len(ground.joints) else None,
         recorded_slide_m=ground.slide if len(ground.joints) else None,
+        still_point_m=errors.still_point if ground.still_point is not None else None,
         **of_errors(clip, made.choice, errors),
     )
 

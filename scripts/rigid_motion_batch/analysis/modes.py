@@ -1,14 +1,23 @@
-"""The modes of a comparison: those of `rigid_motion.motion`, and `best_of`, made of them segment by segment."""
+"""The modes of a comparison: those of `rigid_motion.motion`, and `best_of`, made of them segment by segment.
+
+They are compared with what people have without them: Blender's own curves.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rigid_motion.motion import MODES
+from rigid_motion.motion import KEYFRAME_MODES, MODES
 from rigid_motion_batch.recordings.clip_reading import folder_names
 
-REFERENCE = "lerp_slerp"
-"""The state of the art in the paper: what the other modes are held against."""
+REFERENCE = "bezier"
+"""What the modes are held against unless another is asked for: Blender's own curves, which animators have anyway."""
+
+STATE_OF_THE_ART = "lerp_slerp"
+"""What the paper holds its modes against, and most game engines do."""
+
+COMPARED = (REFERENCE, *KEYFRAME_MODES)
+"""The modes of a comparison where none are named."""
 
 BEST_OF = "best_of"
 """In each segment that mode of the run which comes closest to the recording there."""

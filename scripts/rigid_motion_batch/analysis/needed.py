@@ -1,9 +1,9 @@
 """Keys needed: how few keys each mode can do with to be as good as the reference is with many, evenly spaced ones.
 
-As good means: the same RMS shell error, over the same samples. The reference is the paper's state of the art, sent at
-the rates of the paper's table; the others keep evenly spaced keys too, or those that `reduce_keys` finds,
-or fewer that `fit_keys` has moved: these are no samples, but have as many numbers. The same numbers are
-the points of the curve of error over keys a second. Errors are in metres.
+As good means: the same RMS shell error, over the same samples. The reference keeps keys at the rates of the paper's
+table; the others keep evenly spaced keys too, or those that `reduce_keys` finds, or fewer that `fit_keys` has moved:
+these are no samples, but have as many numbers. The same numbers are the points of the curve of error over keys a
+second. Errors are in metres.
 """
 
 from __future__ import annotations
@@ -88,6 +88,9 @@ class KeysNeeded:
 
     uniform_errors: np.ndarray
     """The RMS shell error with as many evenly spaced keys a second as the reference has, shape (groups, rates)."""
+
+    reference: str = REFERENCE
+    """The mode that the others are to be as good as."""
 
     @property
     def reference_keys_per_s(self) -> np.ndarray:
@@ -191,7 +194,13 @@ class Ways:
         return best, reached
 
 
-def keys_needed(ways: Ways, modes: Iterable[str], *, advance: Callable[[], object] = lambda: None) -> KeysNeeded:
+def keys_needed(
+    ways: Ways,
+    modes: Iterable[str],
+    reference: str = REFERENCE,
+    *,
+    advance: Callable[[], object] = lambda: None,
+) -> KeysNeeded:
     """Find the keys that each mode needs on a clip.
 
     Parameters
@@ -199,6 +208,8 @@ def keys_needed(ways: Ways, modes: Iterable[str], *, advance: Callable[[], objec
     ways : Ways
         The clip, and what can be done with it.
     modes : iterable of str
+    reference : str
+        The mode that they are to be as good as.
     advance : callable
         Called once for each of `RATES`.
 
@@ -219,18 +230,18 @@ def keys_needed(ways: Ways, modes: Iterable[str], *, advance: Callable[[], objec
         if len(kept) >= 2:
             durations[place] = times[-1] - times[0]
             reference_keys[place] = len(kept)
-            targets[place] = stretch.error(kept, REFERENCE)
+            targets[place] = stretch.error(kept, reference)
             errors[:, place] = [stretch.error(kept, group[0]) for group in groups]
         if targets[place] > NOTHING:
             for row, group in enumerate(groups):
-                evenly = kept if REFERENCE in group else _fewest_evenly(stretch, group[0], targets[place], kept)
+                evenly = kept if reference in group else _fewest_evenly(stretch, group[0], targets[place], kept)
                 result = [(evenly, stretch.error(evenly, group[0]))]
                 result += stretch.by_motion(group[0], targets[place], len(evenly))
                 for column, (own, error) in enumerate(result):
                     keys[row, column, place] = np.inf if len(own) == len(times) else len(own)
                     reached[row, column, place] = error
         advance()
-    return KeysNeeded(clip.name, groups, RATES, durations, reference_keys, targets, keys, reached, errors)
+    return KeysNeeded(clip.name, groups, RATES, durations, reference_keys, targets, keys, reached, errors, reference)
 
 
 def evenly_spaced(clip: Clip, segments: int) -> np.ndarray:

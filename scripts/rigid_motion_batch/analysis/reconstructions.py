@@ -24,10 +24,11 @@ from rigid_motion.motion import (
     shell_error,
 )
 from rigid_motion.motion.contacts import slide, standing
+from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
 
-from .choices import Choice, Keys, Uniform
+from .choices import RIGID, Choice, Keys, Uniform
 from .modes import BEST_OF, single_modes
 
 Groups = tuple[tuple[str, ...], ...]
@@ -280,6 +281,9 @@ class MotionErrors:
     slide: float
     """The farthest that a joint which stands on the ground in the recording gets from where it began to stand."""
 
+    still_point: float
+    """The farthest that the point of a rigid body which stays in the recording gets from where it was, in metres."""
+
     largest: np.ndarray
     """The largest error of any joint in position, in metres, and in rotation, in degrees, shape (2, n)."""
 
@@ -295,7 +299,7 @@ class MotionErrors:
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """What stands on the ground in a recording, from the first key to the last."""
+    """What stands on the ground or stays in its place in a recording, from the first key to the last."""
 
     joints: np.ndarray
     """Those that stand at any time; of a rigid body none."""
@@ -306,10 +310,14 @@ class Ground:
     slide: float
     """The farthest that one of them slides in the recording itself, in metres."""
 
+    still_point: np.ndarray | None = None
+    """From the origin of a rigid body to the point of it that stays, along its axes and in metres, shape (3,)."""
+
     @classmethod
     def of(cls, made: Reconstruction) -> Ground:
         if made.clip.rest_body is None:
-            return cls(np.empty(0, dtype=int), np.empty((0, len(made.times)), dtype=bool), 0.0)
+            still = still_point(made.truth(made.samples)[0])
+            return cls(np.empty(0, dtype=int), np.empty((0, len(made.times)), dtype=bool), 0.0, still)
         places = np.concatenate([_upright(made, made.truth(block)) for block in made.blocks()], axis=1)
         stands = standing(made.times, places)
         joints = np.flatnonzero(stands.any(axis=1))
@@ -321,11 +329,14 @@ def errors_of(made: Reconstruction, mode: str, ground: Ground) -> MotionErrors:
     joints, start, count = len(made.skeleton), made.samples.start, len(made.times)
     shell, places = np.empty((joints, count)), np.empty((joints, count, 3), dtype=np.float32)
     feet, largest = np.empty((len(ground.joints), count, 3)), np.empty((2, count))
-    squares = np.zeros((3, joints))
+    squares, still = np.zeros((3, joints)), 0.0
     for block in made.blocks(overlap=1):
-        times = made.clip.times[block]
+        times, truth = made.clip.times[block], made.truth(block)
         shown = made.shown(mode, times)
-        errors = measure(times, shown, made.truth(block), made.radii[:, None])
+        errors = measure(times, shown, truth, made.radii[:, None])
+        if ground.still_point is not None:
+            off = point_at(shown[0], ground.still_point) - point_at(truth[0], ground.still_point)
+            still = max(still, float(np.linalg.norm(off, axis=-1).max()))
         own = slice(block.start - start, block.stop - start)
         places[:, own] = upright = _upright(made, shown)
         shell[:, own], feet[:, own] = errors.shell, upright[ground.joints]
@@ -336,7 +347,38 @@ def errors_of(made: Reconstruction, mode: str, ground: Ground) -> MotionErrors:
             np.square(some).sum(axis=-1) for some in (errors.position[:, new], errors.rotation[:, new], errors.velocity)
         ]
     position, rotation, velocity = np.sqrt(squares / np.array([count, count, count - 1.0])[:, None])
-    return MotionErrors(shell, position, rotation, velocity, slide(feet, ground.stands), largest, places)
+    slid = slide(feet, ground.stands)
+    return MotionErrors(shell, position, rotation, velocity, slid, still, largest, places)
+
+
+STAYS = 0.01
+"""Metres from its mean place up to which a point stays: as a pivot does that is held by hand."""
+
+NEAR = 1.0
+"""Metres from the origin of a body to a point of it, at most."""
+
+MOVES = 10.0
+"""How many times as far the origin or the shell of a body gets that has such a point: else all of it stays."""
+
+
+def still_point(poses: Poses) -> np.ndarray | None:
+    """Return the point of a rigid body that moves least while the body moves: a pivot, or a hinge; None without one.
+
+    Of poses (n,) in metres; from the body's origin along its axes, shape (3,). Of a line of such points it is the
+    nearest to the origin.
+    """
+    turns, ways = rotate(poses.quaternions[:, None], np.eye(3)), poses.positions - poses.positions.mean(axis=0)
+    matrices = np.swapaxes(turns - turns.mean(axis=0), 1, 2).reshape(-1, 3)
+    point = np.linalg.lstsq(matrices, -ways.ravel(), rcond=1e-3)[0]
+    moved = np.max(np.linalg.norm(matrices.reshape(-1, 3, 3) @ point + ways, axis=1))
+    arms = np.max(np.linalg.norm(matrices.reshape(-1, 3, 3), axis=(1, 2))) * RIGID
+    farthest = max(np.max(np.linalg.norm(ways, axis=1)), arms)
+    return point if moved < STAYS and np.linalg.norm(point) < NEAR and farthest > MOVES * moved else None
+
+
+def point_at(poses: Poses, point: np.ndarray) -> np.ndarray:
+    """Return where a point of a body is, (n, 3)."""
+    return poses.positions + rotate(poses.quaternions, point)
 
 
 def _upright(made: Reconstruction, poses: Poses) -> np.ndarray:

@@ -24,6 +24,7 @@ RESEARCH = {
     "live_costs": "live_costs",
     "reduction": "reduction",
     "glb_sizes": "glb_sizes",
+    "rivals": "rivals",
     "stream_tables": "making.stream_tables",
     "pages": "pages",
 }

@@ -33,11 +33,12 @@ from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor, pro
 from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, explain, share_of, survey
 from rigid_motion_batch.pipeline.steps import OWN, VERSION, RunError, Task, version_here
 from rigid_motion_batch.pipeline.store import Store
-from rigid_motion_batch.places import CHECKOUT, manifest, output_folder
+from rigid_motion_batch.places import brings, manifest, output_folder
 from rigid_motion_batch.progress import FARM, Progress
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.reading import split_source
+from rigid_motion_batch.report.held import slip_sentences
 from rigid_motion_batch.report.numbers import Gathering, Numbers
 from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.report.verdict import Verdict, verdict
@@ -100,6 +101,8 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         choices=tuple(options.choices),
         modes=options.modes,
         against=options.against or "",
+        held=tuple(map(tuple, options.held)),
+        reference=options.reference,
         axes=options.axes,
         reading=options.reading,
         radii=options.radius,
@@ -113,6 +116,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
             options.radius.rigid,
             f"{manifest()['name']} {manifest()['version']}",
             command,
+            reference=options.reference,
             joint_radius=options.radius.joint,
             details=details,
         ),
@@ -245,8 +249,7 @@ def _executor(options: argparse.Namespace, store: Store, progress: Progress) -> 
     try:
         from rigid_motion_batch.pipeline.dask import DaskExecutor
     except ImportError as error:
-        way = "python scripts/bootstrap.py dask" if CHECKOUT else "pip install 'rigid-motion[farm]'"
-        raise RunError(f"--scheduler: {error}; `{way}` installs it") from None
+        raise RunError(f"--scheduler: {error}; {brings('farm', 'dask')} installs it") from None
     return DaskExecutor(options.scheduler, store.output, progress.error)
 
 
@@ -338,7 +341,7 @@ class _Comparing:
         """Raise RunError where a tolerance is larger than the motion of every clip."""
         radius = self.plan.comparison.radii.rigid
         for choice in self.plan.comparison.choices:
-            clips = (study.clip.read(self.store.results / study.reader) for study in self.plan.studies)
+            clips = map(self.plan.read, self.plan.studies)
             problem = ""
             if isinstance(choice, Tolerance) and all(problem := choice.problem_with(clip, radius) for clip in clips):
                 raise RunError(problem)
@@ -350,11 +353,20 @@ class _Comparing:
             return
         numbers, said = self._numbers()
         if numbers and said:
-            terminal.show(terminal.table_of(terminal.lines_of(numbers), len(numbers.clips)), said.sentence)
+            bodies = any(study.facts.joints for study in self.plan.studies)
+            title = terminal.heading(len(numbers.clips), self.options.radius, bodies)
+            terminal.show(
+                title,
+                terminal.table_of(terminal.lines_of(numbers)),
+                *terminal.also(numbers),
+                *slip_sentences(self.plan.slips(), numbers),
+                "",
+                said.sentence,
+            )
 
     def _numbers(self) -> tuple[Numbers | None, Verdict | None]:
         """Return all numbers that there are, and what they come to."""
-        gathering, needed = Gathering(), []
+        gathering, needed = Gathering(self.options.reference), []
         for name, tasks in groupby(self._measuring(), key=lambda task: cast(steps.Measure, task.step).clip.name):
             choices = []
             for task in tasks:
@@ -408,6 +420,7 @@ class _Comparing:
             "verdict": said.sentence if said else None,
             "wins": said.wins if said else "",
             "table": [asdict(line) for line in terminal.lines_of(numbers)] if numbers else [],
+            "slips": [asdict(row) for pair in self.plan.slips() for some in pair.choices for row in some.rows],
             "clips": list(numbers.clips) if numbers else [],
             "notes": self.notes,
             "failures": self.work.failures,

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from dataclasses import fields
 
-from rigid_motion.motion import KEYFRAME_MODES, MODES
+from rigid_motion.motion import MODES
 from rigid_motion_batch.analysis.choices import (
     EVERYWHERE,
     JOINT,
@@ -20,7 +20,7 @@ from rigid_motion_batch.analysis.choices import (
     read_radii,
 )
 from rigid_motion_batch.analysis.metrics import FORMS
-from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
+from rigid_motion_batch.analysis.modes import BEST_OF, COMPARED, REFERENCE, single_modes
 from rigid_motion_batch.command_line import bounded, did_you_mean, folder_path, not_empty, parser_of, whole
 from rigid_motion_batch.palette import THEMES
 from rigid_motion_batch.pipeline.comparison_steps import STAGES
@@ -39,20 +39,21 @@ the modes side by side. Without INPUT it compares the recordings in assets/.
 RATES = "5,10,15,20"
 """Keys a second where none are asked for."""
 
-STREAM_MODES = tuple(mode for mode in MODES if mode not in KEYFRAME_MODES)
+STREAM_MODES = tuple(mode for mode in MODES if mode not in COMPARED)
 
 ALL, DISTINCT = "all", "distinct"
-"""Stand for all modes that keyframes can have, with a lane in the film for each, or for each motion that comes out."""
+"""Stand for `COMPARED`, with a lane in the film for each, or for each motion that comes out."""
 
 SCRIPT = "compare.py"
 
 EPILOG = """
 inputs:
-  CSV with named columns (t,x,y,z,qx,qy,qz,qw or timestamp_ms,pos_x,...,rot_w and the like, in any order), TUM, EuRoC,
-  Motive (OptiTrack) CSV, A-Frame motion capture JSON, BVH, FBX, glTF, .blend; a folder stands for the recordings in it.
-  FILE:BODY takes one body of several, FILE:* all of them. A BVH, FBX or glTF is a whole body, FILE:JOINT one joint of
-  it. In a .blend, a body is an object (FILE.blend:OBJECT), a bone of a rig (FILE.blend:OBJECT/BONE) or a whole rig
-  (FILE.blend:RIG), moving as Blender shows it in the world.
+  tables with named columns (t,x,y,z,qx,qy,qz,qw or timestamp_ms,pos_x,...,rot_w and the like, in any order), TUM,
+  KITTI, Motive, Vicon, Qualisys, COLMAP, JSON and more (docs/csv.md), BVH, FBX, glTF, .blend; a folder stands for the
+  recordings in it. FILE:BODY takes one body of several, FILE:* all of them. A BVH, FBX or glTF is a whole body,
+  FILE:JOINT one joint of it; without a skeleton, an FBX or glTF is the objects that move in it. In a .blend, a body is
+  an object (FILE.blend:OBJECT), a bone of a rig (FILE.blend:OBJECT/BONE) or a whole rig (FILE.blend:RIG), moving as
+  Blender shows it in the world.
 
 examples:
   python scripts/compare.py
@@ -65,13 +66,14 @@ examples:
   python scripts/compare.py dances/ --tolerance 1cm --shared --no-video
   python scripts/compare.py take.csv --budget 5,10 --rates 10 --modes all,best_of
   python scripts/compare.py take.csv --against mine.csv
+  python scripts/compare.py take.csv --against lerp_slerp
   blender --background --python scripts/compare.py -- hand_left.csv --axes unity
 
 keys:
   Without more, --rates keys a second are kept, evenly spaced in time and the same for every mode. With --tolerance each
   mode keeps the fewest samples with which its shell error is within that length, with --budget so many on average,
-  where its RMS error is small. Both also count the keys that each mode needs to be as good as lerp_slerp, which takes
-  up to a second for every 100 samples. --rates beside them adds evenly spaced keys for comparison.
+  where its RMS error is small. Both also count the keys that each mode needs to be as good as Blender's own curves,
+  which takes up to two seconds for every 100 samples. --rates beside them adds evenly spaced keys for comparison.
 
 output:
   A table of errors, one sentence, and as the last line the path of OUTPUT/report.html; everything else goes to standard
@@ -97,7 +99,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=_modes,
         default=DISTINCT,
         metavar="MODE,...",
-        help=f"modes to compare: {DISTINCT} for {', '.join(KEYFRAME_MODES)}, with one lane in the film for those that "
+        help=f"modes to compare: {DISTINCT} for {', '.join(COMPARED)}, with one lane in the film for those that "
         f"give the same motion (the default); {ALL} for the same modes, each in a lane of its own; or names of these, "
         f"and of {', '.join(STREAM_MODES)} for streams, which know no later keys, and {BEST_OF} for the best mode of "
         "each segment",
@@ -118,8 +120,18 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--against",
         type=not_empty,
-        metavar="FILE",
-        help="a motion to show beside those of the modes: somebody else's, of the same clip, read as this is",
+        metavar="MODE|FILE",
+        help="what the modes are held against: another mode, such as lerp_slerp, as most game engines do it "
+        f"({REFERENCE}, Blender's own curves); or a file with somebody else's motion of the same clip, to show beside",
+    )
+    parser.add_argument(
+        "--held",
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("CLIP", "HELD"),
+        help="measure how far the second of two clips slips in the first, which holds it, as is done for pairs that "
+        "are found in a file; can be given several times",
     )
     add_reading_options(parser)
     workers = parser.add_mutually_exclusive_group()
@@ -178,7 +190,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video = parser.add_argument_group("video")
     video.add_argument("--no-video", action="store_true", help="numbers and report only")
     video.add_argument(
-        "--blender", metavar="PROGRAM", help="film, and read FBX, glTF and .blend, with this Blender (the module bpy)"
+        "--blender", metavar="PROGRAM", help="film, and read FBX and .blend, with this Blender (the module bpy)"
     )
     video.add_argument("--engine", choices=ENGINES, default="workbench", help="Blender's renderer (%(default)s)")
     video.add_argument(
@@ -236,6 +248,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         options.reading = reading_options(options)
     except ValueError as error:
         parser.error(str(error))
+    options.reference = REFERENCE
+    if options.against in MODES:
+        options.reference, options.against = options.against, None
+        options.modes = tuple(dict.fromkeys((options.reference, *options.modes)))
     options.inputs = options.inputs or own_recordings()
     options.inputs = [file for source in options.inputs for file in files_of(source)]
     if options.against and len(options.inputs) != 1:
@@ -253,7 +269,7 @@ def without(arguments: list[str], *options: str) -> list[str]:
 
 def own_recordings() -> list[str]:
     """Return those that come with the program."""
-    return [str(path) for path in sorted(from_here(ASSETS).glob("*.csv"))]
+    return [f"{path}:*" for path in sorted(from_here(ASSETS).glob("*.csv"))]
 
 
 def _choices(options: argparse.Namespace) -> list[Choice]:
@@ -292,7 +308,7 @@ def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
 def _modes(text: str) -> tuple[tuple[str, ...], bool]:
     """Return the modes of a run, and whether those that are one motion share a lane."""
     written = [part.strip() for part in text.split(",") if part.strip()]
-    named = list(dict.fromkeys(m for part in written for m in (KEYFRAME_MODES if part in (ALL, DISTINCT) else (part,))))
+    named = list(dict.fromkeys(m for part in written for m in (COMPARED if part in (ALL, DISTINCT) else (part,))))
     modes = single_modes(named)
     wrong = [mode for mode in modes if mode not in MODES]
     if wrong or not named:

@@ -1,7 +1,7 @@
 """Look into recordings: bodies, units, axes, rate, length, and what looks wrong, with what to do about it.
 
 The program reads a recording as the other commands do, with the same options, and says what it found. It changes
-nothing. Blender is needed for FBX, glTF and .blend files alone.
+nothing. Blender is needed for FBX and .blend files alone.
 """
 
 from __future__ import annotations

@@ -31,6 +31,7 @@ from rigid_motion_batch.keying.sessions import do_all
 from rigid_motion_batch.keying.work import Doing, Work
 from rigid_motion_batch.recordings.gltf import ENDINGS as GLTF
 from rigid_motion_batch.recordings.options import add_reading_options, reading_options
+from rigid_motion_batch.recordings.reading import JSON, TEXT
 
 IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", *GLTF, ".tsv", ".tum")
 """Endings of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
@@ -184,22 +185,25 @@ class Reduce(Work):
     how: Reductions
 
     def needs_blender(self, job: Job) -> bool:
+        if job.is_recording and not (self.how.blend or self.how.glb):
+            return not job.problem and job.file.suffix.lower() not in (*TEXT, *JSON)
         return not job.problem and (job.is_recording or not _is_gltf(job.file))
 
     def do(self, doing: Doing) -> None:
-        if not self.needs_blender(doing.job):
-            do_gltf(doing, self.how)
-            return
-        from rigid_motion_batch.keying.exporting import export_file
-        from rigid_motion_batch.keying.jobs import do_blend
-        from rigid_motion_batch.keying.recordings import do_recording
-        from rigid_motion_batch.keying.reducing import reducing
-
         if doing.job.is_recording:
+            from rigid_motion_batch.keying.recordings import do_recording
+
             do_recording(doing, self.how)
+        elif not self.needs_blender(doing.job):
+            do_gltf(doing, self.how)
         elif self.how.glb:
+            from rigid_motion_batch.keying.exporting import export_file
+
             export_file(doing, self.how)
         else:
+            from rigid_motion_batch.keying.jobs import do_blend
+            from rigid_motion_batch.keying.reducing import reducing
+
             do_blend(doing, reducing(self.how, self.objects))
 
 

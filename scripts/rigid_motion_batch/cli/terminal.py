@@ -15,11 +15,15 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.choices import Radii, Tolerance
+from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART
 from rigid_motion_batch.report.numbers import MEASURES, Numbers, digits
 
 RMS, WORST, KEYS = "rms_shell_m", "max_shell_m", "keys_per_s"
 """The measures that are shown."""
+
+PLACES = {measure.metric: place for place, measure in enumerate(MEASURES)}
+"""Of measures among the numbers."""
 
 WIDE = 120
 """Columns of what is no terminal."""
@@ -36,6 +40,8 @@ class Line:
     """The ids of those that are this motion."""
 
     name: str
+    """That of the first of them."""
+
     rms_mm: float
     """The RMS shell error, over several clips the geometric mean."""
 
@@ -51,13 +57,12 @@ class Line:
 
 def lines_of(numbers: Numbers) -> list[Line]:
     """Return the table: choices from the fewest keys to the most, motions in the order of the modes."""
-    places = {measure.metric: place for place, measure in enumerate(MEASURES)}
     mean, groups = numbers.mean(), numbers.groups()
     columns = [numbers.modes.index(group[0]) for group in groups]
-    worst = np.nanmax(np.where(np.isnan(numbers.values[places[WORST]]), -np.inf, numbers.values[places[WORST]]), axis=0)
+    worst = np.nanmax(np.where(np.isnan(numbers.values[PLACES[WORST]]), -np.inf, numbers.values[PLACES[WORST]]), axis=0)
     lines = []
     for row, choice in enumerate(numbers.choices):
-        rms, keys = mean[places[RMS], row, columns], mean[places[KEYS], row, columns]
+        rms, keys = mean[PLACES[RMS], row, columns], mean[PLACES[KEYS], row, columns]
         decide = keys if isinstance(choice, Tolerance) else rms
         # What is shown as the same is as good.
         shown = [digits(value) for value in decide.tolist()]
@@ -66,7 +71,7 @@ def lines_of(numbers: Numbers) -> list[Line]:
             Line(
                 choice.title,
                 group,
-                numbers.joined(group),
+                numbers.label(group[0]),
                 float(rms[place]),
                 float(worst[row, columns[place]]),
                 float(keys[place]) if np.isfinite(keys[place]) else None,
@@ -77,10 +82,25 @@ def lines_of(numbers: Numbers) -> list[Line]:
     return lines
 
 
-def table_of(lines: Sequence[Line], clips: int) -> Table:
+def heading(count: int, radii: Radii, bodies: bool) -> str:
+    """Return what the numbers of so many clips are, some of whole bodies, for somebody who has never seen them."""
+    radius, point = (radii.joint, "a joint") if bodies else (radii.rigid, "the body's origin")
+    over = "" if count == 1 else f"; over {count} clips the geometric mean, and the largest of all"
+    return f"Shell error: how far any point within {100.0 * radius:g} cm of {point} is out of place{over}"
+
+
+def also(numbers: Numbers) -> list[str]:
+    """Return what else there is to say of the names of modes: which are one motion, and who goes straight."""
+    groups = [[numbers.label(mode) for mode in group] for group in numbers.groups()]
+    result = [f"{first} is also the motion of {' and '.join(others)}." for first, *others in groups if others]
+    if STATE_OF_THE_ART in numbers.modes:
+        result.append(f"{numbers.label(STATE_OF_THE_ART)} is what most game engines do.")
+    return result
+
+
+def table_of(lines: Sequence[Line]) -> Table:
     """Return the table for a terminal; the best of each choice is marked with a star."""
-    title = "Shell error" if clips == 1 else f"Shell error, mean and largest of {clips} clips"
-    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("Keys")
     table.add_column("Mode", overflow="fold")
     for name in ("RMS, mm", "worst, mm", "keys/s"):

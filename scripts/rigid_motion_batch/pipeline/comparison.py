@@ -7,21 +7,23 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 from rigid_motion_batch.analysis.choices import EVERYWHERE, Choice, Radii, fewest_keys
+from rigid_motion_batch.analysis.held import PairSlips, find_held
 from rigid_motion_batch.analysis.metrics import table_names
-from rigid_motion_batch.analysis.modes import name_of_other, single_modes
+from rigid_motion_batch.analysis.modes import REFERENCE, name_of_other, single_modes
+from rigid_motion_batch.command_line import did_you_mean, listed
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import clip_names
-from rigid_motion_batch.recordings.clips import ClipFacts
-from rigid_motion_batch.recordings.gltf import ENDINGS as GLTF
+from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS, ReadingOptions
 from rigid_motion_batch.recordings.reading import split_source
 from rigid_motion_batch.report.settings import Settings
@@ -31,10 +33,11 @@ from rigid_motion_batch.scenes.timeline import Timeline
 from . import comparison_steps as steps
 from . import values
 from .comparison_steps import ClipOf, Page, Part
-from .steps import Task
+from .steps import RunError, Task
 from .store import Store
 
 METRICS, JOINT_METRICS, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "keys_needed.csv"
+SLIPS = "slip.csv"
 
 ON_ONE_PAGE = 24
 """Number of clips up to which all are on one page; more have a page each."""
@@ -56,10 +59,11 @@ TABLES = {
     METRICS: ("measure", steps.ROWS),
     JOINT_METRICS: ("measure", steps.JOINT_ROWS),
     KEYS_NEEDED: ("count_keys", steps.ROWS),
+    SLIPS: ("slips", steps.ROWS),
 }
 """Tables of all clips: what each is put together of, as `Part` names it, and the name of its rows there."""
 
-IN_BLENDER = (".blend", ".fbx", *GLTF)
+IN_BLENDER = (".blend", ".fbx")
 """Recordings that Blender reads."""
 
 
@@ -75,8 +79,14 @@ class Comparison:
     against: str = ""
     """The source of a motion that is shown beside the modes: somebody else's, of the one clip that there is then."""
 
+    reference: str = REFERENCE
+    """The mode that the others are held against."""
+
     axes: str | None = None
     """A name in `axes.AXES`; None for the axes of each format."""
+
+    held: tuple[tuple[str, str], ...] = ()
+    """Names of clips, one that holds another and that: pairs whose slip is measured beside those that are found."""
 
     reading: ReadingOptions = AS_THE_FILE_SAYS
     radii: Radii = EVERYWHERE
@@ -141,6 +151,8 @@ class ComparisonPlan:
         self.comparison, self.store = comparison, store
         self.studies: list[Study] = []
         """The clips to compare, after `look_into`."""
+        self.held: list[tuple[Study, Study]] = []
+        """Pairs of them, one that holds another and that."""
 
     # -- reading ------------------------------------------------------------------------------------------------------
 
@@ -167,7 +179,10 @@ class ComparisonPlan:
         return Task(step, f"read {source}", inputs=inputs, seconds=0.3)
 
     def look_into(self) -> list[str]:
-        """See what clips there are in the recordings that were read, and return what the user should know of them."""
+        """See what clips there are in the recordings that were read, and return what the user should know of them.
+
+        Raises RunError where a pair that is said to be held is none.
+        """
         comparison = self.comparison
         keys = [task.key for task in self._readers if self.store.index_of(task.key)]
         read = {
@@ -192,7 +207,12 @@ class ComparisonPlan:
                 of_clips += self._left_out(self.studies[-1])
         if self._shows_object and not comparison.blender:
             notes.append(f"the report shows a drill, for there is no Blender here that reads {comparison.subject}")
+        self.held = held_pairs(self.studies, comparison, self.read)
         return notes + of_clips
+
+    def read(self, study: Study) -> Clip:
+        """Return a clip with its samples."""
+        return study.clip.read(self.store.results / study.reader)
 
     @property
     def _shows_object(self) -> bool:
@@ -227,6 +247,13 @@ class ComparisonPlan:
             for part, task in self._numbers(study):
                 yield task
                 keys[part] = task.key
+        for holder, held in self.held:
+            shared = [choice.name for choice in holder.choices if choice in held.choices]
+            measured = [keys[Part("measure", one.clip, name)] for name in shared for one in (holder, held)]
+            measuring = steps.MeasureSlips(holder.clip, held.clip, self.comparison.radii, self.comparison.shared)
+            after = holder.reader, held.reader, *measured
+            yield (task := Task(measuring, f"slip of {held.name} in {holder.name}", after, seconds=0.02 * len(after)))
+            keys[Part("slips", held.clip, holder.name)] = task.key
         for table in self.tables:
             what, rows = TABLES[table]
             clips = {study.clip for study in self.studies if study.facts.joints or table != JOINT_METRICS}
@@ -244,6 +271,12 @@ class ComparisonPlan:
         if self.comparison.about:
             yield from self._pages(keys, filmed, films)
 
+    def slips(self) -> list[PairSlips]:
+        """Return what was found of the pairs, after their tasks."""
+        measuring = (task.key for task in self.tasks(films=False) if isinstance(task.step, steps.MeasureSlips))
+        there = (key for key in measuring if self.store.index_of(key))
+        return [values.read(PairSlips, self.store.results / key / "slips") for key in there]
+
     @property
     def tables(self) -> list[str]:
         """The tables that there will be; of others those of earlier runs are to be withdrawn."""
@@ -251,6 +284,7 @@ class ComparisonPlan:
             METRICS: True,
             KEYS_NEEDED: self.comparison.count_keys,
             JOINT_METRICS: any(study.facts.joints for study in self.studies),
+            SLIPS: bool(self.held),
         }
         return [table for table in TABLES if there[table]]
 
@@ -277,7 +311,10 @@ class ComparisonPlan:
             )
         if comparison.count_keys:
             fit = comparison.fit and not joints
-            count, seconds = steps.CountKeys(clip, comparison.modes, comparison.radii, fit), 0.03 if fit else 0.008
+            count, seconds = (
+                steps.CountKeys(clip, comparison.modes, comparison.radii, fit, comparison.reference),
+                0.03 if fit else 0.008,
+            )
             yield Part("count_keys", clip), Task(count, f"count keys {name}", after, seconds=seconds * size)
 
     def _film(self, study: Study, choice: Choice, measured: str) -> Iterator[Task]:
@@ -349,6 +386,45 @@ class ComparisonPlan:
             publish={name: place + name for name in (steps.PAGE, steps.PAGE_DATA)},
             seconds=0.02 * len(step.clips),
         )
+
+
+def held_pairs(
+    studies: Sequence[Study], comparison: Comparison, read: Callable[[Study], Clip]
+) -> list[tuple[Study, Study]]:
+    """Return the pairs of which one holds the other: those that the user names, and those that are found in a file.
+
+    Raises RunError where a pair that is named is none.
+    """
+    known = {study.name: study for study in studies}
+    result: dict[frozenset[str], tuple[Study, Study]] = {}
+    for names in comparison.held:
+        said = f"--held {' '.join(names)}"
+        for name in names:
+            if name not in known:
+                near = did_you_mean(name, known) or f"; there are {listed(known, 8)}"
+                raise RunError(f"{said}: there is no clip {name!r}{near}")
+            if known[name].facts.joints:
+                raise RunError(f"{said}: {name} is a whole body; name two rigid bodies")
+        if names[0] == names[1]:
+            raise RunError(f"{said}: name two clips, the one that holds and the one that is held")
+        pair = known[names[0]], known[names[1]]
+        spans = [(clip.times[0], clip.times[-1]) for clip in map(read, pair)]
+        if max(start for start, _ in spans) >= min(end for _, end in spans):
+            lasts = " and ".join(
+                f"{name} lasts from {start:.6g} to {end:.6g} s" for name, (start, end) in zip(names, spans, strict=True)
+            )
+            raise RunError(f"{said}: they share no times, {lasts}; give both the same clock")
+        result[frozenset(names)] = pair
+    files: dict[Path, list[Study]] = {}
+    for study in studies:
+        if not study.facts.joints:
+            files.setdefault(split_source(study.facts.source)[0], []).append(study)
+    for bodies in files.values():
+        clips = [*map(read, bodies)] if len(bodies) > 1 else []
+        for holder, held in find_held(clips, comparison.radii.rigid):
+            pair = bodies[holder], bodies[held]
+            result.setdefault(frozenset(study.name for study in pair), pair)
+    return [pair for pair in result.values() if any(choice in pair[1].choices for choice in pair[0].choices)]
 
 
 def rates_above(times: np.ndarray, choices: Iterable[Choice]) -> list[str]:

@@ -23,6 +23,7 @@ from . import values
 from .steps import Job, Step, TaskError
 
 if TYPE_CHECKING:
+    from rigid_motion_batch.analysis.held import PairSlips
     from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 
 STAGES = ("read", "measure", "build", "render", "encode", "report")
@@ -146,6 +147,8 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
     modes: tuple[str, ...]
     radii: Radii
     fit: bool
+    reference: str
+    """The mode that the others are to be as good as."""
 
     def make(self, job: Job) -> None:
         from rigid_motion_batch.analysis import needed
@@ -156,9 +159,41 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
         clip = self.clip.read(job.results[0])
         ways = needed.Ways(clip, self.radii.of(clip), self.fit)
         modes = single_modes(self.modes)
-        result = needed.keys_needed(ways, modes, advance=lambda: job.progress(next(done), len(needed.RATES)))
+        result = needed.keys_needed(
+            ways, modes, self.reference, advance=lambda: job.progress(next(done), len(needed.RATES))
+        )
         write_rows(job.folder / ROWS, needed.NeededRow, needed.rows_of(result))
         values.write(job.folder / "needed", result)
+
+
+class MeasureSlips(Step, rooms=ANALYSIS, stage="report"):
+    """Measure how far a body slips in the one that holds it. Before: both recordings, and in turn what was measured of
+    them under each choice.
+
+    It is of the last stage, where what all shares of a farm have measured is there.
+    """
+
+    holder: ClipOf
+    held: ClipOf
+    radii: Radii
+    shared: bool = False
+
+    def make(self, job: Job) -> None:
+        from rigid_motion_batch.analysis import held
+        from rigid_motion_batch.analysis.results import made_again
+        from rigid_motion_batch.files import write_rows
+
+        clips = self.holder.read(job.results[0]), self.held.read(job.results[1])
+        found = []
+        for folders in zip(job.results[2::2], job.results[3::2], strict=True):
+            result = [result_in(folder) for folder in folders]
+            made = [
+                made_again(clip, one, self.radii, shared=self.shared) for clip, one in zip(clips, result, strict=True)
+            ]
+            if rows := held.slips(*made):
+                found.append(held.ChoiceSlips(result[0].choice, rows))
+        write_rows(job.folder / ROWS, held.Slip, [row for some in found for row in some.rows])
+        values.write(job.folder / "slips", held.PairSlips(self.holder.name, self.held.name, tuple(found)))
 
 
 class Tabulate(Step, rooms=("analysis", "files.py"), stage="report", partial=True):
@@ -258,11 +293,13 @@ class Part:
     """The result of a task before a page."""
 
     what: str
-    """What it is: "read", "measure", "count_keys", "encode" or "subject"."""
+    """What it is: "read", "measure", "count_keys", "slips", "encode" or "subject"."""
 
     clip: ClipOf = ClipOf("")
+    """Of slips the one that is held."""
+
     choice: str = ""
-    """The name of the choice of keys."""
+    """The name of the choice of keys; of slips that of the clip which holds the other."""
 
 
 class Page(Step, rooms=REPORT, stage="report", partial=True):
@@ -306,6 +343,7 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
             films,
             folder=Path(self.folder),
             mesh=mesh,
+            slips=self._slips(job),
             overview=self.overview,
             advance=self._counted(job),
         )
@@ -324,6 +362,14 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
                 keys = values.read(KeysNeeded, needed / "needed") if needed else None
                 yield clip_result(clip.read(recording), result, keys)
 
+    def _slips(self, job: Job) -> list[PairSlips]:
+        """Return what was found of the pairs before a page."""
+        from rigid_motion_batch.analysis.held import PairSlips
+
+        before = zip(self.parts, job.before, strict=False)
+        folders = [folder for part, folder in before if part.what == "slips" and folder]
+        return [values.read(PairSlips, folder / "slips") for folder in folders]
+
     def _counted(self, job: Job) -> Callable[[], None]:
         """Return a function that reports of every clip that it is on the page."""
         total = len(self.clips)
@@ -339,4 +385,11 @@ class Overview(Page):
 
         there = zip(self.clips, job.before[len(self.parts) :], strict=True)
         pages = {name: f"{name}/{PAGE}" if made else None for name, made in there}
-        write_overview(job.folder / PAGE, self._results(job), self.settings, pages, advance=self._counted(job))
+        write_overview(
+            job.folder / PAGE,
+            self._results(job),
+            self.settings,
+            pages,
+            slips=self._slips(job),
+            advance=self._counted(job),
+        )

@@ -83,8 +83,11 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
     seen = _seen(clip)
     truth = _joints(clip.truth)[:, seen]
     # Around the middle: what is far from the origin of its world has digits to spare.
-    truth = truth - (truth.min(axis=(0, 1)) + truth.max(axis=(0, 1))) / 2.0
-    size = (_extent(truth) if body else mesh.size) or 1.0
+    carries = carrying(clip.parents, truth[:, 0]) if clip.parents is not None else np.zeros(1, dtype=bool)
+    drawn = np.flatnonzero(~carries)
+    low, high = truth[drawn].min(axis=(0, 1)), truth[drawn].max(axis=(0, 1))
+    truth = truth - (low + high) / 2.0
+    size = (_extent(truth[drawn]) if body else mesh.size) or 1.0
     cell = _nice(0.3 * size)
     recording = {
         "times": block.put(clip.times - begin, 4, 1e-6),
@@ -98,11 +101,12 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
     return {
         "name": clip.facts.name,
         "joints": short_names(clip.facts.joint_names) if body else [],
-        "parents": [] if clip.parents is None else _drawn_from(clip.parents),
+        "parents": [] if clip.parents is None else _drawn_from(clip.parents, carries),
+        "drawn": drawn.tolist(),
         "size": size,
         "cell": cell,
         "grid": f"{1e3 * cell:g} mm" if cell < 0.01 else f"{100 * cell:g} cm" if cell < 1.0 else f"{cell:g} m",
-        "box": [truth.min(axis=(0, 1)).tolist(), truth.max(axis=(0, 1)).tolist()],
+        "box": [((low - high) / 2.0).tolist(), ((high - low) / 2.0).tolist()],
         "warnings": [
             {
                 "from": None if warning.start_s is None else warning.start_s - begin,
@@ -222,9 +226,9 @@ def _peaks(errors: np.ndarray, every: int) -> np.ndarray:
     return np.maximum.reduceat(errors, np.arange(0, errors.shape[1], every), axis=1) if every > 1 else errors
 
 
-def _drawn_from(parents: np.ndarray) -> list[int]:
+def _drawn_from(parents: np.ndarray, carries: np.ndarray) -> list[int]:
     """Return the parents to draw lines from: none from a root that only carries the body about."""
-    return np.where((parents >= 0) & carrying(parents)[parents], -1, parents).tolist()
+    return np.where((parents >= 0) & carries[parents], -1, parents).tolist()
 
 
 def _factor(largest: float, seen_as: float) -> int:

@@ -45,6 +45,7 @@ MEASURES = (
     Measure("keys_per_s", "Keys", "/s"),
     Measure("bytes_per_s", "Size", "bytes/s"),
     Measure("foot_slide_m", "Feet slide", "mm", 1e3),
+    Measure("still_point_m", "Point that stays, largest", "mm", 1e3),
 )
 NONE, MINUS = "\u2013", "\u2212"
 
@@ -69,10 +70,13 @@ class Numbers:
     groupings: tuple[frozenset[Groups], ...]
     """Of each clip, the modes that are one motion under each choice."""
 
+    asked: str = REFERENCE
+    """The mode that others are to be held against, if it is among them."""
+
     @property
     def reference(self) -> str | None:
         """The mode that others are held against."""
-        return REFERENCE if REFERENCE in self.modes else None
+        return self.asked if self.asked in self.modes else None
 
     def label(self, mode: str) -> str:
         """Return the name of a mode, without its algebra."""
@@ -101,7 +105,8 @@ class Numbers:
 class Gathering:
     """Numbers while clips come in, one at a time."""
 
-    def __init__(self) -> None:
+    def __init__(self, reference: str = REFERENCE) -> None:
+        self.reference = reference
         self._clips: list[str] = []
         self._rows: list[tuple[tuple[Choice, ...], tuple[str, ...], np.ndarray]] = []
         """Of each clip its choices, its modes, and its numbers, shape (measures, choices, modes)."""
@@ -130,7 +135,7 @@ class Gathering:
         for clip, (own_choices, own_modes, own) in enumerate(self._rows):
             rows, columns = [choices.index(item) for item in own_choices], [modes.index(item) for item in own_modes]
             values[:, clip, np.array(rows)[:, None], columns] = own
-        return Numbers(tuple(self._clips), choices, modes, values, tuple(self._groupings))
+        return Numbers(tuple(self._clips), choices, modes, values, tuple(self._groupings), self.reference)
 
 
 def digits(value: float | None, places: int = 3) -> str:

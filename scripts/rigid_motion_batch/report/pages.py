@@ -23,6 +23,7 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from rigid_motion_batch.analysis.choices import Choice
+from rigid_motion_batch.analysis.held import PairSlips
 from rigid_motion_batch.analysis.metrics import Metrics
 from rigid_motion_batch.analysis.modes import description_of, label_of
 from rigid_motion_batch.analysis.needed import KeysNeeded
@@ -33,6 +34,7 @@ from rigid_motion_batch.recordings.clips import ClipFacts
 
 from . import charts, tables
 from .data import Mesh, clip_data, drill, json_in_page, mesh_data
+from .held import MOST_SAID, slip_grids, slip_sentences
 from .numbers import KINDS, LARGEST, MEASURES, MINUS, Gathering, Numbers, digits, percent
 from .settings import Settings
 from .tables import Joints, joints_of
@@ -66,6 +68,7 @@ def write_report(
     *,
     folder: Path | None = None,
     mesh: Mesh | None = None,
+    slips: Sequence[PairSlips] = (),
     overview: str = "",
     advance: Callable[[], object] = lambda: None,
 ) -> list[Path]:
@@ -84,6 +87,8 @@ def write_report(
         Where the page will be in the end: what links are relative to. That of `path` unless given.
     mesh : Mesh, optional
         Of the object that single rigid bodies move in the viewer; a drill unless given.
+    slips : sequence of PairSlips
+        Of clips that hold one another.
     overview : str
         The way to a page of more clips; empty where there is none.
     advance : callable
@@ -101,7 +106,7 @@ def write_report(
     """
     folder = folder or path.parent
     films, mesh = films or {}, mesh or drill()
-    gathering, page = Gathering(), _Clips(path, films, folder, mesh)
+    gathering, page = Gathering(settings.reference), _Clips(path, films, folder, mesh)
     for clip in clips:
         page.facts.append(clip.facts)
         if clip.choices:
@@ -110,7 +115,7 @@ def write_report(
         advance()
     numbers = gathering.numbers()
     start = _start(numbers, page.choices)
-    context = _context(numbers, page.needed, settings) | {
+    context = _context(numbers, page.needed, settings, slips) | {
         "clips": page,
         "overview": overview,
         "script": script_of(SCRIPTS),
@@ -142,13 +147,14 @@ def write_overview(
     settings: Settings,
     pages: Mapping[str, str | None],
     *,
+    slips: Sequence[PairSlips] = (),
     advance: Callable[[], object] = lambda: None,
 ) -> None:
     """Write the page of many clips, those that matter first: with a warning, and then by the largest error.
 
     Parameters
     ----------
-    path, clips, settings, advance
+    path, clips, settings, slips, advance
         As of `write_report`; of the clips the numbers alone are looked at.
     pages : mapping
         Clip name to the way from this page to the clip's; None where there is none.
@@ -158,7 +164,7 @@ def write_overview(
     ValueError
         Where there is nothing to report.
     """
-    gathering = Gathering()
+    gathering = Gathering(settings.reference)
     needed: list[KeysNeeded] = []
     facts: list[ClipFacts] = []
     for clip in clips:
@@ -169,7 +175,7 @@ def write_overview(
             needed.append(clip.needed)
         advance()
     numbers = gathering.numbers()
-    context = _context(numbers, needed, settings) | {
+    context = _context(numbers, needed, settings, slips) | {
         "script": script_of(("tables",)),
         "grids": tables.grids(numbers),
         "rows": _overview_rows(numbers, facts, pages),
@@ -303,13 +309,18 @@ def _overview_rows(
 # -- templates --------------------------------------------------------------------------------------------------------
 
 
-def _context(numbers: Numbers, needed: Sequence[KeysNeeded], settings: Settings) -> dict[str, Any]:
+def _context(
+    numbers: Numbers, needed: Sequence[KeysNeeded], settings: Settings, slips: Sequence[PairSlips]
+) -> dict[str, Any]:
     return {
         "numbers": numbers,
         "verdict": verdict(numbers, needed),
         "settings": settings,
         "date": datetime.now(),
         "needed": needed,
+        "slips": slip_sentences(slips, numbers),
+        "slip_grids": slip_grids(slips, numbers),
+        "most_said": MOST_SAID,
         "measures": MEASURES,
         "deciding": numbers.deciding(0),
         "colours": [colours_on_pages(mode) for mode in numbers.modes],

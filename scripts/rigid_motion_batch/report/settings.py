@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rigid_motion_batch.analysis.choices import JOINT
+from rigid_motion_batch.analysis.modes import REFERENCE
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,9 @@ class Settings:
 
     command: str
     """The command line, as one would type it."""
+
+    reference: str = REFERENCE
+    """The mode that the others are held against."""
 
     joint_radius: float = JOINT
     """Of the shell of a joint, in metres."""

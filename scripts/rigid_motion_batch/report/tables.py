@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, overall
+from rigid_motion_batch.analysis.reconstructions import Groups
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 from rigid_motion_batch.palette import error_hex, full_colour
 from rigid_motion_batch.recordings.rest_bodies import short_names
@@ -67,33 +68,39 @@ def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
         else numbers.clips[0]
     )
     columns = [numbers.modes.index(group[0]) for group in groups]
-    reference = numbers.modes.index(numbers.reference) if numbers.reference else None
     found = []
     for place, measure in enumerate(MEASURES):
-        own = values[place][:, columns]
-        if not np.isfinite(own).any():
+        if not np.isfinite(values[place][:, columns]).any():
             continue
-        texts = [[digits(value) for value in row] for row in own.tolist()]
-        least = [_least(row) for row in texts]
-        rows = tuple(
-            Row(
-                group,
-                tuple(
-                    Cell(
-                        texts[choice][column],
-                        _change(own[choice, column], reference, values[place, choice], group, numbers),
-                        texts[choice][column] == least[choice],
-                        float(np.nan_to_num(own[choice, column], nan=1e12)),
-                    )
-                    for choice in range(len(numbers.choices))
-                ),
-            )
-            for column, group in enumerate(groups)
-        )
+        rows = grid_rows(values[place], groups, numbers)
         caption = f"{measure.title}, {measure.unit}: {where}"
         scope = "all" if clip is None else str(clip)
         found.append(Grid(scope, place, caption, tuple(choice.title for choice in numbers.choices), rows))
     return found
+
+
+def grid_rows(values: np.ndarray, groups: Groups, numbers: Numbers) -> tuple[Row, ...]:
+    """Return a row for each motion, of values of shape (choices, modes)."""
+    columns = [numbers.modes.index(group[0]) for group in groups]
+    reference = numbers.modes.index(numbers.reference) if numbers.reference else None
+    own = values[:, columns]
+    texts = [[digits(value) for value in row] for row in own.tolist()]
+    least = [_least(row) for row in texts]
+    return tuple(
+        Row(
+            group,
+            tuple(
+                Cell(
+                    texts[choice][column],
+                    _change(own[choice, column], reference, values[choice], group, numbers),
+                    texts[choice][column] == least[choice],
+                    float(np.nan_to_num(own[choice, column], nan=1e12)),
+                )
+                for choice in range(len(numbers.choices))
+            ),
+        )
+        for column, group in enumerate(groups)
+    )
 
 
 def _least(texts: Iterable[str]) -> str:

@@ -1,8 +1,9 @@
 """The verdict: one sentence with a number that answers "which mode", and in how many cases that mode was the best.
 
 Everything is computed from the numbers of the run, and true for any outcome of it. Errors are RMS shell errors;
-several clips are averaged by the geometric mean, so that a large motion counts as much as a small one. Modes that are
-one motion throughout are one candidate, and the first of them names it.
+several clips are averaged by the geometric mean, so that a large motion counts as much as a small one, and it is said
+so. Modes that are one motion throughout are one candidate, and the first of them names it. A draw is said to be one,
+and so is a loss.
 """
 
 from __future__ import annotations
@@ -15,8 +16,7 @@ import numpy as np
 from rigid_motion.motion import MODES
 from rigid_motion_batch.analysis.choices import Budget, Tolerance
 from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
-from rigid_motion_batch.analysis.modes import REFERENCE
-from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, overall
+from rigid_motion_batch.analysis.needed import KeysNeeded, overall
 
 from .numbers import KINDS, Numbers, digits, percent
 
@@ -26,11 +26,8 @@ TIE = 0.005
 ASKED = ("20", "15", "12", "30")
 """The rate of the reference that the sentence on keys needed is about: the first that was possible."""
 
-SPACED = {
-    "uniform": "evenly spaced keys",
-    "adaptive": "keys where the motion needs them",
-    "fitted": "fitted keys",
-}
+SPACED = "evenly spaced", "where the motion needs them", "where needed, and fitted"
+"""How keys are placed, by `needed.DECIMATIONS`."""
 
 SAMPLE_IS_KEY = "No mode is off by more than rounding: every sample is a key, or nothing moves."
 
@@ -67,7 +64,7 @@ class _Contest:
     @property
     def reference(self) -> int | None:
         """The group that the reference is in."""
-        return next((place for place, group in enumerate(self.groups) if REFERENCE in group), None)
+        return next((place for place, group in enumerate(self.groups) if self.numbers.asked in group), None)
 
     @property
     def distinguishable(self) -> np.ndarray:
@@ -97,7 +94,9 @@ def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
         Of the clips, where that was looked for.
     """
     contests = list(_contests(numbers))
-    sentences = [_keys_needed(numbers, needed) if needed else None]
+    # What was asked is answered first: within a tolerance, how many keys.
+    within = [contest for contest in contests if contest.kind is Tolerance]
+    sentences = [*map(_beside_rival, within), _keys_needed(numbers, needed) if needed else None]
     sentences += [tell(contest) for contest in contests for tell in (_fewer_keys, _beside_rival)]
     said = [sentence for sentence in sentences if sentence]
     if not said:
@@ -145,24 +144,31 @@ def _best(contest: _Contest) -> tuple[int, int, np.ndarray] | None:
 
 def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> str | None:
     """How few keys are as good as those of the reference at a rate, of those that were looked for."""
-    together = overall(needed)
+    together, reference = overall(needed), needed[0].reference
     rate = next((rate for rate in ASKED if together.asked[together.rates.index(rate)]), None)
     if rate is None:
         return None
     at = together.rates.index(rate)
     whole = together.clips[..., at] == together.asked[at]
     shares = np.where(whole, together.shares[..., at], np.inf)
-    group, way = np.unravel_index(np.argmin(shares), shares.shape)
-    mode = together.groups[group][0]
-    reference = numbers.label(REFERENCE)
+    group, way = (int(place) for place in np.unravel_index(np.argmin(shares), shares.shape))
+    label, theirs = numbers.label(reference), together.reference_keys_per_s[at]
     if shares[group, way] > 1.0 - TIE:
-        return f"No mode needs fewer keys than {reference} at {rate} a second."
-    own, theirs = together.keys_per_s[group, way, at], together.reference_keys_per_s[at]
-    return (
-        f"{numbers.label(mode)}, with {SPACED[DECIMATIONS[way]]}, does with {own:.3g} a second where "
-        f"{'it' if mode == REFERENCE else reference} needs {theirs:.3g} evenly spaced: "
-        f"{percent(1.0 - shares[group, way])} fewer for the same error."
-    )
+        return f"Nothing needs fewer keys than {label}, {theirs:.3g} a second and evenly spaced."
+
+    def amount(group: int) -> str:
+        return f"{together.keys_per_s[group, way, at]:.3g} a second of {numbers.label(together.groups[group][0])}"
+
+    said = f"As good as {theirs:.3g} evenly spaced keys a second of {label} are {amount(group)}, {SPACED[way]}"
+    beside = next((place for place, group in enumerate(together.groups) if reference in group), group)
+    # Where keys are chosen better that is no merit of the mode: its rival has as good ones.
+    if beside != group and np.isfinite(shares[beside, way]):
+        said += f", or {amount(beside)}"
+    return f"{said}{_over(together.asked[at])}."
+
+
+def _over(clips: np.integer) -> str:
+    return f" (geometric mean over {clips} clips)" if clips > 1 else ""
 
 
 def _fewer_keys(contest: _Contest) -> str | None:
@@ -190,11 +196,11 @@ def _fewer_keys(contest: _Contest) -> str | None:
     share = 1.0 - rate / rates[highest]
     if share < TIE:
         return None
-    most, least = ("at most ", "at least ") if at_most else ("", "")
+    most, least = ("At most ", "at least ") if at_most else ("", "")
     placed = " on average" if contest.kind is Budget else ""
     return (
-        f"{contest.name(best)} needs {most}{rate:.3g} keys a second{placed} where {contest.name(reference)} needs "
-        f"{rates[highest]:g}: {least}{percent(share)} fewer keys for the same error."
+        f"{most}{rate:.3g} keys a second{placed} of {contest.name(best)} are as good as {rates[highest]:g} of "
+        f"{contest.name(reference)}: {least}{percent(share)} fewer for the same error{_over(whole.sum())}."
     )
 
 
@@ -206,13 +212,14 @@ def _beside_rival(contest: _Contest) -> str:
     best, rival, ratios = result
     at = int(np.nanargmin(ratios))
     first, other, less = contest.name(best), contest.name(rival), percent(1.0 - ratios[at])
+    over = _over(contest.distinguishable[:, at].sum())
     if contest.kind is not Tolerance:
         keys = contest.numbers.choices[contest.places[at]].amount
         placed = " on average" if contest.kind is Budget else ""
-        return f"{first} has {less} less error than {other} with the same {keys} keys a second{placed}."
+        return f"{first} has {less} less error than {other} with the same {keys} keys a second{placed}{over}."
     phrase, (own, others) = contest.phrase(at), contest.means[at, [best, rival]]
-    said = f"{phrase[0].upper()}{phrase[1:]}, {first} needs {own:.3g} keys a second where {other} needs {others:.3g}"
-    return f"{said}: {less} fewer."
+    said = f"{phrase[0].upper()}{phrase[1:]}, {first} takes {less} fewer keys than {other}"
+    return f"{said}: {own:.3g} a second to {others:.3g}{over}."
 
 
 def _no_winner(contest: _Contest) -> str:
@@ -221,11 +228,29 @@ def _no_winner(contest: _Contest) -> str:
     known = np.flatnonzero(np.isfinite(means).all(axis=1))
     at = int(known[0] if within else known[-1])
     best = contest.reference if contest.reference is not None else int(np.argmin(means[at]))
+    over = _over(contest.distinguishable[:, at].sum())
+    better = means[known].min(axis=1) < (1.0 - TIE) * means[known, best]
+    if better.any():
+        winners: dict[int, list[str]] = {}
+        for choice, is_better in zip(known.tolist(), better.tolist(), strict=True):
+            winner = int(np.argmin(means[choice])) if is_better else best
+            winners.setdefault(winner, []).append(contest.phrase(choice))
+        said = "; ".join(f"{contest.name(winner)} {_listed(phrases)}" for winner, phrases in winners.items())
+        return f"What {'needs the fewest keys' if within else 'is closest'} depends on the keys: {said}{over}."
     unit, off = ("keys a second", "") if within else ("mm", " off (RMS)")
-    said = f"{contest.name(best)}: {digits(means[at, best])} {unit}{off} {contest.phrase(at)}."
+    said = f"{contest.name(best)}: {digits(means[at, best])} {unit}{off} {contest.phrase(at)}"
     if len(contest.groups) == 1:
-        return said
-    return f"No mode {'needs fewer keys' if within else 'comes closer'} than {said}"
+        return f"{said}{over}."
+    following = next(int(group) for group in np.argsort(means[at], kind="stable") if group != best)
+    ratio = means[at, following] / means[at, best] - 1.0
+    name = contest.name(following)
+    beside = f"{name} is as good" if ratio < TIE else f"{name} is next, with {percent(ratio)} more"
+    return f"Nothing {'needs fewer keys' if within else 'comes closer'} than {said}; {beside}{over}."
+
+
+def _listed(phrases: Sequence[str]) -> str:
+    """Return phrases as prose lists them."""
+    return " and ".join(filter(None, (", ".join(phrases[:-1]), phrases[-1])))
 
 
 def _wins(contest: _Contest) -> str:

@@ -18,7 +18,7 @@ from rigid_motion.motion import KEYFRAME_MODES, Poses
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import align_signs, conjugate, multiply, rotate
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.rigs import rigid
+from rigid_motion_batch.recordings.matrices import rigid
 
 LEAST_BONE = 0.02
 """A bone is no shorter than so much of the figure: Blender removes bones of no length."""

@@ -6,7 +6,7 @@ colour the bones, flash the joints at their keys, and put a ring around the wors
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -78,11 +78,17 @@ class BodyMotion:
         of joints in their parents' space (joints, n): (n, m, 3).
         """
         seen = physique.seen_bones(self.rest)
-        joints = self.rest_body.skeleton.in_root_space(poses)[seen]
-        back = conjugate(self.rest.joints.quaternions[seen])
-        arms = rotate(back, self.rest.tails[seen] - self.rest.joints.positions[seen])
-        tails = joints.positions + rotate(joints.quaternions, arms[:, None])
-        return np.concatenate((joints.positions, tails)).transpose(1, 0, 2)
+        joints = self.rest.joints.positions[seen]
+        return self.carried(poses, np.tile(seen, 2), np.concatenate((joints, self.rest.tails[seen])))
+
+    def carried(self, poses: Poses, bones: Sequence[int] | np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return where bones (k,) carry points that are there at rest (k, 3),
+        of joints in their parents' space (joints, n): (n, k, 3).
+        """
+        joints = self.rest_body.skeleton.in_root_space(poses)[bones]
+        back = conjugate(self.rest.joints.quaternions[bones])
+        arms = rotate(back, points - self.rest.joints.positions[bones])
+        return (joints.positions + rotate(joints.quaternions, arms[:, None])).transpose(1, 0, 2)
 
 
 class Bodies:

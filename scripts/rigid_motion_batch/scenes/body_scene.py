@@ -27,7 +27,7 @@ from .bodies import SHADES, Bodies, BodyMotion, flashes
 from .framing import SMOOTHING, Framing, Jointed
 from .lanes import Cast
 from .materials import ink
-from .physique import Physique, body_size
+from .physique import Physique, body_size, seen_bones
 from .scene import LEGEND, assemble_scene, begin
 from .settings import SceneSettings
 from .timeline import Timeline
@@ -61,7 +61,12 @@ def build_body_scene(made: Reconstruction, settings: SceneSettings) -> bpy.types
     rest = Rest.of(made.clip)
     motion, centre = shown_motion(made, [group[0] for group in lanes_of], timeline, rest)
 
-    recording, *others = (Jointed(motion.places(some)) for some in (motion.recording, *motion.modes.values()))
+    shape = Physique.of(made.clip, rest)
+    ends = shape.outermost
+    recording, *others = (
+        Jointed(motion.places(some), motion.carried(some, shape.foremost[ends], shape.vertices[ends]))
+        for some in (motion.recording, *motion.modes.values())
+    )
     framing = Framing.of(recording, SMOOTHING * settings.fps)
     extent, size = framing.extent(recording, others), body_size(rest)
     extent = replace(
@@ -81,7 +86,6 @@ def build_body_scene(made: Reconstruction, settings: SceneSettings) -> bpy.types
         worst={mode: errors.argmax(axis=0) for mode, errors in motion.errors.items()},
     )
     full = full_colour(motion.errors.values())
-    shape = Physique.of(made.clip, rest)
     most = _most(1e3 * full, cast.largest_error)
     reserved = LEGEND * (captions.width_of(LEAST) + captions.width_of(most)) + BAR + 4.0 * BAR_GAP
     legend = ("grey: recording", "ring: the worst joint", f"dots: {'key poses' if made.shared else 'keys'}")
@@ -104,7 +108,8 @@ def shown_motion(
     recording = clip.in_blender(interpolate(clip.times, clip.poses, times, "dq_sclerp"))
     skeleton = made.skeleton
     truth = skeleton.in_root_space(recording)
-    low, high = truth.positions.min(axis=(0, 1)), truth.positions.max(axis=(0, 1))
+    seen = truth.positions[seen_bones(rest)]
+    low, high = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
     centre = np.append((low + high)[:2] / 2.0, low[2])
 
     def around(poses: Poses, joint: int | None = None) -> Poses:

@@ -72,6 +72,9 @@ class Jointed:
     places: np.ndarray
     """Shape (n, m, 3)."""
 
+    surface: np.ndarray
+    """Other points of it that are seen, shape (n, k, 3)."""
+
     @property
     def middle(self) -> np.ndarray:
         """The mean of the joints, at one height as long as the body stays about there: a step is no reason to nod."""
@@ -82,7 +85,7 @@ class Jointed:
         return middle
 
     def around(self, focus: np.ndarray) -> np.ndarray:
-        return (self.places - focus[:, None]).reshape(-1, 3)
+        return (np.concatenate((self.places, self.surface), axis=1) - focus[:, None]).reshape(-1, 3)
 
     def heading(self, focus: np.ndarray) -> float:
         """Return the yaw in radians of a walk that goes to the right and a little towards the camera; from the broad

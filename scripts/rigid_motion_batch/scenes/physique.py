@@ -59,10 +59,21 @@ class Physique:
     smooth: bool
 
     @property
+    def foremost(self) -> np.ndarray:
+        """The bone that carries most of each vertex, shape (v,)."""
+        return np.take_along_axis(self.carriers, self.weights.argmax(axis=1)[:, None], axis=1)[:, 0]
+
+    @property
     def bones(self) -> np.ndarray:
-        """The bone of each face: the one that carries most of its first vertex."""
-        foremost = np.take_along_axis(self.carriers, self.weights.argmax(axis=1)[:, None], axis=1)[:, 0]
-        return foremost[[face[0] for face in self.faces]]
+        """The bone of each face: that of its first vertex."""
+        return self.foremost[[face[0] for face in self.faces]]
+
+    @property
+    def outermost(self) -> np.ndarray:
+        """The numbers of the vertices of each bone that are outermost along the axes, shape (k,)."""
+        parts = (np.flatnonzero(self.foremost == bone) for bone in np.unique(self.foremost))
+        ends = [own[edge(self.vertices[own], axis=0)] for own in parts for edge in (np.argmin, np.argmax)]
+        return np.unique(np.concatenate(ends))
 
     @classmethod
     def of(cls, clip: Clip, rest: Rest) -> Physique:
@@ -124,7 +135,7 @@ def body_size(rest: Rest) -> float:
 
 def seen_bones(rest: Rest) -> list[int]:
     """Return the bones but for roots that carry a single child about: they may reach to wherever the body was left."""
-    carries = carrying(rest.parents)
+    carries = carrying(rest.parents, rest.joints.positions)
     return np.flatnonzero(~carries if not carries.all() else carries).tolist()
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from rigid_motion.live.sockets import is_loopback
 from rigid_motion.streams.wire import LONGEST
-from rigid_motion_batch.places import CHECKOUT
+from rigid_motion_batch.places import brings
 
 if TYPE_CHECKING:
     import zenoh
@@ -92,8 +92,8 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
     try:
         import zenoh
     except ImportError:
-        way = "python scripts/bootstrap.py stream" if CHECKOUT else "pip install 'rigid-motion[stream]'"
-        raise ValueError(f"rooms need Zenoh, which is not installed; `{way}` brings it") from None
+        way = brings("stream", "stream")
+        raise ValueError(f"rooms need Zenoh, which is not installed; {way} brings it") from None
     chosen = settings(role, at, network)
     try:
         text = zenoh.Config.from_file(config) if config else zenoh.Config()

@@ -24,7 +24,7 @@ def rms(ways: Ways, keys: np.ndarray, mode: str) -> float:
 
 @pytest.fixture(scope="module")
 def result() -> KeysNeeded:
-    return keys_needed(WAYS, MODES)
+    return keys_needed(WAYS, MODES, "lerp_slerp")
 
 
 @pytest.mark.parametrize("mode", MODES)

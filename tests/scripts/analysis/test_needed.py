@@ -39,7 +39,7 @@ def swing() -> Clip:
 
 @pytest.fixture(scope="module")
 def result(swing: Clip) -> KeysNeeded:
-    return keys_needed(Ways(swing, 0.1), KEYFRAME_MODES)
+    return keys_needed(Ways(swing, 0.1), KEYFRAME_MODES, "lerp_slerp")
 
 
 def test_the_error_to_reach_is_that_of_the_reference_at_its_rate(swing: Clip, result: KeysNeeded) -> None:
@@ -83,10 +83,10 @@ def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, result: KeysNeeded) -> 
 
 
 def test_where_the_reference_has_all_samples_or_no_two_there_is_nothing_to_reach() -> None:
-    slow = keys_needed(Ways(swinging_clip(seconds=2.0, rate=15.0), 0.1), ["lerp_slerp", "motor_spline"])
+    slow = keys_needed(Ways(swinging_clip(seconds=2.0, rate=15.0), 0.1), ["lerp_slerp", "motor_spline"], "lerp_slerp")
     assert np.isnan(slow.keys[:, :, :3]).all()
     assert np.isfinite(slow.keys[:, :, 3:]).all()
-    short = keys_needed(Ways(swinging_clip(seconds=0.1), 0.1), ["lerp_slerp"])
+    short = keys_needed(Ways(swinging_clip(seconds=0.1), 0.1), ["lerp_slerp"], "lerp_slerp")
     assert np.isnan(short.keys[:, :, RATES.index("8")]).all()
     assert np.isfinite(short.keys[:, :, RATES.index("30")]).all()
 
@@ -95,7 +95,7 @@ def test_what_takes_every_sample_is_not_reached() -> None:
     random = np.random.default_rng(0)
     clip = swinging_clip(seconds=2.0, rate=30.5)
     shaken = replace(clip, poses=Poses(random.normal(size=(len(clip.times), 3)), clip.poses.quaternions))
-    result = keys_needed(Ways(shaken, 0.1), ["lerp_slerp", "motor_spline"])
+    result = keys_needed(Ways(shaken, 0.1), ["lerp_slerp", "motor_spline"], "lerp_slerp")
     at = RATES.index("30")
     assert result.targets[at] > 0.1
     assert np.isinf(result.keys[1, 0, at])

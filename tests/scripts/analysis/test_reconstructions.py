@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import KEYFRAME_MODES, Poses, rms
+from rigid_motion.motion.quaternions import normalise, rotate
 from rigid_motion_batch.analysis import reconstructions
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.reconstructions import (
@@ -17,10 +18,12 @@ from rigid_motion_batch.analysis.reconstructions import (
     moving,
     reconstruct,
     same_motions,
+    still_point,
 )
 from rigid_motion_batch.recordings.clips import Clip
 from tests.motion.bodies import body_errors
 from tests.scripts.clips.bodies import JOINTS, PARENTS, still_body, swinging_body
+from tests.scripts.clips.recordings import swinging_clip
 
 MODES = ("lerp_slerp", "dq_sclerp", "motor_spline")
 
@@ -145,3 +148,33 @@ def test_the_best_mode_has_the_fewest_keys_and_of_as_many_the_least_error() -> N
     made = reconstruct(clip, Tolerance("2cm"), MODES, RADII)
     counts = {mode: sum(map(len, keys)) for mode, keys in made.keys.items()}
     assert counts[made.best_mode] == min(counts.values())
+
+
+def test_the_point_that_stays_is_found_and_how_far_each_mode_moves_it() -> None:
+    times, pivot = np.linspace(0.0, 2.0, 121), np.array((0.2, -0.1, 0.3))
+    random = np.random.default_rng(2)
+    # About a point of its own, by turns of any kind; beside it a hinge, which is a line of such points.
+    wild = normalise(np.array((1.0, 0.0, 0.0, 0.0)) + np.sin(np.outer(3.0 * times, random.normal(size=4))))
+    half = 0.7 * np.sin(2.0 * times)
+    hinge = np.stack((np.cos(half), 0.0 * half, 0.0 * half, np.sin(half)), axis=1)
+    for quaternions, nearest in ((wild, pivot), (hinge, pivot * (1.0, 1.0, 0.0))):
+        poses = Poses(np.array((1.0, 2.0, 3.0)) - rotate(quaternions, pivot), quaternions)
+        assert still_point(poses) == pytest.approx(nearest, abs=1e-9)
+        clip = replace(swinging_clip(seconds=2.0, rate=60.0), times=times, poses=poses)
+        made = reconstruct(clip, Uniform("5"), ("bezier", "lerp_slerp", "dq_sclerp"), 0.1)
+        ground = Ground.of(made)
+        off = {mode: errors_of(made, mode, ground).still_point for mode in made.keys}
+        assert off["dq_sclerp"] < 1e-9
+        assert min(off["bezier"], off["lerp_slerp"]) > 1e-3
+
+
+@pytest.mark.parametrize("kind", ["flies", "rests", "trembles"])
+def test_what_flies_or_rests_all_over_has_no_point_that_stays(kind: str) -> None:
+    random, count = np.random.default_rng(0), 90
+    rest = np.tile((1.0, 0.0, 0.0, 0.0), (count, 1))
+    positions = {
+        "flies": np.linspace((0.0, 0.0, 0.0), (3.0, 1.0, 0.0), count),
+        "rests": np.zeros((count, 3)),
+        "trembles": 1e-3 * random.normal(size=(count, 3)),
+    }[kind]
+    assert still_point(Poses(positions, rest)) is None

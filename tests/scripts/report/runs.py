@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import EVERYWHERE, RIGID, Choice, Uniform
+from rigid_motion_batch.analysis.modes import COMPARED
 from rigid_motion_batch.analysis.needed import Ways, keys_needed
 from rigid_motion_batch.analysis.results import ClipResult, clip_result
 from rigid_motion_batch.recordings.clips import Clip, ClipWarning
 from tests.scripts.clips.recordings import compare_clip
 
-MODES = tuple(KEYFRAME_MODES)
+MODES = COMPARED
 RATES = tuple(map(Uniform, ("5", "10", "15", "20")))
 
 

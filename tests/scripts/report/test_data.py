@@ -1,5 +1,6 @@
 """What Python packs is what the viewer reads, and the viewer's mathematics is that of the program."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,12 +9,15 @@ import pytest
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.results import ClipResult
+from rigid_motion_batch.recordings import read_clips
 from rigid_motion_batch.report import data
 from rigid_motion_batch.report.data import MOST_TRIANGLES, Mesh, clip_data, drill, json_in_page
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.javascript import value_of
 from tests.scripts.report.runs import result_of
+
+BODIES = Path(__file__).parents[1] / "recordings" / "bodies"
 
 TEN = (Uniform("10"),)
 
@@ -108,3 +112,14 @@ def test_a_long_recording_keeps_the_worst_moments_in_view_and_chart(monkeypatch:
 def test_a_mesh_that_the_viewer_cannot_have_is_refused(count: int) -> None:
     with pytest.raises(ValueError, match=f"{count} triangles; give the viewer 1 to {MOST_TRIANGLES}"):
         Mesh(np.zeros((3, 3)), np.zeros((count, 3), dtype=int))
+
+
+def test_a_body_is_in_the_middle_wherever_its_root_stands() -> None:
+    (clip,), _ = read_clips([str(BODIES / "static_root.bvh")])
+    result = clip_data(result_of(clip, TEN), str, drill())
+    low, high = np.array(result["box"])
+    np.testing.assert_allclose(low, -high, atol=1e-12)
+    assert result["drawn"] == [1, 2, 3, 4, 5, 6, 7]
+    assert result["size"] == pytest.approx(1.57, abs=0.02)
+    # It walks 3.5 m, more than 5 m from where its root stands.
+    assert np.ptp(result["box"], axis=0).max() == pytest.approx(3.9, abs=0.3)

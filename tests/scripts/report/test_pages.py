@@ -161,9 +161,9 @@ def test_data_that_would_make_the_page_too_large_are_files_beside_it(tmp_path, m
 
 
 def test_the_lowest_number_is_underlined_with_all_its_ties_but_not_where_all_are_the_same(tmp_path: Path) -> None:
-    clip = result_of(swinging_clip(), TEN, ("lerp_slerp", "dq_sclerp", "pga_lerp"))
+    clip = result_of(swinging_clip(), TEN, ("bezier", "dq_sclerp", "pga_lerp"))
     (result,) = clip.choices
-    errors = {"lerp_slerp": 0.0020001, "dq_sclerp": 0.0020002, "pga_lerp": 0.003}
+    errors = {"bezier": 0.0020001, "dq_sclerp": 0.0020002, "pga_lerp": 0.003}
     motions = tuple(
         replace(motion, metrics=tuple(replace(row, rms_shell_m=errors[row.mode]) for row in motion.metrics))
         for motion in result.motions

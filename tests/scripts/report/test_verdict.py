@@ -42,29 +42,29 @@ def keys_needed(keys: Mapping[str, Sequence[float]], *, fitted: bool = False) ->
     )  # fmt: skip
 
 
-REF, SCREW, SMOOTH = "lerp_slerp", "dq_sclerp", "motor_spline"
+REF, SCREW, SMOOTH = "bezier", "dq_sclerp", "motor_spline"
 
 CASES = {
     "fewer keys, between the rates of the run": (
         numbers((FIVE, TEN, TWENTY), {REF: (16, 4, 1), SMOOTH: (4, 1, 0.25)}),
-        "Smooth Screw needs 10 keys a second where Straight needs 20: 50 % fewer keys for the same error.",
+        "10 keys a second of Smooth Screw are as good as 20 of Blender's Curves: 50 % fewer for the same error.",
     ),
     "better at the lowest rate than the reference at the highest": (
         numbers((FIVE, TEN), {REF: (16, 4), SMOOTH: (3, 1)}),
-        "Smooth Screw needs at most 5 keys a second where Straight needs 10: "
-        "at least 50 % fewer keys for the same error.",
+        "At most 5 keys a second of Smooth Screw are as good as 10 of Blender's Curves: "
+        "at least 50 % fewer for the same error.",
     ),
     "an error that does not fall with the rate": (
         numbers((FIVE, TEN), {REF: (8, 9), SMOOTH: (4, 6)}),
-        "Smooth Screw has 50 % less error than Straight with the same 5 keys a second.",
+        "Smooth Screw has 50 % less error than Blender's Curves with the same 5 keys a second.",
     ),
     "one rate": (
         numbers((TEN,), {REF: (4,), SCREW: (5,), SMOOTH: (1,)}),
-        "Smooth Screw has 75 % less error than Straight with the same 10 keys a second.",
+        "Smooth Screw has 75 % less error than Blender's Curves with the same 10 keys a second.",
     ),
     "the reference is the best": (
         numbers((FIVE, TEN), {REF: (4, 1), SCREW: (5, 1.25), SMOOTH: (8, 2)}),
-        "No mode comes closer than Straight: 1.00 mm off (RMS) at 10 keys/s.",
+        "Nothing comes closer than Blender's Curves: 1.00 mm off (RMS) at 10 keys/s; Screw is next, with 25 % more.",
     ),
     "a run without the reference": (
         numbers((TEN,), {SCREW: (4,), SMOOTH: (1,), "pga_lerp": (5,)}),
@@ -72,27 +72,38 @@ CASES = {
     ),
     "a clip too short for the higher rate": (
         numbers((FIVE, TEN), {REF: (16, 4), SMOOTH: (4, 1)}, {REF: (2, np.nan), SMOOTH: (1, np.nan)}),
-        "Smooth Screw needs 5 keys a second where Straight needs 10: 50 % fewer keys for the same error.",
+        "5 keys a second of Smooth Screw are as good as 10 of Blender's Curves: 50 % fewer for the same error.",
     ),
     "a tolerance": (
         numbers((Tolerance("5mm"),), {REF: (8,), SMOOTH: (6,)}),
-        "Within 5 mm, Smooth Screw needs 6 keys a second where Straight needs 8: 25 % fewer.",
+        "Within 5 mm, Smooth Screw takes 25 % fewer keys than Blender's Curves: 6 a second to 8.",
     ),
     "a tolerance, and the reference needs the fewest keys": (
         numbers((Tolerance("5mm"), Tolerance("10mm")), {REF: (6, 4), SMOOTH: (8, 5)}),
-        "No mode needs fewer keys than Straight: 6.00 keys a second within 5 mm.",
+        "Nothing needs fewer keys than Blender's Curves: 6.00 keys a second within 5 mm; "
+        "Smooth Screw is next, with 33 % more.",
+    ),
+    "a draw": (
+        numbers((Tolerance("5mm"),), {REF: (6,), SMOOTH: (6,), SCREW: (7,)}),
+        "Nothing needs fewer keys than Blender's Curves: 6.00 keys a second within 5 mm; Smooth Screw is as good.",
+    ),
+    "a winner at each end": (
+        numbers((FIVE, TEN, TWENTY), {REF: (4, 2, 1), SMOOTH: (9, 2, 0.9)}, {REF: (4, 2, 1), SMOOTH: (9, 2, 0.9)}),
+        "What is closest depends on the keys: Blender's Curves at 5 keys/s and at 10 keys/s; "
+        "Smooth Screw at 20 keys/s (geometric mean over 2 clips).",
     ),
     "budgets that cross": (
         numbers((Budget("5"), Budget("10")), {REF: (16, 4), SMOOTH: (8, 2)}),
-        "Smooth Screw needs 7.07 keys a second on average where Straight needs 10: 29 % fewer keys for the same error.",
+        "7.07 keys a second on average of Smooth Screw are as good as 10 of Blender's Curves: "
+        "29 % fewer for the same error.",
     ),
     "the best of each segment does not win, since it is chosen for it": (
         numbers((TEN,), {REF: (4,), SMOOTH: (2,), "best_of": (1,)}),
-        "Smooth Screw has 50 % less error than Straight with the same 10 keys a second.",
+        "Smooth Screw has 50 % less error than Blender's Curves with the same 10 keys a second.",
     ),
     "somebody else's motion is no mode that wins": (
         numbers((TEN,), {REF: (4,), SMOOTH: (2,), "mine": (0.1,)}),
-        "Smooth Screw has 50 % less error than Straight with the same 10 keys a second.",
+        "Smooth Screw has 50 % less error than Blender's Curves with the same 10 keys a second.",
     ),
 }
 
@@ -111,22 +122,22 @@ TWO = numbers((TEN,), {REF: (4,), SMOOTH: (1,)})
     [
         (
             keys_needed({REF: (201, 101), SMOOTH: (151, 51)}),
-            "Smooth Screw, with keys where the motion needs them, does with 5 a second where Straight needs "
-            "20 evenly spaced: 75 % fewer for the same error.",
+            "As good as 20 evenly spaced keys a second of Blender's Curves are 5 a second of Smooth Screw, where the "
+            "motion needs them, or 10 a second of Blender's Curves.",
         ),
         (
             keys_needed({REF: (201, 101, 91), SMOOTH: (151, 51, 31)}, fitted=True),
-            "Smooth Screw, with fitted keys, does with 3 a second where Straight needs 20 evenly spaced: "
-            "85 % fewer for the same error.",
+            "As good as 20 evenly spaced keys a second of Blender's Curves are 3 a second of Smooth Screw, where "
+            "needed, and fitted, or 9 a second of Blender's Curves.",
         ),
         (
             keys_needed({REF: (201, 101), SMOOTH: (251, 151)}),
-            "Straight, with keys where the motion needs them, does with 10 a second where it needs 20 "
-            "evenly spaced: 50 % fewer for the same error.",
+            "As good as 20 evenly spaced keys a second of Blender's Curves are 10 a second of Blender's Curves, where "
+            "the motion needs them.",
         ),
         (
             keys_needed({REF: (201, np.inf), SMOOTH: (np.inf, np.inf)}),
-            "No mode needs fewer keys than Straight at 20 a second.",
+            "Nothing needs fewer keys than Blender's Curves, 20 a second and evenly spaced.",
         ),
     ],
 )

@@ -8,6 +8,7 @@ from rigid_motion import animation
 from rigid_motion.motion import shell_error
 from rigid_motion_batch.analysis.needed import part_of
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.world_poses import read_poses
 
 TOLERANCE, RADIUS = 0.005, 0.1
 
@@ -40,7 +41,7 @@ def test_each_row_has_what_it_was_asked_for(live, clip, rotation_mode):
 def test_decimated_curves_are_measured_in_the_scene(live, clip):
     obj = reduction.import_clip(clip, "QUATERNION")
     decimate(obj, mode="RATIO", factor=0.8)
-    shown = animation.read_poses(obj, reduction.frames_of(clip))
+    shown = read_poses(obj, reduction.frames_of(clip))
     one = reduction.outcome(obj, clip, RADIUS)
     assert one.largest == pytest.approx(shell_error(shown, clip.poses, RADIUS).max())
     assert {len(fcurve.keyframe_points) for fcurve in animation.channelbag_of(obj).fcurves} == {round(one.keys)}

@@ -1,4 +1,5 @@
 import dataclasses
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -13,16 +14,19 @@ from rigid_motion.motion.quaternions import angle_between
 from rigid_motion_batch.analysis.choices import Tolerance, Uniform
 from rigid_motion_batch.analysis.reconstructions import Reconstruction, reconstruct
 from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.recordings import read_clips
 from rigid_motion_batch.scenes import layout
 from rigid_motion_batch.scenes.armature import Rest
 from rigid_motion_batch.scenes.bodies import SHADES
-from rigid_motion_batch.scenes.body_scene import build_body_scene
+from rigid_motion_batch.scenes.body_scene import build_body_scene, shown_motion
 from rigid_motion_batch.scenes.film import save_blend
 from rigid_motion_batch.scenes.physique import BONE
 from rigid_motion_batch.scenes.settings import SceneSettings
 from rigid_motion_batch.scenes.timeline import Timeline
 from tests.scripts.clips.dancers import JOINTS, dancing_clip
 from tests.thoroughness import sample
+
+BODIES = Path(__file__).parents[1] / "recordings" / "bodies"
 
 SETTINGS = SceneSettings(resolution=(160, 90), fps=24)
 TWO = ("lerp_slerp", "motor_spline")
@@ -34,6 +38,16 @@ def made_of(clip, modes=TWO, rate="5") -> Reconstruction:
     made = reconstruct(clip, Uniform(rate), modes, RADIUS)
     assert made is not None
     return made
+
+
+def test_a_body_is_in_the_middle_of_the_film_wherever_its_root_stands() -> None:
+    (clip,), _ = read_clips([str(BODIES / "static_root.bvh")])
+    made = made_of(clip)
+    motion, centre = shown_motion(made, TWO[:1], timeline_of(made), Rest.of(clip))
+    hips = clip.in_blender(made.skeleton.in_root_space(clip.poses))[1].positions
+    assert abs(centre[1] - np.ptp(hips[:, 1]) / 2.0 - hips[:, 1].min()) < 0.5, "and not half-way to the root"
+    places = motion.places(motion.recording)
+    np.testing.assert_allclose(places[..., :2].min(axis=(0, 1)), -places[..., :2].max(axis=(0, 1)), atol=0.2)
 
 
 def timeline_of(made: Reconstruction) -> Timeline:

@@ -35,10 +35,18 @@ def walking(*, climbs: float = 0.0) -> np.ndarray:
 
 
 def test_a_walk_is_followed_without_a_nod():
-    framing = Framing.of(Jointed(walking()), smoothing=4.0)
+    framing = Framing.of(Jointed(walking(), np.empty((200, 0, 3))), smoothing=4.0)
     assert framing.follows
     assert np.ptp(framing.focus[:, 2]) == pytest.approx(0.0, abs=1e-12)
     assert np.ptp(framing.focus[:, 0]) > 11.0
+
+
+def test_what_a_body_carries_is_seen_too() -> None:
+    sword = walking()[:, :1] + np.array([(0.0, 0.0, 1.5)])
+    bare, armed = (Jointed(walking(), points) for points in (sword[:, :0], sword))
+    heights = [Framing.of(body, smoothing=4.0).extent(body).size[1] for body in (bare, armed)]
+    assert heights[1] > heights[0] + 1.0
+    assert np.array_equal(bare.middle, armed.middle)
 
 
 def test_what_gets_far_from_the_recording_is_cut_and_does_not_make_it_small():

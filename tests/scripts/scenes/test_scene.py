@@ -7,13 +7,14 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 
-from rigid_motion.animation import channelbag_of, read_poses
+from rigid_motion.animation import channelbag_of
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between, conjugate, multiply, rotate
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.world_poses import read_poses
 from rigid_motion_batch.scenes import layout
 from rigid_motion_batch.scenes.nodes import input_path
 from rigid_motion_batch.scenes.scene import build_scene

@@ -332,9 +332,9 @@ def test_without_zenoh_the_way_out_is_said(monkeypatch, capsys, hand):
     monkeypatch.setitem(sys.modules, "zenoh", None)
     with pytest.raises(ValueError, match="`python scripts/bootstrap"):
         opened("peer")
-    monkeypatch.setattr("rigid_motion_batch.streaming.rooms.CHECKOUT", None)
+    monkeypatch.setattr("rigid_motion_batch.places.CHECKOUT", None)
     assert main(["router"]) == 2
-    assert "pip install 'rigid-motion[stream]'" in capsys.readouterr().err
+    assert "pip install '.[stream]'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,7 @@ export function magnify(factor, automatic = false) {
 
 /* The middle of the object, and a camera close to it, or so far that all of the recording is seen. */
 function middle() {
-  const pose = poseAt(S.recording, S.choice, S.t), along = (k) => pose.places.filter((_, row) => row % 3 === k);
+  const pose = poseAt(S.recording, S.choice, S.t), along = (k) => S.clip.drawn.map((joint) => pose.places[3 * joint + k]);
   return isBody() ? [0, 1, 2].map((k) => (Math.min(...along(k)) + Math.max(...along(k))) / 2)
     : moved(matrixOf(pose), PAGE.mesh.middle);
 }

@@ -1,0 +1,167 @@
+"""The modes beside Blender's own curves: how close on recordings, and where what is rigid shows.
+
+    python scripts/research rivals --recordings FOLDER
+
+Errors are shell errors at a radius of 0.1 m with evenly spaced keys, as shares of those of Blender's curves; means are
+geometric, over the recordings of the folder that have two samples to each key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from research.paper.motions import read_all, read_motion
+from research.studies import files_in, publish, report, study_parser
+from rigid_motion.motion import Poses, decimate, interpolate, rms, shell_error
+from rigid_motion.motion.quaternions import align_signs, conjugate, multiply, rotate
+from rigid_motion_batch.analysis.metrics import geometric_mean
+from rigid_motion_batch.analysis.modes import REFERENCE, STATE_OF_THE_ART
+from rigid_motion_batch.recordings.clips import Clip
+
+MODES = (REFERENCE, STATE_OF_THE_ART, "dq_sclerp", "pga_lerp", "motor_spline")
+RATES = (2, 3, 5, 10, 20, 30)
+"""Keys a second."""
+
+RADIUS = 0.1
+LONGEST = 20.0
+"""Seconds of a recording that are looked at."""
+
+LEVERS = (0.1, 0.3, 1.0)
+"""Metres from the hand to the origin of the tool that it holds."""
+
+ROUNDING = 1e-6
+"""Metres that are none."""
+
+HELD_AT = (5, 10)
+TURNS = (60, 120, 170)
+"""Degrees of a door between two keys."""
+
+HINGE = 0.8
+"""Metres from the origin of the door."""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Measure, and write the figures."""
+    parser = study_parser("rivals", __doc__ or "")
+    parser.add_argument("--recordings", type=Path, required=True, metavar="FOLDER", help="recordings of single bodies")
+    options = parser.parse_args(arguments)
+    clips, left_out = read_all(files_in([options.recordings]), read_motion)
+    found = {
+        "recordings": {clip.name: len(clip.times) for clip in clips},
+        "left_out": sorted(left_out),
+        "errors": errors(clips),
+        "slips": slips(clips),
+        "doors": {str(degrees): door(degrees) for degrees in TURNS},
+        "other_sign_deg": other_sign(clips),
+    }
+    return publish("rivals", found, options, "--recordings", options.recordings)
+
+
+def sampled(clip: Clip, rate: float) -> tuple[np.ndarray, Poses, np.ndarray] | None:
+    """Return times in seconds and poses in metres of the first seconds of a clip, and which of them are keys.
+
+    None where nearly all would be.
+    """
+    count = int(np.searchsorted(clip.times, clip.times[0] + LONGEST))
+    times, poses = clip.times[:count], clip.in_metres(clip.poses[:count])
+    if (len(times) - 1) / (times[-1] - times[0]) < 2.0 * rate:
+        return None
+    keys = decimate(times, rate)
+    part = slice(keys[0], keys[-1] + 1)
+    return times[part], poses[part], keys - keys[0]
+
+
+def errors(clips: Iterable[Clip]) -> dict[str, Any]:
+    """Return the RMS errors of all modes at all rates as shares of those of the reference, and over how many clips."""
+    result: dict[str, Any] = {}
+    for rate in RATES:
+        report(f"{rate} keys a second")
+        rows = []
+        for clip in clips:
+            if (taken := sampled(clip, rate)) and len(taken[2]) > 3:
+                times, poses, keys = taken
+                shown = [interpolate(times[keys], poses[keys], times, mode) for mode in MODES]
+                rows.append([rms(shell_error(one, poses, RADIUS)) for one in shown])
+        means = geometric_mean(np.array(rows))
+        result[str(rate)] = {"clips": len(rows), **dict(zip(MODES, means / means[0], strict=True))}
+    return result
+
+
+def slips(clips: Iterable[Clip]) -> dict[str, Any]:
+    """Return how far a tool gets from its place in the hand that holds it, at most, in mm.
+
+    Hand and tool are keyed together, each for itself: the tool's origin is beside the hand's by a lever.
+    """
+    result: dict[str, Any] = {}
+    for rate in HELD_AT:
+        for lever in LEVERS:
+            grip = np.array((lever, 0.0, 0.0))
+            rows = []
+            for clip in clips:
+                if (taken := sampled(clip, rate)) is None:
+                    continue
+                times, hand, keys = taken
+                tool = Poses(hand.positions + rotate(hand.quaternions, grip), hand.quaternions)
+                row = []
+                for mode in MODES:
+                    holding, held = (interpolate(times[keys], one[keys], times, mode) for one in (hand, tool))
+                    place = rotate(conjugate(holding.quaternions), held.positions - holding.positions)
+                    row.append(np.linalg.norm(place - grip, axis=1).max())
+                rows.append(row)
+            means = 1e3 * geometric_mean(np.maximum(np.array(rows), ROUNDING))
+            means = np.where(means > 1.001e3 * ROUNDING, means, 0.0)
+            result.setdefault(str(rate), {})[str(lever)] = dict(zip(MODES, means, strict=True))
+    return result
+
+
+def door(degrees: float) -> dict[str, float]:
+    """Return how far the hinge of a door leaves its place between two keys, in mm."""
+    half = np.radians(degrees) / 2.0
+    quaternions = np.array(((1.0, 0.0, 0.0, 0.0), (np.cos(half), 0.0, 0.0, np.sin(half))))
+    hinge = np.array((HINGE, 0.0, 0.0))
+    keys, result = Poses(rotate(quaternions, hinge), quaternions), {}
+    for mode in MODES:
+        shown = interpolate([0.0, 1.0], keys, np.linspace(0.0, 1.0, 401), mode)
+        off = np.linalg.norm(shown.positions - rotate(shown.quaternions, hinge), axis=1).max()
+        result[mode] = 0.0 if off < 1e-9 else 1e3 * float(off)
+    return result
+
+
+def other_sign(clips: Iterable[Clip]) -> dict[str, float]:
+    """Return the largest error of rotation in degrees at 10 keys a second where every other key has the quaternion of
+    the other sign, which is the same pose; the median over the clips.
+
+    Blender takes the four numbers as they are; so that is worked out here.
+    """
+    rows = []
+    for clip in clips:
+        if taken := sampled(clip, 10):
+            times, poses, keys = taken
+            kept = poses[keys]
+            signed = np.where(np.arange(len(keys)) % 2, -1.0, 1.0)[:, None] * align_signs(kept.quaternions)
+            row = []
+            for mode in MODES:
+                if mode == REFERENCE:
+                    turned = blenders_quaternions(times[keys], signed, times)
+                else:
+                    turned = interpolate(times[keys], Poses(kept.positions, signed), times, mode).quaternions
+                off = multiply(conjugate(poses.quaternions), turned)
+                half = np.arctan2(np.linalg.norm(off[:, 1:], axis=1), np.abs(off[:, 0]))
+                row.append(np.degrees(2.0 * half.max()))
+            rows.append(row)
+    return dict(zip(MODES, np.median(np.array(rows), axis=0), strict=True))
+
+
+def blenders_quaternions(key_times: np.ndarray, quaternions: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return what Blender makes of quaternions (k, 4) of any sign at times (m,): four curves, as positions have."""
+    still = np.tile((1.0, 0.0, 0.0, 0.0), (len(quaternions), 1))
+    rows = [
+        interpolate(key_times, Poses(quaternions[:, some], still), times, REFERENCE).positions
+        for some in ([0, 1, 2], [3, 3, 3])
+    ]
+    turned = np.column_stack((rows[0], rows[1][:, 0]))
+    return turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
