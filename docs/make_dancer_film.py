@@ -84,7 +84,7 @@ def build() -> bpy.types.Scene:
     recorded, reduced = dance.dancer(), dance.dancer()
     bones = list(reduced.pose.bones)
     animation.reduce_keys_of(bones, MODE, TOLERANCE, RADIUS, shared=True)
-    done = animation.total_reduction(bones)
+    done = animation.reduction_of(bones)
     poses = key_frames(reduced)
     off = math.ceil(1e4 * done.largest_error) / 10.0
     print(

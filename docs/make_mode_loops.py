@@ -28,6 +28,7 @@ from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs, rotate
 from rigid_motion_batch import palette
+from rigid_motion_batch.recordings.world_poses import read_poses
 from rigid_motion_batch.scenes import captions
 from rigid_motion_batch.scenes.film import render_film
 from rigid_motion_batch.scenes.materials import ink, surface
@@ -91,7 +92,7 @@ def build(mode: str) -> bpy.types.Scene:
     make_camera(scene)
     native = hammer("Blender", surface("Blender", THEME.faint, alpha=0.5))
     key(native)
-    shown = animation.read_poses(native, FRAMES)
+    shown = read_poses(native, FRAMES)
     native.delta_location.y = 0.6  # Behind the other, and its way behind both.
     moved = hammer(MODES[mode].label, surface(mode, palette.colour_of(mode)))
     poses = by_mode(native, mode)
@@ -185,4 +186,4 @@ def caption(camera: bpy.types.Object, title: str, colour: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or MODES)
+    main(sys.argv[1:] or [mode for mode in MODES if not MODES[mode].is_reference])

@@ -17,8 +17,8 @@ import bpy
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
-from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.modes import COMPARED
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.recordings.clip_reading import read_clips
@@ -40,7 +40,7 @@ class Still:
 
 
 STILLS = {
-    "comparison.png": Still("screw", "5", 2.7, tuple(KEYFRAME_MODES), (1280, 720), "drill"),
+    "comparison.png": Still("screw", "5", 2.7, COMPARED, (1280, 720), "drill"),
     "smooth.png": Still("reach", "8", 3.32, SMOOTH, (1280, 480), "controller"),
 }
 

@@ -38,7 +38,7 @@ class ModeLoops(ModeDirective):
     """A section for each mode: its film, and what it does."""
 
     def run(self) -> list[nodes.Node]:
-        return [self.section(name, mode) for name, mode in MODES.items()]
+        return [self.section(name, mode) for name, mode in MODES.items() if not mode.is_reference]
 
     def section(self, name: str, mode: Mode) -> nodes.section:
         film = make_video(f"modes/{name}.mp4", f"modes/{name}.png", f"{mode.label}: {mode.description}")
@@ -69,10 +69,10 @@ class ModeDetails(ModeDirective):
             others = joined(link(self, f"{DETAILS}#{anchor(other)}", nodes.literal("", other)) for other in same)
             facts += fact("The same motion", *others, nodes.Text(", where nothing grows"))
         formula = link(self, f"{CONVENTIONS}#{anchor(name)}", nodes.Text("its formula"))
-        film = link(self, f"{LOOPS}#loop-{anchor(name)}", nodes.Text("as a film"))
+        film = [link(self, f"{LOOPS}#loop-{anchor(name)}", nodes.Text("as a film")), nodes.Text("; ")]
         others = (other for other in MODES if other != name and other not in same)
         rest = joined(link(self, f"{DETAILS}#{anchor(other)}", nodes.literal("", other)) for other in others)
-        facts += fact("See also", formula, nodes.Text(", "), film, nodes.Text("; "), *rest)
+        facts += fact("See also", formula, nodes.Text(", "), *(() if mode.is_reference else film), *rest)
         return nodes.section("", title, label, picture, facts, ids=[anchor(name)])
 
 
@@ -114,6 +114,8 @@ def same_motions(modes: Iterable[str]) -> dict[str, list[str]]:
 
 def keys_it_looks_at(mode: Mode) -> str:
     """In words."""
+    if mode.is_reference:
+        return "all keys of a channel, those far away ever less"
     around = [f"{count} {where}" for count, where in ((mode.behind, "before"), (mode.ahead, "after")) if count]
     return "the two keys of a segment" + (f", {' and '.join(around)}" if around else "")
 

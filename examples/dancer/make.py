@@ -47,7 +47,7 @@ def main(arguments: list[str] | None = None) -> None:
     recorded, reduced = rigs
     bones = list(reduced.pose.bones)
     animation.reduce_keys_of(bones, MODE, TOLERANCE, RADIUS, shared=True)
-    done = animation.total_reduction(bones)
+    done = animation.reduction_of(bones)
     poses = np.unique([frame for bone in bones for frame in animation.key_frames(bone)])
     off = measure(recorded, reduced)
 

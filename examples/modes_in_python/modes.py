@@ -33,7 +33,8 @@ paths = {mode: interpolate(key_times, keys, times, mode) for mode in MODES}
 # %% [markdown]
 # Each mode from above. The line is the path of the bar's origin; the bar is drawn at even steps of time, and black at
 # the keys. `dq_sclerp`, `pga_slerp` and, as nothing grows, `cga_slerp` are one motion: a screw. `pga_lerp` and
-# `cga_lerp` run along the same path unevenly. The two splines have no corner at the key in the middle.
+# `cga_lerp` run along the same path unevenly. The two splines have no corner at the key in the middle. `bezier` is what
+# Blender makes of keys without any mode: each number by itself, at rest at the first key and at the last.
 
 
 # %%
@@ -44,7 +45,7 @@ def draw_bars(axes, poses, colour, width):
     axes.plot(*ends[..., :2].T.swapaxes(1, 2), color=colour, linewidth=width, solid_capstyle="round")
 
 
-figure, grid = plt.subplots(2, 4, figsize=(11, 3.6), sharex=True, sharey=True, layout="constrained")
+figure, grid = plt.subplots(3, 3, figsize=(11, 5.4), sharex=True, sharey=True, layout="constrained")
 for (mode, path), axes in zip(paths.items(), grid.flat, strict=True):
     axes.plot(*path.positions[:, :2].T, color=COLOURS[mode], linewidth=2)
     draw_bars(axes, path[::8], COLOURS[mode], 0.7)
