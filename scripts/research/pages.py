@@ -22,7 +22,7 @@ import jinja2
 import numpy as np
 
 from rigid_motion_batch.files import write_text
-from rigid_motion_batch.report.numbers import digits, percent
+from rigid_motion_batch.report.numbers import digits, listed, percent
 
 ROOT = Path(__file__).resolve().parents[2]
 FIGURES, TEMPLATES = "docs/figures", "docs/templates"
@@ -94,12 +94,6 @@ def alike(shares: Iterable[float], word: str = "less") -> str:
 def each(values: Iterable[float], form: str = "{:.2f}", factor: float = 1.0) -> list[str]:
     """Return numbers as texts of this form, times a factor; a dash where there is none."""
     return ["\N{EN DASH}" if value is None else form.format(factor * value) for value in values]
-
-
-def listed(words: Iterable[str]) -> str:
-    """Return words as prose lists them: "5, 10 and 15"."""
-    words = list(words)
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 FILTERS = (alike, digits, each, less, listed, percent, rest, spread)

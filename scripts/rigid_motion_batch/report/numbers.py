@@ -147,6 +147,12 @@ def digits(value: float | None, places: int = 3) -> str:
     return f"{value:.{max(0, places - 1 - floor(log10(abs(value))))}f}"
 
 
+def listed(words: Iterable[str]) -> str:
+    """Return words as prose lists them: "5, 10 and 15"."""
+    words = list(words)
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+
+
 def percent(share: float) -> str:
     """Return a share as prose has it: "64 %"."""
     return f"{100 * share:.0f}\u00a0%"

@@ -18,7 +18,7 @@ from rigid_motion_batch.analysis.choices import Budget, Tolerance
 from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
 from rigid_motion_batch.analysis.needed import KeysNeeded, overall
 
-from .numbers import KINDS, Numbers, digits, percent
+from .numbers import KINDS, Numbers, digits, listed, percent
 
 TIE = 0.005
 """Ratios closer to 1 than this are no difference: they would be shown as 0 %."""
@@ -235,7 +235,7 @@ def _no_winner(contest: _Contest) -> str:
         for choice, is_better in zip(known.tolist(), better.tolist(), strict=True):
             winner = int(np.argmin(means[choice])) if is_better else best
             winners.setdefault(winner, []).append(contest.phrase(choice))
-        said = "; ".join(f"{contest.name(winner)} {_listed(phrases)}" for winner, phrases in winners.items())
+        said = "; ".join(f"{contest.name(winner)} {listed(phrases)}" for winner, phrases in winners.items())
         return f"What {'needs the fewest keys' if within else 'is closest'} depends on the keys: {said}{over}."
     unit, off = ("keys a second", "") if within else ("mm", " off (RMS)")
     said = f"{contest.name(best)}: {digits(means[at, best])} {unit}{off} {contest.phrase(at)}"
@@ -246,11 +246,6 @@ def _no_winner(contest: _Contest) -> str:
     name = contest.name(following)
     beside = f"{name} is as good" if ratio < TIE else f"{name} is next, with {percent(ratio)} more"
     return f"Nothing {'needs fewer keys' if within else 'comes closer'} than {said}; {beside}{over}."
-
-
-def _listed(phrases: Sequence[str]) -> str:
-    """Return phrases as prose lists them."""
-    return " and ".join(filter(None, (", ".join(phrases[:-1]), phrases[-1])))
 
 
 def _wins(contest: _Contest) -> str:
