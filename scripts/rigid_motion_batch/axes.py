@@ -1,7 +1,8 @@
 """Conventions of axes, and how a recording's poses become Blender's: right-handed, z up, y forward, x right.
 
 Each convention is a matrix C of shape (3, 3) that takes a point of the recording to Blender. A rotation R becomes
-C R C^T: the body's own axes change convention together with the world's.
+C R C^T: the body's own axes change convention together with the world's. So what a device or a camera faces is y of
+the object in Blender, and what is above it z.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import in_other_axes
+from rigid_motion.motion.quaternions import conjugate, multiply
 
 AXES: dict[str, np.ndarray] = {
     # Right-handed, z up, y forward: nothing to do.
@@ -22,7 +24,26 @@ AXES: dict[str, np.ndarray] = {
     "ros": np.array(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
     # Left-handed, z up, x forward, y right; its lengths are centimetres.
     "unreal": np.array(((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
+    # Right-handed, y down, z forward: cameras of OpenCV, COLMAP, KITTI.
+    "opencv": np.array(((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))),
 }
+
+NERF = "nerf"
+"""The axes of NeRF's transforms.json: those of Blender in the world, and of its cameras, which are those of OpenGL."""
+
+DESCRIBED = {
+    "blender": "z up, y forward",
+    "opengl": "y up, -z forward",
+    "unity": "left-handed, y up, z forward",
+    "ros": "z up, x forward",
+    "unreal": "left-handed, z up, x forward",
+    "opencv": "y down, z forward",
+    NERF: "z up; cameras y up, -z forward",
+}
+"""What each convention is, in words."""
+
+_LIES = np.sqrt(0.5) * np.array((1.0, -1.0, 0.0, 0.0))
+"""The turn of a body that has z for up and y for forward, to those of OpenGL."""
 
 
 def to_blender(poses: Poses, axes: str) -> Poses:
@@ -32,13 +53,15 @@ def to_blender(poses: Poses, axes: str) -> Poses:
     ----------
     poses : Poses, shape (..., n)
     axes : str
-        The convention that `poses` are in: a name in `AXES`.
+        The convention that `poses` are in: a name in `AXES`; or `NERF`, for poses in the world.
 
     Raises
     ------
     ValueError
         Where there is no such convention.
     """
+    if axes == NERF:
+        return Poses(poses.positions, multiply(poses.quaternions, _LIES), poses.scales)
     if axes not in AXES:
         raise ValueError(f"there are no axes named {axes!r}; known are {', '.join(AXES)}")
     return in_other_axes(poses, AXES[axes])
@@ -46,4 +69,6 @@ def to_blender(poses: Poses, axes: str) -> Poses:
 
 def from_blender(poses: Poses, axes: str) -> Poses:
     """Return the opposite of `to_blender`."""
+    if axes == NERF:
+        return Poses(poses.positions, multiply(poses.quaternions, conjugate(_LIES)), poses.scales)
     return in_other_axes(poses, AXES[axes].T)

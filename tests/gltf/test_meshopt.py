@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigid_motion.gltf import Options, reduced
 from rigid_motion.gltf.accessors import numbers
 from rigid_motion.gltf.documents import Document, GltfError, read_document
 from rigid_motion.gltf.meshopt import decompressed
 from rigid_motion_batch.recordings import read_trajectories
-from tests.gltf.making import Making, turns
+from tests.gltf.making import Making, turns, walk
 
 PLACE = Path(spec.origin).parent / "lib" / "libmeshoptimizer.so" if (spec := find_spec("bpy")) else Path()
 LIBRARY = ctypes.CDLL(str(PLACE)) if PLACE.is_file() else None
@@ -144,6 +145,41 @@ def test_a_recording_that_is_compressed_is_read_like_the_plain_one(tmp_path: Pat
     np.testing.assert_array_equal(result.poses.quaternions, expected.poses.quaternions)
     with pytest.raises(GltfError, match="is compressed by meshopt, which is not read"):
         numbers(read_document(path), 0)
+
+
+def with_mesh(path: Path, how: str) -> Path:
+    """A chain of joints with a skin that a triangle hangs on; its views are compressed, those of the mesh in a way."""
+    made = walk()
+    points = made.accessor(np.zeros((3, 3), dtype="<f4"))
+    four = made.accessor(np.zeros((3, 4), dtype="u1")), made.accessor(np.ones((3, 4), dtype="<f4"))
+    corners = made.accessor(np.arange(3, dtype="<u4"))
+    attributes = {"POSITION": points, "JOINTS_0": four[0], "WEIGHTS_0": four[1]}
+    made.json["meshes"] = [{"primitives": [{"attributes": attributes, "indices": corners}]}]
+    made.json["nodes"].append({"mesh": 0, "skin": 0})
+    made.json["scenes"] = [{"nodes": [0, len(made.json["nodes"]) - 1]}]
+    result = compressed(made, path)
+    json_of = json.loads(result.read_text())
+    views = [json_of["accessors"][accessor]["bufferView"] for accessor in (points, corners)]
+    of_points, of_corners = (json_of["bufferViews"][view]["extensions"]["EXT_meshopt_compression"] for view in views)
+    of_corners["mode"] = "TRIANGLES"
+    of_points |= {"filtered": {"filter": "COLOR"}, "damaged": {"byteLength": of_points["byteLength"] - 1}}.get(how, {})
+    result.write_text(json.dumps(json_of))
+    return result
+
+
+@pytest.mark.parametrize("how", ["plain", "filtered", "damaged"])
+def test_triangles_that_are_not_read_leave_the_motion_alone(tmp_path: Path, how: str) -> None:
+    path = with_mesh(tmp_path / "walk.glb", how)
+    (expected,) = read_trajectories(str(walk().write(tmp_path / "plain.glb"))).trajectories
+    (result,) = read_trajectories(str(path)).trajectories
+    np.testing.assert_array_equal(result.poses.positions, expected.poses.positions)
+    np.testing.assert_array_equal(result.poses.quaternions, expected.poses.quaternions)
+    assert "without its skin: " in result.remark
+
+
+def test_reduce_says_what_to_do_with_it(tmp_path: Path) -> None:
+    with pytest.raises(GltfError, match=r"is compressed by meshopt, which is not read; export the file without it"):
+        reduced(read_document(with_mesh(tmp_path / "walk.glb", "plain")), Options(0.001))
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,8 @@ VERSION = 0xA0
 
 BLOCK_BYTES, BLOCK_ELEMENTS, GROUP, TAIL = 8192, 256, 16, 32
 
+BINDING = "inverseBindMatrices"
+
 DENSEST = 64
 """Bytes that one of compressed ones is at most."""
 
@@ -32,34 +34,58 @@ SHIFTS = {1: np.arange(6, -1, -2, dtype=np.uint8), 2: np.arange(4, -1, -4, dtype
 def decompressed(document: Document) -> Document:
     """Return a document with what of its views can be read in one more buffer; the same where meshopt is not in it.
 
+    Views of meshes alone that are damaged, or compressed in a way that is not read, stay as they are.
+
     Raises
     ------
     GltfError
-        For what is damaged, or compressed in a way that is not read.
+        For other views that are.
     """
     views = objects(document.json, "bufferViews")
     found = {number: own for number, view in enumerate(views) if (own := _compression(view))}
     if not found:
         return document
-    json, data, room = copy.copy(document.json), bytearray(), MOST
+    json, data, room, of_meshes = copy.copy(document.json), bytearray(), MOST, _of_meshes(document.json)
     json["bufferViews"] = list(views)
     for number, own in found.items():
-        width, restored = FILTERS.get(own.get("filter", "NONE"), (0, None))
-        if own.get("mode") != "ATTRIBUTES" or restored is None:
+        try:
+            content = _content(document, own, number, room)
+        except GltfError:
+            if number not in of_meshes:
+                raise
             continue
-        room -= whole(own, "count") * whole(own, "byteStride")
-        if room < 0:
-            raise GltfError("what meshopt compressed is more than is read", "split the file")
-        elements = _elements(document, own, number)
-        if elements.shape[1] % width:
-            raise GltfError(f"view {number} is compressed by meshopt, and damaged")
-        content = restored(elements)
+        if content is None:
+            continue
+        room -= len(content)
         view = {"buffer": len(document.buffers), "byteOffset": len(data), "byteLength": len(content)}
         kept = {name: views[number][name] for name in ("byteStride", "name") if name in views[number]}
         json["bufferViews"][number] = view | kept
         data += content + bytes(-len(content) % ALIGNED)
     json["buffers"] = [*objects(json, "buffers"), {"byteLength": len(data)}]
     return replace(document, json=json, buffers=(*document.buffers, bytes(data)))
+
+
+def _of_meshes(json: Json) -> set[int]:
+    """Return the numbers of the views that have numbers of meshes, and none of animations or skins."""
+    views = [accessor.get("bufferView") for accessor in objects(json, "accessors")]
+    samplers = [sampler for animation in objects(json, "animations") for sampler in objects(animation, "samplers")]
+    named = {sampler.get(name) for sampler in samplers for name in ("input", "output")}
+    named |= {skin.get(BINDING) for skin in objects(json, "skins")}
+    needed = {view for number, view in enumerate(views) if number in named}
+    return {view for view in views if isinstance(view, int)} - needed
+
+
+def _content(document: Document, own: Json, number: int, room: int) -> bytes | None:
+    """Return the bytes of a view, room for so many of which is left; None for lists of triangles and normals."""
+    width, restored = FILTERS.get(own.get("filter", "NONE"), (0, None))
+    if own.get("mode") != "ATTRIBUTES" or restored is None:
+        return None
+    if whole(own, "count") * whole(own, "byteStride") > room:
+        raise GltfError("what meshopt compressed is more than is read", "split the file")
+    elements = _elements(document, own, number)
+    if elements.shape[1] % width:
+        raise GltfError(f"view {number} is compressed by meshopt, and damaged")
+    return restored(elements)
 
 
 def _compression(view: Json) -> Json | None:

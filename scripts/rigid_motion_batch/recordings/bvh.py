@@ -25,8 +25,8 @@ from rigid_motion.motion.quaternions import align_signs
 from .clips import ClipWarning
 from .euler import quaternions_from_intrinsic_eulers
 from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
-from .rest_bodies import RestBody
-from .sizing import LOOKED_AT, sized
+from .rest_bodies import LOOKED_AT, RestBody
+from .sizing import sized
 from .tables import is_number, lines_of, parse_rows
 
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}

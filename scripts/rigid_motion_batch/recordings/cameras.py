@@ -1,7 +1,8 @@
 """Poses of cameras that photogrammetry and SLAM find: COLMAP's images.txt and g2o's graphs.
 
 Neither has times: they are numbers of images or vertices, and need a rate. COLMAP has two lines for each image, in any
-order, and the world as the camera sees it: its pose is the inverse of that. Its unit of length is any.
+order, and the world as the camera sees it: its pose is the inverse of that. Cameras look along z, with x to the right
+and y down; the axes of the world may be any, and mostly are those of a camera, too. Its unit of length is any.
 Sources: https://colmap.github.io/format.html#images-txt, https://github.com/RainerKuemmerle/g2o/wiki/File-Format-SLAM-3D.
 """
 
@@ -32,7 +33,7 @@ def recognises_images(head: list[str]) -> bool:
 def read_images(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """Read the cameras of COLMAP's images.txt. Of images in folders, each folder is a body."""
     remark = "poses of the world were turned into those of the camera; COLMAP's unit of length may be any (--scale)"
-    header = HeaderLine(path, 0, "\t", COLMAP, rows=_images, inverted=True, remark=remark)
+    header = HeaderLine(path, 0, "\t", COLMAP, rows=_images, inverted=True, axes="opencv", remark=remark)
     return read_below(selection, options, header, "name the folder of each camera's images in front of their names")
 
 

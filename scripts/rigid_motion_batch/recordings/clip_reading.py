@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigid_motion.motion import Poses, repair
-from rigid_motion_batch.axes import from_blender
+from rigid_motion_batch.axes import DESCRIBED, from_blender
 from rigid_motion_batch.command_line import listed, printable
 
 from .clips import Clip, ClipWarning, OtherMotion
@@ -82,6 +82,8 @@ def read_source(source: str, axes: str | None, options: ReadingOptions = AS_THE_
     recording = read_trajectories(source, options)
     stem, several = recording.path.stem, len(recording.trajectories) > 1
     clips, notes = [], [recording.note] if recording.note else []
+    if recording.axes_known and not axes:
+        notes.append(f"its axes are {recording.axes} ({DESCRIBED[recording.axes]})")
     for trajectory in recording.trajectories:
         name = f"{stem}-{trajectory.name}" if several else stem
         try:

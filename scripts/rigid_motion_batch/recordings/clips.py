@@ -59,7 +59,7 @@ class Clip:
     """The source that the user gave: the file, and the body where one was named."""
 
     axes: str
-    """The convention of the recording: a name in `rigid_motion_batch.axes.AXES`."""
+    """The convention of the recording: a name in `rigid_motion_batch.axes.DESCRIBED`."""
 
     times: np.ndarray
     """Seconds, strictly rising, shape (n,)."""

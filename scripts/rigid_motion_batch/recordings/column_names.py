@@ -64,7 +64,7 @@ _WORDS = {
     "time": "t ts time times timestamp timestamps stamp clock elapsed realtime datetime",
     "beside time": "since start startup begin beginning launch recording session game app unity unreal system sys host "
     "unix epoch utc posix absolute relative rel abs total sample capture log header field rosbag from of in at the "
-    "real level load unscaled scaled date iso tracking",
+    "real level load unscaled scaled date iso tracking wall device sensor hardware monotonic server client",
     "frames": "frame frames sample samples",
     "beside frames": "index idx number num no nr count counter id",
     "devices": "device tracker controller body object node joint bone hand side role name id",

@@ -4,6 +4,7 @@ Where a comment names the columns (`# timestamp tx ty tz qx qy qz qw`), the name
 seen by the numbers: a matrix has right angles, a quaternion the length 1. Columns may be named by their place,
 `--columns t=1,x=2`. At which end of a quaternion w is no number says: at the last, as in TUM, unless the first rotation
 is 1 0 0 0; in rows with commas, as of EuRoC and VINS, at the one that is larger in the first row. A guess is a warning.
+Nuke's axes are right-handed, y up, and its cameras look along -z.
 Sources: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats,
 https://www.cvlibs.net/datasets/kitti/eval_odometry.php.
 """
@@ -100,7 +101,8 @@ def _header(path: Path, options: ReadingOptions) -> HeaderLine:
         problem = f"{len(cells)} numbers in a row, which are no poses that are known"
         way_out = "write a first line of names, or say which is which by its place: --columns t=1,x=2,..."
         raise TrajectoryError(path, problem, way_out, row.number)
-    return replace(header, names=[*names, *[None] * len(cells)][: len(cells)], warnings=warnings)
+    header = replace(header, names=[*names, *[None] * len(cells)][: len(cells)], warnings=warnings)
+    return replace(header, axes="opengl") if names is CHAN else header
 
 
 def _separator(row: str) -> str | None:

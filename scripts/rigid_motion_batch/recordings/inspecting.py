@@ -12,7 +12,7 @@ import numpy as np
 
 from rigid_motion.motion.quaternions import angle_between
 from rigid_motion.motion.repair import GAP
-from rigid_motion_batch.axes import AXES
+from rigid_motion_batch.axes import AXES, DESCRIBED, NERF
 
 from .clip_reading import make_clip
 from .clips import Clip, ClipWarning
@@ -20,6 +20,7 @@ from .column_names import METRES
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .reading import Format, format_of, read_trajectories, split_source
 from .recordings import ALL, Recording, Trajectory, TrajectoryError
+from .rest_bodies import carrying
 from .sizing import axis_up, leading
 
 UNIT_NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches", "ft": "feet"}
@@ -117,11 +118,15 @@ class Axes:
     """The convention of a recording's axes."""
 
     name: str
-    """The one that it is read in: a name in `axes.AXES`."""
+    """The one that it is read in: a name in `axes.DESCRIBED`."""
 
     known_from: str
     others: tuple[str, ...] = ()
     """Other conventions that the motion speaks for."""
+
+    @property
+    def described(self) -> str:
+        return DESCRIBED[self.name]
 
 
 @dataclass(frozen=True)
@@ -238,7 +243,9 @@ def _size(clip: Clip) -> Size:
     lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1)
     turns = np.degrees(angle_between(root.quaternions[1:], root.quaternions[:-1]))
     if clip.rest_body is not None:
-        places = clip.rest_body.skeleton.in_root_space(clip.poses).positions.reshape(-1, 3) * clip.metres_per_unit
+        joints = clip.rest_body.skeleton.in_root_space(clip.poses).positions
+        joints = joints[~carrying(clip.rest_body.parents, joints)]
+        places = joints.reshape(-1, 3) * clip.metres_per_unit
     return Size(
         tuple(places.min(axis=0).tolist()),
         tuple(places.max(axis=0).tolist()),
@@ -252,7 +259,7 @@ def _size(clip: Clip) -> Size:
 def _up(clip: Clip) -> str:
     """Return the axis that is up, by where people are above the floor, or how they stand; empty if unclear."""
     if clip.rest_body is not None:
-        return axis_up(clip.rest_body, clip.rest_body.skeleton.in_root_space(clip.poses[:, :1]).positions[:, 0])
+        return axis_up(clip.rest_body, clip.poses)
     low, high = np.percentile(clip.poses.positions * clip.metres_per_unit, (1.0, 99.0), axis=0)
     above = (low > ABOVE_THE_FLOOR[0]) & (high < ABOVE_THE_FLOOR[1])
     around = (low < 0.0) & (high > 0.0)
@@ -266,6 +273,8 @@ def _axes(recording: Recording, given: str | None, up: str) -> Axes:
     elif not recording.measured:
         known_from = "as Blender reads it"
     else:
-        known_from = "as its format has it" if name != "blender" else "assumed"
+        known = recording.axes_known or name != "blender"
+        known_from = "as its format has it" if known else "assumed"
     matching = tuple(axes for axes, change in AXES.items() if up and change[2]["xyz".index(up)] == 1.0)
-    return Axes(name, known_from, () if name in matching or not recording.measured else matching)
+    fits = name in matching or name == NERF or not recording.measured
+    return Axes(name, known_from, () if fits else matching)

@@ -1,11 +1,14 @@
 """Poses in JSON: lists of objects that have a position and a rotation, or a matrix, under names that columns may have.
 
 What an object holds becomes columns, named by its keys (`position.x`, `rotation[3]`), and several lists are several
-bodies. Known besides are some orders: A-Frame's `avatar-recorder` and `motion-capture-recorder` have degrees that it
-applies in the order Y X Z, or quaternions x, y, z, w in recordings of January 2017; axes are right-handed, y up, -z
-forward. nuScenes has w first. NeRF's `transforms.json` has no times: the names of its images are counted. Record3D's
-`metadata.json` has lists of seven numbers, and their rate.
-Sources: https://github.com/dmarcos/aframe-motion-capture-components, https://www.nuscenes.org/nuscenes#data-format.
+bodies. Known besides are some orders and axes: A-Frame's `avatar-recorder` and `motion-capture-recorder` have degrees
+that it applies in the order Y X Z, or quaternions x, y, z, w in recordings of January 2017; axes are right-handed, y
+up, -z forward. nuScenes has w first, z up and x forward. NeRF's `transforms.json` has no times: the names of its images
+are counted; its world has z up, and its cameras look along -z with y up. Record3D's `metadata.json` has lists of seven
+numbers, and their rate; axes are those of ARKit, y up, -z forward.
+Sources: https://github.com/dmarcos/aframe-motion-capture-components, https://www.nuscenes.org/nuscenes#data-format,
+https://docs.nerf.studio/quickstart/data_conventions.html,
+https://developer.apple.com/documentation/arkit/arcamera/transform.
 """
 
 from __future__ import annotations
@@ -17,6 +20,8 @@ from functools import cache, partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
+
+from rigid_motion_batch.axes import NERF
 
 from .cameras import in_order, number_in
 from .column_names import column_name
@@ -117,16 +122,23 @@ def _header(
     cells = ["device", "frame", *map(_cell, keys)]
     names = [column_name(cell) for cell in cells]
     held = {key[0] for key in keys}
+    axes = ""
     if {"timestamp", "position", "rotation"} <= held and ("rotation", "w") not in keys:
         names = [name and replace(name, unit="deg" if name.kind == "rotation" else name.unit) for name in names]
         if ("rotation", "x") in keys and not options.euler:
             options = replace(options, euler="YXZ")
+        axes = "opengl"
     elif {"translation", "rotation"} <= held:
         names = [name and replace(name, kind="quaternion" if name.kind == "rotation" else name.kind) for name in names]
+        axes = "ros"
+    elif {"file_path", "transform_matrix"} <= held:
+        axes = NERF
+    elif first and tuple(first[0]) == RECORD3D:
+        axes = "opengl"
     timed = any(name and name.kind == "time" for name in names) or options.frame_rate
     if not timed and isinstance(rate, int | float) and 0.0 < rate < FASTEST:
         options = replace(options, frame_rate=float(rate), time_unit=None)
-    return HeaderLine(path, 0, "\t", cells, names=names), keys, options
+    return HeaderLine(path, 0, "\t", cells, names=names, axes=axes), keys, options
 
 
 def _keys(value: Any, way: Key = ()) -> Iterator[Key]:

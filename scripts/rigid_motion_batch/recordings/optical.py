@@ -9,7 +9,8 @@ Qualisys 6D: lines of a word and its value, among them the rate and the names of
 columns. Both are right-handed, z up. Cells that are empty were not tracked.
 Sources: https://docs.optitrack.com/motive/data-export/data-export-csv,
 https://help.naturalpoint.com/kb/articles/changes-in-motive-s-reported-euler-angles,
-https://docs.qualisys.com/qtm/content/processing_measurement/rotation_angles_in_qtm.htm.
+https://docs.qualisys.com/qtm/content/processing_measurement/rotation_angles_in_qtm.htm,
+https://docs.qualisys.com/qtm/content/rotation_appendix/appendix_g_rotation_angle_calculations_in_qtm.htm.
 """
 
 from __future__ import annotations
@@ -45,6 +46,9 @@ VICON = ("Objects", "Segments", "Trajectories", "Model Outputs", "Joints", "Devi
 
 TRACKED = ("rigid body", "bone")
 """The types of columns that have rotations."""
+
+ROT = tuple(map(str, range(9)))
+"""What stands in the brackets of Qualisys's Rot[0] to Rot[8]."""
 
 AS_ANGLES = 0.01
 """How far a matrix may be from that of the angles beside it."""
@@ -195,26 +199,35 @@ def read_qualisys(path: Path, selection: Selection, options: ReadingOptions) -> 
         names.append(name and replace(name, body=label, unit=unit) if body >= 0 else name)
     if all(name is None or name.kind != "time" for name in names) and not (options.frame_rate or options.time_unit):
         options = replace(options, frame_rate=_rate(path, (settings.get("FREQUENCY") or [""])[0], 1))
-    header = HeaderLine(path, number, "\t", cells, names=names)
-    return read_below(selection, options, replace(header, names=_turned(header, names)), MIXED)
+    return read_below(selection, options, _turned(HeaderLine(path, number, "\t", cells, names=names), names), MIXED)
 
 
-def _turned(header: HeaderLine, names: Sequence[ColumnName | None]) -> list[ColumnName | None]:
-    """Return names of which Rot[0] to Rot[8] go down the columns of the matrix, unless the angles beside say otherwise.
+def _turned(header: HeaderLine, names: Sequence[ColumnName | None]) -> HeaderLine:
+    """Return a header of which Rot[0] to Rot[8] go down the columns of the matrix, unless the angles beside say
+    otherwise.
 
-    These are turns about the moved axes x, y and z, in this order, unless somebody has chosen others.
+    These are turns about the moved axes x, y and z, in this order, unless somebody has chosen others: then, and without
+    them, nothing tells, which is a warning.
     """
-    wanted = ("roll", "pitch", "yaw", *map(str, range(9)))
+    wanted = ("roll", "pitch", "yaw", *ROT)
     axes = [name.axis if name and name.kind in ("euler", "rotation") else "" for name in names]
+    sure = not {*ROT} <= {*axes}
     if {*wanted} <= {*axes}:
         columns = {axis: axes.index(axis) for axis in wanted}
         numbers = Table(header, columns).parse(wanted)
         turns = matrices(quaternions_from_intrinsic_eulers(np.radians(numbers[:, :3]), "XYZ"))
-        apart = np.abs(turns.reshape(9, -1).T - numbers[:, 3:]).max(axis=1)
-        if np.count_nonzero(apart < AS_ANGLES) > len(apart) / 2:
-            return list(names)
-    flipped = {str(place): str(3 * (place % 3) + place // 3) for place in range(9)}
-    return [
+        by_rows, by_columns = (
+            np.count_nonzero(np.abs(one.reshape(9, -1).T - numbers[:, 3:]).max(axis=1) < AS_ANGLES) > len(numbers) / 2
+            for one in (turns, turns.swapaxes(0, 1))
+        )
+        if by_rows:
+            return header
+        sure = bool(by_columns)
+    flipped = {axis: str(3 * (place % 3) + place // 3) for place, axis in enumerate(ROT)}
+    names = [
         replace(name, axis=flipped[axis]) if name and axis in flipped else name
         for name, axis in zip(names, axes, strict=True)
     ]
+    text = "no angles tell how Rot[0] to Rot[8] go, and they are taken to go down the columns of the matrix"
+    way_out = "export Roll, Pitch and Yaw as Qualisys defines them beside"
+    return replace(header, names=names, warnings=() if sure else (ClipWarning(text, way_out),))

@@ -98,7 +98,10 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
     """Add a group of options: `--axes`, and others of which `reading_options` makes one thing."""
     group = parser.add_argument_group("reading", "For recordings that leave something out; docs/csv.md has examples.")
     group.add_argument(
-        "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
+        "--axes",
+        type=str.lower,
+        choices=AXES,
+        help="axes of the recordings (those of the format; blender where it has none)",
     )
     group.add_argument(
         "--columns",

@@ -136,7 +136,9 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
     if all(len(trajectory.times) < 2 for trajectory in trajectories):
         problem = ", ".join(f"{shown(item.name)} has {len(item.times)} samples" for item in trajectories[:3])
         raise TrajectoryError(path, problem, "a trajectory needs at least 2")
-    return replace(selection.recording(trajectories), axes=result.axes, measured=result.measured)
+    own = trajectories[0].axes
+    recording = replace(selection.recording(trajectories), measured=result.measured)
+    return replace(recording, axes=own or result.axes, axes_known=bool(own))
 
 
 def _read(result: Format, path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:

@@ -54,6 +54,9 @@ class Trajectory:
     rate: float | None = None
     """Samples a second, where there may be more between these."""
 
+    axes: str = ""
+    """Those that its program has, where they are not those of the format: a name in `axes.DESCRIBED`."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -76,7 +79,10 @@ class Recording:
     """The body that was asked for by name; empty where the first was, or all."""
 
     axes: str = "blender"
-    """The convention of its format: a name in `axes.AXES`."""
+    """The convention of its format, or of the program that wrote it: a name in `axes.DESCRIBED`."""
+
+    axes_known: bool = False
+    """True if these are those of the program that wrote it, of several that write such a format."""
 
     measured: bool = True
     """True if its format holds what devices measured, and not what was animated."""

@@ -54,8 +54,17 @@ CARRIERS = 4
 BESIDE = 0.3
 """How far a root is from its body, of the size of that, up to which it is a part of it."""
 
+LOOSE = 0.05
+"""How far all moves that hangs on a root which stands, of the size of the body, where nothing is joined to it."""
+
 NOTHING = 1e-9
 """The size of what has none, in any unit."""
+
+LOOKED_AT = 64
+"""Moments of a motion that tell what moves in it."""
+
+STILL = 1e-6
+"""Share by which numbers differ that are the same: single precision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,33 +158,73 @@ def tails_of(rest: Poses, parents: np.ndarray) -> np.ndarray:
 
 
 def carrying(parents: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return which joints are roots that carry a body about, shape (joints,), by their places (joints, 3).
+    """Return which joints only carry a body about, or stand where it moves, by their places (joints, n, 3).
 
     They may be anywhere. One that is near to the only joint that hangs on it is a part of the body, as hips without
     legs are.
     """
-    result = (parents < 0) & ~part_of_body(parents)
-    for root in np.flatnonzero(result).tolist():
-        away = np.linalg.norm(places[parents == root] - places[root])
-        result[root] = away > BESIDE * np.ptp(places[~result], axis=0).max()
+    places = few_of(places)
+    result = ~part_of_body(parents, places)
+    size = float(np.median(np.ptp(places[~result], axis=0).max(axis=-1)))
+    for joint in np.flatnonzero(result)[::-1].tolist():
+        hanging = np.flatnonzero(parents == joint)
+        if len(hanging) == 1 and not result[hanging[0]]:
+            result[joint] = np.median(np.linalg.norm(places[hanging[0]] - places[joint], axis=-1)) > BESIDE * size
     return result
 
 
-def part_of_body(parents: np.ndarray) -> np.ndarray:
-    """Return which joints are part of a body, shape (joints,).
+def part_of_body(parents: np.ndarray, places: np.ndarray | None = None) -> np.ndarray:
+    """Return which joints are part of a body, shape (joints,), by their places (joints, n, 3) where these are known.
 
     Joints that only carry the rest of it about, from the ground or from wherever they were left, are none: a body
-    begins where a joint first has several children.
+    begins where a joint first has several children. Where that joint stands while one of these goes away from it, it
+    begins with its children, without those that stand far from all that moves.
     """
     children = np.bincount(parents[parents >= 0], minlength=len(parents))
     body = np.ones(len(parents), dtype=bool)
+    moves = None if places is None else _travels(places)
     for root in np.flatnonzero(parents < 0).tolist():
         chain = [root]
         while children[chain[-1]] == 1:
             chain.append(int(np.flatnonzero(parents == chain[-1])[0]))
         if children[chain[-1]] > 1:
             body[chain[:-1]] = False
+            if places is not None and moves is not None and moves.any() and not moves[chain[-1]]:
+                body[_beside(parents, places, moves, chain[-1])] = False
     return body
+
+
+def few_of(places: np.ndarray) -> np.ndarray:
+    """Return places (joints, n, 3) at a few moments of all."""
+    return places[:, :: -(-places.shape[1] // LOOKED_AT)]
+
+
+def _travels(places: np.ndarray) -> np.ndarray:
+    """Return which joints are not always at the same place, shape (joints,)."""
+    return np.ptp(places, axis=1).max(axis=-1) > STILL * np.abs(places).max(axis=(1, 2), initial=1.0)
+
+
+def _beside(parents: np.ndarray, places: np.ndarray, moves: np.ndarray, root: int) -> list[int]:
+    """Return the joints that are no part of what moves below one that stands and has several children; none where all
+    stay about where they hang, as on hips.
+    """
+    hanging = np.flatnonzero(parents == root)
+    gone = np.linalg.norm(places[hanging] - places[hanging, :1], axis=-1).max(axis=1)
+    size = float(np.median(np.ptp(places[moves], axis=0).max(axis=-1)))
+    apart = float(np.median(np.linalg.norm(places[moves] - places[root], axis=-1).min(axis=0)))
+    loose = gone.min() > LOOSE * size or gone.max() > BESIDE * size
+    if not loose and not (gone.max() > 0.0 and apart > size):
+        return []
+    middle, result = places[moves].mean(axis=0), [root]
+    for child in hanging.tolist():
+        below = np.zeros(len(parents), dtype=bool)
+        below[child] = True
+        for joint in range(child + 1, len(parents)):
+            below[joint] = parents[joint] >= 0 and below[parents[joint]]
+        away = np.median(np.linalg.norm(places[child] - middle, axis=-1))
+        if not moves[below].any() and away > size:
+            result += np.flatnonzero(below).tolist()
+    return result
 
 
 def size_of(parents: np.ndarray, places: np.ndarray) -> float:

@@ -14,13 +14,7 @@ from rigid_motion_batch.axes import AXES
 
 from .clips import ClipWarning
 from .recordings import Trajectory, shown
-from .rest_bodies import NOTHING, PLAUSIBLE, RestBody, part_of_body, sureness, unit_above_floor
-
-LOOKED_AT = 64
-"""Samples at once among which the first without damage is looked for."""
-
-STILL = 1e-6
-"""Share by which numbers differ that are the same: single precision."""
+from .rest_bodies import LOOKED_AT, NOTHING, PLAUSIBLE, STILL, RestBody, part_of_body, sureness, unit_above_floor
 
 TALLER = 1.5
 """Times the other extents that a body has along the axis that is up."""
@@ -34,7 +28,7 @@ def sized(path: Path, trajectory: Trajectory, axes: str, *, unit_given: bool) ->
     body = trajectory.rest_body
     if body is None or (places := _first_whole(body.skeleton, trajectory.poses)) is None:
         return trajectory
-    places = places[part_of_body(body.parents)] * trajectory.metres_per_unit
+    places = places[part_of_body(body.parents, whole_places(body, trajectory.poses))] * trajectory.metres_per_unit
     size, heights = float(np.ptp(places, axis=0).max()), places @ AXES[axes][2]
     unit, length, why = unit_above_floor(size, float(heights.min()), float(heights.max()))
     metres = size * length
@@ -51,6 +45,17 @@ def sized(path: Path, trajectory: Trajectory, axes: str, *, unit_given: bool) ->
     return replace(trajectory, metres_per_unit=trajectory.metres_per_unit * length, remark=remark, warnings=warnings)
 
 
+def whole_places(body: RestBody, poses: Poses) -> np.ndarray | None:
+    """Return where the joints of a body (joints, n) are at a few moments without damage, shape (joints, m, 3); None
+    without any.
+    """
+    every = -(-poses.shape[1] // LOOKED_AT)
+    with np.errstate(invalid="ignore", over="ignore"):
+        places = body.skeleton.in_root_space(poses[:, ::every]).positions
+    whole = (np.abs(places) < LARGEST).all(axis=(0, 2))
+    return places[:, whole] if whole.any() else None
+
+
 def _first_whole(skeleton: Skeleton, poses: Poses) -> np.ndarray | None:
     """Return where the joints of a body (joints, n) are in the first sample without damage, shape (joints, 3)."""
     for first in range(0, poses.shape[1], LOOKED_AT):
@@ -63,19 +68,19 @@ def _first_whole(skeleton: Skeleton, poses: Poses) -> np.ndarray | None:
     return None
 
 
-def axis_up(body: RestBody, places: np.ndarray) -> str:
-    """Return which of x, y and z is up for a body with joints at these places (joints, 3); empty if that is unclear.
+def axis_up(body: RestBody, poses: Poses) -> str:
+    """Return which of x, y and z is up for a body with these poses (joints, n), by the first; empty if that is unclear.
 
     The head is above the hips, and these above the feet. A body whose joints have other names stands on its end.
     """
-    bones = humanoid_bones(body.joints)
+    places, bones = body.skeleton.in_root_space(poses[:, :1]).positions[:, 0], humanoid_bones(body.joints)
     feet = [bones[name] for name in ("LeftFoot", "RightFoot") if name in bones]
     if "Hips" in bones and "Head" in bones:
         hips = places[bones["Hips"]]
         along = [places[bones["Head"]] - hips, *([hips - places[feet].mean(axis=0)] if feet else [])]
         best = {int(np.argmax(vector)) for vector in along}
         return "xyz"[best.pop()] if len(best) == 1 else ""
-    extents = np.ptp(places[part_of_body(body.parents)], axis=0)
+    extents = np.ptp(places[part_of_body(body.parents, whole_places(body, poses))], axis=0)
     largest = int(np.argmax(extents))
     return "xyz"[largest] if extents[largest] > TALLER * np.delete(extents, largest).max() else ""
 
@@ -83,12 +88,17 @@ def axis_up(body: RestBody, places: np.ndarray) -> str:
 def leading(body: RestBody, poses: Poses) -> Poses:
     """Return the motion (n,) of what carries a body about: its first root, or what hangs on that where it stands still.
 
-    `poses` are those of the joints (joints, n) in their parents' space.
+    Of several that hang on it that with the most joints, of those below which anything moves. `poses` are those of the
+    joints (joints, n) in their parents' space.
     """
-    joint, sizes = 0, body.skeleton.sizes
-    while _stands(poses[joint]) and len(children := np.flatnonzero(body.parents == joint)):
-        joint = int(children[np.argmax(sizes[children])])
-    return body.skeleton.in_root_space(poses)[0 if _stands(poses[joint]) else joint]
+    joint, sizes, stands = 0, body.skeleton.sizes, np.array([_stands(own) for own in poses])
+    moves = ~stands
+    for child in range(len(moves) - 1, 0, -1):
+        if body.parents[child] >= 0:
+            moves[body.parents[child]] |= moves[child]
+    while stands[joint] and len(children := np.flatnonzero(body.parents == joint)):
+        joint = int(max(children, key=lambda child: (moves[child], sizes[child])))
+    return body.skeleton.in_root_space(poses)[0 if stands[joint] else joint]
 
 
 def _stands(poses: Poses) -> bool:

@@ -195,6 +195,9 @@ class HeaderLine:
     inverted: bool = False
     """True if the poses are those of the world, as a camera sees it."""
 
+    axes: str = ""
+    """The axes of the program that wrote it, where they are known: a name in `axes.DESCRIBED`."""
+
     advice: str = ""
     """The way out where columns are missing, if it is not to name them."""
 

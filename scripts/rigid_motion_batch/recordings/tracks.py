@@ -154,7 +154,7 @@ def _trajectory(
     if header.inverted:
         with np.errstate(invalid="ignore", over="ignore"):
             poses = inverse(poses)
-    return Trajectory(body.name, times, poses, metres[0], remark, warnings)
+    return Trajectory(body.name, times, poses, metres[0], remark, warnings, axes=header.axes)
 
 
 def _of_matrices(

@@ -24,7 +24,7 @@ class Layout:
     name: str
     """That of the file."""
 
-    text: str
+    text: str | bytes
     said: Mapping[str, object] = field(default_factory=dict)
     bodies: tuple[str, ...] = ("take",)
     counted: bool = False

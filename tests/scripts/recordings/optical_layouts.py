@@ -87,7 +87,7 @@ OPTICAL: dict[str, Layout] = {
     ),
     "Qualisys": Layout("take.tsv", qualisys(lambda table: table.transpose(0, 2, 1), True), bodies=TWO),
     "Qualisys with angles of its own": Layout(
-        "take.tsv", qualisys(lambda table: table.transpose(0, 2, 1), True, "ZXY"), bodies=TWO
+        "take.tsv", qualisys(lambda table: table.transpose(0, 2, 1), True, "ZXY"), bodies=TWO, warned=True
     ),
     "Qualisys row by row, without times": Layout(
         "take.tsv", qualisys(lambda table: table, False), bodies=TWO, counted=True

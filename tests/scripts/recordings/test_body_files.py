@@ -34,7 +34,48 @@ def test_a_root_that_stands_still_is_not_what_is_measured() -> None:
     assert content.size.speed == pytest.approx(1.8, abs=0.02)
     for name, roots in (("static_root.bvh", [0]), ("upper_body_cm.bvh", [])):
         body, places = whole(name)
-        assert np.flatnonzero(carrying(body.rest_body.parents, places[:, 0])).tolist() == roots
+        assert np.flatnonzero(carrying(body.rest_body.parents, places)).tolist() == roots
+
+
+# A root, hips with two legs and a spine, and two things that hang on the root beside them.
+PARENTS = np.array([-1, 0, 1, 1, 1, 0, 0])
+STANDING = np.array([[0, 0, 0], [5, 0, 0.9], [5, 0.1, 0], [5, -0.1, 0], [5, 0, 1.7], [8, 3, 0], [-2, 0, 2]])
+
+
+@pytest.mark.parametrize(
+    ("moving", "aside"),
+    [
+        ([], []),
+        ([1, 2, 3, 4], [0, 5, 6]),
+        ([1, 2, 3, 4, 5, 6], [0]),
+        ([0, 1, 2, 3, 4, 5, 6], []),
+        ([2, 4], []),
+    ],
+    ids=["nothing", "one of several", "all of several", "the root too", "hips that stay"],
+)
+def test_a_root_that_stands_is_aside_with_what_stands_far_from_all_that_moves(
+    moving: list[int], aside: list[int]
+) -> None:
+    places = np.repeat(STANDING[:, None], 100, axis=1)
+    places[moving, :, 0] += np.linspace(0.0, 2.0, 100)
+    assert np.flatnonzero(carrying(PARENTS, places)).tolist() == aside
+    assert np.flatnonzero(~part_of_body(PARENTS, places)).tolist() == aside
+
+
+def test_what_stands_near_to_a_body_is_seen_with_it() -> None:
+    places = np.repeat(STANDING[:, None], 100, axis=1)
+    places[5:] = [[[5.5, 0.0, 0.0]], [[4.5, 0.0, 0.5]]]
+    places[1:5, :, 0] += np.linspace(-1.0, 1.0, 100)
+    assert np.flatnonzero(carrying(PARENTS, places)).tolist() == [0]
+
+
+def test_hips_that_sit_are_a_part_of_the_body_whose_arms_move() -> None:
+    parents = np.array([-1, 0, 1, 0, 0])
+    places = np.repeat(
+        np.array([[0, 0, 0], [0, 0, 0.5], [0.3, 0, 0.6], [0.4, 0.1, 0], [0.4, -0.1, 0.0]])[:, None], 9, axis=1
+    )
+    places[2, :, 2] += np.linspace(0.0, 0.3, 9)
+    assert not carrying(parents, places).any()
 
 
 def test_the_upper_half_of_a_body_is_not_in_inches_where_its_hips_would_be_higher_than_those_of_giants() -> None:

@@ -83,7 +83,7 @@ def test_the_command_says_it_in_words(write, capsys) -> None:
     assert lines[0].startswith(f"{source}: CSV with named columns, ")
     said = "\n".join(line[13:] if line[2:13].strip() == "" else line for line in lines[1:])
     for expected in (
-        "  axes       unity, as --axes says",
+        "  axes       unity (left-handed, y up, z forward), as --axes says",
         "  body       hand",
         "    samples  261 in 3.322 s",
         "    rate     90 a second, even: intervals from 11.1 to 444 ms, 1 gap",

@@ -1,0 +1,226 @@
+"""One motion as scripts, spreadsheets and editors write it: separators, encodings, ends of lines, units and orders."""
+
+from collections.abc import Callable
+from itertools import permutations
+
+import numpy as np
+
+from tests.scripts.recordings.layouts import (
+    BOTH,
+    COUNTED,
+    EUROC,
+    LEFT,
+    NANOSECONDS,
+    NUMBERS,
+    OTHERS,
+    POSE,
+    RIGHT,
+    SECONDS,
+    Layout,
+    csv,
+    flat,
+    matrices,
+    names,
+    quaternions,
+    rows,
+)
+from tests.scripts.recordings.logs import COUNT, MICROSECONDS
+from tests.scripts.recordings.optical_layouts import OPTICAL
+
+HEADER = "t,x,y,z,qx,qy,qz,qw"
+UNITS = '"t [ms]","x [mm]","y [mm]","z [mm]","qx","qy","qz","qw"'
+PLAIN = csv(HEADER, SECONDS, *POSE)
+TUM = rows(SECONDS, *POSE)
+IN_UNITS = csv(UNITS, MICROSECONDS / 1e3, 1e3 * LEFT.positions, quaternions(), separator=";")
+GERMAN = PLAIN.replace(",", ";").replace(".", ",")
+"""As a spreadsheet writes it where numbers have decimal commas."""
+
+
+def ended(text: str, end: str = "\r\n") -> bytes:
+    """A text with other ends of lines."""
+    return text.replace("\n", end).encode()
+
+
+def each_cell(text: str, change: Callable[[str], str]) -> str:
+    return "".join(",".join(map(change, line.split(","))) + "\n" for line in text.splitlines())
+
+
+def reversed_lines(text: str) -> str:
+    return "".join(text.splitlines(keepends=True)[::-1])
+
+
+ENCODED: dict[str, Layout] = {
+    "semicolons": Layout("take.csv", PLAIN.replace(",", ";")),
+    "semicolons and decimal commas": Layout("take.csv", GERMAN),
+    "tabs": Layout("take.txt", PLAIN.replace(",", "\t")),
+    "tabs and decimal commas": Layout("take.tsv", GERMAN.replace(";", "\t")),
+    "blanks": Layout("take.txt", PLAIN.replace(",", "   ")),
+    "a blank behind each comma": Layout("take.csv", PLAIN.replace(",", ", ")),
+    "quoted names": Layout("take.csv", PLAIN.replace(HEADER, each_cell(HEADER, '"{}"'.format).strip())),
+    "quoted cells": Layout("take.csv", each_cell(PLAIN, '"{}"'.format)),
+    "quoted names with units and decimal commas": Layout("take.csv", IN_UNITS.replace(".", ",")),
+    "UTF-8 with a mark": Layout("take.csv", b"\xef\xbb\xbf" + PLAIN.encode()),
+    "UTF-16, little end first": Layout("take.csv", b"\xff\xfe" + PLAIN.encode("utf-16-le")),
+    "UTF-16, big end first": Layout("take.csv", b"\xfe\xff" + PLAIN.encode("utf-16-be")),
+    "UTF-16 with tabs, CRLF and decimal commas": Layout(
+        "take.txt", GERMAN.replace(";", "\t").replace("\n", "\r\n").encode("utf-16")
+    ),
+    "CRLF": Layout("take.csv", ended(PLAIN)),
+    "CRLF and decimal commas": Layout("take.csv", ended(GERMAN)),
+    "CR": Layout("take.csv", ended(PLAIN, "\r")),
+    "a comma at the end of each row": Layout("take.csv", PLAIN.replace("\n", ",\n")),
+    "blank lines": Layout("take.csv", PLAIN.replace("\n", "\n\n")),
+    "comments": Layout("take.csv", "# my log\n" + PLAIN.replace("\n", "\n# pause\n", 9)),
+    "lines before the names": Layout("take.csv", "Session,7\nOperator,NN\n\n" + PLAIN),
+    "exponents and signs": Layout(
+        "take.csv",
+        HEADER
+        + each_cell("\n" + rows(SECONDS, *POSE, separator=","), lambda cell: f"{float(cell):+.17E}" if cell else ""),
+    ),
+    "no zero before the point": Layout(
+        "take.csv", each_cell(PLAIN, lambda cell: cell.replace("0.", ".", 1) if "0." in cell[:3] else cell)
+    ),
+    "TUM with CRLF": Layout("take.txt", ended(TUM)),
+    "TUM in UTF-8 with a mark": Layout("take.tum", b"\xef\xbb\xbf" + TUM.encode()),
+    "TUM in UTF-16": Layout("take.txt", TUM.encode("utf-16")),
+    "KITTI with tabs": Layout("take.txt", rows(flat(matrices(height=3)), separator="\t"), COUNTED),
+    "EuRoC in text with CRLF": Layout(
+        "take.txt", ended(csv(EUROC, NANOSECONDS, LEFT.positions, quaternions("wxyz"), np.ones((COUNT, 6))))
+    ),
+    "g2o backwards": Layout("take.txt", reversed_lines(str(OTHERS["g2o"].text)), COUNTED),
+    "Motive with CRLF and a mark": Layout(
+        "take.csv", b"\xef\xbb\xbf" + ended(str(OPTICAL["Motive"].text)), bodies=("Tool",)
+    ),
+    "Motive's bones with commas": Layout(
+        "take.csv", str(OPTICAL["Motive's bones"].text).replace(";", ","), bodies=("Tool",)
+    ),
+    "Vicon with CRLF": Layout("take.csv", ended(str(OPTICAL["Vicon"].text)), {}, ("Tool:Tool", "Cup:Cup"), True),
+    "Qualisys with CRLF": Layout("take.tsv", ended(str(OPTICAL["Qualisys"].text)), bodies=("Tool", "Cup")),
+    "COLMAP with CRLF": Layout("take.txt", ended(str(OTHERS["COLMAP"].text)), COUNTED),
+}
+
+
+def in_units(time: str, length: str) -> str:
+    return f"t ({time}),x_{length},y_{length},z_{length},qx,qy,qz,qw"
+
+
+def angles(order: str, degrees: bool) -> np.ndarray:
+    """Euler angles about x, y and z; in small letters the order of turns about the axes of the world."""
+    turned = LEFT.turns.as_euler(order, degrees=degrees)
+    return turned[:, [order.lower().index(axis) for axis in "xyz"]]
+
+
+def vectors(form: str, table: np.ndarray) -> list[str]:
+    return [form.format(*row) for row in table.tolist()]
+
+
+STAMPS = [f"2026-11-22T10:00:{tick // 10**6:02}.{tick % 10**6:06}Z" for tick in MICROSECONDS.tolist()]
+EMPTY = [""] * COUNT
+_vectors = vectors("({}, {}, {})", LEFT.positions), vectors("({}, {}, {}, {})", quaternions())
+
+MEANT: dict[str, Layout] = {
+    "w first, by name": Layout("take.csv", csv("t,x,y,z,qw,qx,qy,qz", SECONDS, LEFT.positions, quaternions("wxyz"))),
+    "w first, without names": Layout(
+        "take.csv", rows(SECONDS, LEFT.positions, quaternions("wxyz"), separator=","), warned=True
+    ),
+    "columns in any order": Layout(
+        "take.csv",
+        csv(
+            "qw,z,t,qy,x,qx,y,qz",
+            *(quaternions("w"), LEFT.positions[:, 2], SECONDS, quaternions("y"), LEFT.positions[:, 0]),
+            *(quaternions("x"), LEFT.positions[:, 1], quaternions("z")),
+        ),
+    ),
+    "rows of positions and of rotations in turn": Layout(
+        "take.csv",
+        HEADER
+        + "\n"
+        + "".join(
+            f"{time!r},{','.join(map(repr, place))},,,,\n{time!r},,,,{','.join(map(repr, turn))}\n"
+            for time, place, turn in zip(SECONDS.tolist(), LEFT.positions.tolist(), quaternions().tolist(), strict=True)
+        ),
+    ),
+    "two clocks, of which one stands": Layout(
+        "take.csv", csv("wall_time,device_time_s," + HEADER[2:], SECONDS // 0.1, SECONDS, *POSE)
+    ),
+    "three clocks": Layout(
+        "take.csv",
+        csv(
+            "unix_ns,timestamp_us,elapsed_ms," + HEADER[2:],
+            NANOSECONDS,
+            MICROSECONDS,
+            np.round(MICROSECONDS / 1e3),
+            *POSE,
+        ),
+    ),
+    "dates": Layout("take.csv", csv("Time,x,y,z,qx,qy,qz,qw", STAMPS, *POSE)),
+    "clock times": Layout("take.csv", csv(HEADER, [stamp[11:-1] for stamp in STAMPS], *POSE)),
+    "millimetres and microseconds": Layout(
+        "take.csv", csv(in_units("us", "mm"), MICROSECONDS, 1e3 * LEFT.positions, quaternions())
+    ),
+    "centimetres and milliseconds": Layout(
+        "take.csv", csv(in_units("ms", "cm"), MICROSECONDS / 1e3, 100.0 * LEFT.positions, quaternions())
+    ),
+    "inches": Layout("take.csv", csv(in_units("s", "inch"), SECONDS, LEFT.positions / 0.0254, quaternions())),
+    "a column of devices": Layout(
+        "take.csv",
+        csv("device," + HEADER, ["left"] * COUNT, SECONDS, *POSE)
+        + rows(["right"] * COUNT, SECONDS, *BOTH[2:], separator=","),
+        bodies=("left", "right"),
+    ),
+    "devices in turn": Layout(
+        "take.csv",
+        csv(
+            "tracker," + HEADER,
+            ["left", "right"] * COUNT,
+            SECONDS.repeat(2),
+            np.stack((LEFT.positions, RIGHT.positions), 1).reshape(-1, 3),
+            np.stack((quaternions(), quaternions(motion=RIGHT)), 1).reshape(-1, 4),
+        ),
+        bodies=("left", "right"),
+    ),
+    "vectors in brackets": Layout("take.csv", csv("t;Position;Rotation", SECONDS, *_vectors, separator=";")),
+    "quoted vectors": Layout(
+        "take.csv", csv("t,Position,Rotation", SECONDS, *([f'"{cell}"' for cell in column] for column in _vectors))
+    ),
+    "vectors of Unreal": Layout(
+        "take.csv",
+        csv(
+            "Time,Location,Rotation",
+            SECONDS,
+            vectors('"X={} Y={} Z={}"', LEFT.positions),
+            vectors('"X={} Y={} Z={} W={}"', quaternions()),
+        ),
+    ),
+    "rostopic in quotes": Layout(
+        "take.csv",
+        csv('"%time",' + names('"field.pose.position.{}"', '"field.pose.orientation.{}"'), NANOSECONDS, *POSE),
+    ),
+    "PX4 with dots": Layout(
+        "take.csv",
+        csv("timestamp,q.0,q.1,q.2,q.3,x,y,z,vx", MICROSECONDS + 10**8, quaternions("wxyz"), LEFT.positions, SECONDS),
+    ),
+    "frames and their rate": Layout("take.csv", csv("frame,x,y,z,qx,qy,qz,qw", NUMBERS + 100, *POSE), COUNTED),
+    "roll, pitch and yaw": Layout(
+        "take.csv",
+        csv("t,x,y,z,roll_deg,pitch_deg,yaw_deg", SECONDS, LEFT.positions, angles("xyz", True)),
+        {"euler": "xyz", "columns": [("rx", "roll_deg"), ("ry", "pitch_deg"), ("rz", "yaw_deg")]},
+    ),
+}
+
+EULER: dict[str, Layout] = {
+    f"angles {order} in {unit}": Layout(
+        "take.csv",
+        csv(
+            f"t,x,y,z,Rot X [{unit}],Rot Y [{unit}],Rot Z [{unit}]",
+            SECONDS,
+            LEFT.positions,
+            angles(order, unit == "deg"),
+        ),
+        {"euler": order},
+    )
+    for letters, unit in (("XYZ", "deg"), ("xyz", "rad"))
+    for order in map("".join, permutations(letters))
+}
+
+WRITTEN = ENCODED | MEANT | EULER
