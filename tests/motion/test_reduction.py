@@ -6,6 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.motion import MODES, Poses, key_costs, key_search, reduce_keys, twists
+from rigid_motion.motion.quaternions import normalise
 from tests.motion.bodies import RADIUS, shell_errors, wandering
 from tests.thoroughness import tried
 
@@ -82,6 +83,22 @@ def test_a_budget_is_spent_as_well_as_by_trying_tolerances(mode, budget):
         ratios.append(error / error_of_bisecting(times, poses, mode, budget, error))
     assert sorted(ratios)[-2] <= 1.05
     assert max(ratios) <= 1.15
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_blenders_curves_need_no_more_keys_within_an_error_than_a_budget_has(seed):
+    """Of a camera as a tracker solves it: keys that are put in where its jitter is largest would follow the jitter."""
+    times, random = np.arange(221) / 24.0, np.random.default_rng(seed)
+    eased = (share := times / times[-1]) ** 2 * (3.0 - 2.0 * share)
+    angle = np.radians(200.0 * eased)
+    turn, _ = twists.exponential(np.concatenate((np.zeros((2, 221)), angle[None] / 2.0, np.zeros((3, 221)))))
+    quaternions = turn.T + 0.001 * random.normal(size=(221, 4))
+    positions = np.stack((np.cos(angle), np.sin(angle), 0.5 + 0.7 * eased), axis=1)
+    jittery = Poses(positions + 0.006 * random.normal(size=(221, 3)), normalise(quaternions))
+    error = error_of(times, jittery, reduce_keys(times, jittery, "bezier", radius=RADIUS, budget=10), "bezier")
+    keys = reduce_keys(times, jittery, "bezier", 1.1 * error, RADIUS)
+    assert len(keys) <= 10
+    assert error_of(times, jittery, keys, "bezier") <= 1.1 * error * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("mode", ["dq_sclerp", "pga_slerp", "cga_slerp", "motor_spline"])

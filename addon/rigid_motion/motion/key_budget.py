@@ -6,6 +6,9 @@ bisecting the tolerance would. Then the best is put together of all that this ha
 once or twice more from there. Where a segment depends on its two keys alone and there are few samples for each key,
 nearly all of them are candidates, and the first layout is the best there is but for a few hundredths. For the mean
 square some more keys are put in, moved, and as many taken out.
+
+Of Blender's own curves every key has a say everywhere, and no search for a tolerance sees that: there budgets are
+tried, and the whole motion tells which keep to the tolerance.
 """
 
 from __future__ import annotations
@@ -65,28 +68,67 @@ SWAPPED = 1.15
 """How many times the budget keys may be in between, for the mean square, to find better places."""
 
 
+FEWER, NEAR = 0.875, 0.03
+"""Of the keys within a tolerance: how many are tried next, and how near the fewest are to too few at last."""
+
+
 def fewest_keys(recording: Recording, budget: int | None, tries: int, *, rms: bool = False) -> np.ndarray:
     """Return fewest samples within the tolerance of a recording, or the best ones within a budget."""
     if len(recording.times) <= 2:
         return np.arange(len(recording.times))
-    if budget is None:
-        keys = Search(recording, rms=rms).within(tries)
-        return _mended(recording, keys, rms=rms) if MODES[recording.mode].is_reference else keys
-    return BudgetSearch(recording, budget, rms=rms).least(tries)
+    if budget is not None:
+        return BudgetSearch(recording, budget, rms=rms).least(tries)
+    search = Search(recording, rms=rms)
+    keys = search.within(tries)
+    return _of_budgets(search, keys, tries) if MODES[recording.mode].is_reference else keys
+
+
+def _of_budgets(search: Search, keys: np.ndarray, tries: int) -> np.ndarray:
+    """Return the fewest keys whose whole motion is within the tolerance, of keys to begin with and of some budgets."""
+    recording, rms = search.recording, search.power == 2
+    best, too_few, budget = _mended(recording, keys, rms=rms), 1, FEWER * len(keys)
+    while tries and len(best) - too_few > max(1, NEAR * len(best)):
+        other = BudgetSearch(recording, max(2, too_few + 1, int(budget)), rms=rms)
+        other.costs = search.costs  # What is known of segments goes for all budgets.
+        fewer = other.least(tries)
+        if _error(_errors(recording, fewer), rms=rms) <= 1.0:
+            best = fewer
+        else:
+            too_few = other.budget
+        # Upwards by small steps, too: where much had to be put in, fewest are near to what was without that.
+        budget = FEWER * len(best) if too_few == 1 else min((too_few + len(best)) / 2, 1 + too_few / FEWER)
+    return _without_needless(recording, best, rms=rms)
+
+
+def _without_needless(recording: Recording, keys: np.ndarray, *, rms: bool) -> np.ndarray:
+    """Return keys without each that the whole motion does without, within the tolerance."""
+    for key in keys[1:-1]:
+        fewer = keys[keys != key]
+        if _error(_errors(recording, fewer), rms=rms) <= 1.0:
+            keys = fewer
+    return keys
 
 
 def _mended(recording: Recording, keys: np.ndarray, *, rms: bool) -> np.ndarray:
     """Return keys with more of them where keys that the search does not look at have the motion pass the tolerance."""
-    times, samples = recording.times, np.arange(len(recording.times))
-    while True:
-        shown = interpolate(times[keys], recording.poses[..., keys], times, recording.mode)
-        errors = recording.errors(samples, shown)
-        errors[keys] = 0.0  # Whatever is left there is rounding.
-        if (np.sqrt(np.square(errors).mean()) if rms else errors.max()) <= 1.0:
-            return keys
+    while _error(errors := _errors(recording, keys), rms=rms) > 1.0:
         worst = np.array([first + int(np.argmax(errors[first:second])) for first, second in pairwise(keys.tolist())])
         of_worst = errors[worst]
         keys = np.union1d(keys, worst[of_worst > min(1.0, 0.9 * of_worst.max())])
+    return keys
+
+
+def _errors(recording: Recording, keys: np.ndarray) -> np.ndarray:
+    """Return how far the whole motion between keys is off at every sample, in tolerances, shape (n,)."""
+    shown = interpolate(recording.times[keys], recording.poses[..., keys], recording.times, recording.mode)
+    errors = recording.errors(np.arange(len(recording.times)), shown)
+    errors[keys] = 0.0  # Whatever is left there is rounding.
+    return errors
+
+
+def _error(errors: np.ndarray, *, rms: bool) -> float:
+    """Return what counts of the errors at all samples."""
+    return float(np.sqrt(np.square(errors).mean()) if rms else errors.max())
 
 
 class BudgetSearch(Search):
