@@ -31,7 +31,7 @@ STARTED = 48_213.0
 TWICE, LOST, FLIPPED = slice(60, 63), slice(150, 158), slice(200, None)
 """Rows that are written twice, that are missing, and whose quaternions have the other sign."""
 
-RATE, MODES, MOMENT = "5", ("lerp_slerp", "dq_sclerp", "motor_spline"), 3.32
+RATE, MODES, MOMENT = "5", ("bezier", "lerp_slerp", "dq_sclerp", "motor_spline"), 3.32
 """Of the picture: keys a second, modes, and seconds."""
 
 SIZE = 800, 360

@@ -12,36 +12,29 @@ import re
 import subprocess
 import sys
 import webbrowser
-from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
-from itertools import chain, count, groupby
+from itertools import chain
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.analysis.needed import KeysNeeded
-from rigid_motion_batch.analysis.results import ChoiceNumbers
-from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, parse
+from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, parse
+from rigid_motion_batch.cli.comparison_folders import free_folder, note_recordings, require_same_comparison
 from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
 from rigid_motion_batch.pipeline import comparison_steps as steps
-from rigid_motion_batch.pipeline import values
-from rigid_motion_batch.pipeline.comparison import IN_BLENDER, TABLES, Comparison, ComparisonPlan
+from rigid_motion_batch.pipeline.comparison import IN_BLENDER, TABLES, ComparisonPlan
 from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor, processors
 from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, explain, share_of, survey
-from rigid_motion_batch.pipeline.steps import OWN, VERSION, RunError, Task, version_here
+from rigid_motion_batch.pipeline.steps import VERSION, RunError, version_here
 from rigid_motion_batch.pipeline.store import Store
-from rigid_motion_batch.places import brings, manifest, output_folder
+from rigid_motion_batch.pipeline.studies import Comparison
+from rigid_motion_batch.places import brings, manifest
 from rigid_motion_batch.progress import FARM, Progress
-from rigid_motion_batch.recordings import TrajectoryError
-from rigid_motion_batch.recordings.clip_reading import folder_names
-from rigid_motion_batch.recordings.reading import split_source
-from rigid_motion_batch.report.held import slip_sentences
-from rigid_motion_batch.report.numbers import Gathering, Numbers
+from rigid_motion_batch.report.held import slip_sentences, still_sentences
+from rigid_motion_batch.report.numbers import error_is
 from rigid_motion_batch.report.settings import Settings
-from rigid_motion_batch.report.verdict import Verdict, verdict
 from rigid_motion_batch.scenes.settings import MODELS, SubjectError
 from rigid_motion_batch.supervising import blender_program, report
 from rigid_motion_batch.system_libraries import missing_for_rendering, way_out, without_blender
@@ -53,12 +46,11 @@ PROGRAM = program_of(SCRIPT)
 SAYING = ("--explain", "--json", "--open", "--quiet")
 """Options that are about what is printed, and are no part of the command that a report names."""
 
+DRAWING = steps.STAGES[steps.STAGES.index("build") :]
+"""Stages after all is measured."""
+
 STARTING = 120.0
 """Seconds that a Blender has to say which it is."""
-
-RECORD = "comparison.json"
-"""The file that says what a folder is the comparison of, among the files of the store: its recordings,
-as they count from there."""
 
 
 def main(arguments: list[str]) -> int:
@@ -72,7 +64,7 @@ def main(arguments: list[str]) -> int:
         comparison = comparison_of(options, as_typed(PROGRAM, said, options.inputs), blender)
         output = options.output or free_folder(options.inputs)
         if not options.overwrite:
-            _require_same_comparison(output, options.inputs)
+            require_same_comparison(output, options.inputs)
         with Store(output, alone=not options.only, overwrite=options.overwrite) as store:
             plan = ComparisonPlan(comparison, store)
             if options.explain:
@@ -118,75 +110,12 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
             command,
             reference=options.reference,
             joint_radius=options.radius.joint,
+            slip_asked=bool(options.held),
             details=details,
         ),
         subject=options.subject,
         blender=blender,
     )
-
-
-# -- where it is done -------------------------------------------------------------------------------------------------
-
-
-def free_folder(sources: list[str]) -> Path:
-    """Return `renders/NAME`, by the first recording, with a number where that holds another comparison
-    or anything else.
-    """
-    if sources == own_recordings():
-        name = "comparison"
-    else:
-        file, _, body = os.path.basename(sources[0]).partition(":")
-        name = Path(file).stem + (f"-{body}" if body not in ("", "*") else "")
-    (name,) = folder_names([name])
-    numbered = (output_folder(name if number == 1 else f"{name}-{number}") for number in count(1))
-    return next(folder for folder in numbered if _is_free(folder) or _is_same(folder, sources))
-
-
-def _is_free(folder: Path) -> bool:
-    return not folder.exists() or (folder.is_dir() and not any(folder.iterdir()))
-
-
-def _is_same(folder: Path, sources: list[str]) -> bool:
-    """Return whether a folder holds the comparison of some of these recordings."""
-    held = _held(folder)
-    return held is not None and (not held or not held.keys().isdisjoint(_places(sources, folder)))
-
-
-def _held(folder: Path) -> dict[str, str] | None:
-    """Return the recordings that a folder holds the comparison of, and their digests; None where it holds none."""
-    return Store(folder).noted(RECORD) if (folder / OWN).is_dir() else None
-
-
-def _places(sources: list[str], folder: Path) -> list[str]:
-    """Return the sources as they count from a folder, so that both can be moved."""
-    here = os.path.abspath(folder)
-    return [os.path.relpath(source, here) if Path(source).drive == folder.drive else source for source in sources]
-
-
-def _require_same_comparison(output: Path, sources: list[str]) -> None:
-    """Raise RunError where a folder holds the comparison of other recordings."""
-    held = _held(output)
-    if held and not _is_same(output, sources) and not {*held.values()} & {*_digests(sources, Store(output)).values()}:
-        names = ", ".join(sorted(Path(item).name for item in held)[:3]) + (" and more" if len(held) > 3 else "")
-        raise RunError(
-            f"{_short(output)} holds another comparison, of {names}; choose another folder, such as --output "
-            f"{_short(free_folder(sources))}, or replace it with --overwrite"
-        )
-
-
-def _short(path: Path) -> str:
-    """Return a path as one would type it here."""
-    path, here = path.absolute(), Path.cwd()
-    return os.fspath(path.relative_to(here) if path.is_relative_to(here) else path)
-
-
-def _digests(sources: list[str], store: Store) -> dict[str, str]:
-    """Return the digest of the file of each source, of those that are there."""
-    result = {}
-    for source in sources:
-        with suppress(TrajectoryError):
-            (result[source],) = store.inputs(split_source(source)[0]).values()
-    return result
 
 
 # -- what it needs ----------------------------------------------------------------------------------------------------
@@ -287,34 +216,38 @@ class _Comparing:
             self._say_nothing_to_compare()
             return 2
         if self.options.only:
+            if self.options.only in DRAWING:
+                self.plan.conclude()
             self._do(self.options.only.capitalize(), self.plan.tasks)
             if self.options.only == "report":
                 self._name_missing()
             return self._end()
         self._require_tolerances()
-        digests = _digests(self.options.inputs, self.store)
-        self.store.note(RECORD, dict(zip(_places([*digests], self.store.output), digests.values(), strict=True)))
+        note_recordings(self.store, self.options.inputs)
         # What an earlier run found is no finding of this.
         self.store.withdraw(TABLES.keys() - self.plan.tables)
+        self._do("Measuring", self.plan.measuring)
+        if self.work.interrupted or self.work.problem:
+            return self._end()
+        self.plan.conclude()
+        self._show_numbers()
         films = (task.name for task in self.plan.tasks() if isinstance(task.step, steps.Encode))
-        if self.plan.comparison.stage and not survey(self.plan.tasks, self.store)[0].keys().isdisjoint(films):
-            # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
-            self._do("Measuring", lambda: self.plan.tasks(films=False))
+        if not survey(self.plan.tasks, self.store)[0].keys().isdisjoint(films):
+            # Pages take seconds, and films minutes: nobody has to wait for the one to see the other.
+            self._do("Reporting", lambda: self.plan.tasks(films=False))
             if self.work.interrupted or self.work.problem:
                 return self._end()
-            self._show_numbers()
             report(summary="Stopped. The report holds what was ready; the same command goes on from here.")
             report(written=os.fspath(self.store.output / steps.PAGE))
             self._note(f"All numbers are there, and films come as they are made: {self.store.output / steps.PAGE}")
             self._do("Filming", self.plan.tasks)
         else:
-            self._do("Comparing", self.plan.tasks)
-            self._show_numbers()
+            self._do("Reporting", self.plan.tasks)
         return self._end()
 
     def _do(self, title: str, tasks: Plan) -> None:
         self.work.do(lambda: share_of(tasks, self.options.only or "", *self.options.part), title)
-        self.page |= bool(self.plan.studies) and not self.work.interrupted
+        self.page |= tasks != self.plan.measuring and bool(self.plan.studies) and not self.work.interrupted
 
     def _note(self, text: str, style: str = "") -> None:
         self.notes.append(text)
@@ -351,42 +284,20 @@ class _Comparing:
     def _show_numbers(self) -> None:
         if self.options.quiet or self.options.json:
             return
-        numbers, said = self._numbers()
-        if numbers and said:
-            bodies = any(study.facts.joints for study in self.plan.studies)
-            title = terminal.heading(len(numbers.clips), self.options.radius, bodies)
+        found = self.plan.found
+        if found.numbers and found.verdict:
+            bodies, radii = [bool(study.facts.joints) for study in self.plan.studies], self.options.radius
+            rigid, joint = None if all(bodies) else radii.rigid, radii.joint if any(bodies) else None
+            choice = found.verdict.choice
             terminal.show(
-                title,
-                terminal.table_of(terminal.lines_of(numbers)),
-                *terminal.also(numbers),
-                *slip_sentences(self.plan.slips(), numbers),
+                error_is(rigid, joint, len(found.numbers.clips)),
+                terminal.table_of(terminal.lines_of(found.numbers)),
+                *terminal.also(found.numbers),
+                *slip_sentences(found.slips, found.numbers, choice),
+                *still_sentences(found.numbers, choice),
                 "",
-                said.sentence,
+                found.verdict.text,
             )
-
-    def _numbers(self) -> tuple[Numbers | None, Verdict | None]:
-        """Return all numbers that there are, and what they come to."""
-        gathering, needed = Gathering(self.options.reference), []
-        for name, tasks in groupby(self._measuring(), key=lambda task: cast(steps.Measure, task.step).clip.name):
-            choices = []
-            for task in tasks:
-                folder = self.store.results / task.key
-                with suppress(OSError, ValueError, KeyError):  # What could not be made.
-                    if isinstance(task.step, steps.CountKeys):
-                        needed.append(values.read(KeysNeeded, folder / "needed"))
-                    else:
-                        choices.append(values.read(ChoiceNumbers, folder / "numbers"))
-            if choices:
-                gathering.add(name, choices)
-        try:
-            numbers = gathering.numbers()
-        except ValueError:
-            return None, None
-        return numbers, verdict(numbers, needed)
-
-    def _measuring(self) -> Iterator[Task]:
-        numbers = steps.Measure, steps.CountKeys
-        return (task for task in self.plan.tasks(films=False) if type(task.step) in numbers)
 
     def _end(self) -> int:
         """Say what came of it, and last the path of the report; the exit code."""
@@ -412,16 +323,17 @@ class _Comparing:
         return code
 
     def _as_data(self, page: Path | None, code: int) -> dict[str, Any]:
-        numbers, said = self._numbers()
+        found = self.plan.found
         counts = {**self.work.counts, FAILED: len(self.work.failures)}
         return {
             "report": os.fspath(page) if page else None,
             "exit_code": code,
-            "verdict": said.sentence if said else None,
-            "wins": said.wins if said else "",
-            "table": [asdict(line) for line in terminal.lines_of(numbers)] if numbers else [],
-            "slips": [asdict(row) for pair in self.plan.slips() for some in pair.choices for row in some.rows],
-            "clips": list(numbers.clips) if numbers else [],
+            "verdict": found.verdict.sentence if found.verdict else None,
+            "beside": found.verdict.beside if found.verdict else "",
+            "wins": found.verdict.wins if found.verdict else "",
+            "table": [asdict(line) for line in terminal.lines_of(found.numbers)] if found.numbers else [],
+            "slips": [asdict(row) for pair in found.slips for some in pair.choices for row in some.rows],
+            "clips": list(found.numbers.clips) if found.numbers else [],
             "notes": self.notes,
             "failures": self.work.failures,
             "tasks": {state: counts[state] for state in STATES if counts.get(state)},
@@ -441,6 +353,9 @@ def _explain(plan: ComparisonPlan, store: Store, options: argparse.Namespace) ->
             lines.append("What follows from these recordings is known when they have been read.")
     elif options.only != "read":
         plan.look_into()
+        plan.conclude()
         lines += reasons(plan.tasks)
+        if plan.comparison.stage and any(not store.index_of(task.key) for task in plan.measuring()):
+            lines.append("Which keys the films show is known when all is measured.")
     print(*(lines or ["nothing to do"]), sep="\n")
     return 0

@@ -41,6 +41,9 @@ RATES = "5,10,15,20"
 
 STREAM_MODES = tuple(mode for mode in MODES if mode not in COMPARED)
 
+SPOKEN_OF = "verdict"
+"""Stands for films of the choice of keys that the verdict speaks of."""
+
 ALL, DISTINCT = "all", "distinct"
 """Stand for `COMPARED`, with a lane in the film for each, or for each motion that comes out."""
 
@@ -214,9 +217,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     video.add_argument(
         "--films",
-        choices=("fewest", ALL),
-        default="fewest",
-        help="for each recording one video, with the fewest keys, or one for every choice of keys (%(default)s)",
+        choices=(SPOKEN_OF, ALL),
+        default=SPOKEN_OF,
+        help="for each recording one video, with the keys that the verdict speaks of, or one for every choice of keys "
+        "(%(default)s)",
     )
     video.add_argument("--theme", choices=THEMES, default="dark", help="colours of the videos (%(default)s)")
     video.add_argument(

@@ -81,7 +81,7 @@ def _lines(result: Inspection) -> Iterator[str]:
     yield printable(f"{result.source}: {result.format}, {size}")
     if len(result.bodies) > 1:
         yield from _row("bodies", f"{listed(result.bodies, LISTED)} ({len(result.bodies)})")
-    axes = f"{result.axes.name}, {result.axes.known_from}"
+    axes = f"{result.axes.name} ({result.axes.described}), {result.axes.known_from}"
     if result.axes.others:
         axes += f"; {result.contents[0].up} seems to be up, as in {' and '.join(result.axes.others)}: --axes"
     yield from _row("axes", axes)

@@ -35,6 +35,9 @@ MOST_PARTS = 1024
 FILMING = ("build", "render", "encode")
 """The stages at the end of which there are films."""
 
+WHOLE = ("slip", "report")
+"""The stages that are not split."""
+
 INPUTS = "{{Param.Inputs}}"
 """The job's folder of inputs, in arguments."""
 
@@ -58,7 +61,7 @@ def main(arguments: list[str]) -> int:
         return 2
     output = (options.output or output_folder("comparison")).absolute()
     stages = [stage for stage in STAGES if options.stage or stage not in FILMING]
-    parts = {stage: 1 if stage == "report" else own.parts for stage in stages}
+    parts = {stage: 1 if stage in WHOLE else own.parts for stage in stages}
     try:
         rest, inputs = below_inputs(without(rest, "-o", "--output"))
         values = write_bundle(own.bundle.absolute(), rest, inputs, output, parts)

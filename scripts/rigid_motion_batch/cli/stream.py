@@ -29,7 +29,7 @@ from rigid_motion_batch.streaming.rooms import (
     Room,
     opened,
 )
-from rigid_motion_batch.streaming.sending import Sending, even_rate, samples_of, together
+from rigid_motion_batch.streaming.sending import Sending, even_rate, found_held, hand_of, samples_of, together
 from rigid_motion_batch.streaming.written import Motion, Tracks, write_motions
 from rigid_motion_batch.supervising import report, stop_signals
 
@@ -84,8 +84,12 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
     keepalive = ALMOST / options.rate if options.rate else KEEPALIVE
     tolerance, rate = options.tolerance.tolerance(clips[0]), options.rate or even_rate(moments)
     sender = Sender(bodies, tolerance, delay, rate, keepalive)
+    held = [(tool, hand_of(hand)) for tool, hand in options.held or ()] or found_held(clips)
+    for tool, hand in held:
+        sender.hold(tool, *hand)
     with _room(options) as room, Progress() as progress:
         _say(f"{options.user} sends {', '.join(body.name for body in bodies)} to {options.room}")
+        _say(*(f"{', '.join(filter(None, hand))} holds {tool}" for tool, hand in held))
         with progress.stage("Sending", float(moments[-1] - moments[0])) as stage:
             sending = Sending(room, options.user, sender)
 
@@ -153,6 +157,7 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
             receiving.on_frame.append(lambda _: tracks.add_keys(receiving.receiver.keys()))
         elif options.output or truth:
             receiving.on_frame.append(tracks.add_shown)
+        receiving.on_frame.append(lambda _: _complain(receiving.receiver))
         _say(f"{options.user} listens in {options.room}")
         until = time.monotonic() + (options.seconds or float("inf"))
         with _stage(progress, "Receiving", options.seconds) as stage:
@@ -237,6 +242,11 @@ def _error(motion: Motion, truth: Clip | None) -> str:
         return ", which are not those of --truth"
     off = Forest([motion.body]).errors(motion.poses[:, within], Path(times, poses).at(motion.times[within])).max(axis=0)
     return f", error {1000.0 * rms(off):.2f} mm RMS, {1000.0 * float(off.max()):.2f} mm at most"
+
+
+def _complain(receiver: Receiver) -> None:
+    for line in receiver.complaints():
+        complain(PROGRAM, line)
 
 
 def _stage(progress: Progress, title: str, seconds: float | None) -> AbstractContextManager[Stage | None]:

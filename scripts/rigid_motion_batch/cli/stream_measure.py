@@ -24,18 +24,20 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import measure
-from rigid_motion_batch.streaming.sending import body_of, samples_of
+from rigid_motion_batch.streaming.measuring import measure, measure_held
+from rigid_motion_batch.streaming.sending import body_of, hand_of, samples_of, together
 
 EPILOG = """
 examples:
   python scripts/stream.py measure walk.bvh
   python scripts/stream.py measure walk.bvh --tolerance 5mm --delay 0.2 --loss 0.01 --output shown.bvh --json
   python scripts/stream.py measure log.csv:left --output shown.csv
+  python scripts/stream.py measure log.csv:hand log.csv:tool --held log-tool log-hand --loss 0.05
 
 Bytes a second leave out what somebody who joins gets once (names, parents, rest
 poses); they are a line of their own. Headers are those of UDP and IPv4, 28 bytes a datagram. shown.bvh is what was
-shown at the recording's moments, in its units and axes.
+shown at the recording's moments, in its units and axes. With --held it says how far the tool slips in the hand, and
+what that costs, where both are streams of their own; bodies of one stream; and the tool is sent in the hand's space.
 """
 
 
@@ -45,7 +47,10 @@ _share = bounded("part of all", 0.0, 0.99)
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options beside those of reading."""
-    parser.add_argument("recording", metavar="RECORDING", help="a recording of a body; FILE:BODY takes one of several")
+    help = "a recording of a body; FILE:BODY takes one of several; with --held all that has the two"
+    parser.add_argument("recordings", nargs="+", metavar="RECORDING", help=help)
+    help = "measure how far a body slips in the hand that holds it, by their names; HAND:JOINT is a joint of a skeleton"
+    parser.add_argument("--held", nargs=2, metavar=("TOOL", "HAND"), help=help)
     help = "largest error: 5mm, 0.5cm (%(default)s)"
     parser.add_argument("--tolerance", type=Tolerance, default="5mm", metavar="LENGTH", help=help)
     parser.add_argument("--delay", type=_delay, default=0.1, metavar="S", help="seconds of delay (%(default)s)")
@@ -58,17 +63,22 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Measure, print and write. Raises TrajectoryError, OSError, RuntimeError or ValueError with what went wrong."""
-    clips, _ = read_clips([options.recording], options.axes, options.reading)
+    clips, _ = read_clips(options.recordings, options.axes, options.reading)
+    if options.held:
+        run_held(options, clips)
+        return
     if len(clips) > 1:
-        raise TrajectoryError(options.recording, f"{len(clips)} bodies", "name one, as FILE:BODY")
+        raise TrajectoryError(
+            options.recordings[0], f"{len(clips)} bodies", "name one, as FILE:BODY, or two by --held TOOL HAND"
+        )
     clip, tolerance = clips[0], options.tolerance.tolerance(clips[0])
     times, poses = samples_of(clip)
     body = body_of(clip, poses, options.radius)
     if options.output and (options.output.suffix.lower() == ".bvh") != (clip.rest_body is not None):
         raise ValueError(f"{options.output}: a body is written as .bvh, a single rigid body as .csv")
-    cost, shown = measure(body, times, poses, tolerance, options.delay, options.loss)
+    cost, shown = measure([body], times, poses, tolerance, options.delay, options.loss)
     if options.output:
-        write(options.output, clip, body, times, shown)
+        write(options.output, clip, body, times, shown.at(times))
     if options.json:
         print(json.dumps({"recording": clip.name, **cost}, indent=2))
         return
@@ -76,6 +86,22 @@ def run(options: argparse.Namespace) -> None:
         print(line)
     if options.output:
         print(path_line(options.output))
+
+
+def run_held(options: argparse.Namespace, clips: list[Clip]) -> None:
+    """Measure a tool in a hand, and print it."""
+    if options.output:
+        raise ValueError("--held writes no file of what was shown; leave --output out")
+    bodies, times, poses = together(clips, radius=options.radius)
+    tool, hand = options.held
+    tolerance = options.tolerance.tolerance(clips[0])
+    ways = measure_held(bodies, times, poses, tolerance, options.delay, options.loss, tool, hand_of(hand))
+    if options.json:
+        print(json.dumps({"held": tool, "by": hand, **ways}, indent=2))
+        return
+    for way, numbers in ways.items():
+        slip = f", {tool} slips {numbers['slip_mm']:.2f} mm at most" if "slip_mm" in numbers else ""
+        print(f"{way}: {numbers['bytes_a_second_with_headers']:.0f} bytes a second with headers{slip}")
 
 
 def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -> None:

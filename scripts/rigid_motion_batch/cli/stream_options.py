@@ -51,10 +51,12 @@ examples:
   python scripts/stream.py send walk.bvh --room studio
   python scripts/stream.py send log.csv:left log.csv:right --room studio --user ada --tolerance 2mm --delay 0.2
   python scripts/stream.py send hand.csv --axes unity --room studio --at studio.local --rate 20
+  python scripts/stream.py send dancer.bvh sword.csv --held sword dancer:RightHand --room studio
   python scripts/stream.py send --from-vmc 39539 --room studio   a performer and trackers of another program
   python scripts/stream.py send walk.bvh --to-vmc 127.0.0.1:39539
 
-All recordings begin together, and take as long as they take, even if nobody listens.
+All recordings begin together, and take as long as they take, even if nobody listens. What is held does not slip in the
+hand, whatever the network loses: a body that never moves in the space of another is found, --held names any other.
 """
 
 RECEIVE_EPILOG = """
@@ -97,6 +99,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     sending.add_argument("--rate", type=_positive, metavar="HZ", help="send a key at each of so many ticks a second")
     help = f"seconds by which it is shown later ({DELAY}; with --rate one interval)"
     sending.add_argument("--delay", type=_delay, metavar="S", help=help)
+    help = "a body that another, or its joint HAND:JOINT, holds, by their names (what is found to be held by a body)"
+    sending.add_argument("--held", nargs=2, action="append", metavar=("TOOL", "HAND"), help=help)
     add_reading_options(sending)
 
     receiving = commands.add_parser(
@@ -155,6 +159,8 @@ def _check(options: argparse.Namespace) -> None:
             raise ValueError("give recordings, or --from-vmc PORT, and not both")
         if options.to_vmc and (options.room or len(options.recordings) != 1):
             raise ValueError("--to-vmc plays one recording to one program, without a room; leave the others out")
+        if options.held and not (options.recordings and options.room):
+            raise ValueError("--held is of recordings that are sent to a room; leave it out")
         if not (options.room or options.to_vmc):
             raise ValueError("give --room NAME, which receivers give as well, or --to-vmc HOST:PORT")
     elif not options.room:

@@ -15,9 +15,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from rigid_motion_batch.analysis.choices import Radii, Tolerance
-from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART
-from rigid_motion_batch.report.numbers import MEASURES, Numbers, digits
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.report.numbers import MEASURES, RMS_IS, Numbers, digits, listed, who_else
 
 RMS, WORST, KEYS = "rms_shell_m", "max_shell_m", "keys_per_s"
 """The measures that are shown."""
@@ -82,20 +81,11 @@ def lines_of(numbers: Numbers) -> list[Line]:
     return lines
 
 
-def heading(count: int, radii: Radii, bodies: bool) -> str:
-    """Return what the numbers of so many clips are, some of whole bodies, for somebody who has never seen them."""
-    radius, point = (radii.joint, "a joint") if bodies else (radii.rigid, "the body's origin")
-    over = "" if count == 1 else f"; over {count} clips the geometric mean, and the largest of all"
-    return f"Shell error: how far any point within {100.0 * radius:g} cm of {point} is out of place{over}"
-
-
 def also(numbers: Numbers) -> list[str]:
-    """Return what else there is to say of the names of modes: which are one motion, and who goes straight."""
+    """Return what the table does not say: which modes are one motion, who goes straight, and what its numbers are."""
     groups = [[numbers.label(mode) for mode in group] for group in numbers.groups()]
-    result = [f"{first} is also the motion of {' and '.join(others)}." for first, *others in groups if others]
-    if STATE_OF_THE_ART in numbers.modes:
-        result.append(f"{numbers.label(STATE_OF_THE_ART)} is what most game engines do.")
-    return result
+    result = [f"{first} is also the motion of {listed(others)}." for first, *others in groups if others]
+    return [*result, *filter(None, [who_else(numbers)]), RMS_IS]
 
 
 def table_of(lines: Sequence[Line]) -> Table:

@@ -1,40 +1,38 @@
-"""The plan of a comparison: what is requested, as one value, and the tasks that make it, clip by clip.
+"""The plan of a comparison: the tasks that make it, clip by clip.
 
-There are two plans, for what recordings hold is known only when they are read: `reading`, `look_into`, then `tasks`.
+There are three plans, for what recordings hold is known only when they are read, and what films are to show only when
+all is measured: `reading` and `look_into`, `measuring` and `conclude`, then `tasks`, which are all of them.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from rigid_motion_batch.analysis.choices import EVERYWHERE, Choice, Radii, fewest_keys
-from rigid_motion_batch.analysis.held import PairSlips, find_held
+from rigid_motion_batch.analysis.choices import Choice, fewest_keys
 from rigid_motion_batch.analysis.metrics import table_names
-from rigid_motion_batch.analysis.modes import REFERENCE, name_of_other, single_modes
-from rigid_motion_batch.command_line import did_you_mean, listed
+from rigid_motion_batch.analysis.modes import name_of_other, single_modes
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import clip_names
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
-from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS, ReadingOptions
 from rigid_motion_batch.recordings.reading import split_source
 from rigid_motion_batch.report.settings import Settings
-from rigid_motion_batch.scenes.settings import MODELS, SceneSettings, place_of_subject
+from rigid_motion_batch.scenes.settings import SceneSettings, place_of_subject
 from rigid_motion_batch.scenes.timeline import Timeline
 
 from . import comparison_steps as steps
 from . import values
 from .comparison_steps import ClipOf, Page, Part
-from .steps import RunError, Task
+from .findings import Findings
+from .steps import Task
 from .store import Store
+from .studies import Comparison, Study, held_pairs, rates_above
 
 METRICS, JOINT_METRICS, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "keys_needed.csv"
 SLIPS = "slip.csv"
@@ -45,15 +43,6 @@ ON_ONE_PAGE = 24
 PIECE = 60
 """Frames of a film that are rendered by one task at most: a long film keeps many processors busy, and little is lost
 where one is interrupted."""
-
-MOST_FRAMES = 216_000
-"""Frames of a film at most: an hour at 60 frames a second."""
-
-MOST_POSES = 600_000
-"""Frames times joints of a film of a body, whose rigs take half a kilobyte for each in every lane."""
-
-RATE_MARGIN = 0.01
-"""Share by which a rate may be above that of a recording: 90 Hz are often 89.9 in truth."""
 
 TABLES = {
     METRICS: ("measure", steps.ROWS),
@@ -67,83 +56,6 @@ IN_BLENDER = (".blend", ".fbx")
 """Recordings that Blender reads."""
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Recordings to compare, and what is requested of them."""
-
-    sources: tuple[str, ...]
-    """Sources as the user gave them: FILE, FILE:BODY, FILE:*."""
-
-    choices: tuple[Choice, ...]
-    modes: tuple[str, ...]
-    against: str = ""
-    """The source of a motion that is shown beside the modes: somebody else's, of the one clip that there is then."""
-
-    reference: str = REFERENCE
-    """The mode that the others are held against."""
-
-    axes: str | None = None
-    """A name in `axes.AXES`; None for the axes of each format."""
-
-    held: tuple[tuple[str, str], ...] = ()
-    """Names of clips, one that holds another and that: pairs whose slip is measured beside those that are found."""
-
-    reading: ReadingOptions = AS_THE_FILE_SAYS
-    radii: Radii = EVERYWHERE
-    form: str = "csv"
-    """The form of the tables of poses of rigid bodies, of `metrics.FORMS`."""
-
-    shared: bool = False
-    """True if the joints of a body have their keys at the same samples where the motion chooses them."""
-
-    count_keys: bool = False
-    """True to find how many keys every mode needs."""
-
-    fit: bool = False
-    """True to find, too, how many keys are needed where they may be fitted."""
-
-    stage: SceneSettings | None = None
-    """The stage of the films; None for a run without films."""
-
-    every_film: bool = False
-    """True if there is a film of every choice of keys, otherwise only of the one with the fewest keys."""
-
-    about: Settings | None = None
-    """Facts of the run that pages show; None for a run without pages."""
-
-    subject: str = next(iter(MODELS))
-    """The object that rigid bodies move, as `place_of_subject` takes it; on pages the first of `MODELS` without
-    Blender."""
-
-    blender: str = ""
-    """The version of the Blender that films and reads; empty where there is none."""
-
-
-@dataclass(frozen=True, slots=True)
-class Study:
-    """A clip, with the choices of keys that it is long enough for."""
-
-    clip: ClipOf
-    reader: str
-    """The key of the task that reads it."""
-
-    facts: ClipFacts = field(repr=False)
-    choices: dict[Choice, tuple[float, float]]
-    """The choices of keys, each with the times of the first and the last key."""
-
-    @property
-    def name(self) -> str:
-        return self.clip.name
-
-    @property
-    def most_frames(self) -> int:
-        return min(MOST_FRAMES, MOST_POSES // max(self.facts.joints, 1))
-
-    def frames(self, choice: Choice, stage: SceneSettings) -> float:
-        start, end = self.choices[choice]
-        return (end - start) * stage.fps * stage.slow_motion + 1.0
-
-
 class ComparisonPlan:
     """The tasks of a comparison in an opened store."""
 
@@ -153,6 +65,8 @@ class ComparisonPlan:
         """The clips to compare, after `look_into`."""
         self.held: list[tuple[Study, Study]] = []
         """Pairs of them, one that holds another and that."""
+        self.found = Findings()
+        """What was measured, after `conclude`."""
 
     # -- reading ------------------------------------------------------------------------------------------------------
 
@@ -231,17 +145,26 @@ class ComparisonPlan:
                 "--slow-motion"
             )
 
-    # -- comparing ----------------------------------------------------------------------------------------------------
+    # -- measuring ----------------------------------------------------------------------------------------------------
 
-    def tasks(self, *, films: bool = True) -> Iterator[Task]:
-        """Yield all tasks, those of numbers first: they take seconds, and are there whatever becomes of the videos.
+    def measuring(self) -> Iterator[Task]:
+        """Yield the tasks of all numbers: they take seconds, and are there whatever becomes of the videos."""
+        return self._measuring({})
 
-        Without `films` the pages leave room for them.
-        """
+    def conclude(self) -> None:
+        """See what the measured numbers come to: which choices of keys films are to show."""
+        reference, alone = self.comparison.reference, self._has_overview
+        asked = bool(self.comparison.held)
+        self.found = Findings.of(self.store, self.measuring(), reference, alone=alone, slip_asked=asked)
+
+    @property
+    def _has_overview(self) -> bool:
+        return len(self.studies) > ON_ONE_PAGE
+
+    def _measuring(self, keys: dict[Part, str]) -> Iterator[Task]:
+        """Yield the tasks of all numbers, and note the keys of those whose results pages show."""
         read = {study.reader for study in self.studies}
         yield from (task for task in self.reading() if task.key in read)
-        keys: dict[Part, str] = {}
-        """Keys of the tasks whose results pages show."""
         for study in self.studies:
             keys[Part("read", study.clip)] = study.reader
             for part, task in self._numbers(study):
@@ -260,22 +183,6 @@ class ComparisonPlan:
             after = tuple(key for part, key in keys.items() if part.what == what and part.clip in clips)
             step = steps.Tabulate(rows)
             yield Task(step, table, after, publish={"table.csv": table}, seconds=0.002 * len(after))
-        filmed: dict[Part, str] = {}
-        for study in self.studies:
-            for choice in self.filmed(study):
-                film = Part("encode", study.clip, choice.name)
-                filmed[film] = ""
-                for task in self._film(study, choice, keys[Part("measure", study.clip, choice.name)]) if films else ():
-                    yield task
-                    filmed[film] = task.key
-        if self.comparison.about:
-            yield from self._pages(keys, filmed, films)
-
-    def slips(self) -> list[PairSlips]:
-        """Return what was found of the pairs, after their tasks."""
-        measuring = (task.key for task in self.tasks(films=False) if isinstance(task.step, steps.MeasureSlips))
-        there = (key for key in measuring if self.store.index_of(key))
-        return [values.read(PairSlips, self.store.results / key / "slips") for key in there]
 
     @property
     def tables(self) -> list[str]:
@@ -287,12 +194,6 @@ class ComparisonPlan:
             SLIPS: bool(self.held),
         }
         return [table for table in TABLES if there[table]]
-
-    def filmed(self, study: Study) -> list[Choice]:
-        """Return the choices that there are films of."""
-        stage, every = self.comparison.stage, self.comparison.every_film
-        choices = study.choices if every else fewest_keys(study.choices)
-        return [choice for choice in choices if stage and study.frames(choice, stage) <= study.most_frames]
 
     def _numbers(self, study: Study) -> Iterator[tuple[Part, Task]]:
         """Yield the tasks of a clip's numbers, and what they are to pages."""
@@ -317,15 +218,45 @@ class ComparisonPlan:
             )
             yield Part("count_keys", clip), Task(count, f"count keys {name}", after, seconds=seconds * size)
 
-    def _film(self, study: Study, choice: Choice, measured: str) -> Iterator[Task]:
-        """Yield the tasks of a film; the last one makes it."""
+    # -- drawing ------------------------------------------------------------------------------------------------------
+
+    def tasks(self, *, films: bool = True) -> Iterator[Task]:
+        """Yield all tasks: of numbers, films and pages; without `films` pages leave room for them."""
+        keys: dict[Part, str] = {}
+        yield from self._measuring(keys)
+        slips: dict[ClipOf, list[str]] = {}
+        for part, key in keys.items():
+            if part.what == "slips":
+                slips.setdefault(part.clip, []).append(key)
+        filmed: dict[Part, str] = {}
+        for study in self.studies:
+            for choice in self.filmed(study):
+                film = Part("encode", study.clip, choice.name)
+                filmed[film] = ""
+                before = keys[Part("measure", study.clip, choice.name)], *slips.get(study.clip, ())
+                for task in self._film(study, choice, before) if films else ():
+                    yield task
+                    filmed[film] = task.key
+        if self.comparison.about:
+            yield from self._pages(keys, filmed, films)
+
+    def filmed(self, study: Study) -> list[Choice]:
+        """Return the choices that there are films of: that of the verdict, unless all are requested."""
+        stage, own = self.comparison.stage, study.choices
+        spoken_of = self.found.spoken_of.get(study.name)
+        one = [spoken_of] if spoken_of in own else fewest_keys(own)[:1]
+        choices = own if self.comparison.every_film else one
+        return [choice for choice in choices if stage and study.frames(choice, stage) <= study.most_frames]
+
+    def _film(self, study: Study, choice: Choice, before: tuple[str, ...]) -> Iterator[Task]:
+        """Yield the tasks of a film of what was measured before; the last one makes it."""
         comparison, stage = self.comparison, cast(SceneSettings, self.comparison.stage)
         seconds = 0.03 + 4e-7 * stage.resolution[0] * stage.resolution[1]
         folder, title = f"{study.name}/{choice.name}", f"{study.name} {choice.phrase}"
         building = Task(
             steps.Build(study.clip, comparison.radii, comparison.shared, stage, comparison.blender),
             f"build {folder}",
-            after=(study.reader, measured),
+            after=(study.reader, *before),
             inputs={} if study.facts.joints else self._subject_file(),
             publish={steps.BLEND: f"{folder}/{steps.BLEND}"},
         )
@@ -362,7 +293,7 @@ class ComparisonPlan:
             step = steps.Subject(subject, comparison.blender)
             yield (task := Task(step, f"object {subject}", inputs=self._subject_file()))
             keys |= {Part("subject"): task.key}
-        if len(self.studies) <= ON_ONE_PAGE:
+        if not self._has_overview:
             yield self._page(Page, keys | filmed, coming=not films)
             return
         of_clips: dict[ClipOf, dict[Part, str]] = {}
@@ -386,51 +317,3 @@ class ComparisonPlan:
             publish={name: place + name for name in (steps.PAGE, steps.PAGE_DATA)},
             seconds=0.02 * len(step.clips),
         )
-
-
-def held_pairs(
-    studies: Sequence[Study], comparison: Comparison, read: Callable[[Study], Clip]
-) -> list[tuple[Study, Study]]:
-    """Return the pairs of which one holds the other: those that the user names, and those that are found in a file.
-
-    Raises RunError where a pair that is named is none.
-    """
-    known = {study.name: study for study in studies}
-    result: dict[frozenset[str], tuple[Study, Study]] = {}
-    for names in comparison.held:
-        said = f"--held {' '.join(names)}"
-        for name in names:
-            if name not in known:
-                near = did_you_mean(name, known) or f"; there are {listed(known, 8)}"
-                raise RunError(f"{said}: there is no clip {name!r}{near}")
-            if known[name].facts.joints:
-                raise RunError(f"{said}: {name} is a whole body; name two rigid bodies")
-        if names[0] == names[1]:
-            raise RunError(f"{said}: name two clips, the one that holds and the one that is held")
-        pair = known[names[0]], known[names[1]]
-        spans = [(clip.times[0], clip.times[-1]) for clip in map(read, pair)]
-        if max(start for start, _ in spans) >= min(end for _, end in spans):
-            lasts = " and ".join(
-                f"{name} lasts from {start:.6g} to {end:.6g} s" for name, (start, end) in zip(names, spans, strict=True)
-            )
-            raise RunError(f"{said}: they share no times, {lasts}; give both the same clock")
-        result[frozenset(names)] = pair
-    files: dict[Path, list[Study]] = {}
-    for study in studies:
-        if not study.facts.joints:
-            files.setdefault(split_source(study.facts.source)[0], []).append(study)
-    for bodies in files.values():
-        clips = [*map(read, bodies)] if len(bodies) > 1 else []
-        for holder, held in find_held(clips, comparison.radii.rigid):
-            pair = bodies[holder], bodies[held]
-            result.setdefault(frozenset(study.name for study in pair), pair)
-    return [pair for pair in result.values() if any(choice in pair[1].choices for choice in pair[0].choices)]
-
-
-def rates_above(times: np.ndarray, choices: Iterable[Choice]) -> list[str]:
-    """Return what to say of rates that are above that of a recording with these times, shape (n,)."""
-    rate = 1.0 / float(np.median(np.diff(times)))
-    above = [choice.rate for choice in choices if choice.rate and float(choice.rate) > rate * (1.0 + RATE_MARGIN)]
-    return (
-        [f"it has {rate:.3g} samples a second: {', '.join(above)} keys a second cannot be had of it"] if above else []
-    )

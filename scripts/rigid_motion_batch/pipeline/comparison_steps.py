@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rigid_motion_batch.analysis.held import PairSlips
     from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 
-STAGES = ("read", "measure", "build", "render", "encode", "report")
+STAGES = ("read", "measure", "slip", "build", "render", "encode", "report")
 """Stages of a comparison; each begins when all before it have ended."""
 
 RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py")
@@ -166,11 +166,11 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
         values.write(job.folder / "needed", result)
 
 
-class MeasureSlips(Step, rooms=ANALYSIS, stage="report"):
+class MeasureSlips(Step, rooms=ANALYSIS, stage="slip", partial=True):
     """Measure how far a body slips in the one that holds it. Before: both recordings, and in turn what was measured of
     them under each choice.
 
-    It is of the last stage, where what all shares of a farm have measured is there.
+    It has a stage of its own, where what all shares of a farm have measured is there.
     """
 
     holder: ClipOf
@@ -183,10 +183,14 @@ class MeasureSlips(Step, rooms=ANALYSIS, stage="report"):
         from rigid_motion_batch.analysis.results import made_again
         from rigid_motion_batch.files import write_rows
 
-        clips = self.holder.read(job.results[0]), self.held.read(job.results[1])
+        recordings, measured = job.before[:2], job.before[2:]
+        pairs = zip(measured[::2], measured[1::2], strict=True) if all(recordings) else ()
+        clips = [clip.read(folder) for clip, folder in zip((self.holder, self.held), recordings, strict=True) if folder]
         found = []
-        for folders in zip(job.results[2::2], job.results[3::2], strict=True):
-            result = [result_in(folder) for folder in folders]
+        for folders in pairs:
+            result = [result_in(folder) for folder in folders if folder]
+            if len(result) < len(clips):
+                continue
             made = [
                 made_again(clip, one, self.radii, shared=self.shared) for clip, one in zip(clips, result, strict=True)
             ]
@@ -218,7 +222,9 @@ def result_in(folder: Path) -> ChoiceResult:
 
 
 class Build(Step, rooms=SCENES, stage="build", blender=True):
-    """Build the scene of a film, and save it. Before: the recording, and what was measured."""
+    """Build the scene of a film, and save it. Before: the recording, what was measured, and how far it slips in bodies
+    that hold it.
+    """
 
     clip: ClipOf
     radii: Radii
@@ -228,18 +234,23 @@ class Build(Step, rooms=SCENES, stage="build", blender=True):
     """The version of Blender."""
 
     def make(self, job: Job) -> None:
+        from rigid_motion_batch.analysis.held import PairSlips
         from rigid_motion_batch.analysis.results import made_again
         from rigid_motion_batch.scenes.body_scene import build_body_scene
         from rigid_motion_batch.scenes.film import save_blend
+        from rigid_motion_batch.scenes.findings import findings_of
         from rigid_motion_batch.scenes.scene import build_scene
 
         clip, result, radii = self.clip.read(job.results[0]), result_in(job.results[1]), self.radii
+        pairs = [values.read(PairSlips, folder / "slips") for folder in job.results[2:]]
+        slips = [row for pair in pairs for some in pair.choices if some.choice == result.choice for row in some.rows]
+        findings = findings_of(result.rows, slips)
         with _told(f"{clip.name} {result.choice.phrase}: no video"):
             made = made_again(clip, result, radii, shared=self.shared)
             if clip.rest_body is None:
-                build_scene(made, self.settings)
+                build_scene(made, self.settings, findings)
             else:
-                build_body_scene(made, self.settings)
+                build_body_scene(made, self.settings, findings)
             save_blend(job.folder / BLEND)
 
 

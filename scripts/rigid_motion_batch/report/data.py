@@ -83,7 +83,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
     seen = _seen(clip)
     truth = _joints(clip.truth)[:, seen]
     # Around the middle: what is far from the origin of its world has digits to spare.
-    carries = carrying(clip.parents, truth[:, 0]) if clip.parents is not None else np.zeros(1, dtype=bool)
+    carries = carrying(clip.parents, truth) if clip.parents is not None else np.zeros(1, dtype=bool)
     drawn = np.flatnonzero(~carries)
     low, high = truth[drawn].min(axis=(0, 1)), truth[drawn].max(axis=(0, 1))
     truth = truth - (low + high) / 2.0

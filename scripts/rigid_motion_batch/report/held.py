@@ -1,20 +1,25 @@
-"""How far bodies slip that hold one another: a table for each pair, and a sentence."""
+"""What should not move: how far bodies slip that hold one another, and how far points move that stay.
+
+A table for each pair, and sentences.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from rigid_motion_batch.analysis.choices import Choice
 from rigid_motion_batch.analysis.held import PairSlips
 from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART
-from rigid_motion_batch.command_line import listed
 
-from .numbers import KINDS, Numbers, digits
+from .numbers import STILL, Numbers, digits, listed
 from .tables import Grid, grid_rows
+from .verdict import Verdict
 
 MOST_SAID = 5
-"""Pairs that a sentence is said of; more are counted."""
+"""Pairs, or clips, that a sentence is said of; more pairs are counted."""
 
 
 def slip_grids(pairs: Sequence[PairSlips], numbers: Numbers) -> list[Grid]:
@@ -40,25 +45,19 @@ def slips_in_mm(pair: PairSlips, numbers: Numbers) -> np.ndarray:
     return values
 
 
-def slip_sentences(pairs: Sequence[PairSlips], numbers: Numbers) -> list[str]:
+def slip_sentences(pairs: Sequence[PairSlips], numbers: Numbers, spoken_of: Choice | None) -> list[str]:
     """Return a sentence for each of the first pairs: what the reference, straight lines and the best mode make of it.
 
-    With the middle one of the choices of the first kind, as pages open with.
+    With the choice of keys that the verdict speaks of, or the first that there is.
     """
-    kind = next(kind for kind in KINDS for choice in numbers.choices if type(choice) is kind)
     result = []
     for pair in pairs[:MOST_SAID]:
         values = slips_in_mm(pair, numbers)
         known = np.isfinite(values).any(axis=1)
-        places = [at for at, choice in enumerate(numbers.choices) if type(choice) is kind and known[at]]
-        if not places:
+        if not known.any():
             continue
-        at = places[(len(places) - 1) // 2]
-        groups = [group[0] for group in numbers.groups() if np.isfinite(values[at, numbers.modes.index(group[0])])]
-        shown = {mode: digits(values[at, numbers.modes.index(mode)]) for mode in groups}
-        best = min(groups, key=lambda mode: float(shown[mode]))
-        named = [mode for mode in (numbers.reference, STATE_OF_THE_ART, best) if mode in shown]
-        said = listed([f"{shown[mode]} mm by {numbers.label(mode)}" for mode in dict.fromkeys(named)])
+        at = _shown(numbers, known, spoken_of)
+        said = _listed(values[at], numbers)
         choice = numbers.choices[at]
         own = next(some.rows[0].recorded_slip_m for some in pair.choices if some.choice == choice)
         result.append(
@@ -69,3 +68,65 @@ def slip_sentences(pairs: Sequence[PairSlips], numbers: Numbers) -> list[str]:
         left = len(pairs) - MOST_SAID
         result.append(f"{left} more {'pairs are' if left > 1 else 'pair is'} in slip.csv.")
     return result
+
+
+def asked_first(said: Verdict, pairs: Sequence[PairSlips], numbers: Numbers) -> Verdict:
+    """Return a verdict on the first pair, whose slip was asked for, with what is said of errors beside it."""
+    for pair in pairs[:1]:
+        values = slips_in_mm(pair, numbers)
+        known = np.isfinite(values).any(axis=1)
+        if not known.any():
+            continue
+        at = _shown(numbers, known, said.choice)
+        shown = _shown_in_mm(values[at], numbers)
+        best, phrase, where = _best(shown), numbers.choices[at].phrase, f"in {pair.holder}"
+        reference = next((mode for group in numbers.groups() if numbers.reference in group for mode in group[:1]), "")
+        equal = [numbers.label(mode) for mode in best if mode != reference]
+        if reference in best:
+            as_good = f"; {listed(equal)} {'are' if len(equal) > 1 else 'is'} as good" if equal else ""
+            least = f"Nothing lets {pair.held} slip less {where} than {numbers.label(reference)}: up to"
+            return replace(said, sentence=f"{least} {shown[reference]} mm {phrase}{as_good}.", beside=said.sentence)
+        least = f"{listed(equal)} {'let' if len(equal) > 1 else 'lets'} {pair.held} slip least {where}: up to"
+        rival = f", {shown[reference]} mm by {numbers.label(reference)}" if reference in shown else ""
+        return replace(said, sentence=f"{least} {shown[best[0]]} mm {phrase}{rival}.", beside=said.sentence)
+    return said
+
+
+def still_sentences(numbers: Numbers, spoken_of: Choice | None) -> list[str]:
+    """Return the same of the first clips that have a point which stays, such as a pivot."""
+    result: list[str] = []
+    for name, values in zip(numbers.clips, numbers.values[STILL], strict=True):
+        known = np.isfinite(values).any(axis=1)
+        if known.any() and len(result) < MOST_SAID:
+            at = _shown(numbers, known, spoken_of)
+            said, phrase = _listed(values[at], numbers), numbers.choices[at].phrase
+            result.append(f"{name} has a point that stays in the recording; it is off by up to {said} {phrase}.")
+    return result
+
+
+def _shown(numbers: Numbers, known: np.ndarray, spoken_of: Choice | None) -> int:
+    """Return the place of the choice that is spoken of, or of the first of those that are known."""
+    asked = numbers.choices.index(spoken_of) if spoken_of in numbers.choices else 0
+    return asked if known[asked] else int(np.argmax(known))
+
+
+def _shown_in_mm(values: np.ndarray, numbers: Numbers) -> dict[str, str]:
+    """Return the first mode of each motion to its number as it is shown, of values (modes,)."""
+    groups = [group[0] for group in numbers.groups() if np.isfinite(values[numbers.modes.index(group[0])])]
+    return {mode: digits(values[numbers.modes.index(mode)]) for mode in groups}
+
+
+def _listed(values: np.ndarray, numbers: Numbers) -> str:
+    """Return the numbers, in mm, of the reference, of straight lines and of the best mode, of values (modes,)."""
+    shown = _shown_in_mm(values, numbers)
+    named = dict.fromkeys(mode for mode in (numbers.reference, STATE_OF_THE_ART) if mode in shown)
+    best = [mode for mode in _best(shown) if mode not in named]
+    parts = [f"{shown[mode]} mm by {numbers.label(mode)}" for mode in named]
+    parts += [f"{shown[best[0]]} mm by {listed(map(numbers.label, best))}"] if best else []
+    return listed(parts)
+
+
+def _best(shown: Mapping[str, str]) -> list[str]:
+    """Return the modes with the least number, as it is shown."""
+    least = min(shown.values(), key=float)
+    return [mode for mode in shown if shown[mode] == least]

@@ -13,7 +13,7 @@ import numpy as np
 
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.metrics import NOTHING, Metrics, geometric_mean
-from rigid_motion_batch.analysis.modes import REFERENCE, label_of
+from rigid_motion_batch.analysis.modes import REFERENCE, STATE_OF_THE_ART, label_of
 from rigid_motion_batch.analysis.reconstructions import Groups, joint_groups
 from rigid_motion_batch.analysis.results import ChoiceNumbers
 
@@ -49,7 +49,7 @@ MEASURES = (
 )
 NONE, MINUS = "\u2013", "\u2212"
 
-ERROR, LARGEST, KEYS = 0, 2, 6
+ERROR, LARGEST, KEYS, STILL = 0, 2, 6, 9
 """Places of measures. The RMS shell error decides, or the keys a second where a tolerance limits the error."""
 
 KINDS: tuple[type[Choice], ...] = (Uniform, Budget, Tolerance)
@@ -100,6 +100,26 @@ class Numbers:
     def deciding(self, choice: int) -> int:
         """Return the measure that decides under a choice."""
         return KEYS if isinstance(self.choices[choice], Tolerance) else ERROR
+
+
+RMS_IS = "RMS is a mean over time in which large errors count more."
+
+
+def error_is(rigid: float | None, joint: float | None, clips: int) -> str:
+    """Return what the errors are, for somebody who has never seen them.
+
+    The radii in metres of rigid bodies and of joints, where there are any, and how many clips there are.
+    """
+    around = [] if rigid is None else [f"{100.0 * rigid:g} cm of the body's origin"]
+    around += [] if joint is None else [f"{100.0 * joint:g} cm of a joint"]
+    over = f"; over {clips} clips the geometric mean, and the largest of all" if clips > 1 else ""
+    return f"Shell error: how far any point within {' or '.join(around)} is out of place{over}"
+
+
+def who_else(numbers: Numbers) -> str:
+    """Return who does without this program what one of the modes does; nothing where none is among them."""
+    known = STATE_OF_THE_ART in numbers.modes
+    return f"{numbers.label(STATE_OF_THE_ART)} is what most game engines do." if known else ""
 
 
 class Gathering:

@@ -34,8 +34,8 @@ from rigid_motion_batch.recordings.clips import ClipFacts
 
 from . import charts, tables
 from .data import Mesh, clip_data, drill, json_in_page, mesh_data
-from .held import MOST_SAID, slip_grids, slip_sentences
-from .numbers import KINDS, LARGEST, MEASURES, MINUS, Gathering, Numbers, digits, percent
+from .held import MOST_SAID, asked_first, slip_grids, slip_sentences, still_sentences
+from .numbers import LARGEST, MEASURES, MINUS, RMS_IS, Gathering, Numbers, digits, error_is, percent, who_else
 from .settings import Settings
 from .tables import Joints, joints_of
 from .verdict import verdict
@@ -114,8 +114,9 @@ def write_report(
             page.add(clip)
         advance()
     numbers = gathering.numbers()
-    start = _start(numbers, page.choices)
-    context = _context(numbers, page.needed, settings, slips) | {
+    context = _context(numbers, page.facts, page.needed, settings, slips)
+    start = _start(numbers, page.choices, context["verdict"].choice)
+    context |= {
         "clips": page,
         "overview": overview,
         "script": script_of(SCRIPTS),
@@ -175,7 +176,7 @@ def write_overview(
             needed.append(clip.needed)
         advance()
     numbers = gathering.numbers()
-    context = _context(numbers, needed, settings, slips) | {
+    context = _context(numbers, facts, needed, settings, slips) | {
         "script": script_of(("tables",)),
         "grids": tables.grids(numbers),
         "rows": _overview_rows(numbers, facts, pages),
@@ -197,7 +198,7 @@ class _Clips:
         self.choices: list[tuple[str, tuple[Choice, ...]]] = []
         self.metrics: list[Metrics] = []
         self.joints: list[Joints] = []
-        self.films: list[tuple[int, str, str | None]] = []
+        self.films: list[tuple[int, Choice, str | None]] = []
         self.places: list[dict[str, Any]] = []
         """What the script finds them by."""
         self.inside: list[str] = []
@@ -218,7 +219,7 @@ class _Clips:
         for result in clip.choices:
             self.metrics += [row for motion in result.motions for row in motion.metrics]
             if (name, result.choice.name) in self._films:
-                self.films.append((place, result.choice.name, self._link(self._films[name, result.choice.name])))
+                self.films.append((place, result.choice, self._link(self._films[name, result.choice.name])))
             if joints := joints_of(place, clip, result, own):
                 self.joints.append(joints)
         self.places.append({"name": name, "data": ""})
@@ -260,11 +261,11 @@ def _address(clip: str, choice: str, seconds: float | None = None) -> str:
     return f"#{quote(clip, safe='')},{quote(choice, safe='')}{moment}"
 
 
-def _start(numbers: Numbers, choices: Sequence[tuple[str, tuple[Choice, ...]]]) -> tuple[str, str]:
-    """Return what the page opens with: the middle choice of the first kind, and the clip with the largest error."""
-    kind = next(kind for kind in KINDS for choice in numbers.choices if type(choice) is kind)
-    places = [place for place, choice in enumerate(numbers.choices) if type(choice) is kind]
-    at = places[(len(places) - 1) // 2]
+def _start(
+    numbers: Numbers, choices: Sequence[tuple[str, tuple[Choice, ...]]], spoken_of: Choice | None
+) -> tuple[str, str]:
+    """Return what the page opens with: the choice of the verdict, and the clip with the largest error."""
+    at = numbers.choices.index(spoken_of) if spoken_of else 0
     mode = numbers.modes.index(numbers.reference) if numbers.reference else 0
     largest = numbers.values[LARGEST, :, at, mode]
     clip = int(np.nanargmax(largest)) if np.isfinite(largest).any() else 0
@@ -310,15 +311,26 @@ def _overview_rows(
 
 
 def _context(
-    numbers: Numbers, needed: Sequence[KeysNeeded], settings: Settings, slips: Sequence[PairSlips]
+    numbers: Numbers,
+    facts: Sequence[ClipFacts],
+    needed: Sequence[KeysNeeded],
+    settings: Settings,
+    slips: Sequence[PairSlips],
 ) -> dict[str, Any]:
+    said = verdict(numbers, needed)
+    said = asked_first(said, slips, numbers) if settings.slip_asked else said
+    bodies = [bool(clip.joints) for clip in facts]
+    rigid, joint = None if all(bodies) else settings.radius, settings.joint_radius if any(bodies) else None
     return {
         "numbers": numbers,
-        "verdict": verdict(numbers, needed),
+        "verdict": said,
         "settings": settings,
         "date": datetime.now(),
         "needed": needed,
-        "slips": slip_sentences(slips, numbers),
+        "slips": slip_sentences(slips, numbers, said.choice),
+        "still": still_sentences(numbers, said.choice),
+        "error_is": f"{error_is(rigid, joint, 1)}. {RMS_IS}",
+        "who_else": who_else(numbers),
         "slip_grids": slip_grids(slips, numbers),
         "most_said": MOST_SAID,
         "measures": MEASURES,

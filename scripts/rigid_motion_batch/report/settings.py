@@ -25,6 +25,9 @@ class Settings:
     reference: str = REFERENCE
     """The mode that the others are held against."""
 
+    slip_asked: bool = False
+    """True if it was asked how far one body slips in another, which is answered first."""
+
     joint_radius: float = JOINT
     """Of the shell of a joint, in metres."""
 

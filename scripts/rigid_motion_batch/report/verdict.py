@@ -1,6 +1,7 @@
 """The verdict: one sentence with a number that answers "which mode", and in how many cases that mode was the best.
 
-Everything is computed from the numbers of the run, and true for any outcome of it. Errors are RMS shell errors;
+It also names the choice of keys that it speaks of: pages open with that, and films show it. Everything is computed
+from the numbers of the run, and true for any outcome of it. Errors are RMS shell errors;
 several clips are averaged by the geometric mean, so that a large motion counts as much as a small one, and it is said
 so. Modes that are one motion throughout are one candidate, and the first of them names it. A draw is said to be one,
 and so is a loss.
@@ -9,12 +10,12 @@ and so is a loss.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rigid_motion.motion import MODES
-from rigid_motion_batch.analysis.choices import Budget, Tolerance
+from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
 from rigid_motion_batch.analysis.needed import KeysNeeded, overall
 
@@ -37,8 +38,17 @@ class Verdict:
     """What a run comes to."""
 
     sentence: str
+    choice: Choice | None = None
+    """The choice of keys that it speaks of, or the nearest to it in the run; None where no mode is off."""
     wins: str = ""
     """In how many cases the best mode was; empty of a single case."""
+    beside: str = ""
+    """What is said of errors where something else was asked."""
+
+    @property
+    def text(self) -> str:
+        """All of it."""
+        return " ".join(filter(None, (self.sentence, self.beside, self.wins and f"{self.wins}.")))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +65,11 @@ class _Contest:
 
     @property
     def kind(self) -> type:
-        return type(self.numbers.choices[self.places[0]])
+        return type(self.choices[0])
 
     @property
     def amounts(self) -> np.ndarray:
-        return np.array([self.numbers.choices[place].size for place in self.places])
+        return np.array([choice.size for choice in self.choices])
 
     @property
     def reference(self) -> int | None:
@@ -77,8 +87,12 @@ class _Contest:
         """Geometric means over the clips where groups can be told apart, shape (choices, groups)."""
         return geometric_mean(np.where(self.distinguishable[..., None], np.maximum(self.values, 1e-9), np.nan))
 
+    @property
+    def choices(self) -> list[Choice]:
+        return [self.numbers.choices[place] for place in self.places]
+
     def phrase(self, choice: int) -> str:
-        return self.numbers.choices[self.places[choice]].phrase
+        return self.choices[choice].phrase
 
     def name(self, group: int) -> str:
         return self.numbers.label(self.groups[group][0])
@@ -96,12 +110,18 @@ def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
     contests = list(_contests(numbers))
     # What was asked is answered first: within a tolerance, how many keys.
     within = [contest for contest in contests if contest.kind is Tolerance]
-    sentences = [*map(_beside_rival, within), _keys_needed(numbers, needed) if needed else None]
-    sentences += [tell(contest) for contest in contests for tell in (_fewer_keys, _beside_rival)]
-    said = [sentence for sentence in sentences if sentence]
-    if not said:
+    verdicts = [*map(_beside_rival, within), _keys_needed(numbers, needed) if needed else None]
+    verdicts += [tell(contest) for contest in contests for tell in (_fewer_keys, _beside_rival)]
+    said = next((one for one in verdicts if one), None)
+    if said is None:
         return Verdict(SAMPLE_IS_KEY)
-    return Verdict(said[0].replace("\u00a0", " "), _wins(contests[0]) if contests else "")
+    counted = next((contest for contest in contests if contest.kind is type(said.choice)), None)
+    return replace(said, sentence=said.sentence.replace("\u00a0", " "), wins=_wins(counted) if counted else "")
+
+
+def nearest(choices: Iterable[Choice], keys_per_s: float) -> Choice:
+    """Return the choice whose rate is nearest to so many keys a second, in ratio; tolerances come last."""
+    return min(choices, key=lambda one: (isinstance(one, Tolerance), abs(np.log(one.size / keys_per_s))))
 
 
 def _contests(numbers: Numbers) -> Iterable[_Contest]:
@@ -142,7 +162,7 @@ def _best(contest: _Contest) -> tuple[int, int, np.ndarray] | None:
 # -- sentences --------------------------------------------------------------------------------------------------------
 
 
-def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> str | None:
+def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Verdict | None:
     """How few keys are as good as those of the reference at a rate, of those that were looked for."""
     together, reference = overall(needed), needed[0].reference
     rate = next((rate for rate in ASKED if together.asked[together.rates.index(rate)]), None)
@@ -153,8 +173,12 @@ def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> str | None:
     shares = np.where(whole, together.shares[..., at], np.inf)
     group, way = (int(place) for place in np.unravel_index(np.argmin(shares), shares.shape))
     label, theirs = numbers.label(reference), together.reference_keys_per_s[at]
-    if shares[group, way] > 1.0 - TIE:
-        return f"Nothing needs fewer keys than {label}, {theirs:.3g} a second and evenly spaced."
+    wins = shares[group, way] <= 1.0 - TIE
+    spaced = [choice for choice in numbers.choices if isinstance(choice, Uniform) == (not wins or way == 0)]
+    keys = float(together.keys_per_s[group, way, at]) if wins else theirs
+    shown = nearest(spaced or numbers.choices, keys)
+    if not wins:
+        return Verdict(f"Nothing needs fewer keys than {label}, {theirs:.3g} a second and evenly spaced.", shown)
 
     def amount(group: int) -> str:
         return f"{together.keys_per_s[group, way, at]:.3g} a second of {numbers.label(together.groups[group][0])}"
@@ -164,14 +188,14 @@ def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> str | None:
     # Where keys are chosen better that is no merit of the mode: its rival has as good ones.
     if beside != group and np.isfinite(shares[beside, way]):
         said += f", or {amount(beside)}"
-    return f"{said}{_over(together.asked[at])}."
+    return Verdict(f"{said}{_over(together.asked[at])}.", shown)
 
 
 def _over(clips: np.integer) -> str:
     return f" (geometric mean over {clips} clips)" if clips > 1 else ""
 
 
-def _fewer_keys(contest: _Contest) -> str | None:
+def _fewer_keys(contest: _Contest) -> Verdict | None:
     """How far down the rate can go, until the error is that of the reference at a higher one.
 
     None where the curves of this run do not tell: rates that do not cross, or an error that does not fall with them.
@@ -198,13 +222,14 @@ def _fewer_keys(contest: _Contest) -> str | None:
         return None
     most, least = ("At most ", "at least ") if at_most else ("", "")
     placed = " on average" if contest.kind is Budget else ""
-    return (
+    return Verdict(
         f"{most}{rate:.3g} keys a second{placed} of {contest.name(best)} are as good as {rates[highest]:g} of "
-        f"{contest.name(reference)}: {least}{percent(share)} fewer for the same error{_over(whole.sum())}."
+        f"{contest.name(reference)}: {least}{percent(share)} fewer for the same error{_over(whole.sum())}.",
+        nearest(contest.choices, rate),
     )
 
 
-def _beside_rival(contest: _Contest) -> str:
+def _beside_rival(contest: _Contest) -> Verdict:
     """How much closer the best mode is with as many keys, or how many fewer it needs within a tolerance."""
     result = _best(contest)
     if not result:
@@ -213,39 +238,45 @@ def _beside_rival(contest: _Contest) -> str:
     at = int(np.nanargmin(ratios))
     first, other, less = contest.name(best), contest.name(rival), percent(1.0 - ratios[at])
     over = _over(contest.distinguishable[:, at].sum())
+    choice = contest.choices[at]
     if contest.kind is not Tolerance:
-        keys = contest.numbers.choices[contest.places[at]].amount
         placed = " on average" if contest.kind is Budget else ""
-        return f"{first} has {less} less error than {other} with the same {keys} keys a second{placed}{over}."
+        same = f"the same {choice.amount} keys a second{placed}{over}"
+        return Verdict(f"{first} has {less} less error than {other} with {same}.", choice)
     phrase, (own, others) = contest.phrase(at), contest.means[at, [best, rival]]
     said = f"{phrase[0].upper()}{phrase[1:]}, {first} takes {less} fewer keys than {other}"
-    return f"{said}: {own:.3g} a second to {others:.3g}{over}."
+    return Verdict(f"{said}: {own:.3g} a second to {others:.3g}{over}.", choice)
 
 
-def _no_winner(contest: _Contest) -> str:
-    """Where no mode is better than the reference, or than all others; the choice with the most keys speaks."""
+def _no_winner(contest: _Contest) -> Verdict:
+    """Where no mode is better than the reference, or than all others; the choice with the fewest keys speaks, where
+    modes differ most.
+    """
     means, within = contest.means, contest.kind is Tolerance
     known = np.flatnonzero(np.isfinite(means).all(axis=1))
-    at = int(known[0] if within else known[-1])
+    at = int(known[-1] if within else known[0])
+    choice = contest.choices[at]
     best = contest.reference if contest.reference is not None else int(np.argmin(means[at]))
     over = _over(contest.distinguishable[:, at].sum())
     better = means[known].min(axis=1) < (1.0 - TIE) * means[known, best]
     if better.any():
         winners: dict[int, list[str]] = {}
-        for choice, is_better in zip(known.tolist(), better.tolist(), strict=True):
-            winner = int(np.argmin(means[choice])) if is_better else best
-            winners.setdefault(winner, []).append(contest.phrase(choice))
+        for place, is_better in zip(known.tolist(), better.tolist(), strict=True):
+            winner = int(np.argmin(means[place])) if is_better else best
+            winners.setdefault(winner, []).append(contest.phrase(place))
         said = "; ".join(f"{contest.name(winner)} {listed(phrases)}" for winner, phrases in winners.items())
-        return f"What {'needs the fewest keys' if within else 'is closest'} depends on the keys: {said}{over}."
+        closest = "needs the fewest keys" if within else "is closest"
+        return Verdict(f"What {closest} depends on the keys: {said}{over}.", choice)
     unit, off = ("keys a second", "") if within else ("mm", " off (RMS)")
     said = f"{contest.name(best)}: {digits(means[at, best])} {unit}{off} {contest.phrase(at)}"
     if len(contest.groups) == 1:
-        return f"{said}{over}."
+        return Verdict(f"{said}{over}.", choice)
     following = next(int(group) for group in np.argsort(means[at], kind="stable") if group != best)
     ratio = means[at, following] / means[at, best] - 1.0
     name = contest.name(following)
     beside = f"{name} is as good" if ratio < TIE else f"{name} is next, with {percent(ratio)} more"
-    return f"Nothing {'needs fewer keys' if within else 'comes closer'} than {said}; {beside}{over}."
+    closer = "needs fewer keys" if within else "comes closer"
+    return Verdict(f"Nothing {closer} than {said}; {beside}{over}.", choice)
 
 
 def _wins(contest: _Contest) -> str:

@@ -19,6 +19,7 @@ from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import align_signs, conjugate, multiply, rotate
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.matrices import rigid
+from rigid_motion_batch.recordings.rest_bodies import LOOKED_AT, carrying
 
 LEAST_BONE = 0.02
 """A bone is no shorter than so much of the figure: Blender removes bones of no length."""
@@ -42,6 +43,9 @@ class Rest:
     tails: np.ndarray
     """The ends of their bones, there too: shape (joints, 3)."""
 
+    aside: np.ndarray
+    """Which joints only carry the others about, or stand where they move, shape (joints,)."""
+
     origin: np.ndarray
     """The origin of that space in the figure's world: below it, on the ground. Shape (3,)."""
 
@@ -59,7 +63,10 @@ class Rest:
         arms[short] = least * along[short]
         tails = joints.positions + rotate(joints.quaternions, arms)
         origin = np.append(joints.positions[:, :2].mean(axis=0), min(joints.positions[:, 2].min(), tails[:, 2].min()))
-        return cls(rest_body.parents, Poses(joints.positions - origin, joints.quaternions), tails - origin, origin)
+        every = -(-len(clip.times) // LOOKED_AT)
+        aside = carrying(rest_body.parents, rest_body.skeleton.in_root_space(clip.poses[:, ::every]).positions)
+        at_rest = Poses(joints.positions - origin, joints.quaternions)
+        return cls(rest_body.parents, at_rest, tails - origin, aside, origin)
 
 
 class Rig:

@@ -24,6 +24,7 @@ from rigid_motion_batch.recordings.rest_bodies import short_names
 from . import captions, layout
 from .armature import Rest
 from .bodies import SHADES, Bodies, BodyMotion, flashes
+from .findings import Finding
 from .framing import SMOOTHING, Framing, Jointed
 from .lanes import Cast
 from .materials import ink
@@ -47,7 +48,9 @@ GROUND = 0.05
 """The part of the ground that is seen below the feet, in units of the figure."""
 
 
-def build_body_scene(made: Reconstruction, settings: SceneSettings) -> bpy.types.Scene:
+def build_body_scene(
+    made: Reconstruction, settings: SceneSettings, findings: Sequence[Finding] = ()
+) -> bpy.types.Scene:
     """Make the scene of a comparison of whole bodies, in a file that is emptied for it.
 
     Parameters
@@ -55,6 +58,8 @@ def build_body_scene(made: Reconstruction, settings: SceneSettings) -> bpy.types
     made : Reconstruction
     settings : SceneSettings
         But for the subject and the deviation: a body shows itself, as it is.
+    findings : sequence of Finding
+        What else was found of it, for the lanes.
     """
     timeline = begin(made, settings)
     lanes_of = identical_modes(made) if settings.distinct else tuple((mode,) for mode in made.keys)
@@ -78,6 +83,7 @@ def build_body_scene(made: Reconstruction, settings: SceneSettings) -> bpy.types
         lanes_of,
         extent,
         _notes(made, motion.modes),
+        findings,
         timeline=timeline,
         framing=framing,
         framing_steps=1,
@@ -88,7 +94,11 @@ def build_body_scene(made: Reconstruction, settings: SceneSettings) -> bpy.types
     full = full_colour(motion.errors.values())
     most = _most(1e3 * full, cast.largest_error)
     reserved = LEGEND * (captions.width_of(LEAST) + captions.width_of(most)) + BAR + 4.0 * BAR_GAP
-    legend = ("grey: recording", "ring: the worst joint", f"dots: {'key poses' if made.shared else 'keys'}")
+    legend = (
+        "grey: recording",
+        "ring: the joint that is farthest off",
+        f"dots: {'key poses' if made.shared else 'keys'}",
+    )
     with registered():
         enter = Bodies(cast, motion, shape, full).enter
         scene = assemble_scene(made, settings, cast, lanes_of, enter, legend, centre, reserved)

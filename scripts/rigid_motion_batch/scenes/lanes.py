@@ -6,7 +6,7 @@ is a child of the frame (`layout`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,18 +15,19 @@ import numpy as np
 
 from rigid_motion.animation import write_channel
 from rigid_motion.motion.quaternions import rotate
-from rigid_motion_batch.analysis.modes import label_of
+from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART, label_of
 from rigid_motion_batch.analysis.reconstructions import Groups, Reconstruction
 from rigid_motion_batch.palette import THEMES, Theme, colour_on
 
 from . import captions, layout, trails
+from .findings import Finding
 from .framing import Extent, Framing
 from .materials import ink
 from .nodes import apply_group
 from .settings import SceneSettings
 from .timeline import Timeline, peaks
 
-TITLE, NAME, NUMBER, UNIT, SMALL = 0.044, 0.026, 0.05, 0.032, 0.028
+TITLE, NAME, NUMBER, UNIT, SMALL, FOUND = 0.044, 0.026, 0.05, 0.032, 0.028, 0.036
 """Sizes of letters on a card, in units of the frame's height, where there is room."""
 
 INSET, COLUMN = 0.016, 0.15
@@ -61,6 +62,7 @@ class Cast:
     notes: Mapping[str, str]
     """Mode id to what its keys are, where the modes have different ones."""
 
+    findings: Sequence[Finding]
     theme: Theme
     ink: bpy.types.Material
     faint: bpy.types.Material
@@ -79,6 +81,7 @@ class Cast:
         lanes_of: Groups,
         extent: Extent,
         notes: Mapping[str, str],
+        findings: Sequence[Finding],
         timeline: Timeline,
         **own: Any,
     ) -> Cast:
@@ -88,7 +91,7 @@ class Cast:
         """
         theme, (width, height) = THEMES[settings.theme], settings.resolution
         named = any(names_of(modes, notes) for modes in lanes_of)
-        plan = layout.arrange(len(lanes_of), extent.size, width / height, named=named)
+        plan = layout.arrange(len(lanes_of), extent.size, width / height, named=named, found=len(findings))
         sampled = {mode: 1e3 * made.shell(mode).max(axis=0) for modes in lanes_of for mode in modes[:1]}
         times = timeline.times_of(timeline.frames)
         own.setdefault("errors", {mode: np.interp(times, made.times, errors) for mode, errors in sampled.items()})
@@ -99,6 +102,7 @@ class Cast:
             sampled=sampled,
             sample_frames=timeline.frames_of(made.times),
             notes=notes,
+            findings=findings,
             theme=theme,
             ink=ink("Ink", theme.ink),
             faint=ink("Faint", theme.faint),
@@ -109,6 +113,18 @@ class Cast:
     def largest_error(self) -> float:
         """In millimetres: what the graphs reach up to."""
         return max(float(errors.max()) for errors in self.sampled.values())
+
+    def found(self, finding: Finding, mode: str) -> str:
+        """Return what is written of a finding in the lane of a mode; empty where that has none."""
+        if mode not in finding.metres:
+            return ""
+        decimals = captions.decimals_for(1e3 * max(finding.metres.values()))
+        return finding.text.format(f"{1e3 * finding.metres[mode]:.{decimals}f} mm")
+
+    def seen_from_focus(self, places: np.ndarray) -> np.ndarray:
+        """Return places (n, 3) at the frames as they are seen, from the focus on, as `Framing.extent` has them."""
+        focus = self.framing.focus[:: self.framing_steps]
+        return rotate(layout.yaw_quaternion(self.framing.yaw), places - focus)
 
     @property
     def behind(self) -> np.ndarray:
@@ -197,6 +213,12 @@ class Lanes:
                 size *= 0.95
             self._put(captions.words(f"{mode} names", text, size, cast.faint), left, line - 0.036 * unit)
 
+        lines = [cast.found(finding, mode) for finding in cast.findings]
+        for place, text in enumerate(filter(None, reversed(lines))):
+            size = min(FOUND * unit, room / captions.width_of(text))
+            line = cell.foot + (INSET + GRAPH + 0.5 * layout.FOUND + layout.FOUND * place) * unit
+            self._put(captions.words(f"{mode} finding {place + 1}", text, size, cast.ink), left, line)
+
         column, foot = right - COLUMN * unit, cell.foot + INSET * unit
         self._add_graph(mode, left, foot, column - left - INSET * unit, GRAPH * unit)
         number = foot + GRAPH * unit - 0.72 * NUMBER * unit
@@ -231,11 +253,20 @@ class Lanes:
 
 
 def names_of(modes: tuple[str, ...], notes: Mapping[str, str]) -> list[str]:
-    """Return what is written below the title of modes that are one motion: a note on their keys,
-    and the other modes.
+    """Return what is written below the title of modes that are one motion: a note on their keys, the other modes, and
+    who else does that.
     """
     others = [_title(mode) for mode in modes[1:]]
-    return [*filter(None, (notes.get(modes[0]),)), *(["= " + others[0], *others[1:]] if others else [])]
+    known = ["as most game engines do"] if STATE_OF_THE_ART in modes else []
+    return [*filter(None, (notes.get(modes[0]),)), *known, *(["= " + others[0], *others[1:]] if others else [])]
+
+
+def remark_on(finding: Finding) -> str:
+    """Return what a number in the lanes is, and how much the recording has of it."""
+    if finding.recorded is None:
+        return finding.remark
+    recorded = 1e3 * finding.recorded
+    return f"{finding.remark}; {recorded:.{captions.decimals_for(recorded)}f} mm in the recording"
 
 
 def _title(mode: str) -> str:

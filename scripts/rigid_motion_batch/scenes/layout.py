@@ -32,9 +32,9 @@ PADDING = 0.028
 CARD = (0.42, 0.3)
 """The width and height of a card on which letters have their full size; on a smaller one all of them are smaller."""
 
-HEAD, NAMES, FOOT = 0.062, 0.052, 0.094
-"""The parts of a card's height that are taken by what is written on it: the title,
-names below it if there are any, and the error."""
+HEAD, NAMES, FOOT, FOUND = 0.062, 0.052, 0.094, 0.042
+"""The parts of a card's height that are taken by what is written on it: the title, names below it if there are any,
+the error, and each finding above that."""
 
 WRAP_GAIN = 0.85
 """A layout of fewer rows is kept while it shows motion and letters so large relative to the best."""
@@ -58,6 +58,9 @@ class Cell:
     named: bool = False
     """True if there are names below the title."""
 
+    found: int = 0
+    """How many findings there are above the error."""
+
     @property
     def unit(self) -> float:
         """The size of its letters, 1 at most."""
@@ -69,14 +72,19 @@ class Cell:
         return self.unit * (HEAD + NAMES * self.named)
 
     @property
+    def base(self) -> float:
+        """The height of what is written at the foot."""
+        return self.unit * (FOOT + FOUND * self.found)
+
+    @property
     def view(self) -> np.ndarray:
         """The middle of the view, shape (2,)."""
-        return np.array((self.x, self.y + (self.unit * FOOT - self.head) / 2.0))
+        return np.array((self.x, self.y + (self.base - self.head) / 2.0))
 
     @property
     def room(self) -> np.ndarray:
         """The width and height that the motion may fill."""
-        return np.array((self.width - self.unit * PADDING, self.height - self.head - self.unit * FOOT))
+        return np.array((self.width - self.unit * PADDING, self.height - self.head - self.base))
 
     @property
     def left(self) -> float:
@@ -158,7 +166,7 @@ def unproject(seen: np.ndarray) -> np.ndarray:
     return seen @ np.stack((RIGHT, UP, AWAY))
 
 
-def arrange(lanes: int, extent: np.ndarray, aspect: float, *, named: bool = False) -> Layout:
+def arrange(lanes: int, extent: np.ndarray, aspect: float, *, named: bool = False, found: int = 0) -> Layout:
     """Return cells in as few rows as show the object, and what is written, well.
 
     Parameters
@@ -170,13 +178,15 @@ def arrange(lanes: int, extent: np.ndarray, aspect: float, *, named: bool = Fals
         The picture's width over its height.
     named : bool
         Whether there are names below the titles.
+    found : int
+        How many findings there are above the errors.
     """
-    candidates = [_arranged(lanes, rows, extent, aspect, named) for rows in range(1, lanes + 1)]
+    candidates = [_arranged(lanes, rows, extent, aspect, named, found) for rows in range(1, lanes + 1)]
     sizes = [candidate.cells[0].unit / candidate.metres for candidate in candidates]
     return next(candidate for candidate, size in zip(candidates, sizes, strict=True) if size >= WRAP_GAIN * max(sizes))
 
 
-def _arranged(lanes: int, rows: int, extent: np.ndarray, aspect: float, named: bool) -> Layout:
+def _arranged(lanes: int, rows: int, extent: np.ndarray, aspect: float, named: bool, found: int) -> Layout:
     columns = -(-lanes // rows)
     width = (aspect - 2.0 * MARGIN - (columns - 1) * GAP) / columns
     height = (1.0 - HEADER - FOOTER - 2.0 * MARGIN - (rows - 1) * GAP) / rows
@@ -188,6 +198,7 @@ def _arranged(lanes: int, rows: int, extent: np.ndarray, aspect: float, named: b
             width,
             height,
             named,
+            found,
         )
         for lane in range(lanes)
     )

@@ -14,7 +14,6 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.rest_bodies import carrying
 
 from .armature import Rest, Rig
 
@@ -134,9 +133,8 @@ def body_size(rest: Rest) -> float:
 
 
 def seen_bones(rest: Rest) -> list[int]:
-    """Return the bones but for roots that carry a single child about: they may reach to wherever the body was left."""
-    carries = carrying(rest.parents, rest.joints.positions)
-    return np.flatnonzero(~carries if not carries.all() else carries).tolist()
+    """Return the bones but for those that are aside: they may reach to wherever the body was left."""
+    return np.flatnonzero(~rest.aside if not rest.aside.all() else rest.aside).tolist()
 
 
 def _solid(head: np.ndarray, tail: np.ndarray, share: float, size: float) -> tuple[np.ndarray, list[tuple[int, ...]]]:

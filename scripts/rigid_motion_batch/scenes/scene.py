@@ -4,8 +4,8 @@ Lanes stand side by side in front of the `Frame`, an empty in the plane of the p
 What changes over time is either a key or a node group that reads the frame: the saved file plays for anyone,
 without scripts. The scene's custom properties tell where the recording's origin is.
 
-A rigid object moves under every mode, the recording as its ghost, with trails and marks of keys. Its own channels are
-the poses of `timeline.ShownMotion`, within its lane.
+A rigid object (`solids`) moves under every mode. Its own channels are the poses of `timeline.ShownMotion`, within its
+lane.
 """
 
 from __future__ import annotations
@@ -18,31 +18,42 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from rigid_motion.animation import bake_poses
-from rigid_motion.motion import Poses
 from rigid_motion_batch.analysis.reconstructions import Groups, Reconstruction, identical_modes
-from rigid_motion_batch.palette import DARK, colour_on, linear
+from rigid_motion_batch.palette import DARK, linear
 
-from . import captions, layout, trails
+from . import captions, layout
+from .findings import Finding
 from .framing import SMOOTHING, Framing, Solid
-from .lanes import Cast, Lane, Lanes
+from .lanes import Cast, Lane, Lanes, remark_on
 from .layout import largest_deviation, magnification, magnified
-from .materials import ghost, ink, surface
-from .nodes import apply_group
+from .pivots import Pivot
 from .settings import MODELS, SceneSettings
-from .subject import load_subject, tinted_slots, vertices_of
+from .solids import Solids
+from .subject import load_subject, vertices_of
 from .timeline import ShownMotion, Timeline
 
 LEGEND = 0.032
 """The size of the letters below the lanes, in units of the frame's height, where there is room."""
+
+CLOCK = 0.3
+"""The room for the time, in units of the frame's height."""
 
 SOFTENED = 0.8
 """The part of a pixel that is the mean of those around it, near ones more: edges are smooth,
 and small letters clear."""
 
 
-def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.types.Scene:
+def build_scene(
+    reconstruction: Reconstruction, settings: SceneSettings, findings: Sequence[Finding] = ()
+) -> bpy.types.Scene:
     """Make the scene of a comparison, in a file that is emptied for it.
+
+    Parameters
+    ----------
+    reconstruction : Reconstruction
+    settings : SceneSettings
+    findings : sequence of Finding
+        What else was found of it, for the lanes.
 
     Raises
     ------
@@ -72,12 +83,14 @@ def build_scene(reconstruction: Reconstruction, settings: SceneSettings) -> bpy.
         lanes_of,
         extent,
         _notes(reconstruction),
+        findings,
         timeline=timeline,
         framing=framing,
         framing_steps=timeline.steps,
     )
-    solids = Solids(cast, motion, deviated, mesh, layout.telling_point(motion.recording, outline))
-    legend = _legend(cast, deviation, enlarged)
+    pivot = Pivot.of(reconstruction, cast, motion.recording[:: timeline.steps], enlarged) if findings else None
+    solids = Solids(cast, motion, deviated, mesh, layout.telling_point(motion.recording, outline), pivot)
+    legend = _legend(cast, deviation, enlarged, float(reconstruction.radii[0]), crosses=bool(pivot))
     scene = assemble_scene(reconstruction, settings, cast, lanes_of, solids.enter, legend, motion.centre)
     # Our own models are closed: what faces away costs time and is never seen.
     scene.display.shading.show_backface_culling = settings.subject in MODELS
@@ -144,12 +157,14 @@ def _notes(reconstruction: Reconstruction) -> dict[str, str]:
     return {mode: f"{(count - 1) / duration:.1f} keys/s" for mode, count in counts.items()}
 
 
-def _legend(cast: Cast, deviation: float, enlarged: float) -> list[str]:
+def _legend(cast: Cast, deviation: float, enlarged: float, radius: float, *, crosses: bool) -> list[str]:
     """Return how to read the picture."""
     full = f"{cast.largest_error:.{captions.decimals_for(cast.largest_error)}f}"
-    drawn = f", deviation drawn {deviation:g} times as large" if deviation > 1.0 else ""
-    parts = ["grey: recording", f"colour: mode{drawn}", "dots: keys", f"mm: shell error (graphs up to {full})"]
-    return [*parts, *([f"object shown {enlarged:.3g} times its size"] if enlarged > 1.0 else [])]
+    drawn = f", {deviation:g} times as far off as it is" if deviation > 1.0 else ""
+    error = f"mm: how far any point within {100.0 * radius:g} cm is off (graphs up to {full})"
+    larger = [f"object {enlarged:.3g} times its size"] if enlarged > 1.0 else []
+    marks = ["dots: keys", *(["crosses: pivot"] if crosses else [])]
+    return ["grey: recording", f"colour: mode{drawn}", *marks, error, *larger]
 
 
 def make_frame(metres: float) -> bpy.types.Object:
@@ -174,7 +189,13 @@ def _make_header(made: Reconstruction, legend: str, cast: Cast, frame: bpy.types
     size = min(0.046, 0.5 * (right - left) / name_width)
     put(captions.words("Clip", made.clip.name, size, cast.ink), left, line)
     rate = captions.words("Choice of keys", made.choice.title, 0.034, cast.faint)
-    put(rate, left + name_width * size + 0.03, line)
+    begins = left + name_width * size + 0.03
+    put(rate, begins, line)
+    if cast.findings:
+        remark = "   \u00b7   ".join(map(remark_on, cast.findings))
+        begins += 0.034 * captions.width_of(made.choice.title) + 0.06
+        size = min(LEGEND, max(0.01, right - CLOCK - begins) / captions.width_of(remark))
+        put(captions.words("Findings", remark, size, cast.faint), begins, line)
     timeline = cast.timeline
     ends = timeline.frames[[0, -1]]
     decimals = captions.readout_group("Time in s", 2, cast.ink)
@@ -296,125 +317,3 @@ def _engine_id(engine: str) -> str:
     if engine == "eevee":
         return "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
     return {"workbench": "BLENDER_WORKBENCH", "cycles": "CYCLES"}[engine]
-
-
-TRAIL_SECONDS = 0.8
-PATH_BEHIND_SECONDS = 1.2
-PATH_AHEAD_SECONDS = 0.5
-MARKS_SHOWN = 14
-"""About so many marks are shown at once: those nearest in time, where keys are dense."""
-
-# In units of the frame's height.
-TRAIL_RADIUS = 0.0036
-PATH_RADIUS = 0.0014
-MARK_RADIUS = 0.0052
-
-
-class Solids:
-    """Rigid objects for the lanes, out of materials, groups and meshes that they share.
-
-    Parameters
-    ----------
-    cast : Cast
-    motion : ShownMotion
-    deviated : dict of Poses
-        Mode id to poses at the fine frames, as far off from the recording as is shown.
-    mesh : bpy.types.Mesh
-    traced : array, shape (3,)
-        The point of the object whose path is drawn.
-    """
-
-    def __init__(
-        self, cast: Cast, motion: ShownMotion, deviated: dict[str, Poses], mesh: bpy.types.Mesh, traced: np.ndarray
-    ) -> None:
-        self.cast, self.motion, self.deviated, self.mesh, self.traced = cast, motion, deviated, mesh, traced
-        self.ghost = ghost(cast.theme)
-        self.ghost_action: bpy.types.Action | None = None
-        self.cut_group = trails.cut_group() if cast.extent.cut else None
-        self.trail_group, self.marks_group = trails.trail_group(), trails.marks_group()
-        recording = self._path_of(motion.recording)
-        self.path = trails.polyline("Recording path", cast.timeline.fine_frames, recording)
-
-    def _path_of(self, poses: Poses) -> np.ndarray:
-        """Return the way of the traced point, shape (n, 3)."""
-        return layout.swept_points(poses, self.traced[None])
-
-    def enter(self, lane: Lane) -> None:
-        """Add the object, its ghost, trails and marks."""
-        self.window = lane.window(self.cast.layout.metres)
-        self._add_actors(lane)
-        self._add_trails(lane)
-
-    def _add_actors(self, lane: Lane) -> None:
-        mode, motion = lane.mode, self.motion
-        frames, steps = self.cast.timeline.frames, self.cast.timeline.steps
-        material = surface(f"Mode {mode}", colour_on(self.cast.theme, mode))
-        self._add_actor(mode, lane, motion.modes[mode][::steps], material)
-        if self.deviated[mode] is not motion.modes[mode]:
-            # The motion itself is there for whoever opens the file; its deviation is what is seen.
-            bpy.data.objects[mode].hide_render = bpy.data.objects[mode].hide_viewport = True
-            self._add_actor(f"{mode} deviating", lane, self.deviated[mode][::steps], material)
-
-        ghost = lane.child(f"{mode} recording", self.mesh)
-        ghost.rotation_mode = "QUATERNION"
-        ghost.delta_location = self.cast.behind
-        _paint(ghost, range(len(ghost.material_slots)), self.ghost)
-        if self.ghost_action is None:
-            bake_poses(ghost, frames, motion.recording[::steps])
-            self.ghost_action = ghost.animation_data.action
-            self.ghost_action.name = "recording"
-        else:
-            ghost.animation_data_create().action = self.ghost_action
-            ghost.animation_data.action_slot = self.ghost_action.slots[0]
-
-    def _add_actor(self, name: str, lane: Lane, poses: Poses, material: bpy.types.Material) -> None:
-        actor = lane.child(name, self.mesh)
-        actor.rotation_mode = "QUATERNION"
-        _paint(actor, tinted_slots(self.mesh), material)
-        bake_poses(actor, self.cast.timeline.frames, poses)
-        actor.animation_data.action.name = name
-        if self.cut_group:
-            apply_group(actor, self.cut_group, **self.window)
-
-    def _add_trails(self, lane: Lane) -> None:
-        mode, motion = lane.mode, self.motion
-        cast, rate, metres = self.cast, self.cast.timeline.rate, self.cast.layout.metres
-        trail = trails.polyline(f"{mode} trail", cast.timeline.fine_frames, self._path_of(self.deviated[mode]))
-        window = {"Past": PATH_BEHIND_SECONDS * rate, "Ahead": PATH_AHEAD_SECONDS * rate}
-        keys = motion.keys[mode]
-        marks = trails.polyline(f"{mode} keys", motion.key_frames[mode], self._path_of(keys), joined=False)
-        crowded = max(1.0, sum(window.values()) / (MARKS_SHOWN * cast.timeline.frames_per_key(len(keys))))
-        apply_group(
-            lane.child(f"{mode} trail", trail),
-            self.trail_group,
-            Past=TRAIL_SECONDS * rate,
-            Ahead=0.0,
-            Radius=TRAIL_RADIUS * metres,
-            Taper=0.9,
-            Material=ink(f"Trail {mode}", colour_on(cast.theme, mode)),
-            **self.window,
-        )
-        apply_group(
-            lane.child(f"{mode} recording path", self.path),
-            self.trail_group,
-            **window,
-            Radius=PATH_RADIUS * metres,
-            Taper=0.0,
-            Material=cast.faint,
-            **self.window,
-        )
-        apply_group(
-            lane.child(f"{mode} keys", marks),
-            self.marks_group,
-            **{side: frames / crowded for side, frames in window.items()},
-            Radius=MARK_RADIUS * metres,
-            Material=cast.ink,
-            **self.window,
-        )
-
-
-def _paint(obj: bpy.types.Object, slots: list[int] | range, material: bpy.types.Material) -> None:
-    """Give this object its own material in slots of the mesh that it shares."""
-    for slot in slots:
-        obj.material_slots[slot].link = "OBJECT"
-        obj.material_slots[slot].material = material

@@ -10,11 +10,12 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.analysis.choices import Tolerance, Uniform
-from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
+from rigid_motion_batch.pipeline.comparison import ComparisonPlan
 from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
-from rigid_motion_batch.pipeline.running import Run
+from rigid_motion_batch.pipeline.running import DONE, UP_TO_DATE, Run
 from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import Store
+from rigid_motion_batch.pipeline.studies import Comparison
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.scenes.settings import SceneSettings
@@ -46,9 +47,13 @@ def compared(
         plan = ComparisonPlan(comparison, store)
         outcome, notes = run(plan.reading, store, opened, progress=listener, **options), plan.look_into()
         listener.notes += notes
+        between = run(plan.measuring, store, opened, progress=listener, **options)
+        plan.conclude()
         later = run(plan.tasks, store, opened, progress=listener, **options)
         listener.made = store.made
-    later.failures = outcome.failures | later.failures
+    later.failures = outcome.failures | between.failures | later.failures
+    done = between.counts[DONE]
+    later.counts.update({DONE: done, UP_TO_DATE: -done})
     return later, listener
 
 
@@ -79,7 +84,7 @@ def test_tables_are_published_and_their_numbers_are_those_of_the_analysis(output
 
 @pytest.mark.slow
 def test_a_film_and_a_page_of_a_clip(output: Path, toss: Path) -> None:
-    comparison = planned(toss, stage=STAGE, about=ABOUT)
+    comparison = planned(toss, choices=(Uniform("5"),), stage=STAGE, about=ABOUT)
     outcome, listener = compared(output, comparison, ProcessExecutor(2))
     assert outcome.failures == {}
     assert {"toss/5/comparison.mp4", "toss/5/comparison.blend", "report.html"} <= {*outputs(output)}
@@ -92,6 +97,51 @@ def test_a_film_and_a_page_of_a_clip(output: Path, toss: Path) -> None:
     assert {*other.made} == {"report.html"}
     _, lighter = compared(output, replace(comparison, stage=replace(STAGE, theme="light")))
     assert {*lighter.made} == {"build toss/5", "render toss/5 from 1", "encode toss/5", "report.html"}
+
+
+def test_films_are_of_the_keys_that_the_verdict_speaks_of(output: Path, toss: Path) -> None:
+    choices = Uniform("5"), Uniform("10"), Tolerance("2cm")
+    comparison = planned(toss, choices=choices, stage=STAGE)
+    with Store(output) as store:
+        plan = ComparisonPlan(comparison, store)
+        for step in (plan.reading, plan.measuring):
+            run(step, store, Executor())
+            plan.look_into()
+        assert plan.filmed(plan.studies[0]) == [Uniform("5")]
+        plan.conclude()
+        assert plan.found.spoken_of == {"toss": Tolerance("2cm")}
+        assert [task.name for task in plan.tasks() if task.name.startswith("encode")] == ["encode toss/tolerance-2cm"]
+        every = ComparisonPlan(replace(comparison, every_film=True), store)
+        every.look_into()
+        assert every.filmed(every.studies[0]) == [*choices]
+
+
+def test_films_of_clips_with_a_page_each_are_of_what_that_page_speaks_of(
+    output: Path, toss: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rigid_motion_batch.pipeline.comparison.ON_ONE_PAGE", 1)
+    short = write_toss(toss.with_name("short.csv"), samples=12)
+    with Store(output) as store:
+        plan = ComparisonPlan(planned(toss, short, stage=STAGE, choices=(Uniform("2"), Uniform("10"))), store)
+        for step in (plan.reading, plan.measuring):
+            run(step, store, Executor())
+            plan.look_into()
+        plan.conclude()
+        assert {*plan.found.spoken_of} == {"toss", "short"}
+        for study in plan.studies:
+            assert plan.filmed(study) == [plan.found.spoken_of[study.name]]
+
+
+def test_a_film_knows_how_far_its_body_slips_in_the_one_that_holds_it(output: Path) -> None:
+    with Store(output) as store:
+        plan = ComparisonPlan(planned(Path(f"{ROOT / 'assets' / 'hold.csv'}:*"), stage=STAGE), store)
+        run(plan.reading, store, Executor())
+        plan.look_into()
+        tasks = {task.name: task for task in plan.tasks()}
+    slip = tasks["slip of hold-tool in hold-hand"].key
+    assert slip in tasks["build hold-tool/5"].after
+    assert slip not in tasks["build hold-hand/5"].after
+    assert [*tasks].index("slip of hold-tool in hold-hand") < [*tasks].index("build hold-hand/5")
 
 
 @pytest.mark.slow

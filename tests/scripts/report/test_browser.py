@@ -65,7 +65,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_report(folder / "adaptive.html", [result_of(swinging_clip(), (Tolerance("20mm"),))], SETTINGS)
     named = result_of(swinging_clip(), RATES[1:2], warnings=[ClipWarning(HOSTILE, HOSTILE, 101.0)])
     named = replace(named, facts=replace(named.facts, name=HOSTILE), choices=tuple(map(renamed, named.choices)))
-    write_report(folder / "hostile.html", [named, two[0]], SETTINGS)
+    write_report(folder / "hostile.html", [named, result_of(swinging_clip("a"), RATES[1:2])], SETTINGS)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pages, "IN_THE_PAGE", 1)
         write_report(folder / "large.html", two, SETTINGS)

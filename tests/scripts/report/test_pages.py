@@ -21,6 +21,7 @@ from rigid_motion_batch.report.numbers import ERROR, KEYS, Gathering
 from rigid_motion_batch.report.pages import write_overview, write_report
 from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.report.tables import grids
+from rigid_motion_batch.report.verdict import verdict
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.runs import MODES, result_of
@@ -107,6 +108,21 @@ def test_every_number_is_there_without_a_script(tmp_path: Path) -> None:
                 row = motion.metrics[0]
                 for value in (1e3 * row.rms_shell_m, 1e3 * row.max_shell_m, row.rms_rotation_deg):
                     assert any(_same(text, value) for text in cells), value
+
+
+def test_it_opens_with_what_the_verdict_speaks_of_and_says_what_the_errors_are(tmp_path: Path) -> None:
+    clip, body = result_of(swinging_clip()), result_of(swinging_body(), TEN)
+    page = written(tmp_path / "report.html", clip)
+    gathering = Gathering()
+    gathering.add("swing", [result.numbers for result in clip.choices])
+    said = verdict(gathering.numbers())
+    assert said.choice is not None
+    (start,) = [json.loads(text)["start"] for text in page.texts["script"] if text.startswith('{"clips"')]
+    assert start == {"clip": "swing", "choice": said.choice.name}
+    assert "how far any point within 10 cm of the body's origin is out of place. RMS is" in all_text(page)
+    assert "Straight is what most game engines do." in all_text(page)
+    both = all_text(written(tmp_path / "both.html", clip, body))
+    assert "10 cm of the body's origin or 3 cm of a joint is out of place" in both
 
 
 def _same(text: str, value: float) -> bool:

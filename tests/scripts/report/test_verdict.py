@@ -64,7 +64,7 @@ CASES = {
     ),
     "the reference is the best": (
         numbers((FIVE, TEN), {REF: (4, 1), SCREW: (5, 1.25), SMOOTH: (8, 2)}),
-        "Nothing comes closer than Blender's Curves: 1.00 mm off (RMS) at 10 keys/s; Screw is next, with 25 % more.",
+        "Nothing comes closer than Blender's Curves: 4.00 mm off (RMS) at 5 keys/s; Screw is next, with 25 % more.",
     ),
     "a run without the reference": (
         numbers((TEN,), {SCREW: (4,), SMOOTH: (1,), "pga_lerp": (5,)}),
@@ -80,8 +80,8 @@ CASES = {
     ),
     "a tolerance, and the reference needs the fewest keys": (
         numbers((Tolerance("5mm"), Tolerance("10mm")), {REF: (6, 4), SMOOTH: (8, 5)}),
-        "Nothing needs fewer keys than Blender's Curves: 6.00 keys a second within 5 mm; "
-        "Smooth Screw is next, with 33 % more.",
+        "Nothing needs fewer keys than Blender's Curves: 4.00 keys a second within 10 mm; "
+        "Smooth Screw is next, with 25 % more.",
     ),
     "a draw": (
         numbers((Tolerance("5mm"),), {REF: (6,), SMOOTH: (6,), SCREW: (7,)}),
@@ -145,6 +145,38 @@ def test_the_keys_needed_come_first_where_they_were_looked_for(needed: KeysNeede
     assert verdict(TWO, [needed]).sentence == expected
 
 
+SPOKEN_OF = {
+    "fewer keys, between the rates of the run": TEN,
+    "better at the lowest rate than the reference at the highest": FIVE,
+    "an error that does not fall with the rate": FIVE,
+    "the reference is the best": FIVE,
+    "a tolerance": Tolerance("5mm"),
+    "a tolerance, and the reference needs the fewest keys": Tolerance("10mm"),
+    "a draw": Tolerance("5mm"),
+    "a winner at each end": FIVE,
+}
+
+
+@pytest.mark.parametrize("case", SPOKEN_OF)
+def test_it_names_the_choice_of_keys_that_it_speaks_of(case: str) -> None:
+    assert verdict(CASES[case][0]).choice == SPOKEN_OF[case]
+
+
+def test_of_keys_needed_it_is_the_nearest_of_the_run_that_are_placed_so() -> None:
+    needed = keys_needed({REF: (201, 101), SMOOTH: (151, 51)})
+    choices = (FIVE, TWENTY, Budget("4"), Budget("20"))
+    run = numbers(choices, {REF: (9, 4, 5, 2), SMOOTH: (4, 2, 3, 1)})
+    assert verdict(run, [needed]).choice == Budget("4")
+    assert verdict(TWO, [needed]).choice == TEN
+    none = keys_needed({REF: (201, np.inf), SMOOTH: (np.inf, np.inf)})
+    assert verdict(run, [none]).choice == TWENTY
+
+
+def test_the_wins_are_those_of_what_it_speaks_of() -> None:
+    run = numbers((TEN, Tolerance("5mm"), Tolerance("10mm")), {REF: (1, 8, 6), SMOOTH: (4, 6, 5)})
+    assert verdict(run).wins == "Fewest keys in 2 of 2 cases"
+
+
 def test_the_cases_that_the_best_mode_won_are_beside_the_sentence() -> None:
     run = numbers(
         (FIVE, TEN), {REF: (16, 4), SCREW: (17, 4.1), SMOOTH: (8, 1)}, {REF: (8, 4), SCREW: (8.5, 4.1), SMOOTH: (10, 2)}
@@ -158,4 +190,5 @@ def test_the_cases_that_the_best_mode_won_are_beside_the_sentence() -> None:
 
 def test_of_a_single_case_or_without_any_error_nothing_is_said_of_wins() -> None:
     assert verdict(numbers((TEN,), {REF: (4,), SMOOTH: (2,)})).wins == ""
-    assert verdict(numbers((TEN,), {REF: (0,), SMOOTH: (0,)})).wins == ""
+    nothing = verdict(numbers((TEN,), {REF: (0,), SMOOTH: (0,)}))
+    assert (nothing.wins, nothing.choice) == ("", None)

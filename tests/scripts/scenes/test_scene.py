@@ -11,11 +11,16 @@ from rigid_motion.animation import channelbag_of
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between, conjugate, multiply, rotate
 from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.held import Slip
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
+from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.places import ASSETS
+from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.world_poses import read_poses
 from rigid_motion_batch.scenes import layout
+from rigid_motion_batch.scenes.findings import findings_of
 from rigid_motion_batch.scenes.nodes import input_path
 from rigid_motion_batch.scenes.scene import build_scene
 from rigid_motion_batch.scenes.settings import SceneSettings
@@ -183,6 +188,46 @@ def test_settings_that_make_no_film_are_refused(wrong, said):
         SceneSettings(**wrong)
 
 
+def test_what_was_found_is_written_into_the_lanes_with_what_it_is_above_them():
+    made = reconstruct(swinging_clip(seconds=0.6), "5", TWO)
+    slipped = [Slip("hand", "swing", mode, "5", 0.001, metres, 0.002, "uniform", None) for mode, metres in
+               (("lerp_slerp", 0.0123), ("dq_sclerp", 0.0015))]  # fmt: skip
+    rows = [dataclasses.replace(row, still_point_m=0.25) for row in measured(made).rows]
+    findings = findings_of(rows, slipped)
+    build_scene(made, SETTINGS, findings)
+    lines = {mode: [bpy.data.curves[f"{mode} finding {place}"].body for place in (2, 1)] for mode in TWO}
+    assert lines == {
+        "lerp_slerp": ["slips up to 12.3 mm", "pivot up to 250.0 mm off"],
+        "dq_sclerp": ["slips up to 1.5 mm", "pivot up to 250.0 mm off"],
+    }
+    assert "in hand, which holds it; 2.00 mm in the recording" in bpy.data.curves["Findings"].body
+    bpy.context.view_layer.update()
+    for name in [f"{mode} finding {place}" for mode in TWO for place in (1, 2)]:
+        words, card = bpy.data.objects[name], bpy.data.objects[f"{name.split()[0]} card"]
+        right = max(corner[0] for corner in words.bound_box)
+        assert words.location.x + right - card.location.x < max(vertex.co.x for vertex in card.data.vertices)
+    assert bpy.data.objects["dq_sclerp finding 1"].location.y > bpy.data.objects["dq_sclerp error"].location.y
+
+
+def test_a_pivot_has_a_cross_where_it_was_and_one_where_the_mode_has_it_as_far_off_as_it_is_measured():
+    (clip,), _ = read_clips([str(ASSETS / "pivot.csv")], "blender")
+    made = reconstruct(clip, "5", ("bezier", "dq_sclerp"))
+    rows = measured(made).rows
+    scene = build_scene(made, dataclasses.replace(SETTINGS, deviation=1.0), findings_of(rows))
+    assert "crosses: pivot" in bpy.data.curves["Legend"].body
+    names = [f"{mode}{pivot}" for mode in ("bezier", "dq_sclerp") for pivot in (" recording pivot", " pivot")]
+    places = poses_on(np.arange(1, scene.frame_end + 1), names)
+    for row in rows:
+        recorded, shown = (places[f"{row.mode}{pivot}"].positions for pivot in (" recording pivot", " pivot"))
+        off = layout.project(shown - recorded)[:, :2]
+        assert 0.4 * row.still_point_m < np.linalg.norm(off, axis=1).max() < 1.01 * row.still_point_m
+        assert np.ptp(layout.project(recorded)[:, :2], axis=0).max() < 0.02
+        facing = rotate(places[f"{row.mode} pivot"].quaternions, np.array((0.0, 0.0, 1.0)))
+        assert facing @ layout.AWAY == pytest.approx(-1.0)
+    build_scene(reconstruct(swinging_clip(seconds=0.6), "5", TWO), SETTINGS, findings_of(rows))
+    assert "crosses" not in bpy.data.curves["Legend"].body
+
+
 def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counted_in_its_caption():
     reconstruction = choose(swinging_clip(seconds=1.0), Tolerance("5mm"), ("lerp_slerp", "motor_spline"), 0.1)
     scene = build_scene(reconstruction, SETTINGS)
@@ -196,7 +241,8 @@ def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counte
         marks.attributes["frame"].data.foreach_get("value", frames)
         assert np.allclose(frames, timeline.frames_of(reconstruction.clip.times[keys]), atol=1e-4)
         caption = " ".join(bpy.data.curves[f"{mode} names"].body.split())
-        assert caption == f"{(len(keys) - 1) / 1.0:.1f} keys/s"
+        engines = ", as most game engines do" if mode == "lerp_slerp" else ""
+        assert caption == f"{(len(keys) - 1) / 1.0:.1f} keys/s{engines}"
 
 
 def test_modes_that_are_one_motion_share_a_lane_that_names_them_all():
@@ -214,7 +260,7 @@ def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_muc
     made = reconstruct(clip, "10", TWO)
     scene = build_scene(made, settings)
     assert scene["deviation_shown_times"] == 20.0
-    assert "deviation drawn 20 times as large" in bpy.data.curves["Legend"].body
+    assert "20 times as far off as it is" in bpy.data.curves["Legend"].body
     for mode in TWO:
         true, shown, truth = (bpy.data.objects[name] for name in (mode, f"{mode} deviating", f"{mode} recording"))
         assert true.hide_render
@@ -231,7 +277,7 @@ def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_muc
 
 def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():
     build_scene(reconstruct(changed(swinging_clip(seconds=1.0), 100.0), "5", TWO), SETTINGS)
-    assert "object shown" in bpy.data.curves["Legend"].body
+    assert "times its size" in bpy.data.curves["Legend"].body
     assert np.ptp(vertices_of(bpy.data.objects["dq_sclerp"].data), axis=0).max() > 0.5
 
 
