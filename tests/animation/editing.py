@@ -306,6 +306,7 @@ class Editing(Machine):
                 for (path, _), fcurve in curves_of(obj).items():
                     if path == transform_paths(obj)[part]:
                         fcurve.keyframe_points.clear()
+            self._let_be_heard(name)
 
         self._edit(delete)
         if len(parts) == 3:
@@ -369,7 +370,18 @@ class Editing(Machine):
     def mute_a_channel(self, who, which):
         name = self._named(who)
         if self._sharing(name) == {name}:
-            self._edit_curve(name, which, lambda fcurve: setattr(fcurve, "mute", not fcurve.mute))
+
+            def change(fcurve: bpy.types.FCurve) -> None:
+                fcurve.mute = not fcurve.mute
+                self._let_be_heard(name)
+
+            self._edit_curve(name, which, change)
+
+    def _let_be_heard(self, name: Name) -> None:
+        """Unmute all channels of what has no other ones left: modes say that they cannot act there, as they should."""
+        obj = self._found(name)
+        for fcurve in curves_of(obj).values() if not moving_curves(obj) else ():
+            fcurve.mute = False
 
     @while_on(who=shares, which=shares, how=st.sampled_from(("delete", "double", "paste")))
     def tamper_with_terms(self, who, which, how):

@@ -19,7 +19,11 @@ BY_NUMBER = {0: "BLENDER", **{mode.number: name for name, mode in KEYFRAME_MODES
 WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, "scale": 3}
 KEY_FIELDS = "interpolation", "easing", "period", "type", "handle_left_type", "handle_right_type"
 MARKED_FIELDS = "back", "amplitude"
-"""In the lowest six bits of these keys say their modes: in the former 16 more than a number, in the latter 42."""
+"""In the lowest six bits of these keys say their modes: in the former 16 more than a number, and 32 where the period
+says what they are held in, in the latter 42."""
+
+HOLD_BITS = 1023
+"""And in these bits of `period` what they are held in, where the former has 32 more."""
 
 
 def curves_of(carrier: Carrier) -> dict[tuple[str, int], bpy.types.FCurve]:
@@ -84,7 +88,7 @@ def _bits(key: bpy.types.Keyframe, field: str) -> int:
 def mark_of(key: bpy.types.Keyframe) -> int:
     """The number of the mode that a key says it has, from 1 on, or 0."""
     back, amplitude = (_bits(key, field) & 63 for field in MARKED_FIELDS)
-    return back - 16 if amplitude == 42 and 16 < back < 32 else 0
+    return back % 32 - 16 if amplitude == 42 and back % 32 > 16 else 0
 
 
 def moving_curves(obj: Carrier) -> list[bpy.types.FCurve]:

@@ -5,6 +5,7 @@ evaluation  from what is keyed, as arrays, to the values that channels are to ha
 transforms  what is moved: objects and pose bones
 actions     what is keyed: slots, channels, modes; read into sources
 terms       what is added to channels: planned, compared with what is there, written
+holds       what things are held in: constraints, keyed
 queries     what is asked of motions: keys, segments, problems
 following   following edits: handlers, refresh, keys that are inserted in between
 edits       what is done to motions: choosing modes, turns, breakdowns
@@ -16,8 +17,9 @@ Data flows from Blender through actions, evaluation and terms back to Blender. E
 
 from . import properties
 from .actions.channels import channelbag_of, write_channel
-from .baking.bake import bake, bake_poses, is_baked, unbake
+from .baking.bake import bake, bake_poses, bake_to_world, is_baked, unbake
 from .baking.fewer_keys import NeedsItsKeys
+from .baking.into_holds import HeldSegment, held_segments, reduce_into_holds
 from .baking.reducing import (
     Reduction,
     WholeRig,
@@ -28,6 +30,7 @@ from .baking.reducing import (
     restore_keys,
 )
 from .edits.breakdowns import Breakdowns, breakdown
+from .edits.holding import HoldFacts, hold_facts, hold_in, key_seen, match_grip, pass_frames
 from .edits.mode_keys import copy_modes, repeat, set_mode, set_turns
 from .evaluation.components import MODE_IDS
 from .following import follower
@@ -40,23 +43,33 @@ from .transforms.sizes import radius_of
 __all__ = [
     "MODE_IDS",
     "Breakdowns",
+    "HeldSegment",
+    "HoldFacts",
     "NeedsItsKeys",
     "Reduction",
     "Refused",
     "WholeRig",
     "bake",
     "bake_poses",
+    "bake_to_world",
     "breakdown",
     "channelbag_of",
     "copy_modes",
     "discard_dense_keys",
+    "held_segments",
+    "hold_facts",
+    "hold_in",
     "is_baked",
     "is_enabled",
     "is_reduced",
     "key_frames",
+    "key_seen",
+    "match_grip",
     "modes_of",
+    "pass_frames",
     "problem_of",
     "radius_of",
+    "reduce_into_holds",
     "reduce_keys_of",
     "reduction_of",
     "refresh",

@@ -50,7 +50,7 @@ def as_fcurve(keys: Keys, *, update: bool = True) -> Iterator[bpy.types.FCurve]:
 
 
 def read_one(fcurve: bpy.types.FCurve) -> Keys:
-    ((places, keys, _),) = read_keys([fcurve])
+    ((places, keys, *_),) = read_keys([fcurve])
     assert places == [0]
     return keys
 

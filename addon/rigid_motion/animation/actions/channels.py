@@ -15,7 +15,7 @@ import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ..fcurves.keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
-from .marks import marks_of
+from .marks import are_held, holds_of, marks_of
 from .modifiers import copy_modifier, is_term, read_cycles, set_settings, settings_of
 
 KEY_FIELDS = {
@@ -33,6 +33,11 @@ KeyFields = dict[str, np.ndarray]
 
 BREAKDOWN = bpy.types.Keyframe.bl_rna.properties["type"].enum_items["BREAKDOWN"].value
 """The code of this type of keys."""
+
+AUTOMATIC = [
+    bpy.types.Keyframe.bl_rna.properties["handle_left_type"].enum_items[name].value for name in ("AUTO", "AUTO_CLAMPED")
+]
+"""The codes of the types of handles that Blender sets by the keys around."""
 
 
 def channelbag_of(animated: bpy.types.ID) -> bpy.types.ActionChannelbag:
@@ -95,14 +100,14 @@ def replace_keys(
     values: np.ndarray,
     *,
     interpolation: str | np.ndarray = "LINEAR",
-    key_type: str = "KEYFRAME",
+    key_type: str | np.ndarray = "KEYFRAME",
     handle_type: str | None = None,
     selected: np.ndarray | None = None,
 ) -> None:
     """Give an F-curve these keys in place of those it has: frames that rise, and values, shape (n,) each.
 
-    What every key gets, see `write_channel`; codes are each key's own interpolation (n,). Handles and selection are
-    Blender's default without a type, or without a mask (n,) of keys that are selected.
+    What every key gets, see `write_channel`; codes are each key's own interpolation or type (n,). Handles and selection
+    are Blender's default without a type, or without a mask (n,) of keys that are selected.
     """
     points = np.empty((len(frames), 2), dtype=np.float32)
     points[:, 0], points[:, 1] = frames, values
@@ -125,6 +130,19 @@ def replace_keys(
 def empty_key_fields(count: int) -> KeyFields:
     """Return all there is to so many keys, zero."""
     return {name: np.zeros((count, width), kind) for name, (width, kind) in KEY_FIELDS.items()}
+
+
+def new_key_fields(
+    frames: np.ndarray, values: np.ndarray, interpolation: np.ndarray | int, key_type: str = "KEYFRAME"
+) -> KeyFields:
+    """Return all there is to new keys on frames (n,), whose handles Blender sets; interpolations are codes."""
+    fields = empty_key_fields(len(frames))
+    for name in ("co", "handle_left", "handle_right"):
+        fields[name][:, 0], fields[name][:, 1] = frames, values
+    for name in ("handle_left_type", "handle_right_type"):
+        fields[name][:] = code_of(name, "AUTO_CLAMPED")
+    fields["interpolation"][:, 0], fields["type"][:] = interpolation, code_of("type", key_type)
+    return fields
 
 
 def key_fields(keys: bpy.types.bpy_prop_collection) -> KeyFields:
@@ -200,6 +218,9 @@ class Read(NamedTuple):
     marks: np.ndarray
     """The marks of the keys, shape (n,): see `marks`."""
 
+    holds: np.ndarray
+    """What the keys are held in, shape (n,): see `marks.hold`; -1 where they do not say."""
+
 
 def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[Read]:
     """Return the keys of F-curves that have some, those together that are keyed together, and the Cycles modifier that
@@ -219,8 +240,8 @@ def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[Read]:
 
 def _read_together(
     channels: Sequence, points: np.ndarray, linear: bool, cycles: Cycles | None
-) -> tuple[Keys, np.ndarray]:
-    """Return the keys of several `keyframe_points` with these frames and values (c, n, 2), and their marks (n,)."""
+) -> tuple[Keys, np.ndarray, np.ndarray]:
+    """Return the keys of several `keyframe_points` with these frames and values (c, n, 2), and what they say (n,)."""
     interpolation = _read_property("interpolation", channels, CODE)
     _replace_unknown(interpolation, INTERPOLATIONS, CONSTANT)
     used = set(np.unique(interpolation).tolist())
@@ -238,8 +259,13 @@ def _read_together(
     # What is no number is not smaller, either.
     is_sound = all(number < LARGEST for number in numbers) and bool(np.all(np.diff(points[0, :, 0]) >= 0.0))
     marked = breakdowns if breakdowns.any() else None
-    keys = Keys(points, interpolation, left, right, easing, settings, linear, cycles, marked, is_sound)
-    return keys, marks_of(back, amplitude).max(axis=0)
+    holds, automatic = np.full(points.shape[1], -1), None
+    if are_held(back, amplitude).any():
+        holds = holds_of(back, amplitude, _read_property("period", channels, np.float32)).max(axis=0)
+        types = [_read_property(f"handle_{side}_type", channels, CODE) for side in ("left", "right")]
+        automatic = np.isin(np.stack(types, axis=-1), AUTOMATIC)
+    keys = Keys(points, interpolation, left, right, easing, settings, linear, cycles, marked, automatic, is_sound)
+    return keys, marks_of(back, amplitude).max(axis=0), holds
 
 
 def _read_property(name: str, channels: Sequence, dtype: type, *width: int) -> np.ndarray:

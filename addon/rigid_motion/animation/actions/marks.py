@@ -1,9 +1,9 @@
-"""Marks: what keys say of the segments that they begin, in the keys themselves.
+"""Marks: what keys say of the segments that they begin, and of what they are held in, in the keys themselves.
 
 Blender keeps nothing of an extension's on a key. But each key has settings for eases that it does not have: `back` and
 `amplitude`. A mark is in the lowest bits of both, where it changes no ease by more than a part in a hundred thousand.
 So it goes where the key goes: it is copied and pasted, duplicated, mirrored, linked and saved with it, and is gone
-where a key is made anew.
+where a key is made anew. What a key is held in is beside its mark, in the lowest bits of `period`.
 
 Without a mark a key goes on with what the key before it says, and before the first mark with what that says.
 """
@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+
+from ..evaluation.runs import MOST_FRAMES
 
 LOW = 63
 """The bits of either setting that have a mark."""
@@ -22,20 +24,49 @@ SIGNATURE = 42
 CHECK = 16
 """What `back` has in these bits beside a mark, which is less."""
 
+HELD = 32
+"""What `back` has in these bits, too, where `period` says what a key is held in."""
+
 MOST = 15
-"""The largest mark."""
+"""The largest mark, and the most holders that keys can tell apart."""
+
+HOLD_BITS = (MOST + 1) * (MOST_FRAMES + 1) - 1
+"""The bits of `period` that have a hold: the number of the holder, and the frames."""
+
+PERIOD = 4.1
+"""Blender's own, where there is none yet to have a hold in its bits."""
 
 
 def marks_of(backs: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
     """Return the marks in settings `back` and `amplitude` of keys (float32, any shape), 0 where there is none."""
     low = backs.view(np.int32) & LOW
-    is_marked = ((amplitudes.view(np.int32) & LOW) == SIGNATURE) & ((low & ~MOST) == CHECK)
+    is_marked = ((amplitudes.view(np.int32) & LOW) == SIGNATURE) & ((low & CHECK) != 0)
     return np.where(is_marked, low & MOST, 0)
+
+
+def are_held(backs: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
+    """Return which keys with these settings say what they are held in."""
+    return (marks_of(backs, amplitudes) > 0) & ((backs.view(np.int32) & HELD) != 0)
+
+
+def holds_of(backs: np.ndarray, amplitudes: np.ndarray, periods: np.ndarray) -> np.ndarray:
+    """Return the holds in the settings of keys (float32, any shape): see `hold`; -1 where there is none."""
+    return np.where(are_held(backs, amplitudes), periods.view(np.int32) & HOLD_BITS, -1)
+
+
+def hold(number: int, frames: int = 0) -> int:
+    """Return the hold of keys in a holder of this number, 0 for none, that is reached over so many frames."""
+    return number * (MOST_FRAMES + 1) + frames
 
 
 def read_marks(fcurve: bpy.types.FCurve) -> np.ndarray:
     """Return the marks of the keys of an F-curve, shape (n,)."""
     return marks_of(*_settings(fcurve))
+
+
+def read_holds(fcurve: bpy.types.FCurve) -> np.ndarray:
+    """Return the holds of the keys of an F-curve, shape (n,): see `hold`; -1 where there is none."""
+    return holds_of(*_settings(fcurve), _setting(fcurve, "period"))
 
 
 def has_marks(fcurve: bpy.types.FCurve) -> bool:
@@ -46,13 +77,27 @@ def has_marks(fcurve: bpy.types.FCurve) -> bool:
 def write_marks(fcurve: bpy.types.FCurve, marks: np.ndarray) -> None:
     """Give the keys of an F-curve marks (n,). Nothing that Blender evaluates changes, so nothing is tagged."""
     backs, amplitudes = settings = _settings(fcurve)
-    for values, bits in ((backs, CHECK | marks), (amplitudes, SIGNATURE)):
+    # What a key is held in stays.
+    held = np.where(are_held(backs, amplitudes), HELD, 0)
+    for values, bits in ((backs, CHECK | marks | held), (amplitudes, SIGNATURE)):
         raw = values.view(np.int32)
         raw[:] = np.where(marks > 0, raw & ~LOW | bits, raw)
     # Without one the signature is off by a bit, so that nothing else is read from it.
     amplitudes.view(np.int32)[(marks == 0) & (marks_of(backs, amplitudes) > 0)] ^= 1
     for name, values in zip(("back", "amplitude"), settings, strict=True):
         fcurve.keyframe_points.foreach_set(name, values)
+
+
+def write_holds(fcurve: bpy.types.FCurve, holds: np.ndarray) -> None:
+    """Give the keys of an F-curve, all of which have marks, holds (n,): see `hold`. Those of -1 have none."""
+    backs, _ = _settings(fcurve)
+    periods = _setting(fcurve, "period")
+    periods[(holds >= 0) & ~(np.abs(periods) > 1e-3)] = PERIOD
+    raw, bits = backs.view(np.int32), periods.view(np.int32)
+    raw[:] = np.where(holds >= 0, raw | HELD, raw & ~HELD)
+    bits[:] = np.where(holds >= 0, bits & ~HOLD_BITS | holds, bits)
+    fcurve.keyframe_points.foreach_set("back", backs)
+    fcurve.keyframe_points.foreach_set("period", periods)
 
 
 def carried_on(marks: np.ndarray) -> np.ndarray:
@@ -64,8 +109,10 @@ def carried_on(marks: np.ndarray) -> np.ndarray:
 
 
 def _settings(fcurve: bpy.types.FCurve) -> tuple[np.ndarray, np.ndarray]:
-    keys = fcurve.keyframe_points
-    backs, amplitudes = np.empty(len(keys), np.float32), np.empty(len(keys), np.float32)
-    keys.foreach_get("back", backs)
-    keys.foreach_get("amplitude", amplitudes)
-    return backs, amplitudes
+    return _setting(fcurve, "back"), _setting(fcurve, "amplitude")
+
+
+def _setting(fcurve: bpy.types.FCurve, name: str) -> np.ndarray:
+    values = np.empty(len(fcurve.keyframe_points), np.float32)
+    fcurve.keyframe_points.foreach_get(name, values)
+    return values

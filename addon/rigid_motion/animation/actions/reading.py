@@ -16,7 +16,7 @@ from ..evaluation.differences import seen_values
 from ..evaluation.sources import SAME_FRAME, TURN_AXES, Marks, Source
 from ..transforms import Channel, Refused, Transform
 from .channels import Read, read_keys
-from .marks import carried_on, has_marks
+from .marks import carried_on, has_marks, hold
 from .modifiers import is_term, on_top
 from .refusals import refuse_drivers, refuse_envelope, refuse_linked, refuse_moving_deltas, refuse_numbers
 from .slots import Binding
@@ -127,6 +127,7 @@ def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> 
         original=user.original(),
         location_axes=user.location_axes,
         driven=frozenset(still),
+        held=_held_in(channels),
     )
 
 
@@ -144,10 +145,21 @@ def _said_by(reads: list[Read]) -> Marks | None:
 
     On one frame the channel that comes first has it.
     """
-    if not any(read.marks.any() for read in reads):
+    return _on_frames(reads, [read.marks for read in reads])
+
+
+def _held_in(reads: list[Read]) -> Marks | None:
+    """Return what keys are held in from which frame on, see `marks.hold`; None where all are held in nothing."""
+    holds = _on_frames(reads, [read.holds + 1 for read in reads])
+    return None if holds is None or not (holds.numbers >= hold(1)).any() else holds
+
+
+def _on_frames(reads: list[Read], of_keys: list[np.ndarray]) -> Marks | None:
+    """Return the numbers of keys, 0 where they say none, from which frame on, as numbers from 0."""
+    if not any(marks.any() for marks in of_keys):
         return None
     frames = np.concatenate([read.keys.times for read in reads])
-    marks = np.concatenate([read.marks for read in reads])
+    marks = np.concatenate(of_keys)
     order = np.lexsort((marks == 0, frames))
     frames, marks = frames[order], marks[order]
     # What is no number is no frame that there was, either.

@@ -104,8 +104,8 @@ class Binding:
         """Return the F-curve of a channel, made where there is none yet."""
         fcurve = self.curves.get(channel)
         if fcurve is None:
-            path, index = channel
-            fcurve = self.curves[channel] = self.channelbag.fcurves.new(path, index=index)
+            (path, index), fcurves = channel, self.channelbag.fcurves
+            fcurve = self.curves[channel] = fcurves.find(path, index=index) or fcurves.new(path, index=index)
         return fcurve
 
 

@@ -3,6 +3,7 @@
 apply        targets, refusals and one refresh for every verb
 mode_keys    choosing modes and turns, and Cycles
 breakdowns   poses in between, keyed where the playhead is
+holding      in which space keys are, and how things pass from hand to hand
 
 Each module imports only those above it.
 """

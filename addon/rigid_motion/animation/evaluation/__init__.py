@@ -2,6 +2,7 @@
 
 components      the rows of arrays: location, rotation, scale; and the numbers of modes
 marks           what keys say beyond their values: modes and axes from frames on, and whether anything changes
+runs            stretches of keys that are held in the same, and where things pass from one holder to the next
 sources         what is keyed, as arrays with a digest, the segments between keys, and whether rounds of them repeat
 source_cache    the sources of earlier edits
 bodies          the channels' own values, progress in a segment, and poses of a body

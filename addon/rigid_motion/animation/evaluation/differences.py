@@ -120,6 +120,8 @@ def channel_differences(
         one to the other, continuous in each span and in the sign that the key at its beginning has; angles
         continuous, and nearest to those of the key at the beginning. Rows that are not filled have no difference.
     """
+    if any(source.switches for source in sources):
+        return _differences_of_runs(sources, frames, given)
     differences = [np.zeros((10, len(times))) for times in frames]
     natives: dict[int, np.ndarray] = {}
     acting = [number for number, source in enumerate(sources) if source.is_live and source.is_repeatable]
@@ -135,6 +137,35 @@ def channel_differences(
     others = values_of([sources[number] for number in rest], [frames[number] for number in rest])
     natives.update(zip(rest, others, strict=True))
     return [(difference, natives[number]) for number, difference in enumerate(differences)]
+
+
+def _differences_of_runs(
+    sources: Sequence[Source], frames: Sequence[np.ndarray], given: np.ndarray | None
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return `channel_differences` of sources, some of which pass from one holder to another: each run by itself."""
+    runs = [(number, run) for number, source in enumerate(sources) for run in source.runs]
+    bounds = [frames[number].searchsorted((run.stretch.first, run.stretch.until)) for number, run in runs]
+    parts = [
+        slice(0 if run is sources[number].runs[0] else begin, end)
+        for (number, run), (begin, end) in zip(runs, bounds, strict=True)
+    ]
+    moments = [
+        run.moments(frames[number][part]) if sources[number].switches else frames[number]
+        for (number, run), part in zip(runs, parts, strict=True)
+    ]
+    asked = [run.source if sources[number].switches else sources[number] for number, run in runs]
+    if given is None:
+        of_runs = channel_differences(asked, moments)
+    else:
+        of_runs = [
+            channel_differences([source], [times], given[part])[0]
+            for source, times, part in zip(asked, moments, parts, strict=True)
+        ]
+    natives = values_of(sources, frames)
+    differences = [np.zeros(native.shape) for native in natives]
+    for (number, _), part, (difference, native) in zip(runs, parts, of_runs, strict=True):
+        differences[number][:, part] = native + difference - natives[number][:, part]
+    return list(zip(differences, natives, strict=True))
 
 
 def _alike(sources: Sequence[Source]) -> list[list[int]]:

@@ -33,6 +33,7 @@ from .marks import (
     turns_at,
     vary,
 )
+from .runs import MOST_FRAMES, Stretch, Switch, keys_in, resting_in, stretches_of, switches_of
 
 __all__ = ["SAME_FRAME", "SCREW_AXIS", "TURN_AXES", "WHOLE_TURN", "Marks", "Source", "distinct"]
 
@@ -74,6 +75,10 @@ class Source:
     driven: frozenset[int] = frozenset()
     """The rows of components that drivers move, or whose channels are muted: to the others they are still."""
 
+    held: Marks | None = None
+    """What keys are held in from frames on, as `actions.marks.hold` has it; None where all are in the space of the
+    channels."""
+
     shaping: np.ndarray | None = None
     """The frames of the keys that segments run between, where they are not those of the channels."""
 
@@ -93,6 +98,8 @@ class Source:
             summary.update(self.location_axes.tobytes())
         if self.turns is not None:
             summary.update(self.turns.raw + repr(self.turns_axis).encode())
+        if self.held is not None:
+            summary.update(repr(self.held).encode())
         return summary.hexdigest()
 
     @property
@@ -291,7 +298,41 @@ class Source:
         """Return whether there is a segment that is to be filled in otherwise than Blender does."""
         if not self.curves or len(self.key_frames) < 2:
             return False
-        return bool(np.any(self.modes))
+        return bool(self.switches) or bool(np.any(self.modes))
+
+    @cached_property
+    def switches(self) -> tuple[Switch, ...]:
+        """Where it passes from one holder to another."""
+        return switches_of(self.keyed_frames, self.held)
+
+    @cached_property
+    def runs(self) -> list[Run]:
+        """The stretches of keys that are held in the same, one behind the other; one alone where nothing is passed."""
+        stretches = stretches_of(self.keyed_frames, self.switches, is_linear=self.is_linear)
+        return [Run(stretch, self._in(stretch)) for stretch in stretches]
+
+    def hold_at(self, frame: float) -> tuple[int, int]:
+        """Return the number of the holder that a key on a frame is in, 0 for none, and the frames of its passing."""
+        if self.held is None:
+            return 0, 0
+        number, frames = divmod(int(self.held.at(np.array([frame + 0.5 * SAME_FRAME]))[0]), MOST_FRAMES + 1)
+        return number, frames
+
+    def run_at(self, frame: float) -> Run:
+        """Return the run whose motion is shown on a frame."""
+        return next((run for run in self.runs if frame < run.stretch.until), self.runs[-1])
+
+    def _in(self, stretch: Stretch) -> Source:
+        """Return the source with the keys of a stretch alone; what has none there rests."""
+        channels, rest = [], dict(self.rest)
+        for rows, keys in self.channels:
+            if (part := keys_in(keys, stretch)) is not None:
+                channels.append((rows, part))
+            else:
+                rest.update(zip(rows, resting_in(keys, stretch).tolist(), strict=True))
+        # A holder has no other axes for location, as the parent of a bone may have.
+        axes = None if self.hold_at(stretch.first)[0] else self.location_axes
+        return replace(self, channels=tuple(channels), rest=rest, held=None, seen=None, location_axes=axes)
 
     @cached_property
     def seen_range(self) -> tuple[int, int]:
@@ -341,6 +382,20 @@ class Source:
             at = np.clip(np.searchsorted(keys.times, at, side="right") - 1, 0, None)
             codes.update(zip(rows, keys.interpolation[:, at], strict=True))
         return np.stack([codes[row] for row in self.filled_rows if row in codes] or [*codes.values()])
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A stretch of keys that are held in the same."""
+
+    stretch: Stretch
+    source: Source
+    """With these keys alone."""
+
+    def moments(self, frames: np.ndarray) -> np.ndarray:
+        """Return the frames of its own motion that are shown on frames (m,): it may rest outside of its keys."""
+        first, last = self.source.keyed_range
+        return np.clip(frames, -np.inf if self.stretch.comes else first, np.inf if self.stretch.goes else last)
 
 
 def repeat(channels: tuple[tuple[list[int], Keys], ...], cyclic: Keys, order: str | None) -> bool:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from ..fcurves.keys import BEZIER, EASINGS, ELASTIC, INTERPOLATIONS, Keys
-from .sources import Source
+from ..fcurves.keys import BEZIER, EASINGS, ELASTIC, INTERPOLATIONS, KEY_TOLERANCE, Keys
+from .components import PART_OF, ROWS
+from .sources import SAME_FRAME, Source, distinct
 
 BOUNCE = {name: code for code, name in INTERPOLATIONS.items()}["BOUNCE"]
 IN, IN_OUT = (code for code, name in EASINGS.items() if name in ("EASE_IN", "EASE_IN_OUT"))
@@ -40,6 +42,8 @@ def spans(source: Source) -> list[Span]:
 
     Of cycles those between the first key and the last: what is added repeats with the channels.
     """
+    if source.switches:
+        return _spans_of_runs(source)
     rows = tuple(source.filled_rows)
     if not (source.is_live and source.is_repeatable and rows):
         return []
@@ -56,6 +60,42 @@ def spans(source: Source) -> list[Span]:
         Span(rows, float(first), float(last), at_first, at_last, tuple(breaks[(breaks > first) & (breaks < last)]))
         for first, last, at_first, at_last in ends
     ]
+
+
+def _spans_of_runs(source: Source) -> list[Span]:
+    """Return the stretches of time from key to key of something that passes from one holder to another.
+
+    What its channels have between the last key in one and the first in the next is the same for none of the modes.
+    """
+    # What turns about an axis need have no keys of its rotation.
+    times = dict.fromkeys(source.filled_rows, np.full(1, np.inf))
+    times |= {row: keys.times for rows, keys in source.channels for row in rows}
+    # Angles stay together: near gimbal lock what one of them has depends on the others.
+    parts = [tuple(row for row in sorted(times) if PART_OF[row] == part) for part in ROWS]
+    breaks, result = np.unique(np.concatenate([np.empty(0), *map(_breaks, source.curves)])), []
+    for run in source.runs:
+        ends = [*distinct(run.source.keyed_frames).tolist(), *({run.stretch.until} - {np.inf})]
+        for rows in filter(None, parts):
+            # The frame of a switch is the next run's, and a channel has its own value where it has a key alone.
+            is_key = [all(np.abs(times[row] - frame).min() < SAME_FRAME for row in rows) for frame in ends]
+            # Strips come to a key by a hair too early, where curves have its value already.
+            shown = [*ends[:-1], _before(ends[-1]) if is_key[-1] and ends[-1] == run.stretch.until else ends[-1]]
+            is_key[-1] |= ends[-1] == run.stretch.until
+            result += [
+                Span(rows, first, last, *are_keys, tuple(breaks[(breaks > first) & (breaks < last)]))
+                for (first, last), are_keys in zip(pairwise(shown), pairwise(is_key), strict=True)
+            ]
+    if source.is_linear and source.seen is not None:
+        (first, last), (before, behind) = source.keyed_range, source.seen
+        for rows in filter(None, parts):
+            result += [Span(rows, float(before), first, False, True, ())] if before < first else []
+            result += [Span(rows, last, float(behind), True, False, ())] if behind > last else []
+    return result
+
+
+def _before(frame: float) -> float:
+    """Return the last frame in single precision before a key on which curves do not have its value yet."""
+    return float(np.nextafter(np.float32(frame - KEY_TOLERANCE), np.float32(-np.inf)))
 
 
 def _breaks(keys: Keys) -> np.ndarray:

@@ -86,6 +86,10 @@ class Keys:
     breakdowns: np.ndarray | None = None
     """True for the keys of type *Breakdown*, shape (n,), where any is."""
 
+    automatic: np.ndarray | None = None
+    """True for handles that Blender sets by the keys around, to the left and to the right of each, shape (c, n, 2),
+    where that is asked for."""
+
     is_sound: bool = True
     """True if all numbers that were read are smaller than `LARGEST`, and the keys in the order of their frames."""
 
@@ -137,7 +141,8 @@ class Keys:
         return part if self.breakdowns is None else replace(part, breakdowns=self.breakdowns[chosen])
 
     def _part(self, part: tuple) -> Keys:
-        arrays = {name: getattr(self, name) for name in ("points", "interpolation", "left", "right", "easing")}
+        names = ("points", "interpolation", "left", "right", "easing", "automatic")
+        arrays = {name: getattr(self, name) for name in names}
         parts = {name: array[part] for name, array in arrays.items() if array is not None}
         settings = None if self.easing_settings is None else self.easing_settings[(slice(None), *part)]
         return replace(self, **parts, easing_settings=settings)

@@ -115,7 +115,7 @@ def _curves_in(slot: Slot) -> dict[Channel, bpy.types.FCurve]:
 @lru_cache(maxsize=65536)
 def _matters(path: str) -> bool:
     prop = split_path(path)[1]
-    return prop in WIDTHS or prop == TURNS_PROPERTY
+    return prop in WIDTHS or prop == TURNS_PROPERTY or prop.startswith("constraints[")
 
 
 def _often_in(curves: Mapping[Channel, bpy.types.FCurve]) -> dict[Channel, tuple[bool, str, bytes]]:
@@ -146,12 +146,13 @@ def _room(names: tuple[str, ...], count: int) -> tuple[np.ndarray, list[tuple[st
 
 
 def settings_of(obj: bpy.types.Object, slots: Sequence[Slot]) -> tuple:
-    """Return what in-betweens of an object depend on beside its keys in these slots: its properties, drivers and
-    strips, and the axes that location runs along where these are other bones'.
+    """Return what in-betweens of an object depend on beside its keys in these slots: its properties, drivers,
+    strips, parent and constraints, and the axes that location runs along where these are other bones'.
     """
     values = [tuple(getattr(obj, name)) for name in OF_OBJECTS]
     driver_count = 0 if obj.animation_data is None else len(obj.animation_data.drivers)
-    return obj.rotation_mode, *values, driver_count, tuple(slots), _axes_in(obj) if slots and obj.pose else None
+    held = obj.parent is None, len(obj.constraints)
+    return obj.rotation_mode, *values, driver_count, held, tuple(slots), _axes_in(obj) if slots and obj.pose else None
 
 
 def _axes_in(rig: bpy.types.Object) -> bytes:

@@ -31,6 +31,7 @@ from ..actions.slots import (
     slots_of,
 )
 from ..evaluation import source_cache
+from ..holds.apply import channels_of
 from ..transforms import WIDTHS, Channel, Transform, let_override_be_read, split_path, transform_of
 from .changes import Snapshot, add_action, bones_in, edited_actions, edited_objects, graphs_of, settings_of
 from .refreshing import is_keying_safe, refresh_bindings
@@ -158,10 +159,12 @@ class Follower:
 
         def keep_poses(stale: Iterable[Binding]) -> None:
             written: dict[Slot, Curves] = {}
+            follows: set[Channel] = set()
             for binding in stale:
                 written.setdefault(binding.slot, {}).update(binding.curves)
+                follows |= channels_of(binding)
             for slot, curves in written.items():
-                self.unkeyed.append(Poses(slot, curves if edited is None else edited, curves, frame))
+                self.unkeyed.append(Poses(slot, {*(curves if edited is None else edited), *follows}, curves, frame))
 
         if bindings:
             refresh_bindings(bindings, before_writing=keep_poses, **options)

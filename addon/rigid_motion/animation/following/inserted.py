@@ -63,6 +63,10 @@ def divided(binding: Binding, new: Source, old: Source) -> Insertion | None:
     frame = float(added[0])
     if not (_is_in_between(old, frame) and old.key_frames[0] < frame < old.key_frames[-1]):
         return None
+    if old.switches:
+        if frame > old.run_at(frame).source.keyed_range[1]:
+            return None
+        old, new = old.run_at(frame).source, new.run_at(frame).source
     seen, curves = seen_values(old, added)[:, 0], _curves_of(binding)
     filled = {*old.filled_rows, *new.filled_rows}
     for rows, keys in new.channels:

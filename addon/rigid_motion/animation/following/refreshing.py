@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 import bpy
 import numpy as np
 
-from ..actions.marks import read_marks, write_marks
+from ..actions.marks import read_holds, read_marks, write_holds, write_marks
 from ..actions.modifiers import add_cycles, has_terms, terms_in
 from ..actions.reading import is_marked, keyed_in, planned_from
 from ..actions.refusals import refuse_numbers
@@ -20,6 +20,7 @@ from ..evaluation.components import MODE_NUMBERS
 from ..evaluation.source_cache import cache_source, cached_source
 from ..evaluation.sources import Source
 from ..fcurves.keys import Cycles
+from ..holds.apply import apply_holds, has_holders
 from ..terms.apply import apply, remove_terms
 from ..terms.planning import plan
 from ..transforms import WIDTHS, Refused
@@ -59,11 +60,14 @@ def refresh_bindings(
     for binding in bindings:
         _tidy(binding)
     _adopt(bindings)
-    marked = [binding for binding in bindings if is_marked(binding)]
+    marked = [binding for binding in bindings if is_marked(binding) or has_holders(binding)]
     stale: list[Reading] = []
     current: dict[Binding, Source] = {}
+    plain: dict[Binding, Source] = {}
     for binding, source in zip(marked, keyed_in(marked), strict=True):
-        if _is_desired(binding, source):
+        if isinstance(source, Source) and not _is_desired(binding, source):
+            plain[binding] = source
+        elif isinstance(source, Source):
             current[binding] = source
             if is_doubtful or source.digest24 != planned_from(binding):
                 stale.append((binding, current.pop(binding)))
@@ -77,7 +81,8 @@ def refresh_bindings(
     # Not before: what has the same keys as something else had is no edit of that which was followed.
     for source in current.values():
         cache_source(source)
-    return len(dropped) + (sum(_apply(stale)) if stale else 0)
+    count = len(dropped) + (sum(_apply(stale)) if stale else 0)
+    return count + sum(apply_holds(*reading, may_key=is_keying_safe()) for reading in (current | plain).items())
 
 
 def _tidy(binding: Binding) -> None:
@@ -107,10 +112,10 @@ def _adopt(bindings: Iterable[Binding]) -> None:
 
 
 def mark_all(binding: Binding, number: int) -> None:
-    """Have all keys of a slot say this mode; none at all where it is Blender's."""
+    """Have all keys of a slot say this mode; none at all where it is Blender's, but what they are held in."""
     for (path, _), fcurve in binding.curves.items():
         if path.removeprefix(binding.prefix) in WIDTHS and fcurve.keyframe_points:
-            write_marks(fcurve, np.full(len(fcurve.keyframe_points), number + 1 if number else 0))
+            write_marks(fcurve, np.where(read_holds(fcurve) >= 0, number + 1, number + 1 if number else 0))
 
 
 def _is_desired(binding: Binding, source: Source | Refused) -> bool:
@@ -158,6 +163,7 @@ def _apply(stale: Sequence[Reading]) -> list[bool]:
     for (binding, source), terms in zip(stale, planned, strict=True):
         result.append(apply(binding, source, terms))
         _carry_marks(binding, source)
+        result[-1] |= apply_holds(binding, source, may_key=is_keying_safe())
         cache_source(source)
     return result
 
@@ -170,7 +176,11 @@ def _carry_marks(binding: Binding, source: Source) -> None:
         if len(marks) and not marks.all():
             times = np.empty((len(marks), 2), np.float32)
             fcurve.keyframe_points.foreach_get("co", times.ravel())
-            write_marks(fcurve, np.where(marks, marks, source.modes_at(times[:, 0].astype(np.float64)) + 1))
+            frames = times[:, 0].astype(np.float64)
+            write_marks(fcurve, np.where(marks, marks, source.modes_at(frames) + 1))
+            if source.held is not None:
+                holds = read_holds(fcurve)
+                write_holds(fcurve, np.where(holds >= 0, holds, source.held.at(frames)))
 
 
 def is_keying_safe() -> bool:

@@ -12,6 +12,7 @@ import bpy
 from ..actions.marks import has_marks
 from ..actions.modifiers import has_terms
 from ..actions.slots import slots_alone
+from ..holds.holders import is_ours
 from ..transforms import WIDTHS, Transform, split_path
 
 
@@ -29,6 +30,11 @@ def with_modes(transforms: Iterable[Transform]) -> Iterator[Transform]:
 def with_in_betweens(transforms: Iterable[Transform]) -> Iterator[Transform]:
     """Yield those with in-betweens that are not Blender's own."""
     return _with(transforms, has_terms)
+
+
+def with_holders(transforms: Iterable[Transform]) -> Iterator[Transform]:
+    """Yield those that something holds, or has held."""
+    return (transform for transform in transforms if any(map(is_ours, transform.carrier.constraints)))
 
 
 def with_more_keys_than(transforms: Iterable[Transform], count: int) -> Iterator[Transform]:

@@ -20,6 +20,7 @@ from ..evaluation.sources import SAME_FRAME, Source
 from ..evaluation.spans import spans
 from ..evaluation.turning import turning_in, values_at_ends
 from ..fcurves.keys import cycled
+from ..holds.problems import refuse_holds
 from ..transforms import Refused, Transform, transform_of
 from .keyed import active_binding
 
@@ -117,7 +118,7 @@ def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
 
 
 def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str:
-    """Return why something does not move as its mode says, and the way out; "" where nothing is amiss."""
+    """Return why something does not move or is not held as its keys say, and the way out; "" where nothing is amiss."""
     transform = transform_of(target)
     bindings = bindings_of([transform])
     try:
@@ -128,6 +129,7 @@ def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str
                     continue
                 raise source
             refuse_numbers(transform.name, source)
+            refuse_holds(transform, binding, source)
             if source.is_live:
                 spans(source)
                 leader = leading(sources)

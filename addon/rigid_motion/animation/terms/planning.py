@@ -167,7 +167,7 @@ def _ranges(every: _Spans, found: _Polynomials) -> np.ndarray:
     # Two spans may meet where there is no key.
     owners = every.owners[found.spans]
     alike = (owners[1:] == owners[:-1]) & (found.rows[1:] == found.rows[:-1])
-    opens[1:] |= alike & (found.last[:-1] == found.first[1:])
+    opens[1:] |= alike & (found.last[:-1] == found.first[1:]) & ~closes[:-1]
     first = np.where(opens, _after(found.first), found.first)
     return np.stack([first, np.where(closes, _before(found.last), found.last)], 1)
 

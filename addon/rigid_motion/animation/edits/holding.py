@@ -1,0 +1,406 @@
+"""Holding things: in which space keys are, and over how many frames something passes from one holder to the next.
+
+For targets, and what is refused, see `apply`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_n as n_
+from mathutils import Euler, Matrix, Quaternion
+
+from ..actions.channels import key_points
+from ..actions.marks import hold, read_holds, read_marks, write_holds, write_marks
+from ..actions.reading import is_marked
+from ..actions.slots import Binding, bindings_of
+from ..evaluation.components import AXIS_ANGLE, LOCATION, MODE_NUMBERS, PART_OF, REST, ROTATION, ROWS, SCALE
+from ..evaluation.differences import seen_values
+from ..evaluation.runs import MOST_FRAMES
+from ..evaluation.sources import SAME_FRAME, Marks, Source
+from ..following import follower
+from ..holds.holders import Holder, add_holder, channel_space, holders_of
+from ..holds.problems import STAYS, refuse_holder, refuse_motion
+from ..queries.keyed import active_binding, modes_in, source_of
+from ..queries.segments import frame_in_action
+from ..transforms import WIDTHS, Refused, Transform, transform_of
+from .apply import Readings, Target, apply_edit, editable_binding
+
+HAND_TO_HAND = 4
+"""Frames over which something passes from hand to hand, where nothing else is said. All else is at once."""
+
+DEFAULT_MODE = "motor_spline"
+"""The mode of the keys of something that is held, where they have none."""
+
+NOT_HELD_YET = n_("{name} is not passed on frame {frame:g} or later: hold it in something first (Hold In)")
+NOT_SHOWN = n_("{name} is hidden or excluded, and Blender does not know where it is: show it first")
+NO_SUCH_BONE = n_("{holder} has no bone {bone}: give the name of one of its pose bones")
+NOT_HELD = n_("{name} is held in nothing, so there is no grip to match: hold it first (Hold In)")
+PASSING = n_(
+    "{name} passes from one holder to the next on frame {frame:g}: key it before or behind, or let it pass at once"
+)
+NO_GRIP = n_("{name} was not held in {holder} before frame {frame:g}, so there is no grip to match")
+FRAMES = n_("{frames} is no number of frames to pass over: give a whole number from 0 to {most}")
+
+
+@dataclass(frozen=True)
+class HoldFacts:
+    """What there is to tell of how something is held on the frame that is shown."""
+
+    holders: tuple[Holder, ...]
+    """What it has been held in."""
+
+    now: Holder | None
+    """What holds it, None where nothing does."""
+
+    switch: float | None
+    """The frame of the key at which it is passed on: on this frame, or the next one."""
+
+    frames: int
+    """Over how many frames that is."""
+
+    apart: float | None
+    """How far apart both holders carry it on this frame, where it is the one of the switch; in Blender's units."""
+
+    turned: float | None
+    """And by what angle, in radians."""
+
+
+def hold_in(
+    prop: Target,
+    holder: bpy.types.Object | bpy.types.PoseBone | None,
+    bone: str | None = None,
+    *,
+    frames: int | None = None,
+) -> None:
+    """Key something on the frame that is shown in the space of a holder. It stays where it is seen.
+
+    What has no key before, or moves, gets one on the frame before, too: until then it moves as it did, but that smooth
+    paths end there. Its keys without a mode get *Smooth Screw*.
+
+    Parameters
+    ----------
+    prop
+        An object or a pose bone.
+    holder
+        An object or a pose bone. None lets go: the key is in the space of the prop's parent, or the world.
+    bone : str, optional
+        The name of a bone of the holder.
+    frames : int, optional
+        Over how many frames before the key it passes from what held it before: 4 from one holder to another, and 0,
+        at once, where it is picked up or let go.
+
+    Raises
+    ------
+    Refused
+        Where the holder follows the prop, or the prop repeats or is linked.
+    """
+    target, name = _target(holder, bone)
+
+    def plan(transform: Transform, readings: Readings) -> Source | None:
+        if frames is not None:
+            _refuse_frames(frames)
+        binding = active_binding(transform, [one for one, _ in readings])
+        source = next((source for one, source in readings if one is binding), None)
+        if isinstance(source, Refused):
+            raise source
+        if target is not None:
+            refuse_motion(transform, source)
+            for user in (transform,) if binding is None else binding.users:
+                refuse_holder(user, target, name)
+        if not transform.animated.evaluated_get(bpy.context.evaluated_depsgraph_get()).is_evaluated:
+            raise Refused(NOT_SHOWN, name=transform.name)
+        return source if source and source.channels else None
+
+    def act(transform: Transform, source: Source | None) -> None:
+        _hold(transform, source, target, name, frames)
+
+    apply_edit(prop, plan, act, None)
+
+
+def match_grip(prop: Target) -> None:
+    """Give the key of something on the frame that is shown the grip that the same holder had on it before."""
+
+    def plan(transform: Transform, readings: Readings) -> tuple[Binding, np.ndarray]:
+        binding = editable_binding(transform, [one for one, _ in readings])
+        source, frame = _source_in(binding, readings), _frame(transform)
+        if not source.switches:
+            raise Refused(NOT_HELD, name=transform.name)
+        runs = source.runs
+        place = runs.index(source.run_at(frame))
+        numbers = [source.hold_at(run.stretch.first)[0] for run in runs]
+        before = [number for number in range(place) if numbers[number] == numbers[place]]
+        if not numbers[place] or not before:
+            holder = next((one.name for one in holders_of(transform) if one.number == numbers[place]), "")
+            raise Refused(NO_GRIP, name=transform.name, holder=holder or "World", frame=frame)
+        grip = runs[before[-1]].source
+        return binding, _rows_of(transform, grip, grip.keyed_range[1])
+
+    def act(transform: Transform, planned: tuple[Binding, np.ndarray]) -> None:
+        _, rows = planned
+        _key(transform, rows, ("location", transform.rotation))
+
+    apply_edit(prop, plan, act, None)
+
+
+def pass_frames(prop: Target, frames: int, *, at: float | None = None) -> None:
+    """Choose over how many frames something passes to its next holder: that of the switch on the frame that is shown.
+
+    Or else of the next switch behind it. `at` is another frame of the Action's to look from.
+    """
+    _refuse_frames(frames)
+
+    def plan(transform: Transform, readings: Readings) -> tuple[Binding, float, int]:
+        binding = editable_binding(transform, [one for one, _ in readings])
+        source, frame = _source_in(binding, readings), _frame(transform) if at is None else at
+        switch = next((one for one in source.switches if one.frame > frame - SAME_FRAME), None)
+        if switch is None:
+            raise Refused(NOT_HELD_YET, name=transform.name, frame=frame)
+        return binding, switch.frame, switch.after
+
+    def act(_: Transform, planned: tuple[Binding, float, int]) -> None:
+        binding, frame, number = planned
+        _say(binding, frame, hold(number, frames))
+
+    apply_edit(prop, plan, act, None)
+
+
+def key_seen(prop: Target, matrix: Sequence[Sequence[float]] | None = None) -> None:
+    """Key something on the frame that is shown, in what holds it, so that it is seen where a matrix of the world is.
+
+    Without a matrix (4, 4) that is where it is seen now. Blender's own *Snap*, *Apply Visual Transform*, visual keying
+    and `matrix_world =` give its channels what it has in the world, as they do with any *Child Of*: there it is not.
+    """
+
+    def plan(transform: Transform, readings: Readings) -> int:
+        binding = active_binding(transform, [one for one, _ in readings])
+        source = None if binding is None else _source_in(binding, readings)
+        if source is None or not source.channels:
+            return 0
+        frame = _frame(transform)
+        if any(switch.begin < frame < switch.frame - SAME_FRAME for switch in source.switches):
+            raise Refused(PASSING, name=transform.name, frame=frame)
+        return source.hold_at(frame)[0]
+
+    def act(transform: Transform, number: int) -> None:
+        seen = world_matrix(transform) if matrix is None else Matrix(matrix)
+        _key_seen(transform, number, seen, _frame(transform))
+
+    apply_edit(prop, plan, act, None)
+
+
+def hold_facts(prop: Target) -> HoldFacts:
+    """Return how something is held on the frame that is shown."""
+    transform = transform_of(prop)
+    source, binding = source_of(transform), active_binding(transform, bindings_of([transform]))
+    holders = () if binding is None else tuple(holders_of(transform))
+    if source is None or source.held is None or binding is None:
+        return HoldFacts(holders, None, None, 0, None, None)
+    frame, by_number = _frame(transform), {holder.number: holder for holder in holders}
+    number, _ = source.hold_at(frame)
+    switch = next((one for one in source.switches if one.frame > frame - SAME_FRAME), None)
+    apart = turned = None
+    if switch is not None and abs(switch.frame - frame) < SAME_FRAME:
+        carried = _carried(transform, source, by_number.get(switch.before), frame)
+        seen = world_matrix(transform)
+        if carried is not None:
+            apart = (carried.translation - seen.translation).length
+            turned = carried.to_quaternion().rotation_difference(seen.to_quaternion()).angle
+    frames = 0 if switch is None else source.hold_at(switch.frame)[1]
+    return HoldFacts(holders, by_number.get(number), None if switch is None else switch.frame, frames, apart, turned)
+
+
+def world_matrix(transform: Transform) -> Matrix:
+    """Return where something is seen on the frame that is shown."""
+    evaluated = transform.animated.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    if not transform.is_part:
+        return evaluated.matrix_world.copy()
+    return evaluated.matrix_world @ cast(Any, evaluated.pose).bones[transform.carrier.name].matrix
+
+
+def _target(holder: object, bone: str | None) -> tuple[bpy.types.Object | None, str]:
+    """Return the object and the name of the bone, "" for none, that something is to be held in."""
+    if isinstance(holder, bpy.types.PoseBone):
+        return cast(bpy.types.Object, holder.id_data), holder.name
+    if holder is not None and not isinstance(holder, bpy.types.Object):
+        raise TypeError(f"neither an object nor a pose bone: {holder!r}")
+    if holder is not None and bone and (holder.pose is None or bone not in holder.pose.bones):
+        raise Refused(NO_SUCH_BONE, holder=holder.name, bone=bone)
+    return holder, bone or ""
+
+
+def _refuse_frames(frames: int) -> None:
+    if isinstance(frames, bool) or not isinstance(frames, int) or not 0 <= frames <= MOST_FRAMES:
+        raise Refused(FRAMES, frames=frames, most=MOST_FRAMES)
+
+
+def _source_in(binding: Binding, readings: Readings) -> Source:
+    source = next(source for one, source in readings if one is binding)
+    if isinstance(source, Refused):
+        raise source
+    return source
+
+
+def _frame(transform: Transform) -> float:
+    """Return the frame that is shown, as the Action has it."""
+    return frame_in_action(transform.animated, cast(bpy.types.Scene, bpy.context.scene).frame_current_final)
+
+
+def _hold(
+    transform: Transform, source: Source | None, target: bpy.types.Object | None, bone: str, frames: int | None
+) -> None:
+    """Key a transform, which is keyed so, in the space of a holder on the frame that is shown."""
+    seen, frame = world_matrix(transform), _frame(transform)
+    before = 0 if source is None else source.hold_at(frame - 2 * SAME_FRAME)[0]
+    if _needs_key_before(source, frame):
+        rows = _rows_of(transform, source, frame - 1.0)
+        _key(transform, rows, ("location", transform.rotation), frame - 1.0)
+        # As any key that is inserted, it leaves the motion as it is.
+        follower.refresh([transform])
+    binding = _binding_of(transform)
+    number = 0 if target is None else add_holder(binding, target, bone)
+    _key_seen(transform, number, seen, frame)
+    binding = _binding_of(transform)
+    _let_go_of_handles(binding, frame)
+    _mark_all(binding, None if source is None else source.held)
+    if frames is None:
+        frames = HAND_TO_HAND if before and number and before != number else 0
+    _say(binding, frame, hold(number, frames if number != before else 0))
+    following = (
+        None if source is None else next((one for one in source.switches if one.frame > frame + SAME_FRAME), None)
+    )
+    if following is not None and following.begin < frame:
+        # It was passing over already: now it does so from here on.
+        _say(binding, following.frame, hold(following.after, int(following.frame - frame)))
+
+
+def _key_seen(transform: Transform, number: int, seen: Matrix, frame: float) -> None:
+    """Key a transform in the space of the holder of a number so that it is where a matrix of the world is."""
+    holder = next((holder for holder in holders_of(transform) if holder.number == number), None)
+    if holder is not None:
+        matrix = holder.matrix(bpy.context.evaluated_depsgraph_get()).inverted() @ seen
+    else:
+        matrix = _converted(transform, seen, "WORLD", "LOCAL")
+    rows = _components(transform, matrix)
+    paths = ["location", transform.rotation]
+    if not np.allclose(rows[ROWS[SCALE]], transform.components()[ROWS[SCALE]], rtol=1e-4):
+        paths.append("scale")
+    _key(transform, rows, paths, frame)
+
+
+def _needs_key_before(source: Source | None, frame: float) -> bool:
+    """Return whether something has no key before a frame, or is not at rest since the last one."""
+    keys = np.empty(0) if source is None else source.keyed_frames
+    keys = keys[keys < frame - SAME_FRAME]
+    if source is None or not len(keys):
+        return True
+    first, last = seen_values(source, np.array([keys[-1], max(frame - 1.0, keys[-1])])).T
+    return bool(np.abs(last - first).max() > STAYS)
+
+
+def _rows_of(transform: Transform, source: Source | None, frame: float) -> np.ndarray:
+    """Return the components (10,) that a transform has on a frame by a source. What has no keys there is as it is."""
+    rows = transform.components()
+    if source is not None:
+        is_keyed = [PART_OF[row] in source.keyed for row in range(len(rows))]
+        rows[is_keyed] = seen_values(source, np.array([frame]))[is_keyed, 0]
+    return rows
+
+
+def _carried(transform: Transform, source: Source, holder: Holder | None, frame: float) -> Matrix | None:
+    """Return where a holder carries something on the frame that is shown, which is that of a switch."""
+    run = next((run for run in source.runs if run.stretch.until > frame - SAME_FRAME), None)
+    if run is None:
+        return None
+    matrix = _matrix(transform, _rows_of(transform, run.source, float(run.moments(np.array([frame]))[0])))
+    if holder is not None:
+        return holder.matrix(bpy.context.evaluated_depsgraph_get()) @ matrix
+    return _converted(transform, matrix, "LOCAL", "WORLD")
+
+
+def _converted(transform: Transform, matrix: Matrix, first: str, second: str) -> Matrix:
+    """Return a matrix between the world and the space of the channels where nothing holds a transform."""
+    obj = transform.animated
+    if transform.is_part:
+        spaces: dict[str, Any] = {"pose_bone": transform.carrier, "from_space": first, "to_space": second}
+        return obj.convert_space(matrix=matrix, **spaces)
+    # Blender's local space of an object is another one without a parent, or on a bone.
+    space = channel_space(transform, bpy.context.evaluated_depsgraph_get())
+    return space @ matrix if second == "WORLD" else space.inverted() @ matrix
+
+
+def _matrix(transform: Transform, rows: np.ndarray) -> Matrix:
+    """Return the matrix of components (10,), in the space of the channels."""
+    first, rotation = rows[ROWS[ROTATION]].tolist(), cast(Any, None)
+    if transform.order is None:
+        rotation = Quaternion(first).normalized()
+    elif transform.order == AXIS_ANGLE:
+        rotation = Quaternion(first[1:], first[0])
+    else:
+        rotation = Euler(first[:3], transform.order)
+    return Matrix.LocRotScale(rows[ROWS[LOCATION]].tolist(), rotation, rows[ROWS[SCALE]].tolist())
+
+
+def _components(transform: Transform, matrix: Matrix) -> np.ndarray:
+    """Return the components (10,) of a matrix, its rotation near to what the transform has."""
+    location, rotation, scale = matrix.decompose()
+    result, had = REST.copy(), transform.components()[ROWS[ROTATION]].tolist()
+    result[ROWS[LOCATION]], result[ROWS[SCALE]] = location, scale
+    if transform.order is None:
+        rotation.make_compatible(Quaternion(had))
+        result[ROWS[ROTATION]] = rotation
+    elif transform.order == AXIS_ANGLE:
+        axis, angle = rotation.to_axis_angle()
+        result[3], result[4:7] = angle, axis
+    else:
+        result[3:6] = rotation.to_euler(cast(Any, transform.order), Euler(had[:3], transform.order))
+    return result
+
+
+def _key(transform: Transform, rows: np.ndarray, paths: Iterable[str], frame: float | None = None) -> None:
+    """Key components (10,) of a transform as Blender does it by hand, on a frame of its Action: else the one shown."""
+    scene_frame, data = cast(bpy.types.Scene, bpy.context.scene).frame_current_final, transform.animated.animation_data
+    if frame is not None:
+        scene_frame = frame if data is None else data.nla_tweak_strip_time_to_scene(frame)
+    starts = {prop: ROWS[part].start for part, prop in transform.properties.items()}
+    group = transform.carrier.name if transform.is_part else "Object Transforms"
+    for path in paths:
+        setattr(transform.carrier, path, rows[starts[path] :][: WIDTHS[path]])
+        transform.carrier.keyframe_insert(path, frame=scene_frame, group=group)
+
+
+def _binding_of(transform: Transform) -> Binding:
+    """Return what moves a transform by its own Action."""
+    return next(one for one in bindings_of([transform]) if one.slot.plays_in(transform.animated))
+
+
+def _mark_all(binding: Binding, held: Marks | None) -> None:
+    """Have all keys say a mode and what they are held in: so far by others, or by none."""
+    is_new = not is_marked(binding)
+    for fcurve in filter(lambda fcurve: fcurve.keyframe_points, binding.moving.values()):
+        frames = key_points(fcurve)[:, 0].astype(np.float64)
+        modes = np.full(len(frames), MODE_NUMBERS[DEFAULT_MODE]) if is_new else modes_in(binding, frames)
+        marks, holds = read_marks(fcurve), read_holds(fcurve)
+        write_marks(fcurve, np.where(marks, marks, modes + 1))
+        said = np.zeros(len(frames), int) if held is None else held.at(frames)
+        write_holds(fcurve, np.where(holds >= 0, holds, said))
+
+
+def _let_go_of_handles(binding: Binding, frame: float) -> None:
+    """Have Blender set the handles of the keys on a frame: those that there were are in another space."""
+    for fcurve in binding.moving.values():
+        for key in fcurve.keyframe_points:
+            if abs(key.co.x - frame) < SAME_FRAME:
+                key.handle_left_type = key.handle_right_type = "AUTO_CLAMPED"
+        fcurve.update()
+
+
+def _say(binding: Binding, frame: float, code: int) -> None:
+    """Have the keys on a frame say a hold: see `marks.hold`."""
+    for fcurve in filter(lambda fcurve: fcurve.keyframe_points, binding.moving.values()):
+        is_there = np.abs(key_points(fcurve)[:, 0] - frame) < SAME_FRAME
+        write_holds(fcurve, np.where(is_there, code, read_holds(fcurve)))

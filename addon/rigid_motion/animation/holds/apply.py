@@ -1,0 +1,246 @@
+"""From what keys say they are held in to the constraints: their influences, and the poses in which things arrive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix, Quaternion, Vector
+
+from ..actions.channels import ensure_group, key_points, replace_keys
+from ..actions.slots import Binding
+from ..evaluation.components import AXIS_ANGLE, LOCATION, PART_OF, ROTATION, ROWS, SCALE
+from ..evaluation.sources import Source
+from ..fcurves.keys import BEZIER, CONSTANT, LINEAR
+from ..transforms import GROUP, Channel, Transform
+from .dependencies import follows
+from .holders import (
+    KINDS,
+    Constraint,
+    Holder,
+    add_constraint,
+    add_passing,
+    channel_of,
+    constraints_to,
+    hang_of,
+    holders_of,
+    is_ours,
+    keep_space,
+    known_holder,
+    node_of,
+    passings_in,
+    passings_of,
+    spoken_of,
+)
+from .keying import InfluenceKeys, Passing, holding_keys, passing, passing_keys
+
+NEAR = 1e-4
+"""Frames of handles, and angles, that differ by less are the same."""
+
+
+def has_holders(binding: Binding) -> bool:
+    """Return whether any user of a binding has constraints of ours."""
+    return any(is_ours(constraint) for user in binding.users for constraint in user.carrier.constraints)
+
+
+def apply_holds(binding: Binding, source: Source, *, may_key: bool = True) -> bool:
+    """Have the constraints of a transform hold it as its keys say. Returns whether anything was changed.
+
+    Unless `may_key`, keys are only moved, for Blender remembers where in memory they are: what else there is to do is
+    done later.
+    """
+    if source.held is None and not has_holders(binding):
+        return False
+    if not source.channels:
+        # As it has no keys it stays in what it is held in now.
+        return may_key and _release(binding)
+    if may_key:
+        changed = _complete(binding, source)
+    elif not all(_is_complete(user, source, binding) for user in binding.users):
+        return False
+    else:
+        changed = False
+    holding, passings = _of_all(binding, constraints_to), _of_all(binding, lambda user: _passings(user, binding))
+    for keys_for, constraints in ((holding_keys, holding), (passing_keys, passings)):
+        for number, constraint in constraints.items():
+            changed |= _key(binding, channel_of(binding.users[0], constraint), keys_for(source, number), may_key)
+    none = InfluenceKeys(np.array([source.keyed_range[0]]), np.zeros(1), np.full(1, CONSTANT))
+    for user in binding.users:
+        ours = _passings(user, binding).values()
+        # Those that pass in another Action do not in this one, whatever keys that came from there say.
+        for constraint in (item for item in passings_of(user) if item not in ours):
+            changed |= _key(binding, channel_of(user, constraint), none, may_key)
+    if passings and may_key and (poses := passing(source)) is not None:
+        changed |= _arrive(binding, source, poses)
+    return changed
+
+
+def _passings(user: Transform, binding: Binding) -> dict[int, Constraint]:
+    return passings_in(user, binding.slot.action)
+
+
+def _of_all(binding: Binding, of_user: Callable) -> dict[int, Constraint]:
+    """Return the constraints of all users of a binding by numbers: those of the first that has one of it."""
+    return {number: item for user in reversed(binding.users) for number, item in of_user(user).items()}
+
+
+def channels_of(binding: Binding) -> set[Channel]:
+    """Return the channels of all constraints of ours, which have what the keys of the transforms say."""
+    ours = [(user, item) for user in binding.users for item in user.carrier.constraints if is_ours(item)]
+    return {channel_of(user, item, prop) for user, item in ours for prop in ("influence", "eval_time")}
+
+
+def _release(binding: Binding) -> bool:
+    """Remove the influences of all constraints of ours. Returns whether there were any."""
+    there = channels_of(binding) & binding.curves.keys()
+    for channel in there:
+        cast(bpy.types.ActionChannelbag, binding.channelbag).fcurves.remove(binding.curves.pop(channel))
+    return bool(there)
+
+
+def _is_complete(user: Transform, source: Source, binding: Binding) -> bool:
+    held, passed = spoken_of(source)
+    return held.keys() <= constraints_to(user).keys() and passed <= _passings(user, binding).keys()
+
+
+def _complete(binding: Binding, source: Source) -> bool:
+    """Have all users have the constraints that keys speak of, as far as holders are known, each in its own space."""
+    (held, passed), changed = spoken_of(source), False
+    for user in binding.users:
+        if not user.animated.is_editable:
+            continue
+        for number in sorted(held.keys() - constraints_to(user).keys()):
+            known = known_holder(binding, number)
+            if known is not None and not follows(
+                (cast(bpy.types.Object, known[0].target), known[0].bone), node_of(user)
+            ):
+                add_constraint(user, *known)
+                changed = True
+        holders = {0: Holder(0, None, ""), **{holder.number: holder for holder in holders_of(user)}}
+        for number in sorted((passed & holders.keys()) - _passings(user, binding).keys()):
+            fellow = _of_all(binding, lambda user: _passings(user, binding)).get(number)
+            label = f"{KINDS['ACTION']} {holders[number].name or 'World'}" if fellow is None else fellow.name
+            add_passing(user, holders[number], label)
+            changed = True
+        ours = _passings(user, binding)
+        for constraint in (*constraints_to(user).values(), *filter(None, (ours.get(0),))):
+            changed |= keep_space(constraint, user)
+    return changed
+
+
+def _key(binding: Binding, channel: Channel, keys: InfluenceKeys, may_key: bool = True) -> bool:
+    """Have an F-curve of a constraint have these keys. Returns whether it had others."""
+    if not may_key and len(binding.curves[channel].keyframe_points if channel in binding.curves else ()) != len(
+        keys.frames
+    ):
+        return False
+    fcurve, user = binding.ensure_curve(channel), binding.users[0]
+    if fcurve.group is None and may_key:
+        fcurve.group = ensure_group(
+            cast(bpy.types.ActionChannelbag, binding.channelbag), user.carrier.name if user.is_part else GROUP
+        )
+    points = fcurve.keyframe_points
+    desired = np.column_stack((keys.frames, keys.values)).astype(np.float32)
+    eases = np.flatnonzero(keys.interpolations == BEZIER)
+    third = (desired[eases + 1, 0] - desired[eases, 0]) / 3
+    level = np.column_stack((third, np.zeros(len(eases))))
+    handles = [("right", eases, level), ("left", eases + 1, -level)]
+    codes = np.empty(len(points), np.int32)
+    points.foreach_get("interpolation", codes)
+    if (
+        np.array_equal(codes, keys.interpolations)
+        and np.array_equal(key_points(fcurve), desired)
+        and all(
+            np.abs(key_points(fcurve, f"handle_{side}")[at] - desired[at] - off).max(initial=0) < NEAR
+            for side, at, off in handles
+        )
+    ):
+        return False
+    if may_key:
+        replace_keys(fcurve, keys.frames, keys.values, interpolation=keys.interpolations)
+    else:
+        points.foreach_set("co", desired.ravel())
+        points.foreach_set("interpolation", keys.interpolations.astype(np.int32))
+    for side, places, offs in handles:
+        for place, off in zip(places.tolist(), offs.tolist(), strict=True):
+            setattr(points[place], f"handle_{side}_type", "FREE")
+            setattr(points[place], f"handle_{side}", points[place].co + Vector(off))
+    if may_key:
+        fcurve.update()
+    return True
+
+
+def _arrive(binding: Binding, source: Source, poses: Passing) -> bool:
+    """Have the constraints that pass show the poses in which something arrives."""
+    slot, changed, last = _slot_of(binding), False, int(np.ceil(poses.frames[-1]))
+    strip: Any = binding.slot.action.layers[0].strips[0]
+    bag = strip.channelbag(slot, ensure=True)
+    user = binding.users[0]
+    # What has no keys is as it is.
+    lacking = [PART_OF[row] not in source.keyed for row in range(len(poses.rows))]
+    poses.rows[lacking] = user.components()[lacking, None]
+    rows = _in_spaces(user, poses, {holder.number: holder.offset for holder in holders_of(user)})
+    values = {channel: rows[row] for row, channel in user.channels.items()}
+    if not user.is_part and user.order is None:
+        # Action constraints turn objects by a delta quaternion without a length, which is half a turn about x.
+        identity = np.ones(1), *np.zeros((3, 1))
+        values |= {("delta_rotation_quaternion", index): one for index, one in enumerate(identity)}
+    for (path, index), numbers in values.items():
+        fcurve = bag.fcurves.find(path, index=index) or bag.fcurves.new(path, index=index)
+        frames, there = poses.frames[: len(numbers)], key_points(fcurve)
+        desired = np.column_stack((frames, numbers))
+        if there.shape != desired.shape or not np.allclose(there, desired, rtol=0.0, atol=1e-7):
+            replace_keys(fcurve, frames, numbers)
+            changed = True
+    for user in binding.users:
+        for number, constraint in _passings(user, binding).items():
+            if (keys := poses.clocks.get(number)) is not None:
+                clock = InfluenceKeys(keys[:, 0], keys[:, 1] / last, np.full(len(keys), LINEAR))
+                changed |= _key(binding, channel_of(user, constraint, "eval_time"), clock)
+            shows = binding.slot.action, slot, 0, last
+            if (constraint.action, constraint.action_slot, constraint.frame_start, constraint.frame_end) != shows:
+                constraint.action, constraint.action_slot = binding.slot.action, slot
+                constraint.frame_start, constraint.frame_end = 0, last
+                changed = True
+    return changed
+
+
+def _in_spaces(user: Transform, poses: Passing, offsets: dict[int, Matrix]) -> np.ndarray:
+    """Return poses (10, m) as constraints see them, in whose spaces those of the channels are at these offsets."""
+    rows = poses.rows.copy()
+    for number, offset in {0: hang_of(user), **offsets}.items():
+        at = np.flatnonzero(poses.numbers == number)
+        if len(at) and offset != Matrix():
+            axes, turn = np.array(offset.to_3x3()), offset.to_quaternion()
+            places = axes @ rows[ROWS[LOCATION], at] + np.array(offset.translation)[:, None]
+            rows[ROWS[LOCATION], at] = places
+            rows[ROWS[SCALE], at] *= abs(np.linalg.det(axes)) ** (1 / 3)
+            if turn.angle > NEAR:
+                rows[ROWS[ROTATION], at] = _turned(rows[ROWS[ROTATION], at], turn, user.order)
+    return rows
+
+
+def _turned(rotations: np.ndarray, turn: Quaternion, order: str | None) -> np.ndarray:
+    """Return rotations (4, m) by channels of an order, turned by another one."""
+    result = rotations.copy()
+    for column, values in zip(result.T, rotations.T.tolist(), strict=True):
+        if order is None:
+            column[:] = turn @ Quaternion(values)
+        elif order == AXIS_ANGLE:
+            axis, angle = (turn @ Quaternion(values[1:], values[0])).to_axis_angle()
+            column[0], column[1:] = angle, axis
+        else:
+            column[:3] = (turn @ Euler(values[:3], order).to_quaternion()).to_euler(
+                cast(Any, order), Euler(values[:3], order)
+            )
+    return result
+
+
+def _slot_of(binding: Binding) -> bpy.types.ActionSlot:
+    """Return the slot with the poses in which what a slot moves arrives, made where there is none yet."""
+    action = binding.slot.action
+    own = next(slot for slot in action.slots if slot.handle == binding.slot.handle)
+    name = f"{own.name_display} passing"
+    return next((slot for slot in action.slots if slot.name_display == name), None) or action.slots.new("OBJECT", name)

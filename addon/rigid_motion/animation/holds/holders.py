@@ -1,0 +1,317 @@
+"""What a transform is held in: the constraints of ours, which the keys tell apart by numbers.
+
+A constraint has its number itself, where it means nothing: one that passes for the name of a bone of no object, one
+that holds in the last row of its inverse. So it stays ours when it is renamed, and goes where it is copied; and the
+F-curves of its influence may be deleted.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any, NamedTuple, cast
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_n as n_
+from mathutils import Matrix
+
+from ..actions.marks import MOST, hold
+from ..actions.slots import Binding, slots_alone
+from ..evaluation.sources import Source
+from ..transforms import Channel, Refused, Transform, transform_of
+from .dependencies import Node
+
+Constraint = Any
+"""A *Child Of* or *Action* constraint, which have different properties."""
+
+KINDS = {"CHILD_OF": "Held In", "ACTION": "Pass To"}
+"""The types of our constraints, and how their names begin."""
+
+_NUMBER = re.compile(r"rigid_motion (\d+)")
+
+_ONE = 2.0**-100
+"""What stands for 1 in the last row of an inverse: nothing, in any product that Blender makes with it."""
+
+ROUNDING = 1e-5
+"""Scales that differ from one by less do so for rounding."""
+
+TOO_MANY = n_("{name} has had {most} holders, and keys cannot tell more apart: remove constraints that hold nothing")
+
+
+def world_of(obj: bpy.types.Object, bone: str, depsgraph: bpy.types.Depsgraph) -> Matrix:
+    """Return where an object or one of its bones is, "" for none."""
+    evaluated = obj.evaluated_get(depsgraph)
+    matrix = evaluated.matrix_world
+    return matrix @ cast(bpy.types.Pose, evaluated.pose).bones[bone].matrix if bone else matrix.copy()
+
+
+def hang_of(user: Transform) -> Matrix:
+    """Return where the space of a transform's channels is in what `own_space` says."""
+    obj = user.animated
+    if not _hangs_on_bone(user):
+        return Matrix()
+    bone = cast(Any, obj.parent).data.bones[obj.parent_bone]
+    end = bone.matrix_local.inverted() if bone.use_relative_parent else Matrix.Translation((0.0, bone.length, 0.0))
+    return end @ obj.matrix_parent_inverse
+
+
+def channel_space(user: Transform, depsgraph: bpy.types.Depsgraph) -> Matrix:
+    """Return where the space of a transform's channels is in the world where nothing holds it.
+
+    Of bones some inherit location otherwise than rotation; theirs is that of a bone at rest.
+    """
+    obj = user.animated
+    if user.is_part:
+        bone = cast(bpy.types.PoseBone, user.carrier)
+        return obj.convert_space(pose_bone=bone, matrix=Matrix(), from_space="LOCAL", to_space="WORLD")
+    if obj.parent is None:
+        return Matrix()
+    if _hangs_on_bone(user):
+        return world_of(obj.parent, obj.parent_bone, depsgraph) @ hang_of(user)
+    return world_of(obj.parent, "", depsgraph) @ obj.matrix_parent_inverse
+
+
+class Holder(NamedTuple):
+    """What something can be held in."""
+
+    number: int
+    """What keys say that are held in it; 0 is the parent of the transform or the world."""
+
+    target: bpy.types.Object | None
+    bone: str
+    """The name of a bone of the target, "" for none."""
+
+    offset: Matrix = Matrix()
+    """Where the space of channels is in it. Channels keep their units: so it takes out the scale that the holder had
+    when it first held something, and has that of their own parent."""
+
+    @property
+    def name(self) -> str:
+        """The name for menus and messages."""
+        if self.target is None:
+            return ""
+        return self.bone or self.target.name
+
+    def matrix(self, depsgraph: bpy.types.Depsgraph) -> Matrix:
+        """Return where the space of channels is that it holds."""
+        assert self.target is not None
+        return world_of(self.target, self.bone, depsgraph) @ self.offset
+
+
+def number_of(constraint: Constraint) -> int | None:
+    """Return the number of the holder that a constraint of ours is to; None where it is none of ours."""
+    if constraint.type == "CHILD_OF":
+        number = constraint.inverse_matrix[3][0] / _ONE
+        return int(number) if 1.0 <= number <= MOST else None
+    found = _NUMBER.fullmatch(constraint.subtarget) if constraint.type == "ACTION" else None
+    return int(found[1]) if found else None
+
+
+def is_ours(constraint: Constraint) -> bool:
+    """Return whether a constraint is one of those that hold and pass."""
+    return number_of(constraint) is not None
+
+
+def constraints_to(user: Transform) -> dict[int, Constraint]:
+    """Return the constraints that hold a transform, by the numbers of their holders."""
+    ours = [(number_of(item), item) for item in user.carrier.constraints if item.type == "CHILD_OF"]
+    return {number: constraint for number, constraint in reversed(ours) if number is not None}
+
+
+def passings_of(user: Transform) -> list[Constraint]:
+    """Return the constraints that pass a transform on, of all its Actions."""
+    return [item for item in user.carrier.constraints if item.type == "ACTION" and is_ours(item)]
+
+
+def passings_in(user: Transform, action: bpy.types.Action) -> dict[int, Constraint]:
+    """Return the constraints that pass a transform on in an Action, by the numbers of those that they pass it to.
+
+    Strips may have others: each constraint shows the poses of one Action. One of an Action that the transform no longer
+    moves by is any's.
+    """
+    others = {slot.action for slot in slots_alone(user.animated)} - {action}
+    ours = [(number_of(item), item) for item in passings_of(user) if item.action not in others]
+    return {number: item for number, item in ours if number is not None}
+
+
+def channel_of(user: Transform, constraint: Constraint, prop: str = "influence") -> Channel:
+    """Return the channel of a property of a constraint."""
+    return f'{user.prefix}constraints["{bpy.utils.escape_identifier(constraint.name)}"].{prop}', 0
+
+
+def holders_of(user: Transform) -> list[Holder]:
+    """Return what a transform has been held in, by its constraints, in the order of their numbers."""
+    result = []
+    for number, constraint in sorted(constraints_to(user).items()):
+        offset = constraint.inverse_matrix.copy()
+        offset[3][0] = 0.0
+        result.append(Holder(number, constraint.target, constraint.subtarget, offset @ hang_of(user)))
+    return result
+
+
+def add_holder(binding: Binding, target: bpy.types.Object, bone: str) -> int:
+    """Have the transforms of a binding be able to be held in something, and return the number of that.
+
+    Where possible it is that which others know it by, so that keys may be pasted from one to another.
+    """
+    taken = {number for user in binding.users for number in constraints_to(user)}
+    for holder in holders_of(binding.users[0]):
+        if (holder.target, holder.bone) == (target, bone):
+            return holder.number
+    known = [holder.number for holder in _all_holders() if (holder.target, holder.bone) == (target, bone)]
+    elsewhere = {holder.number for holder in _all_holders()}
+    choices = [*known, *(n for n in range(1, MOST) if n not in elsewhere), *range(1, MOST)]
+    number = next((number for number in choices if number not in taken), None)
+    if number is None:
+        raise Refused(TOO_MANY, name=binding.name, most=MOST - 1)
+    label = f"{KINDS['CHILD_OF']} {bone or target.name}"
+    while any(label in user.carrier.constraints for user in binding.users):
+        label += "'"
+    added = [(user, add_constraint(user, Holder(number, target, bone), label)) for user in binding.users]
+    if not target.evaluated_get(bpy.context.evaluated_depsgraph_get()).is_evaluated:
+        # What was hidden is evaluated now that something depends on it.
+        cast(bpy.types.ViewLayer, bpy.context.view_layer).update()
+        for user, constraint in added:
+            set_offset(constraint, user, number)
+    return number
+
+
+def own_space(user: Transform) -> tuple[str, bpy.types.Object | None, str]:
+    """Return the space that the channels of a transform are in where nothing holds it: its kind, object and bone.
+
+    Blender's local space of an object knows its parent, but not the bone. Things without parents are in the world
+    anyway, and in a space of their own where they have delta transforms.
+    """
+    if _hangs_on_bone(user):
+        return "CUSTOM", user.animated.parent, user.animated.parent_bone
+    return "LOCAL" if user.is_part or user.animated.parent is not None else "WORLD", None, ""
+
+
+def known_holder(binding: Binding, number: int) -> tuple[Holder, str] | None:
+    """Return the holder that keys of a transform speak of, which has no constraint to it, and the name of one.
+
+    That is what the other users of the slot are held in, or what all others of this number are.
+    """
+    for other in binding.users:
+        if (constraint := constraints_to(other).get(number)) is not None and constraint.target is not None:
+            return Holder(number, constraint.target, constraint.subtarget), constraint.name
+    known = {holder[:3]: holder for holder in _all_holders() if holder.number == number and holder.target is not None}
+    if len(known) != 1:
+        return None
+    (holder,) = known.values()
+    return holder, f"{KINDS['CHILD_OF']} {holder.name}"
+
+
+def _all_holders() -> Iterator[Holder]:
+    """Yield what anything in the file is held in."""
+    for obj in bpy.data.objects:
+        for carrier in (obj, *(() if obj.pose is None else obj.pose.bones)):
+            if len(carrier.constraints):
+                yield from holders_of(transform_of(carrier))
+
+
+def add_constraint(user: Transform, holder: Holder, label: str) -> Constraint:
+    """Have a transform be able to be held in something, as others are; or else so that its scale now is taken out."""
+    constraint = _added(user, "CHILD_OF", label)
+    constraint.target, constraint.subtarget = holder.target, holder.bone
+    constraint.set_inverse_pending, constraint.target_space = False, "WORLD"
+    keep_space(constraint, user)
+    if holder.offset == Matrix():
+        set_offset(constraint, user, holder.number)
+    else:
+        _set_inverse(constraint, holder.offset @ hang_of(user).inverted_safe(), holder.number)
+    return constraint
+
+
+def keep_space(constraint: Constraint, user: Transform) -> bool:
+    """Have a constraint see the channels of a transform as they are where nothing holds it. Returns whether it did not.
+
+    A constraint that holds, of something that hangs on another bone than before or on none, is set anew.
+    """
+    kind, obj, bone = own = own_space(user)
+    before = constraint.owner_space, constraint.space_object, constraint.space_subtarget
+    if before == own or (before[0] == kind and obj is None):
+        return False
+    constraint.owner_space = kind
+    if obj is not None:
+        constraint.space_object, constraint.space_subtarget = obj, bone
+    number = number_of(constraint) if constraint.type == "CHILD_OF" else None
+    if number is not None and "CUSTOM" in (before[0], kind) and constraint.target is not None:
+        set_offset(constraint, user, number)
+    return True
+
+
+def set_offset(constraint: Constraint, user: Transform, number: int) -> None:
+    """Set the inverse of a constraint that holds by the scale that its holder has now: see `Holder.offset`."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    there = world_of(constraint.target, constraint.subtarget, depsgraph)
+    location, rotation, _ = there.decompose()
+    # Blender turns by angles where it leaves scale out, which tremble near gimbal lock: so scale is taken out once.
+    unscaled = there.inverted_safe() @ Matrix.LocRotScale(cast(Any, location), rotation, None)
+    units = abs(channel_space(user, depsgraph).to_3x3().determinant()) ** (1 / 3)
+    _set_inverse(constraint, _without_noise(unscaled @ Matrix.Scale(units, 4)) @ hang_of(user).inverted_safe(), number)
+
+
+def _set_inverse(constraint: Constraint, inverse: Matrix, number: int) -> None:
+    inverse[3][0] = number * _ONE
+    constraint.inverse_matrix = inverse
+
+
+def _without_noise(matrix: Matrix) -> Matrix:
+    """Return a matrix without a location, and the identity for what is one but for rounding."""
+    matrix.translation = 0.0, 0.0, 0.0
+    return Matrix() if np.abs(np.array(matrix) - np.eye(4)).max() < ROUNDING else matrix
+
+
+def add_passing(user: Transform, holder: Holder, label: str) -> Constraint:
+    """Have a transform be able to pass over to a holder; to its parent or the world where that has no target."""
+    constraint = _added(user, "ACTION", label)
+    constraint.subtarget = f"rigid_motion {holder.number}"
+    # To choose how it mixes changes the space.
+    constraint.mix_mode, constraint.use_eval_time = "REPLACE", True
+    if holder.target is None:
+        keep_space(constraint, user)
+    else:
+        constraint.owner_space, constraint.space_object = "CUSTOM", holder.target
+        constraint.space_subtarget = holder.bone
+    return constraint
+
+
+def _added(user: Transform, kind: str, label: str) -> Constraint:
+    """Return a new constraint in front of all that are not ours. What holds is in front of what passes."""
+    constraints: Any = user.carrier.constraints
+    before = sum(is_ours(item) and kind in ("ACTION", item.type) for item in constraints)
+    constraint = constraints.new(kind)
+    constraint.name, constraint.show_expanded, constraint.influence = label, False, 0.0
+    constraints.move(len(constraints) - 1, before)
+    _let_go(user, channel_of(user, constraints[before]))
+    return constraints[before]
+
+
+def _let_go(user: Transform, influence: Channel) -> None:
+    """Key an influence 0 in all Actions that have none of it: where only some strips key it, others have it be 1."""
+    path, index = influence
+    for slot in slots_alone(user.animated):
+        if slot.is_editable and (bag := slot.channelbag) is not None and bag.fcurves.find(path, index=index) is None:
+            first = min((curve.range()[0] for curve in bag.fcurves if curve.keyframe_points), default=0.0)
+            bag.fcurves.new(path, index=index).keyframe_points.insert(first, 0.0)
+
+
+def _hangs_on_bone(user: Transform) -> bool:
+    obj = user.animated
+    return not user.is_part and obj.parent is not None and obj.parent_type == "BONE" and bool(obj.parent_bone)
+
+
+def node_of(user: Transform) -> Node:
+    return user.animated, user.carrier.name if user.is_part else ""
+
+
+def spoken_of(source: Source) -> tuple[dict[int, float], set[int]]:
+    """Return the numbers of the holders that keys are in, from which frame on, and of those that are passed to."""
+    if source.held is None:
+        return {}, set()
+    frames = source.keyed_frames
+    numbers = (source.held.at(frames) // hold(1)).tolist()
+    held = {number: frame for number, frame in zip(reversed(numbers), reversed(frames.tolist()), strict=True) if number}
+    return held, {switch.after for switch in source.switches if not switch.is_at_once}

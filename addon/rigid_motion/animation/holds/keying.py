@@ -1,0 +1,87 @@
+"""From what keys are held in to the keys of influences, and the poses in which things arrive."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..evaluation.differences import seen_values
+from ..evaluation.runs import SOON
+from ..evaluation.sources import Source
+from ..fcurves.keys import BEZIER, CONSTANT
+
+SAMPLES = 8
+"""How many poses a frame has of those in which something arrives that moves: renderers blur motion by such parts."""
+
+
+class InfluenceKeys(NamedTuple):
+    """The keys of an influence, n of them."""
+
+    frames: np.ndarray
+    values: np.ndarray
+    interpolations: np.ndarray
+    """Their codes. Where they are BEZIER both handles are level, a third of the segment long: a smoothstep."""
+
+
+class Passing(NamedTuple):
+    """The poses in which something arrives while it passes from one holder to another, one passing after the other."""
+
+    frames: np.ndarray
+    """On a clock of their own, from 0 on, rising, shape (m,)."""
+
+    rows: np.ndarray
+    """The channels in the space of the holder in which it arrives then, shape (10, m)."""
+
+    numbers: np.ndarray
+    """The number of that holder, shape (m,)."""
+
+    clocks: dict[int, np.ndarray]
+    """For each of these holders what the clock has at frames: both ends of each passing, shape (2 p, 2)."""
+
+
+def holding_keys(source: Source, number: int) -> InfluenceKeys:
+    """Return the keys of how far something is held in the holder of this number: not at all, or all of it."""
+    switches = source.switches
+    first = source.keyed_range[0] if source.channels else 0.0
+    frames = [first, *(switch.frame for switch in switches)]
+    holders = np.array([source.hold_at(first)[0], *(switch.after for switch in switches)])
+    values = (holders == number).astype(float)
+    changes = np.flatnonzero(np.append(True, np.diff(values) != 0.0))
+    return InfluenceKeys(np.array(frames)[changes], values[changes], np.full(len(changes), CONSTANT))
+
+
+def passing_keys(source: Source, number: int) -> InfluenceKeys:
+    """Return the keys of how far something has passed over to the holder of this number."""
+    first = source.keyed_range[0] if source.channels else 0.0
+    keys = [(first, 0.0, CONSTANT)]
+    for switch in source.switches:
+        if switch.after == number and not switch.is_at_once:
+            keys = [key for key in keys if key[0] < switch.begin]
+            keys += [(switch.begin, 0.0, BEZIER), (switch.there, 1.0, CONSTANT), (switch.frame, 0.0, CONSTANT)]
+    frames, values, codes = zip(*keys, strict=True)
+    return InfluenceKeys(np.array(frames), np.array(values), np.array(codes))
+
+
+def passing(source: Source) -> Passing | None:
+    """Return the poses in which something arrives at all holders that it passes over to; None where it does nowhere."""
+    frames, rows, numbers, clocks, clock = [], [], [], dict[int, list[tuple[float, float]]](), 0.0
+    for switch, run in zip(source.switches, source.runs[1:], strict=True):
+        if switch.is_at_once:
+            continue
+        last = switch.frame + SOON
+        inside = np.arange(np.ceil(switch.begin * SAMPLES), last * SAMPLES) / SAMPLES
+        at = np.unique(np.concatenate(((switch.begin,), inside, (switch.frame, last))))
+        values = seen_values(run.source, run.moments(at))
+        if np.ptp(values, axis=1).max() == 0.0:
+            at, values = at[[0, -1]], values[:, [0, -1]]
+        frames.append(at - switch.begin + clock)
+        rows.append(values)
+        numbers.append(np.full(len(at), switch.after))
+        ends = [(switch.begin, clock), (last, frames[-1][-1])]
+        clocks[switch.after] = [key for key in clocks.get(switch.after, ()) if key[0] < switch.begin] + ends
+        clock = float(np.ceil(frames[-1][-1])) + 1.0
+    if not frames:
+        return None
+    every = (np.concatenate(frames), np.concatenate(rows, axis=1), np.concatenate(numbers))
+    return Passing(*every, {number: np.array(keys) for number, keys in clocks.items()})

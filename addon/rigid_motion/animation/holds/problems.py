@@ -1,0 +1,66 @@
+"""What keeps something from being held as its keys say, in one sentence with the way out."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_n as n_
+
+from ..actions.slots import Binding
+from ..evaluation.components import REST
+from ..evaluation.sources import Source
+from ..transforms import Refused, Transform
+from .dependencies import follows
+from .holders import channel_of, constraints_to, node_of, passings_in, spoken_of
+
+STAYS = 1e-5
+"""Values that differ by less stand still."""
+
+ITSELF = n_("{name} cannot be held in itself: choose what holds it last, so that it is active")
+CYCLE = n_("{name} cannot be held in {holder}, which follows it: {holder} would wait for itself")
+REPEATS = n_("{name} repeats by Cycles, and cannot be held: bake the rounds to keys, or remove Cycles")
+DELTAS = n_("{name} has delta transforms: apply them first (Object > Apply > All Deltas)")
+LACKING = n_(
+    "The keys of {name} say that it is held from frame {frame:g} on, but not in what: "
+    "hold it there anew (Hold In), or undo what removed its constraint"
+)
+GONE = n_("What held {name} is gone: choose a target in its constraint {constraint}, or hold it in something else")
+MUTED = n_("{name} is not held as its keys say, for its constraint {constraint} is muted: unmute it and its influence")
+
+
+def refuse_holder(transform: Transform, target: bpy.types.Object, bone: str) -> None:
+    """Raise `Refused` where a transform cannot be held in an object or a bone of it."""
+    if (target, bone) == node_of(transform):
+        raise Refused(ITSELF, name=transform.name)
+    if follows((target, bone), node_of(transform)):
+        raise Refused(CYCLE, name=transform.name, holder=bone or target.name)
+
+
+def refuse_motion(transform: Transform, source: Source | None) -> None:
+    """Raise `Refused` where a transform that is keyed so cannot be held in anything."""
+    if source is not None and any(keys.cycles is not None for keys in source.curves):
+        raise Refused(REPEATS, name=transform.name)
+    if not np.allclose(transform.original(), REST, atol=STAYS):
+        raise Refused(DELTAS, name=transform.name)
+
+
+def refuse_holds(transform: Transform, binding: Binding, source: Source) -> None:
+    """Raise `Refused` where a transform is not held as its keys in a slot say."""
+    held, passed = spoken_of(source)
+    if not held:
+        return
+    refuse_motion(transform, source)
+    holding, passings = constraints_to(transform), passings_in(transform, binding.slot.action)
+    for number, frame in held.items():
+        constraint = holding.get(number)
+        if constraint is None:
+            raise Refused(LACKING, name=transform.name, frame=frame)
+        target, bone = constraint.target, constraint.subtarget
+        if target is None or (bone and (target.pose is None or bone not in target.pose.bones)):
+            raise Refused(GONE, name=transform.name, constraint=constraint.name)
+        refuse_holder(transform, target, bone)
+    ours = [*map(holding.get, held), *(item for number, item in passings.items() if number in passed)]
+    for constraint in filter(None, ours):
+        influence = binding.curves.get(channel_of(transform, constraint))
+        if constraint.mute or (influence is not None and influence.mute):
+            raise Refused(MUTED, name=transform.name, constraint=constraint.name)

@@ -1,0 +1,136 @@
+"""Where props have to be: what a fresh reading of their keys says, in the space of what Blender shows them held in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix
+
+from rigid_motion import animation
+from rigid_motion.animation.actions.reading import read
+from rigid_motion.animation.evaluation.components import PART_OF
+from rigid_motion.animation.evaluation.differences import seen_values
+from rigid_motion.animation.evaluation.sources import Run, Source
+from rigid_motion.animation.queries.keyed import active_binding
+from rigid_motion.animation.transforms import transform_of
+from tests.animation.keyed import Carrier, rotation_path
+from tests.animation.oracle import matrices
+
+OVER = 1e-3
+"""How far off something may be that passes over to where it moves: `test_promises` has what is promised of passes."""
+
+HALF_A_TURN = 0.02
+"""Quaternions whose cosine is less turn either way."""
+
+
+def shown(carriers: Iterable[Carrier], frames: Sequence[float]) -> list[np.ndarray]:
+    """Where Blender shows things in the world, (m, 4, 4) each. The scene returns to its frame."""
+    carriers, scene = list(carriers), bpy.context.scene
+    before, result = scene.frame_current_final, [np.empty((len(frames), 4, 4)) for _ in carriers]
+    for row, frame in enumerate(frames):
+        scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
+        for worlds, carrier in zip(result, carriers, strict=True):
+            worlds[row] = world_of(carrier)
+    scene.frame_set(int(np.floor(before)), subframe=float(before - np.floor(before)))
+    return result
+
+
+def world_of(carrier: Carrier) -> np.ndarray:
+    """Where it is shown now."""
+    evaluated = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    world = np.array(evaluated.matrix_world, float)
+    return world if carrier == carrier.id_data else world @ np.array(evaluated.pose.bones[carrier.name].matrix, float)
+
+
+def assert_held(props: Iterable[Carrier], frames: Sequence[float], tolerance: float = 1e-5) -> None:
+    """Props are shown where their keys say, to a share of what is largest, and to `OVER` while they pass over."""
+    frames = np.asarray(frames, float)
+    for prop in props:
+        expected, tolerances = expected_worlds(prop, frames, tolerance)
+        error = np.abs(shown([prop], frames)[0] - expected).max(axis=(1, 2)) / max(1.0, np.abs(expected).max())
+        worst = int((error / tolerances).argmax())
+        assert error[worst] < tolerances[worst], f"{prop!r} is off by {error[worst]:.3g} on frame {frames[worst]}"
+
+
+def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) -> tuple[np.ndarray, np.ndarray]:
+    """Where a prop has to be on frames, (m, 4, 4), and to which share of its size."""
+    transform = transform_of(prop)
+    source = read(active_binding(transform))
+    holders = {holder.number: holder for holder in animation.hold_facts(prop).holders}
+    numbers = [source.hold_at(run.stretch.first)[0] for run in source.runs]
+    spaces: dict[int, np.ndarray] = {}
+
+    def carried(place: int, chosen: np.ndarray) -> np.ndarray:
+        number, run = numbers[place], source.runs[place] if source.switches else source
+        if number not in spaces:
+            holder = holders.get(number)
+            spaces[number] = (
+                _spaces(prop, frames)
+                if holder is None
+                else _rigid(shown([holder.target.pose.bones[holder.bone] if holder.bone else holder.target], frames)[0])
+            )
+        return spaces[number][chosen] @ _poses(prop, run, frames[chosen])
+
+    result, tolerances = np.empty((len(frames), 4, 4)), np.full(len(frames), tolerance)
+    at = np.searchsorted([run.stretch.until for run in source.runs], frames, side="right")
+    for place in np.unique(at).tolist():
+        result[at == place] = carried(place, at == place)
+    for place, switch in enumerate(source.switches):
+        over = (frames > switch.begin) & (frames < switch.frame)
+        if over.any():
+            share = np.minimum((frames[over] - switch.begin) / (switch.there - switch.begin), 1.0)
+            both = zip(carried(place, over), carried(place + 1, over), share, strict=True)
+            mixed = [_between(Matrix(one), Matrix(other), s * s * (3.0 - 2.0 * s)) for one, other, s in both]
+            result[over] = [matrix for matrix, _ in mixed]
+            tolerances[over] = [OVER if is_sure else np.inf for _, is_sure in mixed]
+    return result, tolerances
+
+
+def _poses(prop: Carrier, run: Run | Source, frames: np.ndarray) -> np.ndarray:
+    order = np.argsort(frames, kind="stable")
+    rows = np.empty((10, len(frames)))
+    # What is never passed on may also go on before and behind its keys.
+    rows[:, order] = (
+        seen_values(run, frames[order])
+        if isinstance(run, Source)
+        else (seen_values(run.source, run.moments(frames[order])))
+    )
+    # What has no keys is as it is.
+    transform = transform_of(prop)
+    source = run if isinstance(run, Source) else run.source
+    for row, one in enumerate(transform.components().tolist()):
+        if PART_OF[row] not in source.keyed:
+            rows[row] = one
+    if prop.rotation_mode == "QUATERNION":
+        turned = rows[3:7].T
+    elif prop.rotation_mode == "AXIS_ANGLE":
+        turned = np.array([Matrix.Rotation(a, 4, (x, y, z)).to_quaternion() for a, x, y, z in rows[3:7].T])
+    else:
+        assert rotation_path(prop) == "rotation_euler"
+        turned = np.array([Euler(angles, prop.rotation_mode).to_quaternion() for angles in rows[3:6].T])
+    return matrices(rows[:3].T, turned, rows[7:].T)
+
+
+def _spaces(prop: Carrier, frames: np.ndarray) -> np.ndarray:
+    """The spaces of the channels of what nothing holds, (m, 4, 4)."""
+    if prop != prop.id_data:
+        return shown([prop.id_data], frames)[0] @ np.array(prop.bone.matrix_local)
+    if prop.parent is None:
+        return np.tile(np.eye(4), (len(frames), 1, 1))
+    return shown([prop.parent], frames)[0] @ np.array(prop.matrix_parent_inverse)
+
+
+def _rigid(worlds: np.ndarray) -> np.ndarray:
+    worlds[:, :3, :3] /= np.linalg.norm(worlds[:, :3, :3], axis=1, keepdims=True)
+    return worlds
+
+
+def _between(one: Matrix, other: Matrix, share: float) -> tuple[np.ndarray, bool]:
+    (place, q, size), (there, r, other_size) = one.decompose(), other.decompose()
+    alike = q.dot(r)
+    turned = q.slerp(r if alike > 0.0 else -r, share)
+    return np.array(Matrix.LocRotScale(place.lerp(there, share), turned, size.lerp(other_size, share))), abs(
+        alike
+    ) > HALF_A_TURN

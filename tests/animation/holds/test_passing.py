@@ -1,0 +1,88 @@
+"""What passes from one holder to another is where both carry it, smoothly from one to the other: by an oracle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from rigid_motion.animation import set_mode
+from rigid_motion.motion import KEYFRAME_MODES
+from tests.animation.holds.hands import HOLDERS, PROPS, by_an_object, by_fk, free, pairs, place, take
+from tests.animation.holds.oracle import Carrier, Held, Motion, apart, carried, shown
+from tests.animation.holds.runs import motion_of
+from tests.thoroughness import THOROUGH
+
+QUARTERS = np.arange(0.0, 84.0, 0.25)
+LENGTHS = 0, 1, 3, 4, 10
+MODES = "motor_spline", "dq_sclerp", "lerp_slerp", "BLENDER"
+RESTING, MOVING = 2e-6, 1e-5
+"""Metres; where channels move, what terms may be off comes on top."""
+
+
+def keys_of(prop: Carrier, frames: Sequence[float], seed: int, reach: float = 0.1) -> None:
+    """More keys of a prop, in the space that it is in then."""
+    for number, frame in enumerate(frames):
+        place(prop, 10 * seed + number, reach, frame=frame)
+
+
+def motions_of(prop: Carrier, holds: Sequence[Held], goes_on: bool = False) -> list[Motion]:
+    """How it moves in each of these by the keys there."""
+    ends = [*(hold.frame for hold in holds[1:]), np.inf]
+    passes = [goes_on, *(hold.frames > 0 for hold in holds[1:]), goes_on]
+    return [
+        motion_of(prop, -np.inf if number == 0 else hold.frame, end, comes=passes[number], goes=passes[number + 1])
+        for number, (hold, end) in enumerate(zip(holds, ends, strict=True))
+    ]
+
+
+def off(
+    prop: Carrier, twin: Carrier, holds: Sequence[Held], frames: np.ndarray = QUARTERS, goes_on: bool = False
+) -> float:
+    """How far it is from where it has to be, in metres."""
+    expected = carried(twin, holds, motions_of(prop, holds, goes_on), frames)
+    (seen,) = shown([prop], frames)
+    return apart(seen, expected)
+
+
+def juggled(prop: Carrier, holders: Sequence[Carrier], frames: Sequence[int], *, moves: bool) -> list[Held]:
+    """Something that is picked up, passed on, let go, and held once more."""
+    keys_of(prop, (1, 11) if moves else (1,), 1, 0.5)
+    holds = [Held(1, None)]
+    for at, holder, over in zip((20, 44, 66, 75), (*holders, None, holders[0]), frames, strict=True):
+        take(prop, holder, at, frames=over, seed=at)
+        holds.append(Held(at, holder, over))
+        if moves:
+            keys_of(prop, (at + 4, at + 8), at)
+    return holds
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("length", LENGTHS)
+def test_a_pass_is_the_formula(live_file, length, mode):
+    for moves in (False, True) if THOROUGH else (length % 2 == MODES.index(mode) % 2,):
+        prop, twin = free(("QUATERNION", "XYZ", "AXIS_ANGLE")[length % 3])
+        holders = by_fk("First", 11), by_an_object("Second", 31)
+        holds = juggled(prop, holders, 4 * (length,), moves=moves)
+        set_mode(prop, mode)
+        assert off(prop, twin, holds) < (MOVING if moves else RESTING)
+
+
+@pytest.mark.parametrize(("by", "what"), pairs(HOLDERS, PROPS))
+def test_all_things_pass_between_all_hands(live_file, by, what):
+    prop, twin = PROPS[what]()
+    holders = HOLDERS[by]("First", 11), HOLDERS[by]("Second", 31)
+    holds = juggled(prop, holders, (3, 4, 10, 3), moves=True)
+    # What inherits its location otherwise than its rotation has no space of its own in the world.
+    in_hands = (QUARTERS >= 20.0) & (QUARTERS < 56.0)
+    frames = QUARTERS[in_hands] if "without" in what else QUARTERS
+    assert off(prop, twin, holds, frames) < MOVING
+
+
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+def test_all_modes_move_in_hands_as_they_do_in_the_world(live_file, mode):
+    prop, twin = free("YXZ")
+    holds = juggled(prop, (by_fk("First", 11), by_an_object("Second", 31)), (0, 4, 0, 3), moves=True)
+    set_mode(prop, mode)
+    assert off(prop, twin, holds) < MOVING

@@ -1,0 +1,267 @@
+"""Whatever is edited of what is held, in whatever order, it is where its keys say, in the space that they say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+import bpy
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.stateful import initialize, invariant, precondition, rule
+
+from rigid_motion import animation
+from tests.animation.bones.rigs import Rest, new_rig
+from tests.animation.editing import EASINGS, INTERPOLATIONS, ORDERS, Editing
+from tests.animation.holds.model import assert_held, world_of
+from tests.animation.keyed import HOLD_BITS, MODE_IDS, Carrier, curves_of, key_frames, snapshot
+from tests.animation.machine import LAST, SETTINGS, goes_on, seeds, shares, while_on
+from tests.animation.scenes import key, new_object, push_down, tweak
+
+HANDS = "Hand", "Other", "Rig/Grip"
+
+
+class Holding(Editing):
+    """An animator at work on props: an object, one with a parent that moves, and a bone; and on what holds them."""
+
+    @initialize(
+        orders=st.lists(st.sampled_from(ORDERS), min_size=3, max_size=3),
+        mode=st.sampled_from(MODE_IDS),
+        seed=seeds,
+    )
+    def begin(self, orders, mode, seed):
+        bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, LAST
+        rests = (
+            Rest("Grip", (0.3, 0.0, 1.4), (0.6, 0.1, 1.3)),
+            Rest("Bone", (-0.5, 0.3, 0.2), (-0.4, 0.3, 0.6), roll=0.9),
+        )
+        rig = new_rig("Rig", rests)
+        carriers = [key(new_object(name), seed=seed + n) for n, name in enumerate(("Hand", "Other", "Parent"))]
+        carriers += [key(rig.pose.bones["Grip"], seed=seed)]
+        for obj, order in zip((new_object("Tool"), new_object("Child"), rig.pose.bones["Bone"]), orders, strict=True):
+            obj.rotation_mode = order
+            key(obj, (1.0, 13.0, 26.0, 37.0), seed=seed + 5)
+            animation.set_mode(obj, mode)
+        bpy.data.objects["Child"].parent = bpy.data.objects["Parent"]
+        self.names = ["Tool", "Child", "Rig/Bone"]
+        bpy.context.view_layer.update()
+        self._start_history()
+
+    def _found(self, name: str) -> Carrier:
+        obj, _, bone = name.partition("/")
+        return bpy.data.objects[obj].pose.bones[bone] if bone else bpy.data.objects[obj]
+
+    def _basis(self, carrier: Carrier) -> np.ndarray:
+        return world_of(carrier)
+
+    def _sharing(self, name: str) -> set[str]:
+        return {name}
+
+    def _frames_to_go_by(self, name: str) -> np.ndarray:
+        return np.empty(0)
+
+    def _keyed(self) -> dict:
+        """Without what follows from the keys, and without what they are held in, which others may come to say."""
+        result = {}
+        for name in self.names:
+            channels = snapshot(self._found(name))
+            result[name] = {
+                channel: (
+                    *rest,
+                    tuple((*k[:8], int(np.float32(k[8]).view(np.int32)) & ~HOLD_BITS, *k[9:]) for k in keys),
+                )
+                for channel, (*rest, keys) in channels.items()
+                if not channel[0].startswith("constraints")
+            }
+        return result
+
+    def _assert_shown(self, names: Sequence[str], frames: np.ndarray) -> None:
+        for prop in map(self._found, names):
+            keys = key_frames(prop)
+            # Blender's own curves go on outside of the keys.
+            inside = frames[(frames >= keys[0]) & (frames <= keys[-1])] if len(keys) and goes_on(prop) else frames
+            if len(keys) and len(inside):
+                assert_held([prop], inside)
+
+    @precondition(lambda self: self.on and self.history)
+    @invariant()
+    def nothing_is_wrong_and_nothing_is_left(self):
+        for name in self.names:
+            assert animation.problem_of(self._found(name)) == ""
+
+    @rule(who=shares, which=shares, interpolation=st.sampled_from(INTERPOLATIONS), easing=st.sampled_from(EASINGS))
+    def ease(self, who, which, interpolation, easing):
+        """Without the settings that only some eases have, for keys are marked there."""
+
+        def change(_: bpy.types.FCurve, point: bpy.types.Keyframe) -> None:
+            point.interpolation, point.easing = interpolation, easing
+
+        self._edit_keys(self._named(who), which, change)
+
+    mute_a_channel = None
+    """What is muted of a rotation leaves the rest of it to Blender, which is none of holding."""
+
+    # Holding
+
+    @while_on(who=shares, by=st.none() | st.sampled_from(HANDS), over=st.none() | st.integers(0, 9))
+    def hold(self, who, by, over):
+        """It stays where it is seen."""
+        self._in_place(who, lambda prop: animation.hold_in(prop, by and self._found(by), frames=over))
+
+    def _in_place(self, who: float, act) -> None:
+        name = self._named(who)
+        prop = self._found(name)
+        if any(curve.mute for curve in curves_of(prop).values()):
+            return
+        seen = {name: world_of(prop)}
+
+        def change() -> None:
+            with suppress(animation.Refused):
+                act(self._found(name))
+
+        self._edit(change, lambda made, after: None)
+        self._assert_in_place(seen)
+        frame = bpy.context.scene.frame_current_final
+        bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
+        self._assert_in_place(seen)
+
+    @while_on(who=shares, over=st.integers(0, 9))
+    def choose_over_how_many_frames_it_passes(self, who, over):
+        self._quietly(who, lambda prop: animation.pass_frames(prop, over))
+
+    @while_on(who=shares)
+    def match_grips(self, who):
+        self._quietly(who, animation.match_grip)
+
+    def _quietly(self, who: float, act) -> None:
+        name = self._named(who)
+
+        def change() -> None:
+            with suppress(animation.Refused):
+                act(self._found(name))
+
+        self._edit(change, lambda made, after: None)
+
+    @while_on(who=shares, which=shares, what=st.sampled_from(("delete keys", "remove", "move", "value")))
+    def tamper_with_influences(self, who, which, what):
+        name = self._named(who)
+
+        def change() -> None:
+            curves = [c for (path, _), c in curves_of(self._found(name)).items() if path.startswith("constraints")]
+            if curves:
+                fcurve = curves[int(which * len(curves))]
+                if what == "remove":
+                    animation.channelbag_of(self._found(name).id_data).fcurves.remove(fcurve)
+                elif what == "delete keys":
+                    fcurve.keyframe_points.clear()
+                elif fcurve.keyframe_points:
+                    setattr(fcurve.keyframe_points[-1].co_ui, "x" if what == "move" else "y", 17.3)
+                self._found(name).id_data.animation_data.action.update_tag()
+
+        self._edit(change)
+
+    @while_on(who=shares, which=shares, by=st.sampled_from((-3.0, 0.5, 2.0, 60.0)))
+    def retime(self, who, which, by):
+        """As the Dope Sheet does with all channels: those of influences move along."""
+        name = self._named(who)
+        frames = key_frames(self._found(name))
+        if not len(frames):
+            return
+        first = frames[int(which * len(frames))]
+
+        def change() -> None:
+            for fcurve in curves_of(self._found(name)).values():
+                for point in fcurve.keyframe_points:
+                    if point.co.x >= first - 0.005:
+                        point.co_ui.x += by
+                fcurve.update()
+
+        if by > 0.0 or not len(frames[(frames < first) & (frames > first + by - 0.1)]):
+            self._edit(change)
+
+    @while_on(which=st.sampled_from(HANDS), seed=seeds)
+    def move_a_hand(self, which, seed):
+        def change() -> None:
+            for fcurve in curves_of(self._found(which)).values():
+                fcurve.keyframe_points[seed % len(fcurve.keyframe_points)].co_ui.y += 0.1
+                fcurve.update()
+
+        self._edit(change)
+
+    @while_on(which=st.sampled_from(("Parent", "Other")), parented=st.booleans())
+    def parent_the_tool(self, which, parented):
+        def change() -> None:
+            tool, parent = bpy.data.objects["Tool"], bpy.data.objects[which]
+            tool.parent = parent if parented else None
+
+        self._edit(change)
+
+    @while_on(who=shares, order=st.sampled_from(ORDERS))
+    def name_constraints_anew(self, who, order):
+        name = self._named(who)
+
+        def change() -> None:
+            for number, constraint in enumerate(self._found(name).constraints):
+                constraint.name = f'Name "{number}" {order}'
+
+        self._edit(change)
+
+    @while_on(who=shares)
+    def make_it_single_user(self, who):
+        name = self._named(who)
+
+        def change() -> None:
+            obj = self._found(name).id_data
+            data = obj.animation_data
+            slot = data.action_slot
+            data.action = data.action.copy()
+            data.action_slot = data.action.slots[slot.identifier]
+
+        if self._found(name).id_data.animation_data.action is not None:
+            self._edit(change)
+
+    @precondition(lambda self: self.on and len(self.names) < 5)
+    @rule(who=shares, with_hand=st.booleans())
+    def duplicate(self, who, with_hand):
+        name = self._named(who).split("/")[0]
+        if name == "Rig":
+            return
+
+        def change() -> None:
+            for obj in bpy.data.objects:
+                obj.select_set(obj.name == name or (with_hand and obj.name == "Hand"))
+            bpy.context.view_layer.objects.active = bpy.data.objects[name]
+            before = set(bpy.data.objects)
+            bpy.ops.object.duplicate()
+            self.names += [obj.name for obj in set(bpy.data.objects) - before if not obj.name.startswith("Hand")]
+
+        self._edit(change)
+
+    @while_on(who=shares, start=st.integers(1, 30), scale=st.sampled_from((1.0, 2.0)), by=st.sampled_from(HANDS))
+    def hold_in_a_strip(self, who, start, scale, by):
+        """In tweak mode as anywhere, and what is seen stays as it is when the strip goes."""
+        prop = self._found(self._named(who))
+        name, obj = self._named(who), prop.id_data
+        if obj.animation_data.action is None or not len(key_frames(prop)):
+            return
+        action, slot = obj.animation_data.action, obj.animation_data.action_slot
+        strip = push_down(obj, start)
+        strip.scale = scale
+        tweak(obj, strip)
+        inside = strip.frame_start < bpy.context.scene.frame_current_final < strip.frame_end
+        bpy.context.view_layer.update()
+        before = world_of(self._found(name))
+        with suppress(animation.Refused):
+            animation.hold_in(self._found(name), self._found(by))
+        bpy.context.view_layer.update()
+        if inside:
+            assert np.abs(world_of(self._found(name)) - before).max() < 1e-5 * max(1.0, np.abs(before).max())
+        obj.animation_data.use_tweak_mode = False
+        obj.animation_data.nla_tracks.remove(obj.animation_data.nla_tracks[0])
+        self._link(obj, action, slot)
+        bpy.context.view_layer.update()
+        self._edit(lambda: None, lambda made, after: None)
+
+
+Holding.TestCase.settings = SETTINGS
+TestHolds = Holding.TestCase

@@ -1,0 +1,118 @@
+"""What is held is held by Blender alone: with the extension off, in files that never see it again, and exported."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Quaternion
+
+from rigid_motion import animation
+from tests.animation.farm import played_on_a_farm
+from tests.animation.holds.hands import HOLDERS, PROPS, by_an_object, by_fk, free
+from tests.animation.holds.oracle import Carrier, apart, shown
+from tests.animation.holds.test_passing import MOVING, QUARTERS, juggled, off
+from tests.animation.holds.test_promises import HELD, assert_held, handed_over
+from tests.animation.scenes import enabled, new_object
+from tests.animation.test_export import FORMATS, Format
+from tests.blank import blank
+
+
+@pytest.fixture
+def file_to_switch(live_file) -> Iterator[None]:
+    """A file in which the extension may be switched off; it is on again afterwards."""
+    yield
+    if not hasattr(bpy.types.Object, "rigid_motion"):
+        animation.register()
+
+
+def move_by_hand(hand: Carrier) -> None:
+    """What animators do to a hand: other keys, another place of the arm, and a constraint."""
+    rig = hand.id_data
+    rig.location, rig.rotation_euler = (0.3, -0.2, 0.1), (0.2, 0.5, -0.3)
+    for frame, turn in ((20, (0.8, 0.1, -0.3, 0.2)), (52, (0.7, -0.4, 0.1, 0.3))):
+        hand.rotation_mode = "QUATERNION"
+        hand.rotation_quaternion = Quaternion(turn).normalized()
+        hand.keyframe_insert("rotation_quaternion", frame=frame)
+    goal = new_object("Goal")
+    goal.location = 0.4, 0.4, 1.6
+    track = hand.constraints.new("DAMPED_TRACK")
+    track.target, track.influence = goal, 0.4
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize("what", PROPS)
+def test_it_follows_edits_of_the_hand_while_the_extension_is_off(file_to_switch, what):
+    prop, twin = PROPS[what]()
+    holders = by_fk("First", 11), by_fk("Second", 31)
+    handed_over(prop, *holders)
+    animation.unregister()
+    (before,) = shown([prop], HELD[0])
+    for hand in holders:
+        move_by_hand(hand)
+    assert apart(before, shown([prop], HELD[0])[0]) > 0.05
+    assert_held(prop, twin, *holders)
+
+
+def test_a_pass_follows_edits_of_the_hands_while_the_extension_is_off(file_to_switch):
+    prop, twin = free("XYZ")
+    holders = by_fk("First", 11), by_fk("Second", 31)
+    holds = juggled(prop, holders, (3, 4, 10, 3), moves=True)
+    animation.unregister()
+    for hand in holders:
+        move_by_hand(hand)
+    assert off(prop, twin, holds) < MOVING
+
+
+@pytest.mark.parametrize("by", ["FK", "IK", "scaled strip", "drivers", "scaled rig"])
+def test_files_are_played_by_a_blender_without_it_as_with_it(live_file, tmp_path, by):
+    prop, _ = PROPS["parented"]()
+    other, _ = PROPS["bone"]()
+    holders = HOLDERS[by]("First", 11), HOLDERS[by]("Second", 31)
+    for each in (prop, other):
+        handed_over(each, *holders)
+    expected = shown([prop, other], QUARTERS)
+    path = tmp_path / "held.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    rig, names = other.id_data, [bone.name for bone in other.id_data.pose.bones]
+    played = played_on_a_farm(path, [prop.name, rig.name], QUARTERS)
+    posed = played.worlds[1] @ played.poses[names.index(other.name)]
+    for one, seen in zip((played.worlds[0], posed), expected, strict=True):
+        assert np.abs(one - seen).max() < 1e-6
+
+
+def baked_out(objects: list[bpy.types.Object], path: Path, how: Format) -> dict[str, bpy.types.Object]:
+    """Export what there is and import it into a new file; the objects there by names."""
+    save, load, options, loading = how
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 80
+    save(filepath=str(path), **options)
+    blank()
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 80
+    load(filepath=str(path), **loading)
+    found = {obj.name: obj for obj in bpy.data.objects}
+    for data in (obj.animation_data for obj in found.values() if obj.animation_data):
+        for strip in (strip for track in data.nla_tracks for strip in track.strips):
+            data.action, data.action_slot = strip.action, strip.action_slot
+    return found
+
+
+@pytest.mark.parametrize("kind", ["glb", "scene.glb", "fbx"])
+def test_what_is_held_is_exported_as_it_is_seen(live_file, tmp_path, kind):
+    with enabled("io_scene_gltf2", "io_scene_fbx"):
+        prop, _ = free()
+        other, _ = PROPS["parented"]()
+        holders = by_an_object("First", 11), by_an_object("Second", 31)
+        for each in (prop, other):
+            juggled(each, holders, (3, 4, 0, 3), moves=True)
+        frames = np.arange(1.0, 81.0)
+        names = [obj.name for obj in (prop, other, *holders)]
+        expected = shown([prop, other, *holders], frames)
+        found = baked_out([prop, other], tmp_path / f"shot.{kind}", FORMATS[kind])
+        for name, one, seen in zip(names, shown([found[name] for name in names], frames), expected, strict=True):
+            moved, right = (worlds @ np.linalg.inv(worlds[:1]) for worlds in (one, seen))
+            assert np.abs(moved - right).max() < 1e-5 * max(1.0, np.abs(right).max()), name
