@@ -14,14 +14,28 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import bake, bake_poses, is_baked, reduce_keys_of, set_mode, unbake
+from rigid_motion.animation import (
+    Refused,
+    bake,
+    bake_poses,
+    bake_to_world,
+    hold_facts,
+    hold_in,
+    is_baked,
+    key_frames,
+    reduce_keys_of,
+    set_mode,
+    unbake,
+)
+from rigid_motion.animation.actions.marks import read_holds
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between
 from rigid_motion_batch.recordings.world_poses import read_poses
 from tests.animation.bones.poses import shown_of
 from tests.animation.bones.rigs import PLAYED, key_all, new_rig, select_only
 from tests.animation.bones.test_rig_edits import assert_nothing_stale
-from tests.animation.keyed import Carrier, curves_of, snapshot
+from tests.animation.held import KINDS, handled, new_hands, new_prop, worlds
+from tests.animation.keyed import Carrier, curves_of, moving_curves, snapshot
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import FRAMES, editor, enabled, key, new_object, new_strip, push_down, tweak
 
@@ -247,3 +261,115 @@ def test_what_is_kept_is_no_clip_of_an_export(live_file, tmp_path, of_bones):
     reduce_keys_of(targets, "dq_sclerp", 0.1)
     assert len(bpy.data.actions) == 3
     assert clips_of(obj, tmp_path) == before
+
+
+def holders_on(prop: Carrier, frames: tuple[float, ...] = (10, 20, 30, 39, 40, 59, 60, 85)) -> list[str | None]:
+    """The names of what holds something."""
+    result = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        now = hold_facts(prop).now
+        result.append(None if now is None else now.name)
+    return result
+
+
+def turn_a_key(hand: Carrier) -> None:
+    for fcurve in curves_of(hand).values():
+        for point in fcurve.keyframe_points:
+            point.co_ui.y += 0.3
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize("throw", [0, 1, 3])
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_held_is_baked_in_the_spaces_of_its_holders(live_file, kind, throw):
+    prop, hands = new_prop(kind), new_hands()
+    handled(prop, *hands, throw=throw)
+    before, keys, holders = worlds(prop), snapshot(prop), holders_on(prop)
+    bpy.context.scene.frame_set(33)
+    assert bake(prop) == (1.0, 80.0)
+    assert bpy.context.scene.frame_current == 33
+    assert key_frames(prop).tolist() == list(range(1, 81))
+    assert np.abs(worlds(prop) - before).max() < 1e-5
+    assert holders_on(prop) == holders == [None, "Hand.L", "Hand.L", "Hand.L", "Hand.R", "Hand.R", None, None]
+    # Every key says so itself.
+    assert all((read_holds(fcurve) >= 0).all() for fcurve in moving_curves(prop))
+    # They hold it wherever they are by now.
+    held = np.r_[20:36, 40:56]
+    local = [np.linalg.inv(worlds(hand, held)) @ worlds(prop, held) for hand in hands]
+    turn_a_key(hands[1])
+    now = [np.linalg.inv(worlds(hand, held)) @ worlds(prop, held) for hand in hands]
+    assert np.abs(now[0][:16] - local[0][:16]).max() < 1e-5
+    assert np.abs(now[1][16:] - local[1][16:]).max() < 1e-5
+    assert np.abs(worlds(prop, held) - before[held - 1]).max() > 0.01
+    unbake(prop)
+    assert snapshot(prop) == keys
+    assert holders_on(prop) == holders
+
+
+@pytest.mark.parametrize(("kind", "step"), [*((kind, 1.0) for kind in KINDS), ("bone", 7.0)])
+def test_what_is_baked_to_the_world_is_held_no_more_and_shown_as_before(live_file, kind, step):
+    prop, hands = new_prop(kind), new_hands()
+    handled(prop, *hands)
+    before, keys, holders = worlds(prop), snapshot(prop), holders_on(prop)
+    bpy.context.scene.frame_set(33)
+    assert bake_to_world(prop, step=step) == (1.0, 80.0)
+    assert bpy.context.scene.frame_current == 33
+    frames = key_frames(prop)
+    assert {1.0, 9.0, 20.0, 40.0, 60.0, 80.0} <= set(frames)
+    assert len(frames) == (80 if step == 1.0 else 19)
+    assert np.abs(worlds(prop, frames) - before[frames.astype(int) - 1]).max() < 1e-5
+    assert holders_on(prop) == [None] * len(holders)
+    turn_a_key(hands[0])
+    assert np.abs(worlds(prop, frames) - before[frames.astype(int) - 1]).max() < 1e-5
+    turn_back = worlds(hands[0])
+    unbake(prop)
+    assert np.abs(worlds(hands[0]) - turn_back).max() < 1e-6
+    assert snapshot(prop) == keys
+    assert holders_on(prop) == holders
+
+
+def test_what_is_held_to_the_end_is_baked_to_the_world_as_far_as_it_is_seen(live_file):
+    """Also with a constraint of the animator's on top, which stays."""
+    prop, hands = new_prop("free"), new_hands()
+    bpy.context.scene.frame_set(20)
+    hold_in(prop, hands[0])
+    limit = prop.constraints.new("LIMIT_LOCATION")
+    limit.use_max_z, limit.max_z = True, float(np.median(worlds(prop)[:, 2, 3]))
+    bpy.context.view_layer.update()
+    before = worlds(prop)
+    assert bake_to_world(prop) == (19.0, 90.0)
+    assert np.abs(worlds(prop) - before).max() < 1e-5
+    assert not limit.mute
+
+
+def test_what_is_held_in_what_is_held_is_baked_to_the_world_with_it_in_a_strip_that_is_entered(live_file):
+    prop, hands, other = new_prop("free"), new_hands(), new_object("Other")
+    other.location = (0.2, 0.1, 0.3)
+    handled(prop, *hands)
+    bpy.context.scene.frame_set(25)
+    hold_in(other, prop)
+    bpy.context.view_layer.update()
+    before = [worlds(one) for one in (prop, other)]
+    bake_to_world([prop, other])
+    for one, places in zip((prop, other), before, strict=True):
+        assert np.abs(worlds(one) - places).max() < 1e-5
+    unbake([prop, other])
+    tweak(prop, push_down(prop, 1))
+    bake_to_world(prop)
+    assert np.abs(worlds(prop) - before[0]).max() < 1e-5
+
+
+def test_what_cannot_be_baked_to_the_world_says_why_and_the_way_out(live_file):
+    prop, hands = new_prop("free"), new_hands()
+    with pytest.raises(Refused, match="Tool is held in nothing"):
+        bake_to_world(prop)
+    handled(prop, *hands)
+    before = snapshot(prop)
+    other = prop.copy()
+    bpy.context.scene.collection.objects.link(other)
+    for act in (bake_to_world, bake):
+        with pytest.raises(Refused, match=r"Tool moves by an Action that others have, too.*Make Single User"):
+            act(prop)
+    assert snapshot(prop) == before
+    assert not is_baked(prop)

@@ -17,6 +17,7 @@ from rigid_motion.animation import (
     bake,
     bake_poses,
     discard_dense_keys,
+    hold_facts,
     is_baked,
     is_reduced,
     key_frames,
@@ -32,9 +33,11 @@ from rigid_motion_batch.recordings import read_trajectories
 from rigid_motion_batch.recordings.world_poses import read_poses
 from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rigs import ARM, key_all, new_rig
-from tests.animation.keyed import curves_of, rotation_path, snapshot
+from tests.animation.held import KINDS, handled, new_hands, new_prop, worlds
+from tests.animation.keyed import Carrier, curves_of, rotation_path, snapshot
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, linked, new_object
+from tests.balls import largest_displacements
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 RATE = 30.0
@@ -203,6 +206,74 @@ def test_what_was_done_last_is_taken_back_first_and_the_file_keeps_dense_keys_un
             assert state() == before.pop()
             assert reduction in (None, reduction_of(obj))
     assert [action.name for action in bpy.data.actions] == ["ToolAction"]
+
+
+COARSE = 0.03
+"""For what moves wildly from one frame to the next."""
+
+
+def switches(prop: Carrier) -> list[tuple]:
+    """What something is passed to, and over how many frames, from frame to frame."""
+    result = []
+    for frame in range(1, 91):
+        bpy.context.scene.frame_set(frame)
+        facts = hold_facts(prop)
+        result.append((facts.now and facts.now.name, facts.switch, facts.frames))
+    return result
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_held_is_reduced_in_its_holders_and_passes_as_before(live_file, kind):
+    prop, hands = new_prop(kind), new_hands()
+    handled(prop, *hands, throw=0)
+    bake(prop)
+    frames = np.arange(1.0, 90.25, 0.25)
+    before, truth, keys = switches(prop), worlds(prop, frames), snapshot(prop)
+    reduction = reduce_keys_of(prop, "motor_spline", COARSE, RADIUS)
+    assert reduction.before == 80
+    assert reduction.after == len(key_frames(prop)) < 40
+    assert {20.0, 40.0, 60.0} <= set(key_frames(prop))
+    assert switches(prop) == before
+    apart = worlds(prop, frames) - truth
+    # Just before a switch it moves as far as whole frames have it.
+    # The radius is that of the scene, whatever it is scaled by.
+    turned = apart[:, :3, :3] / np.linalg.norm(truth[:, :3, :1], axis=1, keepdims=True)
+    error = largest_displacements(apart[:, :3, 3], RADIUS * turned)
+    at_once = [np.flatnonzero((frames > frame - 1.0) & (frames < frame)) for frame in (20.0, 60.0)]
+    error[np.concatenate(at_once)] = 0.0
+    assert 0.0 < error.max() <= COARSE * (1.0 + 1e-3)
+    assert reduction.largest_error <= COARSE * (1.0 + 1e-3)
+    restore_keys(prop)
+    assert snapshot(prop) == keys
+    assert switches(prop) == before
+
+
+def test_what_rests_in_a_hand_is_left_with_a_key_for_each_time(live_file):
+    prop, hands = new_prop("free"), new_hands()
+    handled(prop, *hands, throw=0)
+    for fcurve in curves_of(prop).values():
+        for point in fcurve.keyframe_points:
+            if point.co.x == 28.0:
+                fcurve.keyframe_points.remove(point)
+                break
+    bpy.context.view_layer.update()
+    bake(prop)
+    before = worlds(prop)
+    reduce_keys_of(prop, "motor_spline", TOLERANCE, RADIUS)
+    frames = key_frames(prop)
+    assert frames[(frames > 19.5) & (frames < 60.0)].tolist() == [20.0, 40.0]
+    apart = worlds(prop) - before
+    assert largest_displacements(apart[:, :3, 3], RADIUS * apart[:, :3, :3]).max() <= TOLERANCE * (1.0 + 1e-3)
+
+
+def test_what_is_held_is_not_reduced_to_a_number_of_keys(live_file):
+    prop, hands = new_prop("free"), new_hands()
+    handled(prop, *hands, throw=0)
+    bake(prop)
+    before = snapshot(prop)
+    with pytest.raises(Refused, match=r"Tool is held, and is reduced for each time.*by a tolerance"):
+        reduce_keys_of(prop, count=12)
+    assert snapshot(prop) == before
 
 
 # Where keys cannot be reduced

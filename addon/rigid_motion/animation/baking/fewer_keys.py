@@ -52,6 +52,11 @@ class FewerKeys(NamedTuple):
     rig: WholeRig | None = None
     """The result for the rig that it is, or is a bone of."""
 
+    @property
+    def after(self) -> int:
+        """On how many frames there are keys then."""
+        return count_of(self.fewer)
+
 
 def count_of(source: Source) -> int:
     """Return on how many frames a source has keys."""

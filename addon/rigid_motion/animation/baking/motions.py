@@ -170,6 +170,8 @@ class BodyMotion:
     radius : float, optional
         Of the ball around each bone's head, or around the origin of an object alone, in the scene's units. As far as
         each of them reaches where None.
+    space : array, shape (3, 3), optional
+        What takes the axes of the channels of a single joint, which may be a bone, to those of the scene.
     """
 
     def __init__(
@@ -179,6 +181,7 @@ class BodyMotion:
         sources: Mapping[int, Source],
         frames: np.ndarray,
         radius: float | None,
+        space: np.ndarray | None = None,
     ) -> None:
         self.joints, self._sources = joints, sources
         (obj, *bones), size = [joint.carrier for joint in joints], scale_in_scene(joints[0])
@@ -190,7 +193,7 @@ class BodyMotion:
         else:
             self.radii = np.array([(radius or radius_of(obj)) / size])
         self._curves = {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in slot.fcurves}
-        self._parent = AffineMaps(into_scene(joints[0]), np.zeros(3))
+        self._parent = AffineMaps(into_scene(joints[0]) if space is None else space, np.zeros(3))
         self.poses = self._look_at(frames)
         """Poses of each joint's channels, each of shape (m,)."""
         sizes = np.maximum(self.poses[0].scales / (self.poses[0].scales[0] or 1.0), LEAST_SCALE)

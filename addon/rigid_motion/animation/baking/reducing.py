@@ -11,7 +11,6 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from bpy.app.translations import pgettext_n as n_
 
@@ -22,15 +21,18 @@ from ..actions.refusals import refuse_drivers, refuse_modified
 from ..actions.slots import Binding
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
 from ..edits.mode_keys import set_mode_in
-from ..evaluation.components import MODE_NAMES, PART_OF, SCALE
+from ..evaluation.components import PART_OF, SCALE
 from ..evaluation.sources import Source
 from ..transforms import Refused, Transform, transform_of
 from .bake import go_back
 from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, count_of, has_uneven_scale
+from .held_keys import FewerRuns, fewer_runs, write_runs
 from .originals import REDUCED, Note, Originals, discard_originals, last_change, notes_of
 from .search import NO_FEWER, NOT_SO_MANY, fewer_keys
 
-Plans = dict[Transform, "list[FewerKeys] | Refused"]
+HELD = n_("{name} is held, and is reduced for each time that it is so: by a tolerance, not to a number of keys")
+
+Plans = dict[Transform, "list[FewerKeys | FewerRuns] | Refused"]
 """The keys that targets are to have in each slot that moves them; or why they cannot."""
 
 
@@ -49,6 +51,11 @@ class Reduction:
     channel_keys: tuple[int, int] = (0, 0)
     """The keys of all channels together, before and after. There may be more: a pose has all channels."""
 
+    held: Sequence[Sequence] = ()
+    """What it is held in since, where its keys were reduced into holds: names, first and last frames, and how many keys
+    became one.
+    """
+
 
 def reduce_keys_of(
     targets: Targets,
@@ -65,7 +72,8 @@ def reduce_keys_of(
 
     A key is a pose: location, rotation and, where it is even, scale have keys on the same frames, with the values that
     the recording has there. A scale that differs from axis to axis as it changes keeps the keys it has, and so does
-    everything else in the Action. Bones of one rig are reduced together: what moves one moves all below it.
+    everything else in the Action. Bones of one rig are reduced together: what moves one moves all below it. But what is
+    held is reduced by itself, each time in the space of its holder; the keys at which it passes to another one stay.
 
     Parameters
     ----------
@@ -101,10 +109,11 @@ def reduce_keys_of(
     originals = Originals(REDUCED)
 
     def survey(readings: Mapping[Transform, Readings]) -> None:
-        wishes = {"shared": shared, "hold": hold, "count": count}
-        plans.update(_plans(readings, mode=mode, tolerance=tolerance, radius=radius, **wishes))
+        plans.update(
+            _plans(readings, mode=mode, tolerance=tolerance, radius=radius, shared=shared, hold=hold, count=count)
+        )
 
-    def plan(transform: Transform, readings: Readings) -> list[FewerKeys]:
+    def plan(transform: Transform, readings: Readings) -> list[FewerKeys | FewerRuns]:
         result = plans[transform]
         if isinstance(result, Refused):
             raise result
@@ -112,16 +121,28 @@ def reduce_keys_of(
             raise _no_fewer(transform, readable(transform, readings), count)
         return result
 
-    def act(transform: Transform, fewer: list[FewerKeys]) -> None:
+    def act(transform: Transform, fewer: list[FewerKeys | FewerRuns]) -> None:
         for reduced in fewer:
-            _write(transform, reduced, originals)
+            _write(transform, reduced, mode, originals)
 
     done = apply_edit(targets, plan, act, refused, survey=survey)
     return reduction_of(done) if done else None
 
 
-def _plans(readings: Mapping[Transform, Readings], **wishes: Any) -> Plans:
-    """Return plans for all targets, those together that one slot of an object moves. For wishes see `fewer_keys`."""
+def _plans(
+    readings: Mapping[Transform, Readings],
+    *,
+    mode: str,
+    tolerance: float,
+    radius: float | None,
+    count: int | None,
+    shared: bool,
+    hold: bool,
+) -> Plans:
+    """Return plans for all targets, those together that one slot of an object moves: see `fewer_keys`.
+
+    What is held moves with its holder, and so by itself.
+    """
     plans: Plans = {}
     together: dict[tuple, dict[Transform, tuple[Binding, Source]]] = {}
     for transform, reading in readings.items():
@@ -133,16 +154,22 @@ def _plans(readings: Mapping[Transform, Readings], **wishes: Any) -> Plans:
         except Refused as refusal:
             plans[transform] = refusal
             continue
-        plans[transform] = []
+        of_runs: list[FewerKeys | FewerRuns] = []
+        plans[transform] = of_runs
         for binding, source in keyed:
-            together.setdefault((transform.animated, *binding.slot.key), {})[transform] = binding, source
+            if source.held is None:
+                together.setdefault((transform.animated, *binding.slot.key), {})[transform] = binding, source
+            elif count is not None:
+                plans[transform] = Refused(HELD, name=transform.name)
+            elif (runs := fewer_runs(transform, binding, source, mode, tolerance, radius)) is not None:
+                of_runs.append(runs)
     for (obj, *_), members in together.items():
         try:
-            fewer = fewer_keys(obj, members, **wishes)
+            fewer = fewer_keys(obj, members, mode, tolerance, radius, shared=shared, hold=hold, count=count)
         except ValueError as problem:
             text = n_("{name} cannot be reduced: {problem}")
-            refusal = problem if isinstance(problem, Refused) else Refused(text, name=obj.name, problem=problem)
-            plans.update(dict.fromkeys(members, refusal))
+            why = problem if isinstance(problem, Refused) else Refused(text, name=obj.name, problem=problem)
+            plans |= dict.fromkeys(members, why)
             continue
         for transform, plan in fewer.items():
             if isinstance(result := plans[transform], list):
@@ -168,6 +195,7 @@ def reduction_of(targets: Targets) -> Reduction | None:
         max(item.largest_error for item in reductions),
         max(rigs, key=lambda rig: rig.frames, default=None),
         tuple(map(sum, zip(*(item.channel_keys for item in reductions), strict=True))),
+        [one for item in reductions for one in item.held],
     )
 
 
@@ -191,11 +219,24 @@ def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None
     go_back(targets, REDUCED, refused, by=discard_originals)
 
 
-def _write(transform: Transform, fewer: FewerKeys, originals: Originals) -> None:
-    binding, channel_keys = fewer.binding, _channel_keys(fewer.binding)
+def _write(transform: Transform, fewer: FewerKeys | FewerRuns, mode: str, originals: Originals) -> None:
+    binding, before = fewer.binding, channel_keys(fewer.binding)
     notes = originals.keep(binding)
     if not notes:
         return
+    if isinstance(fewer, FewerRuns):
+        write_runs(transform, fewer, mode)
+    else:
+        _write_keys(transform, fewer)
+        set_mode_in(binding, mode)
+    keys = before, channel_keys(binding)
+    reduction = Reduction(count_of(fewer.source), fewer.after, fewer.largest_error, fewer.rig, keys)
+    for note in notes:
+        note.reduction = json.dumps(asdict(reduction))
+
+
+def _write_keys(transform: Transform, fewer: FewerKeys) -> None:
+    binding = fewer.binding
     for rows, keys in fewer.fewer.channels:
         for row, values, codes in zip(rows, keys.values, keys.interpolation, strict=True):
             if PART_OF[row] != SCALE or not has_uneven_scale(fewer.source):
@@ -204,14 +245,10 @@ def _write(transform: Transform, fewer: FewerKeys, originals: Originals) -> None
                 fcurve.mute = False
     if transform.turns_channel in binding.curves:
         binding.channelbag.fcurves.remove(binding.curves.pop(transform.turns_channel))
-    set_mode_in(binding, MODE_NAMES[fewer.fewer.mode])
-    keys = channel_keys, _channel_keys(binding)
-    reduction = Reduction(count_of(fewer.source), count_of(fewer.fewer), fewer.largest_error, fewer.rig, keys)
-    for note in notes:
-        note.reduction = json.dumps(asdict(reduction))
 
 
-def _channel_keys(binding: Binding) -> int:
+def channel_keys(binding: Binding) -> int:
+    """Return the number of keys of all channels of a binding."""
     return sum(len(fcurve.keyframe_points) for fcurve in binding.curves.values())
 
 

@@ -66,13 +66,15 @@ def fewer_keys(
     shared: bool,
     hold: bool,
     count: int | None,
+    space: np.ndarray | None = None,
 ) -> dict[Transform, FewerKeys]:
     """Return the plans for those of an object and its bones that can have fewer keys.
 
     With a count there are so many keys, or key poses, whatever the tolerance. What is wanted besides, see
-    `reduce_keys_of`. `Refused` where none of several can have fewer.
+    `reduce_keys_of`. `Refused` where none of several can have fewer. With a `space`, see `BodyMotion`, the only member
+    is looked at by itself.
     """
-    body = _Body(obj, members, math.inf if count is not None else tolerance, radius, hold=hold)
+    body = _Body(obj, members, math.inf if count is not None else tolerance, radius, hold=hold, space=space)
     fewer = body.proven(body.searched(mode, count, shared=shared), mode, shared=shared or count is not None)
     if not fewer and len(members) > 1:
         text = NO_FEWER if count is None else NOT_SO_MANY
@@ -84,18 +86,25 @@ class _Body:
     """An object and its bones as one slot moves them: those that are to have fewer keys, and all others as they are."""
 
     def __init__(
-        self, obj: bpy.types.Object, members: Members, tolerance: float, radius: float | None, *, hold: bool
+        self,
+        obj: bpy.types.Object,
+        members: Members,
+        tolerance: float,
+        radius: float | None,
+        *,
+        hold: bool,
+        space: np.ndarray | None,
     ) -> None:
         self.obj, self.tolerance, self.members = obj, tolerance, members
-        bones = obj.pose.bones if any(transform.is_part for transform in members) else ()
-        joints = [transform_of(obj), *map(transform_of, bones)]
+        bones = obj.pose.bones if space is None and any(transform.is_part for transform in members) else ()
+        joints = [transform_of(obj), *map(transform_of, bones)] if space is None else list(members)
         self.sources = {number: members[joint][1] for number, joint in enumerate(joints) if joint in members}
         samples = united(map(samples_of, self.sources.values()))
         self.frames = seen_frames(samples, list(self.sources.values()))
         self.sampled = np.isin(self.frames, samples)
         """True for the moments that keys may be on."""
         slot = next(binding.slot for binding, _ in members.values())
-        self.motion = BodyMotion(joints, slot, self.sources, self.frames, radius)
+        self.motion = BodyMotion(joints, slot, self.sources, self.frames, radius, space)
         self.allowed = tolerance + self.motion.rounding
         self.stands = np.zeros((len(joints), len(self.frames)), dtype=bool)
         """True for the bones that stand on the ground, at each moment."""
@@ -265,12 +274,15 @@ class _Body:
             for number in numbers:
                 # Before and behind its keys it stays where they leave it, or goes through them again.
                 first, last = self._ends(number)
-                places = np.clip(self.sources[number].folded(np.array((frame,))), first, last)
+                folded = self.sources[number].folded(np.array((frame,)))
+                places = np.clip(folded, first, last)
                 if around:
                     at = np.concatenate(
                         (np.searchsorted(samples, places, "right") - 1, np.searchsorted(samples, places))
                     )
-                    places = samples[at]
+                    # How it goes on is that of the two keys at an end.
+                    at += np.where(folded < first, 1, 0) * (0, 1) - np.where(folded > last, 1, 0) * (1, 0)
+                    places = np.clip(samples[np.clip(at, 0, len(samples) - 1)], first, last)
                 if len(more := without(places, chosen[number])):
                     added[number] = np.union1d(chosen[number], (first, *more, last))
             if added:

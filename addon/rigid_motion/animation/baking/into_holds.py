@@ -1,0 +1,421 @@
+"""From dense keys of a prop in the world to few in the hands that held it, as recordings of both tell.
+
+A prop is held where it is at rest in a hand, and not in the world. There its keys become one: the grip with the
+smallest largest error. What is outside stays as it is. Frames are those of the Action, lengths are the scene's units.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import cast
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_n as n_
+
+from ...motion.quaternions import matrices
+from ..actions.channels import (
+    KeyFields,
+    key_fields,
+    key_points,
+    new_key_fields,
+    set_key_fields,
+)
+from ..actions.marks import hold, read_marks, write_holds, write_marks
+from ..actions.refusals import refuse_drivers, refuse_linked, refuse_modified
+from ..actions.slots import Binding
+from ..edits.apply import Readings, Target, apply_edit, readable
+from ..edits.holding import DEFAULT_MODE
+from ..evaluation.components import LOCATION, MODE_NUMBERS, PART_OF, ROTATION, ROWS, SCALE
+from ..evaluation.differences import seen_values
+from ..evaluation.sources import SAME_FRAME, Source, distinct
+from ..fcurves.keys import CONSTANT, LINEAR
+from ..holds.dependencies import Node, follows
+from ..holds.holders import add_holder, holders_of, node_of
+from ..holds.problems import refuse_motion
+from ..queries.keyed import frames_in
+from ..transforms import Refused, Transform
+from ..transforms.sizes import radius_of
+from .fewer_keys import count_of, samples_of
+from .originals import REDUCED, Originals
+from .reducing import Reduction, channel_keys
+from .resting import Body, Rest, relative
+from .worlds import alone_in, poses_of, rows_of, worlds_of
+
+LEAST = 5
+"""The fewest frames on which something is held, where nothing else is said."""
+
+HAND = 0.005
+"""The tolerance where nothing else is said: recorded hands give way."""
+
+CLEARLY = 4.0
+"""What is held moves in the world by more than so many tolerances, and by more than so many of its errors."""
+
+GROWN = 1e-3
+"""The part of its size by which something may grow, and counts as rigid."""
+
+NOTHING_HELD = n_(
+    "{name} is at rest in none of {count} bones and objects for {least} frames, to {tolerance:g}: allow a larger "
+    "tolerance, or select what holds it"
+)
+NO_HANDS = n_("There is nothing that could hold {name}: select objects or rigs, too")
+SPARSE = n_(
+    "{name} has keys far apart around frame {frame:g}, whose in-betweens would change: bake them first (Bake to Keys)"
+)
+NO_KEYS = n_("{name} has no keys of location or rotation to be reduced: bake its motion first (Object > Animation)")
+GROWS = n_("{name} grows or shrinks, and what is held is of one size: remove the keys of its scale first")
+
+Offer = tuple[Node, Rest, float]
+"""What may hold something, when, and how far away it is."""
+
+Holders = Iterable[bpy.types.Object | bpy.types.PoseBone]
+
+
+@dataclass(frozen=True)
+class HeldSegment:
+    """Frames on which something is at rest in a holder."""
+
+    holder: bpy.types.Object
+    bone: str
+    """The name of the holder's bone that it is held in, "" for the holder itself."""
+
+    first: float
+    last: float
+
+    largest: float
+    """The largest error of holding it still, in the scene's units."""
+
+    keys_before: int
+    """On how many of these frames it has keys."""
+
+    grip: np.ndarray = field(repr=False, compare=False)
+    """Where it is in the holder, with what either is scaled by, shape (4, 4)."""
+
+    @property
+    def name(self) -> str:
+        """The name of what holds it."""
+        return self.bone or self.holder.name
+
+
+def held_segments(
+    prop: Target,
+    holders: Holders | None = None,
+    tolerance: float = HAND,
+    radius: float | None = None,
+    *,
+    least: int = LEAST,
+) -> list[HeldSegment]:
+    """Return when something was held in what, as far as its keys tell: the longest and tightest first.
+
+    None of them overlap. Where it rests in the space of its channels as well, before and after, it is not held.
+
+    Parameters
+    ----------
+    prop
+        An object or a pose bone with keys.
+    holders : iterable, optional
+        Objects and pose bones; of a rig all bones. All rigs of the scene, otherwise. What follows the prop is none.
+    tolerance : float
+        The largest shell error on any frame, in the scene's units.
+    radius : float, optional
+        Of the shell. `radius_of` the prop, otherwise.
+    least : int
+        The fewest frames.
+
+    Raises
+    ------
+    Refused
+        Where the prop has no keys, or others than these move it.
+    """
+    found: list[HeldSegment] = []
+
+    def survey(transform: Transform, readings: Readings) -> None:
+        found.extend(_found(transform, readings, holders, tolerance, radius, least))
+
+    apply_edit(prop, survey, lambda *_: None, None)
+    return found
+
+
+def reduce_into_holds(
+    prop: Target,
+    holders: Holders | None = None,
+    tolerance: float = HAND,
+    radius: float | None = None,
+    *,
+    least: int = LEAST,
+    segments: Sequence[HeldSegment] | None = None,
+) -> list[HeldSegment]:
+    """Hold something where its keys say that it was held, with a key for each time, and return these.
+
+    For all else see `held_segments`; `segments` are those of its result that are wanted, otherwise all of them.
+    `restore_keys` gives all keys back.
+    """
+    originals = Originals(REDUCED)
+
+    def plan(transform: Transform, readings: Readings) -> tuple[Binding, Source, list[HeldSegment]]:
+        found = segments
+        if found is None:
+            found = _found(transform, readings, holders, tolerance, radius, least)
+        if not found:
+            count = len(_nodes(transform, holders))
+            raise Refused(NOTHING_HELD, name=transform.name, count=count, least=least, tolerance=tolerance)
+        binding, source = _keyed(transform, readings)
+        refuse_linked(transform, binding)
+        chosen = sorted(found, key=lambda segment: segment.first)
+        _refuse_sparse(transform, source, chosen)
+        return binding, source, chosen
+
+    def act(transform: Transform, planned: tuple[Binding, Source, list[HeldSegment]]) -> list[HeldSegment]:
+        _hold(transform, *planned, originals)
+        return planned[2]
+
+    (done,) = apply_edit(prop, plan, act, None).values()
+    return done
+
+
+def _keyed(transform: Transform, readings: Readings) -> tuple[Binding, Source]:
+    """Return what moves something, and what is keyed of it. `Refused` where it cannot be held as that says."""
+    keyed = [(binding, source) for binding, source in readable(transform, readings) if source.channels]
+    if not any({LOCATION, ROTATION} & source.keyed for _, source in keyed):
+        raise Refused(NO_KEYS, name=transform.name)
+    binding = alone_in(transform, [binding for binding, _ in keyed])
+    source = keyed[0][1]
+    refuse_motion(transform, source)
+    refuse_modified(transform.name, binding)
+    refuse_drivers(transform, binding, source.driven)
+    return binding, source
+
+
+def _nodes(transform: Transform, holders: Holders | None) -> list[Node]:
+    """Return what may hold something, each once."""
+    if holders is None:
+        scene = cast(bpy.types.Scene, bpy.context.scene)
+        holders = [obj for obj in scene.objects if obj.type == "ARMATURE"]
+    result: dict[Node, None] = {}
+    for holder in holders:
+        if isinstance(holder, bpy.types.PoseBone):
+            result[cast(bpy.types.Object, holder.id_data), holder.name] = None
+        elif holder.pose is not None and len(holder.pose.bones):
+            result |= dict.fromkeys((holder, bone.name) for bone in holder.pose.bones)
+        else:
+            result[holder, ""] = None
+    own = node_of(transform)
+    return [node for node in result if node != own and not follows(node, own)]
+
+
+def _found(
+    transform: Transform,
+    readings: Readings,
+    holders: Holders | None,
+    tolerance: float,
+    radius: float | None,
+    least: int,
+) -> list[HeldSegment]:
+    """Return `held_segments` of something that is keyed so."""
+    if not 0.0 < tolerance < math.inf:
+        raise Refused(n_("the tolerance has to be a number above zero, not {tolerance:g}"), tolerance=tolerance)
+    binding, source = _keyed(transform, readings)
+    nodes = _nodes(transform, holders)
+    if not nodes:
+        raise Refused(NO_HANDS, name=transform.name)
+    frames, radius = samples_of(source), radius or radius_of(transform.carrier)
+    worlds = worlds_of(transform, nodes, frames)
+    prop, sizes = poses_of(worlds.prop)
+    if np.ptp(sizes, axis=0).max() > GROWN * np.abs(sizes).max():
+        raise Refused(GROWS, name=transform.name)
+    # The space of the channels is where the prop would be with nothing on them.
+    own = Body(relative(poses_of(worlds.prop @ np.linalg.inv(worlds.local))[0], prop), radius)
+    free = _free(source, frames)
+    # Where more is to be seen before and behind its keys it rests there.
+    free[[0, -1]] &= binding.slot.seen[0] >= frames[0], binding.slot.seen[1] <= frames[-1]
+    lies, anyway = own.rests(tolerance, free, least), own.reached(tolerance, free)
+    offers: list[Offer] = []
+    scales: dict[Node, np.ndarray] = {}
+    for node, places in zip(nodes, worlds.nodes, strict=True):
+        holder, growth = poses_of(places)
+        # What is held by something that grows would grow with it.
+        if np.ptp(growth, axis=0).max() > GROWN * np.abs(growth).max():
+            continue
+        there = Body(relative(holder, prop), radius)
+        for whole in there.rests(tolerance, free, least, anyway):
+            rest = _without(whole, lies)
+            distance = max(tolerance, rest.largest) * CLEARLY
+            if rest.frames >= least and own.moves(rest, distance):
+                offers.append((node, rest, float(np.linalg.norm(rest.pose.positions))))
+                scales[node] = growth[0]
+    keys = distinct(source.keyed_frames)
+    return [
+        _segment(node, rest, frames, keys, (sizes[0], scales[node])) for node, rest in _best(offers, tolerance, least)
+    ]
+
+
+def _free(source: Source, frames: np.ndarray) -> np.ndarray:
+    """Return on which frames (m,) nothing holds something, nor is it passed on."""
+    free = np.ones(len(frames), dtype=bool)
+    for run in source.runs:
+        if source.hold_at(run.stretch.first)[0]:
+            free &= ~((frames > run.stretch.first - SAME_FRAME) & (frames < run.stretch.until - SAME_FRAME))
+    for switch in source.switches:
+        free &= ~((frames > switch.begin - SAME_FRAME) & (frames < switch.frame - SAME_FRAME))
+    return free
+
+
+def _without(rest: Rest, others: Iterable[Rest]) -> Rest:
+    """Return what is left of a rest without the ends that are in others."""
+    first, last = rest.first, rest.last
+    for other in sorted(others):
+        if other.first <= first <= other.last:
+            first = other.last + 1
+    for other in sorted(others, reverse=True):
+        if other.first <= last <= other.last:
+            last = other.first - 1
+    return rest._replace(first=first, last=last)
+
+
+def _best(offers: list[Offer], tolerance: float, least: int) -> Iterator[tuple[Node, Rest]]:
+    """Yield the best of what is offered, none of them overlapping: nodes, rests, and how far away nodes are.
+
+    The longest and tightest one is the best: no error at all is worth twice the length. Of those that are equally good,
+    as bones are that do not move against one another, it is the nearest, and of near ones the one that comes first.
+    """
+
+    def quality(offer: Offer) -> tuple[float, float]:
+        _, rest, away = offer
+        return rest.frames * (2.0 - round(20.0 * rest.largest / tolerance) / 20.0), -round(math.log2(away + tolerance))
+
+    while offers:
+        node, best, _ = max(offers, key=quality)
+        yield node, best
+        cut = [(other, _apart(rest, best), away) for other, rest, away in offers]
+        offers = [offer for offer in cut if offer[1].frames >= least]
+
+
+def _apart(rest: Rest, taken: Rest) -> Rest:
+    """Return the longer part of a rest that is outside of another one."""
+    before = rest._replace(last=min(rest.last, taken.first - 1))
+    after = rest._replace(first=max(rest.first, taken.last + 1))
+    return max(before, after, key=lambda part: part.frames)
+
+
+def _segment(
+    node: Node, rest: Rest, frames: np.ndarray, keys: np.ndarray, scales: tuple[np.ndarray, np.ndarray]
+) -> HeldSegment:
+    """Return the segment of a rest. Scales (3,) are the prop's and the holder's in the world."""
+    first, last = frames[[rest.first, rest.last]].tolist()
+    inside = int(np.count_nonzero((keys > first - SAME_FRAME) & (keys < last + SAME_FRAME)))
+    grip, (own, holder) = np.eye(4), scales
+    grip[:3, :3], grip[:3, 3] = matrices(rest.pose.quaternions) * own, rest.pose.positions
+    grip[:3] /= np.where(holder == 0.0, 1.0, holder)[:, None]
+    return HeldSegment(*node, first, last, rest.largest, inside, grip)
+
+
+def _refuse_sparse(transform: Transform, source: Source, segments: Iterable[HeldSegment]) -> None:
+    """Raise `Refused` where in-betweens that are not straight lines depend on keys that are to go."""
+    keys, frames = source.key_frames, samples_of(source)
+    shaped = (source.modes != 0) | np.array([_is_shaped(source, frame) for frame in keys[:-1].tolist()], dtype=bool)
+    shaped &= (np.diff(keys) > 1.0 + SAME_FRAME) & _free(source, keys[:-1])
+    for segment in segments:
+        behind = np.append(frames, np.inf)[np.searchsorted(frames, segment.last + SAME_FRAME)]
+        first, until = np.searchsorted(keys, np.array((segment.first, behind)) - SAME_FRAME).tolist()
+        # That in which it is no longer, and the one beside it, whose tangent is another one then.
+        for place in (first - 2, first - 1, until - 1, until):
+            if 0 <= place < len(shaped) and shaped[place]:
+                raise Refused(SPARSE, name=transform.name, frame=keys[place])
+
+
+def _is_shaped(source: Source, frame: float) -> bool:
+    """Return whether anything but straight lines and holds goes on from a key."""
+    return any(
+        not np.isin(keys.interpolation[:, place], (LINEAR, CONSTANT)).all()
+        for keys in source.curves
+        if (place := int(np.searchsorted(keys.times, frame + SAME_FRAME)) - 1) >= 0
+    )
+
+
+class _Switches:
+    """When something is held in which of its new holders, k times one behind the other."""
+
+    def __init__(self, source: Source, segments: Sequence[HeldSegment], numbers: Sequence[int]) -> None:
+        frames = samples_of(source)
+        self.source, self.holds = source, np.array([hold(number) for number in numbers])
+        self.begins = np.array([segment.first for segment in segments])
+        behind = np.searchsorted(frames, [segment.last + SAME_FRAME for segment in segments])
+        self.untils = np.append(frames, np.inf)[behind]
+        """The frames from which on it is not, shape (k,)."""
+        before = frames[np.clip(np.searchsorted(frames, self.begins - SAME_FRAME) - 1, 0, None)]
+        before = before[before < self.begins - SAME_FRAME]
+        self.rests = before[~self.are_held(before)]
+        """The last frames before it is, from which on it rests."""
+        self.resumes = self.untils[np.isfinite(self.untils) & ~self.are_held(self.untils)]
+        """The frames on which nothing holds it again."""
+
+    def are_held(self, frames: np.ndarray) -> np.ndarray:
+        """Return on which of these frames (m,) it is held."""
+        after = frames[:, None]
+        return ((after > self.begins - SAME_FRAME) & (after < self.untils - SAME_FRAME)).any(axis=1)
+
+    def holds_on(self, frames: np.ndarray) -> np.ndarray:
+        """Return what keys on these frames (m,) say: see `marks.hold`."""
+        source = self.source
+        old = np.zeros(len(frames), int) if source.held is None else source.held.at(frames + 0.5 * SAME_FRAME)
+        old[_near(frames, self.resumes)] = hold(0)
+        place = np.searchsorted(self.begins, frames + SAME_FRAME) - 1
+        return np.where(self.are_held(frames), self.holds[np.clip(place, 0, None)], old)
+
+
+def _hold(
+    transform: Transform, binding: Binding, source: Source, segments: list[HeldSegment], originals: Originals
+) -> None:
+    """Have something be held in these segments, in their order: a key where each begins, and one behind it."""
+    notes, before = originals.keep(binding), channel_keys(binding)
+    numbers = [add_holder(binding, segment.holder, segment.bone) for segment in segments]
+    switches, rest = _Switches(source, segments, numbers), transform.components()
+    offsets = {holder.number: np.array(holder.offset) for holder in holders_of(transform)}
+    grips = [np.linalg.inv(offsets[number]) @ one.grip for number, one in zip(numbers, segments, strict=True)]
+    rows = rows_of(*poses_of(np.stack(grips)), transform, rest)
+    outside = np.union1d(switches.rests, switches.resumes)
+    seen = seen_values(source, outside) if len(outside) else np.empty((10, 0))
+    scales = SCALE in source.keyed or not np.allclose(rows[ROWS[SCALE], 0], rest[ROWS[SCALE]], rtol=1e-4)
+    group = next((fcurve.group for fcurve in binding.curves.values() if fcurve.group is not None), None)
+    for row, channel in transform.channels.items():
+        if PART_OF[row] == SCALE and not scales:
+            continue
+        fcurve = binding.ensure_curve(channel)
+        if fcurve.group is None and group is not None:
+            fcurve.group = group
+        fields = key_fields(fcurve.keyframe_points)
+        left = ~switches.are_held(fields["co"][:, 0].astype(float))
+        fields = {name: numbers[left] for name, numbers in fields.items()}
+        lacking = ~_near(outside, fields["co"][:, 0])
+        fields = _with_keys(fields, new_key_fields(outside[lacking], seen[row, lacking], LINEAR, "GENERATED"))
+        fields["interpolation"][_near(fields["co"][:, 0], switches.rests)] = CONSTANT
+        fields = _with_keys(fields, new_key_fields(switches.begins, rows[row], CONSTANT))
+        set_key_fields(fcurve, fields)
+    for fcurve in filter(lambda fcurve: fcurve.keyframe_points, binding.moving.values()):
+        frames, marks = key_points(fcurve)[:, 0].astype(float), read_marks(fcurve)
+        marks = np.where(marks, marks, MODE_NUMBERS["BLENDER"] + 1)
+        write_marks(fcurve, np.where(switches.are_held(frames), MODE_NUMBERS[DEFAULT_MODE] + 1, marks))
+        write_holds(fcurve, switches.holds_on(frames))
+    reduction = Reduction(
+        count_of(source),
+        len(frames_in(binding)),
+        max(segment.largest for segment in segments),
+        channel_keys=(before, channel_keys(binding)),
+        held=[(segment.name, segment.first, segment.last, segment.keys_before) for segment in segments],
+    )
+    for note in notes:
+        note.reduction = json.dumps(asdict(reduction))
+
+
+def _with_keys(fields: KeyFields, new: KeyFields) -> KeyFields:
+    """Return all there is to keys, with others on frames on which there are none."""
+    order = np.argsort(np.append(fields["co"][:, 0], new["co"][:, 0]), kind="stable")
+    return {name: np.concatenate((numbers, new[name]))[order] for name, numbers in fields.items()}
+
+
+def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return which frames (m,) are one of others to Blender."""
+    return (np.abs(frames[:, None] - others[None]) < SAME_FRAME).any(axis=1)

@@ -1,0 +1,239 @@
+"""Dense keys become holds where a hand held something, within the tolerance on every frame as Blender shows it.
+
+What is shown is compared point by point, with nothing of the program's; and nothing is held that only lies about.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix, Quaternion
+
+from rigid_motion.animation import (
+    Refused,
+    bake_to_world,
+    held_segments,
+    hold_facts,
+    hold_in,
+    key_frames,
+    reduce_into_holds,
+    reduction_of,
+    restore_keys,
+    set_mode,
+)
+from tests.animation.held import KINDS, new_prop, put, wander, worlds
+from tests.animation.keyed import Carrier, curves_of, rotation_path, snapshot
+from tests.animation.scenes import new_object, write
+from tests.balls import largest_displacements
+from tests.rigs.recorded import FRAMES, recorded_rig
+
+RADIUS, TOLERANCE = 0.1, 0.001
+NOISE = 1e-4
+
+GRIP = np.array(Matrix.LocRotScale((0.02, 0.1, 0.03), Quaternion((0.9, 0.2, 0.3, 0.1)).normalized(), None))
+OTHER = np.array(Matrix.LocRotScale((0.05, 0.08, -0.02), Quaternion((0.3, -0.2, 0.8, 0.4)).normalized(), None))
+
+
+def off(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """How far any point within the radius is from where it is by other matrices, on each frame."""
+    apart = one - other
+    return largest_displacements(apart[:, :3, 3], RADIUS * apart[:, :3, :3])
+
+
+def record(prop: Carrier, places: np.ndarray, frames: np.ndarray = FRAMES) -> None:
+    """Key something where it is to be in the world, on every frame."""
+    scene = bpy.context.scene
+    for frame, place in zip(frames.tolist(), places, strict=True):
+        scene.frame_set(int(frame))
+        if prop == prop.id_data:
+            prop.matrix_world = Matrix(place.tolist())
+        else:
+            prop.matrix = prop.id_data.matrix_world.inverted() @ Matrix(place.tolist())
+        bpy.context.view_layer.update()
+        for path in ("location", rotation_path(prop)):
+            prop.keyframe_insert(path, frame=frame)
+    for fcurve in curves_of(prop).values():
+        for point in fcurve.keyframe_points:
+            point.interpolation = "LINEAR"
+    scene.frame_set(1)
+
+
+def moved(seed: int = 0, noise: float = NOISE, pick: int = 20, put_down: int = 60, over: int = 40) -> np.ndarray:
+    """A tool that lies about up to a frame, is held in the right hand, passed on to the left one, and put down."""
+    body = bpy.data.objects["Body"].pose.bones
+    right, left = worlds(body["Hand.R"], FRAMES) @ GRIP, worlds(body["Hand.L"], FRAMES) @ OTHER
+    number = np.clip(FRAMES, pick, put_down)
+    held = number.astype(int) - 1
+    places = np.where((number < over)[:, None, None], right[held], left[held])
+    places[:, :3, 3] += np.random.default_rng(seed).uniform(-noise, noise, (len(FRAMES), 3))
+    return places
+
+
+def holders_on(prop: Carrier, frames: tuple[int, ...]) -> list[str]:
+    result = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        now = hold_facts(prop).now
+        result.append("" if now is None else now.name)
+    return result
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_hands_held_gets_a_key_for_each_time_and_is_shown_within_the_tolerance(live_file, kind):
+    prop, body = new_prop(kind), recorded_rig()
+    record(prop, moved())
+    before, keys = worlds(prop), snapshot(prop)
+    bpy.context.scene.frame_set(33)
+    found = held_segments(prop, [body], TOLERANCE, RADIUS)
+    assert bpy.context.scene.frame_current == 33
+    assert snapshot(prop) == keys
+    left, right = found
+    # A frame more or less is within the tolerance, where a hand begins to move.
+    assert (left.name, left.first, right.name, right.last) == ("Hand.L", 40.0, "Hand.R", 39.0)
+    assert right.first in (20.0, 21.0)
+    assert left.last in (59.0, 60.0)
+    done = reduce_into_holds(prop, [body], TOLERANCE, RADIUS)
+    assert done == [right, left]
+    inside = (right.first <= FRAMES) & (left.last >= FRAMES)
+    assert key_frames(prop).tolist() == sorted({*FRAMES[~inside], right.first, 40.0})
+    assert holders_on(prop, (19, 21, 39, 40, 59, 61)) == ["", "Hand.R", "Hand.R", "Hand.L", "Hand.L", ""]
+    error = off(worlds(prop), before)
+    assert error[~inside].max() < 1e-5
+    largest = max(left.largest, right.largest)
+    assert largest == pytest.approx(error[inside].max(), abs=2e-6)
+    # The noise is as large along each axis, and what a hand moves by in a frame may come to it.
+    assert 0.5 * NOISE < largest < 0.5 * TOLERANCE
+    reduction = reduction_of(prop)
+    assert (reduction.before, reduction.after) == (90, len(key_frames(prop)))
+    assert reduction.largest_error == pytest.approx(largest)
+    assert [tuple(one) for one in reduction.held] == [
+        (one.name, one.first, one.last, one.keys_before) for one in (right, left)
+    ]
+    # It goes with the hand wherever that is by now.
+    grip = np.linalg.inv(worlds(body.pose.bones["Hand.L"], [45.0])) @ worlds(prop, [45.0])
+    for fcurve in curves_of(body.pose.bones["Hand.L"]).values():
+        for point in fcurve.keyframe_points:
+            point.co_ui.y += 0.1
+    bpy.context.view_layer.update()
+    now = np.linalg.inv(worlds(body.pose.bones["Hand.L"], [55.0])) @ worlds(prop, [55.0])
+    assert np.abs(now - grip).max() < 1e-5
+    assert np.abs(worlds(prop, [45.0]) - before[44:45]).max() > 0.01
+    restore_keys(prop)
+    # Its constraints stay, and do nothing.
+    assert {name: rows for name, rows in snapshot(prop).items() if name in keys} == keys
+    assert holders_on(prop, (30, 50)) == ["", ""]
+
+
+def test_all_rigs_are_looked_at_and_those_segments_that_are_wanted_are_done(live_file):
+    prop, _ = new_prop("free"), recorded_rig()
+    record(prop, moved())
+    left, right = held_segments(prop, tolerance=TOLERANCE, radius=RADIUS)
+    reduce_into_holds(prop, segments=[right])
+    assert holders_on(prop, (30, 50)) == ["Hand.R", ""]
+    # What is held already stays so.
+    assert held_segments(prop, tolerance=TOLERANCE, radius=RADIUS) == [left]
+    reduce_into_holds(prop, tolerance=TOLERANCE, radius=RADIUS)
+    assert holders_on(prop, (20, 30, 50, 61)) == ["", "Hand.R", "Hand.L", ""]
+    assert off(worlds(prop), moved()).max() <= TOLERANCE
+    restore_keys(prop)
+    assert key_frames(prop).tolist() == FRAMES.tolist()
+
+
+def test_what_lies_about_is_not_held_by_what_rests_beside_it(live_file):
+    prop, body = new_prop("free"), recorded_rig(still=("Root", "Spine", "Head", "Arm.R", "Hand.R"))
+    resting = worlds(body.pose.bones["Hand.R"])
+    assert np.ptp(resting, axis=0).max() == 0.0
+    record(prop, resting @ GRIP)
+    assert held_segments(prop, [body], TOLERANCE, RADIUS) == []
+    with pytest.raises(Refused, match="Tool is at rest in none of 7 bones and objects for 5 frames"):
+        reduce_into_holds(prop, [body], TOLERANCE, RADIUS)
+
+
+def test_nor_is_what_moves_past_a_hand_or_for_a_moment_with_it(live_file):
+    prop, body = new_prop("free"), recorded_rig()
+    record(prop, moved(pick=40, put_down=45, over=1))
+    assert held_segments(prop, [body], TOLERANCE, RADIUS) == []
+    assert [one.name for one in held_segments(prop, [body], TOLERANCE, RADIUS, least=3)] == ["Hand.L"]
+    wander(prop, 5)
+    write(prop, "location", FRAMES, np.stack((np.sin(0.2 * FRAMES), 0.1 * FRAMES, 0.0 * FRAMES), axis=1))
+    assert held_segments(prop, [body], TOLERANCE, RADIUS) == []
+
+
+def test_of_bones_that_do_not_move_against_one_another_the_nearest_holds(live_file):
+    prop, body = new_prop("free"), recorded_rig(still=("Hand.R", "Arm.R", "Spine", "Head"))
+    record(prop, worlds(body.pose.bones["Hand.R"], FRAMES) @ GRIP)
+    (found,) = held_segments(prop, [body], TOLERANCE, RADIUS)
+    assert (found.name, found.first, found.last) == ("Hand.R", 1.0, 90.0)
+    reduce_into_holds(prop, [body], TOLERANCE, RADIUS)
+    assert key_frames(prop).tolist() == [1.0]
+    assert off(worlds(prop), worlds(body.pose.bones["Hand.R"], FRAMES) @ GRIP).max() < 1e-5
+
+
+def test_objects_hold_too_but_not_those_that_follow_it(live_file):
+    prop, cart, child = new_prop("free"), new_object("Cart"), new_object("Child")
+    wander(cart, 3)
+    child.parent = prop
+    record(prop, worlds(cart) @ GRIP)
+    bpy.context.view_layer.update()
+    assert [one.name for one in held_segments(prop, [child, prop, cart], TOLERANCE, RADIUS)] == ["Cart"]
+    with pytest.raises(Refused, match="There is nothing that could hold Tool: select objects or rigs, too"):
+        held_segments(prop, [child, prop], TOLERANCE, RADIUS)
+
+
+def test_what_was_held_and_baked_to_the_world_is_held_again(live_file):
+    prop, body = new_prop("free"), recorded_rig()
+    put(prop, 1.0, (0.3, 0.2, 0.1), Quaternion((0.9, 0.1, 0.2, 0.3)))
+    for frame, holder in ((20, body.pose.bones["Hand.R"]), (62, None)):
+        bpy.context.scene.frame_set(frame)
+        hold_in(prop, holder)
+    bpy.context.view_layer.update()
+    before = worlds(prop)
+    bake_to_world(prop)
+    (found,) = held_segments(prop, [body], 1e-4, RADIUS)
+    # Behind its last key it rests.
+    assert (found.name, found.first, found.last) == ("Hand.R", 21.0, 61.0)
+    reduce_into_holds(prop, [body], 1e-4, RADIUS)
+    assert off(worlds(prop), before).max() < 1e-5
+
+
+def far_apart() -> Carrier:
+    prop = new_prop("free")
+    places = moved()
+    record(prop, places)
+    for fcurve in curves_of(prop).values():
+        for _ in range(61, 70):
+            fcurve.keyframe_points.remove(fcurve.keyframe_points[60])
+    set_mode(prop, "motor_spline")
+    return prop
+
+
+def growing() -> Carrier:
+    prop = new_prop("free")
+    record(prop, moved())
+    write(prop, "scale", FRAMES[[0, -1]], np.array(((1.0, 1.0, 1.0), (2.0, 2.0, 2.0))))
+    return prop
+
+
+def unkeyed() -> Carrier:
+    return new_prop("free")
+
+
+@pytest.mark.parametrize(
+    ("make", "message", "wishes"),
+    [
+        (far_apart, "Tool has keys far apart around frame 60.*bake them first", {}),
+        (growing, "Tool grows or shrinks, and what is held is of one size", {}),
+        (unkeyed, "Tool has no keys of location or rotation to be reduced", {}),
+        (growing, "the tolerance has to be a number above zero", {"tolerance": float("nan")}),
+    ],
+)
+def test_where_nothing_can_be_held_it_says_why_and_the_way_out_and_changes_nothing(live_file, make, message, wishes):
+    body = recorded_rig()
+    prop = make()
+    before = snapshot(prop)
+    with pytest.raises(Refused, match=message):
+        reduce_into_holds(prop, [body], **{"tolerance": TOLERANCE, "radius": RADIUS} | wishes)
+    assert snapshot(prop) == before
+    assert not len(prop.constraints)
+    assert not len(prop.rigid_motion.bakes)
