@@ -65,8 +65,8 @@ def parsed(path: Path) -> ast.Module:
 
 def of_class(cls: type) -> Iterator[Message]:
     """Label and description."""
-    is_operator = issubclass(cls, bpy.types.Operator)
-    yield OF_OPERATORS if is_operator else DEFAULT, getattr(cls, "bl_label", "")
+    context = OF_OPERATORS if issubclass(cls, bpy.types.Operator) else DEFAULT
+    yield vars(cls).get("bl_translation_context", context), getattr(cls, "bl_label", "")
     yield DEFAULT, getattr(cls, "bl_description", "")
 
 

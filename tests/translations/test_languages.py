@@ -21,6 +21,10 @@ UNSEEN = {
     " Live",
     " Original",
     " to ",
+    " passing",
+    "Pass To",
+    "rigid_motion ",
+    "rigid_motion (\\d+)",
     "Rigid Motion",
     "Object Transforms",
     "Object Mode",
@@ -32,6 +36,8 @@ UNSEEN = {
     "File Filter",
     "Files that the dialog shows",
     "The rig that the table is for",
+    "Name of the object that holds, with that of its library",
+    "Name of its bone that holds; empty for none",
     # For the log, and for those who call the program from Python
     "In-betweens could not be brought up to date",
     "neither an object nor a pose bone: ",
@@ -40,7 +46,7 @@ UNSEEN = {
     "What is selected cannot be sent",
     " frames do not fit poses of shape ",
     "interpolation: LINEAR or CONSTANT, not ",
-    "list[FewerKeys] | Refused",
+    "list[FewerKeys | FewerRuns] | Refused",
 }
 """Literals with words that no user reads in the interface."""
 

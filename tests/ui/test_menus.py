@@ -46,7 +46,7 @@ def drawn(menu):
 
 
 PIES = [menu for menu in menus.CLASSES if "_pie_" in menu.__name__]
-MODE_MENUS = [menu for menu in menus.CLASSES if menu not in PIES]
+MODE_MENUS = [menu for menu in menus.CLASSES if menu not in (*PIES, menus.RIGID_MOTION_MT_other_keys)]
 
 
 def offered(menu):
@@ -67,10 +67,11 @@ def test_every_menu_offers_every_mode_and_says_which_are_one_motion(tool, menu):
 def test_a_pie_has_one_slice_for_each_motion_and_the_way_to_all_modes(tool, menu):
     motions = {"BLENDER", "motor_spline", "dq_sclerp", "lerp_slerp", "pga_lerp"}
     assert offered(menu).keys() == motions
-    (more,) = [properties.name for name, _, properties in drawn(menu) if name == "wm.call_menu"]
+    more, hold = [properties.name for name, _, properties in drawn(menu) if name == "wm.call_menu"]
     assert offered(getattr(bpy.types, more)).keys() == set(MODE_IDS)
+    assert "rigid_motion.hold_in" in {name for name, *_ in drawn(getattr(bpy.types, hold))}
     write_channel(tool, "scale", FRAMES, np.ones((len(FRAMES), 3)))
-    assert offered(menu).keys() == motions | {"cga_slerp", "cga_lerp"}
+    assert offered(menu).keys() == motions | {"cga_slerp"}
 
 
 def test_the_mode_that_is_chosen_is_ticked(tool):

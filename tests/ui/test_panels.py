@@ -8,11 +8,12 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import bake, set_enabled, set_mode, unbake, write_channel
+from rigid_motion.animation import bake, hold_in, set_enabled, set_mode, unbake, write_channel
 from rigid_motion.ui.panels import MANY, facts_and_notes
-from rigid_motion.ui.wording import BAKED, OUT_OF_DATE, STRIPS
+from rigid_motion.ui.wording import AT_REST, BAKED, OUT_OF_DATE, STRIPS
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
+from tests.ui.conftest import keyed
 
 IN_THE_FIRST_SEGMENT = 5.0
 
@@ -40,6 +41,15 @@ def test_a_refusal_is_shown_with_the_way_out_and_without_a_segment(tool):
     (text,), mode = notes_on(tool)
     assert "Location Z has an Envelope" in text
     assert mode is None
+
+
+def test_between_keys_in_different_hands_there_is_no_segment(tool):
+    hand = keyed("Hand")
+    bpy.context.scene.frame_set(21)
+    hold_in(tool, hand)
+    assert notes_on(tool, 15.0) == ([], "motor_spline")
+    assert notes_on(tool, 20.5) == ([AT_REST], None)
+    assert notes_on(tool, 25.0) == ([AT_REST], None)
 
 
 def test_what_is_baked_can_be_un_baked(tool):

@@ -2,6 +2,7 @@
 
 targets      what an editor means, and operators on it    operators    what can be done to that
 reducing     fewer keys, and all of them again            breakdown    operators that key poses by a slider
+holding      operators by which things are held           held_in      what a panel shows of that
 menus        entries in Blender's menus, and the pies     keymap       shortcuts
 panels       the sidebar, with its notes                  overlay      paths in the viewport
 wording      labels, texts and lines of a panel           preferences  of the extension
@@ -13,13 +14,28 @@ from __future__ import annotations
 
 import bpy
 
-from . import breakdown, gltf_export, keymap, live, manual, menus, operators, overlay, panels, preferences, reducing
+from . import (
+    breakdown,
+    gltf_export,
+    holding,
+    keymap,
+    live,
+    manual,
+    menus,
+    operators,
+    overlay,
+    panels,
+    preferences,
+    reducing,
+)
 
 CLASSES = (
     *preferences.CLASSES,
     *operators.CLASSES,
     *breakdown.CLASSES,
     *reducing.CLASSES,
+    *holding.CLASSES,
+    *overlay.CLASSES,
     *gltf_export.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
@@ -31,6 +47,7 @@ def register() -> None:
     overlay.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    holding.register()
     live.register()
     menus.register()
     keymap.register()
@@ -43,6 +60,7 @@ def unregister() -> None:
     keymap.unregister()
     menus.unregister()
     live.unregister()
+    holding.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     overlay.unregister()

@@ -292,12 +292,12 @@ class RIGID_MOTION_PT_live(Folded, bpy.types.Panel):
         row.prop(live, "port", text="")
         column.prop(live, "delay")
         layout.prop(live, "armature")
+        name, icon = ("listen", "PLAY") if listening is None else ("stop", "PAUSE")
+        layout.operator(f"rigid_motion.live_{name}", icon=icon)
+        if trouble := receiving.running.trouble if listening is None else listening.complaint:
+            draw_text(context, layout, trouble, "ERROR")
         if listening is None:
-            layout.operator("rigid_motion.live_listen", icon="PLAY")
-            if receiving.running.trouble:
-                draw_text(context, layout, receiving.running.trouble, "ERROR")
             return
-        layout.operator("rigid_motion.live_stop", icon="PAUSE")
         joints = listening.joints
         if not joints:
             layout.label(text="Nothing comes yet", icon="INFO")

@@ -17,6 +17,7 @@ EDIT = f"{ANIMATORS}#edit"
 BREAKDOWN = f"{ANIMATORS}#breakdown-push-and-relax"
 LIMITS = f"{ANIMATORS}#limits"
 LIVE = "live.md"
+HOLDING = "holding.md"
 
 PAGES = (
     ("bpy.ops.rigid_motion.set_mode", MODES),
@@ -25,6 +26,17 @@ PAGES = (
         (f"bpy.ops.rigid_motion.{name}", f"{ANIMATORS}#breakdown-push-and-relax")
         for name in ("breakdown", "push", "relax")
     ),
+    *(
+        (f"bpy.ops.rigid_motion.{name}", f"{HOLDING}#{anchor}")
+        for name, anchor in (
+            ("hold_in*", "hold-in"),
+            ("let_go", "let-go"),
+            ("match_grip", "match-grip"),
+            ("pass_frames", "pass"),
+        )
+    ),
+    ("bpy.types.scene.rigid_motion_pass", f"{HOLDING}#pass"),
+    ("bpy.ops.rigid_motion.update_path", f"{ANIMATORS}#see-the-motion"),
     ("bpy.ops.rigid_motion.*bake", f"{ANIMATORS}#bake"),
     ("bpy.ops.rigid_motion.reduce_keys", "reduction.md"),
     ("bpy.ops.rigid_motion.*_keys", f"{ANIMATORS}#reduce-keys"),

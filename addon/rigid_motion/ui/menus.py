@@ -6,6 +6,8 @@ whole object, or in Pose Mode for the whole bone. The mode that is chosen at pre
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
@@ -13,11 +15,12 @@ from ..animation.actions.slots import active_fcurves
 from ..animation.evaluation.components import SCALE
 from ..animation.transforms import OWN_WORDS, Transform
 from .gltf_export import RIGID_MOTION_OT_export_gltf
+from .holding import RIGID_MOTION_MT_hold
 from .targets import CURRENT, SELECTED, WHOLE, active_target, modes_meant
 from .wording import LABELS, twin_of
 
 
-def _draw_modes(context: bpy.types.Context, layout: bpy.types.UILayout, scope: str) -> None:
+def _draw_modes(context: bpy.types.Context, layout: Any, scope: str) -> None:
     """Draw all modes, and behind those that make the same motion as another one what that is."""
     active = active_target(context)
     present, grows = modes_meant(context, active, scope), _grows(active)
@@ -28,9 +31,7 @@ def _draw_modes(context: bpy.types.Context, layout: bpy.types.UILayout, scope: s
         _draw_mode(layout, mode, scope, text, present, "BLANK1")
 
 
-def _draw_mode(
-    layout: bpy.types.UILayout, mode: str, scope: str, text: str, present: set[str], no_icon: str = "NONE"
-) -> None:
+def _draw_mode(layout: Any, mode: str, scope: str, text: str, present: set[str], no_icon: str = "NONE") -> None:
     # One tick where all is one; dots where modes are mixed.
     icon = no_icon if mode not in present else "CHECKMARK" if len(present) == 1 else "DOT"
     properties = layout.operator("rigid_motion.set_mode", text=text, icon=icon, translate=False)
@@ -43,7 +44,7 @@ def _grows(target: Transform | None) -> bool:
     return target is not None and any(fcurve.data_path == path for fcurve in active_fcurves(target.animated))
 
 
-def _draw_breakdowns(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def _draw_breakdowns(self: Any, _context: bpy.types.Context) -> None:
     self.layout.separator()
     for name in ("push", "relax", "breakdown"):
         self.layout.operator(f"rigid_motion.{name}")
@@ -65,18 +66,14 @@ class _Menu:
         _draw_modes(context, layout, self.scope)
         layout.separator()
         layout.menu(self.beside)
+        layout.menu(RIGID_MOTION_MT_hold.__name__)
         layout.separator()
         layout.operator("rigid_motion.set_turns", text="Set Turns...")
         layout.operator_menu_enum("rigid_motion.add_cycles", "mode")
         layout.operator("rigid_motion.copy_mode")
         _draw_breakdowns(self, context)
         layout.separator()
-        layout.operator("rigid_motion.bake", text="Bake to Keys...")
-        layout.operator("rigid_motion.unbake")
-        layout.separator()
-        for name in ("reduce_keys", "restore_keys", "discard_dense_keys"):
-            layout.operator(f"rigid_motion.{name}")
-        layout.separator()
+        layout.menu(RIGID_MOTION_MT_other_keys.__name__)
         layout.operator("rigid_motion.clear")
         layout.operator("rigid_motion.refresh")
         layout.separator()
@@ -93,11 +90,25 @@ class RIGID_MOTION_MT_keys(_Menu, bpy.types.Menu):
     scope, beside, pie = SELECTED, "RIGID_MOTION_MT_whole", "RIGID_MOTION_MT_pie_keys"
 
 
+class RIGID_MOTION_MT_other_keys(bpy.types.Menu):
+    bl_label = "Bake and Reduce"
+    bl_description = "More keys for the same motion, or fewer, and back"
+
+    def draw(self, _context: Any) -> None:
+        layout: Any = self.layout
+        layout.operator_context = "INVOKE_REGION_WIN"
+        layout.operator("rigid_motion.bake", text="Bake to Keys...")
+        layout.operator("rigid_motion.unbake")
+        layout.separator()
+        for name in ("reduce_keys", "restore_keys", "discard_dense_keys"):
+            layout.operator(f"rigid_motion.{name}")
+
+
 class RIGID_MOTION_MT_current(bpy.types.Menu):
     bl_label = "Current Segment"
     bl_description = "How the selected objects or bones move between the two keys that the playhead is between"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         _draw_modes(context, self.layout, CURRENT)
 
 
@@ -105,11 +116,11 @@ class RIGID_MOTION_MT_whole(bpy.types.Menu):
     bl_label = "All Segments"
     bl_description = "One mode for all segments of the objects and bones that are shown"
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         _draw_modes(context, self.layout, WHOLE)
 
 
-MORE = "More"
+MORE, HOLD = "More", "Hold"
 
 SLICES = (
     "BLENDER",
@@ -117,7 +128,7 @@ SLICES = (
     MORE,
     "motor_spline",
     "lerp_slerp",
-    "cga_lerp",
+    HOLD,
     "cga_slerp",
     "pga_lerp",
 )
@@ -127,7 +138,8 @@ SLICES = (
 class _Pie:
     """One slice for each motion: Blender's own in-betweens on the left, the screw on the right, the smooth one on top.
 
-    Where nothing grows, the slices of modes that differ from others only by that are empty. Below is the whole menu.
+    Where nothing grows, the slice of a mode that differs from another only by that is empty; the blend that does is in
+    the whole menu alone, which is below. In the north-east is what holds the selection.
     """
 
     scope: str
@@ -139,6 +151,8 @@ class _Pie:
         for mode in SLICES:
             if mode == MORE:
                 pie.operator("wm.call_menu", text="More...").name = self.menu
+            elif mode == HOLD:
+                pie.operator("wm.call_menu", text="Hold...").name = RIGID_MOTION_MT_hold.__name__
             elif twin_of(mode, grows=grows):
                 pie.separator()
             else:
@@ -160,22 +174,23 @@ CLASSES = (
     RIGID_MOTION_MT_keys,
     RIGID_MOTION_MT_current,
     RIGID_MOTION_MT_whole,
+    RIGID_MOTION_MT_other_keys,
     RIGID_MOTION_MT_pie_view,
     RIGID_MOTION_MT_pie_keys,
 )
 
 
-def _draw_in_view(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def _draw_in_view(self: Any, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.menu(RIGID_MOTION_MT_view.__name__)
 
 
-def _draw_keys(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def _draw_keys(self: Any, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.menu(RIGID_MOTION_MT_keys.__name__)
 
 
-def _draw_export(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def _draw_export(self: Any, _context: bpy.types.Context) -> None:
     self.layout.operator(RIGID_MOTION_OT_export_gltf.bl_idname, text="glTF, Reduced (.glb)")
 
 

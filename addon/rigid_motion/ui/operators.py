@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import ClassVar
 
@@ -10,7 +11,7 @@ import bpy
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.app.translations import pgettext_tip as tip_
-from bpy.props import EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from .. import animation
 from ..animation.actions.marks import read_marks
@@ -19,7 +20,7 @@ from ..animation.baking.originals import BAKED
 from ..animation.evaluation.sources import SCREW_AXIS, TURN_AXES
 from ..animation.properties import MODE_ITEMS, TURN_AXIS_ITEMS
 from ..animation.queries.keyed import active_binding
-from ..animation.queries.polls import with_in_betweens, with_modes, with_more_keys_than
+from ..animation.queries.polls import with_holders, with_in_betweens, with_modes, with_more_keys_than
 from ..animation.transforms import OWN_WORDS, Refused, Transform
 from .preferences import DEFAULT_MODE, default_mode
 from .targets import (
@@ -41,6 +42,12 @@ from .wording import DESCRIPTIONS, LABELS, listed, split
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
 
 
+def with_what_to_bake(targets: Iterable[Transform]) -> Iterator[Transform]:
+    """Yield the targets with in-betweens, and those that are held."""
+    targets = list(targets)
+    return itertools.chain(with_in_betweens(targets), with_holders(targets))
+
+
 class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
     bl_idname = "rigid_motion.bake"
     bl_label = "Bake to Keys"
@@ -50,7 +57,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
     )
 
     nothing_to_do = n_("There are no rigid in-betweens to bake: choose a mode first")
-    with_work = staticmethod(with_in_betweens)
+    with_work = staticmethod(with_what_to_bake)
 
     step: FloatProperty(
         name="Step",
@@ -71,17 +78,28 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
         ],
         translation_context=OWN_WORDS,
     )
+    to_world: BoolProperty(
+        name="To World",
+        description=(
+            "Have what is held be in the space of its parent, or in the world, as if nothing held it: it no longer "
+            "goes with what held it. Otherwise its keys stay in the spaces of what holds it"
+        ),
+        options={"SKIP_SAVE"},
+    )
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         return context.window_manager.invoke_props_dialog(self, confirm_text="Bake")
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         layout = split(self.layout)
         layout.prop(self, "step")
         layout.row().prop(self, "interpolation", expand=True)
+        if self.to_world or any(with_holders(each_target(context))):
+            layout.prop(self, "to_world")
 
     def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
-        begin, end = animation.bake(targets, step=self.step, interpolation=self.interpolation, refused=refused)
+        bake = animation.bake_to_world if self.to_world else animation.bake
+        begin, end = bake(targets, step=self.step, interpolation=self.interpolation, refused=refused)
         return rpt_("baked from frame {first:g} to {last:g}").format(first=begin, last=end)
 
 

@@ -16,10 +16,12 @@ from ..animation.properties import TURN_AXIS_ITEMS
 from ..animation.queries.keyed import active_binding, source_of
 from ..animation.queries.segments import SegmentFacts, frame_in_action, is_up_to_date, segment_at
 from ..animation.transforms import OWN_WORDS, Transform, transform_of
-from . import overlay
+from . import held_in, overlay
+from .holding import facts_or_none, name_of, shown_prop
 from .operators import axis_of_turns
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_key_editor, modes_meant, with_keyed_bones
 from .wording import (
+    AT_REST,
     BAKED,
     DENSE,
     KEYED_BONES,
@@ -66,8 +68,10 @@ def facts_and_notes(
         notes.append(("INFO", KEYED_BONES if of_bones else STRIPS if in_strips else NO_KEYS))
     else:
         frame = frame_in_action(target.animated, frame)
-        segment = segment_at(source, frame)
-        notes += [("ERROR", caution) for caution in cautions(segment)] if segment else [("INFO", NO_SEGMENT)]
+        # From a key in one holder to a key in another one there is no motion: it goes on as before, or rests.
+        segment = segment_at(source.run_at(frame).source if source.switches else source, frame)
+        none = AT_REST if source.switches else NO_SEGMENT
+        notes += [("ERROR", caution) for caution in cautions(segment)] if segment else [("INFO", none)]
         notes += [("INFO", text) for text in _moved_alone(source)] if source.is_live else []
         if not animation.is_enabled() and not is_up_to_date(target, source):
             notes.append(("ERROR", OUT_OF_DATE))
@@ -162,6 +166,18 @@ class _Main(InSidebar):
         _draw_reduction(context, layout, target)
 
 
+class _HeldIn(Folded):
+    bl_label = "Held In"
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        facts = facts_or_none(shown_prop(context))
+        if facts is not None and facts.now is not None:
+            self.layout.label(text=name_of(facts.now), translate=False)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        held_in.draw(context, self.layout)
+
+
 class _Path(Folded):
     bl_label = "Path"
 
@@ -228,6 +244,7 @@ def _panels() -> Iterator[type[bpy.types.Panel]]:
     for space in SPACES:
         yield (main := _in_space(_Main, space))
         yield _in_space(_Path, space, main)
+        yield _in_space(_HeldIn, space, main)
 
 
 CLASSES = tuple(_panels())

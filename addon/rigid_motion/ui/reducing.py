@@ -1,8 +1,11 @@
-"""Reducing keys: *Reduce Keys to Poses*, *Restore Keys* and *Discard Dense Keys*, also of rigs in Object Mode."""
+"""Reducing keys: *Reduce Keys to Poses*, *Restore Keys* and *Discard Dense Keys*, also of rigs in Object Mode.
+
+And *Reduce into Holds*, of what hands held.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import bpy
@@ -12,13 +15,14 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from .. import animation
 from ..animation import Refused
+from ..animation.baking.into_holds import HAND, LEAST
 from ..animation.baking.originals import REDUCED
 from ..animation.properties import MODE_ITEMS
 from ..animation.queries.polls import with_more_keys_than
-from ..animation.transforms import OWN_WORDS, Transform
+from ..animation.transforms import OWN_WORDS, Transform, transform_of
 from ..animation.transforms.sizes import first_tolerance
-from .targets import OnChanged, OnTargets, each_target, with_bones_of_rigs
-from .wording import labelled, reduction_rows, reduction_summary, split
+from .targets import OnChanged, OnTargets, each_target, is_posing, selected_in_view, with_bones_of_rigs
+from .wording import hold_lines, labelled, reduction_rows, reduction_summary, split
 
 
 class _OfRigsToo:
@@ -146,7 +150,96 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
             refused=refused,
         )
         reduced = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]
-        return reduction_summary(context.scene, animation.reduction_of(reduced)) if reduced else ""
+        reduction = animation.reduction_of(reduced)
+        return "" if reduction is None else reduction_summary(context.scene, reduction)
+
+
+Holders = Sequence[bpy.types.Object | bpy.types.PoseBone] | None
+
+
+def props_and_holders(context: bpy.types.Context) -> tuple[list[Transform], Holders]:
+    """Return what is selected to be held, and what may hold it: selected rigs, or else what is active among several.
+
+    While bones are posed those that are selected hold objects that are not posed. None are all rigs of the scene.
+    """
+    things: Sequence[bpy.types.Object | bpy.types.PoseBone] = selected_in_view(context)
+    active: bpy.types.Object | bpy.types.PoseBone | None = context.object
+    if is_posing(context):
+        active = context.active_pose_bone
+        if objects := [obj for obj in context.selected_objects or () if obj.mode != "POSE"]:
+            return list(map(transform_of, objects)), things or None
+    elif rigs := [obj for obj in things if isinstance(obj, bpy.types.Object) and obj.type == "ARMATURE"]:
+        return [transform_of(obj) for obj in things if obj not in rigs], rigs
+    if len(things) < 2 or active is None or active not in things:
+        return list(map(transform_of, things)), None
+    return [transform_of(thing) for thing in things if thing != active], [active]
+
+
+class RIGID_MOTION_OT_reduce_into_holds(OnTargets, bpy.types.Operator):
+    bl_idname = "rigid_motion.reduce_into_holds"
+    bl_label = "Reduce into Holds"
+    bl_description = (
+        "Find out what held the selection as it was recorded, and hold it there with a single key: select it, and then "
+        "the rigs or the bone that may have. With nothing else selected all rigs are looked at. Restore Keys gives all "
+        "of its keys back"
+    )
+    nothing_to_do = n_("Select something with dense keys, as of a recording, and then what held it")
+    with_work = staticmethod(partial(with_more_keys_than, count=LEAST - 1))
+
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description=(
+            "How far off any point may be on any frame, within the radius around what is held. Recorded hands give way "
+            "by a few millimetres"
+        ),
+        default=HAND,
+        min=1e-6,
+        soft_max=1.0,
+        step=0.1,
+        precision=4,
+        subtype="DISTANCE",
+    )
+    least: IntProperty(
+        name="At Least",
+        description="The fewest frames on which something is held. For fewer its keys stay as they are",
+        default=LEAST,
+        min=2,
+        soft_max=100,
+    )
+    radius: FloatProperty(
+        name="Radius",
+        description="At 0 each object has the size of its own bounding box, and each bone that of what it moves",
+        default=0.0,
+        min=0.0,
+        soft_max=10.0,
+        step=1.0,
+        precision=4,
+        subtype="DISTANCE",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
+        return iter(props_and_holders(context)[0])
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split(self.layout)
+        for name in ("tolerance", "least", "radius"):
+            layout.prop(self, name)
+        column = layout.column(align=True)
+        for line in hold_lines(animation.reduction_of(list(self.each_target(context)))):
+            column.label(text=line, translate=False)
+
+    def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        _, holders = props_and_holders(context)
+        done = []
+        for target in targets:
+            try:
+                animation.reduce_into_holds(target, holders, self.tolerance, self.radius or None, least=self.least)
+                done.append(target)
+            except Refused as refusal:
+                refused.append(refusal)
+        return "; ".join(hold_lines(animation.reduction_of(done))) if done else ""
 
 
 class RIGID_MOTION_OT_restore_keys(_OfRigsToo, OnChanged, bpy.types.Operator):
@@ -174,6 +267,7 @@ class RIGID_MOTION_OT_discard_dense_keys(_OfRigsToo, OnChanged, bpy.types.Operat
 
 CLASSES = (
     RIGID_MOTION_OT_reduce_keys,
+    RIGID_MOTION_OT_reduce_into_holds,
     RIGID_MOTION_OT_restore_keys,
     RIGID_MOTION_OT_discard_dense_keys,
 )

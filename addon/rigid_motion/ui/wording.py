@@ -31,6 +31,7 @@ DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 NO_KEYS = n_("No keys of location, rotation or scale yet")
 KEYED_BONES = n_("Its bones have keys. Choose their modes in Pose Mode")
 NO_SEGMENT = n_("No segment on this frame")
+AT_REST = n_("No segment on this frame: it is as it was at the last key, in what holds it")
 STRIPS = n_("Moved by strips: enter one to see its segments (NLA Editor, Tab)")
 BAKED = n_("Baked to keys. Un-Bake brings its own keys back")
 OUT_OF_DATE = n_("The keys have changed since: Live Update is off, in the preferences")
@@ -137,6 +138,15 @@ def reduced_to(scene: bpy.types.Scene, reduction: Reduction) -> str:
     return iface_("{keys}, {error} off").format(keys=became, error=error)
 
 
+def hold_lines(reduction: Reduction | None) -> list[str]:
+    """Return in what something is held since its keys were reduced, a line for each time, in the user's language."""
+    text = iface_("{holder} from {first:g} to {last:g}: {before} keys became 1")
+    return [
+        text.format(holder=holder, first=first, last=last, before=before)
+        for holder, first, last, before in (() if reduction is None else reduction.held)
+    ]
+
+
 def reduction_rows(scene: bpy.types.Scene, reduction: Reduction | None) -> list[tuple[str, str]]:
     """Return what became of keys, and of the rig where it is one, as labels and what belongs to them."""
     if reduction is None:
@@ -197,8 +207,9 @@ def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:
     return lines
 
 
-def split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+def split(layout: bpy.types.UILayout | None) -> bpy.types.UILayout:
     """Return the layout, which then has labels to the left of properties, and no dots to animate them by."""
+    assert layout is not None
     layout.use_property_split = True
     layout.use_property_decorate = False
     return layout

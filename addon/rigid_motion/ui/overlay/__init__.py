@@ -1,9 +1,11 @@
 """The overlay of the 3D viewport: paths of selected objects or bones, Blender's own beside that of a rigid-motion mode.
 
-settings  what to show                  points   where the paths lead, and which ticks can be told apart in a view
-kinds     by what each kind is drawn    parents  where parents carry it
-ghosts    poses every few frames        cache    what is worked out already
-drawing   lines, dots and ghosts on the screen
+points   where the paths lead, and which ticks can be told apart in a view
+parents  where parents carry it         kinds    by what each kind is drawn
+ghosts   poses every few frames         blends   from one place to another
+records  where hands were seen          held     where what is held goes
+cache    what is worked out already     settings what to show
+drawing  lines, dots and ghosts on the screen
 """
 
 from __future__ import annotations
@@ -12,9 +14,11 @@ import bpy
 from bpy.props import PointerProperty
 
 from . import cache, drawing
-from .settings import RigidMotionOverlay, draw_settings, draw_toggle
+from .settings import RIGID_MOTION_OT_update_path, RigidMotionOverlay, draw_settings, draw_toggle
 
-__all__ = ["draw_settings", "register", "unregister"]
+CLASSES = (RIGID_MOTION_OT_update_path,)
+
+__all__ = ["CLASSES", "draw_settings", "register", "unregister"]
 
 
 def register() -> None:

@@ -22,7 +22,9 @@ from ...animation.evaluation.sources import Source
 from ...animation.queries.keyed import active_bindings, frames_in
 from ...animation.transforms import Transform, transform_of
 from ...handlers import append_handlers, remove_handlers
+from . import records
 from .ghosts import ghosts_of
+from .held import Held, is_held
 from .kinds import axis_length_of, followed
 from .parents import Carried, Parents
 from .points import Path, trace
@@ -49,7 +51,15 @@ class _Entry:
     above: frozenset[int] = frozenset()
     """Session ids of what its parents move by, where it follows them."""
 
+    records: tuple[tuple[records.Record, int], ...] = ()
+    """What it depends on that is known as it was seen alone, and how often that had changed."""
+
     stale: bool = False
+
+    @property
+    def is_outdated(self) -> bool:
+        """Return whether anything has been seen otherwise since."""
+        return any(record.version != version or record.transform is None for record, version in self.records)
 
 
 _entries: OrderedDict[tuple[int, str], _Entry] = OrderedDict()
@@ -74,9 +84,11 @@ def paths_of(
         *(scene.frame_start, scene.frame_end),
     )
     stale: dict[Transform, np.ndarray | None] = {}
+    is_playing = _plays()
     for target in targets:
         entry, turn = _entries.get(target.identity), (turned or {}).get(target)
-        if entry is None or entry.stale or entry.settings != (*settings, b"" if entry.above else _bytes(turn)):
+        outdated = entry is None or entry.stale or (entry.is_outdated and not is_playing)
+        if outdated or entry.settings != (*settings, b"" if entry.above else _bytes(turn)):
             stale[target] = turn
     if stale:
         carried = Carried()
@@ -97,6 +109,12 @@ def keep_only(drawn: int) -> None:
     """Drop paths that were not drawn for long, where this many were drawn just now."""
     while len(_entries) > drawn + SPARE:
         _entries.popitem(last=False)
+
+
+def know_from_seeing(targets: Iterable[Transform]) -> bool:
+    """Return whether the path of any of these depends on what is known only where it was seen."""
+    entries = (_entries.get(target.identity) for target in targets)
+    return any(entry is not None and entry.records for entry in entries)
 
 
 def notice_selection(targets: Iterable[bpy.types.Object | Transform]) -> bool:
@@ -134,6 +152,8 @@ def _read(
     if binding is None or source is None:
         # Where it was refused, the panel says why.
         return entry
+    if is_held(source):
+        return _read_held(target, binding, source, entry, settings, before, carried)
     parents = None if target.animated.animation_data.use_tweak_mode else Parents(target, carried)
     if parents is not None and parents.move_by_keys:
         entry.above, entry.settings = frozenset(parents.ids), (*settings, b"")
@@ -163,9 +183,39 @@ def _read(
     return entry
 
 
+def _read_held(
+    target: Transform,
+    binding: Binding,
+    source: Source,
+    entry: _Entry,
+    settings: tuple,
+    before: _Entry | None,
+    carried: Carried,
+) -> _Entry:
+    """Fill the entry of something that is held. In a strip that is tweaked it has no path."""
+    entry.settings = (*settings, b"")
+    if target.animated.animation_data.use_tweak_mode:
+        return entry
+    held = Held(target, source, carried)
+    mode, tick_step, axes_size, ghost_step, *_ = settings
+    selected, size = frames_in(binding, selected=True), axes_size * axis_length_of(target, source)
+    entry.above, entry.records, entry.selected = held.ids, held.records, _selection(binding)
+    entry.digest = (source.digest, tuple(source.rest.items()), selected.tobytes(), size, entry.settings, held.digest)
+    if before is not None and before.digest == entry.digest:
+        entry.path = before.path
+    else:
+        with suppress(ValueError):  # numbers that make no motion
+            chosen = None if mode == "CHOSEN" else mode
+            entry.path = held.trace(chosen, tick_step, size, selected)
+            if ghost_step and entry.path is not None:
+                entry.path = replace(entry.path, ghosts=held.ghosts(ghost_step, chosen))
+    return entry
+
+
 @persistent
-def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if _entries:
+        records.note(scene, depsgraph)
         edited = {update.id.original.session_uid for update in depsgraph.updates}
         for (uid, _), entry in _entries.items():
             entry.stale |= uid in edited or entry.action in edited or not edited.isdisjoint(entry.above)
@@ -176,21 +226,35 @@ def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if not _entries:
         return
     # To Blender, whatever is animated was updated on every frame. Unless it plays, a script may really have edited it.
-    windows = bpy.context.window_manager.windows
-    if not any(window.screen.is_animation_playing or window.screen.is_scrubbing for window in windows):
+    if _plays():
+        records.note(scene, depsgraph)
+    else:
         _on_update(scene, depsgraph)
+
+
+def _plays() -> bool:
+    """Return whether frames pass in any window."""
+    windows = bpy.context.window_manager.windows
+    return any(window.screen.is_animation_playing or window.screen.is_scrubbing for window in windows)
+
+
+@persistent
+def _on_undo(*_: object) -> None:
+    _entries.clear()
+    records.suspend()
 
 
 @persistent
 def _on_file(*_: object) -> None:
     _entries.clear()
+    records.clear()
 
 
 HANDLERS = {
     "depsgraph_update_post": _on_update,
     "frame_change_post": _on_frame,
-    "undo_post": _on_file,
-    "redo_post": _on_file,
+    "undo_post": _on_undo,
+    "redo_post": _on_undo,
     "load_post": _on_file,
 }
 
@@ -202,3 +266,4 @@ def register() -> None:
 def unregister() -> None:
     remove_handlers(HANDLERS)
     _entries.clear()
+    records.clear()

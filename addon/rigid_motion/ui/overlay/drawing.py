@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import functools
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import bpy
@@ -22,12 +24,13 @@ from mathutils import Matrix, Vector
 from ...animation.queries.segments import frame_in_action
 from ...animation.transforms import Transform, transform_of
 from ...handlers import append_handlers, remove_handlers
+from ..holding import hue_of
 from ..preferences import DEFAULT_LOOK, Color, preferences
 from ..targets import selected_in_view
 from . import cache
 from .ghosts import Ghosts, shape_of
 from .kinds import space_of
-from .points import TICKS, Path, Readable, readable, thinned
+from .points import PASSING, TICKS, Path, Readable, readable, thinned
 from .settings import RigidMotionOverlay, is_shown
 
 log = logging.getLogger(__package__)
@@ -45,6 +48,9 @@ AXIS_OPACITY = 0.8
 
 SOLID, EDGES = 0.15, 0.55
 """Opacity of the triangles and of the edges of a ghost."""
+
+DARKEST = 0.2
+"""A colour of the theme that is darker is meant to be dark."""
 
 EDGE_WIDTH = 1.0
 """The width of edges, in pixels at a resolution scale of 1."""
@@ -96,6 +102,12 @@ def _dot_shader() -> gpu.types.GPUShader:
     return gpu.shader.create_from_info(info)
 
 
+def brightened(color: Sequence[float]) -> Color:
+    """Return a colour of the theme as bright as lines have to be beside those of modes."""
+    red, green, blue = (part / max(*color, DARKEST) for part in color)
+    return red, green, blue, 1.0
+
+
 Batch = gpu.types.GPUBatch | None
 """Something on the graphics card; None where there is nothing of the kind."""
 
@@ -109,6 +121,9 @@ class _Batches:
     desired: Batch
     keys: Batch
     selected: Batch
+
+    pieces: tuple[tuple[int, Batch], ...]
+    """The pieces of the mode's path, or else of Blender's, by what holds it."""
 
     views: dict[tuple, Readable] = field(default_factory=dict)
     """The parts that can be told apart in the views that the path was last seen in."""
@@ -124,6 +139,11 @@ class _Batches:
             desired=None if path.desired is None else _batch("LINE_STRIP", thinned(path.desired)),
             keys=_batch("POINTS", path.keys[~path.selected]),
             selected=_batch("POINTS", path.keys[path.selected]),
+            pieces=tuple(
+                (piece.holder, _batch("LINE_STRIP", thinned(line[piece.first : piece.last + 1])))
+                for line in (path.native if path.desired is None else path.desired,)
+                for piece in path.pieces
+            ),
         )
 
     def readable(self, pen: _Pen, *, every_tick: bool) -> Readable:
@@ -163,14 +183,21 @@ def _batch(kind: str, points: np.ndarray | list) -> Batch:
 class _Pen:
     """Draws batches in one redraw of one viewport."""
 
-    def __init__(self, context: bpy.types.Context) -> None:
+    def __init__(self, context: Any) -> None:
         self.lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
         self.dots = _dot_shader()
         self.look = preferences() or DEFAULT_LOOK
         theme = context.preferences.themes[0].user_interface
+        self.hues = [brightened(item.color) for item in context.preferences.themes[0].strip_color]
         self.axis_colors = [(*color, AXIS_OPACITY) for color in (theme.axis_x, theme.axis_y, theme.axis_z)]
         self.size = context.region.width, context.region.height
         self.scale = context.preferences.system.ui_scale
+
+    def held_color(self, holder: int, free: Color) -> Color:
+        """Return the colour of what something is held in, from that of the world."""
+        if holder == 0:
+            return free
+        return self.look.tick_color if holder == PASSING else self.hues[hue_of(holder) - 1]
 
     def line(self, batch: Batch, color: Color, width: float) -> None:
         if batch:
@@ -211,13 +238,14 @@ def _draw_ghosts(pen: _Pen, transform: Transform, ghosts: Ghosts, frame: float, 
         _shapes[identity] = _batch("TRIS", shape.triangles), _batch("LINES", shape.lines)
     triangles, lines = _shapes[identity]
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    red, green, blue, opacity = color
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.face_culling_set("BACK")
     try:
-        for at, matrix in zip(ghosts.frames.tolist(), ghosts.matrices, strict=True):
+        holders = np.zeros(len(ghosts.frames), int) if ghosts.holders is None else ghosts.holders
+        for at, matrix, holder in zip(ghosts.frames.tolist(), ghosts.matrices, holders.tolist(), strict=True):
             if abs(at - frame) < NEAR:
                 continue
+            red, green, blue, opacity = pen.held_color(holder, color)
             with gpu.matrix.push_pop():
                 gpu.matrix.multiply_matrix(Matrix(matrix))
                 if triangles:
@@ -262,7 +290,7 @@ def _complain(problem: Exception) -> None:
         log.exception("The paths could not be drawn")
 
 
-def _draw(context: bpy.types.Context) -> None:
+def _draw(context: Any) -> None:
     scene, depsgraph = context.scene, context.view_layer.depsgraph
     settings, targets = scene.rigid_motion_overlay, list(map(transform_of, selected_in_view(context)))
     spaces = {target: space_of(target, depsgraph) for target in targets}
@@ -314,7 +342,9 @@ def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
         (ticks,) = batches.some("native_ticks", chosen.native_ticks)
         pen.dot(ticks, OUTLINE, TICK, look.native_color, 1.25)
     if batches.desired is not None:
-        pen.outlined_line(batches.desired, look.mode_color, look.line_width)
+        pen.line(batches.desired, OUTLINE, look.line_width + 2.0)
+        for holder, piece in batches.pieces or ((0, batches.desired),):
+            pen.line(piece, pen.held_color(holder, look.mode_color), look.line_width)
         (ticks,) = batches.some("desired_ticks", chosen.desired_ticks)
         pen.dot(ticks, look.tick_color, TICK)
     diameter = KEY if len(path.keys) <= TICKS else TICK

@@ -59,6 +59,9 @@ class Ghosts:
     matrices: np.ndarray
     """Shape (g, 4, 4), for columns of homogeneous coordinates."""
 
+    holders: np.ndarray | None = None
+    """The numbers of what holds it, see `points.Piece`, shape (g,). None for what nothing ever holds."""
+
 
 def ghost_frames(first: int, last: int, step: int) -> np.ndarray:
     """Return the multiples of a step from the first frame to the last."""
@@ -79,16 +82,22 @@ def ghosts_of(
         source = replace(source, mode=MODE_NUMBERS[mode])
     maps = shown(transform, source, frames)[1]
     if parents is None:
-        maps = _in_space(transform, maps, turn)
+        maps = in_space_of_path(transform, maps, turn)
     else:
         spaces, turns = parents.spaces(frames)
-        maps = spaces @ _in_space(transform, maps, turns)
-    matrices = np.tile(np.eye(4), (len(frames), 1, 1))
+        maps = spaces @ in_space_of_path(transform, maps, turns)
+    return Ghosts(frames, matrices_of(maps))
+
+
+def matrices_of(maps: AffineMaps) -> np.ndarray:
+    """Return the matrices (n, 4, 4) of maps (n,)."""
+    matrices = np.tile(np.eye(4), (len(maps.origins), 1, 1))
     matrices[:, :3, :3], matrices[:, :3, 3] = maps.axes, maps.origins
-    return Ghosts(frames, matrices)
+    return matrices
 
 
-def _in_space(transform: Transform, maps: AffineMaps, turn: np.ndarray | None) -> AffineMaps:
+def in_space_of_path(transform: Transform, maps: AffineMaps, turn: np.ndarray | None) -> AffineMaps:
+    """Return where channels that say these maps (n,) put something in the space of its path."""
     origins = maps.origins
     if transform.is_part and transform.carrier.bone.use_connect and transform.carrier.parent:
         origins = np.zeros_like(origins)

@@ -57,7 +57,7 @@ class Carried:
         if key not in self._channels:
             _, source = self._read[transform]
             if source is None:
-                self._channels[key] = _identity(len(frames)) @ _maps(transform.carrier.matrix_basis)
+                self._channels[key] = identity(len(frames)) @ maps_of(transform.carrier.matrix_basis)
             else:
                 self._channels[key] = shown(transform, source, frames)[1]
         return self._channels[key]
@@ -86,15 +86,19 @@ class Parents:
     target : Transform
     carried : Carried
         That of all targets that are looked at together.
+    itself : bool
+        Read the target, too, for where it is itself.
     """
 
-    def __init__(self, target: Transform, carried: Carried) -> None:
+    def __init__(self, target: Transform, carried: Carried, *, itself: bool = False) -> None:
         self.target, self._carried = target, carried
-        self._read = carried.read(_above(target))
-        self.move_by_keys = any(source is not None for _, source in self._read.values()) and all(
+        self._read = carried.read((target, *_above(target)) if itself else _above(target))
+        self.known = all(
             _moves_by_keys(one, carried) and (source is not None or binding is None or not binding.is_keyed)
             for one, (binding, source) in self._read.items()
         )
+        """True if nothing but keys moves them."""
+        self.move_by_keys = self.known and any(source is not None for _, source in self._read.values())
         """True if they move, and by keys alone."""
         self.ids = {item.animated.session_uid for item in self._read}
         self.ids |= {binding.slot.action.session_uid for binding, _ in self._read.values() if binding is not None}
@@ -126,7 +130,7 @@ class Parents:
         """
         if not self.target.is_part:
             return self._carrying(self.target.carrier, frames), None
-        bone, stands = self.target.carrier, _identity(len(frames))
+        bone, stands = self.target.carrier, identity(len(frames))
         hierarchy, numbers = self._carried.hierarchy(self.target.animated)
         number = numbers[bone.name]
         above = None if bone.parent is None else self._carried.posed(bone.parent, frames)
@@ -137,19 +141,24 @@ class Parents:
         maps = self._world(self.target.animated, frames) @ AffineMaps(along, above.at(offset.origins))
         return maps, unless_same(turned)
 
+    def places(self, frames: np.ndarray) -> AffineMaps:
+        """Return where the target itself is in the world on frames (n,)."""
+        world = self._world(self.target.animated, frames)
+        return world @ self._carried.posed(self.target.carrier, frames) if self.target.is_part else world
+
     def _world(self, obj: bpy.types.Object, frames: np.ndarray) -> AffineMaps:
         return self._carrying(obj, frames) @ self._carried.channels(transform_of(obj), frames)
 
     def _carrying(self, obj: bpy.types.Object, frames: np.ndarray) -> AffineMaps:
         parent = obj.parent
         if parent is None:
-            return _identity(len(frames))
+            return identity(len(frames))
         carried = self._world(parent, frames)
         if obj.parent_type == "BONE":
             bone = parent.pose.bones[obj.parent_bone]
-            tail = _maps(Matrix.Translation((0.0, bone.bone.length, 0.0)))
+            tail = maps_of(Matrix.Translation((0.0, bone.bone.length, 0.0)))
             carried = carried @ self._carried.posed(bone, frames) @ tail
-        return carried @ _maps(obj.matrix_parent_inverse)
+        return carried @ maps_of(obj.matrix_parent_inverse)
 
 
 def unless_same(turned: np.ndarray) -> np.ndarray | None:
@@ -202,10 +211,12 @@ def _hung(transform: Transform) -> tuple:
     return (*settings, bone.length, tuple(map(tuple, bone.matrix_local)))
 
 
-def _identity(count: int) -> AffineMaps:
+def identity(count: int) -> AffineMaps:
+    """Return maps (count,) that leave all where it is."""
     return AffineMaps(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)))
 
 
-def _maps(matrix: Matrix) -> AffineMaps:
+def maps_of(matrix: Matrix) -> AffineMaps:
+    """Return a matrix as a map."""
     numbers = np.array(matrix, dtype=np.float64)
     return AffineMaps(numbers[:3, :3], numbers[:3, 3])

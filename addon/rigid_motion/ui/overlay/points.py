@@ -58,6 +58,20 @@ AT_REST = 1.0
 STEPS = [digit * 10**power for power in range(7) for digit in (1, 2, 5)]
 
 
+PASSING = -1
+"""Where there is no single holder: what passes from one to another."""
+
+
+class Piece(NamedTuple):
+    """A part of a path, from one of its points to another, both included."""
+
+    first: int
+    last: int
+
+    holder: int
+    """The number of what holds it there, 0 for the world, or PASSING."""
+
+
 class Followed(NamedTuple):
     """Which point of something a path is of, where it is not the origin."""
 
@@ -128,6 +142,9 @@ class Path:
 
     ghosts: Ghosts | None = None
     """The poses every few frames; None where that was not asked for."""
+
+    pieces: tuple[Piece, ...] = ()
+    """What holds it where, in the order of its points; empty for what nothing ever holds."""
 
     def at(self, frame: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Return where it is at a frame, natively and in the mode, each of shape (3,). The path holds its ends."""

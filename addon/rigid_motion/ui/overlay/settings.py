@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ...animation.properties import MODE_ITEMS
-from ...animation.transforms import OWN_WORDS
+from ...animation.transforms import OWN_WORDS, transform_of
+from ..targets import selected_in_view
 from ..wording import draw_text, labelled
+from . import cache
 
 MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MODE_ITEMS[1:]]
 
@@ -21,7 +25,8 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
         name="Rigid Motion Paths",
         description="Draw the paths of the selected objects or bones: Blender's own, and beside it that of a "
         "rigid-motion mode. Of a bone it is the path of its head, or of its tail where the bone only turns. "
-        "Parents that move by keys are followed; by constraints they are taken as they are on the current frame",
+        "Parents that move by keys are followed; by constraints they are taken as they are on the current frame, "
+        "and what holds something as it was when its frames were last played",
         options=set(),
     )
     mode: EnumProperty(
@@ -73,11 +78,30 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
 
 
-def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+class RIGID_MOTION_OT_update_path(bpy.types.Operator):
+    bl_idname = "rigid_motion.update_path"
+    bl_label = "Update Path"
+    bl_description = (
+        "Play through all frames of the scene once, so that paths know where hands are that follow constraints. "
+        "A pose without a key is lost, as it is where frames are played"
+    )
+    bl_options: Any = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender reads it
+
+    def execute(self, context: Any) -> Any:
+        scene, before, subframe = context.scene, context.scene.frame_current, context.scene.frame_subframe
+        for frame in range(scene.frame_start, scene.frame_end + 1):
+            scene.frame_set(frame)
+        scene.frame_set(before, subframe=subframe)
+        return {"FINISHED"}
+
+
+def draw_settings(layout: bpy.types.UILayout, context: Any) -> None:
     """Draw the settings of the overlay, for a panel."""
     settings = context.scene.rigid_motion_overlay
     if (settings.show_paths or settings.show_ghosts) and not is_shown(context):
         draw_text(context, layout, HIDDEN, "INFO")
+    if cache.know_from_seeing(map(transform_of, selected_in_view(context))):
+        layout.operator(RIGID_MOTION_OT_update_path.bl_idname)
     row = labelled(layout, iface_("Mode", OWN_WORDS))
     row.active = settings.show_paths or settings.show_ghosts
     row.prop(settings, "mode", text="")
@@ -97,7 +121,7 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     size.prop(settings, "axes_size", text="")
 
 
-def draw_toggle(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
+def draw_toggle(panel: Any, context: Any) -> None:
     """Draw the overlay's place among Blender's own, in the viewport's Overlays pop-over."""
     column = panel.layout.column()
     column.active = context.space_data.overlay.show_overlays and context.space_data.overlay.show_motion_paths
@@ -105,7 +129,7 @@ def draw_toggle(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
     column.prop(context.scene.rigid_motion_overlay, "show_ghosts", text="Rigid Motion Ghosts")
 
 
-def is_shown(context: bpy.types.Context) -> bool:
+def is_shown(context: Any) -> bool:
     """Return whether the scene, and the viewport if the context is in one, show paths or ghosts."""
     overlay, settings = getattr(context.space_data, "overlay", None), context.scene.rigid_motion_overlay
     in_view = not isinstance(overlay, bpy.types.View3DOverlay) or (overlay.show_overlays and overlay.show_motion_paths)

@@ -1,0 +1,105 @@
+"""What the sidebar shows of how something is held: what holds it, when it passes on, and what may go wrong there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+
+from ..animation import HoldFacts, hold_facts, reduction_of
+from ..animation.actions.channels import key_points
+from ..animation.actions.slots import active_fcurves
+from ..animation.evaluation.components import SCALE
+from ..animation.holds.dependencies import follows
+from ..animation.holds.holders import Holder, node_of
+from ..animation.transforms import OWN_WORDS, Transform, prefix_of
+from .holding import RIGID_MOTION_MT_holders, has_been_held, icon_of, name_of, shown_prop
+from .wording import degrees, draw_text, hold_lines, labelled, length
+
+FAR_TURNED = math.radians(120)
+"""Half a turn is passed either way round; with less than a third of a turn left to it nobody can tell which."""
+
+TOUCHES = 1e-5
+"""Hands that are less apart, in Blender's units, are at one place in single precision."""
+
+GROWS = 1e-4
+"""Scales that differ by less are the same."""
+
+
+def draw(context: Any, layout: Any) -> None:
+    """Draw what holds the selection, for a panel."""
+    prop = shown_prop(context)
+    if prop is None:
+        return
+    try:
+        facts = hold_facts(prop)
+    except ValueError as refusal:
+        draw_text(context, layout, str(refusal), "ERROR")
+        return
+    row: Any = labelled(layout, prop.carrier.name)
+    row.menu(RIGID_MOTION_MT_holders.__name__, text=name_of(facts.now), icon=icon_of(facts.now), translate=False)
+    if has_been_held(prop):
+        _draw_passing(context, layout, facts)
+        row = layout.row(align=True)
+        row.operator("rigid_motion.hold_in")
+        row.operator("rigid_motion.match_grip")
+        row.operator("rigid_motion.let_go")
+    else:
+        layout.operator("rigid_motion.hold_in")
+    layout.operator("rigid_motion.reduce_into_holds")
+    for line in hold_lines(reduction_of([prop])):
+        layout.label(text=line, icon="CON_CHILDOF", translate=False)
+    for caution in cautions(prop, facts):
+        draw_text(context, layout, caution, "ERROR")
+
+
+def _draw_passing(context: Any, layout: Any, facts: HoldFacts) -> None:
+    if facts.switch is not None:
+        row: Any = labelled(layout, iface_("Pass", OWN_WORDS))
+        row.prop(context.scene, "rigid_motion_pass", text="")
+        row.label(text=iface_("at {frame:g}").format(frame=facts.switch), translate=False)
+    if apart := apart_text(context.scene, facts):
+        labelled(layout).label(text=apart, translate=False)
+
+
+def apart_text(scene: bpy.types.Scene, facts: HoldFacts) -> str:
+    """Return how far apart both hands carry it where it passes, "" elsewhere."""
+    if facts.apart is None or facts.turned is None or facts.switch is None:
+        return ""
+    apart = length(scene, facts.apart if facts.apart > TOUCHES else 0.0, precision=2)
+    return iface_("Hands {distance}, {angle} apart at {frame:g}").format(
+        distance=apart, angle=degrees(facts.turned), frame=facts.switch
+    )
+
+
+def cautions(prop: Transform, facts: HoldFacts) -> Iterator[str]:
+    """Yield what may go wrong with something that is held, and what to do about it."""
+    if facts.turned is not None and facts.frames and facts.turned > FAR_TURNED:
+        yield iface_(
+            "It is turned by {angle} while it passes: it may go round either way. Turn a hand, or Match Grip"
+        ).format(angle=degrees(facts.turned))
+    for holder in facts.holders:
+        if holder.target is None:
+            continue
+        if follows((holder.target, holder.bone), node_of(prop)):
+            yield iface_("{holder} follows {name} by now, which it holds: a cycle. Take that off {holder}").format(
+                holder=holder.name, name=prop.name
+            )
+        if _grows(holder):
+            yield iface_("{holder} has keys of its scale: what it holds grows and shrinks with it").format(
+                holder=holder.name
+            )
+
+
+def _grows(holder: Holder) -> bool:
+    """Return whether keys change the scale of a holder."""
+    path = (prefix_of(holder.bone) if holder.bone else "") + SCALE
+    curves = [] if holder.target is None else active_fcurves(holder.target)
+    return any(
+        fcurve.data_path == path and len(fcurve.keyframe_points) > 1 and np.ptp(key_points(fcurve)[:, 1]) > GROWS
+        for fcurve in curves
+    )

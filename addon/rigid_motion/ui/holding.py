@@ -1,0 +1,404 @@
+"""Holding things: what is held and what holds it, as an editor means them, and operators on these.
+
+What is held is selected first, what holds it last, so that it is active: an object, or in Pose Mode a bone. Selected
+objects that are not posed are meant before bones, as by Blender's Ctrl P. All acts on the current frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from typing import Any, ClassVar
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.app.translations import pgettext_tip as tip_
+from bpy.props import BoolProperty, IntProperty, StringProperty
+
+from .. import animation
+from ..animation import HoldFacts, Refused, hold_facts
+from ..animation.evaluation.runs import MOST_FRAMES
+from ..animation.holds.holders import Holder, is_ours
+from ..animation.transforms import OWN_WORDS, Transform, transform_of
+from .targets import OnTargets, is_posing
+
+Node = bpy.types.Object | bpy.types.PoseBone
+"""Something that holds or is held."""
+
+FIRST_AND_LAST = n_("Select what is to be held, and last what holds it: an object, or in Pose Mode a bone")
+NOTHING_HELD = n_("Nothing selected is held in anything yet: Hold In")
+
+UNSEEN = {"HIDDEN", "SKIP_SAVE"}
+"""The options of properties that menus set."""
+
+HUES = (4, 7, 2, 6, 1, 3)
+"""The theme's colours of strips that holders have in menus and along paths, by their numbers."""
+
+
+def hue_of(number: int) -> int:
+    """Return the number of the theme's colour of a holder that is not the world."""
+    return HUES[(number - 1) % len(HUES)]
+
+
+def icon_of(holder: Holder | None) -> str:
+    """Return the icon of a holder: the colour that its part of a path has."""
+    return "WORLD" if holder is None else f"STRIP_COLOR_{hue_of(holder.number):02d}"
+
+
+def name_of(holder: Holder | None) -> str:
+    """Return what menus call a holder, in the user's language."""
+    if holder is None:
+        return iface_("World", OWN_WORDS)
+    return title_of(holder.target, holder.bone)
+
+
+def title_of(target: bpy.types.Object | None, bone: str) -> str:
+    """Return what menus call an object, or a bone with its rig."""
+    if target is None:
+        return iface_("None")
+    return f"{bone} ({target.name})" if bone else target.name
+
+
+def has_been_held(transform: Transform) -> bool:
+    """Return whether something has any constraint that holds it."""
+    return any(is_ours(constraint) for constraint in transform.carrier.constraints)
+
+
+def active_holder(context: bpy.types.Context, *, use_bone: bool = True) -> Node | None:
+    """Return what is meant to hold: the active bone in Pose Mode and of a rig that is active, or the active object."""
+    if is_posing(context):
+        return context.active_pose_bone
+    return _active_bone(context.object) or context.object if use_bone else context.object
+
+
+def _active_bone(obj: bpy.types.Object | None) -> bpy.types.PoseBone | None:
+    data: Any = None if obj is None else obj.data
+    if obj is None or obj.type != "ARMATURE" or obj.pose is None or data.bones.active is None:
+        return None
+    return obj.pose.bones.get(data.bones.active.name)
+
+
+def chosen(context: bpy.types.Context) -> list[Transform]:
+    """Return all that is selected, what is not posed first."""
+    objects = [obj for obj in context.selected_objects or () if obj.mode != "POSE"]
+    bones = (context.selected_pose_bones or ()) if is_posing(context) else ()
+    return [transform_of(item) for item in (*objects, *bones)]
+
+
+def props_for(context: bpy.types.Context, holder: Node | None) -> list[Transform]:
+    """Return what is selected to be held in something: objects that are not posed, or else bones; not itself."""
+    if holder is None:
+        return []
+    objects = [item for item in chosen(context) if not item.is_part and item.carrier not in (holder, holder.id_data)]
+    return objects or [item for item in chosen(context) if item.is_part and item.carrier != holder]
+
+
+def held(context: bpy.types.Context) -> list[Transform]:
+    """Return what is selected and has been held in anything, but for what is active and holds another one of it."""
+    result = [item for item in chosen(context) if has_been_held(item)]
+    active = active_holder(context)
+    if active is not None and len(result) > 1 and (own := transform_of(active)) in result:
+        is_holder = any(_points_at(item, active) for item in result if item != own)
+        result = [item for item in result if not (is_holder and item == own)]
+    return result
+
+
+def _points_at(item: Transform, node: Node) -> bool:
+    """Return whether something has been held in an object or a bone."""
+    ours: list[Any] = [one for one in item.carrier.constraints if is_ours(one) and one.type == "CHILD_OF"]
+    return any((one.target, one.subtarget) == _node(node) for one in ours)
+
+
+def shown_prop(context: bpy.types.Context) -> Transform | None:
+    """Return what a panel on holding is about: what is held already, or what would be."""
+    active = active_holder(context, use_bone=False)
+    if held_already := held(context):
+        own = None if active is None else transform_of(active)
+        return own if own in held_already else held_already[0]
+    props = props_for(context, active_holder(context))
+    return props[0] if props else None if active is None else transform_of(active)
+
+
+def candidates(context: bpy.types.Context, prop: Transform) -> Iterator[Node]:
+    """Yield what is at hand to hold something: what is active, and active bones of rigs that are selected."""
+    rigs = (_active_bone(obj) for obj in (context.object, *(context.selected_objects or ())))
+    nodes = dict.fromkeys(node for node in (active_holder(context), *rigs, context.object) if node is not None)
+    yield from (node for node in nodes if node not in (prop.carrier, prop.animated))
+
+
+class _Hold(OnTargets):
+    """Operators that key what is selected in the space of something."""
+
+    frames: IntProperty(
+        name="Pass",
+        description="Frames before this one over which it passes from what held it before: 0 at once, to pick up and "
+        "put down; 1 to throw; 3 to catch; 4 from hand to hand",
+        min=0,
+        max=MOST_FRAMES,
+        soft_max=12,
+        options={"SKIP_SAVE"},
+        translation_context=OWN_WORDS,
+    )
+    summary: ClassVar[str]
+    properties: Any
+
+    def holder(self, _context: bpy.types.Context) -> tuple[bpy.types.Object | None, str]:
+        """Return the object that is to hold, None for the world, and the name of the bone, "" for none."""
+        return None, ""
+
+    def do(self, context: Any, targets: list[Transform], refused: list[Refused]) -> str:
+        frames = self.frames if self.properties.is_property_set("frames") else None
+        target, bone = self.holder(context)
+        done = _each(targets, refused, lambda item: animation.hold_in(item, target, bone, frames=frames))
+        if frames is None and done:
+            # So the redo panel has what was chosen.
+            self.frames = hold_facts(done[0]).frames
+        return rpt_(self.summary).format(holder=title_of(target, bone), frame=context.scene.frame_current_final)
+
+
+class RIGID_MOTION_OT_hold_in(_Hold, bpy.types.Operator):
+    bl_idname = "rigid_motion.hold_in"
+    bl_label = "Hold In"
+    bl_description = (
+        "Have the active object hold the others that are selected from this frame on; in Pose Mode the active bone, "
+        "and of a rig that is active its active bone. They stay where they are, and follow each later edit of it"
+    )
+    summary = n_("held in {holder} from frame {frame:g}")
+
+    use_bone: BoolProperty(
+        name="Active Bone",
+        description="Hold them in the active bone of the rig, and not in the rig as a whole",
+        default=True,
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
+        return iter(props_for(context, active_holder(context)))
+
+    @classmethod
+    def reason(cls, _targets: list[Transform], _context: bpy.types.Context) -> str:
+        return tip_(FIRST_AND_LAST)
+
+    def holder(self, context: bpy.types.Context) -> tuple[bpy.types.Object | None, str]:
+        node = active_holder(context, use_bone=self.use_bone)
+        return _node(node) if node is not None else (None, "")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout: Any = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "frames")
+        if not is_posing(context) and _active_bone(context.object) is not None:
+            layout.prop(self, "use_bone")
+
+
+class RIGID_MOTION_OT_hold_in_known(_Hold, bpy.types.Operator):
+    bl_idname = "rigid_motion.hold_in_known"
+    bl_label = "Hold In"
+    bl_description = "Have it held in this from this frame on. It stays where it is"
+    summary = RIGID_MOTION_OT_hold_in.summary
+
+    target: StringProperty(
+        name="Target", description="Name of the object that holds, with that of its library", options=UNSEEN
+    )
+    bone: StringProperty(name="Bone", description="Name of its bone that holds; empty for none", options=UNSEEN)
+
+    @classmethod
+    def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
+        return iter(known_props(context))
+
+    def holder(self, _context: bpy.types.Context) -> tuple[bpy.types.Object | None, str]:
+        found = next((obj for obj in bpy.data.objects if obj.name_full == self.target), None)
+        if found is None:
+            raise Refused(n_("There is no object {name} any more: choose another one to hold it"), name=self.target)
+        return found, self.bone
+
+
+def known_props(context: bpy.types.Context) -> list[Transform]:
+    """Return what is to be held where what holds it is named."""
+    prop = shown_prop(context)
+    return held(context) or props_for(context, active_holder(context)) or ([prop] if prop is not None else [])
+
+
+class _OfHeld(OnTargets):
+    """Operators on what has been held."""
+
+    nothing_to_do = NOTHING_HELD
+
+    @classmethod
+    def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
+        return iter(held(context))
+
+    @classmethod
+    def reason(cls, _targets: list[Transform], _context: bpy.types.Context) -> str:
+        return tip_(cls.nothing_to_do)
+
+
+class RIGID_MOTION_OT_let_go(_OfHeld, _Hold, bpy.types.Operator):
+    bl_idname = "rigid_motion.let_go"
+    bl_label = "Let Go"
+    bl_description = (
+        "Have nothing hold the selection from this frame on: it is in the world, or goes with its parent. "
+        "It stays where it is"
+    )
+    summary = n_("let go on frame {frame:g}")
+
+
+class RIGID_MOTION_OT_match_grip(_OfHeld, bpy.types.Operator):
+    bl_idname = "rigid_motion.match_grip"
+    bl_label = "Match Grip"
+    bl_description = (
+        "Give the key on this frame the grip that the same hand had the last time, so that it is held as before"
+    )
+
+    def do(self, context: Any, targets: list[Transform], refused: list[Refused]) -> str:
+        _each(targets, refused, animation.match_grip)
+        return rpt_("the grip as before on frame {frame:g}").format(frame=context.scene.frame_current_final)
+
+
+class RIGID_MOTION_OT_pass_frames(_OfHeld, bpy.types.Operator):
+    bl_idname = "rigid_motion.pass_frames"
+    bl_label = "Pass"
+    bl_description = (
+        "Choose over how many frames the selection passes to what holds it next: before the key on this frame, "
+        "or before the next one at which another holds it"
+    )
+
+    frames: IntProperty(
+        name="Frames",
+        description="0: at once, to pick up and put down. 1: to throw. 3: to catch. 4: from hand to hand",
+        default=4,
+        min=0,
+        max=MOST_FRAMES,
+        soft_max=12,
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(self, context: Any, _event: bpy.types.Event) -> Any:
+        facts = facts_or_none(next(iter(held(context)), None))
+        if facts is not None and facts.switch is not None and not self.properties.is_property_set("frames"):
+            self.frames = facts.frames
+        return context.window_manager.invoke_props_dialog(self, confirm_text="Pass Over")
+
+    def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        _each(targets, refused, lambda item: animation.pass_frames(item, self.frames))
+        return rpt_("passed over {frames} frames").format(frames=self.frames)
+
+
+def _each(targets: list[Transform], refused: list[Refused], verb: Callable[[Transform], None]) -> list[Transform]:
+    """Do something to each target, and return those that did not refuse."""
+    done = []
+    for target in targets:
+        try:
+            verb(target)
+        except Refused as refusal:
+            refused.append(refusal)
+        else:
+            done.append(target)
+    return done
+
+
+def _node(node: Node) -> tuple[Any, str]:
+    """Return the object of what holds, and the name of its bone, "" for none."""
+    return node.id_data, node.name if isinstance(node, bpy.types.PoseBone) else ""
+
+
+def facts_or_none(prop: Transform | None) -> HoldFacts | None:
+    """Return what there is to tell of how something is held; None where its keys are refused, or there is nothing."""
+    try:
+        return None if prop is None else hold_facts(prop)
+    except ValueError:
+        return None
+
+
+class RIGID_MOTION_MT_holders(bpy.types.Menu):
+    bl_label = "Hold In"
+    bl_description = "What is to hold it from this frame on: the world, what has held it before, or what is active"
+
+    def draw(self, context: Any) -> None:
+        layout: Any = self.layout
+        prop = shown_prop(context)
+        layout.operator_context = "EXEC_REGION_WIN"
+        layout.operator("rigid_motion.let_go", text=name_of(None), icon=icon_of(None), translate=False)
+        facts = facts_or_none(prop)
+        known = [] if facts is None else [holder for holder in facts.holders if holder.target is not None]
+        for holder in known:
+            _draw_holder(layout, holder.target, holder.bone, icon_of(holder))
+        if prop is None:
+            return
+        new = [node for node in candidates(context, prop) if not any(_is(holder, node) for holder in known)]
+        if new:
+            layout.separator()
+        for node in new:
+            _draw_holder(layout, *_node(node), "BONE_DATA" if isinstance(node, bpy.types.PoseBone) else "OBJECT_DATA")
+
+
+def _is(holder: Holder, node: Node) -> bool:
+    return (holder.target, holder.bone) == _node(node)
+
+
+def _draw_holder(layout: Any, target: Any, bone: str, icon: str) -> None:
+    text = title_of(target, bone)
+    properties = layout.operator("rigid_motion.hold_in_known", text=text, icon=icon, translate=False)
+    properties.target, properties.bone = target.name_full, bone
+
+
+class RIGID_MOTION_MT_hold(bpy.types.Menu):
+    bl_label = "Hold"
+    bl_translation_context = OWN_WORDS
+    bl_description = "What holds the selection: pick up, hand over, throw, catch and put down"
+
+    def draw(self, _context: Any) -> None:
+        layout: Any = self.layout
+        layout.operator_context = "INVOKE_REGION_WIN"
+        layout.operator("rigid_motion.hold_in")
+        layout.menu(RIGID_MOTION_MT_holders.__name__, text="Hold In...")
+        layout.operator("rigid_motion.let_go")
+        layout.separator()
+        layout.operator("rigid_motion.match_grip")
+        layout.operator("rigid_motion.pass_frames", text="Pass...")
+
+
+CLASSES = (
+    RIGID_MOTION_OT_hold_in,
+    RIGID_MOTION_OT_hold_in_known,
+    RIGID_MOTION_OT_let_go,
+    RIGID_MOTION_OT_match_grip,
+    RIGID_MOTION_OT_pass_frames,
+    RIGID_MOTION_MT_holders,
+    RIGID_MOTION_MT_hold,
+)
+
+
+def _get_frames(_scene: bpy.types.Scene) -> int:
+    facts = facts_or_none(shown_prop(bpy.context))
+    return 0 if facts is None else facts.frames
+
+
+def _set_frames(_scene: bpy.types.Scene, frames: int) -> None:
+    prop = shown_prop(bpy.context)
+    # What refuses says so in the panel.
+    with suppress(Refused):
+        if prop is not None and frames != _get_frames(_scene):
+            animation.pass_frames(prop, frames)
+
+
+def register() -> None:
+    # Nothing of it is kept: it is the number at the key of what a panel shows.
+    bpy.types.Scene.rigid_motion_pass = IntProperty(
+        name="Pass",
+        description=RIGID_MOTION_OT_pass_frames.bl_description,
+        min=0,
+        max=MOST_FRAMES,
+        soft_max=12,
+        options=set(),
+        get=_get_frames,
+        set=_set_frames,
+        translation_context=OWN_WORDS,
+    )
+
+
+def unregister() -> None:
+    del bpy.types.Scene.rigid_motion_pass

@@ -1,0 +1,85 @@
+"""Where what follows constraints or drivers was seen, on frames that were shown: nobody else knows it of other ones.
+
+Playing once through the frames makes a record whole. What is edited since is seen anew on the frame that is shown, and
+on others once these are. Frames are those of the scene.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...animation.transforms import Transform
+from ...motion.affine import AffineMaps
+from .blends import blended
+
+SAME = 1e-6
+"""Matrices whose parts differ by less are the same."""
+
+
+class Record:
+    """The places of an object or a bone in the world."""
+
+    def __init__(self, transform: Transform) -> None:
+        self.transform: Transform | None = transform
+        """None after an undo, until it is asked for again."""
+        self.places: dict[float, np.ndarray] = {}
+        """Matrices (4, 4) by the frames on which they were seen."""
+        self.version = 0
+
+    def note(self, frame: float, depsgraph: bpy.types.Depsgraph) -> None:
+        """Take down where it is on the frame that is shown."""
+        if self.transform is None:
+            return
+        evaluated: Any = self.transform.animated.evaluated_get(depsgraph)
+        place = np.array(evaluated.matrix_world)
+        if self.transform.is_part:
+            place = place @ np.array(evaluated.pose.bones[self.transform.carrier.name].matrix)
+        before = self.places.get(frame)
+        if before is None or np.abs(before - place).max() > SAME:
+            self.places[frame] = place
+            self.version += 1
+
+    def maps(self, frames: np.ndarray) -> AffineMaps:
+        """Return where it is on frames (n,): between those that were shown, and beyond these as on the nearest one."""
+        known = np.array(sorted(self.places))
+        places = np.stack([self.places[frame] for frame in known.tolist()])
+        seen = AffineMaps(places[:, :3, :3], places[:, :3, 3])
+        at = np.clip(frames, known[0], known[-1])
+        first = np.clip(np.searchsorted(known, at, side="right") - 1, 0, max(len(known) - 2, 0))
+        second = np.minimum(first + 1, len(known) - 1)
+        return blended(seen[first], seen[second], (at - known[first]) / np.maximum(known[second] - known[first], 1e-9))
+
+
+_records: dict[tuple[int, str], Record] = {}
+"""By the identity of what is seen."""
+
+
+def record_of(transform: Transform, frame: float, depsgraph: bpy.types.Depsgraph) -> Record:
+    """Return the record of something, from now on kept up to date by `note`."""
+    record = _records.setdefault(transform.identity, Record(transform))
+    record.transform = transform
+    record.note(frame, depsgraph)
+    return record
+
+
+def note(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Take down where all is that has a record, on the frame that is shown."""
+    for identity, record in list(_records.items()):
+        try:
+            record.note(scene.frame_current_final, depsgraph)
+        except (ReferenceError, KeyError):  # it was removed or renamed
+            del _records[identity]
+
+
+def suspend() -> None:
+    """Let go of what Blender replaces by an undo. Records stay."""
+    for record in _records.values():
+        record.transform = None
+
+
+def clear() -> None:
+    """Forget all."""
+    _records.clear()

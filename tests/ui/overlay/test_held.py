@@ -1,0 +1,126 @@
+"""Paths and ghosts of what is held are where Blender shows it, run by run and while it passes."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import hold_in, set_mode
+from rigid_motion.ui.overlay.cache import path_of
+from rigid_motion.ui.overlay.points import PASSING
+from tests.animation.keyed import curves_of
+from tests.animation.oracle import shown_worlds
+from tests.animation.scenes import key, new_object
+from tests.ui.rigs import FRAMES, key_bone, new_rig
+
+WHOLE = np.arange(1.0, 42.0)
+NEAR = 3e-5
+
+
+def shown(carrier):
+    """Where Blender shows an object or a bone in the world, on all whole frames, (n, 4, 4)."""
+    if isinstance(carrier, bpy.types.Object):
+        return shown_worlds([carrier], WHOLE)[0]
+    result = []
+    for frame in WHOLE.astype(int).tolist():
+        bpy.context.scene.frame_set(frame)
+        rig = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        result.append(np.array(rig.matrix_world @ rig.pose.bones[carrier.name].matrix))
+    return np.array(result)
+
+
+def assert_where_it_is_seen(carrier, scene):
+    expected = shown(carrier)
+    path = path_of(carrier, scene)
+    assert path.in_world
+    first, last = path.frames[[0, -1]].astype(int)
+    whole = slice(first - 1, last)
+    assert path.desired[np.searchsorted(path.frames, WHOLE[whole])] == pytest.approx(expected[whole, :3, 3], abs=NEAR)
+    assert len(path.ghosts.frames) > 4
+    assert path.ghosts.matrices == pytest.approx(expected[(path.ghosts.frames - 1).astype(int)], abs=NEAR)
+    tips = path.axes[:, 0, 1] - path.axes[:, 0, 0]
+    along = expected[(path.axis_frames - 1).astype(int), :3, 0]
+    assert tips / np.linalg.norm(tips, axis=1, keepdims=True) == pytest.approx(along, abs=1e-3)
+    return path
+
+
+def passed_around(prop, holders):
+    """Hold something in one after the other, from frame 8 on; over some frames, too; and let go."""
+    for frame, holder, frames in zip((8, 18, 27, 36), (*holders, holders[0], None), (0, 5, None, 3), strict=True):
+        bpy.context.scene.frame_set(frame)
+        hold_in(prop, holder, frames=frames)
+
+
+@pytest.fixture
+def hands(scene):
+    scene.rigid_motion_overlay.show_ghosts = True
+    left, right = (key(new_object(name), FRAMES, seed=seed) for seed, name in enumerate(("Left", "Right")))
+    set_mode([left, right], "motor_spline")
+    return left, right
+
+
+@pytest.mark.parametrize("parented", [False, True])
+def test_an_object_in_hands_that_move_by_keys(scene, hands, parented):
+    prop = new_object("Prop")
+    prop.location = (0.3, 0.2, 0.1)
+    if parented:
+        prop.parent = key(new_object("Floor"), FRAMES, seed=7)
+    passed_around(prop, hands)
+    path = assert_where_it_is_seen(prop, scene)
+    assert [piece.holder for piece in path.pieces] == [0, 1, PASSING, 2, PASSING, 1, PASSING]
+    assert [piece.last for piece in path.pieces[:-1]] == [piece.first for piece in path.pieces[1:]]
+
+
+def test_what_is_held_last_goes_on_to_the_end_of_the_scene(scene, hands):
+    scene.frame_end = 41
+    prop = new_object("Prop")
+    scene.frame_set(8)
+    hold_in(prop, hands[0])
+    path = assert_where_it_is_seen(prop, scene)
+    assert path.frames[[0, -1]].tolist() == [7.0, 41.0]
+
+
+def test_an_object_in_bones(scene, hands):
+    rig = new_rig()
+    for name in ("Hip", "Hand"):
+        key_bone(rig.pose.bones[name])
+    prop = new_object("Prop")
+    passed_around(prop, (rig.pose.bones["Hand"], hands[0]))
+    assert_where_it_is_seen(prop, scene)
+
+
+def test_a_bone_in_hands(scene, hands):
+    rig = new_rig()
+    key_bone(rig.pose.bones["Hip"])
+    passed_around(rig.pose.bones["Hand"], hands)
+    assert_where_it_is_seen(rig.pose.bones["Hand"], scene)
+
+
+def test_an_edit_of_the_hand_moves_the_path(scene, hands):
+    prop = new_object("Prop")
+    passed_around(prop, hands)
+    before = path_of(prop, scene)
+    for point in curves_of(hands[0])["location", 2].keyframe_points:
+        point.co.y += 1.0
+    bpy.context.view_layer.update()
+    path = assert_where_it_is_seen(prop, scene)
+    assert np.abs(path.desired - before.desired).max() > 0.5
+    assert path_of(prop, scene) is path
+
+
+def test_a_hand_that_follows_is_known_where_it_was_seen(scene, hands):
+    follower = new_object("Follower")
+    follower.constraints.new("COPY_TRANSFORMS").target = hands[0]
+    prop = new_object("Prop")
+    passed_around(prop, (follower, hands[1]))
+    before = path_of(prop, scene)
+    scene.frame_end = 41
+    bpy.ops.rigid_motion.update_path()
+    assert scene.frame_current == 36
+    assert np.abs(path_of(prop, scene).desired - before.desired).max() > 0.1
+    assert_where_it_is_seen(prop, scene)
+    for point in curves_of(hands[0])["location", 2].keyframe_points:
+        point.co.y += 1.0
+    bpy.context.view_layer.update()
+    assert_where_it_is_seen(prop, scene)
