@@ -5,9 +5,11 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from rigid_motion.live import receiving
 from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import rotate
 from rigid_motion.streams import Body, Sender
 from rigid_motion.streams.vmc import write_trackers
 from tests.live.performing import (
@@ -92,6 +94,41 @@ def test_rigid_bodies_of_the_codec_are_objects_and_a_skeleton_moves_the_rig(live
     assert bpy.data.objects["ball"].location.x == pytest.approx(shown, abs=0.005)
     expected = in_world(dance(np.array([shown]))).positions[:, 0]
     assert np.linalg.norm(heads_of(rig) - expected, axis=1).max() < 0.006
+
+
+def test_what_is_held_is_where_the_hand_that_holds_it_is_shown(live, sent):
+    live.armature = rig = new_rig()
+    sword = Body.rigid("sword", radius=0.1)
+    sender = Sender([sword, BODY], 0.005, 0.1, rate=60.0)
+    sender.hold("sword", "dancer", "LeftHand")
+    times, hand = np.arange(120) / 60.0, JOINTS.index("LeftHand")
+    poses = dance(times)
+    places = in_world(poses)[hand]
+    points = places.positions + rotate(places.quaternions, np.array((0.1, 0.2, 0.0)))
+    slips = []
+    for row, moment in enumerate(times.tolist()):
+        where = Poses(points[row : row + 1], places.quaternions[row : row + 1])
+        # Of ten datagrams one gets lost.
+        sent.send(
+            (sender.describe() if row < 2 else [])
+            + [it for it in sender.add(moment, {"sword": where, "dancer": poses[:, row]}) if row % 10],
+            50.0 + moment,
+        )
+        (heard,) = [it for it in receiving.listening()._heard.values() if it.label == "sword"] or [None]
+        if heard and heard.poses:
+            assert (heard.held.body, heard.held.joint) == ("dancer", "LeftHand")
+            assert heard.held.poses.positions[0] == pytest.approx((0.1, 0.2, 0.0), abs=0.002)
+            arm = bpy.data.objects["sword"].matrix_world.translation - Vector(heads_of(rig)[hand])
+            slips.append(abs(arm.length - np.hypot(0.1, 0.2)))
+    assert len(slips) > 60
+    assert max(slips) < 0.002
+
+
+def test_another_version_of_the_wire_is_named_in_the_panel(live, sent):
+    datagram = Sender([Body.rigid("ball")]).describe()[0]
+    sent.send([bytes([datagram[0] - 16]) + datagram[1:]], 50.0)
+    version = datagram[0] // 16
+    assert f"sends version {version - 1} of the wire, not {version}: update" in receiving.listening().complaint
 
 
 @pytest.mark.slow

@@ -46,7 +46,8 @@ def coding() -> list[dict]:
 
 def noted_of(message: Message) -> dict:
     """What a message says, in whole numbers; `cells` are those of the knots besides the end."""
-    said = {name: getattr(message, name) for name in ("back", "end", "finer", "kind")}
+    said = {name: getattr(message, name) for name in ("back", "end", "start", "finer", "kind")}
+    said["holds"] = [list(hold) for hold in message.codec.forest.holds]
     numbers = [own.tolist() for own in message.numbers]
     return said | {"cells": message.cells[1:], "groups": numbers, "memory": list(message.memory)}
 
@@ -67,7 +68,9 @@ def stream() -> dict:
     sender.codec.write = noted
     datagrams, answers, polled = [], [], False
     for row, time in enumerate(times.tolist()):
-        # The tool goes far, and then further than tables say.
+        # The hand takes the tool and lets go of it; then that goes far, and then further than tables say.
+        if row in (5, 12):
+            sender.hold(tool.name, own.name if row == 5 else None, own.joints[-1] if row == 5 else None)
         end, away = poses[-1:, row], (0.0, 40.0 * (row > 15) + 9000.0 * (row > 24), 0.0)
         sample = {own.name: poses[:, row], tool.name: Poses(end.positions + away, end.quaternions)}
         # A sample that is needed does not come.

@@ -49,6 +49,8 @@ def test_messages() -> None:
         assert codec.write(message, base) == motion.data
         known[motion.sequence] = message
     assert {said["kind"] for said in STREAM["messages"]} >= {0, 3}
+    assert [len(said["holds"]) for said in STREAM["messages"]].count(1) > 1
+    assert any(0 < said["end"] - said["start"] < terms.delay for said in STREAM["messages"])
     assert max(np.abs(said["groups"]).max() for said in STREAM["messages"]) >= LARGEST + (1 << LONG)
 
 

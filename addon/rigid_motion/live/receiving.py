@@ -18,12 +18,12 @@ from bpy.app.handlers import persistent
 
 from ..motion import Poses
 from ..streams import Body, Keys, Receiver
-from ..streams.playing import Stream
+from ..streams.playing import Held, Stream
 from ..streams.vmc import VMC
 from .driving import Driver, ObjectDriver, RigDriver, object_of
 from .recording import Take
 from .sockets import Port, check_access
-from .ticking import Ticking
+from .ticking import Ticking, log
 
 Which = tuple[Stream, str]
 """A stream, and the name of one of its bodies."""
@@ -64,6 +64,10 @@ class _Heard:
     """The poses that are shown of it, shape (joints,), and by the sender's clock when that was."""
     moment: float = 0.0
 
+    held: Held | None = None
+    """The joint that holds it, and its pose there: what a constraint would have. It is shown and recorded in the world,
+    where the joint that is shown puts it."""
+
     ahead: deque[tuple[np.ndarray, Poses]] = field(default_factory=lambda: deque(maxlen=MOST_AHEAD))
     """Moments (k,) and poses (joints, k) of keys that are not shown yet."""
 
@@ -98,6 +102,8 @@ class Listening:
         self._receiver = Receiver(settings().delay)
         self._heard: dict[Which, _Heard] = {}
         self._recording: _Recording | None = None
+        self.complaint = ""
+        """Who cannot be understood, and the way out."""
 
     @property
     def is_recording(self) -> bool:
@@ -112,6 +118,9 @@ class Listening:
         """Take what came, and show what is due."""
         for datagram, address in self._port.received():
             self._receiver.take(datagram, now, address)
+        for line in self._receiver.complaints():
+            self.complaint = line
+            log.warning(line)
         for address, answer in self._receiver.answers():
             self._port.send(answer, address)
         # They take up room until they are asked for.
@@ -123,7 +132,7 @@ class Listening:
         }
         for which, (body, what) in shown.items():
             heard = self._heard_of(which, body, shown)
-            heard.moment, heard.poses = what.moment, what.poses[body.name]
+            heard.moment, heard.poses, heard.held = what.moment, what.poses[body.name], what.held.get(body.name)
             self._show(heard)
             if self._recording and heard.driver is not None:
                 self._follow(heard, now)

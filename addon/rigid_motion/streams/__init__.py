@@ -10,6 +10,7 @@ A sender knows what its receivers show, a delay behind, and says something only 
     for datagram in transport.received():         # where receivers answer: what is lost then costs least
         for reply in sender.hear(datagram, now):
             transport.send(reply)
+    sender.hold("sword", "performer", "hand")     # from the next sample on, until sender.hold("sword", None)
     sender.join()                                 # names, parents and rest for somebody who joins, by a reliable way
     sender.finish()                               # what is still needed where no more samples are to come
 
@@ -22,9 +23,13 @@ A receiver takes any bytes, from anybody, without ever raising an exception, and
     for stream, shown in receiver.show(now).items():
         shown.moment                              # of the sender's time
         shown.poses["performer"]                  # Poses (joints,), each joint in its parent's space
+        shown.held.get("sword")                   # who holds it, and its poses there; above it is in the world
         shown.bodies                              # each Body: name, joints, parents, rest
+    receiver.complaints()                         # lines on who sends another version of the wire
     for keys in receiver.keys():                  # since the last call: what was sent, to be recorded
         keys.stream, keys.moments, keys.poses     # (k,) seconds; of each body Poses (joints, k)
+
+What is held is sent in the space of the joint that holds it, and does not slip in the hand, whatever is lost.
 
 Between keys, places go straight and turns about one axis: `lerp_slerp`, and `dq_sclerp` hardly differs. Metres,
 seconds, Blender's axes, quaternions w, x, y, z. docs/wire.md has every byte.

@@ -6,13 +6,17 @@ same moments, and are one array: poses of shape (joints,), each in its parent's 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from ..motion import Poses, Skeleton, shell_error
+from ..motion.humanoid import beside
 from ..motion.poses import joined
 from ..motion.quaternions import normalise
 
@@ -27,6 +31,13 @@ SHORTEST, FURTHEST = 1e-6, 2e11
 
 MOST_BODIES, MOST_JOINTS, LONGEST_NAME = 255, 1024, 255
 """Of a sender; and bytes of a name in UTF-8."""
+
+MOST_NAMED = 40
+"""Joints or bodies that are named to somebody who asks for one that is not there."""
+
+LEVELS = 144
+"""How far what is held is from the joint that holds it: `SMALLEST` times the fourth root of a power of two, which is
+below this one."""
 
 
 def checked(poses: Poses, names: Sequence[str]) -> Poses:
@@ -106,8 +117,16 @@ class Body:
         return cls(name, (name,), np.array([-1]), pose or Poses([[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0, 0.0]]), radius)
 
 
+class Hold(NamedTuple):
+    """A body that is held: its number, that of the joint that holds it, and the level of how far it is from it."""
+
+    body: int
+    joint: int
+    level: int = 0
+
+
 class Forest:
-    """All bodies of a sender, as one array of joints."""
+    """All bodies of a sender, as one array of joints, some of them perhaps held by others."""
 
     def __init__(self, bodies: Sequence[Body]) -> None:
         self.bodies, self.names = tuple(bodies), {body.name for body in bodies}
@@ -124,9 +143,89 @@ class Forest:
         self.sliding = np.concatenate([body.sliding for body in bodies])
         self.skeleton = Skeleton(self.parents)
         self.labels = [label for body in bodies for label in body.labels]
+        self.holds: tuple[Hold, ...] = ()
+        self.holders = np.full(len(self), -1, dtype=np.int16)
+        """The joint that holds each, -1 for none, shape (joints,)."""
+        self._arms = np.linalg.norm(self.rest.positions, axis=1)
+        """How far each is from what it hangs on, shape (joints,)."""
 
     def __len__(self) -> int:
         return len(self.parents)
+
+    def holding(self, holds: tuple[Hold, ...]) -> Forest:
+        """Return these bodies, of which nothing is held, with the roots of some in the space of joints that hold them.
+
+        Raises ValueError where one holds itself, if only through others, or has a root that never changes its place.
+        """
+        forest, _ = copy(self), self.groups
+        forest.__dict__.pop("reaches", None)
+        forest.holds, forest.rest = holds, self.rest.copy()
+        forest.holders, forest._arms = self.holders.copy(), self._arms.copy()
+        for body, joint, level in holds:
+            roots = self._roots(body)
+            if not self.sliding[roots].all():
+                raise ValueError(f"{self.bodies[body].name}: what never changes its place cannot be held")
+            forest.holders[roots], forest._arms[roots] = joint, SMALLEST * 2.0 ** (level / 4.0)
+            forest.rest.positions[roots], forest.rest.quaternions[roots] = 0.0, (1.0, 0.0, 0.0, 0.0)
+        forest.parents = np.where(forest.holders >= 0, forest.holders, self.parents)
+        forest.skeleton = Skeleton(forest.parents)
+        return forest
+
+    def _roots(self, body: int) -> np.ndarray:
+        first = self._ends[body] - len(self.bodies[body].joints)
+        return first + np.flatnonzero(self.bodies[body].parents < 0)
+
+    def joint(self, body: str, joint: str | None = None) -> int:
+        """Return the number of a joint, or of a body's only one. Raises ValueError where there is none."""
+        number = self.body(body)
+        joints = self.bodies[number].joints
+        if joint is None and len(joints) == 1:
+            joint = joints[0]
+        if joint not in joints:
+            raise ValueError(f"{body}: {joint or 'which joint'}? It has {', '.join(joints[:MOST_NAMED])}")
+        return int(self._ends[number]) - len(joints) + joints.index(joint)
+
+    def body(self, name: str) -> int:
+        """Return the number of a body. Raises ValueError where there is none."""
+        names = [body.name for body in self.bodies]
+        if name not in names:
+            raise ValueError(f"{name}: no such body; there are {', '.join(names[:MOST_NAMED])}")
+        return names.index(name)
+
+    def held(self, holders: np.ndarray) -> dict[str, tuple[str, str]]:
+        """Return the body and the joint that hold each body that is held, by its name, of who holds each (joints,)."""
+        hands = {body.name: int(holders[self._roots(row)[0]]) for row, body in enumerate(self.bodies)}
+        return {name: self._name(joint) for name, joint in hands.items() if joint >= 0}
+
+    def _name(self, joint: int) -> tuple[str, str]:
+        number = int(np.searchsorted(self._ends, joint, side="right"))
+        body = self.bodies[number]
+        return body.name, body.joints[joint - int(self._ends[number])]
+
+    def level(self, body: int, poses: Poses) -> int:
+        """Return the level of how far a body is from the joint that holds it, where it has poses (joints,) there."""
+        far = max(np.linalg.norm(poses.positions[self._roots(body)], axis=1).max(), SMALLEST)
+        return min(math.ceil(4.0 * math.log2(far / SMALLEST)), LEVELS - 1)
+
+    def in_hands(self, poses: Poses) -> Poses:
+        """Return poses (joints,) with what is held in the space of what holds it; they have it where roots are."""
+        parents = np.where(self.holders >= 0, -1, self.parents)
+        result, held = poses.copy(), self.holders >= 0
+        if held.any():
+            there = Skeleton(parents).in_root_space(poses[:, None])[:, 0]
+            result[held] = beside(there, self.holders)[held]
+        return result
+
+    def out_of_hands(self, poses: Poses, holders: np.ndarray) -> Poses:
+        """Return poses (joints, n) with what is held where roots are. Who holds each has the same shape, or (1, n)."""
+        if not (holders >= 0).any():
+            return poses
+        result = poses.copy()
+        for hands in np.unique(holders, axis=1).T:
+            held, some = np.flatnonzero(hands >= 0), np.flatnonzero((holders == hands[:, None]).all(axis=0))
+            there = Skeleton(np.where(hands >= 0, hands, self.parents)).in_root_space(poses[:, some])
+            result[np.ix_(held, some)] = there[held]
+        return result
 
     def joined(self, poses: Mapping[str, Poses]) -> Poses:
         """Return the poses of all joints (joints,), of those of each body by its name."""
@@ -160,8 +259,6 @@ class Forest:
     def reaches(self) -> np.ndarray:
         """How far from each joint anything is that hangs on it, with the balls around it, shape (joints,)."""
         reaches = self.radii.copy()
-        arms = np.linalg.norm(self.rest.positions, axis=1)
-        for joint in np.flatnonzero(self.parents >= 0)[::-1]:
-            parent = self.parents[joint]
-            reaches[parent] = max(reaches[parent], arms[joint] + reaches[joint])
+        for joints in self.skeleton.levels[:0:-1]:
+            np.maximum.at(reaches, self.parents[joints], self._arms[joints] + reaches[joints])
         return reaches

@@ -34,10 +34,10 @@ FLAGS = 7 * 2 * HISTORIES * NEIGHBOURS
 those of magnitudes, and then single ones:"""
 
 KNOT_COUNTS = FLAGS + 7 * 2 * HISTORIES * SIZES
-WIDTHS, FINENESS, BASES, ODD = (KNOT_COUNTS + number for number in (1, 2, 4, 5))
+WIDTHS, FINENESS, BASES, ODD, HANDS = (KNOT_COUNTS + number for number in (1, 2, 4, 5, 6))
 """How many knots a window has besides its end; how many binary digits what is above `LARGEST` has; how fine steps are,
-of rigid bodies alone, and in the next table where joints hang on others; what a message builds on; and whether its end
-is between two moments of the grid."""
+of rigid bodies alone, and in the next table where joints hang on others; what a message builds on; whether its end is
+between two moments of the grid; and whether anything is in other hands than where the message builds on."""
 
 FINEST, MOST_KNOTS = 3, 32
 """So many times steps are halved at most; and knots of a window."""

@@ -31,6 +31,9 @@ STILL, BEYOND, NOTHING = 0.25, 0.2, 1e-9
 """Part of the tolerance within which a body does not move; so many seconds later it is still where it was; and moments
 that are not further apart than so many are the same."""
 
+SLIP = 0.4
+"""Part of the tolerance by which what is held may be off in the hand, before it is said anew."""
+
 FAR_APART, MOST_PARTS = 0.013, 8
 """Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
 
@@ -41,38 +44,56 @@ CHOICES = np.array([[1, 1, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0, 0], [0, 1
 class Fitting:
     """Finds what to say of a window of samples, where something is `shown` so far, or nothing.
 
-    The message builds on `base`, which is so many messages `back`, and its window ends at a tick.
+    The message builds on `base`, which is so many messages `back`, and its window ends at a tick. All has been in the
+    same hands since another.
     """
 
-    def __init__(self, codec: Codec, shown: Path | None, base: Message, back: int, ticks: int, samples: Path) -> None:
+    def __init__(
+        self, codec: Codec, shown: Path | None, base: Message, back: int, ticks: int, since: int, samples: Path
+    ) -> None:
         self._codec, self._forest, self._shown, self._samples = codec, codec.forest, shown, samples
-        self._begun, self._ticks = partial(Message, codec, base, back, ticks), ticks
-        self._start, self._end = (ticks - codec.terms.delay) / TICKS, ticks / TICKS
+        self._begun, self._ticks = partial(Message, codec, base, back, ticks, since=since), ticks
+        self._room, self._takes = min(codec.terms.delay - 1, ticks - since), since > ticks - codec.terms.delay
+        """How many ticks before the end knots may be; and whether something changes hands as the window starts."""
+        self._start, self._end = max(ticks - codec.terms.delay, since) / TICKS, ticks / TICKS
+        self._stays = np.zeros(len(codec.forest.groups), dtype=bool)
+        """Groups of what stays where it is in a hand."""
 
     def message(self) -> tuple[Message, bool]:
         """Return the message, and whether all of the window is within the tolerance."""
-        (tolerance, delay, grid), ticks = self._codec.terms, self._ticks
+        (tolerance, _, grid), ticks = self._codec.terms, self._ticks
         moments = self._samples.moments
         inside = moments[(moments > self._start) & (moments < self._end)]
         looked = np.concatenate(([self._start], inside, [self._end]))
         ends = self._samples.at(looked[[0, -1]])
         is_still = self._forest.errors(ends[:, :1], ends[:, 1:]).max() < STILL * tolerance
-        exact = (ticks - inside * TICKS) / grid
+        exact = (ticks - looked[not self._takes : -1] * TICKS) / grid
         # A jump between two cells takes both of them, everything else the nearest.
         for cells in (np.rint(exact), np.concatenate((np.floor(exact), np.ceil(exact)))):
             cells = np.unique(cells.astype(int))[::-1]
-            self._cells = cells[(cells > 0) & (cells * grid < delay)]
+            self._cells = cells[(cells > 0) & (cells * grid <= self._room)]
             self._grid = (ticks - self._cells * grid) / TICKS
             between = self._grid[np.abs(self._grid[:, None] - looked).min(axis=1) > NOTHING]
-            self._moments = closely(np.unique(np.concatenate((looked, between))))[1:]
+            self._moments = closely(np.unique(np.concatenate((looked, between))))[not self._takes :]
             if is_still:
                 # It is to come to rest, and not to be put right again and again.
                 self._moments = np.append(self._moments, self._end + BEYOND)
-            self._truth = self._forest.skeleton.in_root_space(self._samples.at(self._moments))
+            truth = self._samples.at(self._moments)
+            self._truth, self._stays = self._forest.skeleton.in_root_space(truth), self._staying(truth)
             message, error = self._fitted()
             if error <= tolerance:
                 break
         return message, error <= tolerance
+
+    def _staying(self, truth: Poses) -> np.ndarray:
+        """Return the groups (groups,) of what stays where it is in a hand, where the truth (joints, n) has it there."""
+        held = np.flatnonzero(self._forest.holders >= 0)
+        if not len(held):
+            return self._stays
+        expected = self._begun(0).path.at(self._moments)
+        slips = shell_error(expected[held], truth[held], self._forest.reaches[held, None])
+        staying = held[np.where(self._moments <= self._end, slips, 0.0).max(axis=1) <= SLIP * self._codec.tolerance]
+        return np.isin([joint for joint, _, _ in self._forest.groups], staying)
 
     def _fitted(self) -> tuple[Message, float]:
         """Return the message with knots on the grid, and the largest error at the moments (n,) that are looked at."""
@@ -95,7 +116,7 @@ class Fitting:
         tolerance, most_knots = self._codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._forest.groups), 1))
         message = self._begun(finer)
         for cell in cells:
-            message.say(cell, samples=self._samples)
+            message.say(cell, samples=self._samples, stays=self._stays)
         while True:
             errors = self._look(message)[1]
             error, worst = float(errors.max()), self._moments[np.argmax(errors)]
@@ -106,7 +127,7 @@ class Fitting:
             good = finer < FINEST or error <= tolerance
             if good and np.abs(message.path.moments[1:] - worst).min() < away.min():
                 return message, error
-            message.say(int(self._cells[np.argmin(away)]), samples=self._samples)
+            message.say(int(self._cells[np.argmin(away)]), samples=self._samples, stays=self._stays)
 
     def _look(self, message: Message) -> tuple[Poses, np.ndarray]:
         """Return what is shown with a message in the root's space (joints, n), and the largest error of each moment."""
@@ -133,13 +154,13 @@ class Fitting:
             rate = (at_end - before) / (self._end - message.path.moments[-2])
             hat = message.factor * (hat + rate * carried(self._moments - self._end))
             for values, (joint, slide, _) in zip(own[::-1], self._forest.groups[::-1], strict=True):
-                if not values.any():
-                    continue
+                if self._forest.holders[joint] >= 0 or not values.any():
+                    continue  # What is held is said seldom, and then as it is.
                 hung, parent = self._forest.skeleton.below(joint), self._forest.parents[joint]
                 if slide:
                     along = np.eye(3)[..., None] if parent < 0 else axes[:, :, parent]
                     does = np.zeros((2, 3, 3, 1, len(hat)))
-                    does[0] = (along * (self._codec.slide_step * hat))[:, :, None]
+                    does[0] = (along * (self._codec.slide_steps[joint] * hat))[:, :, None]
                 else:
                     about = (axes[:, :, joint] * (self._codec.turn_steps[joint] * hat))[:, :, None]
                     arms = (places[:, hung] - places[:, [joint]])[:, None]

@@ -9,14 +9,15 @@ parent's space; both are counted in steps.
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
 from ..motion import Poses
 from ..motion.poses import joined
 from ..motion.quaternions import normalise, turned, turns_between
-from .bodies import Forest
-from .coding import BASES, FAR, FINENESS, KNOT_COUNTS, MOST_GROUPS, NEAR, ODD, STALE, UNKNOWN, Coder, code
+from .bodies import LEVELS, Forest, Hold
+from .coding import BASES, FAR, FINENESS, HANDS, KNOT_COUNTS, MOST_GROUPS, NEAR, ODD, STALE, UNKNOWN, Coder, code
 from .paths import Path
 from .wire import TICKS, Terms
 
@@ -29,12 +30,21 @@ MOST_BACK, FURTHEST = 129, 3 * TICKS
 TURN_STEP, SLIDE_STEP = 1.0, 0.5
 """Steps, in tolerances: at the end of what hangs on a joint, and of its place."""
 
+HELD_STEP = 0.125
+"""Steps of what is held, in those of the same body where nobody holds it: it is said once, and then goes along."""
+
+NEVER = -(1 << 62)
+"""The tick since which all is in the same hands, where nobody ever took anything."""
+
 NOWHERE = 1e5
 """Metres from the middle of everything at which nothing is any more."""
 
 
 class Codec:
-    """Messages of a forest: their steps, to bytes and back."""
+    """Messages of a forest: their steps, to bytes and back.
+
+    That of the forest as it is described, where nothing is held, reads and writes them all.
+    """
 
     def __init__(self, forest: Forest, terms: Terms) -> None:
         self.forest, self.terms = forest, terms
@@ -42,21 +52,27 @@ class Codec:
         slides = np.array([slide for _, slide, _ in forest.groups], dtype=bool)
         self._turns, self._slides = np.flatnonzero(~slides), np.flatnonzero(slides)
         """The groups of each kind: all joints turn."""
-        self.turn_steps = TURN_STEP * self.tolerance / forest.reaches
-        self.slide_step = SLIDE_STEP * self.tolerance
+        parts = np.where(forest.holders >= 0, HELD_STEP, 1.0)
+        self.turn_steps = TURN_STEP * self.tolerance / forest.reaches * parts
+        self.slide_steps = SLIDE_STEP * self.tolerance * parts
         self._fineness = FINENESS + bool((forest.parents >= 0).any())
         self.rest = Message(self)
         """What is known before any message."""
 
+    def holding(self, holds: tuple[Hold, ...]) -> Codec:
+        """Return that of the same forest with what is held. Raises ValueError where that cannot be."""
+        return Codec(self.forest.holding(holds), self.terms) if holds else self
+
     def moved(self, poses: Poses, numbers: np.ndarray, factor: float) -> Poses:
         """Return poses (joints,) moved by whole numbers (groups, 3), in steps times a factor."""
         places, turns = poses.positions.copy(), numbers[self._turns] * (self.turn_steps * factor)[:, None]
-        places[self.forest.sliding] += numbers[self._slides] * (self.slide_step * factor)
+        sliding = self.forest.sliding
+        places[sliding] += numbers[self._slides] * (self.slide_steps[sliding] * factor)[:, None]
         return Poses(places, turned(poses.quaternions, turns))
 
     def rounded(self, poses: Poses, desired: Poses, factor: float) -> np.ndarray:
         """Return the whole numbers (groups, 3) that move poses (joints,) nearest to others."""
-        slides = (desired.positions - poses.positions) / (self.slide_step * factor)
+        slides = (desired.positions - poses.positions) / (self.slide_steps * factor)[:, None]
         turns = turns_between(poses.quaternions, desired.quaternions) / (self.turn_steps * factor)[:, None]
         numbers = np.zeros((len(self.forest.groups), 3), dtype=np.int64)
         numbers[self._slides], numbers[self._turns] = np.rint(slides[self.forest.sliding]), np.rint(turns)
@@ -90,6 +106,10 @@ class Codec:
         else:
             end = coder.digits(48, said.end)
             end -= end >> 47 << 48  # of either sign
+        hands = self._code_hands(coder, base, end, message)
+        if hands is None:
+            return None
+        codec, since = hands
         finer = coder.symbol(self._fineness, said.finer)
         inner = coder.symbol(KNOT_COUNTS, len(said.cells) - 1)
         most_cells = (terms.delay - 1) // terms.grid
@@ -99,23 +119,66 @@ class Codec:
         if len(set(cells)) < inner:
             return None
         groups = [own.tolist() for own in said.numbers] or [[[0, 0, 0] for _ in range(size)] for _ in range(inner + 1)]
-        read = message or Message(self, base, back, end, finer)
+        read = message or Message(codec, base, back, end, finer, since)
+        if any(cell * terms.grid > end - read.start for cell in cells):
+            return None
         read.memory = code(coder, self.forest, groups, read.kind, base.memory)
+        if holders := read.codec.forest.holds and read.codec.forest.holders.tolist():
+            # What is held is said once, and then stays where it is.
+            joints = (joint for joint, *_ in self.forest.groups)
+            read.memory = tuple(
+                0 if holders[joint] >= 0 else old for joint, old in zip(joints, read.memory, strict=True)
+            )
         if message is None:
             for cell, numbers in zip([0, *cells], groups, strict=True):
                 read.say(cell, np.array(numbers))
         return read if read.is_somewhere else None
+
+    def _code_hands(self, coder: Coder, base: Message, end: int, message: Message | None) -> tuple[Codec, int] | None:
+        """Write or read who holds what, and since which tick; None for what nobody can have written.
+
+        It is the same as where the base ends, or else all of it is there.
+        """
+        delay, forest = self.terms.delay, self.forest
+        since, holds = (message.since, message.codec.forest.holds) if message else (NEVER, ())
+        changes = holds != base.codec.forest.holds or since > max(base.since, end - delay)
+        if not coder.symbol(HANDS, int(changes)):
+            return base.codec, base.since
+        since = end - 1 - coder.flat(delay, min(end - since, delay) - 1)
+        count = coder.flat(len(forest.bodies) + 1, len(holds))
+        said = tuple(
+            Hold(coder.flat(len(forest.bodies), body), coder.flat(len(forest), joint), coder.flat(LEVELS, level))
+            for body, joint, level in holds or [Hold(0, 0)] * count
+        )
+        if any(hold.body <= before.body for before, hold in pairwise(said)):
+            return None
+        try:
+            read = base.codec if said == base.codec.forest.holds else self.holding(said)
+        except ValueError:
+            return None
+        return (message.codec if message else read), since
 
 
 class Message:
     """What a message says of a window: the poses at its knots, the end first, then others between those that are there.
 
     It builds on `base`, which is so many messages `back`, 0 for what is known before any; its window ends at the tick
-    `end`, and steps are halved `finer` times. Others can build on it.
+    `end`, and steps are halved `finer` times. All is in the hands that its codec's forest says since a tick, and the
+    window does not begin before. Others can build on it.
     """
 
-    def __init__(self, codec: Codec, base: Message | None = None, back: int = 0, end: int = 0, finer: int = 0) -> None:
-        self._codec, self.back, self.end, self.finer = codec, back, end, finer
+    def __init__(
+        self,
+        codec: Codec,
+        base: Message | None = None,
+        back: int = 0,
+        end: int = 0,
+        finer: int = 0,
+        since: int = NEVER,
+    ) -> None:
+        self.codec, self.back, self.end, self.finer, self.since = codec, back, end, finer, since
+        self.start = max(end - codec.terms.delay, since)
+        """The tick at which the window starts."""
         self.factor = 0.5**finer
         """Of the steps."""
         self.kind, self._goes_on = UNKNOWN, False
@@ -129,38 +192,59 @@ class Message:
         self.memory: tuple[int, ...] = (0,) * len(codec.forest.groups)
         """How large the residuals of each group were."""
         self.path = Path(np.zeros(1), codec.forest.rest[:, None])
+        self._taken: np.ndarray | None = None
+        """Which joints are in other hands than in the base (joints,), if any are."""
         """From the start of the window to its end: what the motion would do if nothing new came, until that is said."""
         if base:
-            moments = np.array((end - codec.terms.delay, end)) / TICKS
+            moments = np.array((self.start, end)) / TICKS
             if back:
                 self.kind = STALE if end - base.end > OLD else NEAR if back == 1 else FAR
                 self._goes_on = self.kind in (NEAR, FAR)
-            self.path = Path(moments, base.path.at(moments) if self._goes_on else base.path.poses[:, [-1, -1]])
+            poses = base.path.at(moments) if self._goes_on else base.path.poses[:, [-1, -1]]
+            forest, taken = codec.forest, codec.forest.holders != base.codec.forest.holders
+            if taken.any():
+                self._taken = taken
+                poses[taken] = forest.rest[:, None][taken][:, [0, 0]]
+            self.path = Path(moments, poses, holders=forest.holders[:, None])
 
     @property
     def is_somewhere(self) -> bool:
         """Return whether it puts all joints where something can be; otherwise nobody reads it."""
         return bool(np.abs(self.path.poses.positions).max() < NOWHERE)
 
-    def say(self, cell: int, numbers: np.ndarray | None = None, samples: Path | None = None) -> None:
+    def say(
+        self,
+        cell: int,
+        numbers: np.ndarray | None = None,
+        samples: Path | None = None,
+        stays: np.ndarray | slice = slice(0),
+    ) -> None:
         """Move the end, which comes first and is cell 0, or else a new knot, by whole numbers (groups, 3).
 
-        Without numbers it is moved as near to what samples have there as these bring it.
+        Without numbers it is moved as near to what samples have there as these bring it, but for groups that stay.
         """
-        at, moment = 1, (self.end - cell * self._codec.terms.grid) / TICKS
+        at, moment = 1, (self.end - cell * self.codec.terms.grid) / TICKS
         moments, poses = self.path.moments, self.path.poses
         if cell:
-            at = int(np.searchsorted(moments, moment))
+            at = int(np.searchsorted(moments, moment, side="right"))
             moments = np.insert(moments, at, moment)
             poses = joined((poses[:, :at], self.path.pose(moment)[:, None], poses[:, at:]), axis=1)
         self.cells.append(cell)
         self.supports.append((moments[at - 1], moment, moments[at + 1] if cell else np.inf))
         if numbers is None:
             assert samples is not None
-            numbers = self._codec.rounded(poses[:, at], samples.pose(moment), self.factor)
+            numbers = self.codec.rounded(poses[:, at], samples.pose(moment), self.factor)
+            numbers[stays] = 0
         self.numbers.append(numbers)
-        poses[:, at] = self._codec.moved(poses[:, at], numbers, self.factor)
+        poses[:, at] = self.codec.moved(poses[:, at], numbers, self.factor)
         if not (cell or self._goes_on):
             # How the motion got there is not known.
             poses[:, 0] = poses[:, 1]
-        self.path = Path(moments, Poses(poses.positions, normalise(poses.quaternions))).going_on()
+        if self._taken is not None:
+            # Nor how it got into these hands.
+            poses[self._taken, 0] = poses[self._taken, 1]
+        poses = Poses(poses.positions, normalise(poses.quaternions))
+        self.path = Path(moments, poses, holders=self.path.holders[:, :1]).going_on()
+        # What is held goes along, and no way of its own.
+        held = self.codec.forest.holders >= 0
+        self.path.velocities[held] = self.path.spins[held] = 0.0

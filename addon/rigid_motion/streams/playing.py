@@ -18,6 +18,7 @@ from ..motion import Poses
 from ..motion.quaternions import SMALLEST, normalise, turned, turns_between
 from .bodies import Body, Forest
 from .paths import Path
+from .wire import TICKS
 
 LOOK_BACK, MOST_TRANSITS = 3.0, 512
 """Seconds of which the longest transit counts, and of how many datagrams at most."""
@@ -49,6 +50,9 @@ SILENT = 10.0
 
 MOST_KNOTS, MOST_JOINT_KNOTS = 256, 1 << 14
 """Knots of a stream that wait for `keys`, or as many more as a body of few joints has in so many poses of joints."""
+
+NOBODY = np.full(1, -1, dtype=np.int16)
+"""Who holds each joint where nothing is held."""
 
 
 class Playing:
@@ -132,7 +136,10 @@ class Playing:
 
 
 class Fading:
-    """What is shown of a path that changes under it: the difference fades, but does not turn the motion back."""
+    """What is shown of a path that changes under it: the difference fades, but does not turn the motion back.
+
+    What is in other hands than before is in these at once.
+    """
 
     def __init__(self) -> None:
         self._shown: Poses | None = None
@@ -142,14 +149,25 @@ class Fading:
         self._left, self._rate = np.zeros((2, 2, 1, 3))
         """Differences of places and turns, the latter as rotation vectors, and by how much they change a second. Shape
         (2, joints, 3)."""
+        self._holders = NOBODY
+        """Which joints held each as that was shown."""
 
-    def changed(self, poses: Poses) -> None:
-        """Go on from what was shown last, where a new path has poses (joints,)."""
+    def changed(self, poses: Poses, holders: np.ndarray = NOBODY) -> None:
+        """Go on from what was shown last, where a new path has poses (joints,) in the hands of holders (joints,)."""
         if self._shown is not None:
             self._path, self._left = poses, _between(poses, self._shown)
+            self._take_over(holders)
 
-    def show(self, poses: Poses, now: float) -> Poses:
-        """Poses (joints,) of the path, with what is left of differences."""
+    def _take_over(self, holders: np.ndarray) -> None:
+        """Forget the differences of what is in other hands."""
+        differs = self._holders != holders
+        if differs.any():
+            self._left, self._rate = (np.where(differs[:, None], 0.0, each) for each in (self._left, self._rate))
+        self._holders = holders
+
+    def show(self, poses: Poses, now: float, holders: np.ndarray = NOBODY) -> Poses:
+        """Poses (joints,) of the path, in the hands of holders (joints,), with what is left of differences."""
+        self._take_over(holders)
         passed, self._last = max(now - self._last, 0.0), now
         if self._path is not None and passed > 0.0 and self._left.any():
             self._fade(_between(self._path, poses), passed)
@@ -184,19 +202,35 @@ class Stream(NamedTuple):
     identity: bytes
 
 
+class Held(NamedTuple):
+    """Where a body is held: the body and the joint that hold it, and its poses (joints,) with roots in that joint's
+    space.
+    """
+
+    body: str
+    joint: str
+    poses: Poses
+
+
 class Shown(NamedTuple):
     """What a stream shows: the moment in seconds by the sender's clock, and of each body by its name poses (joints,),
-    each joint in its parent's space.
+    each joint in its parent's space, and roots in the world, held or not.
+
+    `held` has what is held, by its name.
     """
 
     stream: Stream
     moment: float
     bodies: tuple[Body, ...]
     poses: dict[str, Poses]
+    held: dict[str, Held] = {}  # noqa: RUF012
 
 
 class Keys(NamedTuple):
-    """What was sent, to be recorded: rising moments (k,) in seconds by the sender's clock, and poses (joints, k)."""
+    """What was sent, to be recorded: rising moments (k,) in seconds by the sender's clock, and poses (joints, k).
+
+    Roots are in the world, held or not. Where a body changes hands, there is a key just before it.
+    """
 
     stream: Stream
     bodies: tuple[Body, ...]
@@ -235,8 +269,12 @@ class Playback:
         self.moment = self.playing.moment(now)
         if self.moment is None or self.path is None or self.moment < self.begins:
             return None
-        poses = self.fading.show(self.path.pose(self.moment), now)
-        return Shown(self.stream, self.moment, self.forest.bodies, self.forest.parted(poses))
+        forest, holders = self.forest, self.path.held_at(self.moment)
+        poses = self.fading.show(self.path.pose(self.moment), now, holders)
+        shown = forest.parted(forest.out_of_hands(poses[:, None], holders[:, None])[:, 0])
+        hands = forest.held(holders) if (holders >= 0).any() else {}
+        held = {name: Held(body, joint, forest.parted(poses)[name]) for name, (body, joint) in hands.items()}
+        return Shown(self.stream, self.moment, forest.bodies, shown, held)
 
     def keys(self) -> Keys | None:
         """Return the knots that are settled and were not handed out yet."""
@@ -245,4 +283,10 @@ class Playback:
         if self.path is None or not len(rows):
             return None
         self.kept = float(moments[rows[-1]])
-        return Keys(self.stream, self.forest.bodies, moments[rows], self.forest.parted(self.path.poses[:, rows]))
+        # Of knots at one moment the first is what was until then, and the last what is from then on.
+        is_last = np.diff(moments[rows], append=np.inf) > 0.0
+        is_first = np.insert(is_last[:-1], 0, True)
+        moments = (moments[rows] - np.where(is_last, 0.0, 0.5 / TICKS))[is_first | is_last]
+        rows = rows[is_first | is_last]
+        poses = self.forest.out_of_hands(self.path.poses[:, rows], self.path.holders[:, rows])
+        return Keys(self.stream, self.forest.bodies, moments, self.forest.parted(poses))

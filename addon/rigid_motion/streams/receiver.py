@@ -49,6 +49,9 @@ class Receiver:
         self._gone: deque[Stream] = deque(maxlen=MOST_GONE)
         self._waiting: OrderedDict[Stream, deque[tuple[Motion, float]]] = OrderedDict()
         """Messages that came before the description, and when."""
+        self._complained: dict[Hashable, int] = {}
+        """Who sends another version of the wire, and which."""
+        self._complaints: list[str] = []
         self._unanswered: dict[Stream, None] = {}
         """Of which something came since the last answers, in that order."""
 
@@ -67,6 +70,8 @@ class Receiver:
                 known.take(datagram, arrival)
             return
         read = wire.read(datagram)
+        if read is None:
+            self._complain(wire.other_version(datagram), source)
         if read is None or isinstance(read, Answer):
             return
         known = self._streams.get(stream := Stream(source, read.identity))
@@ -84,6 +89,19 @@ class Receiver:
                 self._streams[stream] = _Coded(stream, *described, arrival)
                 for motion, when in waiting:
                     self._streams[stream].take(motion, when)
+
+    def _complain(self, version: int | None, source: Hashable) -> None:
+        """Note once of each source that it sends another version of the wire."""
+        if version and source not in self._complained and len(self._complained) < MOST_STREAMS:
+            self._complained[source] = version
+            own, older = wire.VERSION, "this program" if version > wire.VERSION else "the sender"
+            who = ":".join(map(str, source)) if isinstance(source, tuple) else source
+            self._complaints.append(f"{who} sends version {version} of the wire, not {own}: update {older}")
+
+    def complaints(self) -> list[str]:
+        """Return lines on who cannot be understood, and the way out, since the last call."""
+        complaints, self._complaints = self._complaints, []
+        return complaints
 
     def answers(self) -> list[tuple[Hashable, bytes]]:
         """Return what came since the last call, to be sent to where it came from."""
@@ -174,7 +192,7 @@ class _Coded(Playback):
         self.put(path)
         self.settled = float(windows[max(windows)].moments[0])
         if self.moment is not None and (lost or window.moments[0] < self.moment):
-            self.fading.changed(path.pose(self.moment))
+            self.fading.changed(path.pose(self.moment), path.held_at(self.moment))
 
     def there(self) -> tuple[int, int, int]:
         """Return what an answer says: the newest message, which there are of those before it, and what is needed."""

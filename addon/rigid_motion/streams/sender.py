@@ -4,6 +4,10 @@ What is shown is a delay behind. When it gets to where a joint's ball would leav
 then is known here, and is said at once. Until then nothing is sent, for the motion goes on at the receivers as it was
 going, and a body at rest costs a keepalive.
 
+What is held is sent in the space of the joint that holds it: what is off there goes with the hand. Where a body changes
+hands, all until then is said in the old ones, and the window of what comes next starts there. Every message has who
+holds what, unless that is so where the message builds on: whatever is lost, what can be read is right.
+
 A message builds on one that is there: the newest that all receivers who answer have; where nobody answers, the last
 refresh, a message that builds on nothing and is sent twice.
 """
@@ -18,9 +22,9 @@ import numpy as np
 
 from ..motion import Poses
 from . import wire
-from .bodies import FURTHEST, LARGEST, SHORTEST, SMALLEST, Body, Forest, checked
+from .bodies import FURTHEST, LARGEST, SHORTEST, SMALLEST, Body, Forest, Hold, checked
 from .fitting import Fitting, closely
-from .messages import MOST_BACK, Codec, Message
+from .messages import MOST_BACK, NEVER, Codec, Message
 from .paths import Path
 from .wire import LONGEST_DELAY, NEEDS_DESCRIPTION, NEEDS_REFRESH, TICKS, Answer, Description, Motion, Terms
 
@@ -29,8 +33,8 @@ KEEPALIVE, REFRESH = 0.5, 1.0
 on nothing."""
 
 AGAIN, PATIENCE = 0.03, 0.15
-"""Seconds after which a refresh is sent a second time, so that one loss does not lose both; and that it has to arrive,
-before another is sent to somebody who asks for one."""
+"""Seconds after which a refresh, or who holds what from now on, is sent a second time, so that one loss does not lose
+both; and that it has to arrive, before another is sent to somebody who asks for one."""
 
 SILENT, MOST_RECEIVERS = 2.0, 256
 """Seconds after which somebody who does not answer any more is not waited for; and for so many at most."""
@@ -107,10 +111,15 @@ class Sender:
         read = wire.read_description(self._packed)
         if read is None or len(self._packed) > wire.LONGEST - 4:
             raise ValueError("the bodies have too many joints or too long names to be described")
-        self._forest, self.codec = read[0], Codec(*read)
+        self.codec = self._codec = Codec(*read)
+        """As described; and with what is held."""
+        self._wanted: tuple[tuple[int, int], ...] = ()
+        """The numbers of bodies that are held from the next sample on, and of the joints that hold them."""
+        self._since, self._takes = NEVER, False
+        """The tick since which all is in the same hands; and whether that is still to be said."""
         self._slip = 0.0
         """What is added to the times of samples, so that a clock that was set makes no difference."""
-        none = np.empty((len(self._forest), 0, 4))
+        none = np.empty((len(read[0]), 0, 4))
         self._samples = Path(np.empty(0), Poses(none[..., :3], none))
         self._next = math.inf
         self._interval = 0.0
@@ -133,14 +142,43 @@ class Sender:
         """What those who answer have, and when they said so."""
         self._refreshed = self._sent = -math.inf
         """The ends of the last refresh and of the last message."""
-        self._copies: list[bytes] = []
-        """A refresh that is to be sent a second time."""
+        self._copy: tuple[int, float, bytes] | None = None
+        """What is to be sent a second time: its sequence number, and when it was sent."""
         self._base: int | None = None
         """The last refresh."""
         self._desired = False
         """Whether somebody cannot read what is sent."""
         self._missed = -math.inf
         """When somebody said last that so much is lost that all is to be sent twice."""
+
+    def hold(self, tool: str, body: str | None, joint: str | None = None) -> None:
+        """Say that a body is in the hand of a joint of another from the next sample on, or in nobody's any more.
+
+        The poses of its roots are given in the world all the same, and shown there. The more rigidly it is held, the
+        less it costs.
+
+        Parameters
+        ----------
+        tool : str
+        body : str, optional
+        joint : str, optional
+            Not needed of a body with a single joint.
+
+        Raises
+        ------
+        ValueError
+            Where there is no such body or joint, and where it would hold itself, if only through others.
+        """
+        forest = self.codec.forest
+        wanted = {held: holder for held, holder in self._wanted if held != forest.body(tool)}
+        if body is not None:
+            wanted[forest.body(tool)] = forest.joint(body, joint)
+        pairs = tuple(sorted(wanted.items()))
+        try:
+            forest.holding(tuple(Hold(*pair) for pair in pairs))
+        except ValueError as error:
+            raise ValueError(f"{tool} cannot be held by {body}: {error}") from None
+        self._wanted = pairs
 
     def add(self, time: float, poses: Poses | Mapping[str, Poses]) -> list[bytes]:
         """Take a sample, and return what is to be sent now.
@@ -150,6 +188,7 @@ class Sender:
         time : float
             Seconds. Where it goes back or jumps ahead by more than a second, a clock was set: the motion goes on.
         poses : Poses, shape (joints,), or Poses for each body's name
+            Each joint in its parent's space, and roots in the world, held or not.
 
         Raises
         ------
@@ -157,10 +196,11 @@ class Sender:
             Where poses are not as many as joints; and where a place is 10 km away or further, a quaternion is 0, or any
             number is not finite. It is as if there had been no such sample.
         """
-        poses = poses if isinstance(poses, Poses) else self._forest.joined(poses)
-        if poses.shape != (len(self._forest),) or not abs(time) <= FURTHEST:
-            raise ValueError(f"a sample needs {len(self._forest)} poses and a time within {FURTHEST:g} s, not {time}")
-        poses, times, now = checked(poses, self._forest.labels), self._samples.moments, time + self._slip
+        forest = self._codec.forest
+        poses = poses if isinstance(poses, Poses) else forest.joined(poses)
+        if poses.shape != (len(forest),) or not abs(time) <= FURTHEST:
+            raise ValueError(f"a sample needs {len(forest)} poses and a time within {FURTHEST:g} s, not {time}")
+        poses, times, now = checked(poses, forest.labels), self._samples.moments, time + self._slip
         if len(times) and not SHORTEST < now - times[-1] <= STEP:
             usual = times[-1] - times[-2] if len(times) > 1 else 1.0 / TICKS
             now = float(times[-1] + usual)
@@ -168,8 +208,30 @@ class Sender:
         said = self._before_pause(now)
         if len(times):
             self._interval = max(now - float(times[-1]), CALMER * self._interval)
-        self._samples = self._samples.extended(now, poses).since(now - self._delay - STEP)
+        if self._wanted != tuple((body, joint) for body, joint, _ in forest.holds):
+            said += self._take_over(now, poses)
+        else:
+            self._samples = self._samples.extended(now, forest.in_hands(poses)).since(now - self._delay - STEP)
         return said + self._due(now, self._interval)
+
+    def _take_over(self, now: float, poses: Poses) -> list[bytes]:
+        """Go on in other hands from a sample (joints,) on, and return what is to be sent of the motion until then."""
+        before, old, described, said = self._samples, self._codec.forest, self.codec.forest, list[bytes]()
+        holds, known = tuple(Hold(*pair) for pair in self._wanted), {hold[:2]: hold for hold in old.holds}
+        placed = described.holding(holds).in_hands(poses)
+        new = [known.get(hold[:2], hold._replace(level=described.level(hold.body, placed))) for hold in holds]
+        codec = self.codec.holding(tuple(new))
+        taken, begun = old.holders != codec.forest.holders, Path(np.array([now]), placed[:, None])
+        if len(before.moments):
+            # In the old hands it goes on as it went, and how it got into the new ones is not known.
+            until, last = old.in_hands(poses), before.poses[:, -1].copy()
+            until[taken], last[taken] = before.going_on().pose(now)[taken], placed[taken]
+            self._samples = before.extended(now, until)
+            said = self._due(now, math.inf)
+            begun = Path(before.moments[-1:], last[:, None]).extended(now, placed)
+            self._since, self._takes, self._good = math.floor(now * TICKS + ROUNDING), True, now - AGAIN
+        self._codec, self._samples = codec, begun
+        return said
 
     def poll(self, time: float) -> list[bytes]:
         """Return what is to be sent at a time at which no sample came: worth asking at `next`, where one is overdue."""
@@ -224,9 +286,9 @@ class Sender:
         if self._sequence > LAST:
             self._begin()
         due, self._next = [], math.inf
-        if self._copies and now - self._refreshed >= AGAIN:
-            is_there = self._answered(now) and self._base is not None and self._have(self._base)
-            due, self._copies = [] if is_there else self._copies, []
+        if self._copy and now - self._copy[1] >= AGAIN:
+            sequence, _, datagram = self._copy
+            due, self._copy = [] if self._answered(now) and self._have(sequence) else [datagram], None
         if not self._answered(now) and now - self._refreshed >= REFRESH:
             due += [*self.describe(), self._message(now, refresh=True)]
         elif self._desired:
@@ -246,7 +308,7 @@ class Sender:
         if self._good is None and self._path is not None and self._shown < times[-1]:
             moments = closely(times[max(int(np.searchsorted(times, self._shown, side="right")) - 1, 0) :])
             moments = moments[moments > max(self._shown, now - self._delay)]
-            errors = self._forest.errors(self._path.at(moments), self._samples.at(moments))
+            errors = self._codec.forest.errors(self._path.at(moments), self._samples.at(moments))
             off = errors.max(axis=0) > self.codec.tolerance
             if off.any():
                 self._good = float(np.append(self._shown, moments)[np.argmax(off)])
@@ -277,7 +339,8 @@ class Sender:
 
     def _message(self, now: float, refresh: bool = False) -> bytes:
         """Say the window until now. Where no sample is there yet, the motion is taken to go on as it went."""
-        samples, last, now = self._samples, float(self._samples.moments[-1]), max(now, self._sent)
+        samples, last = self._samples, float(self._samples.moments[-1])
+        now = max(now, self._sent, (self._since + 1) / TICKS)
         if now - last > SOON:
             there = samples.going_on().pose(now)
             samples = samples.extended(now, Poses(np.clip(there.positions, -LARGEST, LARGEST), there.quaternions))
@@ -286,7 +349,7 @@ class Sender:
         for number in (None if refresh else self._usable(now), None):
             base = self.codec.rest if number is None else self._messages[number]
             back = 0 if number is None else self._sequence - number
-            message, is_within = Fitting(self.codec, self._path, base, back, end, samples).message()
+            message, is_within = Fitting(self._codec, self._path, base, back, end, self._since, samples).message()
             if message.is_somewhere:
                 break
         datagram = wire.write(Motion(self.identity, self._sequence, self.codec.write(message, base)))
@@ -298,7 +361,8 @@ class Sender:
         self._shown, self._good = min(end / TICKS, last) if is_within else start, None
         self._sent = end / TICKS
         if number is None:
-            self._refreshed, self._desired = now, False
-            self._base, self._copies = self._sequence, [datagram]
+            self._refreshed, self._desired, self._base = now, False, self._sequence
+        if number is None or self._takes:
+            self._copy, self._takes = (self._sequence, now, datagram), False
         self._sequence += 1
         return datagram

@@ -16,7 +16,7 @@ import numpy as np
 from ..motion import Poses
 from .bodies import LARGEST, SMALLEST, Body, Forest
 
-VERSION = 6
+VERSION = 7
 
 TICKS = 3600
 """A second, in the unit of all times on the wire: whole numbers of it are the frames of 24, 25, 30, 60, 72, 90, 120."""
@@ -98,6 +98,17 @@ def read(datagram: bytes) -> Datagram | None:
         return None
     data = [] if made is Answer else [datagram[1 + layout.size :]]
     return made(*layout.unpack_from(datagram, 1), *data)
+
+
+def other_version(datagram: bytes) -> int | None:
+    """Return the version of what is a description of another version, by all that is known of it; None for all else."""
+    version, kind = divmod(datagram[0], 16) if datagram else (0, 0)
+    if kind or version in (0, VERSION):
+        return None
+    try:
+        return version if zlib.decompressobj(RAW).decompress(datagram[4:], 1) == b"[" else None
+    except zlib.error:
+        return None
 
 
 def describe(forest: Forest, terms: Terms) -> bytes:

@@ -5,27 +5,31 @@ after it. Both processes go by the clock of the recording, which stands still wh
 depend on how busy the machine is.
 
 Errors are the largest displacement of any point of the joints' balls, at the moments that are shown; bytes a second are
-those of the motion, without what joining takes.
+those of the motion, without what joining takes. A slip is how far any point of a held body's ball is from its mean
+place in what holds it, as in `analysis.held`.
 """
 
 from __future__ import annotations
 
 import multiprocessing
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from struct import Struct
 
 import numpy as np
 
 from rigid_motion.live.sockets import Address, Outlet, Port
-from rigid_motion.motion import Poses, rms
+from rigid_motion.motion import Poses, rms, shell_error
 from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Body, Receiver, Sender
 from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.paths import Path
 from rigid_motion.streams.wire import Description, read
+from rigid_motion_batch.analysis.held import mean_pose, seen_from
 
-from .sending import even_rate
+from .sending import Hand, even_rate
 
 LOOPBACK = "127.0.0.1"
 
@@ -40,9 +44,16 @@ ARRIVAL = Struct("<d")
 
 
 def measure(
-    body: Body, times: np.ndarray, poses: Poses, tolerance: float, delay: float, loss: float = 0.0, seed: int = 1
-) -> tuple[dict[str, float], Poses]:
-    """Send samples (n,) of a body's poses (joints, n), and return what it costs and what is shown at their moments.
+    bodies: Sequence[Body],
+    times: np.ndarray,
+    poses: Poses,
+    tolerance: float,
+    delay: float,
+    loss: float = 0.0,
+    seed: int = 1,
+    held: Sequence[tuple[str, Hand]] = (),
+) -> tuple[dict[str, float], Path]:
+    """Send samples (n,) of poses (joints, n) of all bodies, and return what it costs and what is shown (joints,).
 
     Datagrams take no time, and a part of them never arrives, in both directions. `joining_bytes`, with headers, are
     those of descriptions: names, parents and rest poses. `answers_a_second` are bytes with headers, too.
@@ -54,10 +65,12 @@ def measure(
     RuntimeError
         Where the other process ended.
     """
-    sender, random = Sender([body], tolerance, delay, even_rate(times)), np.random.default_rng(seed)
+    sender, random = Sender(bodies, tolerance, delay, even_rate(times)), np.random.default_rng(seed)
+    for tool, hand in held:
+        sender.hold(tool, *hand)
     sent, lost, answers = list[bytes](), list[bytes](), list[bytes]()
     with Port(LOOPBACK) as port, ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as processes:
-        receiving = processes.submit(_receive, port.number, times, delay)
+        receiving = processes.submit(_receive, port.number, times, delay, [body.name for body in bodies])
         _, receiver = _received(port)
 
         def say(datagrams: list[bytes], now: float) -> None:
@@ -87,7 +100,7 @@ def measure(
     moments, first = np.unique([moment for moment, _ in frames], return_index=True)
     drawn = joined([frames[row][1][:, None] for row in first.tolist()], axis=1)
     shown = Path(moments, Poses(drawn.positions, normalise(drawn.quaternions)))
-    off = Forest([body]).errors(shown.poses, Path(times, poses).at(moments)).max(axis=0)
+    off = Forest(bodies).errors(shown.poses, Path(times, poses).at(moments)).max(axis=0)
     seconds = float(times[-1] - times[0])
     joining = [datagram for datagram in sent if isinstance(read(datagram), Description)]
     joining_bytes, motions = sum(map(len, joining)), len(sent) - len(joining)
@@ -100,7 +113,62 @@ def measure(
         "share_within_tolerance": float(np.mean(off <= tolerance)),
         "share_within_20_mm": float(np.mean(off <= 0.02)),
         **cost((sum(map(len, sent)) - joining_bytes) / seconds, HEADERS * motions / seconds, off),
-    }, shown.at(times)
+    }, shown
+
+
+def measure_held(
+    bodies: Sequence[Body],
+    times: np.ndarray,
+    poses: Poses,
+    tolerance: float,
+    delay: float,
+    loss: float,
+    tool: str,
+    hand: Hand,
+) -> dict[str, dict[str, float]]:
+    """Return what a tool and the body that holds it cost, and how far the tool slips, for each way to send them; the
+    same arguments as those of `measure`. Last is the cost of the holding body alone, as exact at the tool.
+
+    Raises ValueError where there are no such bodies.
+    """
+    Sender(bodies).hold(tool, *hand)  # or it says what is wrong
+    forest = Forest(bodies)
+    pair = [bodies[forest.body(name)] for name in (hand[0], tool)]
+    forest, poses = Forest(pair), joined([forest.parted(poses)[body.name] for body in pair])
+    joint, root = forest.joint(*hand), len(pair[0].joints)
+    radius = float(forest.radii[root])
+
+    def place(shown: Poses) -> Poses:
+        """Where the tool is in the hand (n,), of poses (joints, n)."""
+        there = forest.skeleton.in_root_space(shown)
+        return seen_from(there[joint], there[root])
+
+    true = place(poses)
+    mean = mean_pose(true)
+
+    def sent(which: Sequence[Body], seed: int = 1, held: Sequence[tuple[str, Hand]] = ()) -> tuple[float, Path]:
+        own = joined([forest.parted(poses)[body.name] for body in which])
+        numbers, shown = measure(which, times, own, tolerance, delay, loss, seed, held)
+        return numbers["bytes_a_second_with_headers"], shown
+
+    def result(size: float, *shown: Path) -> dict[str, float]:
+        seen = times[times >= max(path.moments[0] for path in shown)]
+        off = shell_error(
+            place(joined([path.at(seen) for path in shown])), mean[np.zeros(len(seen), dtype=int)], radius
+        )
+        return {"bytes_a_second_with_headers": size, "slip_mm": 1000.0 * float(off.max())}
+
+    (first, of_hand), (second, of_tool) = (sent([body], seed) for seed, body in enumerate(pair, 1))
+    radii = np.array(pair[0].radius)
+    radii[joint] = max(radii[joint], float(np.linalg.norm(true.positions, axis=1).max()) + radius)
+    return {
+        "two streams": result(first + second, of_hand, of_tool),
+        "one stream, the tool in the world": result(*sent(pair)),
+        "one stream, the tool in the hand": result(*sent(pair, held=[(tool, hand)])),
+        "the hand alone, as exact at the tool": {
+            "bytes_a_second_with_headers": sent([replace(pair[0], radius=radii)])[0]
+        },
+    }
 
 
 def cost(size: float, headers: float, off: np.ndarray) -> dict[str, float]:
@@ -119,8 +187,10 @@ def _received(port: Port) -> tuple[bytes, Address]:
     raise RuntimeError(f"the receiver's process did not answer within {PATIENCE:g} s")
 
 
-def _receive(to: int, times: np.ndarray, delay: float) -> list[tuple[float, Poses]]:
-    """Show what comes from a port a delay behind each sample, answer, and return the moments and poses (joints,)."""
+def _receive(to: int, times: np.ndarray, delay: float, names: Sequence[str]) -> list[tuple[float, Poses]]:
+    """Show what comes from a port a delay behind each sample, answer, and return the moments and poses (joints,) of
+    bodies with these names.
+    """
     receiver, frames, draws = Receiver(), list[tuple[float, Poses]](), (times + delay).tolist()
     with Outlet(LOOPBACK, to) as outlet:
         outlet.say(b"")
@@ -130,7 +200,7 @@ def _receive(to: int, times: np.ndarray, delay: float) -> list[tuple[float, Pose
             while draws and draws[0] <= arrival:
                 # Nothing where the motion of that moment was over when the first datagram came.
                 for shown in receiver.show(draws.pop(0)).values():
-                    frames += [(shown.moment, poses) for poses in shown.poses.values()]
+                    frames.append((shown.moment, joined([shown.poses[name] for name in names])))
             receiver.take(data[ARRIVAL.size :], arrival, to)
             outlet.say(b"".join(answer for _, answer in receiver.answers()))
     return frames

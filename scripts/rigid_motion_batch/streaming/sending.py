@@ -15,6 +15,7 @@ from rigid_motion.streams import Body, Sender
 from rigid_motion.streams.bodies import RADIUS
 from rigid_motion.streams.paths import Path
 from rigid_motion.streams.wire import Description, read
+from rigid_motion_batch.analysis.held import find_held
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rest_bodies import NOTHING, TYPICAL, size_of
@@ -23,6 +24,9 @@ from .rooms import ANSWERS, LISTENING, MOTION, SKELETON, Room
 
 SLIDES = 1e-4
 """Metres by which a joint has to change its place in its parent's space to be sent with it."""
+
+Hand = tuple[str, str | None]
+"""A body that holds another, and its joint that does; None where it has a single root."""
 
 LOOK, AGAIN, AFTER = 0.02, 0.03, 0.3
 """Seconds after which a loop looks up, whatever comes or does not; after which the description is sent again, for many
@@ -68,14 +72,16 @@ def body_of(clip: Clip, poses: Poses, radius: float | None = None) -> Body:
     return Body(clip.name, clip.rest_body.joints, parents, rest, radii, sliding | (parents < 0))
 
 
-def together(clips: Sequence[Clip], rate: float | None = None) -> tuple[list[Body], np.ndarray, Poses]:
+def together(
+    clips: Sequence[Clip], rate: float | None = None, radius: float | None = None
+) -> tuple[list[Body], np.ndarray, Poses]:
     """Return the bodies of clips that begin together, their moments (n,), and the poses (joints, n) of all.
 
     The moments are those of the first clip where all have the same or it is alone, or else even ones: so many a second,
     or as many as the fastest has. A clip that is over stays as it is.
     """
     samples = [samples_of(clip) for clip in clips]
-    bodies = [body_of(clip, poses) for clip, (_, poses) in zip(clips, samples, strict=True)]
+    bodies = [body_of(clip, poses, radius) for clip, (_, poses) in zip(clips, samples, strict=True)]
     moments = first = samples[0][0]
     if rate or not all(np.array_equal(times, first) for times, _ in samples[1:]):
         rate = rate or max(clip.samples_a_second for clip in clips)
@@ -83,6 +89,18 @@ def together(clips: Sequence[Clip], rate: float | None = None) -> tuple[list[Bod
         moments = first[0] + np.arange(int(seconds * rate + 1e-6) + 1) / rate
     shown = [Path(times, poses).at(np.minimum(moments - first[0] + times[0], times[-1])) for times, poses in samples]
     return bodies, moments, joined(shown)
+
+
+def hand_of(text: str) -> Hand:
+    """Return what BODY or BODY:JOINT means."""
+    body, _, joint = text.partition(":")
+    return body, joint or None
+
+
+def found_held(clips: Sequence[Clip]) -> list[tuple[str, Hand]]:
+    """Return which rigid bodies of recordings are held by others all the time, as is found in them."""
+    rigid = [clip for clip in clips if clip.rest_body is None]
+    return [(rigid[held].name, (rigid[holder].name, None)) for holder, held in find_held(rigid, RADIUS)]
 
 
 def even_rate(times: np.ndarray) -> float | None:

@@ -21,6 +21,7 @@ import zenoh  # noqa: F401 - without it these tests are skipped
 
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Receiver
+from rigid_motion_batch.analysis.held import distances, seen_from
 from rigid_motion_batch.cli.stream import main
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
@@ -163,6 +164,20 @@ def test_many_bodies_of_many_senders_are_told_apart(tmp_path, at, hand, endless)
         done(receiver)
     made = sorted(path.name for path in tmp_path.glob("*.bvh"))
     assert made == ["shown-ada-left.bvh", "shown-ada-right.bvh", "shown-bob-endless.bvh"]
+
+
+@pytest.mark.slow
+def test_what_a_hand_holds_is_found_and_does_not_slip(tmp_path, at):
+    shown = tmp_path / "shown.csv"
+    with running("receive", "--room", "r", "--at", at, "--output", shown, *MARGIN) as receiver:
+        sent = run("send", f"{ROOT}/assets/hold.csv:*", "--room", "r", "--user", "ada", "--at", at)
+        done(receiver)
+    assert "hold-hand holds hold-tool\n" in sent
+    bodies = [f"{shown}:ada-{name}" for name in ("hold-hand", "hold-tool")]
+    hand, tool = (clip.in_blender(clip.poses) for clip in read_clips(bodies)[0])
+    assert len(hand) > 200
+    # The recording itself slips by 2.1 mm.
+    assert distances(seen_from(hand, tool), 0.03).max() < 0.003
 
 
 def test_an_even_rate_sends_a_key_at_each_tick_and_a_mode_is_of_these(tmp_path, at, hand):

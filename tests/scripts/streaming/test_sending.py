@@ -15,7 +15,7 @@ from rigid_motion.streams.paths import Path as Motion
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.bvh import _read_hierarchy
 from rigid_motion_batch.recordings.clip_reading import read_clips
-from rigid_motion_batch.streaming.sending import body_of, radii_of, samples_of
+from rigid_motion_batch.streaming.sending import body_of, found_held, hand_of, radii_of, samples_of
 from tests.recordings import RECORDINGS
 from tests.scripts.bvh_bodies import TIMES, write_body
 
@@ -63,6 +63,12 @@ def test_the_ends_of_bones_are_within_the_tolerance(tmp_path: Path, unit: float)
 @pytest.mark.parametrize("delay", [0.1, 0.2])
 def test_the_ends_of_bones_of_a_recording_are_within_the_tolerance(delay: float) -> None:
     assert of_file(RECORDINGS / "beat_saber_body.bvh", 0.005, delay) <= 0.005 * 1.02
+
+
+def test_what_is_held_all_the_time_is_found() -> None:
+    clips, _ = read_clips([str(Path(__file__).parents[3] / "assets/hold.csv") + ":*"])
+    assert found_held(clips) == [("hold-tool", ("hold-hand", None))]
+    assert hand_of("dancer:mixamorig:RightHand") == ("dancer", "mixamorig:RightHand")
 
 
 @pytest.mark.parametrize(("height", "metres"), [(1.7, 1.0), (0.08, 1.0), (170.0, 0.01), (6.0, 1.0)])
