@@ -31,11 +31,13 @@ from research.pages import ROOT, write_figures
 from research.paper.motions import read_all, read_motion
 from research.paper.table import RADIUS, SAMPLES_AN_UPDATE
 from research.studies import files_in
-from rigid_motion.motion import KEYFRAME_MODES, curves, decimate
+from rigid_motion.motion import KEYFRAME_MODES, curves, decimate, key_splines
 from rigid_motion.motion.segments import Curves, Segments
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.metrics import geometric_mean
-from rigid_motion_batch.analysis.modes import BEST_OF, REFERENCE
+from rigid_motion_batch.analysis.modes import BEST_OF
+from rigid_motion_batch.analysis.modes import REFERENCE as BLENDERS
+from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
 from rigid_motion_batch.analysis.needed import TABLE_RATES, KeysNeeded, Ways, keys_needed, overall
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.analysis.results import measured
@@ -46,14 +48,17 @@ from rigid_motion_batch.recordings.clips import Clip
 RATES = ("5", "10", "15", "20", "30")
 """Evenly spaced keys a second."""
 
-STREAMED = (REFERENCE, "dq_sclerp", "motor_spline_causal", "motor_spline")
+STREAMED = (REFERENCE, BLENDERS, "dq_sclerp", "motor_spline_causal", "motor_spline")
 """Modes of the table of errors."""
 
 COUNTED = (REFERENCE, "dq_sclerp", "pga_lerp", "motor_spline")
 """Modes whose keys are counted."""
 
-CHOICES = {"all": "all,best_of", "without_spline": "lerp_slerp,dq_sclerp,pga_lerp,best_of"}
-"""What `best_of` chooses from."""
+CHOICES = {
+    "all": "lerp_slerp,dq_sclerp,pga_lerp,motor_spline,best_of",
+    "without_spline": "lerp_slerp,dq_sclerp,pga_lerp,best_of",
+}
+"""What `best_of` chooses from: a mode of each motion."""
 
 BUDGETS = ("5", "10", "20")
 """Adaptive keys a second, of which `best_of` chooses the modes as well."""
@@ -145,7 +150,7 @@ def _asset_errors(asset: str, rate: str, modes: Sequence[str]) -> dict[str, floa
 
 
 def _errors(paths: Sequence[Path]) -> dict[str, dict[str, float]]:
-    """By mode and rate, the error as a multiple of that of `lerp_slerp`."""
+    """By mode and rate, the error as a multiple of that of `REFERENCE`."""
     with _compared(paths, "--rates", ",".join(RATES), "--modes", ",".join(STREAMED)) as folder:
         table = _Metrics(folder)
         return {mode: {rate: table.mean(partial(table.ratio, rate, mode)) for rate in RATES} for mode in STREAMED[1:]}
@@ -180,11 +185,11 @@ def _errors_of_clips(clips: Sequence[Clip], part: float) -> dict[str, float]:
 
 
 def _needed(clips: Sequence[Clip], modes: Sequence[str], *, fit: bool) -> dict[str, dict[str, dict[str, float]]]:
-    """By mode, way to have keys and rate, the keys needed as a share of those of `lerp_slerp`."""
+    """By mode, way to have keys and rate, the keys needed as a share of those of `REFERENCE`."""
     result = []
     for clip in clips:
         _say(f"keys needed, {clip.name} ...")
-        result.append(_apart(keys_needed(Ways(clip, RADIUS, fit), modes)))
+        result.append(_apart(keys_needed(Ways(clip, RADIUS, fit), modes, REFERENCE)))
     means = overall(result)
     decimations = Ways(clips[0], RADIUS, fit).decimations
     shares = {group[0]: means.shares[row] for row, group in enumerate(means.groups)}
@@ -217,7 +222,8 @@ def _apart(result: KeysNeeded) -> KeysNeeded:
 def _by_rule(clips: Sequence[Clip], name: str) -> dict[str, dict[str, float]]:
     """By way to have keys and rate, what `motor_spline` needs under a rule."""
     _say(f"rule {name} ...")
-    with mock.patch.object(curves, "_shares", RULES[name]):
+    rule = RULES[name]
+    with mock.patch.object(curves, "twist_shares", rule), mock.patch.object(key_splines, "twist_shares", rule):
         return _needed(clips, ("motor_spline",), fit=name in ("parabola", "1, none up to 1/16"))["motor_spline"]
 
 

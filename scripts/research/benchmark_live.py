@@ -41,6 +41,7 @@ class Size(NamedTuple):
 
 
 SIZES = {"objects": Size(100, 10, 1000), "bones": Size(100, 10, 1000), "crowd": Size(400, 10, 1000)}
+HELD = Size(100, 4, 1000)  # keys: where they begin, are picked up, are passed on and end
 
 
 def scaled(size: Size, scale: float) -> Size:
@@ -59,13 +60,18 @@ def new_object(name: str, data: bpy.types.ID | None = None) -> bpy.types.Object:
     return obj
 
 
-def keyed(targets: Sequence[Target], size: Size) -> list[Target]:
-    """Insert keys of poses drawn at random, evenly over the frames of the scene."""
+def frames_of(size: Size) -> list[int]:
+    """Return the frames of keys, evenly over those of the scene."""
+    return np.linspace(1, size.frames, size.key_count).round().astype(int).tolist()
+
+
+def keyed(targets: Sequence[Target], size: Size, frames: Sequence[int] | None = None) -> list[Target]:
+    """Insert keys of poses drawn at random, on these frames or evenly over those of the scene."""
     random = np.random.default_rng(5)
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, size.frames
     for target in targets:
         target.rotation_mode = "QUATERNION"
-        for frame in np.linspace(1, size.frames, size.key_count).round():
+        for frame in frames_of(size) if frames is None else frames:
             for channel in ("location", "rotation_quaternion"):
                 setattr(target, channel, random.normal(size=len(getattr(target, channel))))
                 target.keyframe_insert(channel, frame=frame)
@@ -147,9 +153,11 @@ def edit_again(key: bpy.types.Keyframe) -> None:
         edit(key)
 
 
-def play() -> None:
-    """Show all frames, one after the other."""
-    scene = bpy.context.scene
+def play(scene: bpy.types.Scene | None = None) -> None:
+    """Show all frames of a scene, one after the other: of the one that is open if no other is given."""
+    scene = scene or bpy.context.scene
+    # Blender has more to do for the scene that is seen.
+    bpy.context.window.scene = scene
     for frame in range(scene.frame_start, scene.frame_end + 1):
         scene.frame_set(frame)
 
@@ -194,6 +202,30 @@ def choosing(size: Size, rounds: int) -> dict[str, Any]:
     return row(what, seconds[MODE], seconds["native"])
 
 
+def holding(size: Size, rounds: int) -> dict[str, Any]:
+    """Measure playback of objects that one hand picks up and passes to another, beside such with keys alone."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    begins, picked_up, passed, ends = frames_of(size)
+    runs: dict[str, Callable[[], object]] = {}
+    for name in (NATIVE, MODE):
+        scene = bpy.context.window.scene = bpy.data.scenes.new(name)
+        hands = keyed([new_object(f"{name} hand {number}") for number in range(2)], size)
+        props = [new_object(f"{name} tool {number}") for number in range(size.count)]
+        if name == NATIVE:
+            keyed(props, size)
+        else:
+            keyed(props, size, [begins])
+            for frame, hand in ((picked_up, hands[0]), (passed, hands[1])):
+                scene.frame_set(frame)
+                for prop in props:
+                    animation.hold_in(prop, hand)
+            keyed(props, size, [ends])
+        runs[name] = partial(play, scene)
+    seconds = interleaved_seconds(runs, rounds)
+    what = f"{size.count} objects in two hands, one after the other, (natively with keys alone) played, a frame"
+    return row(what, seconds[MODE], seconds[NATIVE], size.frames)
+
+
 def files(kind: str, targets: Targets, size: Size) -> dict[str, Any]:
     """Return the size of the open file in MB, compressed and not, with modes and without."""
     result: dict[str, Any] = {"what": f"{size.count} {kind}"}
@@ -215,7 +247,7 @@ def measure(rounds: int, scale: float) -> dict[str, Any]:
         targets = scene(sizes[kind])
         written.append(files(kind, targets, sizes[kind]))
         rows += costs(kind, targets, sizes[kind], rounds)
-    rows.append(choosing(sizes["crowd"], max(3, rounds // 8)))
+    rows += [choosing(sizes["crowd"], max(3, rounds // 8)), holding(scaled(HELD, scale), max(3, rounds // 4))]
     return {"sizes": {name: size._asdict() for name, size in sizes.items()}, "rows": rows, "files": written}
 
 

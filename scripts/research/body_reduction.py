@@ -1,4 +1,4 @@
-"""What key reduction leaves of whole bodies, beside greedy insertion and Blender's Decimate."""
+"""What key reduction leaves of whole bodies, beside greedy insertion, Blender's own curves and its Decimate."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from research.decimating import VARIES, DecimatedBody
+from research.decimating import VARIES, DecimatedBody, between
 from research.studies import interleaved_seconds, report
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.metrics import geometric_mean, key_samples
+from rigid_motion_batch.analysis.modes import REFERENCE, STATE_OF_THE_ART
 from rigid_motion_batch.analysis.needed import part_of
 from rigid_motion_batch.analysis.reconstructions import Reconstruction, moving, reconstruct
 from rigid_motion_batch.analysis.results import measured
@@ -24,8 +25,9 @@ from rigid_motion_batch.recordings.clips import Clip
 WITHIN, RADIUS, HEIGHT = Tolerance("10mm"), 0.03, 1.7
 """The errors that are allowed, of the ball at every joint, and what every body's largest extent is made; metres."""
 
-MODE, COMPARED = "motor_spline", ("lerp_slerp", "dq_sclerp", "motor_spline")
+MODE, COMPARED = "motor_spline", (STATE_OF_THE_ART, REFERENCE, "dq_sclerp", "motor_spline")
 WAYS = {"keys of each joint": False, "key poses": True}
+RIVALS = "Blender's curves", "Decimate"
 
 MOST_FRAMES = 1200  # longer recordings are cut off
 LONG = "cmu_01_01"  # the file that is timed uncut
@@ -39,11 +41,14 @@ def figures(paths: Sequence[Path]) -> dict[str, Any]:
     return {
         "bodies": [about(body) | {"extent": HEIGHT / body.metres_per_unit} for body in bodies],
         "greedy": [row for body in bodies for row in beside_greedy(body)],
-        "decimate": [row for of_way in pairs.values() for pair in of_way for row in pair],
-        "decimate_means": {
+        "beside": [row for of_way in pairs.values() for rows in of_way for row in rows],
+        "beside_means": {
             way: {
-                name: geometric_mean(np.array([decimated[name] / reduced[name] for reduced, decimated in of_way]))
-                for name in ("frames", "numbers")
+                rival: {
+                    name: geometric_mean(np.array([rows[place][name] / rows[0][name] for rows in of_way]))
+                    for name in ("frames", "key_count", "numbers")
+                }
+                for place, rival in enumerate(RIVALS, 1)
             }
             for way, of_way in pairs.items()
             if of_way
@@ -114,28 +119,49 @@ def beside_greedy(body: Clip) -> list[dict[str, Any]]:
     ]
 
 
-# -- Blender's Decimate, and time -----------------------------------------------------------------------------
+# -- Blender's own, and time -----------------------------------------------------------------------------------------
 
 
 def beside(body: Clip, way: str) -> list[dict[str, Any]]:
-    """Return what is left by keys of each joint or by key poses, and by Decimate within the error that these have."""
+    """Return what is left by keys of each joint or by key poses, by the same with Blender's curves between them, and by
+    Decimate within the error that the first have.
+    """
     report(f"{body.name}, {way}")
-    made = reduced(body, shared=WAYS[way])
+    made = {mode: reduced(body, mode, shared=WAYS[way]) for mode in (MODE, REFERENCE)}
+    own, curves = (left_by(one) for one in made.values())
+    left = DecimatedBody(made[MODE]).within(1e-3 * own["error_mm"])
+    rows = own, curves, left.figures()
+    return [{"body": body.name, "how": how, **row} for how, row in zip((way, *RIVALS), rows, strict=True)]
+
+
+def left_by(made: Reconstruction) -> dict[str, Any]:
+    """Return what the keys of its one mode are, their largest error between frames as well, and how far feet slide."""
     (row,) = measured(made).rows
-    slides = row.foot_slide_m, row.recorded_slide_m
-    slide, recorded = (None if metres is None else 1e3 * metres for metres in slides)
-    own = {"frames": row.key_frames, "key_count": row.keys, "numbers": numbers_of(made)}
-    left = DecimatedBody(made).within(row.max_shell_m)
-    return [
-        {"body": body.name, "how": way, **own, "error_mm": 1e3 * row.max_shell_m}
-        | {"slide_mm": slide, "recorded_slide_mm": recorded},
-        {"body": body.name, "how": "Decimate", **left.figures()},
-    ]
+    slides = {"slide_mm": row.foot_slide_m, "recorded_slide_mm": row.recorded_slide_m}
+    return {
+        "frames": row.key_frames,
+        "key_count": row.keys,
+        "numbers": numbers_of(made),
+        "on_frames_mm": 1e3 * row.max_shell_m,
+        "error_mm": 1e3 * largest_error(made),
+        **{name: None if metres is None else 1e3 * metres for name, metres in slides.items()},
+    }
+
+
+def largest_error(made: Reconstruction) -> float:
+    """Return the largest error of any joint at any part of a frame, in metres: the recording is straight between its
+    samples.
+    """
+    (mode,) = made.keys
+    every = np.arange(made.samples.start, made.samples.stop)
+    times, straight = between(made.times), replace(made, keys={STATE_OF_THE_ART: (every,) * len(made.radii)})
+    truth = straight.shown(STATE_OF_THE_ART, times)
+    return float(shell_error(made.shown(mode, times), truth, made.radii[:, None]).max())
 
 
 def numbers_of(made: Reconstruction) -> int:
     """Return how many numbers the keys take: for each its time, and the place and the turn where these vary."""
-    clip, keys = made.clip, made.keys[MODE]
+    (keys,), clip = made.keys.values(), made.clip
     places = np.ptp(clip.poses.positions, axis=1).max(axis=1) * clip.metres_per_unit > VARIES
     counts, channels, moves = np.array([*map(len, keys)]), 4 + 3 * places, moving(clip)
     times = len(key_samples(keys)) if made.shared else counts[moves].sum()

@@ -1,7 +1,7 @@
 """Blender's Decimate of the Graph Editor: the fewest keys that it leaves where an error must not become larger.
 
-Users give it one error margin for all F-curves, in the units of these. Which margin an error needs is searched for, and
-what was tried for one error is known when another is asked for. Errors are shell errors in metres.
+Users give it one error margin for all F-curves, in the units of these. Which margin an error needs is searched for.
+Errors are shell errors in metres at eighths of frames, as what is seen between frames counts as well.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ MARGINS = (1e-5, 10.0)  # the smallest and the largest error margin of Decimate,
 TRIALS = 12  # margins tried for an error, at most
 NEAR = 0.98  # part of the requested error that is as good as equal to it
 CLOSE = 1.01  # two margins whose ratio is less leave the same keys, or nearly
+PARTS = 8  # of a frame, at each of which errors are measured
 VARIES = 1e-4  # a channel that never changes by more does not vary: importers calculate in single precision
 
 
@@ -41,6 +42,12 @@ class Left:
         return {"frames": self.frames, "key_count": self.keys, "numbers": self.numbers, "error_mm": 1e3 * self.largest}
 
 
+def between(frames: np.ndarray) -> np.ndarray:
+    """Return frames (n,) with the moments between them at which errors are measured, shape (`PARTS` (n - 1) + 1,)."""
+    count = len(frames)
+    return np.interp(np.arange(PARTS * (count - 1) + 1) / PARTS, np.arange(count), frames)
+
+
 def decimate(obj: bpy.types.Object, **options: object) -> None:
     """Decimate all keys of an object and its bones: `mode`, and `factor` or `remove_error_margin`."""
     for fcurve in animation.channelbag_of(obj).fcurves:
@@ -53,6 +60,40 @@ def decimate(obj: bpy.types.Object, **options: object) -> None:
     region = next(region for region in area.regions if region.type == "WINDOW")
     with bpy.context.temp_override(window=window, area=area, region=region):
         bpy.ops.graph.decimate(**options)
+
+
+def fcurves_of(obj: bpy.types.Object) -> dict[tuple[str, int], bpy.types.FCurve]:
+    """Return the F-curves of an object and its bones, by path and index."""
+    return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in animation.channelbag_of(obj).fcurves}
+
+
+def values_of(obj: bpy.types.Object, frames: np.ndarray) -> dict[tuple[str, int], np.ndarray]:
+    """Return what the F-curves of an object show at frames (n,), by Blender's own evaluation, each of shape (n,)."""
+    at = frames.tolist()
+    return {key: np.array([curve.evaluate(frame) for frame in at]) for key, curve in fcurves_of(obj).items()}
+
+
+def bend(obj: bpy.types.Object) -> None:
+    """Put curves between all keys of an object and its bones, with the handles that Blender gives new keys."""
+    for fcurve in fcurves_of(obj).values():
+        keys = np.array([key.co for key in fcurve.keyframe_points])
+        replace_keys(fcurve, keys[:, 0], keys[:, 1], interpolation="BEZIER", handle_type="AUTO_CLAMPED")
+
+
+def decimated_within(
+    obj: bpy.types.Object, left: Callable[[], Left], largest: float, trials: int = TRIALS
+) -> Left | None:
+    """Return the fewest keys that Decimate leaves whose error is at most this, of straight lines or of curves through
+    all keys; None where no margin tried does. For arguments see `Decimations`.
+    """
+    animated = obj.animation_data
+    straight = Decimations(obj, left, trials)
+    result = [straight.within(largest)]
+    animated.action = animated.action.copy()
+    bend(obj)
+    result.append(Decimations(obj, left, trials).within(largest))
+    animated.action = straight.recorded
+    return min(filter(None, result), key=lambda left: left.keys, default=None)
 
 
 class Decimations:
@@ -101,36 +142,34 @@ class DecimatedBody:
     def __init__(self, made: Reconstruction) -> None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         clip = made.clip
-        self.frames = 1.0 + (made.times - made.times[0]) * clip.samples_a_second
+        frames = 1.0 + (made.times - made.times[0]) * clip.samples_a_second
+        self.frames = between(frames)
         self._skeleton, self._radius = made.skeleton, made.radii[:, None]
         joints = clip.in_blender(clip.poses[:, made.samples])
         roots = clip.whole_body.parents < 0
         places = joints.positions[roots]
         # Single precision is best around the origin.
         joints.positions[roots] -= (places.min(axis=(0, 1)) + places.max(axis=(0, 1))) / 2.0
-        self._truth = self._skeleton.in_root_space(joints)
         self.rig = Rig("Body", Rest.of(clip), clip.whole_body.joints, bpy.context.scene.collection)
         channels = self.rig.channels_of(joints)
         for bone in range(len(self.rig.bones)):
-            self.rig.key(bone, self.frames, channels[bone])
-        self._counted = {curve for curve, values in self._values().items() if np.ptp(values) > VARIES}
+            self.rig.key(bone, frames, channels[bone])
+        self._counted = {curve for curve, values in values_of(self.rig.obj, frames).items() if np.ptp(values) > VARIES}
+        self._truth = self.shown()
+        self._truth[:, ::PARTS] = self._skeleton.in_root_space(joints)
 
     def within(self, largest: float) -> Left | None:
         """Return the fewest keys whose error is at most this, from straight lines or curves through all of them."""
-        straight = Decimations(self.rig.obj, self.left)
-        animated = self.rig.obj.animation_data
-        result = [straight.within(largest)]
-        animated.action = animated.action.copy()
-        for fcurve in self._fcurves().values():
-            keys = np.array([key.co for key in fcurve.keyframe_points])
-            replace_keys(fcurve, keys[:, 0], keys[:, 1], interpolation="BEZIER", handle_type="AUTO_CLAMPED")
-        result.append(Decimations(self.rig.obj, self.left).within(largest))
-        animated.action = straight.recorded
-        return min(filter(None, result), key=lambda left: left.keys, default=None)
+        return decimated_within(self.rig.obj, self.left, largest)
 
     def errors(self) -> np.ndarray:
         """Return how far off each joint is by the F-curves that the rig has now, shape (joints, n)."""
-        values, bones = self._values(), [self.rig.obj.pose.bones[name] for name in self.rig.bones]
+        return shell_error(self.shown(), self._truth, self._radius)
+
+    def shown(self) -> Poses:
+        """Return where the joints are by the F-curves that the rig has now, in the root's space, shape (joints, n)."""
+        obj = self.rig.obj
+        values, bones = values_of(obj, self.frames), [obj.pose.bones[name] for name in self.rig.bones]
 
         def channels(name: str) -> np.ndarray:
             result = np.array([getattr(bone, name) for bone in bones])[:, None].repeat(len(self.frames), axis=1)
@@ -140,19 +179,10 @@ class DecimatedBody:
             return result
 
         joints = self.rig.joints_of(Poses(channels("location"), normalise(channels("rotation_quaternion"))))
-        return shell_error(self._skeleton.in_root_space(joints), self._truth, self._radius)
+        return self._skeleton.in_root_space(joints)
 
     def left(self) -> Left:
         """Return the keys that the rig has now, and their largest error."""
-        curves = [fcurve for curve, fcurve in self._fcurves().items() if curve in self._counted]
+        curves = [fcurve for curve, fcurve in fcurves_of(self.rig.obj).items() if curve in self._counted]
         keys = [key.co.x for fcurve in curves for key in fcurve.keyframe_points]
         return Left(len(set(keys)), len(keys), FREE * len(keys), float(self.errors().max()))
-
-    def _fcurves(self) -> dict[tuple[str, int], bpy.types.FCurve]:
-        fcurves = animation.channelbag_of(self.rig.obj).fcurves
-        return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in fcurves}
-
-    def _values(self) -> dict[tuple[str, int], np.ndarray]:
-        """Return what F-curves show at the samples, by Blender's own evaluation, each of shape (n,)."""
-        frames = self.frames.tolist()
-        return {key: np.array([curve.evaluate(frame) for frame in frames]) for key, curve in self._fcurves().items()}

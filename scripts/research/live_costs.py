@@ -53,7 +53,7 @@ def costs_of(clip: Clip) -> dict[str, Any]:
     times, poses = samples_of(clip)
     body = body_of(clip, poses)
     costs = {
-        f"when needed, {name}": measure(body, times, poses, TOLERANCE, delay)[0] for delay, name in DELAYS.items()
+        f"when needed, {name}": measure([body], times, poses, TOLERANCE, delay)[0] for delay, name in DELAYS.items()
     } | packed(body, times, poses)
     ways = {way: {name: cost[key] for name, key in COST.items()} for way, cost in costs.items()}
     return {"name": clip.name, "joints": len(body.joints), "ways": ways}

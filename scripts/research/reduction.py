@@ -1,11 +1,12 @@
-"""What Reduce Keys to Poses leaves of recordings, beside Blender's own Decimate of the Graph Editor.
+"""What Reduce Keys to Poses leaves of recordings, beside Blender's own curves, and its Decimate of the Graph Editor.
 
     python scripts/research reduction
     python scripts/research reduction --recordings FOLDER --bodies FOLDER_OR_FILES
 
 Each recording is an object with a key of location and rotation on every frame, as Blender's users import it. *Reduce
-Keys to Poses* leaves the fewest keys within the tolerance; Decimate gets the largest error margin with which it is no
-worse, found by trials. All errors are those of what Blender shows, on every frame.
+Keys to Poses* leaves the fewest keys within the tolerance. Keys on as few frames are searched for between which Blender
+puts its own curves, by the same search; and Decimate gets the largest error margin with which it is no worse, found by
+trials. All errors are those of what Blender shows, at eighths of frames.
 """
 
 from __future__ import annotations
@@ -18,25 +19,30 @@ import bpy
 import numpy as np
 
 from research import body_reduction
-from research.decimating import FREE, Decimations, Left
+from research.decimating import FREE, NEAR, PARTS, Left, bend, between, decimated_within, fcurves_of, values_of
 from research.making.motions import MOTIONS
-from research.studies import EXTENSIONS, files_in, publish, study_parser
+from research.studies import EXTENSIONS, files_in, publish, report, study_parser
 from rigid_motion import animation
-from rigid_motion.motion import Poses, interpolate, shell_error
+from rigid_motion.motion import Poses, interpolate, reduce_keys, shell_error
+from rigid_motion.motion.eulers import quaternions_from_extrinsic_eulers
+from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.analysis.metrics import geometric_mean
+from rigid_motion_batch.analysis.modes import REFERENCE, STATE_OF_THE_ART
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.world_poses import read_poses
 from rigid_motion_batch.scenes.body_scene import registered
 
 ROTATION_MODES = ("QUATERNION", "XYZ")
-TRIALS = 14  # error margins tried until Decimate is as good as the reduced poses
+RIVALS = "curves", "curves_between", "decimate"
+TRIALS = 14  # error margins and tolerances tried until a rival is as good as the reduced poses
+ROUNDING = 1e-4  # the share by which single precision may miss a tolerance
 
 
 def read(path: Path, rate: float) -> Clip:
-    """Read the first body of a file at so many frames a second, straight between samples; of a skeleton the root.
+    """Read the first body of a file at so many frames a second, and straight between these at `PARTS` of each, as
+    Blender shows a key on every frame; of a skeleton the root.
 
     Raises
     ------
@@ -45,59 +51,116 @@ def read(path: Path, rate: float) -> Clip:
     """
     clip = read_clips([str(path)])[0][0]
     poses = clip.in_metres(clip.poses if clip.rest_body is None else clip.poses[0])
-    times = np.arange(np.floor((clip.times[-1] - clip.times[0]) * rate) + 1.0) / rate
-    poses = interpolate(clip.times - clip.times[0], Poses(poses.positions, poses.quaternions), times, "lerp_slerp")
+    frames = np.arange(np.floor((clip.times[-1] - clip.times[0]) * rate) + 1.0) / rate
+    times, poses = clip.times - clip.times[0], Poses(poses.positions, poses.quaternions)
+    for at in (frames, between(frames)):
+        times, poses = at, interpolate(times, poses, at, STATE_OF_THE_ART)
     return replace(clip, name=path.stem, times=times, poses=poses, rest_body=None, metres_per_unit=1.0)
 
 
 def frames_of(clip: Clip) -> np.ndarray:
-    """Return the frames of its poses (n,), from 1 on."""
-    return 1.0 + np.arange(len(clip.times))
+    """Return the frames of its poses (n,), from 1 on, of which every `PARTS`th is whole."""
+    return 1.0 + np.arange(len(clip.times)) / PARTS
 
 
-def import_clip(clip: Clip, rotation_mode: str) -> bpy.types.Object:
-    """Return an empty with a key on every frame, alone in a new file, selected."""
+def import_clip(clip: Clip, rotation_mode: str, keys: np.ndarray | slice = slice(None)) -> bpy.types.Object:
+    """Return an empty with a key on every frame, or on some of them, alone in a new file, selected."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj = bpy.data.objects.new(clip.name, None)
     obj.rotation_mode = rotation_mode
     bpy.context.collection.objects.link(obj)
-    animation.bake_poses(obj, frames_of(clip), clip.poses)
+    animation.bake_poses(obj, frames_of(clip)[::PARTS][keys], clip.poses[::PARTS][keys])
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
     return obj
 
 
-def outcome(obj: bpy.types.Object, clip: Clip, radius: float) -> Left:
-    """Return what an object has now for keys, in a channel on average, and how far off it is shown."""
+def shown(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
+    """Return the poses of an object at frames (n,) by its F-curves."""
+    values = values_of(obj, frames)
+    location, turns = (
+        np.column_stack([values[channel] for channel in sorted(values) if channel[0].startswith(what)])
+        for what in ("location", "rotation")
+    )
+    if obj.rotation_mode == "QUATERNION":
+        return Poses(location, normalise(turns))
+    return Poses(location, quaternions_from_extrinsic_eulers(turns, obj.rotation_mode))
+
+
+def recorded(obj: bpy.types.Object, clip: Clip) -> Poses:
+    """Return the poses of an object with a key on every frame: on frames the clip's, between them as they are shown."""
+    result = shown(obj, frames_of(clip))
+    result[::PARTS] = clip.poses[::PARTS]
+    return result
+
+
+def outcome(obj: bpy.types.Object, truth: Poses, radius: float, *, poses: bool = False) -> Left:
+    """Return what an object has now for keys, in a channel on average, and how far off it is shown.
+
+    Keys of whole poses take a number for their frame and one for each channel.
+    """
     curves = [
         [key.co.x for key in fcurve.keyframe_points]
-        for fcurve in animation.channelbag_of(obj).fcurves
-        if fcurve.data_path.startswith(("location", "rotation"))
+        for (path, _), fcurve in fcurves_of(obj).items()
+        if path.startswith(("location", "rotation"))
     ]
     frames, count = len(set().union(*curves)), sum(map(len, curves))
-    numbers = frames * (1 + len(curves)) if animation.is_reduced(obj) else FREE * count
-    error = shell_error(read_poses(obj, frames_of(clip)), clip.poses, radius)
-    return Left(frames, count / len(curves), numbers, float(error.max()))
+    numbers = frames * (1 + len(curves)) if poses else FREE * count
+    return Left(frames, count / len(curves), numbers, float(errors_of(obj, truth, radius).max()))
+
+
+def errors_of(obj: bpy.types.Object, truth: Poses, radius: float) -> np.ndarray:
+    """Return how far off an object is shown, in metres, at every part of a frame, shape (n,)."""
+    return shell_error(shown(obj, 1.0 + np.arange(truth.shape[0]) / PARTS), truth, radius)
+
+
+def blenders_curves(
+    clip: Clip, truth: Poses, rotation_mode: str, tolerance: float, radius: float, largest: float
+) -> tuple[Left | None, Left | None]:
+    """Return the fewest poses found between which Blender's curves stay within the tolerance on frames, and the fewest
+    between which they stay within the largest error between frames too; None where they never do.
+
+    They are searched for as of quaternions. For what Euler angles make of them, and between frames, the tolerance is
+    lowered.
+    """
+    aim, frames, kept = tolerance, frames_of(clip)[::PARTS], None
+    for _ in range(TRIALS):
+        keys = reduce_keys(frames, clip.poses[::PARTS], REFERENCE, aim, radius)
+        obj = import_clip(clip, rotation_mode, keys)
+        bend(obj)
+        left, on_frames = outcome(obj, truth, radius, poses=True), errors_of(obj, truth, radius)[::PARTS].max()
+        if kept is None and on_frames <= tolerance * (1.0 + ROUNDING):
+            kept = left
+        if left.largest <= largest and kept:
+            return kept, left
+        if len(keys) == len(frames):
+            break
+        aim *= NEAR * min(largest / left.largest, tolerance / on_frames, 1.0)
+    return kept, None
 
 
 def measure(clip: Clip, rotation_mode: str, tolerance: float, radius: float) -> dict[str, Any]:
-    """Return what poses leave of a recording, and Decimate with no larger an error; None where it cannot be so good."""
+    """Return what *Reduce Keys to Poses* leaves of a recording, and what its rivals do with no larger an error; None
+    where they cannot be so good.
+    """
+    report(f"{clip.name}, {rotation_mode}")
     obj = import_clip(clip, rotation_mode)
+    truth = recorded(obj, clip)
     animation.reduce_keys_of(obj, "motor_spline", tolerance, radius)
-    reduced = outcome(obj, clip, radius)
+    reduced = outcome(obj, truth, radius, poses=True)
+    curves = blenders_curves(clip, truth, rotation_mode, tolerance, radius, max(tolerance, reduced.largest))
     obj = import_clip(clip, rotation_mode)
-    as_good = Decimations(obj, lambda: outcome(obj, clip, radius), TRIALS).within(reduced.largest)
-    about = {"name": clip.name, "frames": len(clip.times)}
-    return {**about, "reduced": reduced.figures(), "decimate": as_good and as_good.figures()}
+    decimated = decimated_within(obj, lambda: outcome(obj, truth, radius), reduced.largest, TRIALS)
+    rivals = dict(zip(RIVALS, (*curves, decimated), strict=True))
+    about = {"name": clip.name, "frames": len(clip.times[::PARTS]), "reduced": reduced.figures()}
+    return about | {name: left and left.figures() for name, left in rivals.items()}
 
 
-def means(rows: list[dict[str, Any]]) -> dict[str, float]:
-    """Return what Decimate has in multiples of reduced poses: geometric means over the recordings."""
-    pairs = [(row["decimate"], row["reduced"]) for row in rows if row["decimate"]]
-    return {
-        name: geometric_mean(np.array([decimated[name] / reduced[name] for decimated, reduced in pairs]))
-        for name in pairs[0][0]
-    }
+def means(rows: list[dict[str, Any]], rival: str) -> dict[str, float]:
+    """Return what a rival has in multiples of reduced poses: geometric means over those recordings where it can."""
+    pairs = [(row[rival], row["reduced"]) for row in rows if row[rival]]
+    ratios = {name: [one[name] / reduced[name] for one, reduced in pairs] for name in rows[0]["reduced"]}
+    return {"recordings": len(pairs), **{name: geometric_mean(np.array(own)) for name, own in ratios.items()}}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -125,7 +188,10 @@ def main(arguments: list[str] | None = None) -> int:
             "tolerance_mm": 1e3 * options.tolerance,
             "radius": options.radius,
             "recordings": rows,
-            "means": {rotation: means(of_rotation) for rotation, of_rotation in rows.items()},
+            "means": {
+                rotation: {rival: means(of_rotation, rival) for rival in RIVALS}
+                for rotation, of_rotation in rows.items()
+            },
             **body_reduction.figures(bodies),
         }
     given = f"--tolerance {options.tolerance:g} --radius {options.radius:g} --fps {options.fps:g}"

@@ -20,6 +20,7 @@ from rigid_motion.motion import Poses, decimate, interpolate, rms, shell_error
 from rigid_motion.motion.quaternions import align_signs, conjugate, multiply, rotate
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE, STATE_OF_THE_ART
+from rigid_motion_batch.places import ASSETS, from_here
 from rigid_motion_batch.recordings.clips import Clip
 
 MODES = (REFERENCE, STATE_OF_THE_ART, "dq_sclerp", "pga_lerp", "motor_spline")
@@ -37,6 +38,7 @@ ROUNDING = 1e-6
 """Metres that are none."""
 
 HELD_AT = (5, 10)
+REACHED_AT = 8
 TURNS = (60, 120, 170)
 """Degrees of a door between two keys."""
 
@@ -57,6 +59,7 @@ def main(arguments: Sequence[str]) -> int:
         "slips": slips(clips),
         "doors": {str(degrees): door(degrees) for degrees in TURNS},
         "other_sign_deg": other_sign(clips),
+        "reach_mm": reach(),
     }
     return publish("rivals", found, options, "--recordings", options.recordings)
 
@@ -116,6 +119,17 @@ def slips(clips: Iterable[Clip]) -> dict[str, Any]:
             means = np.where(means > 1.001e3 * ROUNDING, means, 0.0)
             result.setdefault(str(rate), {})[str(lever)] = dict(zip(MODES, means, strict=True))
     return result
+
+
+def reach() -> dict[str, float]:
+    """Return the RMS errors in mm of the generated hand at `REACHED_AT` keys a second, which pictures show."""
+    taken = sampled(read_motion(from_here(ASSETS) / "reach.csv"), REACHED_AT)
+    assert taken is not None
+    times, poses, keys = taken
+    return {
+        mode: 1e3 * rms(shell_error(interpolate(times[keys], poses[keys], times, mode), poses, RADIUS))
+        for mode in MODES
+    }
 
 
 def door(degrees: float) -> dict[str, float]:

@@ -4,6 +4,7 @@ parts                        all of it, part by part: each writes docs/figures/p
 motions                      the clips that it is tried on
 table                        Table 1, and why a screw wins here and loses there
 sending                      streams that are sent when needed, and bytes
+holding                      a tool that recorded hands pass on, in the world and in the space of the hand
 bodies                       the same study on whole bodies
 timing                       the running time of a frame
 triangle, strips, catching   the figures, in numbers and drawn

@@ -15,6 +15,7 @@ import numpy as np
 
 from rigid_motion_batch.analysis.choices import JOINT, Uniform
 from rigid_motion_batch.analysis.metrics import geometric_mean
+from rigid_motion_batch.analysis.modes import REFERENCE as BLENDERS
 from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
 from rigid_motion_batch.analysis.needed import DECIMATIONS, RATES, Ways, keys_needed, part_of
 from rigid_motion_batch.analysis.reconstructions import moving, reconstruct
@@ -25,7 +26,7 @@ from rigid_motion_batch.recordings.clips import Clip
 
 from .table import SCREW, has_samples_for, means, shares_of
 
-MODES = (REFERENCE, SCREW, "pga_lerp", "motor_spline")
+MODES = (REFERENCE, BLENDERS, SCREW, "pga_lerp", "motor_spline")
 ERROR_RATES = (5, 10)  # key poses a second at which errors are measured
 
 SEARCHED = 10.0
@@ -57,10 +58,23 @@ def read_body(path: Path) -> Clip:
 
 
 def needed_of(clip: Clip) -> dict[str, dict[str, list[float]]]:
-    """Return the key poses that every mode needs, by mode and decimation: `shares_of` the reference's at `RATES`."""
+    """Return the key poses that every mode needs, by mode and decimation: `shares_of` the reference's at `RATES`.
+
+    Blender's curves have evenly spaced ones alone.
+    """
     radii = np.full(len(clip.rest_body.joints), JOINT)
     searched = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SEARCHED, side="right")) - 1)
-    return shares_of(clip, keys_needed(Ways(searched, radii), MODES, REFERENCE))
+    evenly = shares_of(clip, keys_needed(_Evenly(searched, radii), (BLENDERS,), REFERENCE))
+    others = tuple(mode for mode in MODES if mode != BLENDERS)
+    return evenly | shares_of(clip, keys_needed(Ways(searched, radii), others, REFERENCE))
+
+
+class _Evenly(Ways):
+    """The way to have evenly spaced keys: of curves that all keys influence, every try takes minutes."""
+
+    def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
+        del mode, target, evenly
+        return []
 
 
 def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:

@@ -3,7 +3,8 @@
 The two hands and the tool are separate streams, at the same rate over the same link, and a mode fills in what
 arrives. A hand that holds the tool is one rigid body with it, so nothing between them should move. The hand is tracked
 at the wrist, a hand's length from where it holds. All modes are shown at the same moments of the motion; one that looks
-ahead gets there later. Seconds, metres.
+ahead gets there later. Beside the modes is what holds make of it: the tool in the space of the hand that has it, with
+an update as it is let go and one as it is caught. Seconds, metres.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from research.drawing import FAINT, INK, RULE, Model, column, save, seen, write_
 from research.making.motions import HAND, THERE
 from rigid_motion.motion import MODES, Poses, interpolate, measure, rms
 from rigid_motion.motion.poses import joined
-from rigid_motion.motion.quaternions import multiply, rotate
+from rigid_motion.motion.quaternions import multiply, rotate, turned, turns_between
 from rigid_motion_batch.analysis.modes import label_of
 from rigid_motion_batch.palette import DARK, colour_of
 from rigid_motion_batch.recordings.clips import Clip
@@ -29,7 +30,13 @@ from rigid_motion_batch.scenes.film import render_film
 from rigid_motion_batch.scenes.scene import set_up_render
 from rigid_motion_batch.scenes.settings import SceneSettings
 
-ENGINES = ("lerp_slerp", "dq_sclerp", "pga_lerp", "motor_spline")
+HELD, MOVED = "held", "lerp_slerp"
+"""The tool in the space of the hand, and the mode that fills in hands and flight then."""
+
+ENGINES = ("lerp_slerp", "dq_sclerp", "pga_lerp", "motor_spline", HELD)
+PASS = 1 / 24
+"""For how long the tool passes from its flight to the hand that catches it, where it is held."""
+
 RATES = (5, 10, 15, 20)  # updates a second
 PHASES = 6  # senders of the same rate that begin one after the other within an interval
 
@@ -41,14 +48,17 @@ END = 2.55  # what comes after is another throw
 
 SHOWN = (0.32, 1.90)  # the moments that are shown, from the first to the last
 FPS, SLOWER = 30, 3.0  # of the film
-FILM_SIZE = (720, 1004)  # pixels: as the picture, but smaller
-METRES = 5.6  # that the picture's height spans
+FILM_SIZE = (720, 1220)  # pixels: as the picture, but smaller
+HEIGHT, ROW = 1700, 299  # pixels: of the picture, and of what one mode shows
+METRES = HEIGHT / 250  # that the picture's height spans
 TRAIL_SECONDS = 0.7  # of the motion
 
 YAW = np.radians(52.0)
 """By which the scene is turned for the eye, so that neither the throw nor the tool is seen end on."""
 
 MIDDLE = np.array((0.0, 0.40, 1.14))  # of the throw
+LABELS = {HELD: "Straight, in the space of the hand"}
+COLOURS = {mode: colour_of(mode) for mode in ENGINES} | {HELD: "#009E73"}
 HANDS = {"thrower": "#3A6EA5", "catcher": "#7A5C99"}  # with the colours of their controllers
 
 Bodies = Mapping[str, Poses]
@@ -88,7 +98,33 @@ def shown_of(times: np.ndarray, poses: Bodies, rate: float, mode: str, moments: 
     """Return what a receiver shows of every body at these moments of the motion: its updates, interpolated."""
     ticks = ticks_of(times, rate)
     sent = {body: interpolate(times, of_body, ticks, "dq_sclerp") for body, of_body in poses.items()}
-    return {body: interpolate(ticks, of_body, moments, mode) for body, of_body in sent.items()}
+    used = MOVED if mode == HELD else mode
+    shown = {body: interpolate(ticks, of_body, moments, used) for body, of_body in sent.items()}
+    return shown | {"tool": _held(times, poses, ticks, shown, moments)} if mode == HELD else shown
+
+
+def _held(times: np.ndarray, poses: Bodies, ticks: np.ndarray, shown: Bodies, moments: np.ndarray) -> Poses:
+    """Return the tool in the space of what holds it at these moments: a hand, nothing, the other hand."""
+    let_go, caught = _recorded(times)
+    flying = np.array((let_go, *ticks[(ticks > let_go) & (ticks < caught)], caught))
+    updates = interpolate(times, poses["tool"], flying, "dq_sclerp")
+    flown = interpolate(flying, updates, np.clip(moments, let_go, caught), MOVED)
+    thrown, taken = (_tool_in(shown[hand]) for hand in HANDS)
+    before = joined((thrown[moments <= let_go], flown[moments > let_go]))
+    share = np.clip((moments - caught) / PASS + 1.0, 0.0, 1.0)
+    return _straight(before, taken, share * share * (3.0 - 2.0 * share))
+
+
+def _straight(first: Poses, second: Poses, shares: np.ndarray) -> Poses:
+    """Return poses (n,) that are by these shares (n,) from some to others: LERP and SLERP."""
+    turns = shares[:, None] * turns_between(first.quaternions, second.quaternions)
+    positions = first.positions + shares[:, None] * (second.positions - first.positions)
+    return Poses(positions, turned(first.quaternions, turns))
+
+
+def _tool_in(hand: Poses) -> Poses:
+    """Return where a hand holds the tool, shape (n,)."""
+    return Poses(hand.positions - rotate(hand.quaternions, GRIP), hand.quaternions)
 
 
 def figures(clip: Clip) -> dict[str, dict[int, dict[str, float]]]:
@@ -125,8 +161,9 @@ def _looked_at(times: np.ndarray, poses: Bodies, rate: int, mode: str) -> tuple[
     truth = interpolate(times, poses["tool"], moments, "dq_sclerp")
     ticks = ticks_of(times, rate)
     segment = np.searchsorted(ticks, moments, side="right") - 1
-    first = ticks[np.maximum(segment - MODES[mode].behind, 0)]
-    last = ticks[np.minimum(segment + 1 + MODES[mode].ahead, len(ticks) - 1)]
+    seen = MODES[MOVED if mode == HELD else mode]
+    first = ticks[np.maximum(segment - seen.behind, 0)]
+    last = ticks[np.minimum(segment + 1 + seen.ahead, len(ticks) - 1)]
     holding = zip(HANDS, (last <= let_go, first >= caught), strict=True)
     slips = [_apart(shown["tool"], shown[hand])[held] for hand, held in holding]
     then = shown_of(times, poses, rate, mode, np.array((caught,)))
@@ -136,7 +173,7 @@ def _looked_at(times: np.ndarray, poses: Bodies, rate: int, mode: str) -> tuple[
 
 def _apart(tool: Poses, hand: Poses) -> np.ndarray:
     """Return how far the tool's origin is from where the hand holds it, shape (n,)."""
-    return np.linalg.norm(hand.positions - rotate(hand.quaternions, GRIP) - tool.positions, axis=-1)
+    return np.linalg.norm(_tool_in(hand).positions - tool.positions, axis=-1)
 
 
 # -- as a picture ------------------------------------------------------------------------------------------------------
@@ -163,30 +200,40 @@ def pictures(clip: Clip) -> tuple[np.ndarray, Callable[[int], Axes]]:
     }
 
     def draw(frame: int) -> Axes:
-        axes = column(1400)
-        left, columns = axes.get_xlim()[0] + 0.012, (np.arange(len(RATES)) - 1.5) * 0.174
+        axes = column(HEIGHT)
+        pixels = 1 / HEIGHT
+        left, columns = axes.get_xlim()[0] + 17 * pixels, (np.arange(len(RATES)) - 1.5) * 244 * pixels
         trail = slice(max(frame - round(TRAIL_SECONDS * FPS * SLOWER), 0), frame + 1)
-        axes.text(left, 0.456, "Catching a tool", fontsize=8.5, color=INK)
-        axes.text(-left, 0.456, f"{moments[frame]:.2f} s", fontsize=8.5, color=INK, ha="right")
+        axes.text(left, 0.5 - 62 * pixels, "Catching a tool", fontsize=8.5, color=INK)
+        axes.text(-left, 0.5 - 62 * pixels, f"{moments[frame]:.2f} s", fontsize=8.5, color=INK, ha="right")
         for rate, x in zip(RATES, columns, strict=True):
-            axes.text(x, 0.418, f"{rate} updates/s", fontsize=6.5, color=INK, ha="center")
+            axes.text(x, 0.5 - 115 * pixels, f"{rate} updates/s", fontsize=6.5, color=INK, ha="center")
         for row, mode in enumerate(ENGINES):
-            top = 0.406 - row * 0.2135
+            top = 0.5 - (132 + row * ROW) * pixels
             axes.axhline(top, 0.016, 0.984, color=RULE, linewidth=0.5)
-            axes.text(left, top - 0.025, label_of(mode), fontsize=6.5, color=INK)
+            axes.text(left, top - 35 * pixels, LABELS.get(mode) or label_of(mode), fontsize=6.5, color=INK)
             for rate, x in zip(RATES, columns, strict=True):
-                place, view = (x, top - 0.118), shown[mode, rate]
-                for path, width, colour in ((truth, 0.4, FAINT), (view["tool"], 1.0, colour_of(mode))):
+                place, view = (x, top - 165 * pixels), shown[mode, rate]
+                for path, width, colour in (
+                    (truth, 0.4, FAINT),
+                    (view["tool"], 1.0, COLOURS[mode]),
+                ):
                     axes.plot(*seen(path.positions[trail], place, METRES).T, color=colour, linewidth=width, zorder=-1)
                 tool.draw(axes, truth[frame], place, METRES, DARK.ghost, whole=True)
-                tool.draw(axes, view["tool"][frame], place, METRES, colour_of(mode), whole=False)
+                tool.draw(axes, view["tool"][frame], place, METRES, COLOURS[mode], whole=False)
                 for hand, colour in HANDS.items():
                     controller.draw(axes, view[hand][frame], place, METRES, colour, whole=False)
-                axes.text(x + 0.06, top - 0.052, f"{1e3 * result[mode][rate]['gap']:.0f} mm", fontsize=6.5, ha="center")
+                axes.text(
+                    x + 84 * pixels,
+                    top - 73 * pixels,
+                    f"{1e3 * result[mode][rate]['gap']:.0f} mm",
+                    fontsize=6.5,
+                    ha="center",
+                )
         entries = [*((colour, f"{hand}'s hand") for hand, colour in HANDS.items()), (DARK.ghost, "what happened")]
-        write_legend(axes, entries, left, -0.458, 6.5)
+        write_legend(axes, entries, left, 59 * pixels - 0.5, 6.5)
         legend = "coloured: the tool as shown, and its path; mm: from tool to hand at the catch"
-        axes.text(left, -0.486, legend, fontsize=6, color=FAINT)
+        axes.text(left, 20 * pixels - 0.5, legend, fontsize=6, color=FAINT)
         return axes
 
     return moments, draw
@@ -208,7 +255,7 @@ def write_film(clip: Clip, path: Path) -> None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         scene = bpy.context.scene
         set_up_render(scene, SceneSettings(resolution=FILM_SIZE, fps=FPS), len(moments), "#FFFFFF")
-        strip = scene.sequence_editor_create().strips.new_image("Frames", str(frames[0]), 1, 1, fit_method="FIT")
+        strip = scene.sequence_editor_create().strips.new_image("Frames", str(frames[0]), 1, 1, fit_method="STRETCH")
         for frame in frames[1:]:
             strip.elements.append(frame.name)
         scene.render.use_sequencer = True

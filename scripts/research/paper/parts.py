@@ -29,7 +29,7 @@ from research.studies import files_in, publish, study_parser
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clips import Clip
 
-from . import bodies, catching, motions, sending, strips, table, timing, triangle
+from . import bodies, catching, holding, motions, sending, strips, table, timing, triangle
 from .table import PAPER, TIME_SAVED, UPDATES
 
 EPILOG = """
@@ -109,6 +109,11 @@ def send(options: argparse.Namespace) -> dict[str, Any]:
     return sending.costs(next(iter(clips_of(options)[0].values())))
 
 
+def hold(options: argparse.Namespace) -> dict[str, Any]:
+    """Return a tool that recorded hands hold and pass on, in the world and in the space of the hand."""
+    return holding.measure(next(iter(clips_of(options)[0].values())))
+
+
 def measure_bodies(options: argparse.Namespace) -> dict[str, Any]:
     """Return the same of whole bodies."""
     clips, left_out = motions.read_all(files_in(options.bodies, bodies.EXTENSIONS), bodies.read_body)
@@ -142,6 +147,7 @@ def draw(options: argparse.Namespace) -> None:
 PARTS: dict[str, Callable[[argparse.Namespace], dict[str, Any] | None]] = {
     "table": tabulate,
     "sending": send,
+    "holding": hold,
     "bodies": measure_bodies,
     "timing": race,
     "figures": count_figures,

@@ -36,7 +36,7 @@ PACKINGS = {"7 doubles": 56, "7 singles": 28}
 def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, float]:
     """Send a clip over loopback, and return datagrams and bytes a second, and the RMS shell error of what was shown."""
     times, poses = samples_of(clip)
-    cost, _ = measure(body_of(clip, poses, RADIUS), times, poses, tolerance, delay)
+    cost, _ = measure([body_of(clip, poses, RADIUS)], times, poses, tolerance, delay)
     size = cost["bytes_a_second_with_headers"]
     return (size - cost["bytes_a_second"]) / HEADERS, size, 1e-3 * cost["rms_mm"]
 

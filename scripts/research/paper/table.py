@@ -22,6 +22,7 @@ import numpy as np
 
 from rigid_motion.motion import decimate, interpolate
 from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
+from rigid_motion_batch.analysis.modes import REFERENCE as BLENDERS
 from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
 from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, Ways, keys_needed
 from rigid_motion_batch.recordings.clips import Clip
@@ -36,10 +37,10 @@ RADIUS = 0.1  # of the shell, in metres
 
 SCREW = "dq_sclerp"
 
-MODES = (REFERENCE, SCREW, "pga_lerp", "motor_spline", "motor_spline_causal")
+MODES = (REFERENCE, BLENDERS, SCREW, "pga_lerp", "motor_spline", "motor_spline_causal")
 """`pga_slerp` and `cga_slerp` are the motion of `dq_sclerp`, `cga_lerp` that of `pga_lerp`."""
 
-ADAPTIVE, CHOSEN = (REFERENCE, "motor_spline"), ", keys where needed"
+ADAPTIVE, CHOSEN = (REFERENCE, BLENDERS, "motor_spline"), ", keys where needed"
 """Modes that have their keys where they need them too, and what is added to their names then."""
 
 WAYS = {mode: (mode, DECIMATIONS[0]) for mode in MODES} | {mode + CHOSEN: (mode, DECIMATIONS[1]) for mode in ADAPTIVE}

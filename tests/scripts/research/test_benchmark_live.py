@@ -7,7 +7,7 @@ from tests.scripts.research.keeping import written
 def test_the_study_writes_what_the_page_reads(tmp_path, empty_file, capsys):
     assert benchmark_live.main(["--rounds", "1", "--scale", "0.01", "--root", str(tmp_path)]) == 0
     result = written(tmp_path, "benchmark_live")
-    assert len(result["rows"]) == 7
+    assert len(result["rows"]) == 8
     assert all(row["ms"] >= row["fastest_ms"] > 0.0 < row["native_fastest_ms"] for row in result["rows"])
     assert all(file["uncompressed_mb"] > file["native_uncompressed_mb"] for file in result["files"])
-    assert capsys.readouterr().out.count(", native ") == 11
+    assert capsys.readouterr().out.count(", native ") == 12

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from research.paper import catching
-from research.paper.catching import CATCH, GRIP, RATES, RELEASE
+from research.paper.catching import CATCH, GRIP, HELD, RATES, RELEASE
 from rigid_motion.motion.quaternions import angle_between, rotate
 from tests.scripts.research.paper.clips import thrown
 
@@ -29,3 +29,16 @@ def test_a_screw_keeps_the_tool_in_the_hand_that_holds_it_and_the_state_of_the_a
         assert views()["lerp_slerp"][rate]["slip"] > 1e-3
         for mode in ("dq_sclerp", "pga_lerp", "motor_spline"):
             assert views()[mode][rate]["slip"] < 1e-9
+
+
+def test_a_tool_in_the_space_of_the_hand_neither_slips_nor_is_caught_beside_the_hand():
+    for view in views()[HELD].values():
+        assert max(view["slip"], view["gap"], view["mean_gap"]) < 1e-9
+
+
+def test_a_tool_in_the_space_of_the_hand_flies_as_its_updates_say():
+    times, poses = catching.bodies(thrown())
+    flying = times[(times > RELEASE) & (times < CATCH - catching.PASS)]
+    held, moved = (catching.shown_of(times, poses, 20, mode, flying)["tool"] for mode in (HELD, catching.MOVED))
+    inner = (flying > flying[0] + 0.05) & (flying < flying[-1] - 0.05)
+    np.testing.assert_allclose(held.positions[inner], moved.positions[inner], atol=1e-9)
