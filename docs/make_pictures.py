@@ -20,11 +20,13 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.modes import COMPARED
 from rigid_motion_batch.analysis.reconstructions import reconstruct
+from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.scenes.findings import findings_of
 from rigid_motion_batch.scenes.scene import SceneSettings, build_scene
 
-SMOOTH = ("lerp_slerp", "dq_sclerp", "motor_spline")
+SMOOTH = ("bezier", "lerp_slerp", "dq_sclerp", "motor_spline")
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,8 @@ def main() -> None:
     for picture, still in STILLS.items():
         settings = SceneSettings(resolution=still.resolution, antialiasing="8", subject=still.subject, distinct=True)
         (clip,), _ = read_clips([str(DOCS.parent / "assets" / f"{still.asset}.csv")], "blender")
-        scene = build_scene(reconstruct(clip, Uniform(still.rate), still.modes, radius=0.1), settings)
+        made = reconstruct(clip, Uniform(still.rate), still.modes, radius=0.1)
+        scene = build_scene(made, settings, findings_of(measured(made).rows))
         if hasattr(scene.render.image_settings, "media_type"):
             scene.render.image_settings.media_type = "IMAGE"
         scene.render.image_settings.file_format = "PNG"

@@ -98,17 +98,17 @@ def fighter(name: str, colour: str, place: float) -> bpy.types.Object:
 
 
 def sword(name: str, rig: bpy.types.Object) -> bpy.types.Object:
-    """A sword that a constraint keeps in the hand, upright where the arm is level."""
+    """A sword that is held in the hand, upright where the arm is level."""
     steel, gold = surface("Steel", staging.STEEL), surface("Gold", staging.WOOD)
     blade = figure.boxes(f"{name} sword", steel, ((0.0, 0.0, 0.47), (0.012, 0.05, 0.76)))
     hilt = figure.boxes(f"{name} hilt", gold, ((0, 0, 0), (0.03, 0.03, 0.18)), ((0, 0, 0.09), (0.02, 0.2, 0.025)))
     hilt.parent = blade
-    hold = blade.constraints.new("CHILD_OF")
-    hold.target, hold.subtarget = rig, "hand"
-    rest = rig.matrix_basis @ rig.data.bones["hand"].matrix_local
-    hold.inverse_matrix = rest.inverted()
-    blade.matrix_basis = Matrix.Translation(rest.translation)
-    blade.hide_select = hilt.hide_select = True
+    hand = rig.pose.bones["hand"]
+    bpy.context.scene.frame_set(KEYS[0][0])
+    grip = hand.bone.matrix_local.inverted() @ Matrix.Translation(hand.bone.head_local)
+    blade.matrix_basis = staging.evaluated(rig).matrix_world @ staging.evaluated(rig).pose.bones["hand"].matrix @ grip
+    animation.hold_in(blade, hand)
+    hilt.hide_select = True
     return blade
 
 
