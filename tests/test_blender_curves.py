@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
@@ -62,19 +64,49 @@ def test_random_keys(seed):
     assert_same(frames, Poses(keys.positions, keys.quaternions, keys.scales if seed % 2 else None))
 
 
-def recordings() -> list[str]:
-    return sorted(map(str, [*ASSETS.glob("*.csv"), *RECORDINGS.glob("*.csv"), *RECORDINGS.glob("*.tum")]))
+FOLDERS = (ASSETS, RECORDINGS, RECORDINGS.parent / "rigs")
+
+FROM_SKELETONS = ("hips", "head", "lefthand", "rightfoot")
+"""Joints of whole bodies that are tracks of their own, by where each is in the space of the roots."""
+
+
+def tracks() -> list[tuple[Path, str]]:
+    """Return the devices and the joints that there are: in assets/, and in the recordings of others where those are."""
+    result = []
+    for folder in FOLDERS:
+        tables = sorted(path for path in folder.glob("*") if path.suffix in (".csv", ".tum"))
+        result += [(path, name) for path in tables for name in (("hand", "tool") if path.stem == "hold" else ("",))]
+        result += [(path, joint) for path in sorted(folder.glob("*.bvh")) for joint in FROM_SKELETONS]
+    return result
+
+
+def poses_of(path: Path, name: str) -> tuple[np.ndarray, Poses]:
+    """Return times (n,) in seconds and poses (n,) in metres of a track."""
+    skeleton = path.suffix == ".bvh"
+    clip = read_clips([f"{path}:{name}" if name and not skeleton else str(path)], "blender")[0][0]
+    poses = clip.in_metres(clip.poses)
+    if skeleton:
+        (joint,) = (at for at, joint in enumerate(clip.rest_body.joints) if joint.lower().endswith(name))
+        poses = clip.rest_body.skeleton.in_root_space(poses)[joint]
+    return clip.times - clip.times[0], poses
+
+
+def test_there_are_twenty_recordings():
+    if not RECORDINGS.exists():
+        pytest.skip(f"no {RECORDINGS}")
+    assert len(tracks()) >= 20
+    assert len({(path.stem, name) for path, name in tracks()}) == len(tracks())
 
 
 @pytest.mark.parametrize("rate", [2.0, 5.0, 15.0])
-@pytest.mark.parametrize("path", recordings(), ids=lambda path: path.rsplit("/", 1)[-1])
-def test_recordings(path, rate):
-    clip = read_clips([path], "blender")[0][0]
-    times = 24.0 * (clip.times - clip.times[0])
+@pytest.mark.parametrize(("path", "name"), tracks(), ids=lambda part: part.stem if isinstance(part, Path) else part)
+def test_recordings(path, name, rate):
+    times, poses = poses_of(path, name)
+    times = 24.0 * times
     kept = decimate(times, rate / 24.0)
     # As Blender has keys: frames that single precision knows, apart from one another, and not so far that it rounds.
     kept = kept[times[kept] < 250.0]
     frames = np.round(times[kept] / EVERY) * EVERY
     kept, frames = kept[np.diff(frames, prepend=-1.0) > 0.0], frames[np.diff(frames, prepend=-1.0) > 0.0]
-    poses = clip.in_metres(clip.poses)[kept]
-    assert_same(frames, Poses(np.float32(poses.positions), np.float32(align_signs(poses.quaternions))))
+    keys = poses[kept]
+    assert_same(frames, Poses(np.float32(keys.positions), np.float32(align_signs(keys.quaternions))))

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.axes import AXES, to_blender
+from rigid_motion_batch.axes import AXES, DESCRIBED, NERF, from_blender, to_blender
 
 
 def matrices(poses: Poses) -> np.ndarray:
@@ -37,6 +37,7 @@ def test_a_rotation_becomes_the_one_of_the_changed_matrix(poses: Poses, axes: st
         ("unity", (0, 1, 0), (0, 0, 1), (1, 0, 0)),
         ("ros", (0, 0, 1), (1, 0, 0), (0, -1, 0)),
         ("unreal", (0, 0, 1), (1, 0, 0), (0, 1, 0)),
+        ("opencv", (0, -1, 0), (0, 0, 1), (1, 0, 0)),
     ],
 )
 def test_up_is_z_forward_is_y_and_right_is_x(axes: str, up: tuple, forward: tuple, right: tuple) -> None:
@@ -46,5 +47,22 @@ def test_up_is_z_forward_is_y_and_right_is_x(axes: str, up: tuple, forward: tupl
 
 
 def test_unknown_axes_are_answered_with_the_known_ones(poses: Poses) -> None:
-    with pytest.raises(ValueError, match="'maya'; known are blender, opengl, unity, ros, unreal"):
+    with pytest.raises(ValueError, match="'maya'; known are blender, opengl, unity, ros, unreal, opencv"):
         to_blender(poses, "maya")
+
+
+def test_cameras_of_nerf_face_what_they_film(poses: Poses) -> None:
+    """In a world with z up: a camera looks along its -z, and its y is above it."""
+    there = matrices(poses)
+    here = matrices(to_blender(poses, NERF))
+    np.testing.assert_allclose(here[..., 1], -there[..., 2], atol=1e-14)
+    np.testing.assert_allclose(here[..., 2], there[..., 1], atol=1e-14)
+    np.testing.assert_array_equal(to_blender(poses, NERF).positions, poses.positions)
+
+
+@pytest.mark.parametrize("axes", DESCRIBED)
+def test_there_and_back(poses: Poses, axes: str) -> None:
+    back = from_blender(to_blender(poses, axes), axes)
+    np.testing.assert_allclose(back.positions, poses.positions, atol=1e-15)
+    np.testing.assert_allclose(back.quaternions, poses.quaternions, atol=1e-15)
+    assert {*DESCRIBED} == {*AXES, NERF}

@@ -43,8 +43,8 @@ def test_stages_of_films_are_in_the_job_where_there_are_films(clip: Path, tmp_pa
             step["name"]: step["parameterSpace"]["taskParameterDefinitions"][0]["range"] for step in template["steps"]
         }
 
-    assert steps("--no-video", "--parts", "3") == {"Read": "1-3", "Measure": "1-3", "Report": "1-1"}
-    assert [*steps()] == ["Read", "Measure", "Build", "Render", "Encode", "Report"]
+    assert steps("--no-video", "--parts", "3") == {"Read": "1-3", "Measure": "1-3", "Slip": "1-1", "Report": "1-1"}
+    assert [*steps()] == ["Read", "Measure", "Slip", "Build", "Render", "Encode", "Report"]
 
 
 @pytest.mark.parametrize("option", ["--explain", "--scheduler=tcp://farm:8786"])

@@ -46,6 +46,40 @@ def test_a_single_body_with_loss(tmp_path: Path, capfd: pytest.CaptureFixture[st
     assert len(read_clips([str(shown)])[0][0].times) == len(read_clips([str(source)])[0][0].times)
 
 
+HOLD = ["measure", str(Path(__file__).parents[2] / "assets/hold.csv") + ":*", "--radius", "10cm"]
+
+
+@pytest.mark.parametrize("loss", ["0", "0.01", "0.05"])
+def test_a_tool_slips_least_in_the_space_of_the_hand(loss: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main([*HOLD, "--held", "hold-tool", "hold-hand", "--loss", loss, "--json"]) == 0
+    result = json.loads(capfd.readouterr().out)
+    apart, in_world, in_hand, alone = (result[way] for way in list(result)[2:])
+    assert max(in_hand["slip_mm"], 6.0) < min(apart["slip_mm"], in_world["slip_mm"])
+    # The recording itself slips by 2.1 mm.
+    assert in_hand["slip_mm"] <= 3.0
+    cost = "bytes_a_second_with_headers"
+    assert in_hand[cost] < min(in_world[cost], apart[cost])
+    # A datagram more or less is ten bytes a second of so short a recording.
+    assert in_hand[cost] <= alone[cost] + 20.0
+
+
+@pytest.mark.parametrize(
+    ("options", "what"),
+    [
+        (["--held", "axe", "hold-hand"], "axe: no such body; there are hold-hand, hold-tool"),
+        (["--held", "hold-tool", "hold-hand:palm"], "hold-hand: palm? It has hold-hand"),
+        (["--held", "hold-tool", "hold-tool"], "hold-tool cannot be held by hold-tool"),
+        (["--held", "hold-tool", "hold-hand", "--output", "shown.csv"], "--held writes no file"),
+        ([], "2 bodies; name one, as FILE:BODY, or two by --held TOOL HAND"),
+    ],
+)
+def test_what_is_not_held_is_one_line(options: list[str], what: str, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main([*HOLD, *options]) == 2
+    said = capfd.readouterr().err
+    assert what in said
+    assert said.count("\n") == 1
+
+
 def test_a_body_is_no_table(walk: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert main(["measure", str(walk), "--output", str(tmp_path / "shown.csv")]) == 2
     assert "a body is written as .bvh" in capfd.readouterr().err
