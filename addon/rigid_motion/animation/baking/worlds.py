@@ -12,21 +12,20 @@ from typing import NamedTuple, cast
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
-from mathutils import Matrix
 
 from ...motion import Poses
 from ...motion.quaternions import from_matrices
 from ..actions.channels import key_points
 from ..actions.marks import read_marks, write_holds, write_marks
 from ..actions.slots import Binding
-from ..edits.holding import world_matrix
+from ..edits.holding import converted, world_matrix
 from ..evaluation.components import LOCATION, MODE_NUMBERS, ROTATION, ROWS, SCALE
 from ..evaluation.differences import seen_values
 from ..evaluation.runs import MOST_FRAMES, Switch
 from ..evaluation.sources import SAME_FRAME, Marks, Source
 from ..following import follower
 from ..holds.dependencies import Node
-from ..holds.holders import channel_space, is_ours
+from ..holds.holders import is_ours
 from ..transforms import Refused, Transform
 from .motions import rotation_values
 
@@ -81,19 +80,10 @@ def worlds_of(transform: Transform, nodes: Sequence[Node], frames: np.ndarray) -
             whole = int(np.floor(moment))
             scene.frame_set(whole, subframe=moment - whole)
             world, depsgraph = world_matrix(transform), bpy.context.evaluated_depsgraph_get()
-            result.prop[column], result.local[column] = world, _local(transform, world, depsgraph)
+            result.prop[column], result.local[column] = world, converted(transform, world, "WORLD", "LOCAL")
             for obj, rows in bones.items():
                 _look_at(obj.evaluated_get(depsgraph), rows, result.nodes[:, column])
     return result
-
-
-def _local(transform: Transform, world: Matrix, depsgraph: bpy.types.Depsgraph) -> Matrix:
-    """Return what the channels of a transform have on the frame that is shown where nothing holds it."""
-    if isinstance(transform.carrier, bpy.types.PoseBone):
-        return transform.animated.convert_space(
-            pose_bone=transform.carrier, matrix=world, from_space="WORLD", to_space="LOCAL"
-        )
-    return channel_space(transform, depsgraph).inverted_safe() @ world
 
 
 def _look_at(obj: bpy.types.Object, rows: list[tuple[int, int]], worlds: np.ndarray) -> None:

@@ -23,7 +23,7 @@ from ..evaluation.differences import seen_values
 from ..evaluation.runs import MOST_FRAMES
 from ..evaluation.sources import SAME_FRAME, Marks, Source
 from ..following import follower
-from ..holds.holders import Holder, add_holder, channel_space, holders_of
+from ..holds.holders import Holder, add_holder, channel_space, holders_of, node_of, world_of
 from ..holds.problems import STAYS, refuse_holder, refuse_motion
 from ..queries.keyed import active_binding, modes_in, source_of
 from ..queries.segments import frame_in_action
@@ -216,10 +216,7 @@ def hold_facts(prop: Target) -> HoldFacts:
 
 def world_matrix(transform: Transform) -> Matrix:
     """Return where something is seen on the frame that is shown."""
-    evaluated = transform.animated.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    if not transform.is_part:
-        return evaluated.matrix_world.copy()
-    return evaluated.matrix_world @ cast(Any, evaluated.pose).bones[transform.carrier.name].matrix
+    return world_of(*node_of(transform), bpy.context.evaluated_depsgraph_get())
 
 
 def _target(holder: object, bone: str | None) -> tuple[bpy.types.Object | None, str]:
@@ -284,7 +281,7 @@ def _key_seen(transform: Transform, number: int, seen: Matrix, frame: float) -> 
     if holder is not None:
         matrix = holder.matrix(bpy.context.evaluated_depsgraph_get()).inverted() @ seen
     else:
-        matrix = _converted(transform, seen, "WORLD", "LOCAL")
+        matrix = converted(transform, seen, "WORLD", "LOCAL")
     rows = _components(transform, matrix)
     paths = ["location", transform.rotation]
     if not np.allclose(rows[ROWS[SCALE]], transform.components()[ROWS[SCALE]], rtol=1e-4):
@@ -319,10 +316,10 @@ def _carried(transform: Transform, source: Source, holder: Holder | None, frame:
     matrix = _matrix(transform, _rows_of(transform, run.source, float(run.moments(np.array([frame]))[0])))
     if holder is not None:
         return holder.matrix(bpy.context.evaluated_depsgraph_get()) @ matrix
-    return _converted(transform, matrix, "LOCAL", "WORLD")
+    return converted(transform, matrix, "LOCAL", "WORLD")
 
 
-def _converted(transform: Transform, matrix: Matrix, first: str, second: str) -> Matrix:
+def converted(transform: Transform, matrix: Matrix, first: str, second: str) -> Matrix:
     """Return a matrix between the world and the space of the channels where nothing holds a transform."""
     obj = transform.animated
     if transform.is_part:
@@ -330,7 +327,7 @@ def _converted(transform: Transform, matrix: Matrix, first: str, second: str) ->
         return obj.convert_space(matrix=matrix, **spaces)
     # Blender's local space of an object is another one without a parent, or on a bone.
     space = channel_space(transform, bpy.context.evaluated_depsgraph_get())
-    return space @ matrix if second == "WORLD" else space.inverted() @ matrix
+    return space @ matrix if second == "WORLD" else space.inverted_safe() @ matrix
 
 
 def _matrix(transform: Transform, rows: np.ndarray) -> Matrix:
