@@ -241,8 +241,8 @@ class Keys(NamedTuple):
 class Playback:
     """A stream that is shown: its bodies, the path of what came, and the moment of that which is due.
 
-    `heard` is when something new came, `begins` the first moment that can be shown, and `settled` that until which the
-    path is not going to change any more.
+    `heard` is when something new came, `begins` and `ends` are the first and the last moment that can be shown, and
+    `settled` is that until which the path is not going to change any more.
     """
 
     silent = SILENT
@@ -252,7 +252,7 @@ class Playback:
         self.forest: Any = forest
         """The Forest of all bodies, None for as long as nothing is known of them."""
         self.path: Path | None = None
-        self.begins, self.settled = -np.inf, np.inf
+        self.begins, self.ends, self.settled = -np.inf, np.inf, np.inf
         self.fading = Fading()
         self.moment: float | None = None
         self.kept = -np.inf
@@ -260,14 +260,19 @@ class Playback:
 
     def put(self, path: Path) -> None:
         """Show a path from now on, of which the knots remain that are to be shown or handed out."""
+        self.ends = np.inf
         count = min(max(MOST_JOINT_KNOTS // len(self.forest), MOST_KNOTS), len(path.moments))
         shown = path.moments[0] if self.moment is None else self.moment
         self.path = path.since(max(min(self.kept, shown) - 1e-6, path.moments[-count]))
 
+    def end(self) -> None:
+        """Show nothing behind what came, as the sender has left, unless more comes."""
+        self.ends, self.settled = float(self.path.moments[-1]) if self.path else -np.inf, np.inf
+
     def show(self, now: float) -> Shown | None:
         """Return what is shown now."""
         self.moment = self.playing.moment(now)
-        if self.moment is None or self.path is None or self.moment < self.begins:
+        if self.moment is None or self.path is None or not self.begins <= self.moment <= self.ends:
             return None
         forest, holders = self.forest, self.path.held_at(self.moment)
         poses = self.fading.show(self.path.pose(self.moment), now, holders)

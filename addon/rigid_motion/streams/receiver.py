@@ -116,6 +116,12 @@ class Receiver:
         shown = {stream: it.show(now) for stream, it in self._streams.items()}
         return {stream: what for stream, what in shown.items() if what}
 
+    def leave(self, source: Hashable) -> None:
+        """Show nothing of a source behind what it sent, as it has left."""
+        for stream, it in self._streams.items():
+            if stream.source == source:
+                it.end()
+
     def keys(self) -> list[Keys]:
         """Return what came since the last call and is not going to change any more."""
         return [keys for it in self._streams.values() if (keys := it.keys())]

@@ -18,7 +18,7 @@ ANSWERS_A_SECOND = 100.0
 """To all streams together."""
 
 LINGER = 0.3
-"""Seconds without anybody who sends, after somebody did, that are the end: a sender may be followed by another."""
+"""Seconds without a sender, once all that came has been shown, that are the end: another sender may follow."""
 
 
 class Receiving:
@@ -46,7 +46,7 @@ class Receiving:
         """Show what comes until a moment of `time.monotonic`, or until all who sent have gone."""
         began, frame = time.monotonic(), 0
         while not stopped and (now := time.monotonic()) < until:
-            if self._last > -math.inf and not self._heard and now - self._last > LINGER:
+            if self._last > -math.inf and not self._heard and now - self._last > LINGER + self._margin:
                 break
             due = began + frame / self._fps
             for came in self._room.come(min(due, until) - now):
@@ -88,6 +88,7 @@ class Receiving:
 
     def _leave(self, user: str) -> None:
         self._heard.pop(user, None)
+        self.receiver.leave(user)
         if outlet := self._outlets.pop(user, None):
             outlet.close()
 

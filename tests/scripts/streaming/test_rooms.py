@@ -19,8 +19,10 @@ import numpy as np
 import pytest
 import zenoh  # noqa: F401 - without it these tests are skipped
 
+from rigid_motion.motion.measures import shell_error
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Receiver
+from rigid_motion.streams.paths import Path as Knots
 from rigid_motion_batch.analysis.held import distances, seen_from
 from rigid_motion_batch.cli.stream import main
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
@@ -28,6 +30,7 @@ from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.rest_bodies import RestBody
 from rigid_motion_batch.streaming.receiving import Receiving
 from rigid_motion_batch.streaming.rooms import HERE, Room, is_local, locator, opened, settings
+from rigid_motion_batch.streaming.sending import samples_of
 from tests.streams.links import body, dance
 
 pytestmark = pytest.mark.network
@@ -38,7 +41,7 @@ COMMAND = (sys.executable, str(ROOT / "scripts" / "stream.py"))
 PATIENCE = 60.0
 """Seconds that nothing takes, however busy the machine is."""
 
-MARGIN = ("--margin", "1")
+MARGIN = ("--margin", "3")
 """So that a busy machine is in time."""
 
 
@@ -112,6 +115,14 @@ def largest_mm(printed: str) -> float:
     return float(re.search(r"([\d.]+) mm at most", printed)[1])
 
 
+def errors_of(shown: Path, recording: Path) -> np.ndarray:
+    """Metres that points of a ball of 10 cm are off in each pose that was shown of a recording."""
+    (clip,), _ = read_clips([str(shown)])
+    (truth,), _ = read_clips([str(recording)])
+    times, poses = samples_of(truth)
+    return shell_error(clip.in_blender(clip.poses), Knots(times, poses).at(clip.times)[0], 0.1)
+
+
 def test_a_hand_is_shown_within_the_tolerance(tmp_path, at, hand):
     shown = tmp_path / "shown.csv"
     with (
@@ -181,13 +192,19 @@ def test_what_a_hand_holds_is_found_and_does_not_slip(tmp_path, at):
 
 
 def test_an_even_rate_sends_a_key_at_each_tick_and_a_mode_is_of_these(tmp_path, at, hand):
-    errors = {}
-    options = ("--room", "r", "--at", at, "--truth", hand, *MARGIN)
-    with running("receive", *options) as shown, running("receive", *options, "--mode", "motor_spline") as smooth:
+    options, files = ("--room", "r", "--at", at, *MARGIN), [tmp_path / "shown.csv", tmp_path / "smooth.csv"]
+    with (
+        running("receive", *options, "--output", files[0]) as shown,
+        running("receive", *options, "--output", files[1], "--mode", "motor_spline") as smooth,
+    ):
         sent = run("send", hand, "--room", "r", "--at", at, "--rate", 10, "--tolerance", "1mm")
-        errors = [largest_mm(done(each)) for each in (shown, smooth)]
+        done(shown)
+        done(smooth)
     ticks = 2 * 10
     assert ticks <= int(re.search(r"datagrams: (\d+)", sent)[1]) < 1.5 * ticks
+    assert [clip.times[-1] for clip in read_clips(list(map(str, files)))[0]] == pytest.approx([2.0, 2.0], abs=0.02)
+    # What is typical, as a datagram that a busy machine drops is missed by decimetres at so low a rate.
+    errors = [np.median(errors_of(path, hand)) for path in files]
     assert errors[1] < 0.7 * errors[0]
 
 
