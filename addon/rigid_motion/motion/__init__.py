@@ -4,6 +4,7 @@ No Blender here: importable anywhere. Quaternions are w, x, y, z; positions and 
 """
 
 from .best_of import best_modes, interpolate_by_segments
+from .cleaning import Cleaned, clean
 from .contacts import standing
 from .decimation import decimate
 from .fitting import fit_keys
@@ -19,6 +20,7 @@ from .skeletons import Skeleton
 __all__ = [
     "KEYFRAME_MODES",
     "MODES",
+    "Cleaned",
     "Errors",
     "Mode",
     "Poses",
@@ -26,6 +28,7 @@ __all__ = [
     "SeparateKeys",
     "Skeleton",
     "best_modes",
+    "clean",
     "decimate",
     "fit_keys",
     "in_betweens",

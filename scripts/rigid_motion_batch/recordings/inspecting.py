@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigid_motion.motion.outliers import outliers
 from rigid_motion.motion.quaternions import angle_between
 from rigid_motion.motion.repair import GAP
+from rigid_motion.motion.trembling import trembling
 from rigid_motion_batch.axes import AXES, DESCRIBED, NERF
 
 from .clip_reading import make_clip
@@ -30,6 +32,9 @@ EVEN = 0.1
 
 ABOVE_THE_FLOOR = 0.3, 2.5
 """Metres, where hands, heads and cameras of people are."""
+
+LEAST_TREMBLING = 1e-6, 1e-4
+"""Metres and degrees: less is rounding."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +96,20 @@ class Size:
 
 
 @dataclass(frozen=True)
+class Trembling:
+    """What no motion explains in a body that was measured: see `rigid_motion.motion.clean`."""
+
+    position: float
+    """Metres, the standard deviation along an axis; 0 where none is found."""
+
+    rotation: float
+    """Degrees, likewise."""
+
+    spikes: tuple[float, ...]
+    """The times of samples that are spikes, or only repeat the one before, in seconds of the file."""
+
+
+@dataclass(frozen=True)
 class Contents:
     """Contents of a body."""
 
@@ -111,6 +130,9 @@ class Contents:
     """Sentences on what was repaired."""
 
     warnings: tuple[ClipWarning, ...]
+
+    trembling: Trembling | None
+    """None for whole bodies, and what was animated."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +197,8 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
             clip = make_clip(
                 trajectory, source, trajectory.name, axes or recording.axes, options, measured=result.measured
             )
-            contents.append(_contents(clip, trajectory, _unit(clip, trajectory, result, options)))
+            trembling = _trembling(clip) if result.measured and clip.rest_body is None else None
+            contents.append(_contents(clip, trajectory, _unit(clip, trajectory, result, options), trembling))
         except TrajectoryError as error:
             unreadable.append((trajectory.name, error.problem))
     if not contents:
@@ -189,7 +212,7 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
     return Inspection(source, result.label, size, bodies, taken, tuple(contents), tuple(unreadable), note)
 
 
-def _contents(clip: Clip, trajectory: Trajectory, unit: Unit) -> Contents:
+def _contents(clip: Clip, trajectory: Trajectory, unit: Unit, trembling: Trembling | None) -> Contents:
     said = {str(warning) for warning in clip.warnings}
     return Contents(
         trajectory.name,
@@ -201,7 +224,16 @@ def _contents(clip: Clip, trajectory: Trajectory, unit: Unit) -> Contents:
         _up(clip),
         tuple(repair for repair in clip.repairs if repair not in said),
         clip.warnings,
+        trembling,
     )
+
+
+def _trembling(clip: Clip) -> Trembling:
+    noise = trembling(clip.times, clip.poses)
+    found = np.logical_or(*outliers(clip.times, clip.poses, noise))
+    sizes = np.array([noise.position * clip.metres_per_unit, np.degrees(noise.rotation)])
+    position, rotation = np.where(sizes > LEAST_TREMBLING, sizes, 0.0).tolist()
+    return Trembling(position, rotation, tuple(clip.times[found].tolist()))
 
 
 def _unit(clip: Clip, trajectory: Trajectory, result: Format, options: ReadingOptions) -> Unit:

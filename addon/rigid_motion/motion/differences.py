@@ -1,0 +1,57 @@
+"""Divided differences of a recording, of its places and of its rotations: nothing of a steady motion is left in them.
+
+Rotations are taken as rotation vectors in world axes, from one halfway between the two samples in the middle, so that a
+constant spin about a fixed axis has no second difference, and the differences turn with the world and not with time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .poses import Poses
+from .quaternions import conjugate, turned, turns_between
+
+
+def windows(count: int, width: int) -> np.ndarray:
+    """Return the samples (count - width + 1, width) of all runs of so many."""
+    return np.arange(count - width + 1)[:, None] + np.arange(width)
+
+
+def coefficients(times: np.ndarray, order: int) -> np.ndarray:
+    """Return what each run of order + 1 samples is multiplied by, shape (n - order, order + 1), for its derivative.
+
+    Times (n,) rise strictly, evenly or not.
+    """
+    at = times[windows(len(times), order + 1)]
+    apart = at[:, :, None] - at[:, None, :]
+    apart[:, range(order + 1), range(order + 1)] = 1.0
+    return np.prod(np.arange(1.0, order + 1.0)) / apart.prod(axis=-1)
+
+
+def differences_of_positions(positions: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    """Return differences (n - order, 3) of positions (n, 3)."""
+    return np.einsum("nk,nkc->nc", coefficients, positions[windows(len(positions), coefficients.shape[1])])
+
+
+def differences_of_rotations(quaternions: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    """Return differences (n - order, 3) in radians of rotations (n, 4), in world axes."""
+    count, width = coefficients.shape
+    # Seen from the body, rotations of the world are turned in their own axes.
+    seen = conjugate(quaternions)
+    before, behind = seen[(width - 1) // 2 :][:count], seen[width // 2 :][:count]
+    centre = turned(before, 0.5 * turns_between(before, behind))
+    turns = turns_between(seen[windows(len(seen), width)], centre[:, None])
+    return np.einsum("nk,nkc->nc", coefficients, turns)
+
+
+def turned_in_world(quaternions: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Return rotations (..., 4) turned by rotation vectors (..., 3) in world axes."""
+    return conjugate(turned(conjugate(quaternions), -turns))
+
+
+def differences(poses: Poses, coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return those of positions and of rotations."""
+    return (
+        differences_of_positions(poses.positions, coefficients),
+        differences_of_rotations(poses.quaternions, coefficients),
+    )

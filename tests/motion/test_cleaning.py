@@ -1,0 +1,200 @@
+"""Cleaning: trembling and spikes go, hits stay, and nothing is moved by more than was allowed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_motion.motion import Poses, Skeleton, clean, shell_error
+from rigid_motion.motion.banded import Banded
+from rigid_motion.motion.differences import coefficients, turned_in_world
+from rigid_motion.motion.quaternions import align_signs, multiply, normalise, rotate
+from rigid_motion.motion.trembling import trembling
+
+NOISE, TURNS = 1e-3, np.radians(0.3)
+
+
+def hand(seed: int, count: int = 600, rate: float = 90.0) -> tuple[np.ndarray, Poses]:
+    """A motion of some decimetres and half turns, slower than two in a second."""
+    random = np.random.default_rng(seed)
+    times = np.arange(count) / rate
+    frequencies = random.uniform(0.1, 2.0, (7, 4, 1))
+    waves = np.sin(2.0 * np.pi * (frequencies * times + random.random((7, 4, 1)))) / (1.0 + frequencies)
+    channels = (random.normal(size=(7, 4, 1)) * waves).sum(axis=1).T
+    return times, Poses(0.2 * channels[:, :3], align_signs(normalise(channels[:, 3:] + (3.0, 0.0, 0.0, 0.0))))
+
+
+def shaken(poses: Poses, seed: int) -> Poses:
+    """The same with white noise."""
+    random = np.random.default_rng(seed)
+    places, turns = random.normal(size=(2, len(poses), 3))
+    quaternions = turned_in_world(poses.quaternions, TURNS * turns)
+    return Poses(poses.positions + NOISE * places, align_signs(quaternions))
+
+
+def rms(poses: Poses, truth: Poses) -> float:
+    return float(np.sqrt(np.mean(shell_error(poses, truth) ** 2)))
+
+
+@pytest.mark.parametrize("count", [4, 5, 6, 7, 8, 9, 13, 50, 101])
+def test_the_solver_does_what_dense_matrices_do(count):
+    random = np.random.default_rng(count)
+    rows, weights, diagonal = random.normal(size=(count - 3, 4)), random.random(count - 3), random.random(count) + 0.1
+    dense = np.zeros((count - 3, count))
+    for own in range(count - 3):
+        dense[own, own : own + 4] = rows[own]
+    inverse = np.linalg.inv(np.diag(diagonal) + dense.T * weights @ dense)
+    banded, sides = Banded(diagonal, rows, weights), random.normal(size=(count, 3))
+    np.testing.assert_allclose(banded.solve(sides), inverse @ sides, atol=1e-9)
+    for apart, found in enumerate(banded.inverse_diagonals()):
+        np.testing.assert_allclose(found[: count - apart], np.diagonal(inverse, apart), atol=1e-9)
+
+
+def test_divided_differences_are_derivatives():
+    times = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 30))
+    for order in (1, 3, 6):
+        shares = coefficients(times, order)
+        runs = np.lib.stride_tricks.sliding_window_view(times, order + 1)
+        factorial = float(np.prod(np.arange(1, order + 1)))
+        np.testing.assert_allclose(np.einsum("nk,nk->n", shares, runs**order), factorial, rtol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_white_noise_is_measured_and_most_of_it_goes(seed):
+    times, truth = hand(seed)
+    shaky = shaken(truth, seed)
+    cleaned = clean(times, shaky)
+    assert cleaned.noise[0].position == pytest.approx(NOISE, rel=0.15)
+    assert cleaned.noise[0].rotation == pytest.approx(TURNS, rel=0.15)
+    assert rms(cleaned.poses, truth) < 0.6 * rms(shaky, truth)
+    assert not cleaned.spikes.any()
+    assert not cleaned.repeats.any()
+
+
+def test_motion_without_noise_is_left_alone():
+    times, truth = hand(1)
+    cleaned = clean(times, truth)
+    assert cleaned.noise[0].position == cleaned.noise[0].rotation == 0.0
+    assert cleaned.moved.max() == 0.0
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 6])
+def test_spikes_are_found_and_bridged(length):
+    times, truth = hand(2)
+    shaky = shaken(truth, 2)
+    rows = np.concatenate([np.arange(first, first + length) for first in (60, 200, 350, 500)])
+    positions = shaky.positions.copy()
+    positions[rows] += (0.0, 0.08, 0.05)
+    cleaned = clean(times, Poses(positions, shaky.quaternions), tolerance=0.004)
+    assert np.flatnonzero(cleaned.spikes).tolist() == rows.tolist()
+    assert shell_error(cleaned.poses, truth).max() < 0.006
+
+
+def test_samples_that_repeat_the_one_before_are_bridged():
+    times, truth = hand(3)
+    shaky = shaken(truth, 3)
+    fast = int(np.argmax(np.linalg.norm(np.diff(truth.positions[50:-50], axis=0), axis=1))) + 50
+    rows = np.arange(fast, fast + 4)
+    positions, quaternions = shaky.positions.copy(), shaky.quaternions.copy()
+    positions[rows], quaternions[rows] = positions[fast - 1], quaternions[fast - 1]
+    cleaned = clean(times, Poses(positions, quaternions), tolerance=0.004)
+    assert np.flatnonzero(cleaned.repeats).tolist() == rows.tolist()
+    assert shell_error(cleaned.poses, truth)[rows].max() < 0.006
+
+
+def test_a_drum_stroke_keeps_its_hit():
+    times = np.arange(400) / 100.0
+    # A stick that falls and bounces off every second.
+    phase = (times % 1.0) - 0.5
+    truth = Poses(np.stack([0.0 * times, 0.0 * times, 0.8 * np.abs(phase)], axis=1), np.tile([1.0, 0, 0, 0], (400, 1)))
+    shaky = shaken(truth, 5)
+    cleaned = clean(times, shaky)
+    hits = np.flatnonzero(np.abs(phase) < 1e-9)
+    assert len(hits) == 4
+    own = np.sqrt(np.mean(np.sum((shaky.positions - truth.positions)[hits] ** 2, axis=1)))
+    assert np.linalg.norm((cleaned.poses.positions - truth.positions)[hits], axis=1).max() < max(2.0 * own, 3.0 * NOISE)
+    assert not cleaned.spikes.any()
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10**6), st.floats(1e-5, 0.05), st.floats(0.01, 1.0), st.integers(8, 150))
+def test_nothing_is_moved_by_more_than_the_tolerance(seed, tolerance, radius, count):
+    random = np.random.default_rng(seed)
+    times = np.cumsum(random.uniform(0.001, 0.1, count))
+    walk = np.cumsum(random.normal(size=(count, 7)) * random.choice([0.0, 0.001, 0.1, 3.0], (count, 1)), axis=0)
+    poses = Poses(walk[:, :3], align_signs(normalise(walk[:, 3:] + random.normal(size=4))))
+    cleaned = clean(times, poses, tolerance, radius)
+    listed = cleaned.spikes | cleaned.repeats
+    # Independently: the corners of a fine grid on the sphere.
+    points = random.normal(size=(400, 1, 3))
+    points *= radius / np.linalg.norm(points, axis=-1, keepdims=True)
+    apart = rotate(cleaned.poses.quaternions, points) + cleaned.poses.positions - rotate(poses.quaternions, points)
+    off = np.linalg.norm(apart - poses.positions, axis=-1).max(axis=0)
+    assert (off[~listed] <= tolerance * (1.0 + 1e-9)).all()
+    assert np.isfinite(cleaned.poses.positions).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_world_the_clock_and_the_direction_of_time_do_not_matter(seed):
+    times, truth = hand(seed)
+    shaky, tolerance = shaken(truth, seed), 0.003
+    cleaned = clean(times, shaky, tolerance)
+    turn = normalise(np.array([0.3, 1.0, -0.7, 0.2]))
+
+    def moved(poses: Poses) -> Poses:
+        return Poses(rotate(turn, poses.positions) + np.arange(3.0), multiply(turn, poses.quaternions))
+
+    for other, expected in (
+        (clean(times, moved(shaky), tolerance).poses, moved(cleaned.poses)),
+        (clean(3.0 * times + 5.0, shaky, tolerance).poses, cleaned.poses),
+        (clean(-times[::-1], shaky[::-1], tolerance).poses[::-1], cleaned.poses),
+        # Again it has nothing to do.
+        (clean(times, cleaned.poses, tolerance).poses, cleaned.poses),
+    ):
+        assert shell_error(other, expected).max() < 1e-4 * tolerance
+
+
+def test_a_clock_that_trembles_is_steadied():
+    times, truth = hand(4)
+    stamped = times + np.random.default_rng(4).normal(size=len(times)) * 0.001
+    cleaned = clean(stamped, shaken(truth, 4))
+    assert np.abs(np.diff(cleaned.times, 2)).max() < 1e-9
+    assert rms(cleaned.poses, truth) < 0.6 * rms(shaken(truth, 4), truth)
+
+
+def test_what_cannot_be_cleaned_is_said():
+    times, truth = hand(1, 20)
+    assert clean(times[:8], truth[:8]).moved.max() == 0.0
+    with pytest.raises(ValueError, match="leaves nothing to clean"):
+        clean(times, truth, 0.0)
+    with pytest.raises(ValueError, match="times need to rise"):
+        clean(times[::-1], truth)
+    with pytest.raises(ValueError, match="do not fit"):
+        clean(times[:-1], truth)
+
+
+def test_noise_is_not_found_in_what_is_short():
+    times, truth = hand(1, 9)
+    assert trembling(times, truth)[:2] == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("tolerance", [0.002, 0.01])
+def test_a_body_is_cleaned_joint_by_joint_and_bounded_in_the_world(tolerance):
+    skeleton = Skeleton([-1, 0, 1, 2, 0])
+    times, root = hand(6, 300)
+    joints = [root] + [
+        Poses(np.tile([0.0, 0.3, 0.0], (300, 1)), hand(seed, 300)[1].quaternions) for seed in (7, 8, 9, 10)
+    ]
+    truth = Poses(np.stack([each.positions for each in joints]), np.stack([each.quaternions for each in joints]))
+    shaky = [shaken(each, seed) for seed, each in enumerate(joints)]
+    positions = np.stack([shaky[0].positions, *(each.positions for each in joints[1:])])
+    poses = Poses(positions, np.stack([each.quaternions for each in shaky]))
+    cleaned = clean(times, poses, tolerance, 0.05, skeleton)
+    assert [each.position for each in cleaned.noise[1:]] == [0.0] * 4
+    assert not cleaned.spikes.any()
+    world, before, real = (skeleton.in_root_space(each) for each in (cleaned.poses, poses, truth))
+    assert shell_error(world, before, 0.05).max() <= tolerance * (1.0 + 1e-9)
+    if tolerance > 0.005:
+        assert rms(world, real) < 0.7 * rms(before, real)
