@@ -15,9 +15,8 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.coding import Coder
+from rigid_motion.streams.coding import Coder, standard_tables
 from rigid_motion.streams.messages import Message
-from rigid_motion.streams.tables import TABLES
 from rigid_motion.streams.wire import VERSION
 
 from .links import body, dance
@@ -28,7 +27,7 @@ IDENTITY, RECEIVER = bytes((1, 2, 3)), bytes((7, 8, 9))
 
 def coding() -> list[dict]:
     """Symbols, the numbers of their tables, or how many a flat one could have been; and their bytes."""
-    rng, cases = np.random.default_rng(1), []
+    rng, cases, tables = np.random.default_rng(1), [], standard_tables()
     for length in (0, 1, 5, 40):
         encoder, steps = Coder(), []
         for _ in range(length):
@@ -37,8 +36,8 @@ def coding() -> list[dict]:
                 steps.append({"flat": count, "symbol": int(rng.integers(count))})
                 encoder.flat(count, steps[-1]["symbol"])
             else:
-                table = int(rng.integers(len(TABLES)))
-                steps.append({"table": table, "symbol": int(rng.integers(len(TABLES[table]) - 1))})
+                table = int(rng.integers(len(tables)))
+                steps.append({"table": table, "symbol": int(rng.integers(len(tables[table]) - 1))})
                 encoder.symbol(table, steps[-1]["symbol"])
         cases.append({"steps": steps, "bytes": encoder.finish().hex()})
     return cases

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 
 import numpy as np
 import pytest
 
-from rigid_motion.streams.coding import FLAGS, KNOT_COUNTS, LARGEST, TOTAL, Coder, bucket
-from rigid_motion.streams.tables import TABLES
+from research.making import stream_tables
+from rigid_motion.streams.coding import (
+    BASES,
+    FLAGS,
+    KNOT_COUNTS,
+    LARGEST,
+    TABLE_FILE,
+    TOTAL,
+    Coder,
+    bucket,
+    standard_tables,
+)
+from rigid_motion.streams.wire import VERSION
+
+TABLES_OF_VERSION = 7, "f3f799397ecc2d1e8d24af7602704edb84e8a8217468658dbe4f8c863a7f7477"
 
 
 def table(rng: np.random.Generator, symbols: int) -> tuple[int, ...]:
@@ -67,12 +81,35 @@ def test_any_bytes_are_some_symbols(seed: int) -> None:
 
 
 def test_the_tables_are_whole() -> None:
-    symbols = [len(own) - 1 for own in TABLES]
+    symbols = [len(own) - 1 for own in standard_tables()]
     assert symbols[:KNOT_COUNTS] == [2] * FLAGS + [LARGEST + 1] * (KNOT_COUNTS - FLAGS)
-    for own in TABLES:
+    for own in standard_tables():
         assert (own[0], own[-1]) == (0, TOTAL)
         assert all(low < high for low, high in itertools.pairwise(own))
     assert symbols[KNOT_COUNTS:] == [32, 21, 4, 4, 3, 2, 2]
+
+
+def test_the_tables_are_those_of_this_version_of_the_wire() -> None:
+    assert (
+        VERSION,
+        hashlib.sha256(TABLE_FILE.read_text(encoding="utf-8").encode()).hexdigest(),
+    ) == TABLES_OF_VERSION, (
+        "whoever has other tables reads other numbers: give the wire another version, and its vectors"
+    )
+
+
+def test_the_maker_writes_the_file_as_it_is() -> None:
+    assert stream_tables.text_of(standard_tables()) == TABLE_FILE.read_text(encoding="utf-8")
+
+
+def test_the_maker_counts_into_tables_that_are_whole_and_keeps_those_without_counts() -> None:
+    counts = [np.zeros(len(own) - 1) for own in standard_tables()]
+    assert stream_tables.tables_of(counts)[KNOT_COUNTS:] == standard_tables()[KNOT_COUNTS:]
+    counts[BASES][1] = 1e6
+    made = stream_tables.tables_of(counts)
+    assert [len(own) for own in made] == [len(own) for own in standard_tables()]
+    assert all((own[0], own[-1]) == (0, TOTAL) and min(np.diff(own)) > 0 for own in made)
+    assert np.diff(made[BASES]).tolist() == [1, TOTAL - 2, 1]
 
 
 def test_buckets() -> None:

@@ -218,6 +218,12 @@ def test_keys_are_in_the_world_and_do_not_go_between_two_hands() -> None:
     for hand, now in (("left", moments < times[taken]), ("right", moments >= times[taken])):
         assert shell_error(poses["tool"][now], in_hand(poses[hand][now]), 0.1).max() <= SLIP
     assert 0.0 < times[taken] - moments[moments < times[taken]][-1] < 0.001
+    holders = [holder for keys in came for holder in keys.held["tool"][0]]
+    assert holders == [(hand, hand) for hand in np.where(moments < times[taken], "left", "right").tolist()]
+    inside = joined([keys.held["tool"][1][0] for keys in came])
+    for hand in ("left", "right"):
+        at = [holder[0] == hand for holder in holders]
+        assert shell_error(placed(poses[hand][at], inside[at]), poses["tool"][at], 0.1).max() < 1e-9
 
 
 @pytest.mark.parametrize(

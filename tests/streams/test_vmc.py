@@ -207,7 +207,7 @@ def test_a_skeleton_of_another_size_rest_and_naming_does_the_same():
     sliding = np.array([name == "Hips" for name in pairs])
     bones = {name: row for row, name in enumerate(pairs)}
     retarget = Retargeting(world(body, body.rest[:, None])[:, 0], rest, rows, parents, bones, sliding)
-    back = retarget(world(body, keys.poses["VMC"][:, :1])[:, 0])
+    back = retarget(world(body, keys.poses["VMC"][:, :1]))[:, 0]
     assert retarget.scale == pytest.approx(1.0)
     assert np.abs(np.einsum("ij,ij->i", back.quaternions, rest.quaternions[rows[:, 1]])) == pytest.approx(1.0)
     assert back.positions[0] == pytest.approx(rest.positions[0], abs=1e-6)

@@ -11,15 +11,17 @@ to a place by its location and turned by a parent.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from typing import cast
 
 import bpy
 import numpy as np
 from mathutils import Quaternion
 
+from ..animation.holds.holders import is_ours, world_of
 from ..motion import Poses
 from ..motion.eulers import ORDERS
 from ..motion.humanoid import SPINE, alignments, beside, humanoid_bones, plain_name
+from ..motion.poses import inverse, placed
 from ..motion.quaternions import conjugate, from_matrices, multiply, rotate
 from ..streams import Body
 
@@ -100,10 +102,8 @@ class Retargeting:
         turns = target.quaternions.copy()
         for bone, turn in aligned.items():
             turns[bones[bone]] = multiply(turn, turns[bones[bone]])
-        self._from_rest = multiply(conjugate(source.quaternions), turns)
-        """What turns a source's pose into the target's."""
-        self._beside = np.zeros((len(pairs), 3))
-        """Where the target is, seen from the source's joint at rest: such that what hangs on it is in one place."""
+        self._on = Poses(np.zeros((len(pairs), 3)), multiply(conjugate(source.quaternions), turns))
+        """Where the target is, seen from the source's joint: at rest such that what hangs on it is in one place."""
         for pair in np.flatnonzero(sliding):
             children = np.flatnonzero(parents == pair)
             if len(children):
@@ -111,41 +111,43 @@ class Retargeting:
                 children = np.array(of_hips) if of_hips else children
                 theirs = (source.positions[children] - source.positions[pair]).mean(axis=0)
                 ours = (target.positions[children] - target.positions[pair]).mean(axis=0)
-                self._beside[pair] = rotate(conjugate(source.quaternions[pair]), self.scale * theirs - ours)
+                arm = rotate(conjugate(source.quaternions[pair]), self.scale * theirs - ours)
+                self._on.positions[pair] = arm
+
+    @property
+    def seen(self) -> Poses:
+        """Where the source's joints are in the target's, of their size, shape (pairs,)."""
+        return inverse(self._on)
 
     def __call__(self, poses: Poses) -> Poses:
-        """Return the poses (pairs, ...) of the target of those of the source (joints, ...)."""
+        """Return the poses (pairs, n) of the target of those of the source (joints, n)."""
         poses = poses[self.sources]
-        extra = (slice(None), *(None,) * (poses.quaternions.ndim - 2))
-        positions = self.scale * poses.positions + rotate(poses.quaternions, self._beside[extra])
-        return Poses(positions, multiply(poses.quaternions, self._from_rest[extra]))
+        return placed(Poses(self.scale * poses.positions, poses.quaternions), self._on[:, None])
 
 
 def _lengths(rest: Poses, parents: np.ndarray) -> np.ndarray:
     return np.linalg.norm(rest.positions - rest.positions[parents], axis=1)
 
 
-@dataclass(frozen=True, eq=False)
-class Values:
-    """Channels of objects or bones, as poses: location and rotation on top of where each is with nothing keyed."""
-
-    prefixes: list[str]
-    """Prefixes of the data paths, "" for an object."""
-
-    poses: Poses
-    """Shape (channels, n)."""
-
-    has_location: np.ndarray
-    """Shape (channels,)."""
+Hand = tuple[str, str]
+"""The names of an object and of one of its bones, "" for none, that hold something."""
 
 
 class Driver:
-    """What shows a body on one object."""
+    """What shows a body on one object: a rigid body, by the object's own channels."""
+
+    prefixes: Sequence[str] = ("",)
+    """Of the data paths of channels: location and rotation on top of where each is with nothing keyed."""
+
+    has_location, follows, ends = np.ones(1, dtype=bool), np.full(1, -1), np.zeros(1)
+    """Which channels have one; which of them each hangs on, -1 for the world; and how long bones are that no other
+    hangs on. Shape (channels,)."""
+
+    unit = 1.0
+    """Metres, of `locals` and `ends`."""
 
     def __init__(self, obj: bpy.types.Object, body: Body) -> None:
         self.name, self.body = obj.name, body
-        self.ends = np.zeros(1)
-        """How long bones are that no other channel hangs on (channels,), in the unit of `locals`."""
 
     @property
     def object(self) -> bpy.types.Object | None:
@@ -153,43 +155,35 @@ class Driver:
         return bpy.data.objects.get((self.name, None))
 
     def show(self, poses: Poses) -> bool:
-        """Show poses (joints,); False where the object is gone."""
+        """Show poses (joints,), whatever keys say that it is held in; False where the object is gone."""
         obj = self.object
         if obj is None:
             return False
         if obj.is_editable:
-            values = self.values(poses[:, None])
-            rotations, places = values.poses.quaternions[:, 0].tolist(), values.poses.positions[:, 0].tolist()
-            for owner, has_location, place, rotation in zip(
-                self.owners(obj), values.has_location.tolist(), places, rotations, strict=True
-            ):
+            values = self.values(poses[:, None])[:, 0]
+            rows = values.positions.tolist(), values.quaternions.tolist(), self.has_location.tolist()
+            for owner, place, rotation, has_location in zip(self.owners(obj), *rows, strict=True):
                 if owner is not None:
+                    for constraint in filter(is_ours, owner.constraints):
+                        constraint.influence = 0.0
                     _set(owner, place if has_location else None, rotation)
         return True
 
-    def values(self, poses: Poses) -> Values:
-        """Return the channels' values of poses (joints, n)."""
-        raise NotImplementedError
+    def values(self, poses: Poses) -> Poses:
+        """Return what channels (channels, n) have for poses (joints, n)."""
+        return poses[:1]
 
     def owners(self, obj: bpy.types.Object) -> Iterable[bpy.types.Object | bpy.types.PoseBone | None]:
         """Return whose channels these are, in their order."""
-        raise NotImplementedError
-
-    def locals(self, values: Values) -> tuple[Poses, np.ndarray, float]:
-        """Return poses (channels, n) of these values in the space of what each hangs on, numbers of that (channels,),
-        -1 for the world, and how many metres their unit is.
-        """
-        return values.poses, np.full(len(values.prefixes), -1), 1.0
-
-
-class ObjectDriver(Driver):
-    """A rigid body."""
-
-    def values(self, poses: Poses) -> Values:
-        return Values([""], poses[:1], np.array([True]))
-
-    def owners(self, obj: bpy.types.Object) -> Iterable[bpy.types.Object]:
         return (obj,)
+
+    def locals(self, values: Poses) -> Poses:
+        """Return poses (channels, n) of values in the space of what each hangs on."""
+        return values
+
+    def hand(self, _joint: str) -> tuple[Hand, Poses] | None:
+        """Return what holds for a joint, and the pose () in which the joint is seen there; None where nothing does."""
+        return (self.name, ""), Poses(np.zeros(3), [1.0, 0.0, 0.0, 0.0])
 
 
 class RigDriver(Driver):
@@ -208,65 +202,58 @@ class RigDriver(Driver):
         bones = obj.pose.bones
         joints = [joint for joint in body.joints if pairs.get(joint, "") in bones]
         self.bones = [pairs[joint] for joint in joints]
-        placed, self._follows = _space(obj, self.bones)
+        self.prefixes = [f'pose.bones["{bpy.utils.escape_identifier(name)}"].' for name in self.bones]
+        in_space, self.follows = _space(obj, self.bones)
         lengths = np.array([bones[name].bone.length for name in self.bones])
         # Longer ones than a body is large are an importer's.
-        are_free = lengths <= np.abs(placed.positions).max(initial=0.0)
-        are_free[self._follows[self._follows >= 0]] = False
+        are_free = lengths <= np.abs(in_space.positions).max(initial=0.0)
+        are_free[self.follows[self.follows >= 0]] = False
         self.ends = np.where(are_free, lengths, 0.0)
-        self._offsets = beside(placed, self._follows)
+        self._offsets = beside(in_space, self.follows)[:, None]
         """The pose of each bone with no values, seen from the bone that it follows, or in the armature."""
         _, turn, scale = obj.matrix_basis.decompose()
-        self._turn, self._scale = np.array(turn), max(sum(map(abs, scale)) / 3.0, 1e-9)
+        self._turn, self.unit = np.array(turn), max(sum(map(abs, scale)) / 3.0, 1e-9)
         numbers = np.array([body.joints.index(joint) for joint in joints], dtype=np.int64)
-        in_world = Poses(self._scale * rotate(self._turn, placed.positions), multiply(self._turn, placed.quaternions))
-        named = humanoid_bones(body.joints)
+        named, sliding = humanoid_bones(body.joints), cast(np.ndarray, body.sliding)[numbers]
         rows = {joint: row for row, joint in enumerate(numbers.tolist())}
         self._retarget = Retargeting(
             body.in_root_space(body.rest),
-            in_world,
+            Poses(self.unit * rotate(self._turn, in_space.positions), multiply(self._turn, in_space.quaternions)),
             np.stack((numbers, np.arange(len(numbers))), axis=1),
             np.array([self._above(joint, rows) for joint in numbers.tolist()], dtype=np.int64),
             {bone: rows[joint] for bone, joint in named.items() if joint in rows},
-            body.sliding[numbers],
+            sliding,
         )
         connected = np.array([bones[name].bone.use_connect for name in self.bones], dtype=bool)
-        self._has_location = body.sliding[numbers] & ~connected & self._retarget.has_places
+        self.has_location = sliding & ~connected & self._retarget.has_places
+        # A control of Rigify moves a limb by FK alone; what the limb follows by IK as well is the bone that it is of.
+        hands = [f"ORG-{name.replace('_fk', '')}" for name in self.bones]
+        hands = [hand if hand in bones else name for hand, name in zip(hands, self.bones, strict=True)]
+        moved = placed(inverse(in_space), _placed(obj, hands))
+        seen = placed(inverse(Poses(self.unit * moved.positions, moved.quaternions)), self._retarget.seen)
+        self._hands = {joint: ((obj.name, hand), pose) for joint, hand, pose in zip(joints, hands, seen, strict=True)}
+
+    def hand(self, joint: str) -> tuple[Hand, Poses] | None:
+        hand = self._hands.get(joint)
+        return hand if hand and holder_of(hand[0]) else None
 
     def _above(self, joint: int, rows: Mapping[int, int]) -> int:
         while (joint := int(self.body.parents[joint])) >= 0 and joint not in rows:
             pass
         return rows.get(joint, -1)
 
-    def values(self, poses: Poses) -> Values:
-        target = self._retarget(self.body.skeleton.in_root_space(poses))
-        back = conjugate(self._turn)
-        turns = multiply(back, target.quaternions)
-        places = rotate(back, target.positions) / self._scale
-        hanging, above = self._follows >= 0, self._follows
-        offsets = self._offsets
-        spaces = np.where(
-            hanging[:, None, None], multiply(turns[above], offsets.quaternions[:, None]), offsets.quaternions[:, None]
-        )
-        origins = np.where(
-            hanging[:, None, None],
-            places[above] + rotate(turns[above], offsets.positions[:, None]),
-            offsets.positions[:, None],
-        )
-        spaces = conjugate(spaces)
-        values = Poses(rotate(spaces, places - origins), multiply(spaces, turns))
-        prefixes = [f'pose.bones["{bpy.utils.escape_identifier(name)}"].' for name in self.bones]
-        return Values(prefixes, values, self._has_location)
+    def values(self, poses: Poses) -> Poses:
+        target, back = self._retarget(self.body.skeleton.in_root_space(poses)), conjugate(self._turn)
+        there = Poses(rotate(back, target.positions) / self.unit, multiply(back, target.quaternions))
+        return placed(inverse(self._offsets), beside(there, self.follows))
 
     def owners(self, obj: bpy.types.Object) -> Iterable[bpy.types.PoseBone | None]:
         bones = obj.pose.bones if obj.pose else {}
         return map(bones.get, self.bones)
 
-    def locals(self, values: Values) -> tuple[Poses, np.ndarray, float]:
-        offsets = self._offsets[:, None]
-        slides = np.where(values.has_location[:, None, None], values.poses.positions, 0.0)
-        places = offsets.positions + rotate(offsets.quaternions, slides)
-        return Poses(places, multiply(offsets.quaternions, values.poses.quaternions)), self._follows, self._scale
+    def locals(self, values: Poses) -> Poses:
+        slides = np.where(self.has_location[:, None, None], values.positions, 0.0)
+        return placed(self._offsets, Poses(slides, values.quaternions))
 
 
 def object_of(label: str, body: Body) -> bpy.types.Object | None:
@@ -360,6 +347,20 @@ def _space(obj: bpy.types.Object, bones: list[str]) -> tuple[Poses, np.ndarray]:
     if unsure:
         bpy.context.view_layer.update()
     return placed, follows
+
+
+def holder_of(hand: Hand) -> tuple[bpy.types.Object, str] | None:
+    """Return the object and the name of the bone that hold something; None where one is gone, or is never moved."""
+    obj, bone = bpy.data.objects.get((hand[0], None)), hand[1]
+    if obj is None or not obj.is_editable or (bone and (obj.pose is None or bone not in obj.pose.bones)):
+        return None
+    return obj, bone
+
+
+def seen_hand(hand: Hand) -> Poses:
+    """Return where something that is there and holds is in the world, as it was last evaluated, shape ()."""
+    holder = cast(tuple[bpy.types.Object, str], holder_of(hand))
+    return unscaled(np.array(world_of(*holder, bpy.context.evaluated_depsgraph_get()), dtype=np.float64))
 
 
 def _placed(obj: bpy.types.Object, bones: list[str]) -> Poses:

@@ -11,22 +11,27 @@ import time
 from collections import deque
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
+from typing import cast
 
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
 from ..motion import Poses
+from ..motion.poses import placed
 from ..streams import Body, Keys, Receiver
 from ..streams.playing import Held, Stream
 from ..streams.vmc import VMC
-from .driving import Driver, ObjectDriver, RigDriver, object_of
+from .driving import Driver, Hand, RigDriver, object_of, seen_hand
 from .recording import Take
 from .sockets import Port, check_access
 from .ticking import Ticking, log
 
 Which = tuple[Stream, str]
 """A stream, and the name of one of its bodies."""
+
+InHands = tuple[list[tuple[str, str] | None], Poses]
+"""The body and the joint that hold something at each of some keys (k,), None for none; its poses (joints, k) there."""
 
 MOST_AHEAD = 64
 """Messages of a body whose keys wait to be shown."""
@@ -55,7 +60,7 @@ class _Heard:
 
     label: str
     body: Body
-    is_vmc: bool
+    stream: Stream
     driver: Driver | None = None
     is_gone: bool = False
     """True if its object was deleted."""
@@ -65,11 +70,12 @@ class _Heard:
     moment: float = 0.0
 
     held: Held | None = None
-    """The joint that holds it, and its pose there: what a constraint would have. It is shown and recorded in the world,
-    where the joint that is shown puts it."""
+    """The joint that holds it, and its pose there."""
+    seen: Poses | None = None
+    """Where it is shown (joints,): what is held, in the hand of the rig."""
 
-    ahead: deque[tuple[np.ndarray, Poses]] = field(default_factory=lambda: deque(maxlen=MOST_AHEAD))
-    """Moments (k,) and poses (joints, k) of keys that are not shown yet."""
+    ahead: deque[tuple[np.ndarray, Poses, InHands]] = field(default_factory=lambda: deque(maxlen=MOST_AHEAD))
+    """Moments (k,) and poses (joints, k) of keys that are not shown yet, and what holds it there."""
 
     take: Take | None = None
     origin: float | None = None
@@ -130,10 +136,12 @@ class Listening:
             for stream, what in self._receiver.show(now).items()
             for body in what.bodies
         }
+        present = []
         for which, (body, what) in shown.items():
-            heard = self._heard_of(which, body, shown)
+            present.append(heard := self._heard_of(which, body, shown))
             heard.moment, heard.poses, heard.held = what.moment, what.poses[body.name], what.held.get(body.name)
-            self._show(heard)
+        self._show(present)
+        for heard in present:
             if self._recording and heard.driver is not None:
                 self._follow(heard, now)
         for keys in came:
@@ -153,17 +161,50 @@ class Listening:
                 if (label := body.name if number == 1 else f"{body.name} {number}") not in labels
             )
             before = next((other for other, it in self._heard.items() if it.label == label), None)
-            heard = self._heard[which] = self._heard.pop(before, None) or _Heard(label, body, which[0].identity == VMC)
-            heard.origin = None
+            heard = self._heard[which] = self._heard.pop(before, None) or _Heard(label, body, which[0])
+            heard.stream, heard.origin = which[0], None
         if heard.body is not body:
             heard.body, heard.driver = body, None
         return heard
 
-    def _show(self, heard: _Heard) -> None:
-        if heard.driver is None and not heard.is_gone:
-            heard.driver = self._driver_of(heard)
-        if heard.driver is not None and not heard.driver.show(heard.poses):
-            heard.driver, heard.is_gone = None, True
+    def _show(self, present: list[_Heard]) -> None:
+        for heard in present:
+            if heard.driver is None and not heard.is_gone:
+                heard.driver = self._driver_of(heard)
+        held = [heard for heard in present if self._grip(heard) is not None]
+        for heard in sorted(present, key=held.__contains__):
+            if heard in held[:1]:
+                cast(bpy.types.ViewLayer, bpy.context.view_layer).update()
+            heard.seen = self._seen(heard)
+            if heard.driver is not None and not heard.driver.show(heard.seen):
+                heard.driver, heard.is_gone = None, True
+
+    def _hand(self, stream: Stream, holder: tuple[str, str]) -> tuple[_Heard, Hand, Poses] | None:
+        """Return the body that holds something by its name and that of a joint, what shows that joint, and its pose ()
+        there; None for as long as nothing does.
+        """
+        holding = self._heard.get((stream, holder[0]))
+        if holding is None or holding.driver is None or (hand := holding.driver.hand(holder[1])) is None:
+            return None
+        return holding, *hand
+
+    def _grip(self, heard: _Heard) -> tuple[_Heard, Hand, Poses] | None:
+        """Return what holds a body, and its poses (1,) there. Skeletons are where they were sent, as their bones have
+        keys in their rig.
+        """
+        if heard.held is None or len(heard.body.joints) > 1:
+            return None
+        if (found := self._hand(heard.stream, heard.held[:2])) is None:
+            return None
+        holding, hand, joint = found
+        return holding, hand, placed(joint, heard.held.poses)
+
+    def _seen(self, heard: _Heard) -> Poses:
+        """Return where a body is to be shown (joints,): what is held, in the hand as Blender has it."""
+        if (found := self._grip(heard)) is None:
+            return heard.poses
+        holding, hand, grip = found
+        return placed(seen_hand(hand) if hand[1] else self._seen(holding)[0], grip)
 
     def _driver_of(self, heard: _Heard) -> Driver | None:
         """Return what shows a body; None for as long as nothing can."""
@@ -176,15 +217,14 @@ class Listening:
         obj = object_of(heard.label, heard.body)
         if obj is None:
             return None
-        is_rigid = len(heard.body.joints) == 1
         names = {name: name for name in heard.body.joints}
-        return ObjectDriver(obj, heard.body) if is_rigid else RigDriver(obj, heard.body, names)
+        return Driver(obj, heard.body) if len(names) == 1 else RigDriver(obj, heard.body, names)
 
     def show_again(self) -> None:
         """Show what is shown on top of what another frame has keyed."""
         for heard in self._heard.values():
-            if heard.driver is not None and heard.poses is not None:
-                heard.driver.show(heard.poses)
+            if heard.driver is not None and heard.seen is not None:
+                heard.driver.show(heard.seen)
 
     def look_anew(self, for_all: bool = False) -> None:
         """Choose anew what shows each body, of those whose object is gone as well where asked to."""
@@ -207,16 +247,25 @@ class Listening:
         if heard.origin is None:
             heard.origin = heard.moment - (now - recording.begun)
         if heard.take is None:
-            heard.take = Take(heard.driver, recording.mode, recording.tolerance if heard.is_vmc else None)
+            heard.take = Take(
+                heard.driver, recording.mode, recording.tolerance if heard.stream.identity == VMC else None
+            )
             self._add_shown(heard)
 
     def _add_shown(self, heard: _Heard) -> None:
         """Have the picture itself among what is recorded: where it begins, and where it ends."""
-        self._add(heard, np.array([heard.moment]), heard.poses[:, None])
+        holder, inside = (heard.held[:2], heard.held.poses) if heard.held else (None, heard.poses)
+        self._add(heard, np.array([heard.moment]), heard.poses[:, None], ([holder], inside[:, None]))
 
-    def _add(self, heard: _Heard, moments: np.ndarray, poses: Poses) -> None:
-        recording = self._recording
-        heard.take.add(recording.first_frame + (moments - heard.origin) * recording.frames_a_second, poses)
+    def _add(self, heard: _Heard, moments: np.ndarray, poses: Poses, in_hands: InHands) -> None:
+        recording, numbers, grips = self._recording, np.zeros(len(moments), dtype=int), poses.copy()
+        holders, inside = in_hands
+        for holder in dict.fromkeys(filter(None, holders)):
+            _, hand, joint = self._hand(heard.stream, holder) or (None, ("", holder[1]), poses[0, 0])
+            at = np.array([one == holder for one in holders])
+            numbers[at], grips[:, at] = heard.take.number_of(hand), placed(joint, inside[:, at])
+        frames = recording.first_frame + (moments - heard.origin) * recording.frames_a_second
+        heard.take.add(frames, poses, numbers, grips)
 
     def _keep(self, keys: Keys) -> None:
         """Record keys, or have those at hand that are not shown yet: a recording may begin before they are."""
@@ -224,10 +273,11 @@ class Listening:
             heard = self._heard.get((keys.stream, name))
             if heard is None:
                 continue
-            heard.ahead.append((keys.moments, poses))
+            nobody: InHands = [None] * len(keys.moments), poses
+            heard.ahead.append((keys.moments, poses, keys.held.get(name, nobody)))
             if heard.is_taken and heard.origin is not None:
-                for moments, few in heard.ahead:
-                    self._add(heard, moments, few)
+                for few in heard.ahead:
+                    self._add(heard, *few)
                 heard.ahead.clear()
             while heard.ahead and heard.ahead[0][0][-1] <= heard.moment:
                 heard.ahead.popleft()
@@ -240,6 +290,7 @@ class Listening:
                 if heard.is_taken and heard.origin is not None:
                     self._add_shown(heard)
                 count += heard.take.write()
+                self.complaint = heard.take.refusal or self.complaint
                 heard.take = None
         self._recording = None
         return count
@@ -270,8 +321,7 @@ def listening() -> Listening | None:
 
 def start(host: str, port: int, settings: Callable[[], Settings], pairs: Pairs) -> Listening:
     """Listen to a port, and to nothing else any more. Raises OSError where it is taken, and NotAllowed."""
-    running.start(lambda: Listening(host, port, settings, pairs))
-    return running.thing
+    return running.start(lambda: Listening(host, port, settings, pairs))
 
 
 def stop() -> None:

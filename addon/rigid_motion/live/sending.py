@@ -74,8 +74,7 @@ def sending() -> Sending | None:
 
 def start(host: str, port: int, objects: Iterable[bpy.types.Object]) -> Sending:
     """Send objects, and nothing else any more. Raises OSError where the address is none, and NotAllowed."""
-    running.start(lambda: Sending(host, port, objects))
-    return running.thing
+    return running.start(lambda: Sending(host, port, objects))
 
 
 def stop() -> None:

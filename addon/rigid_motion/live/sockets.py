@@ -9,13 +9,14 @@ from __future__ import annotations
 import ipaddress
 import select
 import socket
+from contextlib import suppress
 from typing import Self
 
 LONGEST = 65535
 MOST_AT_ONCE = 2048
 """Datagrams that one look at a socket takes out of it: a flood does not stop the viewport."""
 
-PENDING, LEAST_PENDING = 1 << 23, 1 << 16
+PENDING = [1 << bits for bits in range(23, 15, -1)]
 """Bytes that may wait to be looked at, where a viewport is slow: as many as the system allows."""
 
 Address = tuple[str, int]
@@ -67,14 +68,10 @@ class Port:
 
     def _allow_pending(self) -> None:
         """Set how many bytes may be pending: Linux takes what is allowed of what is asked for, others refuse it."""
-        size = PENDING
-        while size >= LEAST_PENDING:
-            try:
+        for size in PENDING:
+            with suppress(OSError):
                 self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, size)
-            except OSError:
-                size //= 2
-            else:
-                break
+                return
 
     @property
     def number(self) -> int:
@@ -84,7 +81,7 @@ class Port:
         """Return what came since the last look, or comes first within so many seconds, and from where."""
         if wait:
             select.select([self._socket], [], [], wait)
-        result = []
+        result: list[tuple[bytes, Address]] = []
         while len(result) < MOST_AT_ONCE:
             try:
                 data, (host, port, *_) = self._socket.recvfrom(LONGEST)
@@ -97,10 +94,8 @@ class Port:
 
     def send(self, data: bytes, to: Address) -> None:
         """Send a datagram; as if it had been lost where that cannot be."""
-        try:
+        with suppress(OSError):
             self._socket.sendto(data, to)
-        except OSError:
-            return
 
     def close(self) -> None:
         self._socket.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
@@ -18,23 +18,14 @@ RATE = 60
 """Ticks a second."""
 
 
-class Ticks(Protocol):
-    """What has something to do at every tick, and ports to close."""
-
-    def tick(self, now: float) -> None: ...
-
-    def close(self) -> None: ...
-
-
 class Ticking:
-    """What is ticked. `failure` says what is wrong where it fails; `handlers` are called while there is something.
-
-    It is no generic class: with one that is bound to `Ticks`, Blender 4.5 waits forever when it quits.
+    """What is ticked, by `tick(now)`, until it is closed, by `close()`. `failure` says what is wrong where it fails;
+    `handlers` are called while there is something.
     """
 
     def __init__(self, failure: str, handlers: Mapping[str, Callable] | None = None) -> None:
         self.thing: Any = None
-        """Ticks, or None."""
+        """What is ticked, or None."""
         self.trouble = ""
         """The reason why it ended by itself."""
         self._failure = failure
@@ -46,12 +37,13 @@ class Ticking:
         self._handlers = {"load_pre": on_load, **(handlers or {})}
         self._timer = self.look
 
-    def start(self, make: Callable[[], Ticks]) -> None:
-        """Tick what is made, and nothing else any more."""
+    def start(self, make: Callable[[], Any]) -> Any:
+        """Tick what is made, and nothing else any more, and return it."""
         self.stop()
         self.thing, self.trouble = make(), ""
         append_handlers(self._handlers)
         bpy.app.timers.register(self._timer)
+        return self.thing
 
     def stop(self) -> None:
         """Tick no more, and close it."""

@@ -28,6 +28,7 @@ A receiver takes any bytes, from anybody, without ever raising an exception, and
     receiver.complaints()                         # lines on who sends another version of the wire
     for keys in receiver.keys():                  # since the last call: what was sent, to be recorded
         keys.stream, keys.moments, keys.poses     # (k,) seconds; of each body Poses (joints, k)
+        keys.held.get("sword")                    # who holds it at each, and its poses there
 
 What is held is sent in the space of the joint that holds it, and does not slip in the hand, whatever is lost.
 

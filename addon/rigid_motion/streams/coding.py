@@ -12,11 +12,13 @@ are as likely; both return the number, which has to be given only where it is wr
 
 from __future__ import annotations
 
+import json
 from bisect import bisect_right
 from collections.abc import Sequence
+from functools import cache
+from importlib.resources import files
 
 from .bodies import Forest
-from .tables import TABLES
 
 NEAR, FAR, STALE, UNKNOWN, MIDDLE, FINER, STILL = range(7)
 """Kinds of knots. The end of a window is coded against how the message before it goes on, or one before that; against
@@ -52,6 +54,15 @@ TOTAL = 1 << BITS
 SMALLEST = 1 << 24
 """Below this the interval is widened by a byte."""
 
+TABLE_FILE = files(__package__) / "tables.json"
+"""The tables of the wire's version, which scripts/research/making/stream_tables.py makes."""
+
+
+@cache
+def standard_tables() -> list[list[int]]:
+    """Return the cumulative frequencies of the symbols of each table."""
+    return json.loads(TABLE_FILE.read_text(encoding="utf-8"))
+
 
 class Coder:
     """Numbers to bytes or, where bytes are given, to numbers.
@@ -59,8 +70,9 @@ class Coder:
     Any bytes are some numbers: nothing is raised, and nothing read beyond the end but zeros.
     """
 
-    def __init__(self, data: bytes | None = None, tables: Sequence[Sequence[int]] = TABLES) -> None:
-        self._tables, self._reads, self._data = tables, data is not None, data or b""
+    def __init__(self, data: bytes | None = None, tables: Sequence[Sequence[int]] | None = None) -> None:
+        self._tables = standard_tables() if tables is None else tables
+        self._reads, self._data = data is not None, data or b""
         self._size = (1 << 32) - 1
         self._at = 4 if self._reads else 0
         """The byte that comes next; how many left the interval."""

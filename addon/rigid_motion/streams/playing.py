@@ -229,13 +229,16 @@ class Shown(NamedTuple):
 class Keys(NamedTuple):
     """What was sent, to be recorded: rising moments (k,) in seconds by the sender's clock, and poses (joints, k).
 
-    Roots are in the world, held or not. Where a body changes hands, there is a key just before it.
+    Roots are in the world, held or not. Where a body changes hands, there is a key just before it. `held` has what is
+    held at any of these moments, by its name: the body and the joint that hold it at each (k,), None where nothing
+    does, and its poses (joints, k) with roots in that joint's space.
     """
 
     stream: Stream
     bodies: tuple[Body, ...]
     moments: np.ndarray
     poses: dict[str, Poses]
+    held: dict[str, tuple[list[tuple[str, str] | None], Poses]] = {}  # noqa: RUF012
 
 
 class Playback:
@@ -293,5 +296,11 @@ class Playback:
         is_first = np.insert(is_last[:-1], 0, True)
         moments = (moments[rows] - np.where(is_last, 0.0, 0.5 / TICKS))[is_first | is_last]
         rows = rows[is_first | is_last]
-        poses = self.forest.out_of_hands(self.path.poses[:, rows], self.path.holders[:, rows])
-        return Keys(self.stream, self.forest.bodies, moments, self.forest.parted(poses))
+        poses, holders = self.path.poses[:, rows], self.path.holders[:, rows]
+        seen, inside, held = self.forest.out_of_hands(poses, holders), self.forest.parted(poses), {}
+        if (holders >= 0).any():
+            columns, which = np.unique(holders, axis=1, return_inverse=True)
+            hands = [self.forest.held(column) for column in columns.T]
+            of_keys = [hands[number] for number in which.ravel().tolist()]
+            held = {name: ([one.get(name) for one in of_keys], inside[name]) for name in set().union(*hands)}
+        return Keys(self.stream, self.forest.bodies, moments, self.forest.parted(seen), held)

@@ -3,13 +3,14 @@
     python scripts/research stream_tables FOLDER
 
 counts in every body and every single body of the folder and in the motions of assets/, at two delays, with receivers
-that answer soon, later, and not at all, and writes addon/rigid_motion/streams/tables.py.
+that answer soon, later, and not at all, and writes addon/rigid_motion/streams/tables.json.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+import json
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +19,17 @@ from research.pages import ROOT
 from research.studies import files_in, report
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.coding import FLAGS, HISTORIES, KNOT_COUNTS, NEIGHBOURS, SIZES, TOTAL
+from rigid_motion.streams.coding import (
+    FLAGS,
+    HISTORIES,
+    KNOT_COUNTS,
+    NEIGHBOURS,
+    SIZES,
+    TABLE_FILE,
+    TOTAL,
+    standard_tables,
+)
 from rigid_motion.streams.messages import Message
-from rigid_motion.streams.tables import TABLES
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.streaming.sending import body_of, even_rate, samples_of
 
@@ -31,15 +40,12 @@ MOST_SECONDS = 15.0  # of a recording, so that long ones do not have all the say
 SINGLE_RADIUS = 0.1  # of the balls of single bodies
 PRIOR = 12.0  # what a table without any counts is worth beside them: as the mean over the kinds of knots
 
-TABLE_FILE = ROOT / "addon/rigid_motion/streams/tables.py"
-HEAD = '"""Cumulative frequencies of the coder\'s symbols, in the order of `coding`: made by stream_tables.py."""'
-
 
 class Counting:
     """A coder that writes nothing, and counts how often each symbol of each table occurs."""
 
     def __init__(self) -> None:
-        self.counts = [np.zeros(len(table) - 1) for table in TABLES]
+        self.counts = [np.zeros(len(table) - 1) for table in standard_tables()]
 
     def symbol(self, table: int, value: int = 0) -> int:
         self.counts[table][value] += 1
@@ -100,6 +106,20 @@ def table_of(probability: np.ndarray) -> tuple[int, ...]:
     return (0, *np.cumsum(frequencies).tolist())
 
 
+def tables_of(counts: list[np.ndarray]) -> list[Sequence[int]]:
+    """Return the tables of these counts. Those that say what no motion here has, as that it is held, stay."""
+    tables: list[Sequence[int]] = [table_of(probability) for probability in probabilities(counts)]
+    for table in range(KNOT_COUNTS, len(tables)):
+        if not counts[table].any():
+            tables[table] = standard_tables()[table]
+    return tables
+
+
+def text_of(tables: Iterable[Sequence[int]]) -> str:
+    """Return what is in the file of these tables."""
+    return json.dumps(list(tables), separators=(",", ":")) + "\n"
+
+
 def main(arguments: list[str]) -> int:
     """Count, and write the tables; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -108,8 +128,5 @@ def main(arguments: list[str]) -> int:
     for motion in samples(parser.parse_args(arguments).folder):
         for setting in SETTINGS:
             count(coder, *motion, *setting)
-    tables = map(table_of, probabilities(coder.counts))
-    rows = "".join(f"    {table},\n" for table in tables)
-    text = f"{HEAD}\n\n# fmt: off\n# ruff: noqa: E501\nTABLES: tuple[tuple[int, ...], ...] = (\n{rows})\n"
-    TABLE_FILE.write_text(text, encoding="utf-8")
+    Path(str(TABLE_FILE)).write_text(text_of(tables_of(coder.counts)), encoding="utf-8")
     return 0

@@ -37,11 +37,15 @@ class Program:
 
     def _send(self) -> float:
         due = int((time.monotonic() - self._began) * RATE)
-        for datagrams in frames_of_vmc(np.arange(self._sent, due) / RATE):
-            for datagram in datagrams:
+        for row in range(self._sent, due):
+            for datagram in self.datagrams(row):
                 self._socket.sendto(datagram, self._to)
         self._sent = due
         return 0.5 / RATE
+
+    def datagrams(self, row: int) -> list[bytes]:
+        (frame,) = frames_of_vmc(np.array([row / RATE]))
+        return frame
 
     def close(self) -> None:
         bpy.app.timers.unregister(self._timer)

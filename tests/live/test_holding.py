@@ -1,0 +1,304 @@
+"""What is held in a stream: shown in the hand of the rig, and recorded as held in it."""
+
+from __future__ import annotations
+
+import itertools
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import channelbag_of, hold_facts, modes_of
+from rigid_motion.animation.transforms import transform_of
+from rigid_motion.live import receiving
+from rigid_motion.live.driving import seen_hand, unscaled
+from rigid_motion.motion import Poses, shell_error
+from rigid_motion.motion.poses import inverse, placed
+from rigid_motion.streams import Body, Sender
+from tests.live.performing import BODY, JOINTS, dance, in_world, new_rig
+from tests.rigs.human import human
+
+pytestmark = pytest.mark.network
+
+TIMES = np.arange(270) / 60.0
+FIRST, BEGINS = 10, 30
+"""The frame that a recording begins on, and the sample that is shown then."""
+
+DELAY, TOLERANCE = 0.1, 0.005
+RADIUS = 0.1
+"""Of the ball of the tool, whose points are off by the tolerance at most."""
+
+GRIP = Poses([0.1, 0.05, 0.0], [0.6, 0.0, 0.8, 0.0])
+HANDS, TAKES = ("LeftHand", "Head"), (90, 150, 210)
+"""The joints that hold the sword, and the samples from which on these do, and nothing does again."""
+
+SLIP = 2e-6
+"""Metres that holding itself may cost."""
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """The time that Blender believes it is."""
+    now = [50.0]
+    monkeypatch.setattr(receiving.time, "monotonic", lambda: now[0])
+    return now
+
+
+@pytest.fixture
+def live(extension):
+    extension.scene.render.fps = 30
+    extension.scene.frame_set(FIRST)
+    extension.scene.rigid_motion_live.mode = "lerp_slerp"
+    return extension.scene.rigid_motion_live
+
+
+def hand_at(row: int) -> str | None:
+    return (None, *HANDS, None)[int(np.searchsorted(TAKES, row, side="right"))]
+
+
+def swords() -> Poses:
+    """Where the sword is (n,): on a table, in the hand, at the head, and where that let go of it."""
+    there, poses = in_world(dance(TIMES)), []
+    for row in range(len(TIMES)):
+        if (hand := hand_at(row)) is not None:
+            pose = placed(there[JOINTS.index(hand), row], GRIP)
+        elif row < TAKES[0]:
+            pose = Poses([1.0, 0.0, 0.5], [1.0, 0.0, 0.0, 0.0])
+        poses.append(pose)
+    return Poses([one.positions for one in poses], [one.quaternions for one in poses])
+
+
+def perform(sent, clock, *, holds: bool = True, loss: float = 0.0, on_row=lambda row: None) -> None:
+    """Send a dance with a sword, of which a part is lost, and record it from one sample on."""
+    there, poses, rng = swords(), dance(TIMES), np.random.default_rng(3)
+    sender = Sender([Body.rigid("sword", radius=RADIUS), BODY], TOLERANCE, DELAY, rate=60.0)
+    for row, moment in enumerate(TIMES.tolist()):
+        if holds:
+            sender.hold("sword", hand_at(row) and "dancer", hand_at(row))
+        clock[0] += 1.0 / 60.0
+        datagrams = sender.add(moment, {"sword": there[row : row + 1], "dancer": poses[:, row]})
+        arriving = [datagram for datagram in datagrams if rng.random() >= loss]
+        sent.send((sender.describe() if row < 2 else []) + arriving, clock[0])
+        if row == BEGINS:
+            assert bpy.ops.rigid_motion.live_record() == {"FINISHED"}
+        on_row(row)
+    assert bpy.ops.rigid_motion.live_finish("EXEC_DEFAULT", True) == {"FINISHED"}
+
+
+def frame_of(row: float) -> float:
+    return FIRST + (row / 60.0 - TIMES[BEGINS] + DELAY) * 30
+
+
+def seen_sword() -> Poses:
+    sword = bpy.data.objects["sword"].evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return unscaled(np.array(sword.matrix_world, dtype=np.float64))
+
+
+def play(rows: np.ndarray) -> tuple[Poses, list[Poses]]:
+    """Where the sword is at samples (n,) of the recording, and where it is in each of the hands."""
+    swords, grips, rig = [], [[], []], next(obj for obj in bpy.context.scene.objects if obj.type == "ARMATURE")
+    for frame in map(frame_of, rows.tolist()):
+        bpy.context.scene.frame_set(int(np.floor(frame)), subframe=frame % 1.0)
+        swords.append(seen_sword())
+        for hand, poses in zip(HANDS, grips, strict=True):
+            poses.append(placed(inverse(seen_hand((rig.name, hand))), swords[-1]))
+    return listed(swords), [*map(listed, grips)]
+
+
+def listed(poses: list[Poses]) -> Poses:
+    return Poses([pose.positions for pose in poses], [pose.quaternions for pose in poses])
+
+
+def off_by(poses: Poses, others: Poses) -> float:
+    """Metres by which any point of the ball of the sword is off at most; others (n,) or ()."""
+    return float(shell_error(poses, listed([others] * len(poses)) if others.shape == () else others, RADIUS).max())
+
+
+def grip_in(rig: bpy.types.Object, joint: str) -> Poses:
+    """The grip as the bone of a rig has it whose joints are turned by nothing at rest."""
+    bone = rig.data.bones[joint]
+    head = Poses(np.array(bone.head_local), [1.0, 0.0, 0.0, 0.0])
+    return placed(placed(inverse(unscaled(np.array(bone.matrix_local, dtype=np.float64))), head), GRIP)
+
+
+def influences(obj: bpy.types.Object) -> dict[str, list[tuple[float, float]]]:
+    curves = [one for one in channelbag_of(obj).fcurves if one.data_path.endswith(".influence")]
+    return {one.data_path.split('"')[1]: [tuple(key.co) for key in one.keyframe_points] for one in curves}
+
+
+@pytest.mark.parametrize("mode", ["BLENDER", "lerp_slerp", "motor_spline"])
+def test_what_was_held_has_keys_in_the_hands_and_stays_in_them_when_they_are_edited(live, sent, clock, mode):
+    live.armature, live.mode = (rig := new_rig()), mode
+    perform(sent, clock)
+    receiving.stop()
+    sword, takes = bpy.data.objects["sword"], [frame_of(row) for row in TAKES]
+    assert [(item.target, item.subtarget) for item in sword.constraints] == [(rig, hand) for hand in HANDS]
+    assert influences(sword) == {
+        "Held In LeftHand": [(FIRST, 0.0), (takes[0], 1.0), (takes[1], 0.0)],
+        "Held In Head": [(FIRST, 0.0), (takes[1], 1.0), (takes[2], 0.0)],
+    }
+    assert modes_of(transform_of(sword), takes) == [mode] * 3
+    held = [np.arange(first, last, 0.5) for first, last in itertools.pairwise(TAKES)]
+    before = [play(rows)[1][number] for number, rows in enumerate(held)]
+    for poses, hand in zip(before, HANDS, strict=True):
+        assert off_by(poses, grip_in(rig, hand)) < 1.02 * TOLERANCE
+    loose = np.array([*range(40, 90), *range(211, 250)])
+    assert off_by(play(loose)[0], swords()[loose]) < 1.02 * TOLERANCE
+    moved = play(np.array([100, 160]))[0]
+    for hand in ("LeftUpperArm", "Neck"):
+        rig.pose.bones[hand].rotation_mode = "XYZ"
+        for fcurve in channelbag_of(rig).fcurves:
+            fcurve.mute |= f'"{hand}"' in fcurve.data_path
+        rig.pose.bones[hand].rotation_euler = (0.3, 0.5, -0.8)
+    for number, rows in enumerate(held):
+        assert off_by(play(rows)[1][number], before[number]) < SLIP
+    assert np.linalg.norm(play(np.array([100, 160]))[0].positions - moved.positions, axis=1).min() > 0.05
+
+
+def test_it_does_not_slip_whatever_is_lost(live, sent, clock):
+    live.armature = rig = new_rig()
+    perform(sent, clock, loss=0.1)
+    receiving.stop()
+    for number, (first, last) in enumerate(itertools.pairwise(TAKES)):
+        grips = play(np.arange(first, last, 0.5))[1][number]
+        assert off_by(grips, grip_in(rig, HANDS[number])) < 1.02 * TOLERANCE
+
+
+def test_a_steady_grip_is_one_key_and_keys_are_apart_for_blender(live, sent, clock):
+    live.armature = new_rig()
+    perform(sent, clock)
+    curve = channelbag_of(bpy.data.objects["sword"]).fcurves[0]
+    frames = np.array([key.co.x for key in curve.keyframe_points])
+    assert frames[:2].tolist() == [FIRST, frame_of(TAKES[0])]
+    assert np.diff(frames).min() > 0.01
+
+
+@pytest.mark.parametrize("larger", [1.0, 1.3])
+def test_it_is_shown_in_the_hand_of_a_rig_of_another_size_and_place_and_is_recorded_there(live, sent, clock, larger):
+    live.armature, slips = (rig := new_rig(larger=larger)), []
+    rig.location.x = 2.0
+
+    def look(row: int) -> None:
+        if TAKES[0] + 12 <= row < TAKES[1]:
+            bpy.context.view_layer.update()
+            grip = placed(inverse(seen_hand(("Rig", "LeftHand"))), seen_sword())
+            slips.append(off_by(listed([grip]), grip_in(rig, "LeftHand")))
+
+    perform(sent, clock, on_row=look)
+    assert len(slips) > 40
+    assert max(slips) < 1.02 * TOLERANCE
+    receiving.stop()
+    rows = np.arange(*TAKES[:2], 0.5)
+    assert off_by(play(rows)[1][0], grip_in(rig, "LeftHand")) < 1.02 * TOLERANCE
+
+
+def test_what_comes_is_shown_where_it_is_on_frames_on_which_keys_hold_it(live, sent, clock):
+    live.armature = new_rig()
+    perform(sent, clock)
+    bpy.context.scene.frame_set(round(frame_of(TAKES[0] + 20)))
+    there, poses = swords(), dance(TIMES)
+    sender = Sender([Body.rigid("sword", radius=RADIUS), BODY], TOLERANCE, DELAY, rate=60.0)
+    for row, moment in enumerate(TIMES[:60].tolist()):
+        datagrams = sender.add(moment + 900.0, {"sword": there[row : row + 1], "dancer": poses[:, row]})
+        sent.send((sender.describe() if row < 2 else []) + datagrams, clock[0] + row / 60.0)
+    bpy.context.view_layer.update()
+    assert off_by(listed([seen_sword()]), there[0]) < 1.02 * TOLERANCE
+
+
+def test_a_recording_of_what_is_not_held_behind_one_that_was_is_in_the_world(live, sent, clock):
+    live.armature = new_rig()
+    perform(sent, clock)
+    perform(sent, clock, holds=False)
+    receiving.stop()
+    assert {value for keys in influences(bpy.data.objects["sword"]).values() for _, value in keys} == {0.0}
+    rows = np.arange(40, 250)
+    assert off_by(play(rows)[0], swords()[rows]) < 1.02 * TOLERANCE
+
+
+def test_a_recording_is_one_step_of_undo(live, sent, clock):
+    live.armature = new_rig()
+    bpy.ops.ed.undo_push(message="Rig")
+    perform(sent, clock)
+    assert len(bpy.data.objects["sword"].constraints) == 2
+    bpy.ops.ed.undo()
+    assert not any(obj.constraints or obj.animation_data for obj in bpy.data.objects)
+
+
+def test_what_held_it_and_is_gone_leaves_it_in_the_world(live, sent, clock):
+    def remove(row: int) -> None:
+        if row == TAKES[1] + 20:
+            bpy.data.objects.remove(bpy.data.objects["dancer"])
+
+    perform(sent, clock, on_row=remove)
+    receiving.stop()
+    assert not bpy.data.objects["sword"].constraints
+    rows = np.arange(40, TAKES[1])
+    sword = bpy.data.objects["sword"]
+    for row in rows.tolist():
+        frame = frame_of(row)
+        bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
+        assert off_by(listed([seen_sword()]), swords()[row]) < 2.0 * TOLERANCE, (row, sword.location)
+
+
+def test_what_follows_the_sword_cannot_hold_it_and_that_is_said(live, sent, clock):
+    live.armature = rig = new_rig()
+
+    def tie(row: int) -> None:
+        if row == TAKES[1] + 20:
+            rig.pose.bones["Hips"].constraints.new("COPY_LOCATION").target = bpy.data.objects["sword"]
+
+    perform(sent, clock, on_row=tie)
+    assert receiving.listening().complaint == (
+        "sword cannot be held in LeftHand, which follows it: LeftHand would wait for itself"
+    )
+    assert not bpy.data.objects["sword"].constraints
+    receiving.stop()
+    rows = np.arange(40, 250)
+    assert off_by(play(rows)[0], swords()[rows]) < 2.0 * TOLERANCE
+
+
+def test_bodies_hold_one_another_and_skeletons_that_are_held_have_keys_in_the_world(live, sent, clock):
+    glove, sword, poses = Body.rigid("glove"), Body.rigid("sword", radius=RADIUS), dance(TIMES)
+    there = in_world(poses)[JOINTS.index("LeftHand")]
+    sender = Sender([sword, BODY, glove], TOLERANCE, DELAY, rate=60.0)
+    sender.hold("sword", "glove")
+    sender.hold("dancer", "glove")
+    for row, moment in enumerate(TIMES[:120].tolist()):
+        clock[0] += 1.0 / 60.0
+        hand = there[row : row + 1]
+        datagrams = sender.add(moment, {"sword": placed(hand, GRIP), "dancer": poses[:, row], "glove": hand})
+        sent.send((sender.describe() if row < 2 else []) + datagrams, clock[0])
+        if row == BEGINS:
+            assert bpy.ops.rigid_motion.live_record() == {"FINISHED"}
+    assert bpy.ops.rigid_motion.live_finish() == {"FINISHED"}
+    receiving.stop()
+    obj = bpy.data.objects["sword"]
+    assert [(item.target.name, item.subtarget) for item in obj.constraints] == [("glove", "")]
+    assert hold_facts(obj).now.name == "glove"
+    assert not any(bone.constraints for bone in bpy.data.objects["dancer"].pose.bones)
+    for frame in (20.0, 30.3):
+        bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
+        moment = TIMES[BEGINS] - DELAY + (frame - FIRST) / 30
+        glove_seen = unscaled(np.array(bpy.data.objects["glove"].matrix_world, dtype=np.float64))
+        assert off_by(listed([placed(inverse(glove_seen), seen_sword())]), GRIP) < 1.02 * TOLERANCE
+        head = in_world(dance(np.array([moment])))[JOINTS.index("Head"), 0].positions
+        assert np.linalg.norm(seen_hand(("dancer", "Head")).positions - head) < 2.0 * TOLERANCE
+
+
+@pytest.mark.slow
+def test_a_rig_of_rigify_holds_by_what_follows_its_hands_by_ik_as_well(live, sent, clock):
+    live.armature = rig = human()
+    perform(sent, clock)
+    receiving.stop()
+    assert [item.subtarget for item in bpy.data.objects["sword"].constraints][:1] == ["ORG-hand.L"]
+    rows, grips = np.arange(*TAKES[:2], 7), []
+    for ik in (0.0, 1.0):
+        for bone in rig.pose.bones:
+            if "IK_FK" in bone:
+                bone["IK_FK"] = 1.0 - ik
+        poses = []
+        for frame in map(frame_of, rows.tolist()):
+            bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
+            poses.append(placed(inverse(seen_hand((rig.name, "DEF-hand.L"))), seen_sword()))
+        grips.append(listed(poses))
+    assert off_by(grips[1], grips[0]) < TOLERANCE
