@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import bpy
 import numpy as np
@@ -98,6 +98,10 @@ def is_timed_together(carrier: Carrier, frame: float) -> bool:
 class Editing(Machine):
     """An animator at work on carriers of keys. What they are, machines say that are derived from it."""
 
+    def _expected(self, name: Name, frames: Sequence[float]) -> np.ndarray:
+        """What its channels have to make of it on frames, (m, 4, 4)."""
+        return expected_bases(self._found(name), frames, self.owns.get(name))
+
     def _curve(self, obj: Carrier, share: float) -> bpy.types.FCurve | None:
         curves = [curve for (path, _), curve in curves_of(obj).items() if path in WIDTHS and curve.keyframe_points]
         return curves[int(share * len(curves))] if curves else None
@@ -176,7 +180,7 @@ class Editing(Machine):
         paths = transform_paths(obj) if what is None else [transform_paths(obj)[part] for part in what]
         index = -1 if what is None or index is None else index
         goes_by = self._frames_to_go_by(name) if what is None and not posed and not self._is_posed(obj) else np.empty(0)
-        before = expected_bases(obj, goes_by, self.owns.get(name))
+        before = self._expected(name, goes_by)
         if posed:
             self._pose(obj, seed)
         alone = self._sharing(name) == {name} or not posed
@@ -200,7 +204,7 @@ class Editing(Machine):
             bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
             self._assert_in_place(seen)
         if len(before):
-            error = np.abs(expected_bases(obj, goes_by, self.owns.get(name)) - before).max(axis=(1, 2))
+            error = np.abs(self._expected(name, goes_by) - before).max(axis=(1, 2))
             worst = goes_by[error.argmax()]
             assert error.max() < 1e-3 * max(1.0, np.abs(before).max()), f"{name} moves by {error.max()} on {worst}"
 
@@ -346,7 +350,9 @@ class Editing(Machine):
     def ease(self, who, which, interpolation, easing, one_channel, shape):
         def change(_: bpy.types.FCurve, point: bpy.types.Keyframe) -> None:
             point.interpolation, point.easing = interpolation, easing
-            point.back, point.amplitude, point.period = shape
+            if not self._is_held(self._named(who)):
+                # Keys that say what they are held in do so by settings that only some eases have.
+                point.back, point.amplitude, point.period = shape
 
         self._edit_keys(self._named(who), which, change, one_channel=one_channel)
 
@@ -369,7 +375,7 @@ class Editing(Machine):
     @rule(who=shares, which=shares)
     def mute_a_channel(self, who, which):
         name = self._named(who)
-        if self._sharing(name) == {name}:
+        if self._sharing(name) == {name} and not self._is_held(name):
 
             def change(fcurve: bpy.types.FCurve) -> None:
                 fcurve.mute = not fcurve.mute

@@ -151,7 +151,8 @@ def _with_tangents(
         if 0 < key < len(durations):
             part = _share_of(*durations[key - 1 : key + 1])
             rate = part * arriving[key - 1] / durations[key - 1] + (1.0 - part) * leaving[key] / durations[key]
-            rate = rate * (arriving[key - 1].any() and leaving[key].any())
+            # What differs by rounding alone is at rest.
+            rate = rate * (min(np.abs(arriving[key - 1]).max(), np.abs(leaving[key]).max()) > 1e-6)
         bends.append(tangent * durations[segment] * rate - own)
     first = np.where(u < 0.0, u, np.where(u > 1.0, 0.0, u * (1.0 - u) ** 2))
     second = np.where(u < 0.0, 0.0, np.where(u > 1.0, u - 1.0, -(u**2) * (1.0 - u)))

@@ -103,7 +103,7 @@ def spin_and_end(
     spin, sense, change = Spin(), 0, 0.0
     if angles is not None:
         change, about, stands = _axis_of_angles(angles, order, quaternions, own)
-        if (part and change) or abs(change) > np.pi - 1e-4:
+        if (part and abs(change) > 1e-4) or abs(change) > np.pi - 1e-4:
             spin, sense = Spin(0, tuple(about), stands), 1 if change > 0.0 else -1
     if sense:
         end = _without(spin._replace(turns=sense * part), second)

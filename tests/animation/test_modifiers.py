@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import problem_of, refresh, repeat, set_mode
-from rigid_motion.animation.actions.modifiers import set_settings
+from rigid_motion.animation.actions.modifiers import is_term, set_settings
 from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, rotation_path, snapshot
 from tests.animation.oracle import shown_worlds, world_now
@@ -83,6 +83,61 @@ def test_a_modifier_acts_on_what_is_seen(live_file, what, order, when):
         for modifier in list(fcurve.modifiers):
             fcurve.modifiers.remove(modifier)
     assert snapshot(obj) == keys
+
+
+@pytest.mark.parametrize("step", [3.0, 40.0])
+def test_stepped_looks_at_frames_that_are_not_seen(live_file, step):
+    """Before the first frame of a scene, and from its last one on; and longer steps than ours to begin with."""
+    obj, dense = (key(new_object(name), seed=4) for name in ("Tool", "Dense"))
+    live_file.scene.frame_start, live_file.scene.frame_end = 1, 40
+    for fcurve in [*curves_of(obj).values(), *curves_of(dense).values()]:
+        fcurve.extrapolation = "LINEAR"
+    set_mode([obj, dense], "dq_sclerp")
+    live_file.scene.frame_start, live_file.scene.frame_end = -100, 141
+    bpy.context.view_layer.update()
+    (long,) = shown_worlds([dense], np.arange(-90.0, 131.0))
+    live_file.scene.frame_start, live_file.scene.frame_end = 1, 40
+    bpy.context.view_layer.update()
+    for offset in (0.0, 60.0):
+        added = [fcurve.modifiers.new("STEPPED") for fcurve in curves_of(obj).values()]
+        for modifier in added:
+            modifier.frame_step, modifier.frame_offset = step, offset
+        bpy.context.view_layer.update()
+        held = offset + np.trunc((np.arange(1.0, 41.0) - offset) / step) * step
+        (shown,) = shown_worlds([obj], np.arange(1.0, 41.0))
+        assert np.abs(shown - long[(held + 90.0).astype(int)]).max() < 1e-5
+        for fcurve, modifier in zip(curves_of(obj).values(), added, strict=True):
+            fcurve.modifiers.remove(modifier)
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings"), [("STEPPED", {"frame_offset": 1.0}), ("NOISE", {}), ("FNGENERATOR", {"use_additive": True})]
+)
+def test_what_adds_is_not_made_anew_but_goes_behind_once_it_replaces(live_file, kind, settings):
+    """Scripts that added it go on with it."""
+    obj, dense = (key(new_object(name), seed=4, scale="even") for name in ("Tool", "Dense"))
+    for fcurve in [*curves_of(obj).values(), *curves_of(dense).values()]:
+        fcurve.extrapolation = "LINEAR"
+    live_file.scene.frame_end = 40
+    set_mode([obj, dense], "dq_sclerp")
+    key_densely(dense)
+    for moved in (obj, dense):
+        modify(some_of(moved), (kind, settings))
+    kept = [fcurve.modifiers[-1] for fcurve in some_of(obj)]
+    live_file.scene.frame_end = 400
+    bpy.context.view_layer.update()
+    assert all(is_term(fcurve.modifiers[-1]) for fcurve in some_of(obj))
+    assert all(modifier == fcurve.modifiers[modifier.name] for fcurve, modifier in zip(some_of(obj), kept, strict=True))
+    for moved in (obj, dense):
+        for fcurve in some_of(moved):
+            (modifier,) = (item for item in fcurve.modifiers if item.type == kind)
+            if kind == "NOISE":
+                modifier.blend_type = "MULTIPLY"
+            elif kind == "FNGENERATOR":
+                modifier.use_additive = False
+    bpy.context.view_layer.update()
+    shown, expected = shown_worlds([obj, dense], PLAYED)
+    assert np.abs(shown - expected).max() < 2e-5 * max(1.0, np.abs(expected).max())
 
 
 @pytest.mark.parametrize("paths", [("location",), ("location", "rotation_quaternion")], ids=len)

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import precondition, rule
 
 from rigid_motion import animation
+from tests.animation.bones.rigs import pose_mode, select_only
 from tests.animation.editing import ORDERS, Editing
+from tests.animation.holds.model import world_of
 from tests.animation.keyed import (
     WIDTHS,
     curve_of,
@@ -23,8 +25,7 @@ from tests.animation.keyed import (
     transform_paths,
 )
 from tests.animation.machine import LAST, frames_in, goes_on, seeds, shares, while_on
-from tests.animation.oracle import expected_bases
-from tests.animation.scenes import random_values
+from tests.animation.scenes import editor, random_values
 
 
 class WithTools(Editing):
@@ -41,7 +42,7 @@ class WithTools(Editing):
         obj, done = self._found(name), []
         keys, before = key_frames(obj), snapshot(obj)
         others = keys[np.abs(keys - frame) >= 0.01]
-        fits = len(others) > 1 and others[0] < frame < others[-1]
+        fits = len(others) > 1 and others[0] < frame < others[-1] and not self._is_passed_on(name)
         ends = others[np.searchsorted(others, frame) - 1 :][:2] if fits else None
 
         def change() -> None:
@@ -67,7 +68,7 @@ class WithTools(Editing):
         is_whole = not any(curve.mute for curve in curves_of(obj).values())
         is_whole = is_whole and all(of_one.issuperset(ends) for of_one in frames)
         if kind == "BREAKDOWN" and factor in (0.0, 1.0) and is_whole:
-            now, then = expected_bases(obj, [frame, ends[int(factor)]], self.owns.get(name))
+            now, then = self._expected(name, [frame, ends[int(factor)]])
             assert np.abs(now - then).max() < 2e-5 * max(1.0, np.abs(then).max()), f"{name}: {now}\nis not\n{then}"
 
     @while_on(
@@ -80,6 +81,8 @@ class WithTools(Editing):
     )
     def look_at_it_with_modifiers_and_take_them_off(self, who, step, offset, other, blend, seed):
         name = self._named(who)
+        if any(map(self._is_held, self._carrying(name))):
+            return
 
         def change() -> None:
             obj, added = self._found(name), []
@@ -109,7 +112,7 @@ class WithTools(Editing):
         name = self._named(who)
         curves = moving_curves(self._found(name))
         ends = {(curve.keyframe_points[0].co[0], curve.keyframe_points[-1].co[0]) for curve in curves}
-        if len(ends) != 1 or self._sharing(name) != {name}:
+        if len(ends) != 1 or self._sharing(name) != {name} or self._is_held(name):
             return
         ((first, last),) = ends
         if last <= first:
@@ -167,8 +170,11 @@ class WithTools(Editing):
     def bake(self, which, step, interpolation):
         names = [name for name in self._several(which) if self._sharing(name) == {name}]
         live, keyed = [name for name in names if self._is_live(name)], self._keyed()
-        every = np.arange(-2.0, LAST + 6.0, 0.25) + self.shift
-        before = {name: expected_bases(self._found(name), every, self.owns.get(name)) for name in live}
+        frames = np.concatenate(
+            [(self.shift - 2.0, self.shift + LAST), *(key_frames(self._found(name)) for name in live)]
+        )
+        every = np.arange(np.floor(frames.min()), frames.max() + 6.0, 0.25)
+        before = {name: self._expected(name, every) for name in live}
         keys, baked = {name: key_frames(self._found(name)) for name in live}, []
         refused: list[animation.Refused] = []
 
@@ -186,7 +192,7 @@ class WithTools(Editing):
             is_step = (every >= np.ceil(begin)) & (every <= np.floor(end)) & ((every - begin) % step == 0.0)
             # What goes on is baked from elsewhere on.
             kept = np.isin(every, keys[name]) | (is_step & (len(live) == 1 or not goes_on(self._found(name))))
-            now, then = expected_bases(self._found(name), every[kept], self.owns.get(name)), before[name][kept]
+            now, then = self._expected(name, every[kept]), before[name][kept]
             error = np.abs(now - then).max(axis=(1, 2), initial=0.0) / max(1.0, np.abs(then).max(initial=0.0))
             assert error.max() < 2e-5, f"{name} is baked otherwise on {every[kept][error.argmax()]}"
         self.history[self.place] = self._remembered()
@@ -194,6 +200,51 @@ class WithTools(Editing):
     def _is_live(self, name: Hashable) -> bool:
         keys = key_frames(self._found(name))
         return any(mode_at(self._found(name), frame) != "BLENDER" for frame in keys[:-1])
+
+    @while_on(who=shares, how=st.sampled_from(("move", "turn", "snap")), seed=seeds)
+    def grab_it_and_key_it(self, who, how, seed):
+        """With Blender's own tools. Where it was put it stays."""
+        name, frame = self._named(who), bpy.context.scene.frame_current_final
+        if self._sharing(name) != {name} or any(curve.mute for curve in curves_of(self._found(name)).values()):
+            return
+        by, seen = np.random.default_rng(seed).normal(size=3), []
+        bpy.context.view_layer.update()
+        before = world_of(self._found(name))
+
+        def change() -> None:
+            carrier = self._found(name)
+            if carrier == carrier.id_data:
+                select_only(carrier)
+            else:
+                pose_mode(carrier.id_data, carrier.name)
+            with editor("VIEW_3D"):
+                if how == "move":
+                    bpy.ops.transform.translate(value=by)
+                elif how == "turn":
+                    bpy.ops.transform.rotate(value=by[0], orient_axis="Z", orient_type="GLOBAL")
+                elif self._snaps(name):
+                    bpy.context.scene.cursor.location = by
+                    bpy.ops.view3d.snap_selected_to_cursor(use_offset=False)
+            if carrier != carrier.id_data:
+                bpy.ops.object.mode_set(mode="OBJECT")
+            carrier = self._found(name)
+            for path in transform_paths(carrier)[:2]:
+                carrier.keyframe_insert(path, frame=frame)
+            bpy.context.view_layer.update()
+            seen.append(world_of(carrier))
+
+        self._edit(change, self._completes(frame))
+        if self._snaps(name):
+            there = {"move": before[:3, 3] + by, "turn": before[:3, 3], "snap": by}[how]
+            assert np.abs(seen[0][:3, 3] - there).max() < 1e-4 * max(1.0, np.abs(before).max(), np.abs(there).max())
+        bpy.context.scene.frame_set(int(frame // 1) + 3)
+        bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
+        error = np.abs(world_of(self._found(name)) - seen[0]).max()
+        assert error < 1e-5 * max(1.0, np.abs(seen[0]).max()), f"{name} went on by {error}"
+
+    def _snaps(self, name: Hashable) -> bool:
+        """Whether Blender's tools put it where they are to, now."""
+        return True
 
     @while_on(who=shares, order=st.sampled_from(ORDERS), rekeyed=st.booleans(), seed=seeds)
     def turn_in_another_way(self, who, order, rekeyed, seed):
@@ -252,7 +303,11 @@ class WithTools(Editing):
         bpy.context.scene.collection.objects.link(made)
         if copied:
             self._make_single_user(made)
-        self.names += [new] if made.pose is None else [(new, bone.name) for bone in made.pose.bones]
+        self.names += self._names_in(made)
+
+    def _names_in(self, obj: bpy.types.Object) -> list[Hashable]:
+        """The names of all that moves in an object."""
+        return [obj.name] if obj.pose is None else [(obj.name, bone.name) for bone in obj.pose.bones]
 
     def _make_single_user(self, obj: bpy.types.Object) -> None:
         action, slot = self._linked(obj)
@@ -283,13 +338,16 @@ class WithTools(Editing):
         if action is None or not self._is_free(obj):
             return
         bpy.context.view_layer.update()
-        seen = {name: self._basis(self._found(name))}
+        seen, own = {name: self._basis(self._found(name))}, self._found(name).matrix_basis.copy()
+        frame = bpy.context.scene.frame_current_final
         if cleared:
             obj.animation_data_clear()
         else:
             self._link(obj, None, None)
         self._assert_in_place(seen)
         bpy.context.scene.frame_set(int(there + self.shift))
+        assert self._found(name).matrix_basis == own
+        bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
         self._assert_in_place(seen)
         self._link(obj, action, slot)
         bpy.context.view_layer.update()

@@ -48,7 +48,7 @@ def test_what_is_active_holds_the_rest_where_it_is(stage):
     mug, left, _ = stage
     before = seen(mug)
     assert operators.hold_in() == {"FINISHED"}
-    assert hold_facts(mug).now.target == left
+    assert (hold_facts(mug).now.target, hold_facts(mug).until) == (left, None)
     assert seen(mug) == pytest.approx(before, abs=1e-5)
     grip = np.linalg.inv(seen(left)) @ seen(mug)
     at(31)
@@ -67,6 +67,7 @@ def test_from_hand_to_hand_let_go_and_the_frames_of_it(stage):
     assert operators.let_go(frames=3) == {"FINISHED"}
     assert (hold_facts(mug).now, hold_facts(mug).frames) == (None, 3)
     at(15)
+    assert hold_facts(mug).until == 21.0
     assert operators.pass_frames(frames=7) == {"FINISHED"}
     at(21)
     assert hold_facts(mug).frames == 7

@@ -20,7 +20,9 @@ from .actions.channels import channelbag_of, write_channel
 from .baking.bake import bake, bake_poses, bake_to_world, is_baked, unbake
 from .baking.fewer_keys import NeedsItsKeys
 from .baking.into_holds import HeldSegment, held_segments, reduce_into_holds
+from .baking.native_curves import NATIVE
 from .baking.reducing import (
+    FEWEST,
     Reduction,
     WholeRig,
     discard_dense_keys,
@@ -30,7 +32,7 @@ from .baking.reducing import (
     restore_keys,
 )
 from .edits.breakdowns import Breakdowns, breakdown
-from .edits.holding import HoldFacts, hold_facts, hold_in, key_seen, match_grip, pass_frames
+from .edits.holding import HoldFacts, hold_facts, hold_in, hold_keys, match_grip, pass_frames
 from .edits.mode_keys import copy_modes, repeat, set_mode, set_turns
 from .evaluation.components import MODE_IDS
 from .following import follower
@@ -41,7 +43,9 @@ from .transforms import Refused
 from .transforms.sizes import radius_of
 
 __all__ = [
+    "FEWEST",
     "MODE_IDS",
+    "NATIVE",
     "Breakdowns",
     "HeldSegment",
     "HoldFacts",
@@ -59,11 +63,11 @@ __all__ = [
     "held_segments",
     "hold_facts",
     "hold_in",
+    "hold_keys",
     "is_baked",
     "is_enabled",
     "is_reduced",
     "key_frames",
-    "key_seen",
     "match_grip",
     "modes_of",
     "pass_frames",

@@ -14,8 +14,8 @@ from ..animation import HoldFacts, hold_facts, reduction_of
 from ..animation.actions.channels import key_points
 from ..animation.actions.slots import active_fcurves
 from ..animation.evaluation.components import SCALE
-from ..animation.holds.dependencies import follows
-from ..animation.holds.holders import Holder, node_of
+from ..animation.holds.dependencies import follows, node_of
+from ..animation.holds.holders import Holder
 from ..animation.transforms import OWN_WORDS, Transform, prefix_of
 from .holding import RIGID_MOTION_MT_holders, has_been_held, icon_of, name_of, shown_prop
 from .wording import degrees, draw_text, hold_lines, labelled, length

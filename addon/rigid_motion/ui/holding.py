@@ -152,10 +152,14 @@ class _Hold(OnTargets):
         frames = self.frames if self.properties.is_property_set("frames") else None
         target, bone = self.holder(context)
         done = _each(targets, refused, lambda item: animation.hold_in(item, target, bone, frames=frames))
-        if frames is None and done:
+        facts = facts_or_none(next(iter(done), None))
+        if frames is None and facts is not None:
             # So the redo panel has what was chosen.
-            self.frames = hold_facts(done[0]).frames
-        return rpt_(self.summary).format(holder=title_of(target, bone), frame=context.scene.frame_current_final)
+            self.frames = facts.frames
+        text = rpt_(self.summary).format(holder=title_of(target, bone), frame=context.scene.frame_current_final)
+        if facts is None or facts.until is None:
+            return text
+        return rpt_("{done}, up to its key on frame {until:g}").format(done=text, until=facts.until)
 
 
 class RIGID_MOTION_OT_hold_in(_Hold, bpy.types.Operator):

@@ -11,11 +11,11 @@ from hypothesis.stateful import initialize, precondition, rule
 
 from rigid_motion import animation
 from tests.animation.bones.rigs import ORDERS, Rest, new_rig, with_edit_bones
+from tests.animation.holds.hold_steps import WithHolds
 from tests.animation.keyed import MODE_IDS, transform_paths
 from tests.animation.machine import LAST, SETTINGS, seeds, shares, while_on
 from tests.animation.oracle import assert_there, expected_bases
 from tests.animation.scenes import key, random_values, write
-from tests.animation.tool_steps import WithTools
 
 BONES = (
     Rest("Body", (0.1, -0.2, 0.9), (0.15, -0.1, 1.4), roll=0.4),
@@ -28,7 +28,7 @@ Name = tuple[str, str]
 """Of a rig, and of a bone of it."""
 
 
-class EditingBones(WithTools):
+class EditingBones(WithHolds):
     """An animator at work on the bones of rigs, by the names of both, and on armatures."""
 
     @initialize(
@@ -75,7 +75,14 @@ class EditingBones(WithTools):
 
     def _assert_shown(self, names: Sequence[Name], frames: np.ndarray) -> None:
         for name, bases in self._bases(names, frames).items():
+            if self._is_held(name):
+                self._assert_held(name, frames)
+                continue
             assert_there(self._found(name), frames, bases, expected_bases(self._found(name), frames))
+
+    def _may_be_held(self, name: Name) -> bool:
+        """Not what moves along other axes than it turns about: see `test_promises`."""
+        return self._found(name).bone.use_local_location
 
     # Bones and rigs that come and go
 
@@ -122,6 +129,8 @@ class EditingBones(WithTools):
         before = set(bpy.data.objects[rig].pose.bones.keys())
         if not self._is_free(bpy.data.objects[rig]) or len(before) < 2:
             return
+        if deleted and any(map(self._is_held, self.names)):
+            return
 
         def act(edit_bones: bpy.types.ArmatureEditBones) -> None:
             if deleted:
@@ -144,7 +153,7 @@ class EditingBones(WithTools):
     def move_along_other_axes(self, who):
         rig, bone = self._named(who)
         rest = bpy.data.objects[rig].data.bones[bone]
-        if len(self._users(bpy.data.objects[rig])) == 1:
+        if len(self._users(bpy.data.objects[rig])) == 1 and not self._is_held((rig, bone)):
             self._edit(lambda: setattr(rest, "use_local_location", not rest.use_local_location))
 
     @while_on(who=shares)

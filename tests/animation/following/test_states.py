@@ -12,14 +12,14 @@ from mathutils import Euler, Matrix
 
 from rigid_motion import animation
 from tests.animation.editing import ORDERS
+from tests.animation.holds.hold_steps import WithHolds
 from tests.animation.keyed import MODE_IDS, WIDTHS, curves_of, key_frames, snapshot, transform_paths
 from tests.animation.machine import LAST, SETTINGS, goes_on, seeds, shares, while_on
 from tests.animation.oracle import Own, assert_shown, expected_bases
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, push_down, tweak
-from tests.animation.tool_steps import WithTools
 
 
-class EditingObjects(WithTools):
+class EditingObjects(WithHolds):
     """An animator at work on a few objects, by their names."""
 
     @initialize(
@@ -62,7 +62,11 @@ class EditingObjects(WithTools):
         return {name: own_deltas(self._found(name)) for name in self.names}
 
     def _assert_shown(self, names: Sequence[str], frames: np.ndarray) -> None:
-        assert_shown(list(map(self._found, names)), frames, self.owns)
+        for name in names:
+            if any(map(self._is_held, self._carrying(name))):
+                self._assert_held(name, frames)
+            else:
+                assert_shown([self._found(name)], frames, self.owns)
 
     def _carrying(self, name: str) -> list[str]:
         parent = self._found(name).parent
@@ -77,7 +81,7 @@ class EditingObjects(WithTools):
             self._found(name).delta_location = random.normal(size=3)
             self._found(name).delta_scale = np.full(3, np.exp(0.3 * random.normal()))
 
-        if self._sharing(name) == {name}:
+        if self._sharing(name) == {name} and not self._is_held(name):
             self._edit(change)
 
     @while_on(who=shares, count=st.integers(2, 8))
@@ -97,7 +101,7 @@ class EditingObjects(WithTools):
     def set_a_matrix_and_key_it_in_one_go(self, who, seed):
         obj, scene = self._found(self._named(who)), bpy.context.scene
         frame, name = scene.frame_current_final, obj.name
-        if obj.parent is not None or obj.matrix_world.is_negative:
+        if obj.parent is not None or obj.matrix_world.is_negative or self._is_held(name):
             return
         # What is keyed in a muted channel is not seen.
         if any(fcurve.mute for (path, _), fcurve in curves_of(obj).items() if path in WIDTHS):
@@ -137,6 +141,8 @@ class EditingObjects(WithTools):
         objects = list(map(self._found, names))
         if len({obj.rotation_mode for obj in objects}) > 1 or not all(map(self._is_free, objects)):
             return
+        if any(map(self._is_held, names)):
+            return
 
         def swap() -> None:
             objects = list(map(self._found, names))
@@ -157,6 +163,8 @@ class EditingObjects(WithTools):
         obj = self._found(self._named(who))
         name, (action, slot) = obj.name, self._linked(obj)
         if action is None or not self._is_free(obj) or not len(key_frames(obj)) or goes_on(obj):
+            return
+        if self._is_held(name):
             return
         strip = push_down(obj, start)
         strip.scale = scale

@@ -54,6 +54,17 @@ def assert_held(props: Iterable[Carrier], frames: Sequence[float], tolerance: fl
         assert error[worst] < tolerances[worst], f"{prop!r} is off by {error[worst]:.3g} on frame {frames[worst]}"
 
 
+def poses_in_holders(prop: Carrier, frames: Sequence[float]) -> np.ndarray:
+    """Where its channels have to put a prop in what holds it on frames, (m, 4, 4)."""
+    source, frames = read(active_binding(transform_of(prop))), np.asarray(frames, float)
+    result = np.empty((len(frames), 4, 4))
+    for run in source.runs:
+        shown_by = np.array([source.run_at(frame) is run for frame in frames], bool)
+        if shown_by.any():
+            result[shown_by] = _poses(prop, run if source.switches else source, frames[shown_by])
+    return result
+
+
 def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) -> tuple[np.ndarray, np.ndarray]:
     """Where a prop has to be on frames, (m, 4, 4), and to which share of its size."""
     transform = transform_of(prop)
@@ -116,7 +127,10 @@ def _poses(prop: Carrier, run: Run | Source, frames: np.ndarray) -> np.ndarray:
 def _spaces(prop: Carrier, frames: np.ndarray) -> np.ndarray:
     """The spaces of the channels of what nothing holds, (m, 4, 4)."""
     if prop != prop.id_data:
-        return shown([prop.id_data], frames)[0] @ np.array(prop.bone.matrix_local)
+        rest = np.array(prop.bone.matrix_local)
+        if prop.parent is None:
+            return shown([prop.id_data], frames)[0] @ rest
+        return shown([prop.parent], frames)[0] @ np.linalg.inv(prop.parent.bone.matrix_local) @ rest
     if prop.parent is None:
         return np.tile(np.eye(4), (len(frames), 1, 1))
     return shown([prop.parent], frames)[0] @ np.array(prop.matrix_parent_inverse)

@@ -29,7 +29,7 @@ from tests.animation.holds.staging import (
     stage,
     update,
 )
-from tests.animation.keyed import Carrier, curves_of
+from tests.animation.keyed import Carrier, curves_of, snapshot
 from tests.animation.scenes import key, linked, new_object, push_down
 
 __all__ = ["stage"]
@@ -293,6 +293,53 @@ def test_two_cannot_hold_each_other(stage):
         animation.hold_in(prop, other)
 
 
+def hang(prop: bpy.types.Object, kind: str) -> None:
+    """On the first vertex, or at the beginning of the path, of something that moves."""
+    points = [(0.3, 0.1, 0.2), (1.0, 0.0, 0.0)]
+    if kind == "VERTEX":
+        data = bpy.data.meshes.new("Shape")
+        data.from_pydata(points, [], [])
+    else:
+        data = bpy.data.curves.new("Path", "CURVE")
+        data.use_path = True
+        for point, place in zip((spline := data.splines.new("BEZIER")).bezier_points, points[:1], strict=True):
+            point.co = place
+        spline.bezier_points.add(1)
+    prop.parent, prop.parent_type = key(new_object("Shape", data=data), seed=5), kind
+    update()
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "line"),
+    [
+        ("Tool", lambda prop: hang(prop, "VERTEX"), "Tool hangs on vertices or the path"),
+        ("Tool", lambda prop: hang(prop, "OBJECT"), "Tool hangs on vertices or the path"),
+        ("Tool", lambda prop: setattr(prop, "delta_location", (1.0, 0.0, 0.0)), "Tool has delta transforms"),
+        (
+            "Rig/Grip",
+            lambda grip: with_edit_bones(
+                grip.id_data,
+                lambda bones: [
+                    setattr(bones["Grip"], *one) for one in (("parent", bones["Bone"]), ("use_connect", True))
+                ],
+            ),
+            "Grip is connected to its parent",
+        ),
+    ],
+)
+def test_where_no_constraint_can_place_it_nothing_is_keyed(stage, name, change, line):
+    stage(name, held=False)
+    change(found(name))
+    before = snapshot(found(name))
+    for act in (
+        lambda: animation.hold_in(found(name), found("Hand")),
+        lambda: animation.hold_in(found(name), None),
+    ):
+        with pytest.raises(animation.Refused, match=line):
+            act()
+    assert snapshot(found(name)) == before
+
+
 def test_keys_are_only_moved_while_blender_moves_keys(stage, monkeypatch):
     """It remembers where in memory they are."""
     prop = stage()
@@ -334,7 +381,7 @@ BLENDERS_OWN: dict[str, Callable[[Carrier, Matrix], object]] = {
 @pytest.mark.parametrize("own", BLENDERS_OWN)
 @pytest.mark.parametrize("by_hand", [False, True])
 def test_blender_puts_what_a_child_of_holds_elsewhere(stage, own, by_hand):
-    """Ours as any: should a Blender know better, the docstring of `key_seen` is to be changed."""
+    """Ours as any: should a Blender know better, the documentation is to be changed."""
     prop = stage(held=not by_hand)
     go_to(25.0)
     if by_hand:
@@ -350,18 +397,18 @@ def test_blender_puts_what_a_child_of_holds_elsewhere(stage, own, by_hand):
 
 @pytest.mark.parametrize("name", PROPS)
 @pytest.mark.parametrize("frame", [10.0, 25.0, 36.0, 55.5])
-def test_a_key_is_where_it_is_to_be_seen_in_whatever_holds_it(stage, name, frame):
-    stage(name)
+def test_a_pose_that_is_keyed_stays_where_it_is_seen_in_whatever_holds_it(stage, name, frame):
+    """By *Insert Keyframe*, for its channels are in the hand; not by visual keying."""
+    prop = stage(name)
     go_to(frame)
-    there = Matrix(world_of(found(name)))
-    animation.key_seen(found(name))
+    prop.matrix_basis = Matrix.LocRotScale((0.1, 0.2, -0.3), Quaternion((0.6, 0.0, 0.8, 0.0)), None)
+    update()
+    there = world_of(prop)
+    for path in ("location", "rotation_quaternion"):
+        prop.keyframe_insert(path, frame=frame)
     go_to(frame)
-    assert np.abs(world_of(found(name)) - np.array(there)).max() < 1e-5
-    there = Matrix.LocRotScale((1.0, 2.0, 3.0), Quaternion((0.6, 0.0, 0.8, 0.0)), there.to_scale())
-    animation.key_seen(found(name), there)
-    go_to(frame)
-    assert np.abs(world_of(found(name)) - np.array(there)).max() < 1e-5
-    assert_held([found(name)], FRAMES)
+    assert np.abs(world_of(prop) - there).max() < 1e-5
+    assert_held([prop], FRAMES)
 
 
 @pytest.mark.parametrize("name", PROPS)
@@ -372,10 +419,3 @@ def test_on_the_key_that_it_passes_to_it_is_seen_as_it_is_posed(stage, name):
     found(name).location.x += 1.0
     update()
     assert 0.9 < np.linalg.norm((world_of(found(name)) - before)[:3, 3]) < 1.1
-
-
-def test_where_it_passes_there_is_no_key_that_is_where_it_is_seen(stage):
-    prop = stage()
-    go_to(34.0)
-    with pytest.raises(animation.Refused, match="Tool passes from one holder to the next on frame 34"):
-        animation.key_seen(prop)

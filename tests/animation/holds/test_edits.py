@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
+from rigid_motion.animation.actions.marks import read_holds
 from tests.animation.holds.model import assert_held, shown, world_of
 from tests.animation.holds.staging import (
     FRAMES,
@@ -186,3 +187,23 @@ def test_what_is_hidden_holds_and_what_is_not_there_is_refused(stage, hide):
     else:
         with pytest.raises(animation.Refused, match="Tool is hidden or excluded"):
             animation.hold_in(prop, None)
+
+
+@pytest.mark.parametrize("name", PROPS)
+@pytest.mark.parametrize("seed", range(6))
+def test_a_setting_that_is_typed_takes_no_hold_and_no_mode_off(stage, name, seed):
+    """*Back*, *Amplitude* or *Period* of the active key, in the sidebar of the Graph Editor: one key of one channel."""
+    prop, random = stage(name), np.random.default_rng(seed)
+    frames = animation.key_frames(prop)
+    before, expected, modes = shown([prop], FRAMES)[0], spaces(prop), animation.modes_of(prop, frames)
+    for _ in range(30):
+        fcurve = moving(prop)[random.integers(len(moving(prop)))]
+        point = fcurve.keyframe_points[random.integers(len(fcurve.keyframe_points))]
+        typed = random.choice([0.0, 0.3, 1.0, 1.7, 2.0, 4.1, random.uniform(0.0, 9.0)])
+        setattr(point, random.choice(["back", "amplitude", "period"]), typed)
+        fcurve.update()
+        update()
+        assert spaces(prop) == expected
+        assert animation.modes_of(prop, frames) == modes
+    assert {bytes(read_holds(fcurve)) for fcurve in moving(prop)} == {bytes(read_holds(moving(prop)[0]))}
+    assert np.abs(shown([prop], FRAMES)[0] - before).max() < 1e-5

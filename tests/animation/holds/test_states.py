@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from pathlib import Path
 
 import bpy
 import numpy as np
 from hypothesis import strategies as st
-from hypothesis.stateful import initialize, invariant, precondition, rule
+from hypothesis.stateful import initialize, precondition, rule
 
 from rigid_motion import animation
-from tests.animation.bones.rigs import Rest, new_rig
-from tests.animation.editing import EASINGS, INTERPOLATIONS, ORDERS, Editing
-from tests.animation.holds.model import assert_held, world_of
-from tests.animation.keyed import HOLD_BITS, MODE_IDS, Carrier, curves_of, key_frames, snapshot
-from tests.animation.machine import LAST, SETTINGS, goes_on, seeds, shares, while_on
+from tests.animation.bones.rigs import Rest, new_rig, select_only
+from tests.animation.editing import ORDERS
+from tests.animation.holds.hold_steps import WithHolds
+from tests.animation.holds.model import world_of
+from tests.animation.keyed import MODE_IDS, Carrier, curves_of, key_frames
+from tests.animation.machine import LAST, SETTINGS, seeds, shares, while_on
 from tests.animation.scenes import key, new_object, push_down, tweak
 
 HANDS = "Hand", "Other", "Rig/Grip"
 
 
-class Holding(Editing):
+class Holding(WithHolds):
     """An animator at work on props: an object, one with a parent that moves, and a bone; and on what holds them."""
 
     @initialize(
@@ -55,92 +57,20 @@ class Holding(Editing):
         return world_of(carrier)
 
     def _sharing(self, name: str) -> set[str]:
-        return {name}
+        users, (_, *bone) = self._users(self._animated(name)), name.split("/")
+        return {other for other in self.names if self._animated(other) in users and other.split("/")[1:] == bone}
 
-    def _frames_to_go_by(self, name: str) -> np.ndarray:
-        return np.empty(0)
+    def _names_in(self, obj: bpy.types.Object) -> list[str]:
+        return [obj.name if obj.pose is None else f"{obj.name}/Bone"]
 
-    def _keyed(self) -> dict:
-        """Without what follows from the keys, and without what they are held in, which others may come to say."""
-        result = {}
-        for name in self.names:
-            channels = snapshot(self._found(name))
-            result[name] = {
-                channel: (
-                    *rest,
-                    tuple((*k[:8], int(np.float32(k[8]).view(np.int32)) & ~HOLD_BITS, *k[9:]) for k in keys),
-                )
-                for channel, (*rest, keys) in channels.items()
-                if not channel[0].startswith("constraints")
-            }
-        return result
+    holders = HANDS
 
     def _assert_shown(self, names: Sequence[str], frames: np.ndarray) -> None:
-        for prop in map(self._found, names):
-            keys = key_frames(prop)
-            # Blender's own curves go on outside of the keys.
-            inside = frames[(frames >= keys[0]) & (frames <= keys[-1])] if len(keys) and goes_on(prop) else frames
-            if len(keys) and len(inside):
-                assert_held([prop], inside)
+        for name in names:
+            self._assert_held(name, frames)
 
-    @precondition(lambda self: self.on and self.history)
-    @invariant()
-    def nothing_is_wrong_and_nothing_is_left(self):
-        for name in self.names:
-            assert animation.problem_of(self._found(name)) == ""
-
-    @rule(who=shares, which=shares, interpolation=st.sampled_from(INTERPOLATIONS), easing=st.sampled_from(EASINGS))
-    def ease(self, who, which, interpolation, easing):
-        """Without the settings that only some eases have, for keys are marked there."""
-
-        def change(_: bpy.types.FCurve, point: bpy.types.Keyframe) -> None:
-            point.interpolation, point.easing = interpolation, easing
-
-        self._edit_keys(self._named(who), which, change)
-
-    mute_a_channel = None
-    """What is muted of a rotation leaves the rest of it to Blender, which is none of holding."""
-
-    # Holding
-
-    @while_on(who=shares, by=st.none() | st.sampled_from(HANDS), over=st.none() | st.integers(0, 9))
-    def hold(self, who, by, over):
-        """It stays where it is seen."""
-        self._in_place(who, lambda prop: animation.hold_in(prop, by and self._found(by), frames=over))
-
-    def _in_place(self, who: float, act) -> None:
-        name = self._named(who)
-        prop = self._found(name)
-        if any(curve.mute for curve in curves_of(prop).values()):
-            return
-        seen = {name: world_of(prop)}
-
-        def change() -> None:
-            with suppress(animation.Refused):
-                act(self._found(name))
-
-        self._edit(change, lambda made, after: None)
-        self._assert_in_place(seen)
-        frame = bpy.context.scene.frame_current_final
-        bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
-        self._assert_in_place(seen)
-
-    @while_on(who=shares, over=st.integers(0, 9))
-    def choose_over_how_many_frames_it_passes(self, who, over):
-        self._quietly(who, lambda prop: animation.pass_frames(prop, over))
-
-    @while_on(who=shares)
-    def match_grips(self, who):
-        self._quietly(who, animation.match_grip)
-
-    def _quietly(self, who: float, act) -> None:
-        name = self._named(who)
-
-        def change() -> None:
-            with suppress(animation.Refused):
-                act(self._found(name))
-
-        self._edit(change, lambda made, after: None)
+    mute_a_channel = look_at_it_with_modifiers_and_take_them_off = let_it_repeat_for_a_while = None
+    """What is muted of a rotation leaves the rest of it to Blender, which is none of holding; nor is what repeats."""
 
     @while_on(who=shares, which=shares, what=st.sampled_from(("delete keys", "remove", "move", "value")))
     def tamper_with_influences(self, who, which, what):
@@ -188,11 +118,63 @@ class Holding(Editing):
 
         self._edit(change)
 
-    @while_on(which=st.sampled_from(("Parent", "Other")), parented=st.booleans())
-    def parent_the_tool(self, which, parented):
+    @while_on(which=st.sampled_from(("Parent", "Other")), parented=st.booleans(), by_command=st.booleans())
+    def parent_the_tool(self, which, parented, by_command):
+        """What holds it now goes on with that: it does not move."""
+        tool, is_held = self._found("Tool"), animation.hold_facts(self._found("Tool")).now is not None
+        if is_held and not self._is_passing("Tool"):
+            bpy.context.view_layer.update()
+            seen = world_of(tool)
+
         def change() -> None:
             tool, parent = bpy.data.objects["Tool"], bpy.data.objects[which]
-            tool.parent = parent if parented else None
+            if not by_command:
+                tool.parent = parent if parented else None
+                return
+            select_only(parent, tool)
+            if parented:
+                bpy.ops.object.parent_set(type="OBJECT", keep_transform=True)
+            else:
+                bpy.ops.object.parent_clear(type="CLEAR_KEEP_TRANSFORM")
+
+        self._edit(change)
+        if is_held and not self._is_passing("Tool"):
+            self._assert_seen_at("Tool", seen)
+
+    def _is_passing(self, name: str) -> bool:
+        frame = bpy.context.scene.frame_current_final
+        source = animation.queries.keyed.source_of(self._found(name))
+        return any(switch.begin < frame < switch.frame for switch in source.switches)
+
+    @while_on(which=st.sampled_from(HANDS))
+    def rename_a_hand_for_a_while(self, which):
+        """As long as that takes, all is held in it."""
+        found, before = self._found(which), which.split("/")[-1]
+
+        def change() -> None:
+            hand = found if found == found.id_data else found.id_data.data.bones[before]
+            hand.name = "Someone's"
+            bpy.context.view_layer.update()
+            self._assert_shown(self.names, self._frames_that_are_seen(self.names))
+            hand.name = before
+
+        self._edit(change)
+
+    @precondition(lambda self: self.on and len(self.names) < 5)
+    @rule(who=shares)
+    def append(self, who):
+        """From a copy of this file, with its holders, which are those that are here by no more than their names."""
+        name = self._named(who).split("/")[0]
+        library = str(Path(self.folder.name) / f"library {self.fresh}.blend")
+        self.fresh += 1
+        bpy.ops.wm.save_as_mainfile(filepath=library, compress=False, copy=True)
+
+        def change() -> None:
+            with bpy.data.libraries.load(library) as (_, wanted):
+                wanted.objects = [name]
+            (obj,) = wanted.objects
+            bpy.context.scene.collection.objects.link(obj)
+            self.names += self._names_in(obj)
 
         self._edit(change)
 
@@ -209,16 +191,8 @@ class Holding(Editing):
     @while_on(who=shares)
     def make_it_single_user(self, who):
         name = self._named(who)
-
-        def change() -> None:
-            obj = self._found(name).id_data
-            data = obj.animation_data
-            slot = data.action_slot
-            data.action = data.action.copy()
-            data.action_slot = data.action.slots[slot.identifier]
-
-        if self._found(name).id_data.animation_data.action is not None:
-            self._edit(change)
+        if self._animated(name) not in map(self._animated, self.before_bake):
+            self._edit(lambda: self._make_single_user(self._animated(name)))
 
     @precondition(lambda self: self.on and len(self.names) < 5)
     @rule(who=shares, with_hand=st.booleans())
@@ -242,7 +216,7 @@ class Holding(Editing):
         """In tweak mode as anywhere, and what is seen stays as it is when the strip goes."""
         prop = self._found(self._named(who))
         name, obj = self._named(who), prop.id_data
-        if obj.animation_data.action is None or not len(key_frames(prop)):
+        if obj.animation_data.action is None or not len(key_frames(prop)) or not self._is_free(obj):
             return
         action, slot = obj.animation_data.action, obj.animation_data.action_slot
         strip = push_down(obj, start)

@@ -216,10 +216,10 @@ class Read(NamedTuple):
     keys: Keys
 
     marks: np.ndarray
-    """The marks of the keys, shape (n,): see `marks`."""
+    """The marks of the keys of each channel, shape (c, n): see `marks`."""
 
     holds: np.ndarray
-    """What the keys are held in, shape (n,): see `marks.hold`; -1 where they do not say."""
+    """What the keys of each channel are held in, shape (c, n): see `marks.hold`; -1 where they do not say."""
 
 
 def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[Read]:
@@ -228,20 +228,26 @@ def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[Read]:
     """
     points, together = [key_points(fcurve) for fcurve in fcurves], dict[tuple, list[int]]()
     for number, fcurve in enumerate(fcurves):
-        key = points[number][:, 0].tobytes(), fcurve.extrapolation, read_cycles(fcurve)
+        # A channel that no mode fills says nothing of the types of others.
+        (types,) = _read_property("type", [fcurve.keyframe_points], CODE)
+        times, is_breakdown = points[number][:, 0], types == BREAKDOWN
+        key = times.tobytes(), fcurve.extrapolation, read_cycles(fcurve), is_breakdown.tobytes()
         together.setdefault(key, []).append(number)
     result = []
-    for (_, extrapolation, cycles), numbers in together.items():
-        channels = [fcurves[number].keyframe_points for number in numbers]
-        stacked = np.stack([points[number] for number in numbers])
-        result.append(Read(numbers, *_read_together(channels, stacked, extrapolation == "LINEAR", cycles)))
+    for (_, extrapolation, cycles, mask), numbers in together.items():
+        channels, breakdowns = [fcurves[number].keyframe_points for number in numbers], np.frombuffer(mask, bool)
+        stacked, is_linear = np.stack([points[number] for number in numbers]), extrapolation == "LINEAR"
+        result.append(Read(numbers, *_read_together(channels, stacked, is_linear, cycles, breakdowns)))
     return result
 
 
 def _read_together(
-    channels: Sequence, points: np.ndarray, linear: bool, cycles: Cycles | None
+    channels: Sequence, points: np.ndarray, linear: bool, cycles: Cycles | None, breakdowns: np.ndarray
 ) -> tuple[Keys, np.ndarray, np.ndarray]:
-    """Return the keys of several `keyframe_points` with these frames and values (c, n, 2), and what they say (n,)."""
+    """Return the keys of several `keyframe_points` with these frames and values (c, n, 2), and what they say (c, n).
+
+    `breakdowns` are the keys of this type, shape (n,).
+    """
     interpolation = _read_property("interpolation", channels, CODE)
     _replace_unknown(interpolation, INTERPOLATIONS, CONSTANT)
     used = set(np.unique(interpolation).tolist())
@@ -254,18 +260,17 @@ def _read_together(
         easing = _read_property("easing", channels, CODE)
         _replace_unknown(easing, EASINGS, AUTO)
         settings = np.stack((back, amplitude, _read_property("period", channels, np.float32)))
-    breakdowns = (_read_property("type", channels, CODE) == BREAKDOWN).all(axis=0)
     numbers = (np.abs(part).max(initial=0.0) for part in (points, left, right, settings) if part is not None)
     # What is no number is not smaller, either.
     is_sound = all(number < LARGEST for number in numbers) and bool(np.all(np.diff(points[0, :, 0]) >= 0.0))
     marked = breakdowns if breakdowns.any() else None
-    holds, automatic = np.full(points.shape[1], -1), None
+    holds, automatic = np.full(points.shape[:2], -1), None
     if are_held(back, amplitude).any():
-        holds = holds_of(back, amplitude, _read_property("period", channels, np.float32)).max(axis=0)
+        holds = holds_of(back, amplitude, _read_property("period", channels, np.float32))
         types = [_read_property(f"handle_{side}_type", channels, CODE) for side in ("left", "right")]
         automatic = np.isin(np.stack(types, axis=-1), AUTOMATIC)
     keys = Keys(points, interpolation, left, right, easing, settings, linear, cycles, marked, automatic, is_sound)
-    return keys, marks_of(back, amplitude).max(axis=0), holds
+    return keys, marks_of(back, amplitude), holds
 
 
 def _read_property(name: str, channels: Sequence, dtype: type, *width: int) -> np.ndarray:

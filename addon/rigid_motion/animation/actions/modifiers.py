@@ -7,9 +7,11 @@ product of linear factors in a restricted range, of which the last factor is con
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import dropwhile
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ..fcurves.keys import Cycles
 
@@ -40,6 +42,35 @@ def on_top(fcurve: bpy.types.FCurve) -> Iterator[bpy.types.FModifier]:
     for modifier in fcurve.modifiers:
         if modifier.type != "CYCLES" and not modifier.mute and not is_term(modifier):
             yield modifier
+
+
+def longest_step(fcurve: bpy.types.FCurve) -> float:
+    """Return by how many frames the Stepped modifiers of an F-curve look elsewhere, at most."""
+    steps = [item.frame_step for item in fcurve.modifiers if item.type == "STEPPED" and not item.mute]
+    return float(sum(steps))
+
+
+def misplaced(fcurve: bpy.types.FCurve) -> list[bpy.types.FModifier]:
+    """Return the animator's modifiers that act on what is seen only behind all terms, with those that follow them.
+
+    None where there are no terms behind them. What steps time, and what adds, is the same in front of terms.
+    """
+    behind = list(dropwhile(lambda item: is_term(item) or _commutes(item), fcurve.modifiers))
+    return [item for item in behind if not is_term(item)] if any(map(is_term, behind)) else []
+
+
+def settings_of_others(fcurve: bpy.types.FCurve) -> tuple[float, int]:
+    """Return what terms depend on of the animator's modifiers: `longest_step`, and how many are `misplaced`."""
+    kinds = np.empty(len(fcurve.modifiers), np.int32)
+    fcurve.modifiers.foreach_get("type", kinds)
+    # To look at each of many terms takes its time.
+    return (longest_step(fcurve), len(misplaced(fcurve))) if len(set(kinds.tolist())) > 1 else (0.0, 0)
+
+
+def _commutes(modifier: bpy.types.FModifier) -> bool:
+    if modifier.type == "NOISE":
+        return modifier.blend_type != "MULTIPLY"
+    return modifier.type in ("CYCLES", "STEPPED") or (modifier.type == "FNGENERATOR" and modifier.use_additive)
 
 
 def read_cycles(fcurve: bpy.types.FCurve) -> Cycles | None:

@@ -13,11 +13,11 @@ import numpy as np
 
 from ..evaluation.components import MODE_NAMES, PART_OF, ROTATION, ROWS, UNKNOWN, rows_left_to
 from ..evaluation.differences import seen_values
-from ..evaluation.sources import SAME_FRAME, TURN_AXES, Marks, Source
+from ..evaluation.sources import REACH, SAME_FRAME, TURN_AXES, Marks, Source
 from ..transforms import Channel, Refused, Transform
 from .channels import Read, read_keys
 from .marks import carried_on, has_marks, hold
-from .modifiers import is_term, on_top
+from .modifiers import is_term, longest_step, on_top
 from .refusals import refuse_drivers, refuse_envelope, refuse_linked, refuse_moving_deltas, refuse_numbers
 from .slots import Binding
 
@@ -121,6 +121,7 @@ def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> 
         turns=of_turns[0].keys if of_turns else None,
         turns_axis=TURN_AXES[0] if axes is None else replace(axes, numbers=axes.numbers % len(TURN_AXES)),
         seen=binding.slot.seen if goes_on else None,
+        reach=max([REACH, *map(longest_step, keyed.values())]) if goes_on else REACH,
         order=user.order,
         keyed=names,
         rest=rest,
@@ -141,10 +142,7 @@ def _modes_in(channels: list[Read]) -> int | Marks:
 
 
 def _said_by(reads: list[Read]) -> Marks | None:
-    """Return what the marks of keys say from which frame on, as numbers from 0; None where there are none.
-
-    On one frame the channel that comes first has it.
-    """
+    """Return what the marks of keys say from which frame on, as numbers from 0; None where there are none."""
     return _on_frames(reads, [read.marks for read in reads])
 
 
@@ -155,17 +153,29 @@ def _held_in(reads: list[Read]) -> Marks | None:
 
 
 def _on_frames(reads: list[Read], of_keys: list[np.ndarray]) -> Marks | None:
-    """Return the numbers of keys, 0 where they say none, from which frame on, as numbers from 0."""
-    if not any(marks.any() for marks in of_keys):
+    """Return the numbers of keys, (c, n) for each read, 0 where they say none, from which frame on, as numbers from 0.
+
+    On one frame most channels have it, or else the first of them: whoever types a setting of a key takes its mark off.
+    """
+    if not any(numbers.any() for numbers in of_keys):
         return None
-    frames = np.concatenate([read.keys.times for read in reads])
-    marks = np.concatenate(of_keys)
-    order = np.lexsort((marks == 0, frames))
-    frames, marks = frames[order], marks[order]
+    parts = []
+    for read, numbers in zip(reads, of_keys, strict=True):
+        votes = (read.marks > 0).astype(int)
+        if (numbers == numbers[0]).all() and (votes == votes[0]).all():
+            numbers, votes = numbers[:1], votes[:1] * len(votes)
+        parts.append((np.tile(read.keys.times, len(numbers)), numbers.ravel(), votes.ravel()))
+    frames, numbers, votes = map(np.concatenate, zip(*parts, strict=True))
+    order = np.argsort(frames, kind="stable")
+    frames, numbers, votes = frames[order], numbers[order], votes[order]
     # What is no number is no frame that there was, either.
     with np.errstate(invalid="ignore"):
         first = ~(np.diff(frames, prepend=-np.inf) <= SAME_FRAME)
-    return Marks(frames[first], carried_on(marks[first]) - 1)
+    size = int(numbers.max()) + 1
+    codes, place, at = np.unique(np.cumsum(first) * size + numbers, return_index=True, return_inverse=True)
+    best = np.lexsort((place, -np.bincount(at, weights=votes), codes // size))
+    best = best[np.diff(codes[best] // size, prepend=0) > 0]
+    return Marks(frames[first], carried_on(codes[best] % size) - 1)
 
 
 def is_marked(binding: Binding) -> bool:

@@ -21,15 +21,17 @@ from ..actions.refusals import refuse_drivers, refuse_linked
 from ..actions.slots import Binding
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable
 from ..edits.mode_keys import set_mode_in
+from ..evaluation.channel_values import rotation_values
 from ..evaluation.components import PART_OF, SCALE
 from ..evaluation.runs import Switch
 from ..evaluation.sources import SAME_FRAME, Source, distinct
 from ..fcurves.keys import Cycles
 from ..holds.holders import holders_of
+from ..holds.placing import poses_of, rows_of
 from ..transforms import WIDTHS, Channel, Refused, Transform, transform_of
-from .motions import continuous_values, rotation_values, without
+from .motions import continuous_values, without
 from .originals import BAKED, Originals, last_change, put_back, refuse_without_original
-from .worlds import alone_in, arrivals, poses_of, rows_of, say_holds, seen_range, worlds_of
+from .worlds import alone_in, arrivals, say_holds, seen_range, worlds_of
 
 NOT_HELD = n_("{name} is held in nothing: Bake without To World has keys for its in-betweens")
 

@@ -26,6 +26,7 @@ from ..holds.holders import channel_space, holders_of
 from ..transforms import Transform
 from ..transforms.sizes import radius_of, reaches_of, scale_in_scene
 from .fewer_keys import WholeRig, count_of, has_uneven_scale
+from .native_curves import handles_of
 from .search import fewer_keys
 from .worlds import RESTS, say_holds
 
@@ -42,6 +43,7 @@ class FewerRuns(NamedTuple):
     """In the scene's units."""
 
     rig: WholeRig | None = None
+    between: float = 0.0
 
     @property
     def after(self) -> int:
@@ -57,7 +59,7 @@ def fewer_runs(
     spaces = {one.number: one.matrix(depsgraph) for one in holders_of(transform) if one.target is not None}
     own = channel_space(transform, depsgraph)
     begins = [source.keyed_range[0], *(switch.begin for switch in source.switches)]
-    chosen, largest = [], 0.0
+    chosen, largest, between = [], 0.0, 0.0
     for run, begin in zip(source.runs, begins, strict=True):
         if count_of(run.source) < 2 or _turns(source, run):
             continue
@@ -71,8 +73,8 @@ def fewer_runs(
             plans = fewer_keys(transform.animated, members, *wishes, shared=False, hold=False, count=None, space=space)
             for plan in plans.values():
                 chosen.append((run, _begun(plan.fewer, run.stretch.first)))
-                largest = max(largest, plan.largest_error)
-    return FewerRuns(binding, source, chosen, largest) if chosen else None
+                largest, between = max(largest, plan.largest_error), max(between, plan.between)
+    return FewerRuns(binding, source, chosen, largest, between=between) if chosen else None
 
 
 def _reach(transform: Transform, radius: float | None) -> float:
@@ -136,7 +138,7 @@ def write_runs(transform: Transform, fewer: FewerRuns, mode: str) -> None:
         numbers = source.modes_at(at)
         for first, until in pairwise([*frames, np.inf]):
             if first in chosen:
-                numbers = np.where((at > first - 0.5 * SAME_FRAME) & (at < until), MODE_NUMBERS[mode], numbers)
+                numbers = np.where((at > first - 0.5 * SAME_FRAME) & (at < until), MODE_NUMBERS.get(mode, 0), numbers)
         write_marks(fcurve, numbers + 1)
     assert source.held is not None
     say_holds(binding, source.held)
@@ -147,5 +149,5 @@ def _keys_of(source: Source | None, row: int) -> KeyFields | None:
     for rows, keys in () if source is None else source.channels:
         if row in rows:
             place = rows.index(row)
-            return new_key_fields(keys.times, keys.values[place], keys.interpolation[place])
+            return new_key_fields(keys.times, keys.values[place], keys.interpolation[place]) | handles_of(keys, place)
     return None

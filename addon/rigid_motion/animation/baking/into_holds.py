@@ -33,8 +33,9 @@ from ..evaluation.components import LOCATION, MODE_NUMBERS, PART_OF, ROTATION, R
 from ..evaluation.differences import seen_values
 from ..evaluation.sources import SAME_FRAME, Source, distinct
 from ..fcurves.keys import CONSTANT, LINEAR
-from ..holds.dependencies import Node, follows
-from ..holds.holders import add_holder, holders_of, node_of
+from ..holds.dependencies import Node, follows, node_of
+from ..holds.holders import add_holder, holders_of
+from ..holds.placing import poses_of, rows_of
 from ..holds.problems import refuse_motion
 from ..queries.keyed import frames_in
 from ..transforms import Refused, Transform
@@ -43,7 +44,7 @@ from .fewer_keys import count_of, samples_of
 from .originals import REDUCED, Originals
 from .reducing import Reduction, channel_keys
 from .resting import Body, Rest, relative
-from .worlds import alone_in, poses_of, rows_of, worlds_of
+from .worlds import alone_in, worlds_of
 
 LEAST = 5
 """The fewest frames on which something is held, where nothing else is said."""

@@ -13,11 +13,11 @@ import numpy as np
 
 from ...motion import Poses
 from ...motion.affine import AffineMaps, ball_displacement, displacement_over, largest_displacement
-from ...motion.quaternions import align_signs, matrices, multiply
+from ...motion.quaternions import matrices, multiply
 from ..actions.slots import Slot, slots_alone
 from ..evaluation.bodies import turn_into_quaternions
-from ..evaluation.channel_values import channel_values
-from ..evaluation.components import LOCATION, REST, ROTATION, ROWS, SCALE
+from ..evaluation.channel_values import rotation_values
+from ..evaluation.components import LOCATION, ROTATION, ROWS, SCALE
 from ..evaluation.differences import channel_differences, seen_values
 from ..evaluation.sources import SAME_FRAME, Source
 from ..fcurves.keys import LARGEST
@@ -139,20 +139,6 @@ def continuous_values(source: Source, frames: np.ndarray, added: np.ndarray | fl
     return values
 
 
-def rotation_values(quaternions: np.ndarray, first: np.ndarray, order: str | None) -> np.ndarray:
-    """Return a motion's rotations (m, 4) as the rows of channels, the first as near to `first` (4,) as may be, (4, m).
-
-    The order is None for quaternions, which stay as long as they are and of which the first one stays, AXIS_ANGLE, or
-    that of Euler angles, which have the first three rows.
-    """
-    if order is None:
-        return align_signs(quaternions).T
-    count = len(quaternions)
-    ends = np.concatenate((REST[:3], first, REST[7:]))[None, :, None].repeat(2, axis=0)
-    poses, progress = Poses(np.zeros((count, 3)), align_signs(quaternions)), np.arange(count) / count
-    return channel_values(poses, np.array([count]), progress, ends, REST[:, None], order)[ROWS[ROTATION]]
-
-
 class BodyMotion:
     """An object and bones of it on frames (m,) of an Action, as they were recorded and as they are by now.
 
@@ -256,6 +242,17 @@ class BodyMotion:
             yield number
             number = int(self.parents[number])
 
+    def below(self, number: int) -> np.ndarray:
+        """Return which joints are one or hang on it, shape (joints,)."""
+        return np.array([number in self.above(other) for other in range(len(self.joints))])
+
+    def reach(self, number: int) -> float:
+        """Return how far from a joint anything gets that hangs on it, in the unit of bones."""
+        others = np.flatnonzero(self.below(number))
+        away = np.linalg.norm(self.truth.origins[others] - self.truth.origins[number], axis=-1).max(axis=1)
+        counted = self.radii[others] > 0.0
+        return float((away / self.unit + self.radii[others])[counted].max())
+
     def over(self, allowed: float, weights: np.ndarray) -> list[tuple[float, int, int]]:
         """Return where errors are over what is allowed: weighted error, joint and moment, the largest first.
 
@@ -270,10 +267,16 @@ class BodyMotion:
         at = np.nonzero(~(errors <= allowed))
         return sorted(zip(errors[at].tolist(), *(part.tolist() for part in at), strict=True), reverse=True)
 
-    def largest_errors(self) -> np.ndarray:
-        """Return the largest displacement of any point in each joint's ball, in the scene's units, shape (joints,)."""
+    def largest_errors(self, weights: np.ndarray | None = None) -> np.ndarray:
+        """Return the largest displacement of any point in each joint's ball, in the scene's units, shape (joints,).
+
+        It is that times weights (joints, m) where they are given.
+        """
         now, truth = self.now(), self.truth
-        return np.array([largest_displacement(now[n], truth[n], radius) for n, radius in enumerate(self.radii)])
+        if weights is None:
+            return np.array([largest_displacement(now[n], truth[n], radius) for n, radius in enumerate(self.radii)])
+        balls = (np.full(len(self.frames), radius) for radius in self.radii)
+        return np.array([(ball_displacement(now[n], truth[n], r) * weights[n]).max() for n, r in enumerate(balls)])
 
     def to_blame(self, number: int, moment: int, among: Iterable[int], share: float) -> list[int]:
         """Return which of these joints, as they were recorded, would take a joint's error at a moment to a share of it.

@@ -13,21 +13,18 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
-from ...motion import Poses
-from ...motion.quaternions import from_matrices
 from ..actions.channels import key_points
 from ..actions.marks import read_marks, write_holds, write_marks
 from ..actions.slots import Binding
-from ..edits.holding import converted, world_matrix
-from ..evaluation.components import LOCATION, MODE_NUMBERS, ROTATION, ROWS, SCALE
+from ..evaluation.components import MODE_NUMBERS
 from ..evaluation.differences import seen_values
 from ..evaluation.runs import MOST_FRAMES, Switch
 from ..evaluation.sources import SAME_FRAME, Marks, Source
 from ..following import follower
 from ..holds.dependencies import Node
 from ..holds.holders import is_ours
+from ..holds.placing import converted, world_matrix
 from ..transforms import Refused, Transform
-from .motions import rotation_values
 
 SEVERAL = n_(
     "{name} moves by an Action that others have, too, and is elsewhere than they are: "
@@ -112,29 +109,6 @@ def _as_keyed(transform: Transform) -> Iterator[None]:
             stack.callback(setattr, constraint, "mute", False)
             constraint.mute = True
         yield
-
-
-def poses_of(matrices: np.ndarray) -> tuple[Poses, np.ndarray]:
-    """Return the rigid part of matrices (..., 4, 4) without shear, shape (...), and their scales, shape (..., 3)."""
-    axes = matrices[..., :3, :3]
-    # Blender has what is mirrored along one axis mirrored along all of them, and turned.
-    sizes = np.linalg.norm(axes, axis=-2) * np.where(np.linalg.det(axes) < 0.0, -1.0, 1.0)[..., None]
-    turns = from_matrices(axes / np.where(sizes == 0.0, 1.0, sizes)[..., None, :])
-    return Poses(matrices[..., :3, 3], turns), sizes
-
-
-def rows_of(poses: Poses, sizes: np.ndarray, transform: Transform, first: np.ndarray) -> np.ndarray:
-    """Return the components (10, m) of poses (m,) with scales (m, 3), the first rotation near to `first` (10,).
-
-    From one to the next rotations do not jump.
-    """
-    turns = poses.quaternions
-    if turns[0] @ first[ROWS[ROTATION]] < 0.0 and transform.order is None:
-        turns = -turns
-    rows = np.empty((10, len(turns)))
-    rows[ROWS[LOCATION]], rows[ROWS[SCALE]] = poses.positions.T, sizes.T
-    rows[ROWS[ROTATION]] = rotation_values(turns, first[ROWS[ROTATION]], transform.order)
-    return rows
 
 
 def seen_range(source: Source, seen: tuple[int, int]) -> tuple[float, float]:

@@ -62,11 +62,13 @@ class _Between:
         self.binding = binding = editable_binding(transform, [binding for binding, _ in readings])
         self.frame = frame = frame_in_action(transform.animated, frame)
         whole = next(source for one, source in readable(transform, readings) if one is binding)
+        is_switch = any(abs(switch.frame - frame) < SAME_FRAME for switch in whole.switches)
         self.source = _without(whole, frame)
         """The keys without those of this frame."""
         # Copies of keys in cycles are none to set others between.
         first, last = self.source.keyed_range if self.source.channels else (np.inf, -np.inf)
-        if not first < frame < last:
+        # Where something passes from one holder to the next the keys around are in different spaces.
+        if is_switch or not first < frame < last:
             text = n_("{name} needs a key before and a key after frame {frame:g}: go to a frame between two keys")
             raise Refused(text, name=transform.name, frame=frame)
         keys = self.source.key_frames

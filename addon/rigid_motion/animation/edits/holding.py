@@ -7,24 +7,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import cast
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
-from mathutils import Euler, Matrix, Quaternion
+from mathutils import Matrix
 
 from ..actions.channels import key_points
 from ..actions.marks import hold, read_holds, read_marks, write_holds, write_marks
 from ..actions.reading import is_marked
 from ..actions.slots import Binding, bindings_of
-from ..evaluation.components import AXIS_ANGLE, LOCATION, MODE_NUMBERS, PART_OF, REST, ROTATION, ROWS, SCALE
+from ..evaluation.components import MODE_NUMBERS, PART_OF, ROWS, SCALE
 from ..evaluation.differences import seen_values
 from ..evaluation.runs import MOST_FRAMES
 from ..evaluation.sources import SAME_FRAME, Marks, Source
 from ..following import follower
-from ..holds.holders import Holder, add_holder, channel_space, holders_of, node_of, world_of
-from ..holds.problems import STAYS, refuse_holder, refuse_motion
+from ..holds.holders import Holder, add_holder, basis_in, holders_of, world_in
+from ..holds.placing import matrices_of, poses_of, rows_of, world_matrix
+from ..holds.problems import STAYS, refuse_holder, refuse_motion, refuse_space
 from ..queries.keyed import active_binding, modes_in, source_of
 from ..queries.segments import frame_in_action
 from ..transforms import WIDTHS, Refused, Transform, transform_of
@@ -40,9 +41,6 @@ NOT_HELD_YET = n_("{name} is not passed on frame {frame:g} or later: hold it in 
 NOT_SHOWN = n_("{name} is hidden or excluded, and Blender does not know where it is: show it first")
 NO_SUCH_BONE = n_("{holder} has no bone {bone}: give the name of one of its pose bones")
 NOT_HELD = n_("{name} is held in nothing, so there is no grip to match: hold it first (Hold In)")
-PASSING = n_(
-    "{name} passes from one holder to the next on frame {frame:g}: key it before or behind, or let it pass at once"
-)
 NO_GRIP = n_("{name} was not held in {holder} before frame {frame:g}, so there is no grip to match")
 FRAMES = n_("{frames} is no number of frames to pass over: give a whole number from 0 to {most}")
 
@@ -60,8 +58,11 @@ class HoldFacts:
     switch: float | None
     """The frame of the key at which it is passed on: on this frame, or the next one."""
 
+    until: float | None
+    """The frame of the key behind this frame at which it is passed on; None where nothing comes of that kind."""
+
     frames: int
-    """Over how many frames that is."""
+    """Over how many frames the switch is."""
 
     apart: float | None
     """How far apart both holders carry it on this frame, where it is the one of the switch; in Blender's units."""
@@ -97,7 +98,7 @@ def hold_in(
     Raises
     ------
     Refused
-        Where the holder follows the prop, or the prop repeats or is linked.
+        Where the holder follows the prop, or the prop repeats or is linked, or hangs where no constraint can place it.
     """
     target, name = _target(holder, bone)
 
@@ -108,6 +109,7 @@ def hold_in(
         source = next((source for one, source in readings if one is binding), None)
         if isinstance(source, Refused):
             raise source
+        refuse_space(transform)
         if target is not None:
             refuse_motion(transform, source)
             for user in (transform,) if binding is None else binding.users:
@@ -118,6 +120,39 @@ def hold_in(
 
     def act(transform: Transform, source: Source | None) -> None:
         _hold(transform, source, target, name, frames)
+
+    apply_edit(prop, plan, act, None)
+
+
+def hold_keys(prop: Target, frames: np.ndarray, holders: Sequence[tuple[bpy.types.Object, str] | None]) -> None:
+    """Have all keys of something say what they are held in, whose channels have its poses there already.
+
+    Parameters
+    ----------
+    prop
+        An object or a pose bone.
+    frames : array, shape (n,)
+        Of the Action, rising.
+    holders : sequence of n
+        What keys are held in from each of these frames on: an object and the name of a bone of it, "" for none; or None
+        for the prop's parent, or the world. It passes at once.
+
+    Raises
+    ------
+    Refused
+        Where a holder follows the prop, or the prop is linked, has delta transforms, or too many holders.
+    """
+
+    def plan(transform: Transform, readings: Readings) -> Binding:
+        refuse_motion(transform, None)
+        for holder in dict.fromkeys(filter(None, holders)):
+            refuse_holder(transform, *holder)
+        return editable_binding(transform, [one for one, _ in readings])
+
+    def act(transform: Transform, binding: Binding) -> None:
+        numbers = {holder: add_holder(binding, *holder) for holder in dict.fromkeys(filter(None, holders))}
+        codes = np.array([hold(numbers[holder] if holder else 0) for holder in holders])
+        _mark_all(_binding_of(transform), Marks(frames - SAME_FRAME / 2, codes))
 
     apply_edit(prop, plan, act, None)
 
@@ -169,40 +204,17 @@ def pass_frames(prop: Target, frames: int, *, at: float | None = None) -> None:
     apply_edit(prop, plan, act, None)
 
 
-def key_seen(prop: Target, matrix: Sequence[Sequence[float]] | None = None) -> None:
-    """Key something on the frame that is shown, in what holds it, so that it is seen where a matrix of the world is.
-
-    Without a matrix (4, 4) that is where it is seen now. Blender's own *Snap*, *Apply Visual Transform*, visual keying
-    and `matrix_world =` give its channels what it has in the world, as they do with any *Child Of*: there it is not.
-    """
-
-    def plan(transform: Transform, readings: Readings) -> int:
-        binding = active_binding(transform, [one for one, _ in readings])
-        source = None if binding is None else _source_in(binding, readings)
-        if source is None or not source.channels:
-            return 0
-        frame = _frame(transform)
-        if any(switch.begin < frame < switch.frame - SAME_FRAME for switch in source.switches):
-            raise Refused(PASSING, name=transform.name, frame=frame)
-        return source.hold_at(frame)[0]
-
-    def act(transform: Transform, number: int) -> None:
-        seen = world_matrix(transform) if matrix is None else Matrix(matrix)
-        _key_seen(transform, number, seen, _frame(transform))
-
-    apply_edit(prop, plan, act, None)
-
-
 def hold_facts(prop: Target) -> HoldFacts:
     """Return how something is held on the frame that is shown."""
     transform = transform_of(prop)
     source, binding = source_of(transform), active_binding(transform, bindings_of([transform]))
     holders = () if binding is None else tuple(holders_of(transform))
     if source is None or source.held is None or binding is None:
-        return HoldFacts(holders, None, None, 0, None, None)
+        return HoldFacts(holders, None, None, None, 0, None, None)
     frame, by_number = _frame(transform), {holder.number: holder for holder in holders}
     number, _ = source.hold_at(frame)
     switch = next((one for one in source.switches if one.frame > frame - SAME_FRAME), None)
+    until = next((one.frame for one in source.switches if one.frame > frame + SAME_FRAME), None)
     apart = turned = None
     if switch is not None and abs(switch.frame - frame) < SAME_FRAME:
         carried = _carried(transform, source, by_number.get(switch.before), frame)
@@ -211,12 +223,8 @@ def hold_facts(prop: Target) -> HoldFacts:
             apart = (carried.translation - seen.translation).length
             turned = carried.to_quaternion().rotation_difference(seen.to_quaternion()).angle
     frames = 0 if switch is None else source.hold_at(switch.frame)[1]
-    return HoldFacts(holders, by_number.get(number), None if switch is None else switch.frame, frames, apart, turned)
-
-
-def world_matrix(transform: Transform) -> Matrix:
-    """Return where something is seen on the frame that is shown."""
-    return world_of(*node_of(transform), bpy.context.evaluated_depsgraph_get())
+    at = None if switch is None else switch.frame
+    return HoldFacts(holders, by_number.get(number), at, until, frames, apart, turned)
 
 
 def _target(holder: object, bone: str | None) -> tuple[bpy.types.Object | None, str]:
@@ -251,7 +259,7 @@ def _hold(
     transform: Transform, source: Source | None, target: bpy.types.Object | None, bone: str, frames: int | None
 ) -> None:
     """Key a transform, which is keyed so, in the space of a holder on the frame that is shown."""
-    seen, frame = world_matrix(transform), _frame(transform)
+    seen, posed, frame = world_matrix(transform), transform.components(), _frame(transform)
     before = 0 if source is None else source.hold_at(frame - 2 * SAME_FRAME)[0]
     if _needs_key_before(source, frame):
         rows = _rows_of(transform, source, frame - 1.0)
@@ -260,7 +268,12 @@ def _hold(
         follower.refresh([transform])
     binding = _binding_of(transform)
     number = 0 if target is None else add_holder(binding, target, bone)
-    _key_seen(transform, number, seen, frame)
+    passes = source is not None and any(one.begin < frame < one.frame for one in source.switches)
+    if number == (0 if source is None else source.hold_at(frame)[0]) and not passes:
+        # By way of the world rounding would move what rests.
+        _key(transform, posed, ("location", transform.rotation), frame)
+    else:
+        _key_seen(transform, number, seen, frame)
     binding = _binding_of(transform)
     _let_go_of_handles(binding, frame)
     _mark_all(binding, None if source is None else source.held)
@@ -278,11 +291,8 @@ def _hold(
 def _key_seen(transform: Transform, number: int, seen: Matrix, frame: float) -> None:
     """Key a transform in the space of the holder of a number so that it is where a matrix of the world is."""
     holder = next((holder for holder in holders_of(transform) if holder.number == number), None)
-    if holder is not None:
-        matrix = holder.matrix(bpy.context.evaluated_depsgraph_get()).inverted() @ seen
-    else:
-        matrix = converted(transform, seen, "WORLD", "LOCAL")
-    rows = _components(transform, matrix)
+    basis = np.array(basis_in(transform, holder, seen))
+    rows = rows_of(*poses_of(basis[None]), transform, transform.components())[:, 0]
     paths = ["location", transform.rotation]
     if not np.allclose(rows[ROWS[SCALE]], transform.components()[ROWS[SCALE]], rtol=1e-4):
         paths.append("scale")
@@ -313,49 +323,8 @@ def _carried(transform: Transform, source: Source, holder: Holder | None, frame:
     run = next((run for run in source.runs if run.stretch.until > frame - SAME_FRAME), None)
     if run is None:
         return None
-    matrix = _matrix(transform, _rows_of(transform, run.source, float(run.moments(np.array([frame]))[0])))
-    if holder is not None:
-        return holder.matrix(bpy.context.evaluated_depsgraph_get()) @ matrix
-    return converted(transform, matrix, "LOCAL", "WORLD")
-
-
-def converted(transform: Transform, matrix: Matrix, first: str, second: str) -> Matrix:
-    """Return a matrix between the world and the space of the channels where nothing holds a transform."""
-    obj = transform.animated
-    if transform.is_part:
-        spaces: dict[str, Any] = {"pose_bone": transform.carrier, "from_space": first, "to_space": second}
-        return obj.convert_space(matrix=matrix, **spaces)
-    # Blender's local space of an object is another one without a parent, or on a bone.
-    space = channel_space(transform, bpy.context.evaluated_depsgraph_get())
-    return space @ matrix if second == "WORLD" else space.inverted_safe() @ matrix
-
-
-def _matrix(transform: Transform, rows: np.ndarray) -> Matrix:
-    """Return the matrix of components (10,), in the space of the channels."""
-    first, rotation = rows[ROWS[ROTATION]].tolist(), cast(Any, None)
-    if transform.order is None:
-        rotation = Quaternion(first).normalized()
-    elif transform.order == AXIS_ANGLE:
-        rotation = Quaternion(first[1:], first[0])
-    else:
-        rotation = Euler(first[:3], transform.order)
-    return Matrix.LocRotScale(rows[ROWS[LOCATION]].tolist(), rotation, rows[ROWS[SCALE]].tolist())
-
-
-def _components(transform: Transform, matrix: Matrix) -> np.ndarray:
-    """Return the components (10,) of a matrix, its rotation near to what the transform has."""
-    location, rotation, scale = matrix.decompose()
-    result, had = REST.copy(), transform.components()[ROWS[ROTATION]].tolist()
-    result[ROWS[LOCATION]], result[ROWS[SCALE]] = location, scale
-    if transform.order is None:
-        rotation.make_compatible(Quaternion(had))
-        result[ROWS[ROTATION]] = rotation
-    elif transform.order == AXIS_ANGLE:
-        axis, angle = rotation.to_axis_angle()
-        result[3], result[4:7] = angle, axis
-    else:
-        result[3:6] = rotation.to_euler(cast(Any, transform.order), Euler(had[:3], transform.order))
-    return result
+    rows = _rows_of(transform, run.source, float(run.moments(np.array([frame]))[0]))
+    return world_in(transform, holder, Matrix(matrices_of(rows[:, None], transform.order)[0].tolist()))
 
 
 def _key(transform: Transform, rows: np.ndarray, paths: Iterable[str], frame: float | None = None) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...motion import Poses
 from ...motion.eulers import extrinsic_eulers_from_quaternions
-from ...motion.quaternions import conjugate, multiply
-from .components import AXIS_ANGLE, LOCATION, ROTATION, ROWS, SCALE
+from ...motion.quaternions import align_signs, conjugate, multiply
+from .components import AXIS_ANGLE, LOCATION, REST, ROTATION, ROWS, SCALE
 from .marks import FULL_TURN
 
 STEPS = 12
@@ -195,3 +195,17 @@ def _axis_angles(
     angles -= FULL_TURN * (steps - steps[starts].repeat(many))
     angles += _whole_turns(first[0] - angles[keys]).repeat(many)
     return np.concatenate((angles[None], axes))
+
+
+def rotation_values(quaternions: np.ndarray, first: np.ndarray, order: str | None) -> np.ndarray:
+    """Return a motion's rotations (m, 4) as the rows of channels, the first as near to `first` (4,) as may be, (4, m).
+
+    The order is None for quaternions, which stay as long as they are and of which the first one stays, AXIS_ANGLE, or
+    that of Euler angles, which have the first three rows.
+    """
+    if order is None:
+        return align_signs(quaternions).T
+    count = len(quaternions)
+    ends = np.concatenate((REST[:3], first, REST[7:]))[None, :, None].repeat(2, axis=0)
+    poses, progress = Poses(np.zeros((count, 3)), align_signs(quaternions)), np.arange(count) / count
+    return channel_values(poses, np.array([count]), progress, ends, REST[:, None], order)[ROWS[ROTATION]]

@@ -37,6 +37,9 @@ from .runs import MOST_FRAMES, Stretch, Switch, keys_in, resting_in, stretches_o
 
 __all__ = ["SAME_FRAME", "SCREW_AXIS", "TURN_AXES", "WHOLE_TURN", "Marks", "Source", "distinct"]
 
+REACH = 12.0
+"""Frames that are looked at outside of the seen ones. A Stepped modifier of no more changes nothing, when it comes."""
+
 
 @dataclass(frozen=True, eq=False)
 class Source:
@@ -72,6 +75,9 @@ class Source:
     seen: tuple[int, int] | None = None
     """First and last frame that are seen of it, in scenes and strips."""
 
+    reach: float = REACH
+    """How many frames before and behind the seen ones motion blur and Stepped modifiers look at, at most."""
+
     driven: frozenset[int] = frozenset()
     """The rows of components that drivers move, or whose channels are muted: to the others they are still."""
 
@@ -91,7 +97,7 @@ class Source:
             summary.update(keys.raw)
         # Where something stands that is not keyed does not change how it moves.
         rest = {row: value for row, value in self.rest.items() if row >= ROWS[ROTATION].start}
-        seen = self.seen if self.goes_on and self.cyclic is None else None
+        seen = (self.seen, self.reach) if self.goes_on and self.cyclic is None else None
         summary.update(repr((self.order, sorted(self.keyed), rest, self.mode, sorted(self.driven), seen)).encode())
         summary.update(self.original[ROWS[ROTATION]].tobytes())
         if self.location_axes is not None:
@@ -341,6 +347,12 @@ class Source:
         if self.seen is not None and self.goes_on:
             first, last = min(first, self.seen[0]), max(last, self.seen[1])
         return math.floor(first), math.ceil(last)
+
+    @property
+    def goes_on_to(self) -> tuple[float, float]:
+        """The frames before its first key and behind its last one to which terms take what goes on at its slope."""
+        assert self.seen is not None
+        return self.seen[0] - self.reach, self.seen[1] + self.reach
 
     @cached_property
     def filled_rows(self) -> list[int]:

@@ -52,10 +52,11 @@ def spans(source: Source) -> list[Span]:
     inside = acts & ~source.holds
     ends = [(first, last, True, True) for first, last in zip(keys[:-1][inside], keys[1:][inside], strict=True)]
     if source.is_linear and source.seen is not None:
-        if acts[0] and source.seen[0] < keys[0]:
-            ends.insert(0, (float(source.seen[0]), keys[0], False, True))
-        if acts[-1] and source.seen[1] > keys[-1]:
-            ends.append((keys[-1], float(source.seen[1]), True, False))
+        before, behind = source.goes_on_to
+        if acts[0] and before < keys[0]:
+            ends.insert(0, (before, keys[0], False, True))
+        if acts[-1] and behind > keys[-1]:
+            ends.append((keys[-1], behind, True, False))
     return [
         Span(rows, float(first), float(last), at_first, at_last, tuple(breaks[(breaks > first) & (breaks < last)]))
         for first, last, at_first, at_last in ends
@@ -86,10 +87,10 @@ def _spans_of_runs(source: Source) -> list[Span]:
                 for (first, last), are_keys in zip(pairwise(shown), pairwise(is_key), strict=True)
             ]
     if source.is_linear and source.seen is not None:
-        (first, last), (before, behind) = source.keyed_range, source.seen
+        (first, last), (before, behind) = source.keyed_range, source.goes_on_to
         for rows in filter(None, parts):
-            result += [Span(rows, float(before), first, False, True, ())] if before < first else []
-            result += [Span(rows, last, float(behind), True, False, ())] if behind > last else []
+            result += [Span(rows, before, first, False, True, ())] if before < first else []
+            result += [Span(rows, last, behind, True, False, ())] if behind > last else []
     return result
 
 

@@ -178,9 +178,8 @@ def _add_angles(
         change = (end - start)[:3]
         furthest = np.abs(change).argmax(axis=0)
         by = np.take_along_axis(change, furthest[None], axis=0)[0]
-    some = np.flatnonzero((np.abs(by) >= HALF_TURN) | (parts != 0.0))
-    if order == AXIS_ANGLE:
-        some = some[by[some] != 0.0]
+    # An angle that changes by rounding alone has no sense.
+    some = np.flatnonzero((np.abs(by) >= HALF_TURN) | ((parts != 0.0) & (np.abs(by) > NO_TURN)))
     if not len(some):
         return senses
     by, sense = by[some], np.sign(by[some])

@@ -5,6 +5,7 @@ shared_turns   turns of segments that keys divide
 inserted       keys that were inserted on in-betweens: their fellow channels, and the motion beside them
 unkeyed        poses without keys, which are set again once something was written
 changes        what Blender tells of edits, and which channels they were about
+assigned       poses of the world that are assigned to held things
 refreshing     from what is keyed to the terms in its channels
 follower       the handlers
 

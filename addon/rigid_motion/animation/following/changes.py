@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ..actions.channels import KEY_FIELDS
+from ..actions.modifiers import settings_of_others
 from ..actions.slots import Slot
 from ..transforms import TURNS_PROPERTY, WIDTHS, Channel, split_path
 
@@ -123,9 +124,12 @@ def _often_in(curves: Mapping[Channel, bpy.types.FCurve]) -> dict[Channel, tuple
     return {channel: (one.mute, one.extrapolation, _keys_of(one, OFTEN)) for channel, one in curves.items()}
 
 
-def _seldom_in(curves: Mapping[Channel, bpy.types.FCurve]) -> dict[Channel, tuple[int, bytes]]:
-    """Return the number of modifiers of F-curves, and `SELDOM` of their keys."""
-    return {channel: (len(one.modifiers), _keys_of(one, SELDOM)) for channel, one in curves.items()}
+def _seldom_in(curves: Mapping[Channel, bpy.types.FCurve]) -> dict[Channel, tuple]:
+    """Return the number of modifiers of F-curves, what matters of the animator's, and `SELDOM` of their keys."""
+    return {
+        channel: (len(one.modifiers), *settings_of_others(one), _keys_of(one, SELDOM))
+        for channel, one in curves.items()
+    }
 
 
 def _keys_of(fcurve: bpy.types.FCurve, names: tuple[str, ...]) -> bytes:

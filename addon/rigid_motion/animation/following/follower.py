@@ -33,6 +33,7 @@ from ..actions.slots import (
 from ..evaluation import source_cache
 from ..holds.apply import channels_of
 from ..transforms import WIDTHS, Channel, Transform, let_override_be_read, split_path, transform_of
+from .assigned import Assigned, Settled, assigned, set_keys, set_values, settled
 from .changes import Snapshot, add_action, bones_in, edited_actions, edited_objects, graphs_of, settings_of
 from .refreshing import is_keying_safe, refresh_bindings
 from .unkeyed import Poses
@@ -54,6 +55,8 @@ class Follower:
             "depsgraph_update_pre": self._handler(self.before_update),
             "depsgraph_update_post": self._handler(self.after_update),
             "frame_change_pre": self._handler(self.before_frame),
+            "undo_pre": self._handler(self.before_undo),
+            "redo_pre": self._handler(self.before_undo),
             "undo_post": self._handler(self.after_undo),
             "redo_post": self._handler(self.after_undo),
             "load_post": self._handler(self.after_load),
@@ -71,6 +74,12 @@ class Follower:
         """The objects and Actions, by session id, that were added to dependency graphs."""
         self.unkeyed: list[Poses] = []
         """Poses without keys that are to be set again."""
+        self.undoes = False
+        """True while objects are those of an undo step, whose matrices are of nothing evaluated yet."""
+        self.assigned: list[Assigned] = []
+        """Poses of the world that held things are to have once they are evaluated."""
+        self.settled: dict[tuple[tuple[int, str], bytes], Settled] = {}
+        """What became of such poses, by their things and components: Blender's undo steps have these."""
         self.forget_snapshots()
 
     def forget_snapshots(self) -> None:
@@ -196,12 +205,25 @@ class Follower:
         self.ranges = _ranges()
         self.refresh()
 
+    def settle(self, items: Iterable[Settled], frame: float) -> None:
+        """Have held things be where they were assigned to be in the world, on this frame of the scene."""
+        keyed = [item for item in items if set_keys(item, frame)]
+        if keyed:
+            self.refresh(item.transform for item in keyed)
+            bpy.context.view_layer.update()
+        for item in items:
+            set_values(item)
+            self.settled[item.transform.identity, item.before.tobytes()] = item
+        if items:
+            bpy.context.view_layer.update()
+
     def before_update(self, scene: bpy.types.Scene, *_: object) -> None:
         graphs = graphs_of(scene)
-        actions = edited_actions(*graphs)
+        actions, objects = edited_actions(*graphs), edited_objects(*graphs)
+        self.assigned = [] if self.undoes else assigned(objects)
         self.followed = {action.session_uid for action in actions}
         self.follow(actions, scene.frame_current_final)
-        self.follow_objects(edited_objects(*graphs), scene.frame_current_final)
+        self.follow_objects(objects, scene.frame_current_final)
 
     def after_update(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         if self.ranges is None or (depsgraph.id_type_updated("SCENE") and self.ranges != _ranges()):
@@ -218,17 +240,32 @@ class Follower:
         unkeyed, self.unkeyed = self.unkeyed, []
         if sum(poses.set_again() for poses in unkeyed):
             bpy.context.view_layer.update()
+        items, self.assigned, self.undoes = self.assigned, [], False
+        self.settle(settled(items), scene.frame_current_final)
 
     def before_frame(self, scene: bpy.types.Scene, *_: object) -> None:
         if self.ranges is None:
             self.look_through()
-        self.follow(edited_actions(*graphs_of(scene)), scene.frame_current_final)
+        graphs = graphs_of(scene)
+        items = [] if self.undoes else settled(assigned(edited_objects(*graphs)))
+        for item in items:
+            set_keys(item, bpy.context.view_layer.depsgraph.scene_eval.frame_current_final)
+            set_values(item)
+        self.follow(edited_actions(*graphs), scene.frame_current_final)
         self.unkeyed.clear()
 
-    def after_undo(self, *_: object) -> None:
+    def before_undo(self, *_: object) -> None:
+        self.undoes = True
+
+    def after_undo(self, scene: bpy.types.Scene, *_: object) -> None:
+        self.undoes = True
         # What there was is back with its terms; but nothing that was kept of it is to be trusted.
         self.forget_snapshots()
         self.unkeyed.clear()
+        objects = map(Transform, bpy.data.objects if self.settled else ())
+        known = ((one, self.settled.get((one.identity, one.components().tobytes()))) for one in objects)
+        items = [item._replace(transform=transform) for transform, item in known if item is not None]
+        self.settle(items, scene.frame_current_final)
 
     def after_load(self, *_: object) -> None:
         source_cache.clear()

@@ -33,11 +33,10 @@ def key_fellows(binding: Binding, new: Source, old: Source) -> bool:
         return False
     times, before, none = _times_of(new), _times_of(old), np.empty(0)
     rows = sorted({*old.filled_rows, *new.filled_rows} & times.keys())
-    added = [none]
-    for row in rows:
-        more = _without(times[row], had := before.get(row, none))
-        # Where keys were moved or replaced there are none more than these.
-        added += [more] if len(more) == len(times[row]) - len(had) else []
+    # Where keys were moved or replaced none was inserted, nor where channels came with others in their place.
+    if any(len(_without(before.get(row, none), times[row])) for row in rows):
+        return False
+    added = [none, *(_without(times[row], before.get(row, none)) for row in rows)]
     # Where terms needed a channel it has a key on the first frame of all.
     frames = _without(np.unique(np.concatenate(added)), np.union1d(old.key_frames, old.keyed_range[0]))
     frames = frames[[_is_in_between(old, frame) for frame in frames.tolist()]] if len(frames) else frames

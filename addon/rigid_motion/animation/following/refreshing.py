@@ -11,6 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 import bpy
 import numpy as np
 
+from ..actions.channels import key_points
 from ..actions.marks import read_holds, read_marks, write_holds, write_marks
 from ..actions.modifiers import add_cycles, has_terms, terms_in
 from ..actions.reading import is_marked, keyed_in, planned_from
@@ -18,7 +19,7 @@ from ..actions.refusals import refuse_numbers
 from ..actions.slots import Binding
 from ..evaluation.components import MODE_NUMBERS
 from ..evaluation.source_cache import cache_source, cached_source
-from ..evaluation.sources import Source
+from ..evaluation.sources import SAME_FRAME, Source
 from ..fcurves.keys import Cycles
 from ..holds.apply import apply_holds, has_holders
 from ..terms.apply import apply, remove_terms
@@ -73,8 +74,9 @@ def refresh_bindings(
                 stale.append((binding, current.pop(binding)))
     kept = {*current, *(binding for binding, _ in stale)}
     dropped = [item for item in bindings if item not in kept and any(map(has_terms, item.moving.values()))]
-    if stale or dropped:
-        before_writing([*dropped, *(binding for binding, _ in stale)])
+    held = [binding for binding in {**current, **plain} if has_holders(binding)]
+    if stale or dropped or held:
+        before_writing([*dropped, *held, *(binding for binding, _ in stale)])
     for binding in dropped:
         remove_terms(binding)
     stale = _completed(stale) if stale and may_key else stale
@@ -169,18 +171,22 @@ def _apply(stale: Sequence[Reading]) -> list[bool]:
 
 
 def _carry_marks(binding: Binding, source: Source) -> None:
-    """Mark the keys that go on with what others say, so that they say it without these."""
-    channels = binding.users[0].channels.values()
-    for fcurve in filter(None, map(binding.curves.get, channels)):
-        marks = read_marks(fcurve)
-        if len(marks) and not marks.all():
-            times = np.empty((len(marks), 2), np.float32)
-            fcurve.keyframe_points.foreach_get("co", times.ravel())
-            frames = times[:, 0].astype(np.float64)
-            write_marks(fcurve, np.where(marks, marks, source.modes_at(frames) + 1))
-            if source.held is not None:
-                holds = read_holds(fcurve)
-                write_holds(fcurve, np.where(holds >= 0, holds, source.held.at(frames)))
+    """Mark the keys that go on with what others say, or differ from them, so that they say it without these."""
+    voting = {row for rows, _ in source.channels for row in rows}
+    for row, channel in binding.users[0].channels.items():
+        if (fcurve := binding.curves.get(channel)) is None or not fcurve.keyframe_points:
+            continue
+        frames = key_points(fcurve)[:, 0].astype(np.float64) + 0.5 * SAME_FRAME
+        marks, modes = read_marks(fcurve), source.modes_at(frames) + 1
+        # A channel that has no say now, as it is muted, may say otherwise later.
+        modes = modes if row in voting else np.where(marks, marks, modes)
+        if not np.array_equal(marks, modes):
+            write_marks(fcurve, modes)
+        if source.held is not None:
+            said, holds = read_holds(fcurve), source.held.at(frames)
+            holds = holds if row in voting else np.where(said >= 0, said, holds)
+            if not np.array_equal(said, holds):
+                write_holds(fcurve, holds)
 
 
 def is_keying_safe() -> bool:

@@ -5,6 +5,7 @@ constraint to each shows, while something passes to it, the pose in which it arr
 nothing: their influences are keyed from what the keys of the transform say, see `actions.marks`.
 
 dependencies  whether a holder follows what it is to hold
+placing       where things are, and the components that put them there
 holders       the constraints, and what they are to
 keying        from a source to the keys of influences; NumPy alone
 problems      why something is not held as its keys say

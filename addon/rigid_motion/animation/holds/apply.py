@@ -7,15 +7,15 @@ from typing import Any, cast
 
 import bpy
 import numpy as np
-from mathutils import Euler, Matrix, Quaternion, Vector
+from mathutils import Matrix, Vector
 
 from ..actions.channels import ensure_group, key_points, replace_keys
 from ..actions.slots import Binding
-from ..evaluation.components import AXIS_ANGLE, LOCATION, PART_OF, ROTATION, ROWS, SCALE
+from ..evaluation.components import PART_OF
 from ..evaluation.sources import Source
 from ..fcurves.keys import BEZIER, CONSTANT, LINEAR
 from ..transforms import GROUP, Channel, Transform
-from .dependencies import follows
+from .dependencies import follows, node_of
 from .holders import (
     KINDS,
     Constraint,
@@ -24,20 +24,19 @@ from .holders import (
     add_passing,
     channel_of,
     constraints_to,
-    hang_of,
     holders_of,
     is_ours,
     keep_space,
     known_holder,
-    node_of,
     passings_in,
     passings_of,
     spoken_of,
 )
 from .keying import InfluenceKeys, Passing, holding_keys, passing, passing_keys
+from .placing import hang_of, matrices_of, poses_of, rows_of
 
 NEAR = 1e-4
-"""Frames of handles, and angles, that differ by less are the same."""
+"""Frames of handles that differ by less are the same."""
 
 
 def has_holders(binding: Binding) -> bool:
@@ -213,29 +212,9 @@ def _in_spaces(user: Transform, poses: Passing, offsets: dict[int, Matrix]) -> n
     for number, offset in {0: hang_of(user), **offsets}.items():
         at = np.flatnonzero(poses.numbers == number)
         if len(at) and offset != Matrix():
-            axes, turn = np.array(offset.to_3x3()), offset.to_quaternion()
-            places = axes @ rows[ROWS[LOCATION], at] + np.array(offset.translation)[:, None]
-            rows[ROWS[LOCATION], at] = places
-            rows[ROWS[SCALE], at] *= abs(np.linalg.det(axes)) ** (1 / 3)
-            if turn.angle > NEAR:
-                rows[ROWS[ROTATION], at] = _turned(rows[ROWS[ROTATION], at], turn, user.order)
+            placed = np.array(offset) @ matrices_of(rows[:, at], user.order)
+            rows[:, at] = rows_of(*poses_of(placed), user, rows[:, at[0]])
     return rows
-
-
-def _turned(rotations: np.ndarray, turn: Quaternion, order: str | None) -> np.ndarray:
-    """Return rotations (4, m) by channels of an order, turned by another one."""
-    result = rotations.copy()
-    for column, values in zip(result.T, rotations.T.tolist(), strict=True):
-        if order is None:
-            column[:] = turn @ Quaternion(values)
-        elif order == AXIS_ANGLE:
-            axis, angle = (turn @ Quaternion(values[1:], values[0])).to_axis_angle()
-            column[0], column[1:] = angle, axis
-        else:
-            column[:3] = (turn @ Euler(values[:3], order).to_quaternion()).to_euler(
-                cast(Any, order), Euler(values[:3], order)
-            )
-    return result
 
 
 def _slot_of(binding: Binding) -> bpy.types.ActionSlot:

@@ -8,7 +8,7 @@ from typing import cast
 
 import bpy
 
-from ..transforms import bone_name, split_path
+from ..transforms import Transform, bone_name, split_path
 
 Node = tuple[bpy.types.Object, str]
 """An object, and the name of one of its bones; "" for the object itself."""
@@ -16,6 +16,11 @@ Node = tuple[bpy.types.Object, str]
 
 Chain = tuple[bpy.types.Constraint, set[str]]
 """A constraint that moves a chain of bones, and the names of those of them that are above its own."""
+
+
+def node_of(user: Transform) -> Node:
+    """Return what a transform is to others."""
+    return user.animated, user.carrier.name if user.is_part else ""
 
 
 def follows(node: Node, other: Node) -> bool:

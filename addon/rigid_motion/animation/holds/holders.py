@@ -20,7 +20,7 @@ from ..actions.marks import MOST, hold
 from ..actions.slots import Binding, slots_alone
 from ..evaluation.sources import Source
 from ..transforms import Channel, Refused, Transform, transform_of
-from .dependencies import Node
+from .placing import channel_space, converted, hang_of, hangs_on_bone, world_of
 
 Constraint = Any
 """A *Child Of* or *Action* constraint, which have different properties."""
@@ -37,39 +37,6 @@ ROUNDING = 1e-5
 """Scales that differ from one by less do so for rounding."""
 
 TOO_MANY = n_("{name} has had {most} holders, and keys cannot tell more apart: remove constraints that hold nothing")
-
-
-def world_of(obj: bpy.types.Object, bone: str, depsgraph: bpy.types.Depsgraph) -> Matrix:
-    """Return where an object or one of its bones is, "" for none."""
-    evaluated = obj.evaluated_get(depsgraph)
-    matrix = evaluated.matrix_world
-    return matrix @ cast(bpy.types.Pose, evaluated.pose).bones[bone].matrix if bone else matrix.copy()
-
-
-def hang_of(user: Transform) -> Matrix:
-    """Return where the space of a transform's channels is in what `own_space` says."""
-    obj = user.animated
-    if not _hangs_on_bone(user):
-        return Matrix()
-    bone = cast(Any, obj.parent).data.bones[obj.parent_bone]
-    end = bone.matrix_local.inverted() if bone.use_relative_parent else Matrix.Translation((0.0, bone.length, 0.0))
-    return end @ obj.matrix_parent_inverse
-
-
-def channel_space(user: Transform, depsgraph: bpy.types.Depsgraph) -> Matrix:
-    """Return where the space of a transform's channels is in the world where nothing holds it.
-
-    Of bones some inherit location otherwise than rotation; theirs is that of a bone at rest.
-    """
-    obj = user.animated
-    if user.is_part:
-        bone = cast(bpy.types.PoseBone, user.carrier)
-        return obj.convert_space(pose_bone=bone, matrix=Matrix(), from_space="LOCAL", to_space="WORLD")
-    if obj.parent is None:
-        return Matrix()
-    if _hangs_on_bone(user):
-        return world_of(obj.parent, obj.parent_bone, depsgraph) @ hang_of(user)
-    return world_of(obj.parent, "", depsgraph) @ obj.matrix_parent_inverse
 
 
 class Holder(NamedTuple):
@@ -97,6 +64,24 @@ class Holder(NamedTuple):
         """Return where the space of channels is that it holds."""
         assert self.target is not None
         return world_of(self.target, self.bone, depsgraph) @ self.offset
+
+
+def world_in(
+    user: Transform, holder: Holder | None, basis: Matrix, depsgraph: bpy.types.Depsgraph | None = None
+) -> Matrix:
+    """Return where channels that have this matrix put a transform in a holder; None is its parent or the world."""
+    if holder is None:
+        return converted(user, basis, "LOCAL", "WORLD", depsgraph)
+    return holder.matrix(depsgraph or bpy.context.evaluated_depsgraph_get()) @ basis
+
+
+def basis_in(
+    user: Transform, holder: Holder | None, world: Matrix, depsgraph: bpy.types.Depsgraph | None = None
+) -> Matrix:
+    """Return the matrix that channels need to have in a holder for a transform to be there in the world."""
+    if holder is None:
+        return converted(user, world, "WORLD", "LOCAL", depsgraph)
+    return holder.matrix(depsgraph or bpy.context.evaluated_depsgraph_get()).inverted_safe() @ world
 
 
 def number_of(constraint: Constraint) -> int | None:
@@ -183,7 +168,7 @@ def own_space(user: Transform) -> tuple[str, bpy.types.Object | None, str]:
     Blender's local space of an object knows its parent, but not the bone. Things without parents are in the world
     anyway, and in a space of their own where they have delta transforms.
     """
-    if _hangs_on_bone(user):
+    if hangs_on_bone(user):
         return "CUSTOM", user.animated.parent, user.animated.parent_bone
     return "LOCAL" if user.is_part or user.animated.parent is not None else "WORLD", None, ""
 
@@ -296,15 +281,6 @@ def _let_go(user: Transform, influence: Channel) -> None:
         if slot.is_editable and (bag := slot.channelbag) is not None and bag.fcurves.find(path, index=index) is None:
             first = min((curve.range()[0] for curve in bag.fcurves if curve.keyframe_points), default=0.0)
             bag.fcurves.new(path, index=index).keyframe_points.insert(first, 0.0)
-
-
-def _hangs_on_bone(user: Transform) -> bool:
-    obj = user.animated
-    return not user.is_part and obj.parent is not None and obj.parent_type == "BONE" and bool(obj.parent_bone)
-
-
-def node_of(user: Transform) -> Node:
-    return user.animated, user.carrier.name if user.is_part else ""
 
 
 def spoken_of(source: Source) -> tuple[dict[int, float], set[int]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
@@ -10,8 +12,8 @@ from ..actions.slots import Binding
 from ..evaluation.components import REST
 from ..evaluation.sources import Source
 from ..transforms import Refused, Transform
-from .dependencies import follows
-from .holders import channel_of, constraints_to, node_of, passings_in, spoken_of
+from .dependencies import follows, node_of
+from .holders import channel_of, constraints_to, passings_in, spoken_of
 
 STAYS = 1e-5
 """Values that differ by less stand still."""
@@ -20,6 +22,8 @@ ITSELF = n_("{name} cannot be held in itself: choose what holds it last, so that
 CYCLE = n_("{name} cannot be held in {holder}, which follows it: {holder} would wait for itself")
 REPEATS = n_("{name} repeats by Cycles, and cannot be held: bake the rounds to keys, or remove Cycles")
 DELTAS = n_("{name} has delta transforms: apply them first (Object > Apply > All Deltas)")
+HANGS = n_("{name} hangs on vertices or the path of its parent: parent it to the object or a bone instead (Ctrl P)")
+CONNECTED = n_("{name} is connected to its parent, which it cannot leave: disconnect it first (Alt P in Edit Mode)")
 LACKING = n_(
     "The keys of {name} say that it is held from frame {frame:g} on, but not in what: "
     "hold it there anew (Hold In), or undo what removed its constraint"
@@ -40,8 +44,21 @@ def refuse_motion(transform: Transform, source: Source | None) -> None:
     """Raise `Refused` where a transform that is keyed so cannot be held in anything."""
     if source is not None and any(keys.cycles is not None for keys in source.curves):
         raise Refused(REPEATS, name=transform.name)
+    refuse_space(transform)
+
+
+def refuse_space(transform: Transform) -> None:
+    """Raise `Refused` where no constraint knows the space of the channels of a transform, or moves it there."""
     if not np.allclose(transform.original(), REST, atol=STAYS):
         raise Refused(DELTAS, name=transform.name)
+    carrier, parent = transform.carrier, transform.animated.parent
+    if isinstance(carrier, bpy.types.PoseBone):
+        if carrier.bone.use_connect:
+            raise Refused(CONNECTED, name=transform.name)
+    elif parent is not None:
+        goes_along_path = parent.type == "CURVE" and cast(bpy.types.Curve, parent.data).use_path
+        if carrier.parent_type.startswith("VERTEX") or (carrier.parent_type != "BONE" and goes_along_path):
+            raise Refused(HANGS, name=transform.name)
 
 
 def refuse_holds(transform: Transform, binding: Binding, source: Source) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...motion import KEYFRAME_MODES
 from ..actions.channels import ensure_group
-from ..actions.modifiers import is_term, put_behind, terms_in
+from ..actions.modifiers import is_term, misplaced, put_behind, terms_in
 from ..actions.reading import influence_for
 from ..actions.slots import Binding
 from ..evaluation.components import MODE_NAMES
@@ -111,10 +111,10 @@ def _apply_to(fcurve: bpy.types.FCurve, named: Mapping[str, Term]) -> bool:
         write(modifier, term)
     if missing:
         _add(modifiers, missing, is_mixed=is_mixed)
-    if missing and is_mixed:
-        # What the animator has acts on what is seen.
-        for other in [other for other in modifiers if other.type != "CYCLES" and not is_term(other)]:
-            put_behind(fcurve, other)
+    # Python's references to what is made anew are lost: so only what would act on less than is seen.
+    for other in misplaced(fcurve) if is_mixed else ():
+        put_behind(fcurve, other)
+        changed = True
     return changed
 
 

@@ -1,0 +1,112 @@
+"""What animators do with what they hold, as steps of a machine that edits: hold, let go, pass, match."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+import bpy
+import numpy as np
+from hypothesis import strategies as st
+
+from rigid_motion import animation
+from tests.animation.editing import SAME_FRAME
+from tests.animation.holds.model import assert_held, poses_in_holders, world_of
+from tests.animation.keyed import HOLD_BITS, Carrier, curves_of, key_frames, snapshot
+from tests.animation.machine import Name, goes_on, shares, while_on
+from tests.animation.tool_steps import WithTools
+
+
+class WithHolds(WithTools):
+    """An animator who also has things be held."""
+
+    @property
+    def holders(self) -> list[Name]:
+        """The names of what something may be held in."""
+        return self.names
+
+    def _is_held(self, name: Name) -> bool:
+        """Whether its keys say that it is held in anything."""
+        source = animation.queries.keyed.source_of(self._found(name))
+        return source is not None and source.held is not None
+
+    def _is_passed_on(self, name: Name) -> bool:
+        source, frame = animation.queries.keyed.source_of(self._found(name)), bpy.context.scene.frame_current_final
+        return source is not None and any(abs(switch.frame - frame) < SAME_FRAME for switch in source.switches)
+
+    def _expected(self, name: Name, frames: Sequence[float]) -> np.ndarray:
+        return poses_in_holders(self._found(name), frames) if self._is_held(name) else super()._expected(name, frames)
+
+    def _frames_to_go_by(self, name: Name) -> np.ndarray:
+        return np.empty(0) if self._is_held(name) else super()._frames_to_go_by(name)
+
+    def _keyed(self) -> dict[Name, dict]:
+        """Without what follows from the keys, and without what they are held in, which others may come to say."""
+        result = {}
+        for name in self.names:
+            channels = snapshot(self._found(name))
+            result[name] = {
+                channel: (
+                    *rest,
+                    tuple((*k[:8], int(np.float32(k[8]).view(np.int32)) & ~HOLD_BITS, *k[9:]) for k in keys),
+                )
+                for channel, (*rest, keys) in channels.items()
+                if not channel[0].startswith("constraints")
+            }
+        return result
+
+    def _snaps(self, name: Name) -> bool:
+        """Blender moves what passes by a part of it alone, and snaps what is held to where it would be in the world."""
+        return not self._is_held(name)
+
+    def _assert_held(self, name: Name, frames: np.ndarray) -> None:
+        """It is where its keys say on some frames, in what they say."""
+        prop = self._found(name)
+        keys = key_frames(prop)
+        # Blender's own curves go on outside of the keys.
+        inside = frames[(frames >= keys[0]) & (frames <= keys[-1])] if len(keys) and goes_on(prop) else frames
+        if len(keys) and len(inside):
+            assert_held([prop], inside)
+
+    @while_on(who=shares, by=st.none() | shares, over=st.none() | st.integers(0, 9))
+    def hold(self, who, by, over):
+        """It stays where it is seen."""
+        name = self._named(who)
+        prop, holder = self._found(name), None if by is None else self.holders[int(by * len(self.holders))]
+        if not self._may_be_held(name) or any(curve.mute for curve in curves_of(prop).values()):
+            return
+        seen = world_of(prop)
+
+        def act(prop: Carrier) -> None:
+            animation.hold_in(prop, holder and self._found(holder), frames=over)
+
+        self._if_possible(name, act)
+        self._assert_seen_at(name, seen)
+        frame = bpy.context.scene.frame_current_final
+        bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
+        self._assert_seen_at(name, seen)
+
+    def _assert_seen_at(self, name: Name, then: np.ndarray) -> None:
+        """It is still seen where it was in the world."""
+        bpy.context.view_layer.update()
+        now = world_of(self._found(name))
+        error = np.abs(now - then).max()
+        assert error < 1e-5 * max(1.0, np.abs(then).max()), f"{name} jumped by {error} from\n{then}\nto\n{now}"
+
+    def _may_be_held(self, name: Name) -> bool:
+        return True
+
+    @while_on(who=shares, over=st.integers(0, 9))
+    def choose_over_how_many_frames_it_passes(self, who, over):
+        self._if_possible(self._named(who), lambda prop: animation.pass_frames(prop, over))
+
+    @while_on(who=shares)
+    def match_grips(self, who):
+        self._if_possible(self._named(who), animation.match_grip)
+
+    def _if_possible(self, name: Name, act: Callable[[Carrier], None]) -> None:
+        def change() -> None:
+            with suppress(animation.Refused):
+                act(self._found(name))
+
+        self._edit(change, lambda made, after: None)
