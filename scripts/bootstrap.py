@@ -81,6 +81,9 @@ GLTF = (".glb", ".gltf", ".vrm", ".vrma")
 TABLES = (".csv", ".tsv", ".txt", ".tum", ".chan", ".g2o", ".json")
 """Endings of the inputs that reduce needs none for, of tables only where no other files are made of them."""
 
+IN_BLENDER = (".blend", ".bvh", ".fbx")
+"""Endings of those that it needs one for, and takes of folders."""
+
 
 def main(arguments: list[str]) -> int:
     """Set up, run, and pass on the exit code."""
@@ -161,7 +164,8 @@ def _is_program(arguments: list[str]) -> bool:
 def _is_without_blender(arguments: list[str]) -> bool:
     """Return whether all inputs of reduce are glTF files that stay such, or tables that become tables.
 
-    What follows an option is its value, unless it is there as a file: better a Blender too many than one too few.
+    What follows an option is its value, unless it is there as a file: better a Blender too many than one too few. Of
+    folders what is in them counts.
     """
     inputs = [
         argument
@@ -170,7 +174,14 @@ def _is_without_blender(arguments: list[str]) -> bool:
         and (not before.startswith("-") or (before != "--output" and _is_there(argument)))
     ]
     endings = GLTF if "--glb" in arguments else (*GLTF, *TABLES)
-    return bool(inputs) and all(name.lower().endswith(endings) for name in inputs) and "--blend" not in arguments
+    files = [name for given in inputs for name in (_in_folder(given) if os.path.isdir(given) else [given])]
+    return bool(inputs) and all(name.lower().endswith(endings) for name in files) and "--blend" not in arguments
+
+
+def _in_folder(folder: str) -> list[str]:
+    """Return the names of the files in a folder and below it that reduce takes."""
+    endings = (*GLTF, *IN_BLENDER, *TABLES)
+    return [name for _, _, names in os.walk(folder) for name in names if name.lower().endswith(endings)]
 
 
 def _is_there(source: str) -> bool:

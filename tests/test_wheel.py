@@ -12,6 +12,7 @@ import pytest
 
 from rigid_motion_batch.cli.commands import COMMANDS
 from rigid_motion_batch.places import CHECKOUT, manifest
+from tests.gltf.making import walk
 from tests.thoroughness import sample
 
 BESIDES = (
@@ -33,17 +34,27 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the commands of an environment with the wheel, NumPy and Blender alone."""
-    folder = tmp_path_factory.mktemp("environment")
+    """The command of an environment with the wheel, what it depends on, and Blender."""
+    return command_of(tmp_path_factory.mktemp("environment"), wheel, BESIDES)
+
+
+@pytest.fixture(scope="module")
+def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The command of an environment with the wheel and NumPy alone."""
+    return command_of(tmp_path_factory.mktemp("bare"), wheel, ("numpy",))
+
+
+def command_of(folder: Path, wheel: Path, besides: tuple[str, ...]) -> Path:
+    """The command `rigid-motion` of an environment that is made in a folder, with these packages beside the wheel."""
     made = venv.EnvBuilder(with_pip=False).ensure_directories(folder)
     venv.create(folder, with_pip=False)
     to = Path(made.env_dir) / "lib" / f"python{sys.version_info.major}.{sys.version_info.minor}" / "site-packages"
-    for name in BESIDES:
+    for name in besides:
         lend(name, to)
     options = ("--no-deps", "--no-index", "--disable-pip-version-check")
     done = run(sys.executable, "-m", "pip", "--python", made.env_exe, "install", *options, wheel)
     assert done.returncode == 0, done.stderr
-    return Path(made.bin_path)
+    return Path(made.bin_path) / "rigid-motion"
 
 
 def lend(name: str, to: Path) -> None:
@@ -66,6 +77,7 @@ def test_the_wheel_holds_two_packages_with_their_types_and_no_name_besides(wheel
         "rigid_motion_batch",
     }
     assert {"rigid_motion/py.typed", "rigid_motion_batch/py.typed", "rigid_motion/blender_manifest.toml"} <= {*names}
+    assert "rigid_motion/streams/tables.json" in names
     modules = {
         f"{package.name}/{path.relative_to(package).as_posix()}"
         for package in (CHECKOUT / "addon" / "rigid_motion", CHECKOUT / "scripts" / "rigid_motion_batch")
@@ -76,7 +88,7 @@ def test_the_wheel_holds_two_packages_with_their_types_and_no_name_besides(wheel
 
 
 def test_the_main_job_runs_on_the_motions_that_come_along(installed: Path, tmp_path: Path) -> None:
-    done = run(installed / "rigid-motion", "compare", "--no-video", "--rates", "5", cwd=tmp_path)
+    done = run(installed, "compare", "--no-video", "--rates", "5", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     report = Path(done.stdout.splitlines()[-1])
     assert report == tmp_path / "renders" / "comparison" / "report.html"
@@ -87,33 +99,60 @@ def test_the_main_job_runs_on_the_motions_that_come_along(installed: Path, tmp_p
 
 
 def test_the_zip_for_blender_is_the_same_as_from_the_checkout(installed, tmp_path, extension_zip):
-    done = run(installed / "rigid-motion", "build", "--output", tmp_path)
+    done = run(installed, "build", "--output", tmp_path)
     assert done.returncode == 0, done.stderr
     assert Path(done.stdout.strip()).read_bytes() == extension_zip.read_bytes()
 
 
 @pytest.mark.parametrize("command", sample(list(COMMANDS)))
 def test_help_shows_every_command_as_it_is_typed(command: str, installed: Path) -> None:
-    done = run(installed / "rigid-motion", command, "--help")
+    done = run(installed, command, "--help")
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith(f"usage: rigid-motion {command}")
     assert "python scripts/" not in done.stdout.replace("python scripts/bootstrap.py tasks", "")
 
 
 def test_a_command_that_there_is_not_is_said(installed: Path) -> None:
-    done = run(installed / "rigid-motion", "compair")
+    done = run(installed, "compair")
     assert done.returncode == 2
     assert "'compair'" in done.stderr
     assert "compare" in done.stderr
-    assert run(installed / "rigid-motion", "--version").stdout == f"rigid-motion {manifest()['version']}\n"
+    assert run(installed, "--version").stdout == f"rigid-motion {manifest()['version']}\n"
 
 
-def test_without_blender_a_command_says_what_brings_it(wheel: Path, tmp_path: Path) -> None:
-    without = "import sys; sys.modules['bpy'] = None; sys.path.insert(0, sys.argv.pop()); sys.argv[0] = 'rigid-motion'"
-    code = f"{without}; from rigid_motion_batch.cli.commands import main; sys.exit(main(['bake', 'shot.blend']))"
-    with zipfile.ZipFile(wheel) as opened:
-        opened.extractall(tmp_path)
-    done = run(sys.executable, "-c", code, tmp_path, cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.startswith("rigid-motion bake: ")
-    assert "pip install '.[blender]'" in done.stderr
+NEEDS_BLENDER = "this needs Blender, which `pip install 'rigid-motion[blender]'` brings, with Python 3.11 or 3.13"
+
+
+def test_glb_files_are_reduced_and_looked_into_with_numpy_alone(bare: Path, tmp_path: Path) -> None:
+    (tmp_path / "clips").mkdir()
+    walk(joints=2, seconds=1.0).write(tmp_path / "clips" / "walk.glb")
+    done = run(bare, "reduce", "clips", "--output", "small", "--tolerance", "2mm", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, f"{Path('small', 'walk-reduced.glb')}\n"), done.stderr
+    done = run(bare, "inspect", "clips/walk.glb", "small/walk-reduced.glb", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("  body       walk") == 2
+
+
+def test_without_blender_what_needs_it_is_one_line_and_all_else_is_done(bare: Path, tmp_path: Path) -> None:
+    for command in ("bake", "reduce"):
+        done = run(bare, command, "shot.blend", cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (2, f"rigid-motion {command}: {NEEDS_BLENDER}\n")
+    (tmp_path / "clips").mkdir()
+    walk(joints=2, seconds=1.0).write(tmp_path / "clips" / "walk.glb")
+    (tmp_path / "clips" / "run.fbx").touch()
+    done = run(bare, "reduce", "clips", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (1, f"{Path('clips', 'walk-reduced.glb')}\n")
+    assert f"{Path('clips', 'run.fbx')}: {NEEDS_BLENDER}\n" in done.stderr
+
+
+def test_what_a_comparison_draws_with_is_one_line_where_it_is_missing(
+    bare: Path, wheel: Path, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    missing = {"filelock": bare}
+    missing["vl_convert"] = command_of(
+        tmp_path_factory.mktemp("plain"), wheel, tuple({*BESIDES} - {"bpy", "vl-convert-python"})
+    )
+    for module, command in missing.items():
+        done = run(command, "compare", "--no-video", cwd=tmp_path)
+        said = f"this needs the module {module}, which `pip install 'rigid-motion[compare]'` brings"
+        assert (done.returncode, done.stderr) == (2, f"rigid-motion compare: {said}\n")

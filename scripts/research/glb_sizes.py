@@ -1,137 +1,239 @@
 """Animations of GLB files made smaller: reduce, gltf-transform and gltfpack side by side.
 
-    python scripts/research glb_sizes walk.fbx run.bvh --tools FOLDER
+    python scripts/research glb_sizes --hand-made walk.fbx fox.glb --mocap run.bvh --avatars run.bvh --tools FOLDER
 
-`--tools` is the folder with the programs `gltfpack` and `gltf-transform`, as `npm install gltfpack
-@gltf-transform/cli` puts them into `node_modules/.bin`; each that is missing is left out. What the files show is worked
-out by matrices, with nothing of the program.
+GLB files are taken as they are, all others are exported by Blender, avatars with a skin and an expression. `--tools` is
+the folder with the programs `gltfpack` and `gltf-transform`, as `npm install gltfpack @gltf-transform/cli` puts them
+into `node_modules/.bin`; without it they are left out, and so is what they decode.
 """
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from functools import cache, partial
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import bpy
+import brotli
 import numpy as np
 
+from research.glb_bodies import HEIGHT, export
+from research.glb_playing import animation_bytes, errors_of, opened, size_of
+from research.pages import FIGURES
 from research.studies import publish, report, study_parser
-from rigid_motion.gltf import Options, reduce_file
-from rigid_motion.gltf.accessors import stored_size
-from rigid_motion.gltf.documents import read_document
 from rigid_motion_batch.analysis.metrics import geometric_mean
-from tests.gltf.player import File, eighths
+from rigid_motion_batch.cli import reduce
 
-HEIGHT, RADIUS = 1.7, 0.03  # metres
-TOLERANCES = (1e-4, 1e-3, 5e-3)  # metres
+RADIUS = 0.03
+"""Metres: what is looked at around joints of a body of that height; of larger ones in proportion."""
 
-TOOLS = {
-    "gltf-transform `resample`": ("gltf-transform", "resample", "{0}", "{1}"),
-    "gltfpack `-noq`": ("gltfpack", "-i", "{0}", "-o", "{1}", "-kn", "-noq"),
-    "gltfpack, its defaults": ("gltfpack", "-i", "{0}", "-o", "{1}", "-kn"),
-}
-"""Programs beside, with the arguments that make one file another."""
+TOLERANCES = (1e-4, 1e-3, 5e-3)
 
+WAYS = ("", " --curves", " --meshopt")
+"""Options of reduce."""
 
-def points(file: File, clip: str | None, times: np.ndarray, names: list[str]) -> np.ndarray:
-    """Return where the heads of nodes and points beside them are in the world, shape (nodes, times, 7, 3)."""
-    numbers = {node.get("name"): number for number, node in enumerate(file.json["nodes"])}
-    worlds = file.worlds(clip, times)[[numbers[name] for name in names]]
-    axes = np.swapaxes(worlds[..., :3, :3], -1, -2)
-    axes = RADIUS * axes / np.linalg.norm(axes, axis=-1, keepdims=True)
-    heads = worlds[..., None, :3, 3]
-    return np.concatenate((heads, heads + axes, heads - axes), axis=-2)
+NEEDS_TOOLS = " --meshopt"
 
+GROUPS = {"hand_made": "Hand-made", "mocap": "Motion capture", "avatars": "Avatars"}
 
-def errors_of(original: File, smaller: File, clip: str) -> np.ndarray:
-    """Return how far each node is off at eighths of the gaps between the keys of both files, shape (nodes, times).
+EXPORTED, RESAMPLED = "as exported", "gltf-transform `resample`"
+NOT_PACKED, DEFAULTS = "gltfpack `-noq -af 0`", "gltfpack `-cc`, its defaults"
 
-    Without the clip it rests.
-    """
-    kept = clip if any(animation["name"] == clip for animation in smaller.json["animations"]) else None
-    times = eighths(np.union1d(original.moments(clip), smaller.moments(kept)))
-    before, after = ({node.get("name") for node in file.json["nodes"]} for file in (original, smaller))
-    names = sorted((before & after) - {None})
-    there, truth = points(smaller, kept, times, names), points(original, clip, times, names)
-    return np.linalg.norm(there - truth, axis=-1).max(axis=-1)
+KINDS = ("animation", "file", "brotli")
+"""What is counted in bytes: all keys, whole files, and these as servers send them."""
+
+RATE_KEPT = {"-cc": "gltfpack `-cc -af 0`", "-cz": "gltfpack `-cz -af 0`"}
+"""How its animations are compressed, by EXT_ and by the newer KHR_meshopt_compression."""
+
+ROTATION_BITS, TRANSLATION_BITS = range(4, 17), range(6, 25)
+"""What its `-ar` and `-at` may be."""
 
 
-def animation_bytes(path: Path) -> int:
-    """Return the bytes of all keys of a file: times and values."""
-    document = read_document(path, in_memory=True)
-    samplers = [sampler for animation in document.json["animations"] for sampler in animation["samplers"]]
-    return sum(
-        stored_size(document.json, it) for it in {sampler[side] for sampler in samplers for side in ("input", "output")}
-    )
+def knows(way: str) -> bool:
+    """Return whether reduce has these options."""
+    try:
+        with redirect_stderr(StringIO()):
+            reduce.parse(["walk.glb", *way.split()])
+    except SystemExit:
+        return False
+    return True
 
 
-def beside(original: Path, smaller: Path, tool: str) -> dict[str, Any]:
-    """Return what a tool made of a file, with the errors of all clips."""
-    files = File(original), File(smaller)
-    errors = np.concatenate([errors_of(*files, clip["name"]).ravel() for clip in files[0].json["animations"]])
-    return {
-        "tool": tool,
-        "animation_bytes": animation_bytes(smaller),
-        "share": animation_bytes(smaller) / animation_bytes(original),
-        "file_bytes": smaller.stat().st_size,
-        "error_mm": 1e3 * errors.max(),
-        "within_tenth": (errors <= 1e-4).mean(),
-        "within_one": (errors <= 1e-3).mean(),
-    }
+class Measured:
+    """A body, and what each program makes of it."""
 
-
-def export(path: Path, output: Path) -> None:
-    """Import a body with Blender, scale it to `HEIGHT`, and export it with a key on every frame."""
-
-    def load(scale: float) -> bpy.types.Object:
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        if path.suffix.lower() == ".fbx":
-            bpy.ops.import_scene.fbx(filepath=str(path), global_scale=scale)
+    def __init__(self, path: Path, group: str, tools: Path | None, folder: Path) -> None:
+        self.tools, self.output = tools, folder / "smaller.glb"
+        self.exported = folder / "exported.glb"
+        if path.suffix.lower() == ".glb":
+            shutil.copyfile(path, self.exported)
         else:
-            options = {"use_fps_scale": False, "update_scene_fps": True, "update_scene_duration": True}
-            bpy.ops.import_anim.bvh(filepath=str(path), global_scale=scale, **options)
-        return next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+            export(path, self.exported, as_avatar=group == "avatars")
+        self.original = opened(self.exported, tools)
+        self.scale = size_of(self.original) / HEIGHT
+        self.cheapest = cache(self._cheapest)
 
-    rig = load(1.0)
-    heads = np.array([rig.matrix_world @ bone.head_local for bone in rig.data.bones])
-    load(HEIGHT / float(np.ptp(heads, axis=0).max()))
-    ends = [frame for action in bpy.data.actions for frame in action.frame_range]
-    scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = int(min(ends)), int(max(ends))
-    bpy.ops.export_scene.gltf(filepath=str(output), export_format="GLB")
+    def ways(self) -> Iterator[tuple[str, Callable[[], dict[str, Any]]]]:
+        """Yield the names of all rows, and what makes them."""
+        yield EXPORTED, partial(self._row, self.exported)
+        for tolerance in TOLERANCES:
+            within = f"within {1e3 * tolerance:g} mm"
+            for way in filter(knows, WAYS):
+                if self.tools or way != NEEDS_TOOLS:
+                    yield f"reduce{way}, {within}", partial(self._reduced, way, tolerance)
+            for flag, name in RATE_KEPT.items() if self.tools else ():
+                yield f"{name}, {within}", partial(self._packed_within, flag, tolerance)
+        if self.tools:
+            yield NOT_PACKED, partial(self._packed, "-noq", "-af", 0)
+            yield DEFAULTS, partial(self._packed, "-cc")
+            yield RESAMPLED, self._resampled
+
+    def _row(self, path: Path) -> dict[str, Any]:
+        content = path.read_bytes()
+        errors = errors_of(self.original, opened(path, self.tools), RADIUS * self.scale)
+        millimetres = {name: None if off is None else 1e3 * off / self.scale for name, off in errors.items()}
+        sizes = {"animation": animation_bytes(path), "file": len(content), "brotli": len(brotli.compress(content))}
+        return {**sizes, **millimetres}
+
+    def _reduced(self, way: str, tolerance: float) -> dict[str, Any]:
+        """Return a row of reduce; one without numbers where it leaves the file alone, which would grow."""
+        self.output.unlink(missing_ok=True)
+        given = {"--tolerance": tolerance * self.scale, "--radius": RADIUS * self.scale}
+        lengths = [part for name, length in given.items() for part in (name, f"{1e3 * length:.6f}mm")]
+        arguments = [str(self.exported), "--output", str(self.output), "--overwrite", "--jobs", "0"]
+        with redirect_stdout(StringIO()):
+            code = reduce.main([*arguments, *lengths, *way.split()])
+        assert code == 0
+        return self._row(self.output) if self.output.exists() else {}
+
+    def _packed_within(self, flag: str, tolerance: float) -> dict[str, Any]:
+        """Return a row of gltfpack with all frames, and the bits that take fewest bytes; none where none will do."""
+        bits = self.cheapest(tolerance)
+        return {} if bits is None else self._packed(flag, *_kept_in(bits)) | {"bits": "{}/{}".format(*bits)}
+
+    def _packed(self, *options: object) -> dict[str, Any]:
+        self._pack(*options)
+        return self._row(self.output)
+
+    def _pack(self, *options: object) -> None:
+        self._run("gltfpack", "-i", self.exported, "-o", self.output, "-kn", *options)
+
+    def _resampled(self) -> dict[str, Any]:
+        self._run("gltf-transform", "resample", self.exported, self.output)
+        return self._row(self.output)
+
+    def _run(self, program: str, *arguments: object) -> None:
+        found = shutil.which(program, path=str(self.tools))
+        assert found, f"{program} is not in {self.tools}"
+        subprocess.run([found, *map(str, arguments)], check=True, capture_output=True)
+
+    def _cheapest(self, tolerance: float) -> tuple[int, int] | None:
+        """Return the bits of rotations and of translations that take the fewest bytes within a tolerance, if any do."""
+        largest = tolerance * self.scale
+
+        def is_within(*bits: int) -> bool:
+            self._pack("-cc", *_kept_in(bits))
+            errors = errors_of(self.original, opened(self.output, self.tools), RADIUS * self.scale, largest)
+            return max(error or 0.0 for error in errors.values()) <= largest
+
+        def size(bits: tuple[int, int]) -> int:
+            self._pack("-cc", *_kept_in(bits))
+            return animation_bytes(self.output)
+
+        def least(of: range, fits: Any) -> int | None:
+            below, above = of.start - 1, of.stop
+            while above - below > 1:
+                middle = (below + above) // 2
+                below, above = (below, middle) if fits(middle) else (middle, above)
+            return above if above < of.stop else None
+
+        if not is_within(ROTATION_BITS[-1], TRANSLATION_BITS[-1]):
+            return None
+        fewest = least(ROTATION_BITS, lambda bits: is_within(bits, TRANSLATION_BITS[-1]))
+        found = []
+        for rotation in range(fewest or ROTATION_BITS.stop, ROTATION_BITS.stop)[:3]:
+            translation = least(TRANSLATION_BITS, lambda bits, rotation=rotation: is_within(rotation, bits))
+            found += [(rotation, translation)] if translation else []
+        return min(found, key=size, default=None)
 
 
-def measure(path: Path, tools: Path | None, folder: Path) -> list[dict[str, Any]]:
-    """Return what the exporter and each tool make of a body."""
-    exported, output = folder / f"{path.stem}.glb", folder / f"{path.stem}-smaller.glb"
-    export(path, exported)
-    result = [beside(exported, exported, "exported by Blender")]
-    for tolerance in TOLERANCES:
-        reduce_file(exported, output, Options(tolerance, RADIUS))
-        result.append(beside(exported, output, f"`reduce --tolerance {1e3 * tolerance:g}mm`"))
-    for name, (program, *given) in TOOLS.items():
-        if tools and (found := shutil.which(program, path=str(tools))):
-            arguments = [argument.format(exported, output) for argument in given]
-            subprocess.run([found, *arguments], check=True, capture_output=True)
-            result.append(beside(exported, output, name))
+def _kept_in(bits: tuple[int, ...]) -> tuple[object, ...]:
+    """Return the options by which gltfpack keeps all frames, in so many bits for rotations and translations."""
+    return ("-af", 0, "-ar", bits[0], "-at", bits[1])
+
+
+def means(clips: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return geometric means over clips of what each program leaves of the bytes as exported."""
+    result = []
+    for rows in zip(*(clip["tools"] for clip in clips), strict=True):
+        known = [(row, clip["tools"][0]) for row, clip in zip(rows, clips, strict=True) if "animation" in row]
+        shares = {
+            kind: float(geometric_mean(np.array([[row[kind] / first[kind]] for row, first in known]))[0])
+            for kind in KINDS
+            if known
+        }
+        result.append({"tool": rows[0]["tool"], "clips": len(known), **shares})
     return result
+
+
+def beside(clips: list[dict[str, Any]]) -> dict[str, dict[str, dict[str, float]]]:
+    """Return the bytes of reduce in those of gltfpack `-cc` within the same tolerance: geometric means over clips."""
+    result: dict[str, dict[str, dict[str, float]]] = {}
+    for tolerance in TOLERANCES:
+        within = f"within {1e3 * tolerance:g} mm"
+        for way in WAYS:
+            found: dict[str, list[float]] = {}
+            for clip in clips:
+                rows = {row["tool"]: row for row in clip["tools"]}
+                ours, theirs = (rows.get(f"{name}, {within}", {}) for name in (f"reduce{way}", RATE_KEPT["-cc"]))
+                for kind in KINDS if "file" in ours and "file" in theirs else ():
+                    found.setdefault(kind, []).append(ours[kind] / theirs[kind])
+            if found:
+                ratios = {kind: float(geometric_mean(np.array(own)[:, None])[0]) for kind, own in found.items()}
+                result.setdefault(within, {})[f"reduce{way}"] = ratios
+    return result
+
+
+def _known(root: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
+    """Return the rows of the figures as they are, by group, clip and tool."""
+    groups = json.loads((root / FIGURES / "benchmark_glb.json").read_text(encoding="utf-8"))["groups"]
+    return {
+        (title, clip["name"], row["tool"]): row
+        for title, group in groups.items()
+        for clip in group["clips"]
+        for row in clip["tools"]
+    }
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, and write the figures."""
     parser = study_parser("glb_sizes", __doc__)
-    parser.add_argument("bodies", type=Path, nargs="+", metavar="PATH", help="FBX and BVH files")
+    for group, title in GROUPS.items():
+        option = f"--{group.replace('_', '-')}"
+        parser.add_argument(option, type=Path, nargs="+", default=[], metavar="PATH", help=f"{title}: FBX, BVH, GLB")
     parser.add_argument("--tools", type=Path, metavar="FOLDER", help="where gltfpack and gltf-transform are")
+    parser.add_argument("--keep", action="store_true", help="measure only what the figures do not have yet")
     options = parser.parse_args(arguments)
-    clips = []
-    with tempfile.TemporaryDirectory() as folder:
-        for path in options.bodies:
-            report(path.name)
-            clips.append({"name": path.stem, "tools": measure(path, options.tools, Path(folder))})
-    shares = np.array([[row["share"] for row in clip["tools"]] for clip in clips])
-    means = dict(zip((row["tool"] for row in clips[0]["tools"]), geometric_mean(shares), strict=True))
-    given = f"...{' --tools ...' if options.tools else ''}"
-    return publish("benchmark_glb", {"clips": clips, "means": means}, options, given, Blender=bpy.app.version_string)
+    versions = {"Blender": bpy.app.version_string}
+    if options.tools:
+        said = subprocess.run([options.tools / "gltfpack", "-v"], capture_output=True, text=True).stdout
+        versions["gltfpack"] = said.split()[-1]
+    groups, known = {}, _known(options.root) if options.keep else {}
+    for group, title in GROUPS.items():
+        clips: list[dict[str, Any]] = []
+        for path in getattr(options, group):
+            report(f"{title}: {path.name}")
+            with tempfile.TemporaryDirectory() as folder:
+                ways = Measured(path, group, options.tools, Path(folder)).ways()
+                rows = [{"tool": tool} | (known.get((title, path.stem, tool)) or make()) for tool, make in ways]
+            clips.append({"name": path.stem, "tools": rows})
+            groups[title] = {"clips": clips, "means": means(clips), "beside": beside(clips)}
+            publish("benchmark_glb", {"groups": groups}, options, "...", **versions)
+    return 0

@@ -20,10 +20,8 @@ LICENSE = (CHECKOUT or EXTENSION) / "LICENSE"
 
 
 def brings(extra: str, command: str) -> str:
-    """Return what installs an extra: in a checkout a command does by itself, and elsewhere pip from the source."""
-    return (
-        f"`python scripts/bootstrap.py {command}`" if CHECKOUT else f"`pip install '.[{extra}]'` in the source's folder"
-    )
+    """Return what installs an extra: in a checkout a command does by itself, and elsewhere pip."""
+    return f"`python scripts/bootstrap.py {command}`" if CHECKOUT else f"`pip install 'rigid-motion[{extra}]'`"
 
 
 def output_folder(name: str) -> Path:

@@ -38,12 +38,30 @@ def missing_for_rendering() -> str | None:
 
 def require_blender(script: str) -> None:
     """Load Blender, or end the command of a script with code 2 and what to do about it."""
+    if problem := blender_problem(script):
+        print(f"{program_of(script)}: {problem}", file=sys.stderr)
+        sys.exit(2)
+
+
+def blender_problem(script: str) -> str:
+    """Load Blender, and return why that fails in a script and what to do about it; empty where it does not."""
     try:
         with ended_at_once(), silenced():  # Where OCIO is set, it says so.
             import bpy  # noqa: F401
     except ImportError as error:
-        print(f"{program_of(script)}: {error}\n{way_out(str(error), script)}", file=sys.stderr)
-        sys.exit(2)
+        return problem_of(error, script)
+    return ""
+
+
+def problem_of(error: ImportError, script: str = "compare.py") -> str:
+    """Return what is missing and what brings it: a line where pip has installed the program, a few in a checkout."""
+    if CHECKOUT or not isinstance(error, ModuleNotFoundError):
+        return f"{error}\n{way_out(str(error), script)}"
+    if error.name != "bpy":
+        return f"this needs the module {error.name}, which {brings('compare', 'compare')} brings"
+    return (
+        f"this needs Blender, which {brings('blender', 'compare')} brings, with Python {' or '.join(BLENDER_PYTHONS)}"
+    )
 
 
 def way_out(error: str, script: str = "compare.py") -> str:
@@ -57,16 +75,13 @@ def way_out(error: str, script: str = "compare.py") -> str:
         )
     module = re.search(r"No module named '([\w.]+)'", error)
     if module and module[1] != "bpy":
-        way = "python scripts/bootstrap.py, as in the README," if CHECKOUT else "pip install . in the source's folder"
-        return f"{way} brings it. A Blender that lacks it can run compare.py, which looks for it elsewhere."
+        way = "python scripts/bootstrap.py, as in the README, brings it."
+        return f"{way} A Blender that lacks it can run compare.py, which looks for it elsewhere."
     here = ".".join(map(str, sys.version_info[:2]))
     fitting = f"Python {' or '.join(BLENDER_PYTHONS)}"
     lines = [f"Blender has no wheel for Python {here}: use {fitting}."] if here not in BLENDER_PYTHONS else []
-    if CHECKOUT is None:
-        lines.append(f"{brings('blender', 'compare')} brings it, with {fitting}.")
-    else:
-        lines.append("Run this by `python scripts/bootstrap.py`, which installs it,")
-        lines.append(f"or inside Blender: blender --background --python scripts/{script} -- INPUT")
+    lines.append("Run this by `python scripts/bootstrap.py`, which installs it,")
+    lines.append(f"or inside Blender: blender --background --python scripts/{script} -- INPUT")
     return "\n".join(lines)
 
 

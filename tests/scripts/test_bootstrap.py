@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.cli.commands import COMMANDS
+from rigid_motion_batch.cli.reduce import IN_FOLDERS
 from rigid_motion_batch.recordings.gltf import ENDINGS
 from rigid_motion_batch.recordings.reading import JSON, TEXT
 from rigid_motion_batch.system_libraries import DEBIAN, way_out
@@ -111,20 +112,31 @@ def test_commands_say_what_they_do_where_there_is_no_blender():
         ("walk.glb --shared hand.csv:left", True),
         ("walk.glb gone.fbx", True),
         ("walk.glb --blend", True),
-        ("folder", True),
+        ("folder empty", False),
+        ("folder --glb --output gone", False),
+        ("shots", True),
         ("", True),
     ],
 )
 def test_gltf_files_and_tables_are_reduced_without_a_blender(installed, monkeypatch, tmp_path, arguments, is_needed):
     monkeypatch.chdir(tmp_path)
-    for name in ("small", "folder"):
-        (tmp_path / name).mkdir()
-    for name in ("walk.glb", "wave.vrma", "hand.csv"):
+    for name in ("small", "empty", "folder", "shots/b"):
+        (tmp_path / name).mkdir(parents=True)
+    for name in (
+        "walk.glb",
+        "wave.vrma",
+        "hand.csv",
+        "folder/Walk.GLB",
+        "folder/a.png",
+        "shots/a.glb",
+        "shots/b/c.fbx",
+    ):
         (tmp_path / name).touch()
     assert bootstrap.main(["reduce", *arguments.split()]) == 0
     assert [blender is not None for blender in installed] == [is_needed]
     assert bootstrap.GLTF == ENDINGS
     assert (*TEXT, *JSON) == bootstrap.TABLES
+    assert {*IN_FOLDERS} <= {*bootstrap.GLTF, *bootstrap.TABLES, *bootstrap.IN_BLENDER}
 
 
 @pytest.mark.parametrize("kind", ["", "ImportError: "])

@@ -63,7 +63,9 @@ def names(package: Path) -> list[str]:
 
 
 def test_the_zip_holds_the_modules_the_manifest_and_the_licence_and_nothing_else(extension_zip):
-    files = {path.relative_to(EXTENSION).as_posix() for kind in ("*.py", "*.po") for path in EXTENSION.rglob(kind)}
+    files = {
+        path.relative_to(EXTENSION).as_posix() for kind in ("*.py", "*.po", "*.json") for path in EXTENSION.rglob(kind)
+    }
     assert set(names(extension_zip)) == files | {"blender_manifest.toml", "LICENSE"}
     assert len(names(extension_zip)) == len(set(names(extension_zip)))
 

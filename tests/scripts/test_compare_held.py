@@ -76,7 +76,7 @@ def test_bodies_that_are_named_one_by_one_are_a_pair_in_that_order(tmp_path: Pat
 
 def test_a_pair_that_is_named_is_measured_and_not_found_twice(tmp_path: Path) -> None:
     toss = write_toss(tmp_path / "toss.csv", 300)
-    held = ["--held", "hold-tool", "hold-hand", "--held", "hold-hand", "toss"]
+    held = ["--held", "hold-hand", "hold-tool", "--held", "toss", "hold-hand"]
     assert run(f"{HOLD}:*", toss, *held, *FAST, "--quiet", "--output", tmp_path / "output") == 0
     found = rows_of(tmp_path / "output" / "slip.csv")
     assert [(row["clip_a"], row["clip_b"]) for row in found[::6]] == [("hold-tool", "hold-hand"), ("hold-hand", "toss")]
@@ -94,7 +94,7 @@ def test_a_pair_that_is_named_is_measured_and_not_found_twice(tmp_path: Path) ->
 def test_where_it_is_asked_for_the_verdict_begins_with_the_slip(
     tmp_path: Path, capsys: pytest.CaptureFixture, rate: str, said: str
 ) -> None:
-    asked = "--held", "hold-hand", "hold-tool", "--no-video", "--modes", "bezier,lerp_slerp,dq_sclerp", "--rates", rate
+    asked = "--held", "hold-tool", "hold-hand", "--no-video", "--modes", "bezier,lerp_slerp,dq_sclerp", "--rates", rate
     assert run(f"{HOLD}:*", *asked, "--output", tmp_path) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[-2].startswith(said)
@@ -107,9 +107,9 @@ def test_where_it_is_asked_for_the_verdict_begins_with_the_slip(
     ("named", "said"),
     [
         (("hold-hand", "hold-tol"), "there is no clip 'hold-tol': did you mean hold-tool?"),
-        (("hold-hand", "hold-hand"), "name two clips, the one that holds and the one that is held"),
+        (("hold-hand", "hold-hand"), "name two clips, the one that is held and the one that holds it"),
         (("hold-hand", "body"), "body is a whole body; name two rigid bodies"),
-        (("later", "hold-hand"), "they share no times, later lasts from 50 to 5"),
+        (("hold-hand", "later"), "they share no times, later lasts from 50 to 5"),
     ],
 )
 def test_a_pair_that_is_none_is_refused(

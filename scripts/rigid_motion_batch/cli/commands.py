@@ -13,7 +13,7 @@ from rigid_motion_batch import standard_streams
 from rigid_motion_batch.command_line import INSTALLED, did_you_mean, own_arguments, printable, program_of
 from rigid_motion_batch.places import EXTENSION, PACKAGE, manifest
 from rigid_motion_batch.supervising import begin_child, blender_program, ended_at_once, stop_signals, supervise
-from rigid_motion_batch.system_libraries import way_out
+from rigid_motion_batch.system_libraries import problem_of
 
 from .in_blender import NoEnvironment, become, elsewhere
 
@@ -23,6 +23,7 @@ RESEARCH = {
     "benchmark_live": "benchmark_live",
     "live_costs": "live_costs",
     "reduction": "reduction",
+    "curve_keys": "curve_keys",
     "glb_sizes": "glb_sizes",
     "rivals": "rivals",
     "stream_tables": "making.stream_tables",
@@ -106,7 +107,7 @@ def _main(arguments: list[str]) -> int:
     except ModuleNotFoundError as error:
         if not error.name or error.name.partition(".")[0] in (EXTENSION.name, PACKAGE.name, "research"):
             raise
-        print(f"{sys.argv[0]}: {error}\n{way_out(str(error))}", file=sys.stderr)
+        print(f"{sys.argv[0]}: {problem_of(error)}", file=sys.stderr)
         return 2
 
 

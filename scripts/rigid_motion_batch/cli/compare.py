@@ -59,6 +59,8 @@ def main(arguments: list[str]) -> int:
     try:
         if (requested := os.environ.get(VERSION)) and requested != (result := version_here()):
             raise RunError(f"this machine has {result}, and the bundle is of {requested}")
+        if not find_spec("vl_convert"):
+            raise RunError(f"this needs the module vl_convert, which {brings('compare', 'compare')} brings")
         blender = _blender(options)
         said = [argument for argument in arguments if argument not in SAYING]
         comparison = comparison_of(options, as_typed(PROGRAM, said, options.inputs), blender)

@@ -132,8 +132,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         nargs=2,
         action="append",
         default=[],
-        metavar=("CLIP", "HELD"),
-        help="measure how far the second of two clips slips in the first, which holds it, as is done for pairs that "
+        metavar=("TOOL", "HAND"),
+        help="measure how far the first of two clips slips in the second, which holds it, as is done for pairs that "
         "are found in a file; can be given several times",
     )
     add_reading_options(parser)

@@ -6,7 +6,7 @@ import argparse
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext
 
 from rigid_motion.live.sockets import Port
 from rigid_motion.motion import rms
@@ -15,20 +15,14 @@ from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.paths import Path
 from rigid_motion.streams.sender import KEEPALIVE
 from rigid_motion_batch.command_line import complain, path_line
-from rigid_motion_batch.progress import Progress, Stage
+from rigid_motion_batch.progress import Progress
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming import vmc
 from rigid_motion_batch.streaming.measuring import HEADERS
 from rigid_motion_batch.streaming.receiving import Receiving
-from rigid_motion_batch.streaming.rooms import (
-    EVERYWHERE,
-    HERE,
-    MOTION,
-    Room,
-    opened,
-)
+from rigid_motion_batch.streaming.rooms import EVERYWHERE, HERE, MOTION, Room, opened
 from rigid_motion_batch.streaming.sending import Sending, even_rate, found_held, hand_of, samples_of, together
 from rigid_motion_batch.streaming.written import Motion, Tracks, write_motions
 from rigid_motion_batch.supervising import report, stop_signals
@@ -49,10 +43,10 @@ ALMOST = 0.9
 def main(arguments: list[str]) -> int:
     """Do a command, and return the exit code."""
     options = parse(arguments)
-    command = {"send": send, "receive": receive, "router": router, "measure": measure}[options.command]
+    command = {"send": send, "receive": receive, "router": router, "measure": stream_measure.run}[options.command]
     stopped: list[int] = []
     try:
-        with stopping() if command is not measure else nullcontext(stopped) as stopped:
+        with stopping() if options.command != "measure" else nullcontext(stopped) as stopped:
             command(options, stopped)
         report(ended=True)
         return 128 + stopped[0] if stopped else 0
@@ -160,7 +154,7 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
         receiving.on_frame.append(lambda _: _complain(receiving.receiver))
         _say(f"{options.user} listens in {options.room}")
         until = time.monotonic() + (options.seconds or float("inf"))
-        with _stage(progress, "Receiving", options.seconds) as stage:
+        with progress.stage("Receiving", options.seconds) if options.seconds else nullcontext() as stage:
             if stage:
                 receiving.on_frame.append(lambda _: stage.reach(options.seconds - (until - time.monotonic())))
             receiving.hear(until, stopped)
@@ -190,11 +184,6 @@ def router(options: argparse.Namespace, stopped: list[int]) -> None:
             time.sleep(min(LOOK, max(until - time.monotonic(), 0.0)))
     finally:
         session.close()
-
-
-def measure(options: argparse.Namespace, _: list[int]) -> None:
-    """Measure what a recording costs."""
-    stream_measure.run(options)
 
 
 # What they have in common
@@ -247,11 +236,6 @@ def _error(motion: Motion, truth: Clip | None) -> str:
 def _complain(receiver: Receiver) -> None:
     for line in receiver.complaints():
         complain(PROGRAM, line)
-
-
-def _stage(progress: Progress, title: str, seconds: float | None) -> AbstractContextManager[Stage | None]:
-    """Return a stage of so many seconds, where they are known."""
-    return progress.stage(title, seconds) if seconds else nullcontext()
 
 
 def _say(*lines: str) -> None:

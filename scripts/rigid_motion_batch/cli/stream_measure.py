@@ -61,7 +61,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print numbers as JSON")
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: argparse.Namespace, _stopped: list[int]) -> None:
     """Measure, print and write. Raises TrajectoryError, OSError, RuntimeError or ValueError with what went wrong."""
     clips, _ = read_clips(options.recordings, options.axes, options.reading)
     if options.held:

@@ -7,4 +7,5 @@ baking       keys instead of modes, and back                        reducing    
 options      those that both commands have                          recordings  few keys of a recording
 blend_files  opening files safely, saving them whole                keyed_files recordings as files of their own
 gltf_files   glTF files with fewer keys                             exporting   .blend and FBX files as GLB files
+views        what a page shows of a glTF file that was reduced
 """

@@ -11,7 +11,7 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, replace
@@ -27,6 +27,7 @@ from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.supervising import blender_program, report
 
 from .planning import Job
+from .records import FileProblem
 from .reductions import as_text
 from .work import Doing, Outcome, Work
 
@@ -40,6 +41,8 @@ ROOMS = (
     "analysis",
     "keying",
     "recordings",
+    "report/data.py",
+    "report/reduced.py",
     "scenes/armature.py",
 )
 """The packages that the files that are written depend on."""
@@ -74,7 +77,15 @@ class Keyed(steps.Step, rooms=ROOMS):
         return {"outcome": doing.outcome}
 
 
-def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = None, *, as_json: bool = False) -> int:
+def do_all(
+    program: str,
+    jobs: Sequence[Job],
+    work: Work,
+    workers: int | None = None,
+    *,
+    as_json: bool = False,
+    page: Callable[[Sequence[Outcome]], Path] | None = None,
+) -> int:
     """Do all inputs, print the paths of what was written or JSON, and return the exit code.
 
     Parameters
@@ -85,6 +96,9 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
     work : Work
     workers : int, optional
         Processes; 0 for this one. One for each processor, and this one for a single input, where None.
+    as_json : bool
+    page : callable, optional
+        Writes a page on all of it, and returns its path; unless the session was stopped. Raises FileProblem.
     """
     stopped, unmatched = False, set()
     report(prints_paths=not as_json)
@@ -113,19 +127,32 @@ def do_all(program: str, jobs: Sequence[Job], work: Work, workers: int | None = 
                 progress.note(
                     f"{program}: --objects {name}: no object or bone of that name has anything to be {work.done}"
                 )
-    outcomes = session.in_order
+    outcomes, unwritten = session.in_order, False
+    paths = [path for outcome in outcomes for path in outcome.written]
+    if page and not stopped:
+        try:
+            paths.append(page(outcomes))
+            if as_json:
+                print(f"{program}: the page is {path_line(paths[-1])}", file=sys.stderr)
+        except FileProblem as problem:
+            unwritten = True
+            complain(program, problem)
     report(ended=True)
     if as_json:
         print(json.dumps([outcome.as_data() for outcome in outcomes], indent=1, ensure_ascii=False), flush=True)
     elif not work.dry_run:
-        for path in (path for outcome in outcomes for path in outcome.written):
+        for path in paths:
             print(path_line(path), flush=True)
     print(_summary(outcomes, len(jobs), work, interrupted=stopped), file=sys.stderr, flush=True)
     if stopped:
         return 130
     if all(outcome.unreadable for outcome in outcomes):
         return 2
-    return int(bool(unmatched) or any(outcome.refused or outcome.failed or outcome.incomplete for outcome in outcomes))
+    return int(
+        unwritten
+        or bool(unmatched)
+        or any(outcome.refused or outcome.failed or outcome.incomplete for outcome in outcomes)
+    )
 
 
 class _Session:

@@ -50,7 +50,7 @@ class Comparison:
     """A name in `axes.AXES`; None for the axes of each format."""
 
     held: tuple[tuple[str, str], ...] = ()
-    """Names of clips, one that holds another and that: pairs whose slip is measured beside those that are found."""
+    """Names of clips, one that is held and its holder: pairs whose slip is measured beside those that are found."""
 
     reading: ReadingOptions = AS_THE_FILE_SAYS
     radii: Radii = EVERYWHERE
@@ -126,12 +126,13 @@ def held_pairs(
             if known[name].facts.joints:
                 raise RunError(f"{said}: {name} is a whole body; name two rigid bodies")
         if names[0] == names[1]:
-            raise RunError(f"{said}: name two clips, the one that holds and the one that is held")
-        pair = known[names[0]], known[names[1]]
+            raise RunError(f"{said}: name two clips, the one that is held and the one that holds it")
+        pair = known[names[1]], known[names[0]]
         spans = [(clip.times[0], clip.times[-1]) for clip in map(read, pair)]
         if max(start for start, _ in spans) >= min(end for _, end in spans):
             lasts = " and ".join(
-                f"{name} lasts from {start:.6g} to {end:.6g} s" for name, (start, end) in zip(names, spans, strict=True)
+                f"{name} lasts from {start:.6g} to {end:.6g} s"
+                for name, (start, end) in zip(reversed(names), spans, strict=True)
             )
             raise RunError(f"{said}: they share no times, {lasts}; give both the same clock")
         result[frozenset(names)] = pair

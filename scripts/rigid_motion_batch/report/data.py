@@ -88,7 +88,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
     low, high = truth[drawn].min(axis=(0, 1)), truth[drawn].max(axis=(0, 1))
     truth = truth - (low + high) / 2.0
     size = (_extent(truth[drawn]) if body else mesh.size) or 1.0
-    cell = _nice(0.3 * size)
+    cell = nice(0.3 * size)
     recording = {
         "times": block.put(clip.times - begin, 4, 1e-6),
         "seen": block.put(seen, 4, 1.0),
@@ -105,7 +105,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
         "drawn": drawn.tolist(),
         "size": size,
         "cell": cell,
-        "grid": f"{1e3 * cell:g} mm" if cell < 0.01 else f"{100 * cell:g} cm" if cell < 1.0 else f"{cell:g} m",
+        "grid": size_as_text(cell),
         "box": [((low - high) / 2.0).tolist(), ((high - low) / 2.0).tolist()],
         "warnings": [
             {
@@ -151,7 +151,7 @@ def _choice_data(
                 "name": label(motion.modes[0]),
                 "also": [label(mode) for mode in motion.modes[1:]],
                 "rms": [1e3 * row.rms_shell_m, 1e3 * row.rms_position_m, row.rms_rotation_deg],
-                "errors": [block.put(row) for row in _peaks(motion.errors, every) * [[1e3], [1e3], [1.0]]],
+                "errors": [block.put(row) for row in peaks(motion.errors, every) * [[1e3], [1e3], [1.0]]],
                 "keys": block.put(motion.keys - first, 4, 1.0),
                 **_deviations(block, clip, motion, within, first),
             }
@@ -221,7 +221,7 @@ def _seen(clip: ClipResult) -> np.ndarray:
     return np.unique(np.concatenate(kept))
 
 
-def _peaks(errors: np.ndarray, every: int) -> np.ndarray:
+def peaks(errors: np.ndarray, every: int) -> np.ndarray:
     """Return the largest of every few samples, shape (3, about n / every)."""
     return np.maximum.reduceat(errors, np.arange(0, errors.shape[1], every), axis=1) if every > 1 else errors
 
@@ -236,10 +236,15 @@ def _factor(largest: float, seen_as: float) -> int:
     return next(factor for factor in FACTORS if factor * largest <= seen_as or factor == 1) if largest > NOTHING else 1
 
 
-def _nice(length: float) -> float:
+def nice(length: float) -> float:
     """1, 2 or 5 times a power of ten, at least this."""
     power = 10.0 ** floor(log10(length))
     return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= length)
+
+
+def size_as_text(metres: float) -> str:
+    """Return a length in the unit in which it has few digits."""
+    return f"{1e3 * metres:g} mm" if metres < 0.01 else f"{100 * metres:g} cm" if metres < 1.0 else f"{metres:g} m"
 
 
 def _extent(places: np.ndarray) -> float:

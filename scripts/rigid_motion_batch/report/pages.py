@@ -7,18 +7,15 @@ large for the page, are files beside it.
 from __future__ import annotations
 
 import base64
-import hashlib
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, fields
 from datetime import datetime
-from functools import cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import jinja2
 import numpy as np
 from markupsafe import Markup, escape
 
@@ -28,7 +25,7 @@ from rigid_motion_batch.analysis.metrics import Metrics
 from rigid_motion_batch.analysis.modes import description_of, label_of
 from rigid_motion_batch.analysis.needed import KeysNeeded
 from rigid_motion_batch.analysis.results import ClipResult
-from rigid_motion_batch.files import line_of, replacing, write_text
+from rigid_motion_batch.files import line_of, write_text
 from rigid_motion_batch.palette import ERROR_COLOURS, colours_on_pages
 from rigid_motion_batch.recordings.clips import ClipFacts
 
@@ -36,14 +33,10 @@ from . import charts, tables
 from .data import Mesh, clip_data, drill, json_in_page, mesh_data
 from .held import MOST_SAID, asked_first, slip_grids, slip_sentences, still_sentences
 from .numbers import LARGEST, MEASURES, MINUS, RMS_IS, Gathering, Numbers, digits, error_is, percent, who_else
+from .rendering import SCRIPTS, address, script_of, shaders, style, write_page
 from .settings import Settings
 from .tables import Joints, joints_of
 from .verdict import verdict
-
-HERE = Path(__file__).parent
-
-SCRIPTS = ("data", "mathematics", "state", "pointers", "drawing", "view", "chart", "tables", "page")
-"""The modules of the viewer, each after those that it imports."""
 
 IN_THE_PAGE = 5_000_000
 """Bytes of data of all clips; where they are more, each clip has a file beside the page."""
@@ -132,13 +125,13 @@ def write_report(
                 "clips": page.places,
                 "modes": list(numbers.modes),
                 "mesh": mesh_data(mesh),
-                "shaders": _shaders(),
+                "shaders": shaders(),
                 "ramp": ERROR_COLOURS,
                 "start": {"clip": start[0], "choice": start[1]},
             }
         ),
     }
-    _write(path, "page.html.j2", context)
+    write_page(path, "page.html.j2", context)
     return [path, *page.files]
 
 
@@ -183,7 +176,7 @@ def write_overview(
         "count": len(facts),
         "warned": sum(bool(fact.warnings) for fact in facts),
     }
-    _write(path, "overview.html.j2", context)
+    write_page(path, "overview.html.j2", context)
 
 
 # -- clips of a page --------------------------------------------------------------------------------------------------
@@ -248,17 +241,11 @@ class _Clips:
                 "clip": name,
                 "text": item.text,
                 "way_out": item.way_out,
-                "address": _address(name, choice, None if item.start_s is None else item.start_s - begin),
+                "address": address(name, choice, None if item.start_s is None else item.start_s - begin),
             }
             for name, warned, begin in self._warned
             for item in warned
         ]
-
-
-def _address(clip: str, choice: str, seconds: float | None = None) -> str:
-    """As the script's `addressOf` writes it."""
-    moment = "" if seconds is None else f",{max(seconds, 0.0):.3f}"
-    return f"#{quote(clip, safe='')},{quote(choice, safe='')}{moment}"
 
 
 def _start(
@@ -337,39 +324,16 @@ def _context(
         "deciding": numbers.deciding(0),
         "colours": [colours_on_pages(mode) for mode in numbers.modes],
         "descriptions": [description_of(mode) for mode in numbers.modes],
-        "style": Markup((HERE / "templates" / "page.css").read_text(encoding="utf-8")),
+        "style": style(),
         "most_tabs": MOST_TABS,
         "most_warnings": MOST_WARNINGS,
         "ramp": ERROR_COLOURS,
-    }
-
-
-@cache
-def _templates() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(HERE / "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.globals |= {
         "chart": charts.chart,
-        "address": _address,
         "needed_rows": tables.needed_rows,
         "csv": _csv,
         "label_of": label_of,
         "marked": marked,
-        "hash": lambda text: base64.b64encode(hashlib.sha256(text.encode()).digest()).decode(),
     }
-    environment.filters |= {"digits": digits}
-    return environment
-
-
-def _write(path: Path, template: str, context: Mapping[str, Any]) -> None:
-    with replacing(path) as stream:
-        stream.reconfigure(errors="backslashreplace")  # Names of files may be no text.
-        stream.writelines(_templates().get_template(template).generate(context))
 
 
 def _csv(rows: Sequence[Metrics]) -> str:
@@ -389,22 +353,3 @@ def marked(sentence: str, numbers: Numbers) -> Markup:
         return f"<{tag}>{match[0].replace(' ', NO_BREAK)}</{tag.partition(' ')[0]}>"
 
     return Markup(re.sub(rf"({known})|\b\d[\d.]*(?: (?:%|mm))?", mark, str(escape(sentence))))
-
-
-@cache
-def script_of(names: tuple[str, ...]) -> Markup:
-    """Return the modules as one: imports and exports are only there for each of them alone."""
-    texts = []
-    for name in names:
-        text = (HERE / "viewer" / f"{name}.js").read_text(encoding="utf-8")
-        text = re.sub(r"^import .*?;\n", "", text, flags=re.MULTILINE | re.DOTALL)
-        texts.append(re.sub(r"^export ", "", text, flags=re.MULTILINE))
-    return Markup("\n".join(texts))
-
-
-@cache
-def _shaders() -> dict[str, list[str]]:
-    """Return the sources of each program: of its vertices, and of its fragments."""
-    text = (HERE / "viewer" / "shaders.glsl").read_text(encoding="utf-8")
-    parts = re.split(r"^//// (\w+)\n", text, flags=re.MULTILINE)[1:]
-    return {name: sources.split("----\n") for name, sources in zip(parts[::2], parts[1::2], strict=True)}

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rigid_motion_batch.report.pages import script_of
+from rigid_motion_batch.report.rendering import script_of
 from tests.scripts.report import chromium
 
 NODE = shutil.which("node")

@@ -366,7 +366,7 @@ def test_without_zenoh_the_way_out_is_said(monkeypatch, capsys, hand):
         opened("peer")
     monkeypatch.setattr("rigid_motion_batch.places.CHECKOUT", None)
     assert main(["router"]) == 2
-    assert "pip install '.[stream]'" in capsys.readouterr().err
+    assert "pip install 'rigid-motion[stream]'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ const dataOf = (place, src = PAGE.clips[place].data) => new Promise((resolve, re
 });
 
 async function show({ clip, choice, t }) {
-  const place = Math.max(0, PAGE.clips.findIndex(({ name }) => name === clip)), own = ++last;
+  const place = Math.max(0, PAGE.clips.findIndex(({ name }) => name === clip)), own = ++last, playing = S.playing;
   const data = S.clip?.name === PAGE.clips[place].name ? S.clip : await dataOf(place);
   const recording = data === S.clip ? S.recording : await readRecording(data.recording);
   const found = await readChoice(data.choices.find(({ name }) => name === choice) ?? data.choices[0], recording);
@@ -36,6 +36,7 @@ async function show({ clip, choice, t }) {
   listModes();
   magnify(S.automatic ? found.factor : S.factor, S.automatic);
   if (t === undefined) toWorst(true); else [seek(t), follow(true, true)];
+  if (PAGE.plays) play(playing);
 }
 
 function listModes() {
@@ -121,3 +122,4 @@ addEventListener("beforeprint", () => all("details").forEach((one) => { one.open
 await openView();
 readColours();
 await show(fromHere() || PAGE.start).catch((error) => { $("about").textContent = error.message; });
+if (PAGE.plays && !matchMedia("(prefers-reduced-motion: reduce)").matches) play(true);

@@ -4,7 +4,7 @@ export const $ = (id) => document.getElementById(id);
 export const PAGE = JSON.parse($("page").textContent);
 export const UNITS = ["mm", "mm", "°"];
 export const S = { t: 0, low: 0, high: 1, playing: false, speed: 0.5, measure: 0, hidden: new Set(), hot: "", factor: 1,
-  automatic: true, layout: "", ghost: true, paths: true, follow: true };
+  automatic: true, layout: "", ghost: true, paths: true, follow: true, ...PAGE.begins };
 export const id = (motion) => motion.modes[0];
 export const shown = () => S.choice.motions.filter((motion) => !S.hidden.has(id(motion)));
 export const ink = (motion) => `--m${PAGE.modes.indexOf(id(motion))}`;
