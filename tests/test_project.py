@@ -83,7 +83,8 @@ def test_the_blenders_that_are_tested_are_named_everywhere():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     tested = project["tool"]["rigid-motion"]["blender"]
     installed = [f"bpy=={versions[0]}; python_version == '{python}'" for python, versions in tested.items()]
-    assert project["project"]["optional-dependencies"]["blender"] == installed
+    extras = project["project"]["optional-dependencies"]
+    assert extras["blender"] == [*installed, *extras["compare"]]
     workflow = (ROOT / ".github" / "workflows" / "tests.yml").read_text(encoding="utf-8")
     pairs = {(version, python) for python, versions in tested.items() for version in versions}
     assert {*re.findall(r'blender: "(.+?)", python: "(.+?)"', workflow)} == pairs

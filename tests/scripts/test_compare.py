@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -247,7 +248,7 @@ def test_the_report_is_opened_where_that_is_asked_for(short_clip, tmp_path, monk
 
 
 def test_without_blender_films_are_refused_and_numbers_are_not(short_clip, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(compare, "find_spec", lambda name: None)
+    monkeypatch.setattr(compare, "find_spec", lambda name: None if name == "bpy" else find_spec(name))
     monkeypatch.setattr(compare, "blender_program", lambda: "")
     assert run(short_clip, "--output", tmp_path / "out") == 2
     said = capsys.readouterr().err

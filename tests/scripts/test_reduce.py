@@ -29,11 +29,11 @@ from tests.scripts.reducing import (
 )
 
 
-@pytest.mark.parametrize("mode", ["motor_spline", "lerp_slerp"])
+@pytest.mark.parametrize("mode", ["motor_spline", "lerp_slerp", "BLENDER"])
 def test_an_object_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path, mode):
     path = object_file(tmp_path / "shot.blend")
     before = path.read_bytes()
-    assert run(path, "--tolerance", "5mm", "--mode", mode) == 0
+    assert run(path, "--tolerance", "5mm", *(["--curves"] if mode == "BLENDER" else ["--mode", mode])) == 0
     assert path.read_bytes() == before
     assert listed(tmp_path) == ["shot-reduced.blend", "shot.blend"]
     assert 0.0 < displacement(played(reduced_name(path), "Tool"), played(path, "Tool")) <= 5e-3 + ROUNDING
@@ -53,10 +53,11 @@ def test_a_tolerance_in_metres_is_that_in_a_scene_of_centimetres(tmp_path):
     assert 1e-3 < off <= 5e-3 + ROUNDING, "5 thousandths of a centimetre"
 
 
-def test_a_rig_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path, capsys):
+@pytest.mark.parametrize("options", [(), ("--curves",)])
+def test_a_rig_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path, capsys, options):
     path = rig_file(tmp_path / "shot.blend")
     before, probes = path.read_bytes(), ("at Root", "at Arm", "at Hand")
-    assert run(path, "--tolerance", "5mm") == 0
+    assert run(path, "--tolerance", "5mm", *options) == 0
     assert path.read_bytes() == before
     at_ends = np.zeros((1, 3))  # The end of a bone is as far from its head as its radius.
     assert 0.0 < displacement(played(reduced_name(path), *probes), played(path, *probes), at_ends) <= 5e-3 + ROUNDING

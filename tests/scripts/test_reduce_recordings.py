@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -29,6 +30,8 @@ from tests.scripts.reducing import (
     worlds_of,
     write_csv,
 )
+
+REACH = Path(__file__).resolve().parents[2] / "assets" / "reach.csv"
 
 
 @pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp"])
@@ -90,8 +93,11 @@ def test_frames_are_the_samples_of_a_recording_whose_rate_is_no_whole_number(tmp
     assert all(key.co.x == round(key.co.x) for key in keys)
 
 
-@pytest.mark.parametrize("options", [(), ("--shared",)])
-def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, options):
+BY_MODE = "--mode", "motor_spline"
+
+
+@pytest.mark.parametrize("options", [BY_MODE, (*BY_MODE, "--shared"), (), ("--curves", "--shared")])
+def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, capsys, options):
     source = hand_made(tmp_path)
     assert run(source, "--tolerance", "5mm", "--output", tmp_path / "keyed", *options) == 0
     made = tmp_path / "keyed" / "body-keys.blend"
@@ -105,15 +111,29 @@ def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, 
         (rig,) = bpy.data.objects
         keyed = [bone for bone in rig.pose.bones if len(key_frames(bone))]
         assert sum(len(key_frames(bone)) for bone in keyed) < len(keyed) * len(clip.times)
-        assert {mode for bone in keyed for mode in modes_of(bone, key_frames(bone)[:-1])} == {"motor_spline"}
+        modes = {mode for bone in keyed for mode in modes_of(bone, key_frames(bone)[:-1])}
+        assert modes == {"motor_spline" if "--mode" in options else "BLENDER"}
         assert len(bpy.data.actions) == 1, "the recording has the dense keys, and this file need not"
+
+    told = "curves of Blender's own, as motor_spline would leave" in capsys.readouterr().err
+    assert told == (options == ()), "which needed fewer keys is said where neither was asked for"
+
+
+def test_a_rigid_motion_becomes_curves_in_a_file_alone(tmp_path, capsys):
+    assert run(REACH, "--curves", "--tolerance", "1mm", "--output", tmp_path) == 0
+    assert listed(tmp_path) == ["reach-keys.blend"]
+    assert re.search(
+        r"reduced, 424 -> \d\d keys, \S+ mm off at most \(1 mm allowed\) on frames", capsys.readouterr().err
+    )
+    assert run(REACH, "--curves", "--output", tmp_path / "reach.csv") == 1
+    assert "what has curves becomes a .blend file: name that with --output" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("body", [mixed_rates, curved])
 def test_the_tolerance_holds_at_every_key_of_every_curve_and_between_them(tmp_path, capsys, body):
     body = body()
     source = body.write(tmp_path / "walk.glb")
-    assert run(source, "--blend") == 0
+    assert run(source, "--blend", "--mode", "motor_spline") == 0
     told = re.search(r"(\S+) mm off at most \(5 mm allowed\)", capsys.readouterr().err)
     assert told is not None
     assert float(told[1]) <= 5.0

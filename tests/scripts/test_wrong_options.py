@@ -32,6 +32,7 @@ REFUSED = {
         (["a.csv", "--output", "b.glb"], "add --glb, and a.csv becomes a GLB file"),
         (["a.glb", "--output", "b.blend"], "a.glb becomes a .glb file here: name such a one"),
         (["a.blend", "--mode", "BLENDER"], "invalid choice"),
+        (["a.blend", "--mode", "dq_sclerp", "--curves"], "--curves and --mode exclude one another"),
         (["a.csv", "--fps", "29.97"], "is no number of frames a second; give a whole number from 1 to 240"),
         (["a.csv", "--degrees"], "--degrees is for Euler angles"),
         (["a.csv", "--in-place"], "--in-place is for .blend files, and a.csv is none"),

@@ -33,6 +33,8 @@ UNSEEN = {
     "It has keys for in-betweens too",
     "It has few of the keys",
     "The tolerance that was offered last, for as long as nobody sets another",
+    "The mode that was chosen last, for as long as nobody chooses another",
+    "Whether a mode was chosen since the operator was called",
     "File Filter",
     "Files that the dialog shows",
     "The rig that the table is for",

@@ -8,9 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import bake, hold_in, set_enabled, set_mode, unbake, write_channel
+from rigid_motion.animation import bake, hold_in, pass_frames, set_enabled, set_mode, unbake, write_channel
 from rigid_motion.ui.panels import MANY, facts_and_notes
-from rigid_motion.ui.wording import AT_REST, BAKED, OUT_OF_DATE, STRIPS
+from rigid_motion.ui.wording import BAKED, OUT_OF_DATE, PASSES, RESTS, STRIPS
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
 from tests.ui.conftest import keyed
@@ -48,8 +48,10 @@ def test_between_keys_in_different_hands_there_is_no_segment(tool):
     bpy.context.scene.frame_set(21)
     hold_in(tool, hand)
     assert notes_on(tool, 15.0) == ([], "motor_spline")
-    assert notes_on(tool, 20.5) == ([AT_REST], None)
-    assert notes_on(tool, 25.0) == ([AT_REST], None)
+    assert notes_on(tool, 20.5) == ([RESTS.format(frame=21)], None)
+    assert notes_on(tool, 25.0) == ([RESTS.format(frame=41)], None)
+    pass_frames(tool, 4)
+    assert notes_on(tool, 38.0) == ([PASSES.format(frame=41)], None)
 
 
 def test_what_is_baked_can_be_un_baked(tool):

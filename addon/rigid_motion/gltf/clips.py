@@ -63,6 +63,9 @@ class Options:
     channels: str = NEEDED_CHANNELS
     """One of CHANNELS: whether those in which a node is as it rests keep a key, also where nothing else moves it."""
 
+    curves: bool = False
+    """Whether cubic curves take the place of lines where these need more keys: see `curves`."""
+
     run: Run = map
     """What has stretches of long clips searched, called as `map` is, with functions of modules."""
 
@@ -89,6 +92,12 @@ class ReducedClip:
 
     slides: tuple[float, float] = (0.0, 0.0)
     """How far joints slide that stand on the ground, before and after."""
+
+    between: float = 0.0
+    """Of curves: the largest displacement of what is seen between frames, from lines from one to the next."""
+
+    lines: int = 0
+    """Of curves: how many keys these channels would have needed with lines."""
 
 
 class _LargerError(Exception):
@@ -135,10 +144,7 @@ class ClipReduction:
         self.tolerance = options.tolerance
         self.before = before
         channels = [Channel(world, track, self.tolerance) for track in clip.all_tracks]
-        moved = [
-            channel.times for channel in channels if channel.track.path != WEIGHTS and not channel.track.is_constant
-        ]
-        times = np.unique(np.concatenate([world.times, *moved]))
+        times = self._moments(world, channels)
         self.world = world if np.array_equal(times, world.times) else replace(world, times=times)
         self.given = by_target(clip.pointers)
         """The tracks that stay."""
@@ -162,12 +168,21 @@ class ClipReduction:
             return self._kept(LARGER)
         if result is None:
             return self._kept(NEEDED)
-        tracks, worst = result
+        return self._result(*result)
+
+    def _result(self, tracks: list[StoredTrack], worst: Worst) -> ReducedClip:
         after = self._amount(tracks)
         slides, where = self.feet.slides(self._shown(tracks)), self._told(worst)
         return ReducedClip(
             self.clip.number, self.clip.name, tuple(tracks), "", self.before, after, worst.error, where, slides
         )
+
+    def _moments(self, world: World, channels: Sequence[Channel]) -> np.ndarray:
+        """Return the times between which all channels run evenly."""
+        moved = [
+            channel.times for channel in channels if channel.track.path != WEIGHTS and not channel.track.is_constant
+        ]
+        return np.unique(np.concatenate([world.times, *moved]))
 
     def _told(self, worst: Worst) -> str:
         if worst.node < 0:
@@ -193,14 +208,17 @@ class ClipReduction:
         for weight in FEET_WEIGH:
             weights = np.ones((len(self.world.moving), len(self.world.times)))
             weights[self.feet.rows] += (weight - 1.0) * self.feet.stand
-            keys = search.so_many_key_poses(count, weights)
-            tracks = self._stored([keys] * len(self.dense))
+            tracks = self._key_poses(search.so_many_key_poses(count, weights))
             farther = self.feet.farther(self._shown(tracks))
             if farther < farthest:
                 best, farthest = tracks, farther
             if farther <= MORE_SLIDE * self.size:
                 break
         return best, self.world.worst(self._shown(best), self.morphed)[0]
+
+    def _key_poses(self, keys: np.ndarray) -> list[StoredTrack]:
+        """All tracks as they are to be stored, with these samples as key poses."""
+        return self._stored([keys] * len(self.dense))
 
     def _within_tolerance(self) -> tuple[list[StoredTrack], Worst] | None:
         """Tracks with few keys that keep to the tolerance, and the largest error; None where none do."""

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from .clips import ALL_CHANNELS, LARGER, ClipReduction, Options, ReducedClip, kept
+from .curves import CurveReduction
 from .documents import Document, GltfError, damage_refused, read_document
 from .errors import World
 from .nodes import Nodes, by_target, steadied
@@ -104,7 +105,8 @@ def reduced(document: Document, options: Options) -> Report:
             targets = ((track.node, track.path) for track in clip.tracks)
             needed = {target for target in targets if keeps_all or moved_by[target] - {clip.number}}
             amount = amount_before(document, references, clip)
-            result.append(ClipReduction(world, clip, needed, joints, size, options, amount).reduced())
+            reduction = CurveReduction if options.curves else ClipReduction
+            result.append(reduction(world, clip, needed, joints, size, options, amount).reduced())
     tracks = {clip.number: clip.tracks for clip in result if clip.tracks is not None}
     with damage_refused():
         within = tolerance if options.count is None else max((clip.error for clip in result), default=0.0)

@@ -49,7 +49,7 @@ class Search:
         skeleton, free = Skeleton(world.parents), ~self.fixed
 
         def part(some: slice) -> Body:
-            poses = self._poses(some)
+            poses = self.poses(some)
             return Body(world.times[some], poses, skeleton, MODE, world.radii, np.broadcast_to(1.0, poses.shape), free)
 
         keys = keys_in_stretches(part, tolerance, True, world.stretches, self.run)
@@ -69,11 +69,11 @@ class Search:
 
     def _reduced(self, samples: slice, **options: Any) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
         world = self.world
-        times, poses = world.times[samples], self._poses(samples)
+        times, poses = world.times[samples], self.poses(samples)
         return reduce_skeleton_keys(times, poses, world.parents, MODE, radius=world.radii, **options)
 
-    def _poses(self, samples: slice) -> Poses:
-        """Those of the nodes at some of the moments."""
+    def poses(self, samples: slice) -> Poses:
+        """Return those of the nodes at some of the moments."""
         world, times = self.world, self.world.times[samples]
         shape = (len(world.moving), len(times))
         positions, quaternions = np.empty((*shape, 3)), np.empty((*shape, 4))

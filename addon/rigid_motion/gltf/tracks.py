@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..motion.quaternions import normalise
+from ..motion.quaternions import normalise, turned_at
 from .accessors import EVERY, MOST_ZEROS, Rows, numbers
 from .documents import Document, GltfError, Json, bytes_of, entry, objects, shown
 
@@ -26,9 +26,6 @@ WIDTHS = {TRANSLATION: 3, ROTATION: 4, SCALE: 3}
 """Numbers of a key."""
 
 TO_WXYZ, TO_XYZW = [3, 0, 1, 2], [1, 2, 3, 0]
-
-NARROWEST = 1e-9
-"""An angle that stands for none: its sine is itself."""
 
 AT_ONCE = 2**14
 """Keys of a track that are looked at in one go."""
@@ -131,20 +128,6 @@ class Track:
         out, into = length * self.values[keys, 2], length * self.values[keys + 1, 0]
         result = (2 * s**3 - 3 * s**2 + 1) * self.values[keys, 1] + (s**3 - 2 * s**2 + s) * out
         return result + (3 * s**2 - 2 * s**3) * self.values[keys + 1, 1] + (s**3 - s**2) * into
-
-
-def turned_at(key_times: np.ndarray, keys: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return unit quaternions (m, 4) at times between keys (n, 4), each on the short way at an even speed."""
-    keys = normalise(keys)
-    first, second = keys[:-1], keys[1:]
-    second = np.where(np.einsum("ij,ij->i", first, second)[:, None] < 0.0, -second, second)
-    angles = 2.0 * np.arctan2(np.linalg.norm(second - first, axis=1), np.linalg.norm(second + first, axis=1))
-    angles = np.maximum(angles, NARROWEST)
-    segments = np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, len(first) - 1)
-    share = (times - key_times[segments]) / np.diff(key_times)[segments]
-    angles, sines = angles[segments], np.sin(angles)[segments]
-    begin, end = np.sin((1.0 - share) * angles) / sines, np.sin(share * angles) / sines
-    return begin[:, None] * first[segments] + end[:, None] * second[segments]
 
 
 POINTER = re.compile(r"/nodes/(\d{1,9})/(translation|rotation|scale|weights)")

@@ -9,6 +9,9 @@ import numpy as np
 SMALLEST = 1e-12
 """Stands for the sine of no turn."""
 
+NARROWEST = 1e-9
+"""An angle that stands for none: its sine is itself."""
+
 FEW = 6000
 """Numbers in vectors: up to so many, fewer calls of NumPy are worth copies of their components."""
 
@@ -149,3 +152,17 @@ def turns_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     sine = np.sqrt(np.einsum("...i,...i->...", turns[..., 1:], turns[..., 1:]))
     angle = 2.0 * np.arctan2(sine, np.abs(w))
     return turns[..., 1:] * (np.where(w < 0.0, -1.0, 1.0) * angle / np.maximum(sine, SMALLEST))[..., None]
+
+
+def turned_at(key_times: np.ndarray, keys: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return unit quaternions (m, 4) at times between keys (n, 4), each on the short way at an even speed."""
+    keys = normalise(keys)
+    first, second = keys[:-1], keys[1:]
+    second = np.where(np.einsum("ij,ij->i", first, second)[:, None] < 0.0, -second, second)
+    angles = 2.0 * np.arctan2(np.linalg.norm(second - first, axis=1), np.linalg.norm(second + first, axis=1))
+    angles = np.maximum(angles, NARROWEST)
+    segments = np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, len(first) - 1)
+    share = (times - key_times[segments]) / np.diff(key_times)[segments]
+    angles, sines = angles[segments], np.sin(angles)[segments]
+    begin, end = np.sin((1.0 - share) * angles) / sines, np.sin(share * angles) / sines
+    return begin[:, None] * first[segments] + end[:, None] * second[segments]

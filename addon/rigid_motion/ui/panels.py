@@ -21,7 +21,6 @@ from .holding import facts_or_none, name_of, shown_prop
 from .operators import axis_of_turns
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_key_editor, modes_meant, with_keyed_bones
 from .wording import (
-    AT_REST,
     BAKED,
     DENSE,
     KEYED_BONES,
@@ -32,6 +31,8 @@ from .wording import (
     NO_SEGMENT,
     OUT_OF_DATE,
     PARTS,
+    PASSES,
+    RESTS,
     STRIPS,
     cautions,
     draw_text,
@@ -70,8 +71,9 @@ def facts_and_notes(
         frame = frame_in_action(target.animated, frame)
         # From a key in one holder to a key in another one there is no motion: it goes on as before, or rests.
         segment = segment_at(source.run_at(frame).source if source.switches else source, frame)
-        none = AT_REST if source.switches else NO_SEGMENT
-        notes += [("ERROR", caution) for caution in cautions(segment)] if segment else [("INFO", none)]
+        notes += (
+            [("ERROR", caution) for caution in cautions(segment)] if segment else [("INFO", _between(source, frame))]
+        )
         notes += [("INFO", text) for text in _moved_alone(source)] if source.is_live else []
         if not animation.is_enabled() and not is_up_to_date(target, source):
             notes.append(("ERROR", OUT_OF_DATE))
@@ -100,6 +102,14 @@ def _read(target: Transform) -> tuple[Source | None, str]:
     if _problem[0] != depends_on:
         _problem = depends_on, animation.problem_of(target)
     return (None if _problem[1] else source), _problem[1]
+
+
+def _between(source: Source, frame: float) -> str:
+    """Return what there is to say of a frame of the Action on which there is no segment."""
+    switch = next((one for one in source.switches if one.frame > frame), None)
+    if switch is None:
+        return NO_SEGMENT
+    return iface_(PASSES if switch.begin < frame else RESTS).format(frame=switch.frame)
 
 
 def _moved_alone(source: Source) -> Iterator[str]:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import cast
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import animation
 from ..animation import Refused
@@ -22,7 +23,7 @@ from ..animation.queries.polls import with_more_keys_than
 from ..animation.transforms import OWN_WORDS, Transform, transform_of
 from ..animation.transforms.sizes import first_tolerance
 from .targets import OnChanged, OnTargets, each_target, is_posing, selected_in_view, with_bones_of_rigs
-from .wording import hold_lines, labelled, reduction_rows, reduction_summary, split
+from .wording import NATIVE_LABEL, hold_lines, labelled, reduction_rows, reduction_summary, split
 
 
 class _OfRigsToo:
@@ -96,10 +97,28 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
     )
     mode: EnumProperty(
         name="Mode",
-        description="What fills in between the keys that are left, and which keys those are",
-        items=[item for item in MODE_ITEMS if item[0] != "BLENDER"],
+        description=(
+            "What fills in between the keys that are left, and which keys those are. To begin with Native Curves or "
+            "Smooth Screw, whichever needs fewer keys"
+        ),
+        items=[
+            (
+                animation.NATIVE,
+                NATIVE_LABEL,
+                "Blender's own Bezier keys with handles, which need no mode and play anywhere. They keep to the "
+                "tolerance on frames. How far they are off between frames is below",
+                0,
+            ),
+            *(item for item in MODE_ITEMS if item[0] != "BLENDER"),
+        ],
         default="motor_spline",
         translation_context=OWN_WORDS,
+    )
+    offered_mode: StringProperty(
+        description="The mode that was chosen last, for as long as nobody chooses another", options={"HIDDEN"}
+    )
+    is_chosen: BoolProperty(
+        description="Whether a mode was chosen since the operator was called", options={"HIDDEN", "SKIP_SAVE"}
     )
     shared: BoolProperty(
         name="Key Poses",
@@ -126,22 +145,25 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         for name in ("radius", "mode", *(of_rigs if rigs else ())):
             layout.prop(self, name)
         column = layout.column(align=True)
-        for label, text in reduction_rows(context.scene, animation.reduction_of(targets)):
+        for label, text in reduction_rows(cast(bpy.types.Scene, context.scene), animation.reduction_of(targets)):
             labelled(column, label).label(text=text, translate=False)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         targets = list(self.each_target(context))
         if not self.properties.is_property_set("tolerance") or self.tolerance == self.offered:
-            self.tolerance = self.offered = first_tolerance(context.scene, targets, shared=self.shared)
+            self.tolerance = self.offered = first_tolerance(
+                cast(bpy.types.Scene, context.scene), targets, shared=self.shared
+            )
         if not self.radius and len(targets) == 1:
             self.radius = animation.radius_of(targets[0].carrier)
         return super().execute(context)
 
     def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
         before = [len(target.motion.bakes) for target in targets]
+        is_offered = not self.properties.is_property_set("mode") or self.mode == self.offered_mode
         animation.reduce_keys_of(
             targets,
-            self.mode,
+            animation.FEWEST if is_offered and not self.is_chosen else self.mode,
             self.tolerance,
             self.radius or None,
             shared=self.shared,
@@ -151,7 +173,12 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         )
         reduced = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]
         reduction = animation.reduction_of(reduced)
-        return "" if reduction is None else reduction_summary(context.scene, reduction)
+        if reduction is None:
+            return ""
+        if len(reduction.needed) > 1:
+            self.mode = self.offered_mode = reduction.mode
+        self.is_chosen = True
+        return reduction_summary(cast(bpy.types.Scene, context.scene), reduction)
 
 
 Holders = Sequence[bpy.types.Object | bpy.types.PoseBone] | None

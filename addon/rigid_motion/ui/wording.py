@@ -25,13 +25,17 @@ from ..motion import KEYFRAME_MODES
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it. Translated as `OWN_WORDS`: Blender has another Screw."""
 
+NATIVE_LABEL = "Native Curves"
+"""What is in place of a mode where keys are reduced without any. Translated as these."""
+
 DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 """The effect of each mode on the motion, in one sentence without a full stop."""
 
 NO_KEYS = n_("No keys of location, rotation or scale yet")
 KEYED_BONES = n_("Its bones have keys. Choose their modes in Pose Mode")
 NO_SEGMENT = n_("No segment on this frame")
-AT_REST = n_("No segment on this frame: it is as it was at the last key, in what holds it")
+RESTS = n_("At rest up to the key on frame {frame:g}, which is in another space")
+PASSES = n_("Passing over to the key on frame {frame:g}, which is in another space")
 STRIPS = n_("Moved by strips: enter one to see its segments (NLA Editor, Tab)")
 BAKED = n_("Baked to keys. Un-Bake brings its own keys back")
 OUT_OF_DATE = n_("The keys have changed since: Live Update is off, in the preferences")
@@ -116,6 +120,12 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
     summary = rpt_("{before} keys became {after}, largest error {error}").format(
         before=reduction.before, after=reduction.after, error=error
     )
+    if reduction.between:
+        summary += rpt_(" on frames, {between} between them").format(
+            between=length(scene, reduction.between, precision=3)
+        )
+    if others := _others(reduction):
+        summary += rpt_("; it takes {others}").format(others=others)
     before, after = reduction.channel_keys
     if after > before:
         summary += rpt_(", but channels have {after} keys together, and had {before}").format(
@@ -151,13 +161,16 @@ def reduction_rows(scene: bpy.types.Scene, reduction: Reduction | None) -> list[
     """Return what became of keys, and of the rig where it is one, as labels and what belongs to them."""
     if reduction is None:
         return []
+    error, between = (length(scene, off, precision=3) for off in (reduction.largest_error, reduction.between))
+    text = iface_("{error} on frames") if reduction.between else iface_("{error} at most")
     rows = [
         (iface_("Keys", OWN_WORDS), f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"),
-        (
-            iface_("Off By", OWN_WORDS),
-            iface_("{error} at most").format(error=length(scene, reduction.largest_error, precision=3)),
-        ),
+        (iface_("Off By", OWN_WORDS), text.format(error=error)),
     ]
+    if reduction.between:
+        rows.append((iface_("Between", OWN_WORDS), iface_("{error} at most").format(error=between)))
+    if others := _others(reduction):
+        rows.append((iface_("Instead", OWN_WORDS), others))
     before, after = reduction.channel_keys
     if after > before:
         rows.append(
@@ -171,6 +184,15 @@ def reduction_rows(scene: bpy.types.Scene, reduction: Reduction | None) -> list[
             # What follows constraints or drivers is somewhere else than its keys say.
             rows.append((iface_("Not Promised", OWN_WORDS), listed(bones)))
     return rows
+
+
+def _others(reduction: Reduction) -> str:
+    """Return how many keys it would have with what else was tried; nothing where nothing was."""
+    text = iface_("{count} keys with {mode}")
+    others = ((mode, count) for mode, count in reduction.needed.items() if mode != reduction.mode)
+    return ", ".join(
+        text.format(count=count, mode=iface_(LABELS.get(mode, NATIVE_LABEL), OWN_WORDS)) for mode, count in others
+    )
 
 
 def _slides(scene: bpy.types.Scene, rig: WholeRig) -> str | None:

@@ -9,11 +9,13 @@ result is a new file; the input stays as it is.
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, fields
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-from rigid_motion_batch.command_line import not_empty, parser_of, program_of, whole
-from rigid_motion_batch.system_libraries import require_blender
+from rigid_motion_batch.command_line import as_typed, complain, not_empty, parser_of, program_of, whole
+from rigid_motion_batch.system_libraries import blender_problem, require_blender
 
 SCRIPT = "reduce.py"
 PROGRAM = program_of(SCRIPT)
@@ -24,11 +26,12 @@ from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis.choices import RIGID, Tolerance, radius_in_metres
 from rigid_motion_batch.keying.gltf_files import do_gltf
 from rigid_motion_batch.keying.options import EXIT_CODES, add_file_options, add_target_options, refuse_odd_places
-from rigid_motion_batch.keying.planning import Job, file_and_body, named_file, planned
-from rigid_motion_batch.keying.records import is_made
+from rigid_motion_batch.keying.planning import NAMES_OF_FILES, Job, file_and_body, named_file, planned
+from rigid_motion_batch.keying.records import FileProblem, Record, is_made, refuse_read_only
 from rigid_motion_batch.keying.reductions import GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reductions, name_of
 from rigid_motion_batch.keying.sessions import do_all
-from rigid_motion_batch.keying.work import Doing, Work
+from rigid_motion_batch.keying.work import Doing, Outcome, Work
+from rigid_motion_batch.places import manifest
 from rigid_motion_batch.recordings.gltf import ENDINGS as GLTF
 from rigid_motion_batch.recordings.options import add_reading_options, reading_options
 from rigid_motion_batch.recordings.reading import JSON, TEXT
@@ -37,6 +40,8 @@ IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", *GLTF, ".tsv", ".tum")
 """Endings of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
 
 MODE = "motor_spline"
+
+PAGE = "report.html"
 
 MOST = 1000000
 """Keys that can be asked for: Blender's last frame."""
@@ -48,9 +53,12 @@ examples:
   python scripts/reduce.py shot.blend --keys 12
   python scripts/reduce.py hand.csv --axes unity --tolerance 5mm --blend --fps 30
   python scripts/reduce.py walk.glb --output small/walk.glb --tolerance 2mm
+  python scripts/reduce.py walk.glb --curves --tolerance 1mm
+  python scripts/reduce.py walk.bvh --curves --tolerance 1mm
   python scripts/reduce.py avatar.vrm wave.vrma --json
   python scripts/reduce.py walk.fbx dance.bvh shot.blend --glb --tolerance 2mm
   python scripts/reduce.py mocap --output small --jobs 4 --dry-run
+  python scripts/reduce.py clips --output small --report
   blender --background --python scripts/reduce.py -- shot.blend
 
 .blend files:
@@ -58,7 +66,8 @@ examples:
   keeps the keys that the mode needs, and sets the mode on them. The dense keys stay in the file, so that Restore Keys
   brings them back; with --discard they do not. Bones that follow constraints or drivers, and what hangs on them, are
   not promised: they are named. What needs all of its keys stays as it is, and so does an object whose scale has keys
-  everywhere that differ from axis to axis.
+  everywhere that differ from axis to axis. With --curves what is left are Bezier keys, with handles and without a mode,
+  which play in any Blender. They keep to the tolerance on frames; how far they are off between these is said.
 
 glTF files:
   walk.glb becomes walk-reduced.glb, and so with .vrm and .vrma; walk.gltf becomes walk-reduced.gltf with its .bin
@@ -66,13 +75,15 @@ glTF files:
   point within --radius of any node, is off by more than the tolerance in the world, neither at keys nor at eighths
   between them: what is written is played again. What moves no node, or would become larger, is left alone. With --glb,
   .blend and FBX files and recordings become such files: Blender exports them, sampled on every frame as they are shown,
-  for glTF knows lines and even turns alone.
+  for glTF knows lines and even turns alone. With --curves, channels that need fewer keys as cubic splines become such.
+  These keep to the tolerance at the keys of the input; how far off they are between, from its lines, is said.
 
 recordings:
   The program reads what compare.py reads; FILE:BODY takes one body of several, FILE:* all. A rigid motion becomes
   NAME-keys.csv, t,x,y,z,qw,qx,qy,qz in the axes and units of the recording, and with --blend also NAME-keys.blend with
-  an empty; a whole body becomes NAME-keys.blend with a rig. These are in metres and Blender's axes, and play in any
-  Blender, with or without the extension. The first sample is on frame 1.
+  an empty; a whole body becomes NAME-keys.blend with a rig, with the mode or with curves, whichever needs fewer keys:
+  --mode or --curves decides. With --curves a rigid motion becomes NAME-keys.blend alone. These are in metres and
+  Blender's axes, and play in any Blender, with or without the extension. The first sample is on frame 1.
 
 what is written:
   New files beside the inputs or in --output, which for a single input may be the name of the file. A file that was
@@ -115,7 +126,15 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         metavar="N",
         help="instead of a tolerance: N keys of each object, or N key poses of each rig, where the error is smallest",
     )
-    keys.add_argument("--mode", choices=KEYFRAME_MODES, help=f"mode between the keys ({MODE}; glTF knows one)")
+    keys.add_argument(
+        "--mode", choices=KEYFRAME_MODES, help=f"mode between the keys ({MODE}, or curves; glTF knows one)"
+    )
+    keys.add_argument(
+        "--curves",
+        action="store_true",
+        help="Bezier keys with handles in place of a mode, in glTF files cubic splines: they keep to the tolerance on "
+        "the frames of the input, and how far they are off between is said",
+    )
     keys.add_argument(
         "--radius",
         type=radius_in_metres,
@@ -152,6 +171,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     add_file_options(parser)
     parser.add_argument(
+        "--report",
+        action="store_true",
+        help=f"also write a page, {PAGE}, into the folder of --output or of the first input: bytes and keys of all "
+        "files, and the motion of glTF files before and after, side by side, with its error over time",
+    )
+    parser.add_argument(
         "--json",
         action="store_true",
         help="print JSON in place of paths: a list with what became of each input, or would, in metres and bytes",
@@ -160,7 +185,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     try:
         refuse_odd_places(options)
         options.reading = reading_options(options)
+        options.fewest = not (options.mode or options.curves)
         how = {field.name: getattr(options, field.name) for field in fields(Reductions)}
+        options.report = _place_of_page(options)
         options.work = Reduce.of(options, how=Reductions(**how | {"mode": options.mode or MODE}))
         options.todo = _planned(options)
         _refuse_odd(options)
@@ -172,9 +199,40 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def main(arguments: list[str]) -> int:
     """Do all inputs, and return the exit code."""
     options = parse(arguments)
-    if any(map(options.work.needs_blender, options.todo)):
+    todo, needing = options.todo, [job for job in options.todo if options.work.needs_blender(job)]
+    if needing and len(needing) == len(todo):
         require_blender(SCRIPT)
-    return do_all(PROGRAM, options.todo, options.work, options.jobs, as_json=options.json)
+    elif needing and (problem := blender_problem(SCRIPT)):
+        lacking = " ".join(map(str.strip, problem.splitlines()))
+        todo = [replace(job, problem=lacking) if job in needing else job for job in todo]
+    page = _page(options, as_typed(PROGRAM, arguments, options.inputs)) if options.report else None
+    return do_all(PROGRAM, todo, options.work, options.jobs, as_json=options.json, page=page)
+
+
+def _page(options: argparse.Namespace, command: str) -> Callable[[Sequence[Outcome]], Path]:
+    """Return what writes the page of a run; ends the program with code 2 where it is not to be written."""
+    from rigid_motion_batch.keying.views import place_of_views, read_views
+    from rigid_motion_batch.report.reduced import write_reduced
+
+    path = options.report
+    record = Record(path.parent, path, overwrite=options.overwrite)
+    try:
+        record.refuse_to_replace(path)
+        refuse_read_only(path)
+    except FileProblem as problem:
+        complain(PROGRAM, problem)
+        sys.exit(2)
+
+    def write(outcomes: Sequence[Outcome]) -> Path:
+        done = [
+            (outcome.as_data(), [view for made in outcome.written for view in read_views(place_of_views(made))])
+            for outcome in outcomes
+        ]
+        with record.writing(path) as beside:
+            write_reduced(beside, done, f"{manifest()['name']} {manifest()['version']}", command)
+        return path
+
+    return write
 
 
 @dataclass(frozen=True)
@@ -185,7 +243,7 @@ class Reduce(Work):
     how: Reductions
 
     def needs_blender(self, job: Job) -> bool:
-        if job.is_recording and not (self.how.blend or self.how.glb):
+        if job.is_recording and not (self.how.blend or self.how.glb or self.how.curves):
             return not job.problem and job.file.suffix.lower() not in (*TEXT, *JSON)
         return not job.problem and (job.is_recording or not _is_gltf(job.file))
 
@@ -247,6 +305,10 @@ def _refuse_odd(options: argparse.Namespace) -> None:
     gltf = [job for job in jobs if not job.is_recording and _is_gltf(job.file)]
     if options.count is not None and options.tolerance is not None:
         raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
+    if options.curves and options.mode:
+        raise ValueError("--curves and --mode exclude one another: curves need no mode")
+    if options.curves and options.shared and (gltf or options.glb):
+        raise ValueError("--curves and --shared exclude one another in glTF files: --key-poses N --curves shares keys")
     if options.in_place and (others := recorded + gltf):
         raise ValueError(f"--in-place is for .blend files, and {others[0].source} is none: leave one out")
     if options.glb:
@@ -272,6 +334,18 @@ def _refuse_beside_glb(options: argparse.Namespace, jobs: list[Job]) -> None:
             raise ValueError(
                 f"with --glb Blender imports {job.source} whole: leave out --axes and what says how to read it"
             )
+
+
+def _place_of_page(options: argparse.Namespace) -> Path | None:
+    """Return where the page goes; None without one. Raises ValueError where nothing is written."""
+    if options.report and options.dry_run:
+        raise ValueError(
+            "--report writes a page of what was written, and --dry-run writes nothing: leave one of them out"
+        )
+    first = file_and_body(options.inputs[0])[0]
+    named = named_file(options.output, options.inputs, NAMES_OF_FILES) if options.report else None
+    folder = named.parent if named else options.output or (first if first.is_dir() else first.parent)
+    return folder / PAGE if options.report else None
 
 
 def _is_gltf(path: Path) -> bool:

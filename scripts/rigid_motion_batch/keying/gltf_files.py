@@ -44,7 +44,8 @@ def reduce_gltf(
         document = read_document(job.file) if export is None else _exported(export)
         tolerance = None if how.tolerance is None else how.tolerance.metres(per_unit)
         with side_by_side(doing.work.processes) as run:
-            report = reduced(document, Options(tolerance, how.radius, how.shared, how.count, how.channels, run))
+            own = {name: getattr(how, name) for name in ("radius", "shared", "count", "channels", "curves")}
+            report = reduced(document, Options(tolerance, **own, run=run))
     except GltfError as error:
         raise Unreadable(str(error)) from None
     except OSError as error:  # Also while it is worked on.
@@ -68,6 +69,12 @@ def reduce_gltf(
     if reason:
         doing.say(f"{reason}; {doing.would}written as it was exported")
     _write(doing, output, document, report)
+    if how.report:
+        from .views import place_of_views, views_of, write_views
+
+        views = place_of_views(output)
+        write_views(views, views_of(document, report, how.radius))
+        outcome.beside.append(views)
     doing.tell_written(output)
 
 
@@ -132,6 +139,11 @@ def _summary(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: st
     summary = f"{would}{done}, {before.keys} -> {after.keys} keys, {before.size} -> {after.size} bytes"
     summary += off(tolerance, clip.error, per_unit, by_number=by_number)
     summary += f", {printable(clip.where)}" if clip.where else ""
+    if clip.lines:
+        between = tolerance.alike(clip.between, per_unit)
+        summary += (
+            f"; at frames, and up to {between} from lines between them; lines need {clip.lines} keys for the same"
+        )
     if clip.slides[0] > 0.0:
         slid, slides = (tolerance.alike(slide, per_unit) for slide in clip.slides)
         summary += f"; feet slide {slides}, and {slid} before"

@@ -83,13 +83,13 @@ def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
     return frames
 
 
-def key_densely(clip: Clip, frames: np.ndarray, name: str) -> None:
+def key_densely(clip: Clip, frames: np.ndarray, name: str) -> bpy.types.Object:
     """Put axes or a rig into the open file that move as a recording did, with a key for every sample, frames (n,)."""
-    if clip.rest_body is None:
-        poses = clip.in_blender(clip.poses)
-        animation.bake_poses(_axes(name), frames, poses, key_type="KEYFRAME")
-    else:
-        _rig(clip, frames, name)
+    if clip.rest_body is not None:
+        return _rig(clip, frames, name).obj
+    obj = _axes(name)
+    animation.bake_poses(obj, frames, clip.in_blender(clip.poses), key_type="KEYFRAME")
+    return obj
 
 
 def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name: str) -> bpy.types.Object:
@@ -102,18 +102,23 @@ def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name
 
 
 def key_body(clip: Clip, frames: np.ndarray, how: Reductions, name: str) -> Result:
-    """Put a rig into the open file that moves as a whole body did, its samples on frames (n,), with few keys.
+    """Put axes or a rig into the open file that move as a recording did, its samples on frames (n,), with few keys.
 
     Returns
     -------
     Result
-        What became of the bones that move; those that were left play straight from sample to sample.
+        What became of what moves; bones that were left play straight from sample to sample.
     """
-    rig = _rig(clip, frames, name)
-    bones = map(transform_of, cast(bpy.types.Pose, rig.obj.pose).bones)
-    keyed = [bone for bone in bones if len(animation.key_frames(bone))]
+    obj = key_densely(clip, frames, name)
+    keyed = [
+        target
+        for target in map(transform_of, obj.pose.bones if obj.pose else (obj,))
+        if len(animation.key_frames(target))
+    ]
     if not keyed:
         return Result()
+    if how.fewest:
+        how = replace(how, mode=animation.FEWEST)
     return reduced(keyed, replace(how, discard=True))  # The recording has the dense keys.
 
 

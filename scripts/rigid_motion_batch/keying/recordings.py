@@ -72,9 +72,10 @@ class _Clip:
         table, scene, glb = (output.with_name(f"{output.name}{end}") for end in (ending or ".csv", ".blend", ".glb"))
         if self.how.glb:
             self._glb(glb)
-        elif clip.rest_body is not None:
+        elif clip.rest_body is not None or self.how.curves:
             if ending not in ("", ".blend"):
-                raise FileProblem(f"a whole body becomes a .blend file: name that with --output, and not {ending}")
+                what = "what has curves" if clip.rest_body is None else "a whole body"
+                raise FileProblem(f"{what} becomes a .blend file: name that with --output, and not {ending}")
             self._body(scene)
         else:
             if table == scene and not self.how.blend:
@@ -115,19 +116,24 @@ class _Clip:
 
         doing = self.doing
         doing.require_free(scene)
-        result = key_body(self.clip, self._new_file(), self.how, self.name)
+        how = self.how if self.clip.rest_body else replace(self.how, radius=self.radius)
+        result = key_body(self.clip, self._new_file(), how, self.name)
         for bones, reason, count in result.refusals():
             doing.refuse(bones, reason, count)
         if result.left:
             doing.say(result.describe_kept())
         if result.done:
-            doing.say(f"{counted(len(result.done), 'bone')} {doing.would}reduced{result.summary}")
+            what = f"{counted(len(result.done), 'bone')} " if self.clip.rest_body else ""
+            doing.say(f"{what}{doing.would}reduced{result.summary}")
         if not (result.done or result.left):
             doing.leave_alone("nothing could be reduced" if result.refused else "nothing of this body moves")
             return
         self._note(*(replace(numbers, name=self.clip.name) for numbers in result.numbers))
         self._save(scene)
-        doing.outcome.bones += len(result.done)
+        if self.clip.rest_body:
+            doing.outcome.bones += len(result.done)
+        else:
+            doing.outcome.objects += len(result.done)
 
     def _glb(self, path: Path) -> None:
         from .exporting import export_glb

@@ -47,7 +47,7 @@ def reduced(targets: Sequence[Transform], how: Reductions) -> Result:
     refusals: list[Refused] = []
     animation.reduce_keys_of(
         targets,
-        how.mode,
+        animation.NATIVE if how.curves else how.mode,
         tolerance.metres(unit) / unit,
         None if how.radius is None else how.radius / unit,
         shared=how.shared,
@@ -84,6 +84,11 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_nu
     summary = f", {reduction.before} -> {reduction.after} keys"
     summary += f" on {counted(rig.frames, 'frame')}" if rig else ""
     summary += off(tolerance, reduction.largest_error * unit, unit, by_number=by_number)
+    if reduction.between:
+        summary += f" on frames, {tolerance.alike(reduction.between * unit, unit)} between them"
+    for mode, count in reduction.needed.items():
+        if mode != reduction.mode:
+            summary += f"; {_named(reduction.mode)}, as {_named(mode)} would leave {count} keys"
     before, after = reduction.channel_keys
     if after > before:
         summary += f"; channels have {after} keys together, and had {before}"
@@ -95,6 +100,10 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_nu
             f"; not promised for what follows constraints or drivers, and hangs on it: {', '.join(rig.not_promised)}"
         )
     return summary
+
+
+def _named(mode: str) -> str:
+    return "curves of Blender's own" if mode == animation.NATIVE else mode
 
 
 def _doubt(targets: Sequence[Transform], tolerance: Tolerance | None, unit: float) -> str:

@@ -31,6 +31,12 @@ class Reductions:
     """How few keys are to be kept, of what, and how they are written: plain data."""
 
     mode: str
+    curves: bool
+    """True for Blender's own curves in place of a mode."""
+
+    fewest: bool
+    """True where neither was asked for: whole bodies get what needs fewer keys."""
+
     tolerance: Tolerance | None
     """The tolerance; where None, what each thing begins with in Blender's window, or `reduce.py` with recordings."""
 
@@ -63,6 +69,9 @@ class Reductions:
 
     glb: bool
     """True if GLB files are written, and nothing else."""
+
+    report: bool
+    """True if a page shows what glTF files were and are."""
 
 
 def name_of(file: Path, body: str | None) -> str:

@@ -13,7 +13,6 @@ import numpy as np
 
 from rigid_motion.animation import set_mode
 from tests.animation.scenes import key
-from tests.thoroughness import THOROUGH
 
 PLAYED = np.arange(-2.0, 44.0)
 """From before the first key until after the last."""
@@ -29,6 +28,9 @@ def in_turn(cases: Iterable, others: Sequence) -> list[tuple]:
     """Each case with one of the others by default, which is another one on each Blender, and with half of them in
     thorough runs: every second of all pairs, of each case and of each of the others.
     """
+    # A Blender that is a window has no Hypothesis.
+    from tests.thoroughness import THOROUGH
+
     step, this_blender = 2 if THOROUGH else len(others), 10 * bpy.app.version[0] + bpy.app.version[1]
     pairs = itertools.product(enumerate(cases), enumerate(others))
     return [(case, other) for (i, case), (j, other) in pairs if (i + j + this_blender) % step == 0]

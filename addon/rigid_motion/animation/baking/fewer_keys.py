@@ -52,6 +52,9 @@ class FewerKeys(NamedTuple):
     rig: WholeRig | None = None
     """The result for the rig that it is, or is a bone of."""
 
+    between: float = 0.0
+    """The largest error between frames, of curves that keep to a tolerance on frames alone."""
+
     @property
     def after(self) -> int:
         """On how many frames there are keys then."""
@@ -99,17 +102,18 @@ def values_on(transform: Transform, source: Source, frames: np.ndarray) -> dict[
     rows = [row for row in transform.channels if PART_OF[row] in source.keyed]
     if has_uneven_scale(source):
         rows = [row for row in rows if PART_OF[row] != SCALE]
-    return {row: values[row] for row in rows if row in keyed or not _is_constant(values[row])}
+    return {row: values[row] for row in rows if row in keyed or not is_constant(values[row])}
 
 
 def has_uneven_scale(source: Source) -> bool:
     """Return whether a scale is keyed that differs from axis to axis as it changes."""
     if SCALE not in source.keyed or source.uniform_scale:
         return False
-    return not np.all(_is_constant(source.values_at(source.keyed_frames)[ROWS[SCALE]].T))
+    return not np.all(is_constant(source.values_at(source.keyed_frames)[ROWS[SCALE]].T))
 
 
-def _is_constant(columns: np.ndarray) -> np.ndarray:
+def is_constant(columns: np.ndarray) -> np.ndarray:
+    """Return whether values (n, ...) stay the same, shape (...)."""
     return np.ptp(columns, axis=0) <= SMALLEST * np.maximum(np.abs(columns).max(axis=0), 1.0)
 
 

@@ -1,4 +1,4 @@
-"""Reducing keys: from a recording with a key on every frame to the few poses that a mode needs to tell its motion.
+"""Reducing keys: from a recording with a key on every frame to the few that a mode, or Blender's own curves, need.
 
 A recording is whatever an object's channels say: imported mocap, a baked simulation, a solved camera. Its poses are
 those in the space of the channels, with the object's own delta transforms. The original keys stay in the file, for
@@ -10,13 +10,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 from bpy.app.translations import pgettext_n as n_
 
 from ...motion import KEYFRAME_MODES
 from ...motion.modes import no_such_mode
-from ..actions.channels import replace_keys
 from ..actions.refusals import refuse_drivers, refuse_modified
 from ..actions.slots import Binding
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
@@ -27,10 +27,17 @@ from ..transforms import Refused, Transform, transform_of
 from .bake import go_back
 from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, count_of, has_uneven_scale
 from .held_keys import FewerRuns, fewer_runs, write_runs
+from .native_curves import NATIVE, write_keys
 from .originals import REDUCED, Note, Originals, discard_originals, last_change, notes_of
 from .search import NO_FEWER, NOT_SO_MANY, fewer_keys
 
 HELD = n_("{name} is held, and is reduced for each time that it is so: by a tolerance, not to a number of keys")
+
+SMOOTH = "motor_spline"
+"""The mode that mostly needs the fewest keys."""
+
+FEWEST = "FEWEST"
+"""Asks for `NATIVE` or `SMOOTH`, whichever needs fewer keys."""
 
 Plans = dict[Transform, "list[FewerKeys | FewerRuns] | Refused"]
 """The keys that targets are to have in each slot that moves them; or why they cannot."""
@@ -51,6 +58,15 @@ class Reduction:
     channel_keys: tuple[int, int] = (0, 0)
     """The keys of all channels together, before and after. There may be more: a pose has all channels."""
 
+    between: float = 0.0
+    """The largest error between frames, where it is that on frames alone which keeps to the tolerance."""
+
+    mode: str = ""
+    """The mode of the keys, or `NATIVE`."""
+
+    needed: Mapping[str, int] = field(default_factory=dict)
+    """How many keys of all that was reduced together would be left, by each mode that was tried."""
+
     held: Sequence[Sequence] = ()
     """What it is held in since, where its keys were reduced into holds: names, first and last frames, and how many keys
     became one.
@@ -59,7 +75,7 @@ class Reduction:
 
 def reduce_keys_of(
     targets: Targets,
-    mode: str = "motor_spline",
+    mode: str = SMOOTH,
     tolerance: float = 0.001,
     radius: float | None = None,
     *,
@@ -68,12 +84,13 @@ def reduce_keys_of(
     count: int | None = None,
     refused: list[Refused] | None = None,
 ) -> Reduction | None:
-    """Leave only the keys that a mode needs to show the same motion.
+    """Leave only the keys that a mode, or curves of Blender's own, need to show the same motion.
 
     A key is a pose: location, rotation and, where it is even, scale have keys on the same frames, with the values that
     the recording has there. A scale that differs from axis to axis as it changes keeps the keys it has, and so does
     everything else in the Action. Bones of one rig are reduced together: what moves one moves all below it. But what is
     held is reduced by itself, each time in the space of its holder; the keys at which it passes to another one stay.
+    Native curves are Bezier keys: location, rotation and scale are fitted each as it is keyed, on the same frames.
 
     Parameters
     ----------
@@ -81,9 +98,10 @@ def reduce_keys_of(
         See `edits.apply`.
     mode : str
         What fills in between the keys, one of `rigid_motion.motion.KEYFRAME_MODES`. It is that of all segments.
+        `NATIVE` is Blender's own curves, `FEWEST` these or `SMOOTH`.
     tolerance : float
-        The largest shell error on any frame, in the scene's units. Of bones it is that in the rig's space, through all
-        that they hang on, and holds for every bone that hangs on a target too.
+        The largest shell error at any moment, or with native curves on any frame, in the scene's units. Of bones it is
+        that in the rig's space, through all that they hang on, and holds for every bone that hangs on a target too.
     radius : float, optional
         Of the shell, in the scene's units. `radius_of` each target, otherwise.
     shared : bool
@@ -99,22 +117,33 @@ def reduce_keys_of(
     Reduction or None
         That of all targets which did not refuse, see `reduction_of`.
     """
-    if mode not in KEYFRAME_MODES:
+    modes = (NATIVE, SMOOTH) if mode == FEWEST else (mode,)
+    if mode not in (NATIVE, FEWEST) and mode not in KEYFRAME_MODES:
         raise Refused(no_such_mode(mode, KEYFRAME_MODES))
     if not 0.0 < tolerance < math.inf:
         raise Refused(n_("the tolerance has to be a number above zero, not {tolerance:g}"), tolerance=tolerance)
     if count is not None and count < 2:
         raise Refused(n_("a motion has 2 keys at least, not {count}"), count=count)
-    plans: Plans = {}
+    found: dict[str, Plans] = {}
+    needed: dict[str, int] = {}
     originals = Originals(REDUCED)
 
     def survey(readings: Mapping[Transform, Readings]) -> None:
-        plans.update(
-            _plans(readings, mode=mode, tolerance=tolerance, radius=radius, shared=shared, hold=hold, count=count)
-        )
+        wish: dict[str, Any] = {
+            "tolerance": tolerance,
+            "radius": radius,
+            "shared": shared,
+            "hold": hold,
+            "count": count,
+        }
+        for name in modes:
+            found[name] = _plans(readings, mode=name, **wish)
+            needed[name] = _keys_left(found[name], readings)
+        nonlocal mode
+        mode = min(needed, key=lambda name: (needed[name], _error_of(found[name])))
 
     def plan(transform: Transform, readings: Readings) -> list[FewerKeys | FewerRuns]:
-        result = plans[transform]
+        result = found[mode][transform]
         if isinstance(result, Refused):
             raise result
         if not result:
@@ -123,7 +152,7 @@ def reduce_keys_of(
 
     def act(transform: Transform, fewer: list[FewerKeys | FewerRuns]) -> None:
         for reduced in fewer:
-            _write(transform, reduced, mode, originals)
+            _write(transform, reduced, mode, needed, originals)
 
     done = apply_edit(targets, plan, act, refused, survey=survey)
     return reduction_of(done) if done else None
@@ -177,6 +206,20 @@ def _plans(
     return plans
 
 
+def _keys_left(plans: Plans, readings: Mapping[Transform, Readings]) -> int:
+    """Return on how many frames targets have keys then, all together, those that refuse as well."""
+    count = 0
+    for transform, plan in plans.items():
+        fewer = {id(one.binding): one.after for one in plan} if isinstance(plan, list) else {}
+        sources = ((id(binding), source) for binding, source in readings[transform] if isinstance(source, Source))
+        count += sum(fewer.get(binding, count_of(source)) for binding, source in sources if source.channels)
+    return count
+
+
+def _error_of(plans: Plans) -> float:
+    return max((one.largest_error for plan in plans.values() if isinstance(plan, list) for one in plan), default=0.0)
+
+
 def reduction_of(targets: Targets) -> Reduction | None:
     """Return what became of the keys of targets, all together, when they were reduced. None where none of them were."""
     notes: dict[tuple, Note] = {}
@@ -195,6 +238,9 @@ def reduction_of(targets: Targets) -> Reduction | None:
         max(item.largest_error for item in reductions),
         max(rigs, key=lambda rig: rig.frames, default=None),
         tuple(map(sum, zip(*(item.channel_keys for item in reductions), strict=True))),
+        max(item.between for item in reductions),
+        reductions[-1].mode,
+        reductions[-1].needed,
         [one for item in reductions for one in item.held],
     )
 
@@ -219,7 +265,9 @@ def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None
     go_back(targets, REDUCED, refused, by=discard_originals)
 
 
-def _write(transform: Transform, fewer: FewerKeys | FewerRuns, mode: str, originals: Originals) -> None:
+def _write(
+    transform: Transform, fewer: FewerKeys | FewerRuns, mode: str, needed: Mapping[str, int], originals: Originals
+) -> None:
     binding, before = fewer.binding, channel_keys(fewer.binding)
     notes = originals.keep(binding)
     if not notes:
@@ -228,9 +276,10 @@ def _write(transform: Transform, fewer: FewerKeys | FewerRuns, mode: str, origin
         write_runs(transform, fewer, mode)
     else:
         _write_keys(transform, fewer)
-        set_mode_in(binding, mode)
+        set_mode_in(binding, "BLENDER" if mode == NATIVE else mode)
     keys = before, channel_keys(binding)
-    reduction = Reduction(count_of(fewer.source), fewer.after, fewer.largest_error, fewer.rig, keys)
+    counts = count_of(fewer.source), fewer.after
+    reduction = Reduction(*counts, fewer.largest_error, fewer.rig, keys, fewer.between, mode, needed)
     for note in notes:
         note.reduction = json.dumps(asdict(reduction))
 
@@ -238,10 +287,10 @@ def _write(transform: Transform, fewer: FewerKeys | FewerRuns, mode: str, origin
 def _write_keys(transform: Transform, fewer: FewerKeys) -> None:
     binding = fewer.binding
     for rows, keys in fewer.fewer.channels:
-        for row, values, codes in zip(rows, keys.values, keys.interpolation, strict=True):
+        for channel, row in enumerate(rows):
             if PART_OF[row] != SCALE or not has_uneven_scale(fewer.source):
                 fcurve = binding.ensure_curve(transform.channels[row])
-                replace_keys(fcurve, keys.times, values, interpolation=codes, handle_type="AUTO_CLAMPED")
+                write_keys(fcurve, keys, channel)
                 fcurve.mute = False
     if transform.turns_channel in binding.curves:
         binding.channelbag.fcurves.remove(binding.curves.pop(transform.turns_channel))

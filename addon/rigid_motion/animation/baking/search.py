@@ -36,6 +36,7 @@ from .fewer_keys import (
     with_keys,
 )
 from .motions import LEAST_SCALE, SMALLEST, BodyMotion, not_promised, without
+from .native_curves import NATIVE, JointCurves, choose_handles, needed, scratch_curve
 
 NO_FEWER = n_("{name} needs its {count} keys to stay within the tolerance: allow a larger one")
 NOT_SO_MANY = n_("{name} has {count} keys: ask for fewer")
@@ -49,8 +50,18 @@ APART = 4
 AT_ONCE = 2**18
 """Joints times moments that are looked at in one go."""
 
+TRIES, TIGHTER, MOST = 3, 0.8, 3.0
+"""So often curves are searched for, each time within less of the tolerance by this power of what they were over it, and
+by no more than this."""
+
+HALVINGS = 24
+"""The most steps towards the tolerance with which there are so many keys."""
+
 Members = Mapping[Transform, tuple[Binding, Source]]
 """What one slot moves of an object and its bones, and is to have fewer keys: by what it moves, and what is keyed."""
+
+Keyed = Callable[[int, np.ndarray], Source]
+"""Returns the source of a joint, by its number, with keys on frames (k,) alone."""
 
 Over = list[tuple[float, int, int]]
 """What is over the tolerance, see `BodyMotion.over`."""
@@ -75,7 +86,11 @@ def fewer_keys(
     is looked at by itself.
     """
     body = _Body(obj, members, math.inf if count is not None else tolerance, radius, hold=hold, space=space)
-    fewer = body.proven(body.searched(mode, count, shared=shared), mode, shared=shared or count is not None)
+    shared |= count is not None
+    if mode == NATIVE:
+        fewer = body.curved(count, shared=shared)
+    else:
+        fewer = body.proven(body.searched(mode, count, shared=shared), body.with_mode(mode), shared=shared)
     if not fewer and len(members) > 1:
         text = NO_FEWER if count is None else NOT_SO_MANY
         raise NeedsItsKeys(text, name=obj.name, count=np.count_nonzero(body.sampled))
@@ -115,8 +130,14 @@ class _Body:
         self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
         self.errors = np.zeros(len(joints))
         """The largest displacement of any point in each joint's ball, as was proven last, shape (joints,)."""
-        every, step = moments(self.frames, list(self.sources.values())), max(1, AT_ONCE // len(joints))
-        self._stretches = [every[first : first + step] for first in range(0, len(every), step)]
+        self.between = np.zeros(len(joints))
+        """The largest displacement at any moment, where errors are those on frames; or nothing, shape (joints,)."""
+        self._stretches = self._split(moments(self.frames, list(self.sources.values())))
+
+    def _split(self, frames: np.ndarray) -> list[np.ndarray]:
+        """Return frames in stretches that are looked at in one go."""
+        step = max(1, AT_ONCE // len(self.motion.joints))
+        return [frames[first : first + step] for first in range(0, len(frames), step)]
 
     def searched(self, mode: str, count: int | None, *, shared: bool) -> dict[int, np.ndarray]:
         """Return the frames of the keys that joints need if all of them are rigid, by their numbers."""
@@ -166,20 +187,108 @@ class _Body:
         chains = 1 + max(np.count_nonzero(heads[[*motion.above(number)]]) for number in range(len(heads)))
         return parents, Poses(positions, align_signs(quaternions), scales if grows else None), chains**-0.5
 
+    def curved(self, count: int | None, *, shared: bool) -> dict[int, Source]:
+        """Return the joints that get fewer keys, and these, with curves of Blender's own: see `proven`.
+
+        They keep to the tolerance on frames. `between` becomes how far off joints are at all moments.
+        """
+        every, self._stretches = self._stretches, self._split(self.frames)
+        curves = self._curves(
+            every=shared, tolerance=self.motion.extent * self.motion.unit if count else self.tolerance
+        )
+        fewer, scales = self._so_many(curves, count) if count else self._fewest(curves, shared=shared)
+        fewer = self._automatic(curves, fewer, scales)
+        on_frames, self._stretches = self._stretches, every
+        self._keep_to(math.inf, fewer)
+        self.between, self._stretches = self.errors.copy(), on_frames
+        self._keep_to(math.inf, fewer)
+        return fewer
+
+    def _curves(self, tolerance: float, *, every: bool) -> dict[int, JointCurves]:
+        """Return the curves that joints need, by their numbers: with keys between their ends, or on every sample."""
+        samples, motion = self.frames[self.sampled], self.motion
+        result = {}
+        for number, source in self.sources.items():
+            first, last = self._ends(number)
+            frames = samples if every else samples[(samples >= first) & (samples <= last)]
+            weights = self.weights[motion.below(number)].max(axis=0)[np.searchsorted(self.frames, frames)]
+            allowed = tolerance / motion.unit / weights
+            result[number] = JointCurves(motion.joints[number], source, frames, motion.reach(number), allowed)
+        return result
+
+    def _fewest(self, curves: dict[int, JointCurves], *, shared: bool) -> tuple[dict[int, Source], dict[int, float]]:
+        """Return the fewest keys that are found for all joints, and by how much of what is allowed each is off."""
+        choose_handles(curves)
+        scales, best, fewest = dict.fromkeys(curves, 1.0), (dict[int, Source](), dict[int, float]()), math.inf
+        for _ in range(TRIES):
+            chosen, keyed = needed(curves, scales, shared=shared), _keyed(curves, scales)
+            self.motion.show({number: keyed(number, keys) for number, keys in chosen.items()})
+            # Errors of what hangs on one another add up.
+            errors = self.motion.largest_errors(self.weights) / self.allowed
+            excess = {number: max(1.0, errors[self.motion.below(number)].max()) for number in curves}
+            fewer = self.proven(chosen, keyed, shared=shared)
+            count = sum(count_of(fewer.get(number, source)) for number, source in self.sources.items())
+            if count < fewest:
+                best, fewest = (fewer, scales), count
+            if max(excess.values()) == 1.0:
+                break
+            scales = {number: scale / min(excess[number], MOST) ** TIGHTER for number, scale in scales.items()}
+        return best
+
+    def _so_many(self, curves: dict[int, JointCurves], count: int) -> tuple[dict[int, Source], dict[int, float]]:
+        """Return so many keys on the same frames for all joints, and by how much of what is allowed each is off."""
+        low, high, keys = 0.0, 1.0, self.frames[self.sampled][[0, -1]]
+        for _ in range(HALVINGS):
+            scale = math.sqrt(low * high) or high / MOST**2
+            found = united(needed(curves, dict.fromkeys(curves, scale), shared=True).values())
+            low, high, keys = (scale, high, keys) if len(found) > count else (low, scale, found)
+            if len(keys) == count or low > high / 1.01:
+                break
+        scales = dict.fromkeys(curves, high)
+        able, keyed = [n for n, source in self.sources.items() if count < count_of(source)], _keyed(curves, scales)
+        while True:
+            fewer = {number: keyed(number, keys) for number in able}
+            if len(keys) >= count or not able:
+                return fewer, scales
+            # Where there are as many at once as with a little less of an error, keys go where that is the largest.
+            self.motion.show({number: fewer.get(number) for number in self.sources})
+            off = (self.frames[moment] for _, _, moment in self.motion.over(0.0, self.weights))
+            left = np.setdiff1d(self.frames[self.sampled], keys)
+            keys = np.union1d(keys, next((frame for frame in off if frame in left), left[0]))
+
+    def _automatic(
+        self, curves: dict[int, JointCurves], fewer: dict[int, Source], scales: dict[int, float]
+    ) -> dict[int, Source]:
+        """Return the joints with the handles that Blender sets wherever all stays within the tolerance with them."""
+        result = dict(fewer)
+        with scratch_curve() as scratch:
+            for number, source in fewer.items():
+                result[number] = curves[number].automatic(source, scales[number], scratch)
+
+        def mend(over: Over, motion: BodyMotion) -> bool:
+            back = {item for _, number, _ in over for item in motion.above(number)}
+            changed = [number for number in back if number in fewer and result[number] is not fewer[number]]
+            result.update({number: fewer[number] for number in changed})
+            return bool(changed)
+
+        self._keep_to(self.allowed, result, mend)
+        return result
+
     def plans(self, fewer: Mapping[int, Source]) -> dict[Transform, FewerKeys]:
         """Return the plans for joints that have fewer keys by now."""
-        joints, motion, largest, whole = self.motion.joints, self.motion, float(self.errors[0]), None
+        joints, motion, whole = self.motion.joints, self.motion, None
+        counted = np.ones(len(joints), dtype=bool)
         if fewer and len(joints) > 1:
             excepted = not_promised(self.obj)
             # Of what is not promised, that counts which has fewer keys.
-            counted = [n in fewer or joint.carrier.name not in excepted for n, joint in enumerate(joints)]
-            largest = float(self.errors[counted].max())
+            counted[:] = [n in fewer or joint.carrier.name not in excepted for n, joint in enumerate(joints)]
             motion.show(fewer)
             slides = (slide(maps.origins, self.stands) for maps in (motion.truth, motion.now()))
             frames = united(source.keyed_frames for source in fewer.values())
             whole = WholeRig(len(frames), *slides, excepted)
+        largest, between = (float(errors[counted].max()) for errors in (self.errors, self.between))
         return {
-            joints[number]: FewerKeys(*self.members[joints[number]], source, largest, whole)
+            joints[number]: FewerKeys(*self.members[joints[number]], source, largest, whole, between)
             for number, source in fewer.items()
         }
 
@@ -194,7 +303,18 @@ class _Body:
         ends = distinct(self.sources[number].keyed_frames)[[0, -1]]
         return self.frames[np.searchsorted(self.frames, ends - SAME_FRAME)]
 
-    def proven(self, chosen: dict[int, np.ndarray], mode: str, *, shared: bool) -> dict[int, Source]:
+    def with_mode(self, mode: str) -> Keyed:
+        """Return what gives a joint keys on frames alone, with a mode."""
+
+        def keyed(number: int, keys: np.ndarray) -> Source:
+            source, every = self.sources[number], np.union1d(self.frames, keys)
+            at = np.searchsorted(every, keys)
+            values = values_on(self.motion.joints[number], source, every)
+            return with_keys(source, keys, {row: column[at] for row, column in values.items()}, mode)
+
+        return keyed
+
+    def proven(self, chosen: dict[int, np.ndarray], keyed: Keyed, *, shared: bool) -> dict[int, Source]:
         """Return the joints that get fewer keys, and these, so that all of the body keeps to the tolerance.
 
         Keys are put back in `chosen`, the frames of each joint's, where the motion of the channels is off after all.
@@ -204,12 +324,8 @@ class _Body:
 
         def have(numbers: Iterable[int]) -> None:
             for number in numbers:
-                source, every = self.sources[number], np.union1d(self.frames, chosen[number])
-                at = np.searchsorted(every, chosen[number])
-                values = values_on(self.motion.joints[number], source, every)
-                values = {row: column[at] for row, column in values.items()}
-                fewer[number] = with_keys(source, chosen[number], values, mode)
-                if count_of(fewer[number]) >= count_of(source):
+                fewer[number] = keyed(number, chosen[number])
+                if count_of(fewer[number]) >= count_of(self.sources[number]):
                     del fewer[number], chosen[number]
 
         def mend(over: Over, motion: BodyMotion) -> bool:
@@ -221,7 +337,9 @@ class _Body:
         self._keep_to(self.allowed, fewer, mend)
         return fewer
 
-    def _keep_to(self, allowed: float, fewer: dict[int, Source], mend: Callable[[Over, BodyMotion], bool]) -> None:
+    def _keep_to(
+        self, allowed: float, fewer: dict[int, Source], mend: Callable[[Over, BodyMotion], bool] | None = None
+    ) -> None:
         """Have `fewer` mended, of which all is shown, until nothing is over what is allowed at any moment.
 
         Of a long recording no more is looked at at once than a stretch of it.
@@ -238,7 +356,7 @@ class _Body:
                 while True:
                     motion.show({number: fewer.get(number) for number in self.sources})
                     over = motion.over(allowed, weights)
-                    if not over or not mend(over, motion):
+                    if not over or mend is None or not mend(over, motion):
                         break
                     settled = False
                 self.errors = np.maximum(self.errors, motion.largest_errors())
@@ -288,6 +406,11 @@ class _Body:
             if added:
                 return added
         return {}
+
+
+def _keyed(curves: Mapping[int, JointCurves], scales: Mapping[int, float]) -> Keyed:
+    """Return what gives a joint curves with keys on frames alone, by as much off as these shares of what is allowed."""
+    return lambda number, keys: curves[number].keyed(keys, scales[number])
 
 
 def _apart(over: Over, motion: BodyMotion) -> Iterator[tuple[float, int, int]]:

@@ -1,0 +1,263 @@
+"""Blender's own Bezier keys for a motion: few, on its samples, with handles that need no mode between them.
+
+All channels of a part have their keys on the same frames. Handles are a third of the segment long, so that values are
+cubics in time, or as long as automatic ones are without smoothing, where something needs fewer keys then. They are
+those that Blender sets by the keys around wherever these do as well. Frames are those of the Action.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...motion.cubic_keys import CONSTANT, CUBIC, THIRD, CubicKeys, Samples, errors_between, fitted_together, keyed_at
+from ..actions.channels import KeyFields, code_of, key_points, replace_keys
+from ..evaluation.components import LOCATION, PART_OF, ROTATION, ROWS
+from ..evaluation.sources import Source
+from ..fcurves.evaluation import evaluate
+from ..fcurves.keys import BEZIER, CODE, Keys
+from ..transforms import Transform
+from .fewer_keys import is_constant, values_on
+
+NATIVE = "NATIVE_CURVES"
+"""What is asked for in place of a mode."""
+
+UNSMOOTHED = 1.0 / 2.5614
+"""The length of automatic handles where Auto Handle Smoothing of F-curves is None, as in files of old."""
+
+WORTH, NEARER = 0.9, 0.25
+"""Handles are so long where that leaves no more than this share of the keys, or as many with a quarter of the error."""
+
+LENGTHS = 1e-4
+"""The weight of a quaternion's length: handles are to look as if set by hand, and what is between frames stays near."""
+
+ASKED = 5
+"""So many are tried first, to see whether any gains by that."""
+
+TRIES = 8
+"""So often automatic handles are tried on fewer keys than before."""
+
+COLLINEAR = 1e-4
+"""Handles are in one line whose slopes differ by less, relative to the larger of them."""
+
+ROUNDING = 3e-3
+"""That of single precision, relative to the value, over `COLLINEAR`."""
+
+
+class JointCurves:
+    """What something needs to move by curves alone.
+
+    Parameters
+    ----------
+    transform : Transform
+    source : Source
+        Its dense keys.
+    frames : array, shape (m,)
+        The samples that keys may be on.
+    reach : float
+        How far away anything is that it turns.
+    allowed : array, shape (m,)
+        How far off that may be on each of them, in the same unit, which is that of its channels.
+    """
+
+    def __init__(
+        self, transform: Transform, source: Source, frames: np.ndarray, reach: float, allowed: np.ndarray
+    ) -> None:
+        self.source, self.frames = source, frames
+        self.values = values_on(transform, source, frames)
+        self.parts: list[tuple[list[int], Samples]] = []
+        """The rows that change of each part, and their samples."""
+        for part in ROWS:
+            rows = [row for row in self.values if PART_OF[row] == part]
+            turns = part == ROTATION and source.order is None and len(rows) == 4
+            changing = [row for row in rows if not is_constant(self.values[row])]
+            if changing:
+                rows = rows if turns else changing
+                values = np.column_stack([self.values[row] for row in rows])
+                by = 1.0 if part == LOCATION else reach
+                if turns:
+                    # Half of their angle counts.
+                    values, by = values / np.linalg.norm(values, axis=1, keepdims=True), 2.0 * reach
+                self.parts.append((rows, Samples(values, allowed / by, turns, lengths=LENGTHS)))
+
+    def scaled(self, scale: float) -> list[Samples]:
+        """Return the samples of all parts, which may be so many times as far off."""
+        return [_scaled(samples, scale) for _, samples in self.parts]
+
+    def with_handles(self, length: float) -> None:
+        """Have handles be a share of the segment long."""
+        self.parts = [(rows, samples._replace(handles=length)) for rows, samples in self.parts]
+
+    def fit(self, length: float) -> tuple[int, float]:
+        """Return how many keys it needs with handles so long, and how far off most segments are."""
+        self.with_handles(length)
+        (keys,) = needed({0: self}, {0: 1.0}, shared=False).values()
+        at = np.searchsorted(self.frames, keys)
+        errors = np.max([errors_between(self.frames, samples, at) for _, samples in self.parts], axis=0)
+        return len(keys), float(np.median(errors))
+
+    def keyed(self, keys: np.ndarray, scale: float) -> Source:
+        """Return the source with keys on these frames (k,) alone; what does not move has a single one."""
+        at = np.searchsorted(self.frames, keys)
+        channels = []
+        for rows, samples in self.parts:
+            curves = keyed_at(self.frames, _scaled(samples, scale), at, steps=True)
+            channels.append((rows, self._with_handles(rows, curves, samples.handles)))
+        moving = {row for rows, _ in self.parts for row in rows}
+        if still := [row for row in self.values if row not in moving]:
+            points = np.array([[(self.frames[0], self.values[row][0])] for row in still], np.float32)
+            channels.append((still, Keys(points, np.full(points.shape[:2], BEZIER, CODE))))
+        for rows, kept in self.source.channels:
+            if indices := [index for index, row in enumerate(rows) if row not in self.values]:
+                channels.append(([rows[index] for index in indices], kept.only(indices)))
+        rest = {row: value for row, value in self.source.rest.items() if row not in self.values}
+        return replace(self.source, channels=tuple(channels), rest=rest, mode=0, turns=None)
+
+    def _with_handles(self, rows: Sequence[int], curves: CubicKeys, length: float) -> Keys:
+        """Return keys of rows with handles of this length, as a share of each segment."""
+        lengths, values = np.diff(curves.times)[:, None] * length, curves.values
+        before, behind = np.concatenate((lengths[:1], lengths)), np.concatenate((lengths, lengths[-1:]))
+        # What goes on outside of its keys goes on as it leaves them.
+        leaving, arriving = curves.leaving.copy(), curves.arriving.copy()
+        arriving[0], leaving[-1] = leaving[0], arriving[-1]
+        times, kinds = curves.times[:, None], curves.kinds.copy()
+        # What is held is a curve as well, and no jump where its end is moved later.
+        kinds[:-1][(kinds[:-1] == CONSTANT) & (values[1:] == values[:-1]).all(axis=1)] = CUBIC
+        kinds[-1] = CUBIC
+        points, left, right = (
+            np.stack((np.broadcast_to(x, y.shape), y), axis=-1).swapaxes(0, 1).astype(np.float32)
+            for x, y in (
+                (times, values),
+                (times - before, values - before * arriving),
+                (times + behind, values + behind * leaving),
+            )
+        )
+        old = next((keys for keyed, keys in self.source.channels if not set(rows).isdisjoint(keyed)), None)
+        return Keys(
+            points,
+            np.tile(kinds.astype(CODE), (len(rows), 1)),
+            left,
+            right,
+            linear=old is not None and old.linear,
+            cycles=None if old is None else old.cycles,
+        )
+
+    def automatic(self, fewer: Source, scale: float, scratch: bpy.types.FCurve) -> Source:
+        """Return the source with the handles that Blender sets where the curves stay within so much with them.
+
+        A scratch F-curve is needed for that.
+        """
+        channels = list(fewer.channels)
+        for number, (_, samples) in enumerate(self.parts):
+            rows, keys = channels[number]
+            channels[number] = rows, self._with_automatic(keys, _scaled(samples, scale), scratch)
+        return replace(fewer, channels=tuple(channels))
+
+    def _with_automatic(self, keys: Keys, samples: Samples, scratch: bpy.types.FCurve) -> Keys:
+        begins = np.searchsorted(self.frames, keys.times)
+        flags = np.ones(len(begins), dtype=bool)
+        for _ in range(TRIES):
+            tried = _shaped(
+                replace(keys, automatic=np.broadcast_to(flags[:, None], (*keys.points.shape[:2], 2))), scratch
+            )
+            (shown,) = evaluate([tried], [self.frames])
+            shown = shown.T / (np.linalg.norm(shown.T, axis=1, keepdims=True) if samples.are_turns else 1.0)
+            off = np.linalg.norm(shown - samples.values, axis=1) / samples.allowed
+            bad = np.maximum.reduceat(off[:-1], begins[:-1]) > 1.0
+            wrong = flags & (np.append(bad, False) | np.append(False, bad))
+            if not wrong.any():
+                return tried
+            flags &= ~wrong
+        return keys
+
+
+def needed(curves: Mapping[int, JointCurves], scales: Mapping[int, float], *, shared: bool) -> dict[int, np.ndarray]:
+    """Return the frames of the keys (k,) that joints need, all on the same samples or each its own.
+
+    `scales` are what each may be off as a share of what it is allowed.
+    """
+    result = {number: joint.frames[:1] for number, joint in curves.items()}
+    samples = {number: joint.scaled(scales[number]) for number, joint in curves.items() if joint.parts}
+    for numbers in [list(samples)] if shared and samples else [[number] for number in samples]:
+        groups = [part for number in numbers for part in samples[number]]
+        keys = fitted_together(curves[numbers[0]].frames, groups, steps=True)[0].times
+        result.update(dict.fromkeys(numbers, keys))
+    return result
+
+
+def choose_handles(curves: Mapping[int, JointCurves]) -> None:
+    """Have joints have handles of the length with which they need the fewest keys."""
+    count = len(curves)
+    moving = [number for number, joint in curves.items() if joint.parts]
+    first = moving[:: max(1, count // ASKED)]
+    for some in (first, [number for number in moving if number not in first]):
+        gained = False
+        for joint in map(curves.__getitem__, some):
+            (keys, error), (others, less) = joint.fit(THIRD), joint.fit(UNSMOOTHED)
+            gains = others <= WORTH * keys or (others <= keys and less <= NEARER * error)
+            joint.with_handles(UNSMOOTHED if gains else THIRD)
+            gained |= gains
+        if not gained:
+            break
+
+
+@contextmanager
+def scratch_curve() -> Iterator[bpy.types.FCurve]:
+    """Have an F-curve to try keys on, which moves nothing."""
+    action = bpy.data.actions.new("Scratch")
+    try:
+        strip: Any = action.layers.new("Scratch").strips.new(type="KEYFRAME")
+        yield strip.channelbag(action.slots.new("WORLD", "Scratch"), ensure=True).fcurves.new("scratch")
+    finally:
+        bpy.data.actions.remove(action)
+
+
+def _shaped(keys: Keys, scratch: bpy.types.FCurve) -> Keys:
+    """Return keys with the handles that Blender gives those with automatic ones."""
+    sides: list[list[np.ndarray]] = [[], []]
+    for channel in range(len(keys.points)):
+        write_keys(scratch, keys, channel)
+        for handles, side in zip(sides, ("left", "right"), strict=True):
+            handles.append(key_points(scratch, f"handle_{side}"))
+    left, right = map(np.stack, sides)
+    return replace(keys, left=left, right=right)
+
+
+def write_keys(fcurve: bpy.types.FCurve, keys: Keys, channel: int) -> None:
+    """Give an F-curve the keys of a channel, with the types of their handles where they have handles."""
+    points = keys.points[channel]
+    if keys.automatic is not None and keys.right is not None:
+        longest = (keys.right[channel, :-1, 0] - points[:-1, 0]) / np.diff(points[:, 0])
+        fcurve.auto_smoothing = "NONE" if np.any(longest > (THIRD + UNSMOOTHED) / 2.0) else "CONT_ACCEL"
+    replace_keys(
+        fcurve, keys.times, points[:, 1], interpolation=keys.interpolation[channel], handle_type="AUTO_CLAMPED"
+    )
+    for name, numbers in handles_of(keys, channel).items():
+        fcurve.keyframe_points.foreach_set(name, numbers.ravel())
+    fcurve.update()
+
+
+def handles_of(keys: Keys, channel: int) -> KeyFields:
+    """Return the handles of n keys of a channel and their types, each of shape (n, width); nothing without handles."""
+    if keys.left is None or keys.right is None:
+        return {}
+    points, left, right = keys.points[channel], keys.left[channel], keys.right[channel]
+    (before, rise), (behind, rest) = (points - left).T.astype(float), (right - points).T.astype(float)
+    size = np.maximum(np.abs(rise), np.abs(rest)) + ROUNDING * np.abs(points[:, 1])
+    straight = np.abs(rise * behind - rest * before) <= COLLINEAR * size * (before + behind)
+    aligned, free, automatic = (code_of("handle_left_type", name) for name in ("ALIGNED", "FREE", "AUTO_CLAMPED"))
+    types = np.where(straight, aligned, free).astype(np.int32)
+    if keys.automatic is not None:
+        types[keys.automatic[channel].all(axis=1)] = automatic
+    types = types[:, None]
+    return {"handle_left": left, "handle_right": right, "handle_left_type": types, "handle_right_type": types}
+
+
+def _scaled(samples: Samples, scale: float) -> Samples:
+    """Return samples that may be so many times as far off."""
+    return samples._replace(allowed=samples.allowed * scale)

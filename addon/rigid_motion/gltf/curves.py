@@ -1,0 +1,160 @@
+"""Clips as the fewest cubic curves through their frames: CUBICSPLINE where it needs fewer keys than lines.
+
+The promise is another one than that of lines: it holds at the file's frames. What lies between them is measured, and
+said. Channels of scales and of weights, and whatever needs no search, are as they are with lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from ..motion import Poses, Skeleton
+from ..motion.cubic_bodies import CurvedBody, JointCurves, fitted_body
+from ..motion.cubic_keys import CubicKeys, Samples, is_of_lines, joined, keyed_at
+from ..motion.quaternions import align_signs
+from ..motion.skeleton_stretches import stretches
+from .clips import MORE_SLIDE, ClipReduction, ReducedClip
+from .errors import World, Worst
+from .rewriting import StoredTrack, stored
+from .search import Search
+from .settling import Channel
+from .tracks import CUBICSPLINE, LINEAR, ROTATION, TRANSLATION, WEIGHTS, Target, Track, Tracks
+
+STRETCH, LONG = 500, 2
+"""Frames that are searched in one go, where there are more than so many times as many."""
+
+EXACTLY = 1e-6
+"""What values may differ by where as many keys as wanted are given: what is a line then is one."""
+
+SLOWEST = 1 / 20
+"""Seconds: frames that are farther apart are keys, with lines in between that count as well."""
+
+ROUNDS = 12
+"""How often less is allowed where the proof fails."""
+
+LESS, AROUND = 0.5, 2
+"""How much less, and so many frames around; where feet slide, for as long as they stand."""
+
+
+class CurveReduction(ClipReduction):
+    """The search for the curves of one clip."""
+
+    lines = 0
+    """How many keys lines would need."""
+
+    @cached_property
+    def _known(self) -> dict[tuple[int, bytes], list[JointCurves]]:
+        """The curves of stretches, by their numbers and what is allowed there."""
+        return {}
+
+    def _moments(self, world: World, channels: Sequence[Channel]) -> np.ndarray:
+        """Return the frames: those of keys, and some between keys that are far apart."""
+        moving = [channel for channel in channels if channel.track.path != WEIGHTS and not channel.track.is_constant]
+        splines = [channel.times for channel in moving if channel.is_curved]
+        keys = np.unique(np.concatenate([world.times, *splines, *(channel.track.times for channel in moving)]))
+        parts = np.ceil(np.diff(keys) / SLOWEST).astype(np.int64)
+        number = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+        between = np.repeat(keys[:-1], parts) + np.repeat(np.diff(keys) / parts, parts) * number
+        return np.append(between, keys[-1]).astype(np.float32).astype(np.float64)
+
+    def _within_tolerance(self) -> tuple[list[StoredTrack], Worst] | None:
+        if not self.dense:
+            return super()._within_tolerance()
+        allowed = np.full((len(self.world.moving), len(self.world.times)), self.tolerance)
+        for _ in range(ROUNDS):
+            tracks = self._curved(allowed)
+            self._amount(tracks)
+            shown = self._shown(tracks)
+            worst, rows, samples = self.world.worst(shown, self.morphed, self.tolerance, parts=1)
+            slips = self._slips(shown)
+            if not len(rows) and not slips:
+                worst = max(worst, self.world.morphed(shown)[0])
+                return (tracks, worst) if worst.error <= self.tolerance else None
+            for row, sample in zip(rows.tolist(), samples.tolist(), strict=True):
+                allowed[row, max(sample - AROUND, 0) : sample + AROUND + 1] *= LESS
+            for row, first, end in slips:
+                some = allowed[row, first:end]
+                some[:] = LESS * np.minimum(some, MORE_SLIDE * self.size / LESS)
+        return None
+
+    def _key_poses(self, keys: np.ndarray) -> list[StoredTrack]:
+        tracks = [stored(track, integers=False) for track in self.settled.values()]
+        for (_, path), track in self.dense.items():
+            exactly = np.full(len(self.world.times), EXACTLY)
+            samples = Samples(track.at(self.world.times), exactly, path == ROTATION)
+            tracks.append(stored(_as_track(track, keyed_at(self.world.times, samples, keys)), integers=False))
+        return self._spanning(tracks)
+
+    def _slips(self, shown: Tracks) -> set[tuple[int, int, int]]:
+        """Return rows of joints that slide too far, and the samples on which these stand: first, and behind last."""
+        rows, samples = self.feet.slips(shown, MORE_SLIDE * self.size)
+        spans = self.feet.spans.tolist()
+        return {
+            (row, first, last + 1)
+            for slid, sample in zip(rows.tolist(), samples.tolist(), strict=True)
+            for row, first, last in spans
+            if row == slid and first <= sample <= last
+        }
+
+    def _result(self, tracks: list[StoredTrack], worst: Worst) -> ReducedClip:
+        between = self.world.worst(self._shown(tracks), self.morphed)[0].error
+        return replace(super()._result(tracks, worst), between=between, lines=self.lines)
+
+    @cached_property
+    def storing(self) -> tuple[frozenset[Target], float]:
+        """Nothing is stored as integers."""
+        return frozenset(), 0.0
+
+    def _curved(self, allowed: np.ndarray) -> list[StoredTrack]:
+        """All tracks as they are to be stored, where so much is allowed (n, m)."""
+        world = self.world
+        some = self._stretches()
+        tasks = [(number, allowed[:, own].tobytes()) for number, own in enumerate(some)]
+        new = [task for task in tasks if task not in self._known]
+        bodies = (self._body(some[number], allowed) for number, _ in new)
+        self._known |= zip(new, self.options.run(fitted_body, bodies), strict=True)
+        parts = [self._known[task] for task in tasks]
+        joints = [_joined(curves) for curves in zip(*parts, strict=True)]
+        self.lines = sum(curves.lines for curves in joints)
+        tracks = [stored(track, integers=False) for track in self.settled.values()]
+        for (node, path), track in self.dense.items():
+            curves = joints[world.rows[node]]
+            keys = curves.rotation if path == ROTATION else curves.location
+            assert keys is not None
+            tracks.append(stored(_as_track(track, keys), integers=False))
+        return self._spanning(tracks)
+
+    def _stretches(self) -> list[slice]:
+        """Return the frames whose curves are searched in one go: all channels have keys where they meet."""
+        count = len(self.world.times)
+        return stretches(count, STRETCH) if count > LONG * STRETCH else [slice(0, count)]
+
+    def _body(self, some: slice, allowed: np.ndarray) -> CurvedBody:
+        """Return the nodes of the world at some of the moments as a body."""
+        world, skeleton, times = self.world, Skeleton(self.world.parents), self.world.times[some]
+        nothing, nodes = np.zeros(len(world.moving), dtype=bool), world.moving.tolist()
+        curved = np.array([[(node, path) in self.dense for path in (TRANSLATION, ROTATION)] for node in nodes])
+        lengths, tracks = world.lengths_above(times), {**self.given, **self.settled, **self.dense}
+        truth, local = (Search(world, own, nothing, map).poses(some) for own in (world.truth, tracks))
+        local = Poses(local.positions / lengths, align_signs(local.quaternions))
+        truth = skeleton.in_root_space(truth)
+        return CurvedBody(times, skeleton, truth, local, lengths, world.radii, curved, allowed[:, some], True)
+
+
+def _joined(parts: Sequence[JointCurves]) -> JointCurves:
+    location, rotation = (
+        None if curves[0] is None else joined(curves, are_turns=bool(number))
+        for number, curves in enumerate(zip(*(part[:2] for part in parts), strict=True))
+    )
+    return JointCurves(location, rotation, sum(part.lines for part in parts))
+
+
+def _as_track(track: Track, keys: CubicKeys) -> Track:
+    if is_of_lines(keys):
+        return replace(track, interpolation=LINEAR, times=keys.times, values=keys.values)
+    values = np.stack((keys.arriving, keys.values, keys.leaving), axis=1)
+    return replace(track, interpolation=CUBICSPLINE, times=keys.times, values=values)

@@ -1,0 +1,103 @@
+"""Keys that come back: animations that were keyed by hand and baked, and motion capture, as curves and as lines.
+
+    python scripts/research curve_keys pab_walk.fbx freebvh.bvh
+
+The hand-made figure of 20 bones is that of the tests, with handles of a third of the segments and with those of
+Blender. All is exported by Blender with a key on every frame. What files show is worked out by matrices, with nothing
+of the program.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from research.glb_sizes import RADIUS, animation_bytes, errors_of, export, points
+from research.studies import publish, report, study_parser
+from rigid_motion.gltf import Options, reduce_file
+from tests.animation.bones.hand_made import AUTOMATIC, THIRD, hand_made, keys_of
+from tests.gltf.player import File
+
+TOLERANCE = 1e-3  # metres
+RATE = 24
+SEEDS = range(3)
+MOVED = ("translation", "rotation")
+
+
+def keys_in(file: File, clip: str) -> dict[tuple[str, str], np.ndarray]:
+    """Return the times of the keys of each channel that moves, by the name of its node and its path."""
+    nodes = file.json["nodes"]
+    tracks = ((nodes[node].get("name"), path, times) for (node, path), (_, times, _) in file.tracks(clip).items())
+    return {(name, path): times for name, path, times in tracks if path in MOVED and len(times) > 1}
+
+
+def error_at_frames(original: File, smaller: File, clip: str) -> float:
+    """Return how far any point near any node is off at the frames of the original."""
+    times = original.moments(clip)
+    before, after = ({node.get("name") for node in file.json["nodes"]} for file in (original, smaller))
+    names = sorted((before & after) - {None})
+    off = points(smaller, clip, times, names) - points(original, clip, times, names)
+    return float(np.linalg.norm(off, axis=-1).max())
+
+
+def measure(original: Path, folder: Path, own: dict[str, np.ndarray] | None = None) -> dict[str, Any]:
+    """Return what curves and lines make of the clips of a file, of whose nodes the frames of the own keys are known."""
+    output, files, sizes = folder / "smaller.glb", {}, [animation_bytes(original)]
+    for curves in (False, True):
+        reduce_file(original, output, Options(TOLERANCE, RADIUS, curves=curves))
+        files[curves] = File(output)
+        sizes.append(animation_bytes(output))
+    truth = File(original)
+    clip = max((item["name"] for item in truth.json["animations"]), key=lambda name: len(keys_in(truth, name)))
+    keys = keys_in(files[True], clip)
+    result = {
+        "samples": sum(map(len, keys_in(truth, clip).values())),
+        "lines": sum(map(len, keys_in(files[False], clip).values())),
+        "curves": sum(map(len, keys.values())),
+        "animation_bytes": sizes,
+        "error_mm": 1e3 * error_at_frames(truth, files[True], clip),
+        "between_mm": 1e3 * float(errors_of(truth, files[True], clip).max()),
+    }
+    if own is None:
+        return result
+    frames = {channel: np.round(times * RATE) for channel, times in keys.items()}
+    result["own"] = sum(len(own[name]) for name, _ in keys)
+    result["on_own_frames"] = sum(int(np.isin(rows, own[name]).sum()) for (name, _), rows in frames.items())
+    return result
+
+
+def by_hand(handles: str, seed: int, folder: Path) -> dict[str, Any]:
+    """Return what comes back of a hand-made animation."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    own, exported = keys_of(hand_made(handles, seed=seed)), folder / "hand.glb"
+    bpy.ops.export_scene.gltf(filepath=str(exported), export_format="GLB")
+    return {"handles": handles, "seed": seed, **measure(exported, folder, own)}
+
+
+def recorded(path: Path, folder: Path) -> dict[str, Any]:
+    """Return what comes of a recording."""
+    exported = folder / "recorded.glb"
+    export(path, exported)
+    return {"name": path.stem, **measure(exported, folder)}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, and write the figures."""
+    parser = study_parser("curve_keys", __doc__)
+    parser.add_argument("bodies", type=Path, nargs="+", metavar="PATH", help="FBX and BVH files")
+    options = parser.parse_args(arguments)
+    hands, bodies = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for handles in (THIRD, AUTOMATIC):
+            for seed in SEEDS:
+                report(f"handles: {handles}, {seed}")
+                hands.append(by_hand(handles, seed, Path(folder)))
+        for path in options.bodies:
+            report(path.name)
+            bodies.append(recorded(path, Path(folder)))
+    figures = {"hands": hands, "bodies": bodies}
+    return publish("curve_keys", figures, options, "...", Blender=bpy.app.version_string)

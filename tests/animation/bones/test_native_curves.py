@@ -1,0 +1,167 @@
+"""Reduced to Blender's own curves, a motion has the keys of an animator, within the tolerance on the frames it had."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import (
+    FEWEST,
+    NATIVE,
+    bake,
+    bake_poses,
+    discard_dense_keys,
+    reduce_keys_of,
+    reduction_of,
+    restore_keys,
+)
+from rigid_motion.motion import Poses
+from tests.animation.bones.hand_made import AUTOMATIC, LAST, OF_OLD, THIRD, bake_each_frame, hand_made, keys_of
+from tests.animation.bones.poses import shown_of
+from tests.animation.bones.rigs import in_turn
+from tests.animation.held import handled, new_hands, new_prop, worlds
+from tests.animation.keyed import curves_of, key_frames, mode_at, snapshot
+from tests.animation.scenes import new_object, write
+from tests.balls import largest_displacements
+
+FRAMES = np.arange(LAST + 1.0)
+EIGHTHS = np.arange(8 * LAST + 1) / 8.0
+TOLERANCE, RADIUS = 0.001, 0.06
+ROUNDED = 1.0 + 1e-3
+"""Of single precision, as matrices come from Blender."""
+
+
+def apart(a: np.ndarray, b: np.ndarray, share: float = 1.0) -> float:
+    """How far any point in the balls around things is from where it is in others, (..., 4, 4) each, of most of them."""
+    change = a - b
+    return float(np.quantile(largest_displacements(change[..., :3, 3], RADIUS * change[..., :3, :3]), share))
+
+
+def bones(rig: bpy.types.Object) -> list[bpy.types.PoseBone]:
+    return list(rig.pose.bones)
+
+
+def handles_of(rig: bpy.types.Object) -> Counter[str]:
+    """How many keys of bones have handles of which type."""
+    curves = [curve for bone in rig.pose.bones for curve in curves_of(bone).values()]
+    return Counter(key.handle_right_type for curve in curves for key in curve.keyframe_points)
+
+
+CASES = [(THIRD, 1.0), (AUTOMATIC, 1.0), (OF_OLD, 1.1)]
+
+
+@pytest.mark.parametrize(("case", "rotation_mode"), in_turn(CASES, ("QUATERNION", "XYZ")))
+def test_a_hand_made_animation_comes_back_with_its_own_keys(live_file, case, rotation_mode):
+    handles, share = case
+    rig = hand_made(handles, rotation_mode)
+    own, made = keys_of(rig), shown_of(rig, EIGHTHS)
+    bake_each_frame(rig)
+    baked = shown_of(rig, FRAMES)
+    reduction = reduce_keys_of(bones(rig), NATIVE, TOLERANCE, RADIUS)
+    found, count = keys_of(rig), sum(map(len, own.values()))
+    assert reduction.after == sum(map(len, found.values())) <= share * count
+    assert sum(len(np.intersect1d(own[name], found[name])) for name in own) > 0.7 * count
+    # Far less than what a baked file itself is off between frames.
+    shown = shown_of(rig, EIGHTHS)
+    assert reduction.largest_error <= TOLERANCE
+    assert apart(shown[:, ::8], baked) <= TOLERANCE * ROUNDED
+    if handles != OF_OLD:
+        assert apart(shown, made, 0.99) <= TOLERANCE < 0.5 * reduction.between
+    assert {mode_at(bone, 60.0) for bone in bones(rig)} == {"BLENDER"}
+    kinds = handles_of(rig)
+    common = "AUTO_CLAMPED" if handles == AUTOMATIC else "ALIGNED"
+    assert handles == OF_OLD or kinds[common] > 0.7 * kinds.total()
+
+
+def test_all_of_it_comes_back_until_dense_keys_are_discarded(live_file):
+    rig = hand_made(AUTOMATIC)
+    bake_each_frame(rig)
+    before = [snapshot(bone) for bone in bones(rig)]
+    reduce_keys_of(bones(rig), NATIVE, TOLERANCE, RADIUS)
+    restore_keys(bones(rig))
+    assert [snapshot(bone) for bone in bones(rig)] == before
+    reduce_keys_of(bones(rig), NATIVE, TOLERANCE, RADIUS)
+    few = keys_of(rig)
+    discard_dense_keys(bones(rig))
+    assert list(bpy.data.actions) == [rig.animation_data.action]
+    assert all(np.array_equal(frames, few[name]) for name, frames in keys_of(rig).items())
+
+
+STEPS = np.where(FRAMES < 15, 0.0, np.where(FRAMES < 31, 0.5, -0.4))
+LINES = np.interp(FRAMES, (0, 20, 40, LAST), (0, 1, 1, 3))
+STOPS = np.where(FRAMES < 50, np.clip(FRAMES / 20.0, 0.0, 1.0) ** 2 * (3.0 - 2.0 * np.clip(FRAMES / 20.0, 0, 1)), 1.0)
+SLOWS = STOPS + np.where(FRAMES > 70, 3.0 * ((FRAMES - 70.0) / 50.0) ** 2, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"), [(STEPS, [0, 15, 31, LAST]), (LINES, [0, 20, 40, LAST]), (SLOWS, [0, 20, 70, LAST])]
+)
+@pytest.mark.parametrize("path", ["location", "rotation_euler", "scale"])
+def test_steps_lines_and_holds_are_what_they_were(live_file, path, values, expected):
+    obj = new_object(rotation_mode="XYZ")
+    columns = np.column_stack([1.0 + values] * 3 if path == "scale" else (values, 0.0 * values, 0.0 * values))
+    write(obj, path, FRAMES, columns)
+    reduce_keys_of(obj, NATIVE, TOLERANCE, RADIUS)
+    fcurve = curves_of(obj)[path, 0]
+    assert key_frames(obj).tolist() == expected
+    assert [fcurve.evaluate(frame) for frame in FRAMES] == pytest.approx(columns[:, 0], abs=1e-6)
+    if values is STEPS:
+        assert [fcurve.evaluate(frame) for frame in (14.9, 15.0, 30.9)] == pytest.approx(columns[[14, 15, 30], 0])
+    if values is LINES:
+        assert [key.interpolation for key in fcurve.keyframe_points][:3] == ["LINEAR", "BEZIER", "LINEAR"]
+        assert fcurve.evaluate(30.5) == pytest.approx(columns[30, 0])
+
+
+@pytest.mark.parametrize("count", [2, 5, 12])
+def test_so_many_key_poses_are_on_the_same_frames(live_file, count):
+    rig = hand_made(THIRD)
+    bake_each_frame(rig)
+    baked = shown_of(rig, FRAMES)
+    reduction = reduce_keys_of(bones(rig), NATIVE, radius=RADIUS, count=count)
+    assert {tuple(frames) for frames in keys_of(rig).values()} == {tuple(keys_of(rig)["Hips"])}
+    assert len(keys_of(rig)["Hips"]) == count
+    assert apart(shown_of(rig, FRAMES), baked) == pytest.approx(reduction.largest_error, rel=1e-3)
+
+
+def test_key_poses_keep_to_a_tolerance(live_file):
+    rig = hand_made(THIRD)
+    bake_each_frame(rig)
+    baked = shown_of(rig, FRAMES)
+    reduce_keys_of(bones(rig), NATIVE, 0.02, RADIUS, shared=True)
+    assert len({tuple(frames) for frames in keys_of(rig).values()}) == 1
+    assert len(keys_of(rig)["Hips"]) < 0.5 * len(FRAMES)
+    assert apart(shown_of(rig, FRAMES), baked) <= 0.02 * ROUNDED
+
+
+@pytest.mark.parametrize("is_screw", [True, False])
+def test_what_needs_fewer_keys_is_taken_where_that_is_asked_for(live_file, is_screw):
+    obj, frames = new_object(), np.arange(1.0, 101.0)
+    if is_screw:
+        angle = 0.05 * frames / 2.0
+        turns = np.column_stack((np.cos(angle), 0.0 * angle, 0.0 * angle, np.sin(angle)))
+        places = np.column_stack((np.cos(2.0 * angle), np.sin(2.0 * angle), 0.1 * angle))
+    else:
+        turns = np.tile((1.0, 0.0, 0.0, 0.0), (100, 1))
+        places = np.column_stack((np.polyval((1e-5, -1e-3, 2e-2, 0.0), frames), 0.0 * frames, 0.0 * frames))
+    bake_poses(obj, frames, Poses(places, turns))
+    reduction = reduce_keys_of(obj, FEWEST, TOLERANCE, RADIUS)
+    assert reduction.needed[reduction.mode] == reduction.after == min(reduction.needed.values())
+    assert (reduction.mode == "motor_spline") == is_screw
+    assert reduction == reduction_of(obj)
+
+
+def test_what_is_held_gets_curves_in_its_hands(live_file):
+    prop, hands = new_prop("free"), new_hands()
+    handled(prop, *hands, throw=0)
+    bake(prop)
+    frames = np.arange(1.0, 91.0)
+    truth, keys = worlds(prop, frames), snapshot(prop)
+    reduction = reduce_keys_of(prop, NATIVE, 0.01, RADIUS)
+    assert reduction.after == len(key_frames(prop)) < 40
+    assert apart(worlds(prop, frames), truth) <= 0.01 * ROUNDED
+    assert "FREE" in {key.handle_left_type for key in curves_of(prop)["location", 0].keyframe_points}
+    restore_keys(prop)
+    assert snapshot(prop) == keys

@@ -1,0 +1,147 @@
+"""Clips as curves: keys that were set by hand come back, and what is promised holds at the frames of the file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion.gltf import Options, Report, reduce_file
+from tests.gltf.making import Making, turns, walk
+from tests.gltf.player import File, vertices
+
+RADIUS, TOLERANCE = 0.03, 1e-3
+
+ROUNDING = 1e-6
+"""Of the size: single precision."""
+
+RATE, LAST = 24, 120
+
+
+def reduced(
+    made: Making, folder: Path, tolerance: float | None = TOLERANCE, **more: object
+) -> tuple[File, File, Report]:
+    path = made.write(folder / "clip.glb")
+    output = folder / "reduced.glb"
+    report = reduce_file(path, output, Options(tolerance, RADIUS, curves=True, **more))
+    return File(path), File(output), report
+
+
+def error_at_frames(before: File, after: File) -> float:
+    """How far any point around any node is off at the keys of the file, by matrices alone."""
+    times = before.moments(0)
+    around = before.around(0, RADIUS)
+    truth, result = (file.points(0, times, around) for file in (before, after))
+    return max(float(np.linalg.norm(result[what] - places, axis=-1).max()) for what, places in truth.items())
+
+
+def hand_made(joints: int = 8, seed: int = 0) -> tuple[Making, dict[int, np.ndarray]]:
+    """A chain of joints that was keyed by hand, on frames of their own, and baked."""
+    made, random = Making(), np.random.default_rng(seed)
+    made.json["nodes"] = [{"translation": [0.0, 0.2, 0.0], "children": [joint + 1]} for joint in range(joints)]
+    del made.json["nodes"][-1]["children"]
+    made.json["skins"] = [{"joints": list(range(joints))}]
+    times, own = made.times(np.arange(LAST + 1) / RATE), {}
+    for joint in range(joints):
+        inner = 8 * random.choice(np.arange(1, LAST // 8), random.integers(4, 8), replace=False)
+        own[joint] = np.unique(np.concatenate(((0, LAST), inner + random.integers(-2, 3, len(inner)))))
+        keys = np.column_stack((np.ones(len(own[joint])), 0.2 * random.normal(size=(len(own[joint]), 3))))
+        keys /= np.linalg.norm(keys, axis=1, keepdims=True)
+        slopes = np.gradient(keys, own[joint], axis=0)
+        values = _hermite(own[joint], keys, slopes, np.arange(LAST + 1))
+        values /= np.linalg.norm(values, axis=1, keepdims=True)
+        made.channel(joint, "rotation", times, values[:, [1, 2, 3, 0]])
+    return made, own
+
+
+def _hermite(frames: np.ndarray, keys: np.ndarray, slopes: np.ndarray, at: np.ndarray) -> np.ndarray:
+    first = np.clip(np.searchsorted(frames, at, side="right") - 1, 0, len(frames) - 2)
+    length = np.diff(frames)[first, None]
+    s = (at - frames[first])[:, None] / length
+    result = (1 + 2 * s) * (1 - s) ** 2 * keys[first] + s * (1 - s) ** 2 * length * slopes[first]
+    return result + s**2 * (3 - 2 * s) * keys[first + 1] + s**2 * (s - 1) * length * slopes[first + 1]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_keys_that_were_set_by_hand_come_back_mostly_on_their_own_frames(tmp_path, seed):
+    made, own = hand_made(seed=seed)
+    before, after, report = reduced(made, tmp_path)
+    tracks = {node: (kind, times) for (node, _), (kind, times, _) in after.tracks(0).items()}
+    keys = {node: np.round(times * RATE) for node, (_, times) in tracks.items()}
+    count, true = sum(map(len, keys.values())), sum(map(len, own.values()))
+    assert count <= 1.1 * true
+    assert sum(np.isin(frames, own[node]).sum() for node, frames in keys.items()) > 0.6 * count
+    assert {kind for kind, _ in tracks.values()} == {"CUBICSPLINE"}
+    assert report.clips[0].lines > 3 * count
+    assert error_at_frames(before, after) <= TOLERANCE + ROUNDING * report.size
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-2])
+def test_no_point_around_any_joint_is_off_by_more_than_the_tolerance_at_frames(tmp_path, tolerance):
+    before, after, report = reduced(walk(), tmp_path, tolerance)
+    error = error_at_frames(before, after)
+    assert 0.1 * tolerance < error <= tolerance + ROUNDING * report.size
+    assert error <= report.clips[0].error + ROUNDING * report.size
+    assert report.clips[0].error <= report.clips[0].between
+    assert after.moments(0)[[0, -1]].tolist() == before.moments(0)[[0, -1]].tolist()
+
+
+def test_a_long_clip_is_searched_in_stretches_and_joined(tmp_path):
+    before, after, report = reduced(walk(joints=3, seconds=36.0), tmp_path)
+    assert len(before.moments(0)) > 1000
+    assert error_at_frames(before, after) <= TOLERANCE + ROUNDING * report.size
+
+
+def test_what_moves_in_lines_stays_lines(tmp_path):
+    made = walk(joints=2)
+    times = np.arange(61) / 30
+    made.channel(
+        1, "translation", made.times(times), np.interp(times, [0, 0.5, 1.5, 2], [0, 1, 1, 0])[:, None] * [1, 0, 0]
+    )
+    before, after, _ = reduced(made, tmp_path)
+    kind, times, _ = after.tracks(0)[1, "translation"]
+    assert kind == "LINEAR"
+    assert np.allclose(times, [0, 0.5, 1.5, 2])
+    assert error_at_frames(before, after) <= TOLERANCE
+
+
+def test_keys_that_are_far_apart_are_lines_that_count(tmp_path):
+    """Three keys make no curve: what lies between them is a line in the file, and stays near it."""
+    made = Making()
+    made.json["nodes"] = [{"translation": [0.0, 0.0, 0.0]}]
+    made.channel(0, "rotation", made.times(np.arange(61) / 30), turns(np.arange(61) / 30, 0))
+    made.channel(0, "translation", made.times([0.0, 1.0, 2.0]), np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0]]))
+    before, after, _ = reduced(made, tmp_path)
+    times = np.linspace(0.0, 2.0, 41)
+    off = vertices(after, 0, times, RADIUS) - vertices(before, 0, times, RADIUS)
+    assert np.linalg.norm(off, axis=-1).max() <= 2 * TOLERANCE
+
+
+def test_so_many_key_poses_have_curves_between_them(tmp_path):
+    errors = {}
+    for curves in (True, False):
+        path = walk().write(tmp_path / "clip.glb")
+        report = reduce_file(path, tmp_path / "poses.glb", Options(None, RADIUS, count=8, curves=curves))
+        tracks = File(tmp_path / "poses.glb").tracks(0)
+        assert {len(times) for (_, path), (_, times, _) in tracks.items() if path == "rotation"} == {8}
+        errors[curves] = report.clips[0].error
+    assert errors[True] < 0.5 * errors[False]
+
+
+def test_feet_that_stand_slide_no_farther_than_with_lines(tmp_path):
+    """A leg swings above a knee that turns back as far, so that the foot stands."""
+    made, times = Making(), np.arange(121) / 30
+    made.json["nodes"] = [{"name": f"Joint{joint}", "children": [joint + 1]} for joint in range(3)]
+    del made.json["nodes"][2]["children"]
+    made.json["nodes"][1]["translation"] = made.json["nodes"][2]["translation"] = [0.0, -0.8, 0.0]
+    made.json["nodes"] += [{"name": "Head", "translation": [0.0, 1.0, 0.0]}]
+    made.json["scenes"][0]["nodes"] = [0, 3]
+    made.json["skins"] = [{"joints": [0, 1, 2, 3]}]
+    own, angles = made.times(times), 0.3 * np.sin(3.0 * times) + 0.02 * np.sin(19.0 * times)
+    arms = np.column_stack((np.sin(angles), np.cos(angles), np.zeros_like(angles))) * 0.8
+    made.channel(0, "translation", own, arms + np.array((0.0, 0.8, 0.0)))
+    halves = -angles / 2
+    made.channel(0, "rotation", own, np.column_stack((0 * halves, 0 * halves, np.sin(halves), np.cos(halves))))
+    made.channel(1, "rotation", own, np.column_stack((0 * halves, 0 * halves, -np.sin(halves), np.cos(halves))))
+    _, _, report = reduced(made, tmp_path, 2e-2)
+    before, after = report.clips[0].slides
+    assert before < ROUNDING < after <= before + 1e-3 * report.size / 1.7 + ROUNDING
