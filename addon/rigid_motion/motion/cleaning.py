@@ -66,8 +66,8 @@ class Cleaned:
     alone: np.ndarray
     """Which samples were left where they are, or nearly, as motion cannot be told from noise there."""
 
-    noise: tuple[Trembling, ...]
-    """What was found to be noise, of each joint."""
+    noise: np.ndarray
+    """What was found to be noise, of places and of rotations in radians, along an axis: (2,), or (2, joints)."""
 
 
 def clean(
@@ -145,10 +145,10 @@ def clean(
     spikes, repeats, alone = (
         np.array([getattr(each, name) for each in found]) for name in ("spikes", "repeats", "alone")
     )
-    noise = tuple(each.noise for each in found)
+    noise = np.array([(each.noise.position, each.noise.rotation) for each in found]).T
     if len(poses.shape) == 2:
         return Cleaned(times, cleaned, moved, spikes, repeats, alone, noise)
-    return Cleaned(times, cleaned[0], moved[0], spikes[0], repeats[0], alone[0], noise)
+    return Cleaned(times, cleaned[0], moved[0], spikes[0], repeats[0], alone[0], noise[:, 0])
 
 
 class _Joint:

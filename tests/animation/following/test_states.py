@@ -103,7 +103,9 @@ class EditingObjects(WithHolds):
         frame, name = scene.frame_current_final, obj.name
         if obj.parent is not None or obj.matrix_world.is_negative or self._is_held(name):
             return
-        # What is keyed in a muted channel is not seen.
+        # What is flat has no rotation in its matrix, and what is keyed in a muted channel is not seen.
+        if min(map(abs, obj.matrix_world.to_scale())) < 1e-6:
+            return
         if any(fcurve.mute for (path, _), fcurve in curves_of(obj).items() if path in WIDTHS):
             return
         values = np.random.default_rng(seed).normal(size=6)

@@ -50,7 +50,7 @@ def scenario(hand: Hand) -> Steps[None]:
     rig = recorded_rig()
     rig.select_set(True)
     space.view_location, space.view_distance = (0.0, 0.0, 0.9), 5.0
-    bpy.ops.rigid_motion.reduce_keys(by="NUMBER", count=8)
+    bpy.ops.rigid_motion.reduce_keys(by="NUMBER", count=8, mode="motor_spline")
     bpy.context.scene.frame_end = int(FRAMES[-1])
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("TAB", ctrl=True)
