@@ -16,7 +16,8 @@ from typing import Any
 import bpy
 import numpy as np
 
-from research.glb_sizes import RADIUS, animation_bytes, errors_of, export, points
+from research.glb_bodies import RADIUS, export
+from research.glb_playing import animation_bytes, errors_of, opened
 from research.studies import publish, report, study_parser
 from rigid_motion.gltf import Options, reduce_file
 from tests.animation.bones.hand_made import AUTOMATIC, THIRD, hand_made, keys_of
@@ -35,23 +36,15 @@ def keys_in(file: File, clip: str) -> dict[tuple[str, str], np.ndarray]:
     return {(name, path): times for name, path, times in tracks if path in MOVED and len(times) > 1}
 
 
-def error_at_frames(original: File, smaller: File, clip: str) -> float:
-    """Return how far any point near any node is off at the frames of the original."""
-    times = original.moments(clip)
-    before, after = ({node.get("name") for node in file.json["nodes"]} for file in (original, smaller))
-    names = sorted((before & after) - {None})
-    off = points(smaller, clip, times, names) - points(original, clip, times, names)
-    return float(np.linalg.norm(off, axis=-1).max())
-
-
 def measure(original: Path, folder: Path, own: dict[str, np.ndarray] | None = None) -> dict[str, Any]:
     """Return what curves and lines make of the clips of a file, of whose nodes the frames of the own keys are known."""
     output, files, sizes = folder / "smaller.glb", {}, [animation_bytes(original)]
     for curves in (False, True):
         reduce_file(original, output, Options(TOLERANCE, RADIUS, curves=curves))
-        files[curves] = File(output)
+        files[curves] = opened(output, None)
         sizes.append(animation_bytes(output))
-    truth = File(original)
+    truth = opened(original, None)
+    errors = errors_of(truth, files[True], RADIUS)
     clip = max((item["name"] for item in truth.json["animations"]), key=lambda name: len(keys_in(truth, name)))
     keys = keys_in(files[True], clip)
     result = {
@@ -59,8 +52,8 @@ def measure(original: Path, folder: Path, own: dict[str, np.ndarray] | None = No
         "lines": sum(map(len, keys_in(files[False], clip).values())),
         "curves": sum(map(len, keys.values())),
         "animation_bytes": sizes,
-        "error_mm": 1e3 * error_at_frames(truth, files[True], clip),
-        "between_mm": 1e3 * float(errors_of(truth, files[True], clip).max()),
+        "error_mm": 1e3 * errors["at_frames"],
+        "between_mm": 1e3 * errors["joints"],
     }
     if own is None:
         return result
@@ -81,7 +74,7 @@ def by_hand(handles: str, seed: int, folder: Path) -> dict[str, Any]:
 def recorded(path: Path, folder: Path) -> dict[str, Any]:
     """Return what comes of a recording."""
     exported = folder / "recorded.glb"
-    export(path, exported)
+    export(path, exported, as_avatar=False)
     return {"name": path.stem, **measure(exported, folder)}
 
 

@@ -11,6 +11,9 @@ import numpy as np
 HEIGHT = 1.7
 """Metres."""
 
+RADIUS = 0.03
+"""Metres: what is looked at around joints of a body of that height; of larger ones in proportion."""
+
 CORNERS = np.array([*itertools.product((-1.0, 1.0), (0.0, 1.0), (-1.0, 1.0))])
 FACES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
 """Of a box; y goes along the bone."""

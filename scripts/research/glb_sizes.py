@@ -24,15 +24,12 @@ import bpy
 import brotli
 import numpy as np
 
-from research.glb_bodies import HEIGHT, export
+from research.glb_bodies import HEIGHT, RADIUS, export
 from research.glb_playing import animation_bytes, errors_of, opened, size_of
 from research.pages import FIGURES
 from research.studies import publish, report, study_parser
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.cli import reduce
-
-RADIUS = 0.03
-"""Metres: what is looked at around joints of a body of that height; of larger ones in proportion."""
 
 TOLERANCES = (1e-4, 1e-3, 5e-3)
 
