@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import bpy
 import pytest
 
+import rigid_motion.live.receiving as receiving
 from tests.live.performing import Sent
 
 
@@ -20,6 +21,14 @@ def port(extension) -> int:
     extension.scene.rigid_motion_live.port = number
     extension.scene.rigid_motion_live.delay = 0.0
     return number
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The time that Blender believes it is."""
+    now = [50.0]
+    monkeypatch.setattr(receiving.time, "monotonic", lambda: now[0])
+    return now
 
 
 @pytest.fixture

@@ -22,14 +22,6 @@ TOLERANCE = 0.002
 
 
 @pytest.fixture
-def clock(monkeypatch):
-    """The time that Blender believes it is."""
-    now = [50.0]
-    monkeypatch.setattr(receiving.time, "monotonic", lambda: now[0])
-    return now
-
-
-@pytest.fixture
 def live(extension):
     extension.scene.render.fps = 30
     extension.scene.frame_set(FIRST)

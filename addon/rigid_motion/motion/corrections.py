@@ -95,7 +95,7 @@ class Corrections:
     """Those of a body, from poses (n,) at times (n,), that trembles so much; samples (n,) are left out, and follow."""
 
     def __init__(self, times: np.ndarray, start: Poses, noise: Trembling, out: np.ndarray) -> None:
-        self._start, self._channels = start, [None, None]
+        self._start = start
         shares = coefficients(times, ORDER)
         steps = (times[ORDER:] - times[:-ORDER]) / ORDER
 

@@ -7,14 +7,10 @@ constant spin about a fixed axis has no second difference, and the differences t
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from .poses import Poses
 from .quaternions import conjugate, turned, turns_between
-
-
-def windows(count: int, width: int) -> np.ndarray:
-    """Return the samples (count - width + 1, width) of all runs of so many."""
-    return np.arange(count - width + 1)[:, None] + np.arange(width)
 
 
 def coefficients(times: np.ndarray, order: int) -> np.ndarray:
@@ -22,7 +18,7 @@ def coefficients(times: np.ndarray, order: int) -> np.ndarray:
 
     Times (n,) rise strictly, evenly or not.
     """
-    at = times[windows(len(times), order + 1)]
+    at = sliding_window_view(times, order + 1)
     apart = at[:, :, None] - at[:, None, :]
     apart[:, range(order + 1), range(order + 1)] = 1.0
     return np.prod(np.arange(1.0, order + 1.0)) / apart.prod(axis=-1)
@@ -30,7 +26,7 @@ def coefficients(times: np.ndarray, order: int) -> np.ndarray:
 
 def differences_of_positions(positions: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
     """Return differences (n - order, 3) of positions (n, 3)."""
-    return np.einsum("nk,nkc->nc", coefficients, positions[windows(len(positions), coefficients.shape[1])])
+    return np.einsum("nk,nck->nc", coefficients, sliding_window_view(positions, coefficients.shape[1], axis=0))
 
 
 def differences_of_rotations(quaternions: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
@@ -40,7 +36,7 @@ def differences_of_rotations(quaternions: np.ndarray, coefficients: np.ndarray) 
     seen = conjugate(quaternions)
     before, behind = seen[(width - 1) // 2 :][:count], seen[width // 2 :][:count]
     centre = turned(before, 0.5 * turns_between(before, behind))
-    turns = turns_between(seen[windows(len(seen), width)], centre[:, None])
+    turns = turns_between(sliding_window_view(seen, width, axis=0).swapaxes(1, 2), centre[:, None])
     return np.einsum("nk,nkc->nc", coefficients, turns)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from .poses import Poses
 from .quaternions import conjugate, turned, turns_between
@@ -127,7 +128,7 @@ def _usual(values: np.ndarray, apart: int) -> np.ndarray:
     """Return what is usual at each of values (n,): the median of some so far before it or behind it, above 0."""
     count = len(values)
     width = min(USUAL, count)
-    medians = np.median(np.lib.stride_tricks.sliding_window_view(values, width), axis=-1)
+    medians = np.median(sliding_window_view(values, width), axis=-1)
     # Near an end, the side that is there counts.
     before, behind = np.arange(count) - apart - width + 1, np.arange(count) + apart
     sides = [

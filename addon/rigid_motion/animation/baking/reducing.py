@@ -11,7 +11,6 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
 
 from bpy.app.translations import pgettext_n as n_
 
@@ -129,15 +128,10 @@ def reduce_keys_of(
     originals = Originals(REDUCED)
 
     def survey(readings: Mapping[Transform, Readings]) -> None:
-        wish: dict[str, Any] = {
-            "tolerance": tolerance,
-            "radius": radius,
-            "shared": shared,
-            "hold": hold,
-            "count": count,
-        }
         for name in modes:
-            found[name] = _plans(readings, mode=name, **wish)
+            found[name] = _plans(
+                readings, mode=name, tolerance=tolerance, radius=radius, shared=shared, hold=hold, count=count
+            )
             needed[name] = _keys_left(found[name], readings)
         nonlocal mode
         mode = min(needed, key=lambda name: (needed[name], _error_of(found[name])))
