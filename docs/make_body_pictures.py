@@ -24,7 +24,8 @@ from examples.dancer import dance
 from examples.stills import render_still
 from rigid_motion import animation
 from rigid_motion_batch.analysis.choices import EVERYWHERE, Uniform
-from rigid_motion_batch.analysis.results import ChoiceResult, compare_clip
+from rigid_motion_batch.analysis.reconstructions import reconstruct
+from rigid_motion_batch.analysis.results import ChoiceResult, measured
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.palette import ERROR_COLOURS, full_colour
 from rigid_motion_batch.recordings.clip_reading import read_clips
@@ -32,7 +33,7 @@ from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.rest_bodies import short_names
 from rigid_motion_batch.scenes.materials import surface
 
-RATE, MODES = "4", ("lerp_slerp", "dq_sclerp", "motor_spline")
+RATE, MODES = "4", ("bezier", "dq_sclerp", "motor_spline")
 
 MAPPED = "motor_spline"
 """The mode whose errors are mapped."""
@@ -59,7 +60,8 @@ def main() -> None:
         render_still(scene, DOCS / "bodies.png")
 
         (clip,), _ = read_clips([source], None)
-        draw_errors(clip, compare_clip(clip, Uniform(RATE), MODES, EVERYWHERE, shared=False), DOCS / "bodies-heat.svg")
+        made = reconstruct(clip, Uniform(RATE), MODES, EVERYWHERE.of(clip))
+        draw_errors(clip, measured(made), DOCS / "bodies-heat.svg")
 
 
 def draw_errors(clip: Clip, result: ChoiceResult, path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 from assets import make_assets
-from research.making.motions import GRIP, HOLD, MOTIONS, PITCH, SITE, TIP
+from research.making.motions import EDGE, GRIP, HINGE, HOLD, MOTIONS, OTHERS, PITCH, SITE, TIP
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import conjugate, multiply, rotate
 from rigid_motion_batch.recordings.reading import read_trajectories
@@ -36,10 +36,10 @@ def place_of(point: ArrayLike, poses: Poses) -> np.ndarray:
 
 
 def test_the_folder_holds_the_clips_that_the_script_makes_and_no_other_table():
-    assert {path.stem for path in ASSETS.glob("*.csv")} == {*MOTIONS, HOLD}
+    assert {path.stem for path in ASSETS.glob("*.csv")} == {*MOTIONS, *OTHERS}
 
 
-@pytest.mark.parametrize("name", [*MOTIONS, HOLD])
+@pytest.mark.parametrize("name", [*MOTIONS, *OTHERS])
 def test_the_script_makes_the_kept_clip_again(name):
     assert make_assets.clip(name) == (ASSETS / f"{name}.csv").read_text(encoding="utf-8")
 
@@ -58,9 +58,9 @@ def test_a_failure_while_writing_leaves_the_old_file_whole(tmp_path):
     assert list(tmp_path.iterdir()) == [old]
 
 
-@pytest.mark.parametrize("name", [*MOTIONS, HOLD])
+@pytest.mark.parametrize("name", [*MOTIONS, *OTHERS])
 def test_a_clip_has_the_timer_of_a_90_hz_device(name):
-    times = recorded(name)[0] if name in MOTIONS else recorded_in_hand()[0]
+    times = recorded(name)[0] if name != HOLD else recorded_in_hand()[0]
     steps = np.diff(times)
     assert times[0] == 0.0
     assert 4.0 <= times[-1] <= 5.0
@@ -90,6 +90,14 @@ def test_the_screw_advances_by_its_pitch_with_every_turn():
     advance = (tip - tip[0]) @ forward
     assert advance[-1] == pytest.approx(PITCH * (turns[-1] - turns[0]), abs=1e-3)
     assert np.polyfit(turns, advance, 1)[0] == pytest.approx(PITCH, rel=0.15)
+
+
+def test_the_door_opens_wide_and_stays_in_its_hinge():
+    _, poses = recorded("door")
+    assert np.linalg.norm(place_of(EDGE, poses) - HINGE, axis=1).max() < 5e-3
+    opened = np.degrees(2.0 * np.arctan2(poses.quaternions[:, 3], poses.quaternions[:, 0]))
+    assert opened.max() == pytest.approx(170.0, abs=0.5)
+    assert np.abs(opened[[0, -1]]).max() < 0.5
 
 
 def test_the_tool_stays_where_the_hand_holds_it_but_for_the_noise_of_both_devices():

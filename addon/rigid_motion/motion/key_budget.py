@@ -7,8 +7,9 @@ once or twice more from there. Where a segment depends on its two keys alone and
 nearly all of them are candidates, and the first layout is the best there is but for a few hundredths. For the mean
 square some more keys are put in, moved, and as many taken out.
 
-Of Blender's own curves every key has a say everywhere, and no search for a tolerance sees that: there budgets are
-tried, and the whole motion tells which keep to the tolerance.
+Within a tolerance a few budgets are tried, each for fewer keys than are known to keep to it; in long recordings it is
+only one, and in those of whole bodies none. Of Blender's own curves every key has a say everywhere, which no search
+sees: there the whole motion tells.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from .key_costs import Recording
-from .key_links import joined_keys, traded_keys
+from .key_links import WITHIN, joined_keys, traded_keys
 from .key_search import ROUNDS, SHORT, Keys, Search, spaced
 from .key_spread import moved_together, spread_keys
 from .modes import MODES, interpolate
@@ -67,9 +68,18 @@ FEW = 8
 SWAPPED = 1.15
 """How many times the budget keys may be in between, for the mean square, to find better places."""
 
+FEWER, NEAR = (0.9, 0.95), 0.03
+"""Of the keys within a tolerance: how many are tried first, and next, and how near they are to too few at last."""
 
-FEWER, NEAR = 0.875, 0.03
-"""Of the keys within a tolerance: how many are tried next, and how near the fewest are to too few at last."""
+STEEP = 4.0
+"""The power of the number of keys by which an error mostly falls, or less: what is too far off needs no more tries."""
+
+HOPELESS = 1.25
+"""The largest error in tolerances of keys that will not come within one, by all that follows."""
+
+MANY = 2**10
+"""Poses, of more of which only one budget is tried, and of whole bodies none: that found nothing in any of 12 trials,
+and took 2.5 times as long."""
 
 
 def fewest_keys(recording: Recording, budget: int | None, tries: int, *, rms: bool = False) -> np.ndarray:
@@ -79,64 +89,87 @@ def fewest_keys(recording: Recording, budget: int | None, tries: int, *, rms: bo
     if budget is not None:
         return BudgetSearch(recording, budget, rms=rms).least(tries)
     search = Search(recording, rms=rms)
-    keys = search.within(tries)
-    return _of_budgets(search, keys, tries) if MODES[recording.mode].is_reference else keys
+    return _of_budgets(search, search.within(tries), tries)
 
 
 def _of_budgets(search: Search, keys: np.ndarray, tries: int) -> np.ndarray:
-    """Return the fewest keys whose whole motion is within the tolerance, of keys to begin with and of some budgets."""
-    recording, rms = search.recording, search.power == 2
-    best, too_few, budget = _mended(recording, keys, rms=rms), 1, FEWER * len(keys)
-    while tries and len(best) - too_few > max(1, NEAR * len(best)):
-        other = BudgetSearch(recording, max(2, too_few + 1, int(budget)), rms=rms)
+    """Return the fewest keys whose motion is within the tolerance, of keys to begin with and of some budgets."""
+    recording, best, too_few = search.recording, _mended(search, keys), 1
+    budgets = tries + 1 if tries else 0
+    if len(recording.times) * recording.poses_each > MANY:
+        budgets = min(tries, 1) if recording.poses_each == 1.0 else 0
+    # Where much had to be put in, fewest are near to what was without that.
+    budget = min(math.floor(FEWER[0] * len(best)), 1 + math.ceil(len(keys) / FEWER[0]))
+    for _ in range(budgets):
+        budget = max(budget, too_few + 1)
+        if budget >= len(best) or len(best) - too_few <= max(1, NEAR * len(best)):
+            break
+        other = BudgetSearch(recording, budget, rms=search.power == 2, enough=1.0)
         other.costs = search.costs  # What is known of segments goes for all budgets.
         fewer = other.least(tries)
-        if _error(_errors(recording, fewer), rms=rms) <= 1.0:
-            best = fewer
+        error = _error(search, fewer)
+        if error > WITHIN:
+            too_few, fewer = budget, _mended(search, fewer)
+        if len(fewer) < len(best):
+            best = _without_needless(search, fewer)
+            too_few = too_few if too_few < len(best) else 1
+            budget = max(math.floor(FEWER[1] * len(best)), (too_few + len(best)) // 2)
         else:
-            too_few = other.budget
-        # Upwards by small steps, too: where much had to be put in, fewest are near to what was without that.
-        budget = FEWER * len(best) if too_few == 1 else min((too_few + len(best)) / 2, 1 + too_few / FEWER)
-    return _without_needless(recording, best, rms=rms)
+            budget = math.ceil(budget * error ** (1.0 / STEEP))
+        if too_few > 1:
+            budget = min(budget, 1 + math.ceil(too_few / FEWER[0]))
+    return _without_needless(search, best)
 
 
-def _without_needless(recording: Recording, keys: np.ndarray, *, rms: bool) -> np.ndarray:
-    """Return keys without each that the whole motion does without, within the tolerance."""
-    for key in keys[1:-1]:
+def _without_needless(search: Search, keys: np.ndarray) -> np.ndarray:
+    """Return keys without those that the motion does without, within the tolerance."""
+    if not MODES[search.recording.mode].is_reference:
+        return search.refined(search.measured(keys)).indices
+    inner = (measured := search.measured(keys)).inner
+    _, peak = search.evaluate(search.without(measured, inner))
+    for key in keys[inner[(peak.max(axis=1) <= HOPELESS) | (search.power == 2)]]:
         fewer = keys[keys != key]
-        if _error(_errors(recording, fewer), rms=rms) <= 1.0:
+        if _error(search, fewer) <= WITHIN:
             keys = fewer
     return keys
 
 
-def _mended(recording: Recording, keys: np.ndarray, *, rms: bool) -> np.ndarray:
-    """Return keys with more of them where keys that the search does not look at have the motion pass the tolerance."""
-    while _error(errors := _errors(recording, keys), rms=rms) > 1.0:
+def _mended(search: Search, keys: np.ndarray) -> np.ndarray:
+    """Return keys with more of them where the motion passes the tolerance."""
+    while _error(search, keys) > WITHIN:
+        errors = _errors(search, keys)
         worst = np.array([first + int(np.argmax(errors[first:second])) for first, second in pairwise(keys.tolist())])
         of_worst = errors[worst]
         keys = np.union1d(keys, worst[of_worst > min(1.0, 0.9 * of_worst.max())])
     return keys
 
 
-def _errors(recording: Recording, keys: np.ndarray) -> np.ndarray:
+def _errors(search: Search, keys: np.ndarray) -> np.ndarray:
     """Return how far the whole motion between keys is off at every sample, in tolerances, shape (n,)."""
+    recording = search.recording
+    if not MODES[recording.mode].is_reference:
+        return search.costs.errors(search.segments(search.measured(keys))[1])
     shown = interpolate(recording.times[keys], recording.poses[..., keys], recording.times, recording.mode)
     errors = recording.errors(np.arange(len(recording.times)), shown)
     errors[keys] = 0.0  # Whatever is left there is rounding.
     return errors
 
 
-def _error(errors: np.ndarray, *, rms: bool) -> float:
+def _error(search: Search, keys: np.ndarray) -> float:
     """Return what counts of the errors at all samples."""
-    return float(np.sqrt(np.square(errors).mean()) if rms else errors.max())
+    errors = _errors(search, keys)
+    return float(np.sqrt(np.square(errors).mean()) if search.power == 2 else errors.max())
 
 
 class BudgetSearch(Search):
-    """The search for a number of keys, under one mode: for the largest error, or with `rms` for its mean square."""
+    """The search for a number of keys, under one mode: for the largest error, or with `rms` for its mean square.
 
-    def __init__(self, recording: Recording, budget: int, *, rms: bool = False) -> None:
+    A largest error may be `enough`, in tolerances: then the search ends where it has that, or is far from it.
+    """
+
+    def __init__(self, recording: Recording, budget: int, *, rms: bool = False, enough: float = 0.0) -> None:
         super().__init__(recording, rms=rms)
-        self.budget = budget
+        self.budget, self.enough = budget, enough
         self._length = int(np.searchsorted(LENGTHS, len(recording.times) / budget, side="right"))
         self._is_short = self._length < 2
         """Whether there are few samples for each key."""
@@ -177,7 +210,7 @@ class BudgetSearch(Search):
         steps = FIRST_STEP if self.reach and self._length == 0 else STEPS[self._length]
         samples, result = keys.indices, [keys.indices]
         for _ in range(min(tries, 2 if self.reach and not self._is_short else 1)):
-            if self.costs.peak(samples) == 0.0:
+            if self.costs.peak(samples) <= self.enough:
                 break
             samples, is_complete = spread_keys(self.costs, candidates, samples, self.budget)
             moved = self._moved_together(samples, steps)
@@ -190,18 +223,23 @@ class BudgetSearch(Search):
         best = min(result, key=self.costs.peak)
         # Without neighbours there is little left to gain, and in long recordings it takes long.
         is_long = len(self.recording.times) > SHORT and not self.reach
-        if is_long or self.costs.peak(best) == 0.0:
+        if is_long or self._is_over(best):
             return best
         if self.reach:
             result += self._of_tolerance(best)
             best = min(result, key=self.costs.peak)
-        if self.is_linkable:
+        if self.is_linkable and not self._is_over(best):
             # Without neighbours all are near to one another: the two best have what the others have.
             by_peak = {self.costs.peak(keys): keys for keys in result}
             result = [by_peak[peak] for peak in sorted(by_peak)[: None if self.reach else 2]]
             joined = self.filled(self.measured(joined_keys(self.costs, result, self.budget))).indices
             best = min(best, joined, key=self.costs.peak)
-        return self._closed(best) if self.reach else best
+        return self._closed(best) if self.reach and not self._is_over(best) else best
+
+    def _is_over(self, best: np.ndarray) -> bool:
+        """Whether there is no more to be done for the best keys."""
+        peak = self.costs.peak(best)
+        return peak <= self.enough or 0.0 < HOPELESS * self.enough < peak
 
     def _of_tolerance(self, best: np.ndarray) -> list[np.ndarray]:
         """Return what a search for a tolerance makes of the best keys, brought to the budget."""

@@ -138,7 +138,8 @@ class Costs:
     def errors(self, segments: np.ndarray) -> np.ndarray:
         """Return error at every sample between the keys of segments (s, keys), in tolerances, zero elsewhere, (n,)."""
         errors = np.zeros(len(self.recording.times))
-        for batch, counts in self._batches(segments[self._counts(segments) > 0]):
+        filled = segments[self._counts(segments) > 0]
+        for batch, counts in self._batches(filled) if len(filled) else ():
             samples, errors_there = self._errors(batch, counts)
             errors[samples] = errors_there
         return errors

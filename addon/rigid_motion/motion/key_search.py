@@ -244,7 +244,6 @@ class Search:
     def thinned(self, keys: Keys, tolerance: float, fewest: int = 2) -> Keys:
         """Keys without all those that can be removed, down to the fewest that are wanted."""
         reach = self.reach
-        columns = np.concatenate((np.arange(-1 - 2 * reach, 0), np.arange(1, 2 + 2 * reach)))
         seen = np.zeros(len(keys.indices), dtype=bool)
         cost, peak = np.zeros((2, len(keys.indices), 1 + 2 * reach))
 
@@ -255,7 +254,7 @@ class Search:
             inner = keys.inner
             unseen = inner[~seen[inner]]
             if len(unseen):
-                cost[unseen], peak[unseen] = self.evaluate(keys.windows(unseen, columns), promising)
+                cost[unseen], peak[unseen] = self.evaluate(self.without(keys, unseen), promising)
                 seen[unseen] = True
             rise = cost[inner].sum(axis=1) - self._cost_around(keys, inner)
             most = len(keys.indices) - fewest
@@ -269,6 +268,11 @@ class Search:
             seen[near[(near >= 0) & (near < len(seen))]] = False
             seen, cost, peak = seen[left], cost[left], peak[left]
         return keys
+
+    def without(self, keys: Keys, numbers: np.ndarray) -> np.ndarray:
+        """Return samples of the keys around each of some keys, without it, that have a say where it has, (c, m)."""
+        columns = np.arange(-1 - 2 * self.reach, 2 + 2 * self.reach)
+        return keys.windows(numbers, columns[columns != 0])
 
     def _removable(self, rise: np.ndarray, peak: np.ndarray, keys: Keys, tolerance: float, most: int) -> np.ndarray:
         """Which of the inner keys go next: those whose removal raises the cost least, far enough from one another."""

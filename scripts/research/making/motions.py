@@ -1,4 +1,5 @@
-"""Motions of a hand-held tool as people make them: reaching, pivoting on a tip, throwing and catching, driving a screw.
+"""Motions of a hand-held tool as people make them: reaching, pivoting on a tip, throwing and catching, driving a screw;
+and of a door.
 
 Metres, seconds, radians; right-handed, z up, the person stands at the origin and looks along +y. The tool's own axes
 are x to the right, y forward (along the bit), z up, with the origin in the hand: a tool held level points along +y.
@@ -289,7 +290,22 @@ def held_in(hand: Poses, grip: Poses) -> Poses:
 HOLD = "hold"
 """The recording of two devices: a hand, and the tool that it holds."""
 
-HOLDING = Motion(4.6, hold)
+# ---- a door ----------------------------------------------------------------------------------------------------------
+
+HINGE, EDGE = np.array((-0.40, 0.70, 1.00)), np.array((-0.80, 0.0, 0.0))
+"""Where the hinge is, and where it is seen from the tracker at the door's edge."""
+
+
+def door(_: np.random.Generator, times: np.ndarray) -> Poses:
+    """Push a door open, and on to the wall, from where it is slammed and springs back a little."""
+    #         onset, duration, degrees
+    table = np.array(((0.3, 0.8, 100.0), (1.25, 0.6, 70.0), (2.3, 0.75, -170.0), (3.05, 0.35, 14.0), (3.4, 0.4, -14.0)))
+    opened = strokes(times, table[:, :1], table[:, 1:2], np.radians(table[:, 2:]))
+    return held_by(EDGE, np.broadcast_to(HINGE, (len(times), 3)), about(Z, opened[:, 0]))
+
+
+OTHERS = {HOLD: Motion(4.6, hold), "door": Motion(4.6, door)}
+"""Motions that the page of the paper leaves out."""
 
 MOTIONS = {
     "reach": Motion(4.7, reach),

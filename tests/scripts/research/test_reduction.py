@@ -10,6 +10,8 @@ from rigid_motion_batch.analysis.needed import part_of
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.world_poses import read_poses
 
+pytestmark = pytest.mark.blender
+
 TOLERANCE, RADIUS = 0.005, 0.1
 
 
