@@ -22,7 +22,7 @@ MARKED_FIELDS = "back", "amplitude"
 """In the lowest six bits of these keys say their modes: in the former 16 more than a number, and 32 where the period
 says what they are held in, in the latter 42."""
 
-HOLD_BITS = 1023
+HOLD_BITS = 16383
 """And in these bits of `period` what they are held in, where the former has 32 more."""
 
 

@@ -103,7 +103,8 @@ def spin_and_end(
     spin, sense, change = Spin(), 0, 0.0
     if angles is not None:
         change, about, stands = _axis_of_angles(angles, order, quaternions, own)
-        if (part and abs(change) > 1e-4) or abs(change) > np.pi - 1e-4:
+        # A key that took what was seen is off by what in-betweens are.
+        if (part and abs(change) > 1e-5) or abs(change) > np.pi - 1e-4:
             spin, sense = Spin(0, tuple(about), stands), 1 if change > 0.0 else -1
     if sense:
         end = _without(spin._replace(turns=sense * part), second)

@@ -111,7 +111,11 @@ def test_of_two_objects_with_one_name_that_is_found_which_was_edited(tmp_path: P
     namesakes[number].update_tag()
     bpy.context.view_layer.update()
     bpy.app.handlers.depsgraph_update_pre.remove(note)
-    assert found == [namesakes[number]]
+    # An evaluated copy does not say safely which library it is of: that may be gone.
+    assert namesakes[number] in found
+    namesakes[1].update_tag()
+    bpy.data.libraries.remove(bpy.data.libraries[0])
+    bpy.context.view_layer.update()
 
 
 @pytest.mark.parametrize("frame", [15, 16])

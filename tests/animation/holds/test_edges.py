@@ -9,7 +9,7 @@ import pytest
 from rigid_motion.animation import refresh, set_mode, set_turns
 from tests.animation.holds.hands import by_an_object, by_fk, free, place, take
 from tests.animation.holds.oracle import Carrier, Held, apart, carried, shown
-from tests.animation.holds.test_passing import MOVING, QUARTERS, RESTING, juggled, keys_of, motions_of, off
+from tests.animation.holds.test_passing import MOVING, RESTING, juggled, keys_of, motions_of, off
 from tests.animation.keyed import WIDTHS, curve_of, curves_of
 from tests.animation.scenes import push_down
 
@@ -168,35 +168,6 @@ def test_what_is_held_in_a_strip_is_held_and_passed_on_its_frames(live_file, sca
     frames = in_scene(np.arange(1.0, 82.0, 0.25))
     (seen,) = shown([prop], frames)
     assert apart(seen, carried(twin, held, slow, frames, soon=scale / 64.0)) < MOVING
-
-
-def with_key(prop: Carrier, at: float) -> float:
-    """How far something is, at most, from where it was before a key of all that it has was inserted on a frame."""
-    (before,) = shown([prop], QUARTERS)
-    bpy.context.scene.frame_set(int(at), subframe=at % 1)
-    for path in ("location", "rotation_quaternion"):
-        prop.keyframe_insert(path, frame=at)
-    bpy.context.view_layer.update()
-    (after,) = shown([prop], QUARTERS)
-    return apart(before, after)
-
-
-@pytest.mark.parametrize("frames", [(0, 0, 0, 0), (3, 4, 4, 3)])
-@pytest.mark.parametrize("at", [15, 26, 37, 42, 43.5, 46, 60, 63])
-def test_keys_that_are_inserted_keep_what_rests_in_hands(live_file, frames, at):
-    prop, _ = free()
-    juggled(prop, (by_fk("First", 11), by_an_object("Second", 31)), frames, moves=False)
-    assert with_key(prop, at) < KEPT
-
-
-@pytest.mark.parametrize(
-    ("mode", "at"), [("motor_spline", 26), ("motor_spline", 46), ("dq_sclerp", 26), ("dq_sclerp", 37), ("BLENDER", 42)]
-)
-def test_keys_that_are_inserted_keep_what_moves_in_hands(live_file, mode, at):
-    """As everywhere, a path that depends on the keys around is another one by a key outside of these, in the rest."""
-    prop, _, _ = thrown((0, 0, 0, 0))
-    set_mode(prop, mode)
-    assert with_key(prop, at) < MOVING
 
 
 def test_blur_just_before_a_switch_is_of_the_old_hand(live_file):

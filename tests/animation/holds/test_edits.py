@@ -207,3 +207,21 @@ def test_a_setting_that_is_typed_takes_no_hold_and_no_mode_off(stage, name, seed
         assert animation.modes_of(prop, frames) == modes
     assert {bytes(read_holds(fcurve)) for fcurve in moving(prop)} == {bytes(read_holds(moving(prop)[0]))}
     assert np.abs(shown([prop], FRAMES)[0] - before).max() < 1e-5
+
+
+@pytest.mark.parametrize("name", PROPS)
+@pytest.mark.parametrize("setting", ["back", "amplitude", "period"])
+@pytest.mark.parametrize("typed", [0.0, 0.8, 1.70158, 5.0, 8.3])
+def test_a_setting_that_all_keys_get_at_once_takes_no_hold_off(stage, name, setting, typed):
+    """As *Copy to Selected* of a field does."""
+    prop = stage(name)
+    before, expected = shown([prop], FRAMES)[0], spaces(prop)
+    for fcurve in moving(prop):
+        for point in fcurve.keyframe_points:
+            setattr(point, setting, typed)
+        fcurve.update()
+    update()
+    assert spaces(prop) == expected
+    if setting != "back":
+        # The mode is in there, too.
+        assert np.abs(shown([prop], FRAMES)[0] - before).max() < 1e-5

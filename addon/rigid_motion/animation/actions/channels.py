@@ -14,8 +14,9 @@ import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
+from ...blender import channelbag_in, enum_value, existing
 from ..fcurves.keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
-from .marks import are_held, holds_of, marks_of
+from .marks import holds_of, is_any_flagged, marks_of
 from .modifiers import copy_modifier, is_term, read_cycles, set_settings, settings_of
 
 KEY_FIELDS = {
@@ -31,18 +32,16 @@ KEY_FIELDS = {
 KeyFields = dict[str, np.ndarray]
 """All there is to n keys, each field of shape (n, width)."""
 
-BREAKDOWN = bpy.types.Keyframe.bl_rna.properties["type"].enum_items["BREAKDOWN"].value
+BREAKDOWN = enum_value(bpy.types.Keyframe, "type", "BREAKDOWN")
 """The code of this type of keys."""
 
-AUTOMATIC = [
-    bpy.types.Keyframe.bl_rna.properties["handle_left_type"].enum_items[name].value for name in ("AUTO", "AUTO_CLAMPED")
-]
+AUTOMATIC = [enum_value(bpy.types.Keyframe, "handle_left_type", name) for name in ("AUTO", "AUTO_CLAMPED")]
 """The codes of the types of handles that Blender sets by the keys around."""
 
 
 def channelbag_of(animated: bpy.types.ID) -> bpy.types.ActionChannelbag:
     """Return the channels of `animated` in its Action; make what is missing of Action, slot, layer and strip."""
-    data = animated.animation_data or animated.animation_data_create()
+    data = existing(getattr(animated, "animation_data", None) or animated.animation_data_create())
     if data.action is None:
         data.action = bpy.data.actions.new(f"{animated.name}Action")
     action = data.action
@@ -53,7 +52,7 @@ def channelbag_of(animated: bpy.types.ID) -> bpy.types.ActionChannelbag:
         return result
     layer = action.layers[0] if action.layers else action.layers.new("Layer")
     strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
-    return strip.channelbag(data.action_slot, ensure=True)
+    return channelbag_in(strip, data.action_slot)
 
 
 def write_channel(
@@ -204,7 +203,7 @@ def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag
 
 def code_of(name: str, value: str) -> int:
     """Return the number that stands for a value of one of the enumerations of `bpy.types.Keyframe`."""
-    return bpy.types.Keyframe.bl_rna.properties[name].enum_items[value].value
+    return enum_value(bpy.types.Keyframe, name, value)
 
 
 class Read(NamedTuple):
@@ -265,8 +264,9 @@ def _read_together(
     is_sound = all(number < LARGEST for number in numbers) and bool(np.all(np.diff(points[0, :, 0]) >= 0.0))
     marked = breakdowns if breakdowns.any() else None
     holds, automatic = np.full(points.shape[:2], -1), None
-    if are_held(back, amplitude).any():
+    if is_any_flagged(back):
         holds = holds_of(back, amplitude, _read_property("period", channels, np.float32))
+    if (holds >= 0).any():
         types = [_read_property(f"handle_{side}_type", channels, CODE) for side in ("left", "right")]
         automatic = np.isin(np.stack(types, axis=-1), AUTOMATIC)
     keys = Keys(points, interpolation, left, right, easing, settings, linear, cycles, marked, automatic, is_sound)
@@ -275,7 +275,7 @@ def _read_together(
 
 def _read_property(name: str, channels: Sequence, dtype: type, *width: int) -> np.ndarray:
     """Return a property of the n keys of each of c channels, (c, n) or (c, n, width)."""
-    values = np.empty((len(channels), len(channels[0]), *width), dtype)
+    values: np.ndarray = np.empty((len(channels), len(channels[0]), *width), dtype)
     for keys, buffer in zip(channels, values, strict=True):
         keys.foreach_get(name, buffer.ravel())
     return values

@@ -3,7 +3,8 @@
 Blender keeps nothing of an extension's on a key. But each key has settings for eases that it does not have: `back` and
 `amplitude`. A mark is in the lowest bits of both, where it changes no ease by more than a part in a hundred thousand.
 So it goes where the key goes: it is copied and pasted, duplicated, mirrored, linked and saved with it, and is gone
-where a key is made anew. What a key is held in is beside its mark, in the lowest bits of `period`.
+where a key is made anew. What a key is held in is beside its mark, in the lowest bits of `period`, with a check of its
+own: a number that is typed into one of the three settings takes its say off, and the other two tell.
 
 Without a mark a key goes on with what the key before it says, and before the first mark with what that says.
 """
@@ -33,6 +34,12 @@ MOST = 15
 HOLD_BITS = (MOST + 1) * (MOST_FRAMES + 1) - 1
 """The bits of `period` that have a hold: the number of the holder, and the frames."""
 
+CHECK_BITS = 15 * (HOLD_BITS + 1)
+"""Those above, which say whether it is one."""
+
+MULTIPLIER, ADDED = 4181, 3863
+"""What they are made by: so no whole number up to 500 says a hold, nor any hundredths up to 20."""
+
 PERIOD = 4.1
 """Blender's own, where there is none yet to have a hold in its bits."""
 
@@ -44,14 +51,33 @@ def marks_of(backs: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
     return np.where(is_marked, low & MOST, 0)
 
 
-def are_held(backs: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
-    """Return which keys with these settings say what they are held in."""
-    return (marks_of(backs, amplitudes) > 0) & ((backs.view(np.int32) & HELD) != 0)
+def are_held(backs: np.ndarray, amplitudes: np.ndarray, periods: np.ndarray) -> np.ndarray:
+    """Return which keys with these settings (float32, any shape) say what they are held in."""
+    return (marks_of(backs, amplitudes) > 0) & _are_flagged(backs) & _are_checked(periods)
 
 
 def holds_of(backs: np.ndarray, amplitudes: np.ndarray, periods: np.ndarray) -> np.ndarray:
     """Return the holds in the settings of keys (float32, any shape): see `hold`; -1 where there is none."""
-    return np.where(are_held(backs, amplitudes), periods.view(np.int32) & HOLD_BITS, -1)
+    return np.where(are_held(backs, amplitudes, periods), periods.view(np.int32) & HOLD_BITS, -1)
+
+
+def is_any_flagged(backs: np.ndarray) -> bool:
+    """Return whether any key with such a setting may say what it is held in."""
+    return bool(_are_flagged(backs).any())
+
+
+def _are_flagged(backs: np.ndarray) -> np.ndarray:
+    return (backs.view(np.int32) & (CHECK | HELD)) == CHECK | HELD
+
+
+def _are_checked(periods: np.ndarray) -> np.ndarray:
+    bits = periods.view(np.int32) & (CHECK_BITS | HOLD_BITS)
+    return _checked(bits & HOLD_BITS) == bits
+
+
+def _checked(holds: np.ndarray) -> np.ndarray:
+    """Return holds with the bits that say that they are some."""
+    return holds | (holds * MULTIPLIER + ADDED) & CHECK_BITS
 
 
 def hold(number: int, frames: int = 0) -> int:
@@ -69,6 +95,20 @@ def read_holds(fcurve: bpy.types.FCurve) -> np.ndarray:
     return holds_of(*_settings(fcurve), _setting(fcurve, "period"))
 
 
+def mend_marks(fcurve: bpy.types.FCurve) -> np.ndarray:
+    """Mark keys again that say a hold by two of the three settings, as one was typed over.
+
+    Returns which of them do not say any more what it was, shape (n,).
+    """
+    (backs, amplitudes), is_checked = _settings(fcurve), _are_checked(_setting(fcurve, "period"))
+    is_flagged, is_signed = _are_flagged(backs), (amplitudes.view(np.int32) & LOW) == SIGNATURE
+    typed = is_flagged.astype(int) + is_signed + is_checked == 2
+    if typed.any():
+        marks = np.where(typed & is_flagged, backs.view(np.int32) & MOST, marks_of(backs, amplitudes))
+        write_marks(fcurve, np.where(typed & (marks == 0), np.maximum(carried_on(marks), 1), marks))
+    return typed & ~(is_flagged & is_checked)
+
+
 def has_marks(fcurve: bpy.types.FCurve) -> bool:
     """Return whether any of the keys of an F-curve has a mark."""
     return bool(read_marks(fcurve).any())
@@ -78,7 +118,9 @@ def write_marks(fcurve: bpy.types.FCurve, marks: np.ndarray) -> None:
     """Give the keys of an F-curve marks (n,). Nothing that Blender evaluates changes, so nothing is tagged."""
     backs, amplitudes = settings = _settings(fcurve)
     # What a key is held in stays.
-    held = np.where(are_held(backs, amplitudes), HELD, 0)
+    is_held = (amplitudes.view(np.int32) & LOW) == SIGNATURE
+    is_held |= _are_checked(_setting(fcurve, "period"))
+    held = np.where(is_held & _are_flagged(backs), HELD, 0)
     for values, bits in ((backs, CHECK | marks | held), (amplitudes, SIGNATURE)):
         raw = values.view(np.int32)
         raw[:] = np.where(marks > 0, raw & ~LOW | bits, raw)
@@ -95,7 +137,9 @@ def write_holds(fcurve: bpy.types.FCurve, holds: np.ndarray) -> None:
     periods[(holds >= 0) & ~(np.abs(periods) > 1e-3)] = PERIOD
     raw, bits = backs.view(np.int32), periods.view(np.int32)
     raw[:] = np.where(holds >= 0, raw | HELD, raw & ~HELD)
-    bits[:] = np.where(holds >= 0, bits & ~HOLD_BITS | holds, bits)
+    bits[:] = np.where(holds >= 0, bits & ~(CHECK_BITS | HOLD_BITS) | _checked(holds), bits)
+    # Without one the check is off by a bit, so that none is read from it.
+    bits[(holds < 0) & _are_checked(periods)] ^= HOLD_BITS + 1
     fcurve.keyframe_points.foreach_set("back", backs)
     fcurve.keyframe_points.foreach_set("period", periods)
 

@@ -28,6 +28,10 @@ TURN_AXES = (SCREW_AXIS, "X", "Y", "Z")
 SAME_FRAME = 0.01
 """Keys closer than this are one key to Blender, and here."""
 
+SAME_VALUE = 1e-5
+"""Values that differ by less, relative or absolute below 1, are the same: keys that took what was seen are so far off.
+"""
+
 
 def distinct(frames: np.ndarray) -> np.ndarray:
     """Return rising frames of keys, those that are one key to Blender once."""

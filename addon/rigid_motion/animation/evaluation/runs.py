@@ -17,7 +17,7 @@ import numpy as np
 from ...motion.channel_curves import auto_clamped_slopes
 from ..fcurves.evaluation import evaluate
 from ..fcurves.keys import Keys
-from .marks import SAME_FRAME, Marks, distinct
+from .marks import SAME_FRAME, SAME_VALUE, Marks, distinct
 
 MOST_FRAMES = 63
 """The most frames over which something passes from one holder to the next."""
@@ -95,6 +95,11 @@ def keys_in(keys: Keys, stretch: Stretch) -> Keys | None:
     chosen = (keys.times >= stretch.first) & (keys.times < stretch.until)
     if not chosen.any():
         return None
+    if keys.breakdowns is not None and not stretch.goes:
+        # A breakdown that rests where the key before it is does not shape the way to that.
+        rests = np.abs(np.diff(keys.values)) <= SAME_VALUE * np.maximum(1.0, np.abs(keys.values[:, 1:]))
+        shapes = chosen & np.append(True, ~(keys.breakdowns[1:] & chosen[:-1] & rests.all(axis=0)))
+        chosen[np.flatnonzero(shapes)[-1] + 1 :] = False
     part = replace(keys.at(chosen), linear=stretch.comes or stretch.goes, cycles=None)
     if part.left is None or part.right is None or part.automatic is None:
         return part

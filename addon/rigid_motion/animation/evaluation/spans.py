@@ -73,7 +73,8 @@ def _spans_of_runs(source: Source) -> list[Span]:
     times |= {row: keys.times for rows, keys in source.channels for row in rows}
     # Angles stay together: near gimbal lock what one of them has depends on the others.
     parts = [tuple(row for row in sorted(times) if PART_OF[row] == part) for part in ROWS]
-    breaks, result = np.unique(np.concatenate([np.empty(0), *map(_breaks, source.curves)])), []
+    breaks = np.unique(np.concatenate([distinct(source.keyed_frames), *map(_breaks, source.curves)]))
+    result: list[Span] = []
     for run in source.runs:
         ends = [*distinct(run.source.keyed_frames).tolist(), *({run.stretch.until} - {np.inf})]
         for rows in filter(None, parts):

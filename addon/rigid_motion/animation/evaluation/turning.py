@@ -21,7 +21,7 @@ from ...motion.quaternions import conjugate, normalise, rotate
 from ...motion.spins import FULL_TURN, Spins
 from .bodies import body_poses
 from .components import AXIS_ANGLE, ROTATION, ROWS
-from .marks import HALF_TURN, SCREW_AXIS, sweeps
+from .marks import HALF_TURN, SAME_VALUE, SCREW_AXIS, sweeps
 from .sources import Source
 
 NO_TURN = 1e-4
@@ -179,7 +179,7 @@ def _add_angles(
         furthest = np.abs(change).argmax(axis=0)
         by = np.take_along_axis(change, furthest[None], axis=0)[0]
     # An angle that changes by rounding alone has no sense.
-    some = np.flatnonzero((np.abs(by) >= HALF_TURN) | ((parts != 0.0) & (np.abs(by) > NO_TURN)))
+    some = np.flatnonzero((np.abs(by) >= HALF_TURN) | ((parts != 0.0) & (np.abs(by) > SAME_VALUE)))
     if not len(some):
         return senses
     by, sense = by[some], np.sign(by[some])

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ...blender import view_layer
 from ..evaluation.components import ROWS, SCALE
 from ..evaluation.sources import SAME_FRAME
 from ..holds.holders import Holder, basis_in, constraints_to, holders_of, passings_of, world_in
@@ -57,7 +58,7 @@ def _assigned(obj: bpy.types.Object, graphs: Iterable[bpy.types.Depsgraph]) -> A
     transform, known = Transform(obj), [one for graph in graphs if (one := obj.evaluated_get(graph)).is_evaluated]
     if not known or any(one.matrix_world == obj.matrix_world for one in known) or _holder_of(transform) is None:
         return None
-    taken = world_in(transform, None, obj.matrix_basis, bpy.context.view_layer.depsgraph)
+    taken = world_in(transform, None, obj.matrix_basis, view_layer().depsgraph)
     if not np.allclose(np.array(taken), np.array(obj.matrix_world), rtol=ROUNDING, atol=ROUNDING):
         return None
     return Assigned(transform, obj.matrix_world.copy(), transform.components(), np.array(known[0].scale))
@@ -73,7 +74,7 @@ def _holder_of(transform: Transform) -> Holder | None:
 
 def settled(items: Iterable[Assigned]) -> list[Settled]:
     """Return what has things be where they were assigned to be, in what holds them as they are evaluated."""
-    result, depsgraph = [], bpy.context.view_layer.depsgraph
+    result, depsgraph = [], view_layer().depsgraph
     for item in items:
         transform, holder = item.transform, _holder_of(item.transform)
         if holder is not None and holder.target is not None:
@@ -94,8 +95,9 @@ def set_keys(item: Settled, frame: float) -> bool:
     if binding is None or not binding.slot.is_editable:
         return False
     at, found = frame_in_action(transform.animated, frame), False
-    for row, fcurve in ((row, binding.curves.get(channel)) for row, channel in transform.channels.items()):
-        for key in () if fcurve is None else fcurve.keyframe_points:
+    curves = ((row, binding.curves.get(channel)) for row, channel in transform.channels.items())
+    for row, fcurve in ((row, fcurve) for row, fcurve in curves if fcurve is not None):
+        for key in fcurve.keyframe_points:
             if abs(key.co.x - at) < SAME_FRAME and key.co.y == np.float32(item.before[row]):
                 key.co_ui.y, found = item.after[row], True
                 fcurve.update()

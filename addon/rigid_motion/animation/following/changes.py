@@ -1,18 +1,20 @@
 """What Blender tells of edits, and which channels of an Action they were about.
 
-Its dependency graphs name data-blocks that wait to be evaluated, or just were. They are found by their names, for the
-original of what was deleted just now is no longer there to be asked for. Of an Action they say no more, so a snapshot
-of its keys is kept and compared.
+Its dependency graphs name data-blocks that wait to be evaluated, or just were. They are found by their names
+alone, for of what was deleted just now neither the original nor its library is there to be asked for. Of an Action they
+say no more, so a snapshot of its keys is kept and compared.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
+from typing import Any
 
 import bpy
 import numpy as np
 
+from ...blender import armature, pose_bones
 from ..actions.channels import KEY_FIELDS
 from ..actions.modifiers import settings_of_others
 from ..actions.slots import Slot
@@ -24,9 +26,6 @@ OF_OBJECTS = (
 )
 """The properties of objects that in-betweens depend on."""
 
-BlockKey = tuple[str, str | None]
-"""The key that a data-block is found by in the file: its name, and the file that it is linked from."""
-
 OFTEN = ("co", "handle_left", "handle_right")
 """What of keys is dragged: it is looked at first."""
 
@@ -34,28 +33,31 @@ SELDOM = ("interpolation", "easing", "back", "amplitude", "period", "type")
 """What else in-betweens depend on of keys."""
 
 
-def key_of(block: bpy.types.ID) -> BlockKey:
-    return block.name, block.library and block.library.filepath
-
-
 def edited_actions(*graphs: bpy.types.Depsgraph) -> set[bpy.types.Action]:
     """Return the Actions that wait to be evaluated in dependency graphs, or just were."""
     updates = [update.id for graph in graphs if graph.id_type_updated("ACTION") for update in graph.updates]
-    keys = {key_of(block) for block in updates if isinstance(block, bpy.types.Action)}
-    return set(map(bpy.data.actions.get, keys)) - {None}
+    return _originals(bpy.data.actions, [block for block in updates if isinstance(block, bpy.types.Action)])
 
 
 def edited_objects(*graphs: bpy.types.Depsgraph) -> set[bpy.types.Object]:
     """Return the objects that wait to be evaluated in dependency graphs, or just were, with the rigs of armatures."""
-    graphs = [graph for graph in graphs if graph.id_type_updated("OBJECT") or graph.id_type_updated("ARMATURE")]
-    updates = [update.id for graph in graphs for update in graph.updates]
-    keys = {key_of(block) for block in updates if isinstance(block, bpy.types.Object)}
-    result = set(map(bpy.data.objects.get, keys)) - {None}
+    edited = (graph for graph in graphs if graph.id_type_updated("OBJECT") or graph.id_type_updated("ARMATURE"))
+    updates = [update.id for graph in edited for update in graph.updates]
+    result = _originals(bpy.data.objects, [block for block in updates if isinstance(block, bpy.types.Object)])
     # A setting of a bone at rest is the armature's alone, until that was evaluated.
-    alone = {key_of(block) for block in updates if isinstance(block, bpy.types.Armature)}
-    alone -= {key_of(obj.data) for obj in result if obj.type == "ARMATURE"}
+    alone = {block.name for block in updates if isinstance(block, bpy.types.Armature)}
+    alone -= {armature(obj).name for obj in result if obj.type == "ARMATURE"}
     if alone:
-        result |= {obj for obj in bpy.data.objects if obj.type == "ARMATURE" and key_of(obj.data) in alone}
+        result |= {obj for obj in bpy.data.objects if obj.type == "ARMATURE" and armature(obj).name in alone}
+    return result
+
+
+def _originals(present: Any, blocks: Iterable[bpy.types.ID]) -> set:
+    """Return those present in the file that these are evaluated copies of; linked ones of the same names with them."""
+    names = {block.name for block in blocks}
+    result = {present.get(name) for name in names} - {None}
+    if names and bpy.data.libraries:
+        result |= {block for block in present if block.library is not None and block.name in names}
     return result
 
 
@@ -66,8 +68,9 @@ def add_action(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, added: set
     and Actions that this was tried for.
     """
     action = None if obj.animation_data is None else obj.animation_data.action
-    key = None if action is None else (obj.session_uid, action.session_uid)
-    if key is not None and key not in added and not action.evaluated_get(depsgraph).is_evaluated:
+    if action is None or (key := (obj.session_uid, action.session_uid)) in added:
+        return
+    if not action.evaluated_get(depsgraph).is_evaluated:
         added.add(key)
         # No edit, but Blender finds out anew what depends on what.
         obj.instance_type = obj.instance_type
@@ -161,7 +164,7 @@ def settings_of(obj: bpy.types.Object, slots: Sequence[Slot]) -> tuple:
 
 def _axes_in(rig: bpy.types.Object) -> bytes:
     """Return the bones at rest, as far as these say along which axes others move."""
-    bones = rig.data.bones
+    bones = armature(rig).bones
     is_local = np.empty(len(bones), bool)
     bones.foreach_get("use_local_location", is_local)
     at_rest = np.zeros((len(bones), 16), np.float32)
@@ -172,7 +175,7 @@ def _axes_in(rig: bpy.types.Object) -> bytes:
 
 def bones_in(rig: bpy.types.Object) -> np.ndarray:
     """Return how the bones of a rig turn, and what rotation and scale they have, a row each."""
-    bones, columns = rig.pose.bones, []
+    bones, columns = pose_bones(rig), []
     for name, width in {**WIDTHS, "rotation_mode": 1}.items():
         values = np.empty((len(bones), width), np.float32 if name in WIDTHS else np.int32)
         bones.foreach_get(name, values.ravel())

@@ -14,8 +14,8 @@ from contextlib import contextmanager
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
+from ...blender import existing, persistent, pose_bones, view_layer
 from ...handlers import append_handlers, remove_handlers
 from ..actions.marks import has_marks
 from ..actions.modifiers import has_terms
@@ -195,7 +195,7 @@ class Follower:
                 edited += map(transform_of, (obj, *(() if pose is None else pose.bones)))
             elif bones is not None:
                 numbers = np.flatnonzero((bones != bones_before).any(axis=1)).tolist()
-                edited += [transform_of(pose.bones[number]) for number in numbers]
+                edited += [transform_of(pose_bones(obj)[number]) for number in numbers]
         # What others move by may have been planned for those that move by it no longer.
         bindings = (*bindings_in(left & set(bpy.data.actions)), *bindings_of(edited))
         self._refresh([*{(item.slot.key, item.prefix): item for item in bindings}.values()], (), frame)
@@ -210,12 +210,12 @@ class Follower:
         keyed = [item for item in items if set_keys(item, frame)]
         if keyed:
             self.refresh(item.transform for item in keyed)
-            bpy.context.view_layer.update()
+            view_layer().update()
         for item in items:
             set_values(item)
             self.settled[item.transform.identity, item.before.tobytes()] = item
         if items:
-            bpy.context.view_layer.update()
+            view_layer().update()
 
     def before_update(self, scene: bpy.types.Scene, *_: object) -> None:
         graphs = graphs_of(scene)
@@ -239,7 +239,7 @@ class Follower:
             self.follow_objects(added, scene.frame_current_final)
         unkeyed, self.unkeyed = self.unkeyed, []
         if sum(poses.set_again() for poses in unkeyed):
-            bpy.context.view_layer.update()
+            view_layer().update()
         items, self.assigned, self.undoes = self.assigned, [], False
         self.settle(settled(items), scene.frame_current_final)
 
@@ -249,7 +249,7 @@ class Follower:
         graphs = graphs_of(scene)
         items = [] if self.undoes else settled(assigned(edited_objects(*graphs)))
         for item in items:
-            set_keys(item, bpy.context.view_layer.depsgraph.scene_eval.frame_current_final)
+            set_keys(item, existing(existing(view_layer().depsgraph).scene_eval).frame_current_final)
             set_values(item)
         self.follow(edited_actions(*graphs), scene.frame_current_final)
         self.unkeyed.clear()

@@ -13,15 +13,15 @@ from collections.abc import Mapping
 import bpy
 import numpy as np
 
+from ...blender import existing
 from ..actions.slots import Binding
 from ..evaluation.components import DEPENDS_ON_KEYS
 from ..evaluation.differences import seen_values
+from ..evaluation.marks import SAME_VALUE
 from ..evaluation.sources import SAME_FRAME, Source
 from ..evaluation.turning import needs_turning
+from .kept_runs import keep_run
 from .kept_timing import Insertion, nearest_key
-
-SAME_VALUE = 1e-5
-"""Values that differ by less, relative or absolute below 1, are the same in single precision."""
 
 
 def key_fellows(binding: Binding, new: Source, old: Source) -> bool:
@@ -59,23 +59,31 @@ def divided(binding: Binding, new: Source, old: Source) -> Insertion | None:
     added = _without(new.key_frames, old.key_frames)
     if len(added) != 1 or len(new.key_frames) != len(old.key_frames) + 1 or old.order != new.order:
         return None
-    frame = float(added[0])
-    if not (_is_in_between(old, frame) and old.key_frames[0] < frame < old.key_frames[-1]):
-        return None
+    frame, run = float(added[0]), None
     if old.switches:
-        if frame > old.run_at(frame).source.keyed_range[1]:
+        run = old.run_at(frame)
+        old, new = run.source, new.run_at(frame).source
+        if frame < old.key_frames[0]:
             return None
-        old, new = old.run_at(frame).source, new.run_at(frame).source
-    seen, curves = seen_values(old, added)[:, 0], _curves_of(binding)
+    elif not (_is_in_between(old, frame) and old.key_frames[0] < frame < old.key_frames[-1]):
+        return None
+    seen = seen_values(old, added if run is None else run.moments(added))[:, 0]
+    curves, mode = _curves_of(binding), old.mode_at(frame) if len(old.key_frames) > 1 else 0
     filled = {*old.filled_rows, *new.filled_rows}
     for rows, keys in new.channels:
         at = int(np.argmin(np.abs(keys.times - frame)))
         off = np.abs(keys.values[:, at] - seen[rows]) > SAME_VALUE * np.maximum(1.0, np.abs(seen[rows]))
-        off |= abs(keys.times[at] - frame) >= SAME_FRAME
+        if abs(keys.times[at] - frame) >= SAME_FRAME:
+            # Blender's own in-betweens are those of each channel by itself.
+            off[:] = mode != 0
         if np.any(off & [row in filled for row in rows]):
             return None
-    if not needs_turning(old):
-        _mark_breakdown(curves, old, frame)
+    is_divided = frame < old.key_frames[-1] and mode != 0
+    if run is not None:
+        keep_run(curves, old, new, frame, may_free=is_divided)
+    is_at_rest = run is not None and frame > old.key_frames[-1] and not run.stretch.goes
+    if old.cyclic is None and mode in DEPENDS_ON_KEYS and (is_at_rest or (is_divided and not needs_turning(old))):
+        _mark_breakdown(curves, frame)
     return Insertion(curves, old, frame)
 
 
@@ -106,13 +114,12 @@ def _without(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     return frames[np.abs(others[indices] - frames[:, None]).min(axis=1) >= SAME_FRAME]
 
 
-def _mark_breakdown(curves: Mapping[int, bpy.types.FCurve], old: Source, frame: float) -> None:
+def _mark_breakdown(curves: Mapping[int, bpy.types.FCurve], frame: float) -> None:
     """Make a new key a breakdown, where the path would be another one with a key more that shapes it."""
-    if old.cyclic is None and old.mode_at(frame) in DEPENDS_ON_KEYS:
-        for fcurve in curves.values():
-            number, points = nearest_key(fcurve, frame)
-            if len(points) and abs(points[number, 0] - frame) < SAME_FRAME:
-                fcurve.keyframe_points[number].type = "BREAKDOWN"
+    for fcurve in curves.values():
+        number, points = nearest_key(fcurve, frame)
+        if len(points) and abs(points[number, 0] - frame) < SAME_FRAME:
+            fcurve.keyframe_points[number].type = "BREAKDOWN"
 
 
 def set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
@@ -125,7 +132,7 @@ def set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
         before = keys[int(np.argmax(np.where(times < frame, times, -np.inf)))] if (times < frame).any() else None
         # Read first: an insertion moves the other keys elsewhere in memory.
         eased = None if before is None else (before.interpolation, before.easing)
-        key = keys.insert(frame, value)
+        key = existing(keys.insert(frame, value))
         if eased is not None:
             key.interpolation, key.easing = eased
     fcurve.update()

@@ -55,6 +55,13 @@ class Insertion:
         return int(np.searchsorted(self.old.key_frames, self.frame)) - 1
 
     @property
+    def is_shaped(self) -> bool:
+        """Return whether handles shape the segment that it divides, if it divides one of a mode."""
+        old = self.old
+        is_inside = old.key_frames[0] < self.frame < old.key_frames[-1]
+        return is_inside and bool(old.has_handles[self.segment]) and old.mode_at(self.frame) != 0
+
+    @property
     def frames(self) -> np.ndarray:
         """Those of the key before it, its own and that of the key behind it, (3,)."""
         return np.insert(self.old.key_frames[self.segment : self.segment + 2], 1, self.frame)
@@ -91,15 +98,32 @@ class Insertion:
             if abs(begun[-1]) >= STILL and total > 0.0:
                 desired = (begun / begun[-1] * (total + linear[side]) - linear[side] * MOMENTS) / total
                 handles = fit_together(MOMENTS, desired, np.array(shares)[:, side] / total, np.array(times)[:, side])
+                self._go_on(side, of_all, begun[-1], linear[side] / total)
             for three, of_one in zip(of_all, handles, strict=True):
                 _set_handles(three[side], three[side + 1], of_one)
         for row, *_ in curved:
             self.curves[row].update()
 
+    def _go_on(self, side: int, of_all: Iterable[list[bpy.types.Keyframe]], share: float, linear: float) -> None:
+        """Have it go on before its first key or behind its last one at the speed that it had, by handles outside.
+
+        `share` is the part of the segment on this side, and `linear` that of channels without handles to that of those
+        which have some, `of_all`.
+        """
+        frames, duration = self.frames, float(np.diff(self.frames)[side])
+        if not self.old.is_linear or frames[2 * side] != self.old.key_frames[-side]:
+            return
+        third = duration / 3 if side else -duration / 3
+        gone = progress_at([self.old], [frames[2 * side, None] + third])[0][0] - side
+        gone = (1.0 + linear) * gone / share - linear * third / duration
+        for three in of_all:
+            key, change = three[2 * side], three[side + 1].co.y - three[side].co.y
+            setattr(key, ("handle_left", "handle_right")[side], (key.co.x + third, key.co.y + gone * change))
+
 
 def keep_timing(insertions: Iterable[Insertion]) -> None:
     """Set the handles of new keys and of those beside them, where handles shape the segment."""
-    shaped = [inserted for inserted in insertions if inserted.old.has_handles[inserted.segment]]
+    shaped = [inserted for inserted in insertions if inserted.is_shaped]
     if shaped:
         of_all = progress_at([inserted.old for inserted in shaped], [inserted.moments for inserted in shaped])
         for inserted, progress in zip(shaped, of_all, strict=True):

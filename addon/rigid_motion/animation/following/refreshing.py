@@ -13,15 +13,14 @@ import numpy as np
 
 from ..actions.channels import key_points
 from ..actions.marks import read_holds, read_marks, write_holds, write_marks
-from ..actions.modifiers import add_cycles, has_terms, terms_in
+from ..actions.modifiers import add_cycles, cycles_of, has_terms, terms_in
 from ..actions.reading import is_marked, keyed_in, planned_from
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import Binding
 from ..evaluation.components import MODE_NUMBERS
 from ..evaluation.source_cache import cache_source, cached_source
 from ..evaluation.sources import SAME_FRAME, Source
-from ..fcurves.keys import Cycles
-from ..holds.apply import apply_holds, has_holders
+from ..holds.apply import apply_holds, has_holders, restore_holds
 from ..terms.apply import apply, remove_terms
 from ..terms.planning import plan
 from ..transforms import WIDTHS, Refused
@@ -61,6 +60,8 @@ def refresh_bindings(
     for binding in bindings:
         _tidy(binding)
     _adopt(bindings)
+    for binding in filter(has_holders, bindings):
+        restore_holds(binding)
     marked = [binding for binding in bindings if is_marked(binding) or has_holders(binding)]
     stale: list[Reading] = []
     current: dict[Binding, Source] = {}
@@ -99,8 +100,8 @@ def _tidy(binding: Binding) -> None:
                 continue
             for term in terms:
                 modifiers.remove(term)
-        elif len(modifiers) > 1 and (last := modifiers[-1]).type == "CYCLES":
-            add_cycles(fcurve, Cycles(last.mode_before, last.mode_after, last.cycles_before, last.cycles_after))
+        elif len(modifiers) > 1 and isinstance(last := modifiers[-1], bpy.types.FModifierCycles):
+            add_cycles(fcurve, cycles_of(last))
 
 
 def _adopt(bindings: Iterable[Binding]) -> None:

@@ -22,7 +22,7 @@ from ..transforms import GROUP, bone_name
 
 
 def set_turns_in(
-    binding: Binding, turns: float | Sequence[float], frames: Sequence[float], axis: str | None = None
+    binding: Binding, turns: float | Sequence[float], frames: Sequence[float] | np.ndarray, axis: str | None = None
 ) -> None:
     """Key the channel of turns of a slot on the frames of keys that begin segments, with one number on all of these or
     one on each, rising; and behind them where others go on. About this one of `TURN_AXES`, all of them, if it is given.
@@ -150,7 +150,7 @@ def _shares(
     most = max(abs(float(turned.spins.turns[0])), float(np.abs(source.segment_turns).sum()))
     steps = SAMPLES * (1 + int(most))
 
-    def sampled(ends: Sequence[float]) -> np.ndarray:
+    def sampled(ends: Sequence[float] | np.ndarray) -> np.ndarray:
         inner = [np.linspace(*pair, steps, endpoint=False) for pair in itertools.pairwise(ends)]
         return np.append(np.concatenate(inner), ends[-1])
 

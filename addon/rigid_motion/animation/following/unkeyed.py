@@ -14,6 +14,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...blender import existing, pose_bones
 from ..actions.slots import Curves, Slot
 from ..transforms import WIDTHS, Channel, prefix_of, split_path
 
@@ -37,7 +38,9 @@ class Poses:
 
     def __init__(self, slot: Slot, edited: Collection[Channel], written: Curves, frame: float) -> None:
         # Under NLA strips there is no telling where channels have something, and Blender evaluates all in any case.
-        self._users = [user for user in slot.users if slot.plays_in(user) and not len(user.animation_data.nla_tracks)]
+        self._users = [
+            user for user in slot.users if slot.plays_in(user) and not len(existing(user.animation_data).nla_tracks)
+        ]
         self._left_out, self._others = set(edited), []
         for fcurve in slot.fcurves if self._users else ():
             path = fcurve.data_path
@@ -58,7 +61,7 @@ class Poses:
             then = dict(zip(self._others, values, strict=True))
             for name, now in _of_bones(user).items():
                 for number, index in np.argwhere(now != bones[name]).tolist():
-                    then[prefix_of(user.pose.bones[number].name) + name, index] = float(bones[name][number, index])
+                    then[prefix_of(pose_bones(user)[number].name) + name, index] = float(bones[name][number, index])
             for channel, value in then.items():
                 if channel not in self._left_out and value is not None and _value_of(user, channel) != value:
                     _set_value(user, channel, value)
@@ -74,8 +77,8 @@ def _is_of_bone(path: str) -> bool:
 
 def _of_bones(rig: bpy.types.Object) -> dict[str, np.ndarray]:
     """Return the properties of all bones that move them, (bones, width) each."""
-    bones, result = () if rig.pose is None else rig.pose.bones, {}
-    for name, width in WIDTHS.items() if bones else ():
+    result: dict[str, np.ndarray] = {}
+    for name, width in WIDTHS.items() if rig.pose is not None and (bones := rig.pose.bones) else ():
         result[name] = np.empty((len(bones), width), np.float32)
         bones.foreach_get(name, result[name].ravel())
     return result
@@ -85,7 +88,7 @@ def _value_of(user: bpy.types.Object, channel: Channel) -> Any:
     """Return what a channel moves, None where that is not there or no number."""
     path, index = channel
     try:
-        prop = user.path_resolve(path)
+        prop: Any = user.path_resolve(path)
         value = prop if isinstance(prop, int | float) else prop[index]
     except (ValueError, IndexError, TypeError, KeyError):
         return None
@@ -95,13 +98,13 @@ def _value_of(user: bpy.types.Object, channel: Channel) -> Any:
 def _set_value(user: bpy.types.Object, channel: Channel, value: Any) -> None:
     """Set what a channel moves."""
     path, index = channel
-    prop = user.path_resolve(path)
+    prop: Any = user.path_resolve(path)
     if not isinstance(prop, int | float):
         prop[index] = value
         return
     is_custom = path.endswith('"]')
     holder, _, name = path[:-2].rpartition('["') if is_custom else path.rpartition(".")
-    owner = user.path_resolve(holder) if holder else user
+    owner: Any = user.path_resolve(holder) if holder else user
     if is_custom:
         owner[bpy.utils.unescape_identifier(name)] = value
         # Of a custom property Blender does not know by itself that it was set.

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from functools import partial
+from typing import cast
 
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
+from ...blender import channelbag_in
 from ..actions.channels import ensure_group, key_points, replace_keys
+from ..actions.marks import hold, mend_marks, read_holds, write_holds
 from ..actions.slots import Binding
 from ..evaluation.components import PART_OF
 from ..evaluation.sources import Source
@@ -44,6 +47,31 @@ def has_holders(binding: Binding) -> bool:
     return any(is_ours(constraint) for user in binding.users for constraint in user.carrier.constraints)
 
 
+def restore_holds(binding: Binding) -> None:
+    """Have keys of which a setting was typed over say again what they are held in: what constraints do on their frames.
+
+    Keys of all channels may have lost it at once, as the Graph Editor copies a setting to all selected ones.
+    """
+    lost = [(fcurve, places) for fcurve in binding.moving.values() if (places := mend_marks(fcurve)).any()]
+    if not lost:
+        return
+    holding, passings = (
+        {number: binding.curves[one] for one, number in _influences(binding, of_user).items() if one in binding.curves}
+        for of_user in (constraints_to, partial(_passings, binding=binding))
+    )
+
+    def held_on(frame: float) -> int:
+        number = next((number for number, one in holding.items() if one.evaluate(frame + NEAR) > 0.5), 0)
+        ends = key_points(passings[number])[:, 0] if number in passings else np.empty(0)
+        begins = ends[:-2][np.abs(ends[2:] - frame) < NEAR]
+        return hold(number, round(frame - float(begins[0])) if len(begins) else 0)
+
+    for fcurve, places in lost:
+        frames, holds = key_points(fcurve)[:, 0].tolist(), read_holds(fcurve)
+        holds[places] = [held_on(frames[place]) for place in np.flatnonzero(places).tolist()]
+        write_holds(fcurve, holds)
+
+
 def apply_holds(binding: Binding, source: Source, *, may_key: bool = True) -> bool:
     """Have the constraints of a transform hold it as its keys say. Returns whether anything was changed.
 
@@ -61,10 +89,10 @@ def apply_holds(binding: Binding, source: Source, *, may_key: bool = True) -> bo
         return False
     else:
         changed = False
-    holding, passings = _of_all(binding, constraints_to), _of_all(binding, lambda user: _passings(user, binding))
-    for keys_for, constraints in ((holding_keys, holding), (passing_keys, passings)):
-        for number, constraint in constraints.items():
-            changed |= _key(binding, channel_of(binding.users[0], constraint), keys_for(source, number), may_key)
+    holding, passings = _influences(binding, constraints_to), _influences(binding, partial(_passings, binding=binding))
+    for keys_for, channels in ((holding_keys, holding), (passing_keys, passings)):
+        for channel, number in channels.items():
+            changed |= _key(binding, channel, keys_for(source, number), may_key)
     none = InfluenceKeys(np.array([source.keyed_range[0]]), np.zeros(1), np.full(1, CONSTANT))
     for user in binding.users:
         ours = _passings(user, binding).values()
@@ -85,6 +113,13 @@ def _of_all(binding: Binding, of_user: Callable) -> dict[int, Constraint]:
     return {number: item for user in reversed(binding.users) for number, item in of_user(user).items()}
 
 
+def _influences(binding: Binding, of_user: Callable) -> dict[Channel, int]:
+    """Return the numbers of constraints by the channels of their influences, whatever names they have at each user."""
+    return {
+        channel_of(user, item): number for user in reversed(binding.users) for number, item in of_user(user).items()
+    }
+
+
 def channels_of(binding: Binding) -> set[Channel]:
     """Return the channels of all constraints of ours, which have what the keys of the transforms say."""
     ours = [(user, item) for user in binding.users for item in user.carrier.constraints if is_ours(item)]
@@ -95,7 +130,7 @@ def _release(binding: Binding) -> bool:
     """Remove the influences of all constraints of ours. Returns whether there were any."""
     there = channels_of(binding) & binding.curves.keys()
     for channel in there:
-        cast(bpy.types.ActionChannelbag, binding.channelbag).fcurves.remove(binding.curves.pop(channel))
+        binding.channelbag.fcurves.remove(binding.curves.pop(channel))
     return bool(there)
 
 
@@ -119,7 +154,7 @@ def _complete(binding: Binding, source: Source) -> bool:
                 changed = True
         holders = {0: Holder(0, None, ""), **{holder.number: holder for holder in holders_of(user)}}
         for number in sorted((passed & holders.keys()) - _passings(user, binding).keys()):
-            fellow = _of_all(binding, lambda user: _passings(user, binding)).get(number)
+            fellow = _of_all(binding, partial(_passings, binding=binding)).get(number)
             label = f"{KINDS['ACTION']} {holders[number].name or 'World'}" if fellow is None else fellow.name
             add_passing(user, holders[number], label)
             changed = True
@@ -137,9 +172,7 @@ def _key(binding: Binding, channel: Channel, keys: InfluenceKeys, may_key: bool 
         return False
     fcurve, user = binding.ensure_curve(channel), binding.users[0]
     if fcurve.group is None and may_key:
-        fcurve.group = ensure_group(
-            cast(bpy.types.ActionChannelbag, binding.channelbag), user.carrier.name if user.is_part else GROUP
-        )
+        fcurve.group = ensure_group(binding.channelbag, user.carrier.name if user.is_part else GROUP)
     points = fcurve.keyframe_points
     desired = np.column_stack((keys.frames, keys.values)).astype(np.float32)
     eases = np.flatnonzero(keys.interpolations == BEZIER)
@@ -174,8 +207,7 @@ def _key(binding: Binding, channel: Channel, keys: InfluenceKeys, may_key: bool 
 def _arrive(binding: Binding, source: Source, poses: Passing) -> bool:
     """Have the constraints that pass show the poses in which something arrives."""
     slot, changed, last = _slot_of(binding), False, int(np.ceil(poses.frames[-1]))
-    strip: Any = binding.slot.action.layers[0].strips[0]
-    bag = strip.channelbag(slot, ensure=True)
+    bag = channelbag_in(binding.slot.action.layers[0].strips[0], slot)
     user = binding.users[0]
     # What has no keys is as it is.
     lacking = [PART_OF[row] not in source.keyed for row in range(len(poses.rows))]
