@@ -32,7 +32,7 @@ from rigid_motion_batch.cli import reduce
 
 TOLERANCES = (1e-4, 1e-3, 5e-3)
 
-WAYS = ("", " --curves", " --meshopt")
+WAYS = ("", " --curves", " --meshopt", " --meshopt --feet-may-slide --channels moving")
 """Options of reduce."""
 
 NEEDS_TOOLS = " --meshopt"
@@ -82,7 +82,7 @@ class Measured:
         for tolerance in TOLERANCES:
             within = f"within {1e3 * tolerance:g} mm"
             for way in filter(knows, WAYS):
-                if self.tools or way != NEEDS_TOOLS:
+                if self.tools or NEEDS_TOOLS not in way:
                     yield f"reduce{way}, {within}", partial(self._reduced, way, tolerance)
             for flag, name in RATE_KEPT.items() if self.tools else ():
                 yield f"{name}, {within}", partial(self._packed_within, flag, tolerance)

@@ -1,72 +1,27 @@
-"""What meshopt compressed is read as its own library would have it."""
+"""Documents that meshopt compressed are read whole, reduced and compressed again; plain ones where asked for."""
 
 import base64
-import ctypes
 import json
-from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rigid_motion.gltf import Options, reduced
+from rigid_motion.gltf import Options, read_document, reduce_file, reduced
 from rigid_motion.gltf.accessors import numbers
-from rigid_motion.gltf.documents import Document, GltfError, read_document
-from rigid_motion.gltf.meshopt import decompressed
+from rigid_motion.gltf.attribute_streams import encoded
+from rigid_motion.gltf.documents import Document, GltfError
+from rigid_motion.gltf.meshopt import Streams, decompressed, packed
+from rigid_motion.gltf.tracks import read_clips
+from rigid_motion_batch.cli import reduce
 from rigid_motion_batch.recordings import read_trajectories
 from tests.gltf.making import Making, turns, walk
+from tests.gltf.player import File, off
 
-PLACE = Path(spec.origin).parent / "lib" / "libmeshoptimizer.so" if (spec := find_spec("bpy")) else Path()
-LIBRARY = ctypes.CDLL(str(PLACE)) if PLACE.is_file() else None
-"""That of the Blender module, from Blender 5.2 on."""
+EXT, KHR = "EXT_meshopt_compression", "KHR_meshopt_compression"
 
-
-def encodings(elements: np.ndarray) -> Iterator[bytes]:
-    """What the library makes of elements (count, stride) of bytes, and what is made of them here."""
-    yield encoded(elements)
-    if LIBRARY:
-        LIBRARY.meshopt_encodeVertexBufferBound.restype = LIBRARY.meshopt_encodeVertexBuffer.restype = ctypes.c_size_t
-        LIBRARY.meshopt_encodeVertexVersion(0)
-        shape, content = tuple(map(ctypes.c_size_t, elements.shape)), np.ascontiguousarray(elements)
-        size = LIBRARY.meshopt_encodeVertexBufferBound(*shape)
-        result = ctypes.create_string_buffer(size)
-        place = content.ctypes.data_as(ctypes.c_void_p)
-        length = LIBRARY.meshopt_encodeVertexBuffer(result, ctypes.c_size_t(size), place, *shape)
-        assert length
-        yield result.raw[:length]
-
-
-def encoded(elements: np.ndarray) -> bytes:
-    """The same with the narrowest way for each group."""
-    count, stride = elements.shape
-    most, result = min(8192 // stride // 16 * 16, 256), bytearray(b"\xa0")
-    steps = np.diff(elements, axis=0, prepend=elements[:1]).view(np.int8)
-    signed = (steps.astype(np.int16) << 1 ^ (steps >> 7)).astype(np.uint8)
-    for first in range(0, count, most):
-        block = signed[first : first + most]
-        block = np.concatenate([block, np.zeros((-len(block) % 16, stride), dtype=np.uint8)])
-        for column in block.T:
-            kinds, groups = [], []
-            for group in column.reshape(-1, 16):
-                ways = [b"" if not group.any() else bytes(99), packed(group, 1), packed(group, 2), group.tobytes()]
-                kinds.append(min(range(4), key=lambda way: len(ways[way])))
-                groups.append(ways[kinds[-1]])
-            kinds += [0] * (-len(kinds) % 4)
-            result += bytes(
-                sum(kind << 2 * place for place, kind in enumerate(kinds[four : four + 4]))
-                for four in range(0, len(kinds), 4)
-            )
-            result += b"".join(groups)
-    return bytes(result) + bytes(max(32 - stride, 0)) + elements[0].tobytes()
-
-
-def packed(group: np.ndarray, kind: int) -> bytes:
-    """A group in parts of bytes of 2 or 4 bits, and whole ones where these do not do."""
-    widest, each = 4**kind - 1, 4 // kind
-    parts = np.minimum(group, widest).reshape(-1, each)
-    shifts = 2 * kind * np.arange(each - 1, -1, -1)
-    return bytes((parts << shifts).sum(axis=1).tolist()) + group[group >= widest].tobytes()
+TRIANGLES = "e1f0007687566778a9866589689801690000"
+"""A stream of one triangle."""
 
 
 def document(data: bytes, count: int, stride: int, **more: object) -> Document:
@@ -75,46 +30,7 @@ def document(data: bytes, count: int, stride: int, **more: object) -> Document:
     return Document({"buffers": [{"byteLength": len(data)}, {}], "bufferViews": [view]}, (data, None))
 
 
-@pytest.mark.parametrize("count", [1, 16, 17, 257, 1000])
-@pytest.mark.parametrize("stride", [4, 12, 64, 256])
-@pytest.mark.parametrize("wide", [0, 1, 40, 255])
-def test_elements_come_back_as_they_were(count: int, stride: int, wide: int) -> None:
-    random = np.random.default_rng(count + stride + wide)
-    steps = random.integers(-wide, wide + 1, (count, stride)) * (random.random((count, stride)) < 0.3)
-    elements = np.cumsum(steps, axis=0).astype(np.uint8)
-    for data in encodings(elements):
-        result = decompressed(document(data, count, stride))
-        assert result.buffers[-1][: count * stride] == elements.tobytes()
-        assert result.json["bufferViews"] == [{"buffer": 2, "byteOffset": 0, "byteLength": count * stride}]
-
-
-@pytest.mark.parametrize(
-    ("name", "stride", "elements", "kind", "values"),
-    [
-        (
-            "QUATERNION",
-            8,
-            "825a825a825afc7f7ea57ea5e6edfd7f000000000000ff7f921249c82525fc7f",
-            "<i2",
-            [16383, 16384, 16384, 16384, -3277, 22937, -16384, -16384, 0, 0, 0, 32767, 30256, 3362, -10085, 6724],
-        ),
-        (
-            "EXPONENTIAL",
-            12,
-            "002000f300e0fff1ea3e00e3883e00fc000000f200c8fff5",
-            "<f4",
-            [1.0, -0.25, 2.9999762773513794e-05, 1000.5, 0.0, -7.0],
-        ),
-    ],
-)
-def test_filters_are_undone_as_by_the_library(name: str, stride: int, elements: str, kind: str, values: list) -> None:
-    given = np.frombuffer(bytes.fromhex(elements), np.uint8).reshape(-1, stride)
-    data = encoded(given)
-    made = decompressed(document(data, len(given), stride, filter=name)).buffers[-1]
-    assert np.frombuffer(made, kind).tolist() == values
-
-
-def compressed(made: Making, path: Path) -> Path:
+def compressed(made: Making, path: Path, name: str = EXT) -> Path:
     """A file of the same, every view of which is compressed."""
     plain = read_document(made.write(path))
     parts, views = [], []
@@ -124,7 +40,7 @@ def compressed(made: Making, path: Path) -> Path:
         data = encoded(np.frombuffer(content, np.uint8).reshape(accessor["count"], -1))
         own = {"buffer": 0, "byteOffset": sum(map(len, parts)), "byteLength": len(data), "count": accessor["count"]}
         own |= {"byteStride": len(content) // accessor["count"], "mode": "ATTRIBUTES"}
-        views.append({"buffer": 1, "byteLength": len(content), "extensions": {"EXT_meshopt_compression": own}})
+        views.append({"buffer": 1, "byteLength": len(content), "extensions": {name: own}})
         parts.append(data)
     uri = f"data:application/octet-stream;base64,{base64.b64encode(b''.join(parts)).decode()}"
     buffers = [{"byteLength": sum(map(len, parts)), "uri": uri}, {"byteLength": 1, "extensions": {}}]
@@ -143,12 +59,10 @@ def test_a_recording_that_is_compressed_is_read_like_the_plain_one(tmp_path: Pat
     (result,) = read_trajectories(str(path)).trajectories
     np.testing.assert_array_equal(result.poses.positions, expected.poses.positions)
     np.testing.assert_array_equal(result.poses.quaternions, expected.poses.quaternions)
-    with pytest.raises(GltfError, match="is compressed by meshopt, which is not read"):
-        numbers(read_document(path), 0)
 
 
-def with_mesh(path: Path, how: str) -> Path:
-    """A chain of joints with a skin that a triangle hangs on; its views are compressed, those of the mesh in a way."""
+def with_mesh(path: Path, how: str = "", name: str = EXT) -> Path:
+    """A chain of joints with a skin that a triangle hangs on; all views are compressed, one of the mesh in some way."""
     made = walk()
     points = made.accessor(np.zeros((3, 3), dtype="<f4"))
     four = made.accessor(np.zeros((3, 4), dtype="u1")), made.accessor(np.ones((3, 4), dtype="<f4"))
@@ -157,18 +71,26 @@ def with_mesh(path: Path, how: str) -> Path:
     made.json["meshes"] = [{"primitives": [{"attributes": attributes, "indices": corners}]}]
     made.json["nodes"].append({"mesh": 0, "skin": 0})
     made.json["scenes"] = [{"nodes": [0, len(made.json["nodes"]) - 1]}]
-    result = compressed(made, path)
+    result = compressed(made, path, name)
     json_of = json.loads(result.read_text())
     views = [json_of["accessors"][accessor]["bufferView"] for accessor in (points, corners)]
-    of_points, of_corners = (json_of["bufferViews"][view]["extensions"]["EXT_meshopt_compression"] for view in views)
-    of_corners["mode"] = "TRIANGLES"
-    of_points |= {"filtered": {"filter": "COLOR"}, "damaged": {"byteLength": of_points["byteLength"] - 1}}.get(how, {})
+    of_points, of_corners = (json_of["bufferViews"][view]["extensions"][name] for view in views)
+    stream, buffer = bytes.fromhex(TRIANGLES), json_of["buffers"][0]
+    data = base64.b64decode(buffer["uri"].partition(",")[2]) + stream
+    of_corners |= {"mode": "TRIANGLES", "byteOffset": len(data) - len(stream), "byteLength": len(stream)}
+    of_points |= {"unknown": {"filter": "HUE"}, "damaged": {"byteLength": of_points["byteLength"] - 1}}.get(how, {})
+    buffer |= {"byteLength": len(data), "uri": f"data:;base64,{base64.b64encode(data).decode()}"}
     result.write_text(json.dumps(json_of))
     return result
 
 
-@pytest.mark.parametrize("how", ["plain", "filtered", "damaged"])
-def test_triangles_that_are_not_read_leave_the_motion_alone(tmp_path: Path, how: str) -> None:
+def test_a_skin_that_is_compressed_is_read(tmp_path: Path) -> None:
+    (result,) = read_trajectories(str(with_mesh(tmp_path / "walk.glb"))).trajectories
+    assert "without its skin" not in result.remark
+
+
+@pytest.mark.parametrize("how", ["unknown", "damaged"])
+def test_a_mesh_that_cannot_be_read_leaves_the_motion_alone(tmp_path: Path, how: str) -> None:
     path = with_mesh(tmp_path / "walk.glb", how)
     (expected,) = read_trajectories(str(walk().write(tmp_path / "plain.glb"))).trajectories
     (result,) = read_trajectories(str(path)).trajectories
@@ -177,18 +99,106 @@ def test_triangles_that_are_not_read_leave_the_motion_alone(tmp_path: Path, how:
     assert "without its skin: " in result.remark
 
 
-def test_reduce_says_what_to_do_with_it(tmp_path: Path) -> None:
-    with pytest.raises(GltfError, match=r"is compressed by meshopt, which is not read; export the file without it"):
-        reduced(read_document(with_mesh(tmp_path / "walk.glb", "plain")), Options(0.001))
+def plain(path: Path, folder: Path) -> Path:
+    """A file of the same, decompressed."""
+    document = decompressed(read_document(path))
+    json_of = {name: part for name, part in document.json.items() if not name.startswith("extensions")}
+    buffers = [bytes(data or b"-") for data in document.buffers]
+    uris = [f"data:;base64,{base64.b64encode(data).decode()}" for data in buffers]
+    json_of["buffers"] = [{"byteLength": len(data), "uri": uri} for data, uri in zip(buffers, uris, strict=True)]
+    result = folder / f"{path.stem}-plain.gltf"
+    result.write_text(json.dumps(json_of))
+    return result
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 5e-3])
+def test_what_is_compressed_keeps_to_the_tolerance_in_fewer_bytes(tmp_path: Path, tolerance: float) -> None:
+    path = walk().write(tmp_path / "walk.glb")
+    reports = [
+        reduce_file(path, tmp_path / f"{kind}.glb", Options(tolerance, 0.03, meshopt=kind == "packed"))
+        for kind in ("packed", "reduced")
+    ]
+    assert reports[0].clips[0].after.size < 0.7 * reports[1].clips[0].after.size
+    error = off(File(path), File(plain(tmp_path / "packed.glb", tmp_path)), 0, 0.03).error
+    assert 0.5 * tolerance < error <= min(tolerance, reports[0].clips[0].error * 1.02)
+    json_of = read_document(tmp_path / "packed.glb").json
+    assert json_of["extensionsRequired"] == json_of["extensionsUsed"] == [EXT]
+    filters = [view["extensions"][EXT].get("filter") for view in json_of["bufferViews"] if "extensions" in view]
+    assert {"QUATERNION", "EXPONENTIAL"} <= set(filters)
+
+
+def test_a_clip_lasts_as_long_and_feet_stay_unless_they_may_slide(tmp_path: Path) -> None:
+    path = walk().write(tmp_path / "walk.glb")
+    held, free = (reduced(read_document(path), Options(2e-2, meshopt=True, feet=feet)) for feet in (True, False))
+    assert free.clips[0].after.size <= held.clips[0].after.size
+    assert held.clips[0].slides[1] <= held.clips[0].slides[0] + 0.001 * held.size / 1.7 + 1e-6
+    moments = [
+        (min(track.times[0] for track in clip.tracks), max(track.times[-1] for track in clip.tracks))
+        for clip in (read_clips(document)[0] for document in (read_document(path), decompressed(free.document)))
+    ]
+    assert moments[1] == pytest.approx(moments[0], abs=2.0**-16)
+
+
+@pytest.mark.parametrize("name", [EXT, KHR])
+def test_what_came_compressed_goes_out_so(tmp_path: Path, name: str) -> None:
+    path = with_mesh(tmp_path / "walk.glb", name=name)
+    report = reduce_file(path, tmp_path / "made.gltf", Options(2e-3))
+    before, after = (decompressed(read_document(it)) for it in (path, tmp_path / "made.gltf"))
+    assert not report.left_alone
+    assert report.after == (tmp_path / "made.gltf").stat().st_size < report.before
+    assert after.json["extensionsUsed"] == [name]
+    (view,) = [
+        it
+        for it in report.document.json["bufferViews"]
+        if it.get("extensions", {}).get(name, {}).get("mode") == "TRIANGLES"
+    ]
+    stream = view["extensions"][name]
+    data = bytes(report.document.buffers[0])[stream["byteOffset"] :][: stream["byteLength"]]
+    assert data.hex() == TRIANGLES
+    for key in ("POSITION", "JOINTS_0", "WEIGHTS_0"):
+        own = [numbers(it, it.json["meshes"][0]["primitives"][0]["attributes"][key]) for it in (before, after)]
+        assert np.array_equal(*own)
+
+
+def test_numbers_come_back_bit_by_bit(tmp_path: Path) -> None:
+    """Whatever they are, with the filters or without."""
+    made, times = walk(), np.arange(61) / 30
+    made.channel(0, "scale", made.times(times), 1.0 + 0.1 * np.random.default_rng(1).normal(size=(61, 3)))
+    whole = np.rint(turns(times, 3).astype(np.float64) * 32767).astype("<i2")
+    made.channel(0, "rotation", made.times(times), made.accessor(whole, normalized=True), clip=1)
+    document = read_document(made.write(tmp_path / "walk.glb"))
+    after = decompressed(packed(document, Streams()).reread())
+    for animation, other in zip(document.json["animations"], after.json["animations"], strict=True):
+        for sampler, own in zip(animation["samplers"], other["samplers"], strict=True):
+            for key in ("input", "output"):
+                assert np.array_equal(numbers(document, sampler[key]), numbers(after, own[key]))
+
+
+def test_files_whose_bytes_may_be_named_elsewhere_are_left_alone(tmp_path: Path) -> None:
+    made = walk()
+    made.json |= {"extensionsUsed": ["ACME_hair"], "extensions": {"ACME_hair": {"strands": 1}}}
+    report = reduced(read_document(made.write(tmp_path / "walk.glb")), Options(2e-3, meshopt=True))
+    assert "meshopt moves them: do it without" in report.left_alone
+
+
+def test_the_option_is_for_gltf_files_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = walk().write(tmp_path / "walk.glb")
+    assert reduce.main([str(path), "--meshopt", "--tolerance", "2mm"]) == 0
+    assert EXT in read_document(tmp_path / "walk-reduced.glb").json["extensionsUsed"]
+    (tmp_path / "hand.csv").write_text("t,x,y,z\n")
+    with pytest.raises(SystemExit):
+        reduce.main([str(tmp_path / "hand.csv"), "--meshopt"])
+    assert "hand.csv is none: add --glb, or leave it out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("data", "problem"),
     [
-        (b"\xa1" + bytes(40), "is compressed by a newer meshopt; export the file without it"),
-        (b"\xa0" + bytes(30), "is compressed by meshopt, and damaged"),
-        (b"\xa0" + bytes(99), "is compressed by meshopt, and damaged"),
-        (b"\xa0" + b"\xff" * 40, "is compressed by meshopt, and damaged"),
+        (b"\xa2" + bytes(40), "is compressed by meshopt: it is newer than is known here; export the file without it"),
+        (b"\xa1" + bytes(40), "is compressed by meshopt: it is damaged"),
+        (b"\xa0" + bytes(30), "is compressed by meshopt: it is damaged"),
+        (b"\xa0" + bytes(99), "is compressed by meshopt: it is damaged"),
+        (b"\xa0" + b"\xff" * 40, "is compressed by meshopt: it is damaged"),
     ],
 )
 def test_damage_is_told(data: bytes, problem: str) -> None:

@@ -123,6 +123,8 @@ def _content(file: File, part: Any, name: str = "") -> Any:
         return {key: _content(file, below, key) for key, below in part.items() if key not in skipped}
     if isinstance(part, list):
         return [_content(file, below, name) for below in part]
+    if isinstance(part, float) and name in (*REST, "matrix") and str(np.float32(part)) == str(part):
+        return float(np.float32(part))  # in as few digits as single precision needs
     return _numbers(file, part) if name in ("indices", "inverseBindMatrices") else part
 
 

@@ -12,6 +12,8 @@ from tests.animation.farm import played_on_a_farm
 from tests.gltf.player import File, off
 from tests.scripts.reducing import FRAMES, WALK, hand_made, joints_in_metres, rig_file, run, write_csv
 
+pytestmark = pytest.mark.blender
+
 MM = 1e-3
 
 SINGLE = 2e-5

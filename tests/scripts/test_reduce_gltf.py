@@ -20,6 +20,8 @@ from tests.gltf.making import Making, walk
 from tests.gltf.player import File, off
 from tests.scripts.reducing import listed
 
+pytestmark = pytest.mark.blender
+
 WITHOUT_BLENDER = """
 import sys
 sys.modules["bpy"] = None

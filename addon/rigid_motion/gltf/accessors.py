@@ -151,7 +151,7 @@ def _in_view(
     extensions = view.get("extensions")
     if isinstance(extensions, dict) and any(name in extensions for name in COMPRESSIONS):
         raise GltfError(
-            f"{what} is compressed by meshopt, which is not read", "export the file without it (gltfpack: without -c)"
+            f"{what} is compressed by meshopt, and damaged", "export the file without it (gltfpack: without -c)"
         )
     entry(document.json, "buffers", view.get("buffer"))
     data = document.buffers[view["buffer"]]

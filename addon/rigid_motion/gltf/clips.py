@@ -15,11 +15,13 @@ import numpy as np
 from ..motion import SeparateKeys, Skeleton
 from ..motion.skeleton_stretches import Run
 from .errors import NOWHERE, PARTS, Feet, World, Worst
+from .meshopt import TIME_EXPONENT, packed_size
 from .nodes import by_target
+from .packing import Packing
 from .rewriting import Amount, EveryKey, StoredTrack, amount, key_size, shown, stored
 from .search import Search
 from .settling import Channel, settled, shared_times
-from .tracks import CUBICSPLINE, ROTATION, TRANSLATION, WEIGHTS, Clip, Target, Track, Tracks
+from .tracks import CUBICSPLINE, LINEAR, ROTATION, TRANSLATION, WEIGHTS, Clip, Target, Track, Tracks
 
 OF_INTEGERS = 0.85
 """The share of the tolerance that rotations may take that are stored as 16-bit integers."""
@@ -39,7 +41,7 @@ ROUNDS = 24
 LEAST = 0.1
 """The share of the tolerance that is worth a search."""
 
-NEEDED_CHANNELS, ALL_CHANNELS = CHANNELS = ("needed", "all")
+NEEDED_CHANNELS, ALL_CHANNELS, MOVING_CHANNELS = CHANNELS = ("needed", "all", "moving")
 
 NEEDED, LARGER = "all of its keys are needed", "fewer keys would take more bytes"
 
@@ -62,6 +64,12 @@ class Options:
 
     channels: str = NEEDED_CHANNELS
     """One of CHANNELS: whether those in which a node is as it rests keep a key, also where nothing else moves it."""
+
+    feet: bool = True
+    """Whether feet that stand keep to where they stand, but for `MORE_SLIDE`, however large the tolerance is."""
+
+    meshopt: bool = False
+    """Whether the document is compressed by meshopt; one that came so is in any case."""
 
     curves: bool = False
     """Whether cubic curves take the place of lines where these need more keys: see `curves`."""
@@ -158,6 +166,7 @@ class ClipReduction:
         self.dense = {target: track for target, track in rest.items() if target[0] not in self.stepping}
         """The tracks that are to have fewer keys."""
         self.feet = Feet(self.world, joints)
+        self.more_slide = MORE_SLIDE * size if options.feet else np.inf
 
     def reduced(self) -> ReducedClip:
         """Return the clip with fewer keys, or as it was."""
@@ -194,6 +203,9 @@ class ClipReduction:
     def _amount(self, tracks: list[StoredTrack]) -> Amount:
         """Return how much tracks are. Raises _LargerError where that is no less than before."""
         result = amount(tracks)
+        if self.options.meshopt:
+            arrays = [part for track in tracks for part in track.accessors]
+            result = replace(result, size=packed_size(arrays, range(0, len(arrays), 2)))
         if result.size >= self.before.size:
             raise _LargerError
         return result
@@ -212,9 +224,39 @@ class ClipReduction:
             farther = self.feet.farther(self._shown(tracks))
             if farther < farthest:
                 best, farthest = tracks, farther
-            if farther <= MORE_SLIDE * self.size:
+            if farther <= self.more_slide:
                 break
         return best, self.world.worst(self._shown(best), self.morphed)[0]
+
+    def _packed(self) -> tuple[list[StoredTrack], Worst] | None:
+        """Tracks that meshopt packs into few bytes and that keep to the tolerance, and the largest error."""
+        held = {
+            target: track
+            for target, track in self.settled.items()
+            if target[1] in (TRANSLATION, ROTATION) and len(track.times) == 1 and target[0] not in self.stepping
+        }
+        if not self.dense and not held:
+            return None
+        others = {target: track for target, track in self.settled.items() if target not in held}
+        fixed = {**self.given, **self._shown(map(self._stored_track, others.values()))}
+        packing = Packing(self.world, {**self.dense, **held}, fixed, self.tolerance, self.feet, self.more_slide)
+        for keys in packing.trials():
+            new = [
+                StoredTrack(packing.tracks[target].channel, LINEAR, own.times.astype(np.float32), own.stored)
+                for target, own in keys.items()
+            ]
+            tracks = self._spanning(new + list(map(self._stored_track, others.values())))
+            self._amount(tracks)
+            played, times = self._shown(tracks), self.world.times
+            if len(self.feet.slips(played, self.more_slide)[0]):
+                continue
+            moments = np.unique(np.concatenate([times, *(own.times for own in keys.values())]))
+            world = replace(self.world, times=moments[(moments >= times[0]) & (moments <= times[-1])])
+            if len(world.worst(played, self.morphed, self.tolerance, parts=1)[1]):
+                continue
+            if (worst := max(self.morphed[0], world.worst(played, self.morphed)[0])).error <= self.tolerance:
+                return tracks, worst
+        return None
 
     def _key_poses(self, keys: np.ndarray) -> list[StoredTrack]:
         """All tracks as they are to be stored, with these samples as key poses."""
@@ -222,6 +264,8 @@ class ClipReduction:
 
     def _within_tolerance(self) -> tuple[list[StoredTrack], Worst] | None:
         """Tracks with few keys that keep to the tolerance, and the largest error; None where none do."""
+        if self.options.meshopt and not self.options.shared and (result := self._packed()) is not None:
+            return result
         if not self.dense:
             return self._proven([])
         search, allowed = self._search(), self.tolerance - self.storing[1]
@@ -303,7 +347,7 @@ class ClipReduction:
         largest error are noted: they are not looked at again for as long as they stay the same.
         """
         world = self.world
-        rows, samples = self.feet.slips(tracks, MORE_SLIDE * self.size)
+        rows, samples = self.feet.slips(tracks, self.more_slide)
         if len(rows):
             return rows, PARTS * samples
         failures = [(NOWHERE, NOWHERE)]
@@ -354,7 +398,8 @@ class ClipReduction:
         ends = self.world.times[[0, -1]]
         times = [*(track.times for track in tracks), *(track.times for track in self.given.values())]
         seen = np.concatenate([own[[0, -1]] for own in times]) if times else ends[:0]
-        if np.isin(ends.astype(np.float32), seen).all():
+        rounded = 2.0 ** (TIME_EXPONENT - 1) if self.options.meshopt else 0.0
+        if len(seen) and np.abs(seen[:, None] - ends.astype(np.float32)).min(axis=0).max() <= rounded:
             return tracks
         number = min(
             (number for number, track in enumerate(tracks) if track.interpolation != CUBICSPLINE),

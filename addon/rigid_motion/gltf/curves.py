@@ -17,7 +17,7 @@ from ..motion.cubic_bodies import CurvedBody, JointCurves, fitted_body
 from ..motion.cubic_keys import CubicKeys, Samples, is_of_lines, joined, keyed_at
 from ..motion.quaternions import align_signs
 from ..motion.skeleton_stretches import stretches
-from .clips import MORE_SLIDE, ClipReduction, ReducedClip
+from .clips import ClipReduction, ReducedClip
 from .errors import World, Worst
 from .rewriting import StoredTrack, stored
 from .search import Search
@@ -78,7 +78,7 @@ class CurveReduction(ClipReduction):
                 allowed[row, max(sample - AROUND, 0) : sample + AROUND + 1] *= LESS
             for row, first, end in slips:
                 some = allowed[row, first:end]
-                some[:] = LESS * np.minimum(some, MORE_SLIDE * self.size / LESS)
+                some[:] = LESS * np.minimum(some, self.more_slide / LESS)
         return None
 
     def _key_poses(self, keys: np.ndarray) -> list[StoredTrack]:
@@ -91,7 +91,7 @@ class CurveReduction(ClipReduction):
 
     def _slips(self, shown: Tracks) -> set[tuple[int, int, int]]:
         """Return rows of joints that slide too far, and the samples on which these stand: first, and behind last."""
-        rows, samples = self.feet.slips(shown, MORE_SLIDE * self.size)
+        rows, samples = self.feet.slips(shown, self.more_slide)
         spans = self.feet.spans.tolist()
         return {
             (row, first, last + 1)

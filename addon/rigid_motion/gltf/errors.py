@@ -135,7 +135,7 @@ class World:
 
     def parted(self, first: int, end: int, parts: int) -> np.ndarray:
         """Return some of the moments, and so many parts of the gaps behind them."""
-        times = _parted(self.times[first : end + 1], parts)
+        times = parted(self.times[first : end + 1], parts)
         return times if end >= len(self.times) else times[:-1]
 
     def worlds(self, tracks: Tracks, times: np.ndarray) -> AffineMaps:
@@ -184,6 +184,11 @@ class World:
         """How long anything of length 1 in a node's space gets in the world at most, shape (n,)."""
         return self._extremes[1]
 
+    @property
+    def distances(self) -> np.ndarray:
+        """How far each node gets from its parent in the world at most, shape (n,); 0 where that does not move."""
+        return self._extremes[2]
+
     @cached_property
     def balls(self) -> np.ndarray:
         """The radii of the balls in the spaces of the nodes, shape (n,)."""
@@ -225,7 +230,7 @@ class World:
                 continue
             given = shown.get((node, path))
             keys = track.times if given is None else np.union1d(track.times, given.times)
-            times = _parted(keys, PARTS)
+            times = parted(keys, PARTS)
             there = self.nodes.rest_of(node, path) if given is None else given.at(times)
             morph = self.seen.morphs[node]
             errors = np.abs(there - track.at(times)) @ morph.deltas * self.morph_scale(node)
@@ -294,7 +299,7 @@ def _largest(axes: np.ndarray) -> np.ndarray:
     return np.sqrt(np.abs(np.swapaxes(axes, -1, -2) @ axes).sum(axis=-1).max(axis=-1))
 
 
-def _parted(times: np.ndarray, parts: int) -> np.ndarray:
+def parted(times: np.ndarray, parts: int) -> np.ndarray:
     """Return moments, and so many parts of the gaps behind them."""
     gaps = times[:-1, None] + np.diff(times)[:, None] * np.arange(parts) / parts
     return np.append(gaps.ravel(), times[-1])
@@ -353,8 +358,12 @@ class Feet:
 
     def farther(self, tracks: Tracks) -> float:
         """How much farther than before any of them slides, at most."""
+        return float(self.more(tracks).max(initial=0.0))
+
+    def more(self, tracks: Tracks) -> np.ndarray:
+        """How much farther than before each slides in each of the spans, shape (s,)."""
         ways = zip(self._before, self._ways(tracks), strict=True)
-        return max((float(after.max() - before.max()) for before, after in ways), default=0.0)
+        return np.array([after.max() - before.max() for before, after in ways])
 
     def slips(self, tracks: Tracks, more: float) -> tuple[np.ndarray, np.ndarray]:
         """Rows of joints and samples at which one slides by more than this farther than before, and began to."""

@@ -7,14 +7,16 @@ import secrets
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from .clips import ALL_CHANNELS, LARGER, ClipReduction, Options, ReducedClip, kept
+from .clips import ALL_CHANNELS, LARGER, NEEDED_CHANNELS, ClipReduction, Options, ReducedClip, kept
 from .curves import CurveReduction
 from .documents import Document, GltfError, damage_refused, read_document
 from .errors import World
+from .meshopt import are_clear, decompressed, packed, shortened, unpacked
 from .nodes import Nodes, by_target, steadied
 from .references import References
 from .rewriting import StoredTrack, amount_before, made_smaller, shown
@@ -36,6 +38,9 @@ SINGLE = 1e-6
 
 MOVERS = ("VRMC_node_constraint",)
 """Extensions of nodes by which these follow others."""
+
+UNCLEAR = "an extension that is not known here may say where its bytes are, and meshopt moves them: do it without"
+"""Why a document is not compressed."""
 
 NewTracks = Mapping[int, Sequence[StoredTrack]]
 """By the numbers of clips; of others they stay."""
@@ -72,15 +77,19 @@ def reduced(document: Document, options: Options) -> Report:
     GltfError
         For what is damaged, and where the tolerance makes no sense.
     """
-    before = document.size
+    given, before = document, document.size
     with damage_refused():
-        clips, nodes, references = read_clips(document), Nodes(document), References(document.json)
+        document, streams = unpacked(given)
+        options = replace(options, meshopt=options.meshopt or document is not given)
+        document = shortened(document)
+        nodes = Nodes(document)
+        clips, references = read_clips(document), References(document.json)
         earlier, joints = _noted(document), set(itertools.chain.from_iterable(joints_of(document)))
 
         def left_alone(reason: str, size: float = 0.0, clips: Sequence[ReducedClip] = ()) -> Report:
-            return Report(size, options.tolerance or 0.0, tuple(clips), document, before, before, reason, earlier)
+            return Report(size, options.tolerance or 0.0, tuple(clips), given, before, before, reason, earlier)
 
-        if reason := unread(nodes, clips):
+        if reason := unread(nodes, clips) or (options.meshopt and not are_clear(document.json) and UNCLEAR) or "":
             return left_alone(reason)
         seen = Seen.of(nodes, clips)
         size = size_of(nodes, seen, _moved(nodes, clips, PATHS), clips)
@@ -92,7 +101,7 @@ def reduced(document: Document, options: Options) -> Report:
         return left_alone(f"{reason}: give one below {MOST * size:.2g} m", size)
     options = replace(options, tolerance=tolerance)
     # What shows nothing is a library of clips for bodies that may rest in other ways.
-    keeps_all = options.channels == ALL_CHANNELS or not seen.reaches.any()
+    keeps_all = options.channels == ALL_CHANNELS or (options.channels == NEEDED_CHANNELS and not seen.reaches.any())
     moved_by = {} if keeps_all else _moved_by(nodes, clips)
     result = []
     for clip in clips:
@@ -104,16 +113,18 @@ def reduced(document: Document, options: Options) -> Report:
             world = World(nodes, seen, own, shells, steadied(clip.all_tracks), _key_times(clip))
             targets = ((track.node, track.path) for track in clip.tracks)
             needed = {target for target in targets if keeps_all or moved_by[target] - {clip.number}}
-            amount = amount_before(document, references, clip)
+            amount = amount_before(document, references, clip, streams.shares)
             reduction = CurveReduction if options.curves else ClipReduction
             result.append(reduction(world, clip, needed, joints, size, options, amount).reduced())
     tracks = {clip.number: clip.tracks for clip in result if clip.tracks is not None}
     with damage_refused():
         within = tolerance if options.count is None else max((clip.error for clip in result), default=0.0)
-        changed, chosen = made_smaller(_with_note(document, within + (earlier or 0.0)), references, tracks)
+        noted = _with_note(document, within + (earlier or 0.0)) if tracks else document
+        pack = partial(packed, streams=streams) if options.meshopt else None
+        changed, chosen = made_smaller(noted, references, tracks, pack)
         larger = tracks.keys() - chosen
         result = [kept(it.number, it.name, it.before, LARGER) if it.number in larger else it for it in result]
-        if not chosen:
+        if not (pack or chosen) or changed.size >= before:
             return left_alone("no clip would become smaller", size, result)
         _require_proven(changed, nodes, seen, clips, {number: tracks[number] for number in chosen})
     return Report(size, tolerance, tuple(result), changed, before, changed.size, "", earlier)
@@ -180,7 +191,7 @@ def _require_proven(document: Document, nodes: Nodes, seen: Seen, clips: Sequenc
     GltfError
         Where it does not.
     """
-    document = document.reread()
+    document = decompressed(document.reread())
     written, own = read_clips(document), Nodes(document)
     same = all(np.array_equal(nodes.rest[path], own.rest[path]) for path in nodes.rest)
     if not same or not np.array_equal(nodes.parents, own.parents) or not seen.is_same(Seen.of(own, clips)):

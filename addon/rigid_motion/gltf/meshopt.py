@@ -1,68 +1,122 @@
-"""Documents that meshopt compressed, made readable: views of keys and vertices, not those of triangles.
+"""Documents that meshopt compressed, made plain, and plain ones made small: the numbers are the same, bit by bit.
 
-Source: the specification of EXT_meshopt_compression, Khronos 2021, appendices A and B.
+What is read: all modes and filters of both names that the extension has. What is written: attributes, with the filters
+of quaternions and floats where these give the same numbers back; streams that came with a document stay as they were.
+Source: the specifications of EXT_meshopt_compression, Khronos 2021, and KHR_meshopt_compression, Khronos 2026.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
-from dataclasses import replace
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from .accessors import ALIGNED, COMPRESSIONS
-from .documents import Document, GltfError, Json, entry, objects, whole
-
-VERSION = 0xA0
-"""The first byte of what is read."""
-
-BLOCK_BYTES, BLOCK_ELEMENTS, GROUP, TAIL = 8192, 256, 16, 32
+from .accessors import ALIGNED, COMPRESSIONS, raw_numbers, stored_size
+from .attribute_streams import TAILS, VERSIONS, decoded, differences, encoded, encoded_size
+from .documents import Document, GltfError, Json, as_text, data_uri, entry, objects, whole
+from .filters import (
+    EXPONENTIAL,
+    FEWEST_BITS,
+    INTEGER,
+    MOST_BITS,
+    QUATERNION,
+    UNDONE,
+    floats_of,
+    quaternions_of,
+    with_floats,
+    with_quaternions,
+)
+from .index_streams import decoded_indices, decoded_triangles
+from .references import References, other_slots, sampler_slots, view_slots
 
 BINDING = "inverseBindMatrices"
 
-DENSEST = 64
+WIDEST = 256
+"""Bytes of an element at most."""
+
+DENSEST = 1024
 """Bytes that one of compressed ones is at most."""
 
 MOST = 2**30
 """Bytes that all of a document may become."""
 
-SHIFTS = {1: np.arange(6, -1, -2, dtype=np.uint8), 2: np.arange(4, -1, -4, dtype=np.uint8)}
-"""Of the parts of a byte, the first one first, by how a group is packed."""
+NONE, ATTRIBUTES = "NONE", "ATTRIBUTES"
+
+MODES = {"TRIANGLES": decoded_triangles, "INDICES": decoded_indices}
+
+TRANSFORMS = ("translation", "rotation", "scale", "matrix")
+"""What a node may have."""
+
+FRAME = 1 + TAILS[0]
+"""Bytes of a stream beside its elements, but for long ones."""
+
+LEAST_EXPONENT = -100
+
+TIME_EXPONENT = -15
+"""Times are multiples of 2 to the power of it, where they may be."""
+
+SINGLE_BITS = 24
+"""Of the mantissa of a float."""
+
+
+@dataclass(frozen=True, eq=False)
+class Streams:
+    """The streams that a document came with."""
+
+    name: str = COMPRESSIONS[0]
+    """Of the extension."""
+
+    known: dict[bytes, tuple[str, Json, bytes]] = field(default_factory=dict)
+    """By the bytes of a view: the name of the extension, what it says, and the stream."""
+
+    shares: dict[int, float] = field(default_factory=dict)
+    """By the number of a view: the bytes of its stream, of its own."""
 
 
 def decompressed(document: Document) -> Document:
-    """Return a document with what of its views can be read in one more buffer; the same where meshopt is not in it.
+    """Return a document with all views that meshopt compressed in one more buffer; the same where it did none.
 
-    Views of meshes alone that are damaged, or compressed in a way that is not read, stay as they are.
+    Views of meshes alone that are damaged stay as they are.
 
     Raises
     ------
     GltfError
         For other views that are.
     """
+    return unpacked(document)[0]
+
+
+def unpacked(document: Document) -> tuple[Document, Streams]:
+    """Return the same as `decompressed`, and the streams that were there."""
     views = objects(document.json, "bufferViews")
-    found = {number: own for number, view in enumerate(views) if (own := _compression(view))}
+    found = {number: how for number, view in enumerate(views) if (how := _compression(view))}
     if not found:
-        return document
+        return document, Streams()
     json, data, room, of_meshes = copy.copy(document.json), bytearray(), MOST, _of_meshes(document.json)
+    streams = Streams(max(name for name, _ in found.values()))
     json["bufferViews"] = list(views)
-    for number, own in found.items():
+    for number, (name, own) in found.items():
         try:
-            content = _content(document, own, number, room)
-        except GltfError:
-            if number not in of_meshes:
-                raise
-            continue
-        if content is None:
-            continue
+            stream = _stream(document, own, room)
+            content = _content(own, stream)
+        except GltfError as error:
+            if number in of_meshes:
+                continue
+            raise GltfError(f"view {number} is compressed by meshopt: {error.problem}", error.way_out) from None
         room -= len(content)
         view = {"buffer": len(document.buffers), "byteOffset": len(data), "byteLength": len(content)}
-        kept = {name: views[number][name] for name in ("byteStride", "name") if name in views[number]}
-        json["bufferViews"][number] = view | kept
+        json["bufferViews"][number] = view | {
+            key: value for key, value in views[number].items() if key not in (*view, "extensions")
+        }
+        streams.known[content] = name, own, stream
+        streams.shares[number] = len(stream) / len(content)
         data += content + bytes(-len(content) % ALIGNED)
     json["buffers"] = [*objects(json, "buffers"), {"byteLength": len(data)}]
-    return replace(document, json=json, buffers=(*document.buffers, bytes(data)))
+    return replace(document, json=json, buffers=(*document.buffers, bytes(data))), streams
 
 
 def _of_meshes(json: Json) -> set[int]:
@@ -75,102 +129,296 @@ def _of_meshes(json: Json) -> set[int]:
     return {view for view in views if isinstance(view, int)} - needed
 
 
-def _content(document: Document, own: Json, number: int, room: int) -> bytes | None:
-    """Return the bytes of a view, room for so many of which is left; None for lists of triangles and normals."""
-    width, restored = FILTERS.get(own.get("filter", "NONE"), (0, None))
-    if own.get("mode") != "ATTRIBUTES" or restored is None:
-        return None
-    if whole(own, "count") * whole(own, "byteStride") > room:
-        raise GltfError("what meshopt compressed is more than is read", "split the file")
-    elements = _elements(document, own, number)
-    if elements.shape[1] % width:
-        raise GltfError(f"view {number} is compressed by meshopt, and damaged")
-    return restored(elements)
-
-
-def _compression(view: Json) -> Json | None:
+def _compression(view: Json) -> tuple[str, Json] | None:
+    """Return the name of the extension by which a view is compressed, and what it says."""
     extensions = view.get("extensions")
     names = [name for name in COMPRESSIONS if isinstance(extensions, dict) and name in extensions]
-    return view["extensions"][names[0]] if names else None
+    return (names[0], view["extensions"][names[0]]) if names else None
 
 
-def _elements(document: Document, own: Json, number: int) -> np.ndarray:
-    """Return the bytes of what is compressed, shape (count, stride)."""
+def _stream(document: Document, own: Json, room: int) -> bytes:
+    """Return the bytes that a view is compressed to, where there is room for those that it has."""
+    if not isinstance(own, dict):
+        raise GltfError("it does not say how")
+    size = whole(own, "count", least=1) * whole(own, "byteStride", least=1)
+    if size > room:
+        raise GltfError("what meshopt compressed is more than is read", "split the file")
     entry(document.json, "buffers", own.get("buffer"))
     source = document.buffers[own["buffer"]]
     first, length = whole(own, "byteOffset", 0), whole(own, "byteLength", least=1)
-    count, stride = whole(own, "count", least=1), whole(own, "byteStride", least=1)
-    if source is None or first + length > len(source) or count * stride > DENSEST * length or stride > BLOCK_ELEMENTS:
-        raise GltfError(f"view {number} is compressed by meshopt, and says more than it holds")
-    data = bytes(source[first : first + length])
-    if data[0] != VERSION:
-        raise GltfError(f"view {number} is compressed by a newer meshopt", "export the file without it")
+    if source is None or first + length > len(source) or size > DENSEST * length:
+        raise GltfError("it says more than it holds")
+    return bytes(source[first : first + length])
+
+
+def _content(own: Json, stream: bytes) -> bytes:
+    """Return the bytes of a view of its stream."""
+    mode, name = own.get("mode"), own.get("filter", NONE)
+    count, stride = whole(own, "count"), whole(own, "byteStride")
+    strides, undone = UNDONE.get(name, ((), None)) if isinstance(name, str) else ((), None)
+    fits = stride % 4 == 0 and stride <= WIDEST and stride in (strides or (stride,))
+    if mode in MODES:
+        fits = stride in (2, 4) and name == NONE
+    elif mode != ATTRIBUTES or undone is None:
+        raise GltfError("its mode or filter is not known", "export the file without meshopt")
+    if mode == ATTRIBUTES and stream[0] not in VERSIONS:
+        raise GltfError("it is newer than is known here", "export the file without it")
     try:
-        return _decoded(data, count, stride)
-    except (IndexError, ValueError):
-        raise GltfError(f"view {number} is compressed by meshopt, and damaged") from None
+        if not fits:
+            raise ValueError
+        elements = (decoded if mode == ATTRIBUTES else MODES[mode])(stream, count, stride)
+        with np.errstate(all="ignore"):
+            return undone(elements).tobytes() if undone else b""
+    except (ArithmeticError, IndexError, ValueError):
+        raise GltfError("it is damaged") from None
 
 
-def _decoded(data: bytes, count: int, stride: int) -> np.ndarray:
-    """Return elements (count, stride): of each byte the differences from element to element come block by block."""
-    most = min(BLOCK_BYTES // stride // GROUP * GROUP, BLOCK_ELEMENTS)
-    result, place = np.empty((count, stride), dtype=np.uint8), 1
-    last = np.frombuffer(data, np.uint8, stride, len(data) - stride)
-    for first in range(0, count, most):
-        block = result[first : first + most]
-        for column in range(stride):
-            differences, place = _differences(data, place, len(block))
-            signs = (differences >> 1) ^ (0 - (differences & 1))
-            block[:, column] = last[column] + np.cumsum(signs, dtype=np.uint8)
-        last = block[-1]
-    if place + max(stride, TAIL) != len(data):
-        raise ValueError
+class Packed(NamedTuple):
+    """Numbers as elements, from which a filter gives them back."""
+
+    filter: str
+    elements: np.ndarray
+    """Shape (count, stride), bytes."""
+
+
+def filtered(numbers: np.ndarray, most: int = 0) -> Packed | None:
+    """Return numbers (count, columns) as elements that take few bytes; None for those that are not packed.
+
+    Floats are multiples of 2 to the power of `most`, or of a smaller one.
+    """
+    numbers = np.ascontiguousarray(numbers)
+    plain = Packed(NONE, numbers.view(np.uint8))
+    if numbers.dtype == np.int16 and numbers.shape[1] == 4:
+        for bits in range(FEWEST_BITS, MOST_BITS + 1):
+            first, second = (with_quaternions(numbers / INTEGER, bits, rank) for rank in (0, 1))
+            fits = (quaternions_of(first) == numbers).all(axis=1)
+            elements = np.where(fits[:, None], first, second)
+            if np.array_equal(quaternions_of(elements), numbers):
+                return Packed(QUATERNION, elements)
+    if numbers.dtype == np.float32:
+        exponent = min(_exponent(numbers), most)
+        elements = with_floats(numbers.astype(np.float64), exponent)
+        if floats_of(elements).tobytes() == numbers.tobytes():
+            return Packed(EXPONENTIAL, elements)
+    return plain if plain.elements.shape[1] % 4 == 0 else None
+
+
+def _exponent(numbers: np.ndarray) -> int:
+    """Return the largest power of 2 of which floats are multiples."""
+    mantissas, exponents = np.frexp(numbers[numbers != 0.0].astype(np.float64))
+    integers = np.ldexp(mantissas, SINGLE_BITS).astype(np.int64)
+    lowest = np.frexp((integers & -integers).astype(np.float64))[1] - 1
+    return max(int((exponents - SINGLE_BITS + lowest).min(initial=0)), LEAST_EXPONENT)
+
+
+class Group(NamedTuple):
+    """Accessors that are in one view."""
+
+    filter: str
+    numbers: list[int]
+    """Of the accessors, in their order there."""
+
+    elements: np.ndarray
+    """Shape (count, stride)."""
+
+
+def grouped(arrays: Mapping[int, np.ndarray], times: Iterable[int]) -> list[Group]:
+    """Return numbers of accessors (count, columns) in groups that are packed alike, those that are times apart.
+
+    Without those that are not packed.
+    """
+    times = set(times)
+    groups: dict[tuple[bool, str, int], dict[int, np.ndarray]] = defaultdict(dict)
+    for number, array in arrays.items():
+        if (own := filtered(array, TIME_EXPONENT if number in times else 0)) is not None:
+            groups[number in times, own.filter, own.elements.shape[1]][number] = own.elements
+    result = []
+    for (_, name, _), members in groups.items():
+        orders = [list(members), *([_chained(members)] if len(members) > 2 else [])]
+        joined = [np.concatenate([members[number] for number in order]) for order in orders]
+        best = min(range(len(orders)), key=lambda way: encoded_size(joined[way]))
+        result.append(Group(name, orders[best], joined[best]))
     return result
 
 
-def _differences(data: bytes, place: int, count: int) -> tuple[np.ndarray, int]:
-    """Return numbers (count,) that begin at a place, their lowest bit being the sign, and the place behind them."""
-    groups = -(-count // GROUP)
-    kinds, place = data[place : place + -(-groups // 4)], place + -(-groups // 4)
-    result = np.zeros((groups, GROUP), dtype=np.uint8)
-    for group, own in enumerate(result):
-        kind = kinds[group // 4] >> (group % 4 * 2) & 3
-        if kind == 3:
-            own[:] = np.frombuffer(data, np.uint8, GROUP, place)
-            place += GROUP
-        elif kind:
-            packed = np.frombuffer(data, np.uint8, 4 * kind, place)
-            widest = 4**kind - 1
-            own[:] = (packed[:, None] >> SHIFTS[kind] & widest).ravel()
-            wide = own == widest
-            more = int(np.count_nonzero(wide))
-            own[wide] = np.frombuffer(data, np.uint8, more, place + 4 * kind) if more else 0
-            place += 4 * kind + more
-    return result.ravel()[:count], place
+def _chained(members: Mapping[int, np.ndarray]) -> list[int]:
+    """Return the numbers in an order in which each begins near to where the one before ends."""
+    numbers = np.array(list(members))
+    firsts, lasts = (np.stack([elements[end] for elements in members.values()]) for end in (0, -1))
+    waiting = np.ones(len(numbers), dtype=bool)
+    order, place = [], int(np.argmax([len(elements) for elements in members.values()]))
+    while True:
+        order.append(int(numbers[place]))
+        waiting[place] = False
+        left = np.flatnonzero(waiting)
+        if not len(left):
+            return order
+        pairs = np.stack((np.broadcast_to(lasts[place], firsts[left].shape), firsts[left]))
+        steps = differences(pairs.reshape(2, -1))[1].reshape(len(left), -1)
+        place = int(left[np.digitize(steps, (1, 3, 15)).sum(axis=1).argmin()])
 
 
-def _quaternions(elements: np.ndarray) -> bytes:
-    """Three components of quaternions, and which is the fourth, as four."""
-    given = np.ascontiguousarray(elements).view("<i2").reshape(-1, 4).astype(np.int64)
-    parts = given[:, :3] / (given[:, 3:] | 3) * np.sqrt(0.5)
-    fourth = np.sqrt(np.maximum(1.0 - np.sum(parts**2, axis=1), 0.0))
-    largest = given[:, 3] & 3
-    result = np.empty((len(given), 4))
-    for offset, part in enumerate((fourth, *parts.T)):
-        result[np.arange(len(given)), (largest + offset) % 4] = part
-    return np.rint(result * 32767.0).astype("<i2").tobytes()
+def packed_size(arrays: Sequence[np.ndarray], times: Iterable[int]) -> int:
+    """Return how many bytes numbers (count, columns), some of which are times, take in streams with others."""
+    times = set(times)
+    unique = {(n in times, array.dtype.str, array.shape, array.tobytes()): n for n, array in enumerate(arrays)}
+    return sum(encoded_size(it.elements) - FRAME for it in grouped({n: arrays[n] for n in unique.values()}, times))
 
 
-def _exponentials(elements: np.ndarray) -> bytes:
-    """Whole numbers of 24 bits and their exponents as floats."""
-    given = np.ascontiguousarray(elements).view("<i4")
-    return np.ldexp((given << 8 >> 8).astype(np.float64), given >> 24).astype("<f4").tobytes()
+class _Buffers:
+    """The buffers of a document that grows: one with bytes, and one that stands for compressed views, by extension."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.sizes: dict[str, int] = {}
+        self.views: list[Json] = []
+
+    def put(self, content: bytes) -> Json:
+        self.data += bytes(-len(self.data) % ALIGNED)
+        place = {"buffer": 0, "byteLength": len(content)} | ({"byteOffset": len(self.data)} if self.data else {})
+        self.data += content
+        return place
+
+    def add(self, view: Json, content: bytes) -> int:
+        """Add a view of plain bytes, and return its number."""
+        self.views.append(_without_place(view) | self.put(content))
+        return len(self.views) - 1
+
+    def add_stream(self, view: Json, name: str, own: Json, stream: bytes) -> int:
+        """Add a view that is compressed to a stream, and return its number."""
+        size, offset = own["count"] * own["byteStride"], -(-self.sizes.get(name, 0) // ALIGNED) * ALIGNED
+        number = 1 + list(self.sizes | {name: 0}).index(name)
+        self.sizes[name] = offset + size
+        place = {"buffer": number, "byteLength": size} | ({"byteOffset": offset} if offset else {})
+        kept = {key: value for key, value in own.items() if key not in ("buffer", "byteOffset", "byteLength")}
+        self.views.append(_without_place(view) | place | {"extensions": {name: self.put(stream) | kept}})
+        return len(self.views) - 1
 
 
-FILTERS: dict[str, tuple[int, Callable[[np.ndarray], bytes]]]
-FILTERS = {
-    "NONE": (1, lambda elements: elements.tobytes()),
-    "QUATERNION": (8, _quaternions),
-    "EXPONENTIAL": (4, _exponentials),
-}
-"""What filters are undone by, and the bytes that it takes at once."""
+def _without_place(view: Json) -> Json:
+    return {key: value for key, value in view.items() if key not in ("buffer", "byteOffset", "byteLength")}
+
+
+def _own(name: str, elements: np.ndarray) -> Json:
+    """Return what an extension says of elements that it compresses."""
+    count, stride = elements.shape
+    own = {"count": count, "byteStride": stride, "mode": ATTRIBUTES}
+    return own if name == NONE else own | {"filter": name}
+
+
+def packed(document: Document, streams: Streams) -> Document:
+    """Return a plain document with its numbers compressed, in one buffer; no reference in it may be unclear."""
+    json, buffers, numbers = copy.deepcopy(document.json), _Buffers(), {}
+    accessors = objects(json, "accessors")
+    elsewhere = {container[key] for container, key in other_slots(json)}
+    inputs = {sampler[key] for sampler, key in sampler_slots(json) if key == "input"}
+    for number in sorted({sampler[key] for sampler, key in sampler_slots(json)} - elsewhere):
+        if "bufferView" in accessors[number] and "sparse" not in accessors[number]:
+            numbers[number] = raw_numbers(document, number)
+    groups = grouped(numbers, inputs)
+    moved = {number for group in groups for number in group.numbers}
+    slots: dict[int, list[Json]] = defaultdict(list)
+    others = [part for number, part in enumerate(accessors) if number not in moved]
+    for part in (others, {key: value for key, value in json.items() if key not in ("accessors", "bufferViews")}):
+        for container, _ in view_slots({"parts": part}):
+            slots[container["bufferView"]].append(container)
+    indices = {
+        it["indices"] for mesh in objects(json, "meshes") for it in objects(mesh, "primitives") if "indices" in it
+    }
+    of_indices = {accessors[number].get("bufferView") for number in indices}
+    for number, containers in sorted(slots.items()):
+        new = _repacked(document, number, containers, streams, buffers, number in of_indices)
+        for container in containers:
+            container["bufferView"] = new
+    for group in groups:
+        stream, offset = encoded(group.elements), 0
+        view = buffers.add_stream({}, streams.name, _own(group.filter, group.elements), stream)
+        for number in group.numbers:
+            accessor = accessors[number]
+            accessor["bufferView"] = view
+            accessor.pop("byteOffset", None)
+            if offset:
+                accessor["byteOffset"] = offset
+            offset += len(numbers[number]) * group.elements.shape[1]
+    return _with_buffers(document, json, buffers)
+
+
+def shortened(document: Document) -> Document:
+    """Return a document that says how its nodes rest in as few digits as single precision needs."""
+    with np.errstate(over="ignore"):
+        nodes = [
+            {
+                key: list(map(_short, value)) if key in TRANSFORMS and isinstance(value, list) else value
+                for key, value in node.items()
+            }
+            for node in objects(document.json, "nodes")
+        ]
+    return replace(document, json={**document.json, "nodes": nodes}) if nodes else document
+
+
+def _short(number: float) -> float:
+    """Return the number with the fewest digits that is the same in single precision, where it is one of these."""
+    if not isinstance(number, float) or float(single := np.float32(number)) != number:
+        return number
+    return float(str(single))
+
+
+def _repacked(
+    document: Document, number: int, containers: list[Json], streams: Streams, buffers: _Buffers, are_indices: bool
+) -> int:
+    """Add a view as small as it may be without a loss, and return its number among the new ones."""
+    view = document.json["bufferViews"][number]
+    if (compression := _compression(view)) is not None:  # Damaged, and of a mesh.
+        name, own = compression
+        return buffers.add_stream(view, name, own, _stream(document, own, MOST))
+    data, first, length = document.buffers[view["buffer"]], whole(view, "byteOffset", 0), whole(view, "byteLength")
+    if data is None or first + length > len(data):
+        raise GltfError(f"view {number} reaches beyond its buffer")
+    content = bytes(data[first : first + length])
+    if content in streams.known:
+        return buffers.add_stream(view, *streams.known[content])
+    stride = _stride(document, view, containers)
+    if stride and not are_indices and stride % 4 == 0 and stride <= WIDEST and length % stride == 0:
+        elements = np.frombuffer(content, np.uint8).reshape(-1, stride)
+        stream, own = encoded(elements), _own(NONE, elements)
+        if len(stream) + len(as_text({streams.name: own})) < length:
+            return buffers.add_stream(view, streams.name, own, stream)
+    return buffers.add(view, content)
+
+
+def _stride(document: Document, view: Json, containers: list[Json]) -> int:
+    """Return the bytes from element to element that all accessors of a view have; 0 where they differ."""
+    if not all("componentType" in it and "count" in it and "sparse" not in it for it in containers):
+        return 0
+    accessors = objects(document.json, "accessors")
+    widths = {stored_size({"accessors": [it]}, 0) // whole(it, "count", least=1) for it in containers if accessors}
+    if "byteStride" in view:
+        return whole(view, "byteStride")
+    even = all(whole(it, "byteOffset", 0) % max(widths, default=1) == 0 for it in containers)
+    return widths.pop() if len(widths) == 1 and even else 0
+
+
+def _with_buffers(document: Document, json: Json, buffers: _Buffers) -> Document:
+    """Return a document with these buffers, that says what it needs to be read."""
+    own: Json = {"byteLength": max(len(buffers.data), 1)}
+    given = objects(document.json, "buffers")
+    if document.chunks is None:
+        beside = any(isinstance(it.get("uri"), str) and not it["uri"].startswith("data:") for it in given)
+        own["uri"] = "buffer.bin" if beside else data_uri(bytes(buffers.data))
+    json["buffers"] = [own]
+    for name, size in buffers.sizes.items():
+        json["buffers"].append({"byteLength": size, "extensions": {name: {"fallback": True}}})
+    json["bufferViews"] = buffers.views
+    for key in ("extensionsUsed", "extensionsRequired"):
+        kept = [name for name in json.get(key, []) if name not in COMPRESSIONS]
+        json[key] = kept + list(buffers.sizes)
+        if not json[key]:
+            del json[key]
+    contents = bytes(buffers.data) or bytes(1), *[None] * len(buffers.sizes)
+    return replace(document, json=json, buffers=contents, changed=frozenset({0}), original=None)
+
+
+def are_clear(json: Json) -> bool:
+    """Whether all places of a document are known that name its views and buffers."""
+    references = References(json)
+    return not references.unclear and not references.buffers_are_named

@@ -12,7 +12,7 @@ from __future__ import annotations
 import copy
 from bisect import bisect_left
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
@@ -61,16 +61,22 @@ class StoredTrack:
 
 
 def made_smaller(
-    document: Document, references: References, tracks: Mapping[int, Sequence[StoredTrack]]
+    document: Document,
+    references: References,
+    tracks: Mapping[int, Sequence[StoredTrack]],
+    pack: Callable[[Document], Document] | None = None,
 ) -> tuple[Document, frozenset[int]]:
     """Return the document with those of the tracks that make it smaller, and the numbers of their animations.
 
+    Where it is packed, with all of them: what each of them is worth then, nobody knows.
     Channels of these that are not among the tracks go, but for those that move no node or that extensions define.
     What several animations share goes with the last of them that uses it. So an animation is worth the most together
     with all others, and one that is worth nothing then is worth nothing at all.
     """
     animations = objects(document.json, "animations")
     chosen = {number: new for number, new in tracks.items() if not any(unknown(animations[number]))}
+    if pack:
+        return pack(_Rewriting(document, references, chosen).done()), frozenset(chosen)
     while chosen:
         rewriting = _Rewriting(document, references, chosen)
         smaller = {number: new for number, new in chosen.items() if rewriting.saved(number) > 0}
@@ -149,8 +155,9 @@ class _Rewriting:
             if number in new:
                 times, values = new[number].accessors
                 sampler |= {"input": self.view.add(times, bounds=True), "output": self.view.add(values)}
-                if sampler.get("interpolation", LINEAR) != new[number].interpolation:
-                    sampler["interpolation"] = new[number].interpolation
+                sampler["interpolation"] = new[number].interpolation
+                if sampler["interpolation"] == LINEAR:  # goes without saying
+                    del sampler["interpolation"]
             elif moves_node(channel["target"]):
                 continue
             same = numbers.setdefault(as_text(sampler), len(samplers))
@@ -380,10 +387,17 @@ def amount(tracks: Iterable[StoredTrack]) -> Amount:
     return Amount(sum(len(track.times) for track in tracks), sum(len(content) for _, content in parts))
 
 
-def amount_before(document: Document, references: References, clip: Clip) -> Amount:
-    """Keys and bytes of the tracks of a clip as it is in the file, without bytes that other things use as well."""
+def amount_before(
+    document: Document, references: References, clip: Clip, shares: Mapping[int, float] | None = None
+) -> Amount:
+    """Keys and bytes of the tracks of a clip as it is in the file, without bytes that other things use as well.
+
+    Of views that are compressed, what `shares` says by their numbers.
+    """
     animation = document.json["animations"][clip.number]
     samplers = [animation["samplers"][animation["channels"][track.channel]["sampler"]] for track in clip.tracks]
     accessors = {sampler[key] for sampler in samplers for key in ("input", "output")}
     own = [number for number in accessors if ELSEWHERE not in references.users[number]]
-    return Amount(sum(len(track.times) for track in clip.tracks), sum(stored_size(document.json, n) for n in own))
+    packed = [(shares or {}).get(document.json["accessors"][number].get("bufferView"), 1.0) for number in own]
+    size = sum(stored_size(document.json, number) * share for number, share in zip(own, packed, strict=True))
+    return Amount(sum(len(track.times) for track in clip.tracks), round(size))

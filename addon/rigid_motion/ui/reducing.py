@@ -12,21 +12,21 @@ from typing import cast
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from .. import animation
 from ..animation import Refused
 from ..animation.baking.into_holds import HAND, LEAST
-from ..animation.baking.originals import REDUCED
+from ..animation.baking.originals import CLEANED, REDUCED
 from ..animation.properties import MODE_ITEMS
 from ..animation.queries.polls import with_more_keys_than
 from ..animation.transforms import OWN_WORDS, Transform, transform_of
 from ..animation.transforms.sizes import first_tolerance
+from ..blender import BoolProperty, EnumProperty, FloatProperty, IntProperty, Returned, StringProperty, with_properties
 from .targets import OnChanged, OnTargets, each_target, is_posing, selected_in_view, with_bones_of_rigs
 from .wording import NATIVE_LABEL, hold_lines, labelled, reduction_rows, reduction_summary, split
 
 
-class _OfRigsToo:
+class OfRigsToo:
     """Operators that act on all keyed bones of a rig where it is selected outside of Pose Mode: an import is."""
 
     @classmethod
@@ -34,7 +34,8 @@ class _OfRigsToo:
         return with_bones_of_rigs(context, each_target(context))
 
 
-class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_reduce_keys(OfRigsToo, OnTargets):
     bl_idname = "rigid_motion.reduce_keys"
     bl_label = "Reduce Keys to Poses"
     bl_description = (
@@ -48,7 +49,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
     )
     with_work = staticmethod(partial(with_more_keys_than, count=2))
 
-    by: EnumProperty(
+    by: str = EnumProperty(
         name="Reduce By",
         description="What decides how many keys are left",
         items=[
@@ -57,7 +58,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         ],
         translation_context=OWN_WORDS,
     )
-    tolerance: FloatProperty(
+    tolerance: float = FloatProperty(
         name="Tolerance",
         description=(
             "How far off any point may be at any moment, within the radius around what is moved. Of bones that counts "
@@ -71,17 +72,17 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         precision=4,
         subtype="DISTANCE",
     )
-    offered: FloatProperty(
+    offered: float = FloatProperty(
         description="The tolerance that was offered last, for as long as nobody sets another", options={"HIDDEN"}
     )
-    count: IntProperty(
+    count: int = IntProperty(
         name="Number",
         description="Keys left of each object, or key poses of each rig. Below is how far off the motion is then",
         default=12,
         min=2,
         soft_max=100,
     )
-    radius: FloatProperty(
+    radius: float = FloatProperty(
         name="Radius",
         description=(
             "How far out from the origin nothing may be off by more: the larger, the more a rotation counts. "
@@ -95,11 +96,11 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         subtype="DISTANCE",
         options={"SKIP_SAVE"},
     )
-    mode: EnumProperty(
+    mode: str = EnumProperty(
         name="Mode",
         description=(
-            "What fills in between the keys that are left, and which keys those are. To begin with Native Curves or "
-            "Smooth Screw, whichever needs fewer keys"
+            "What fills in between the keys that are left, and which keys those are. To begin with Native Curves, "
+            "Smooth Screw or another mode, whichever needs the fewest keys"
         ),
         items=[
             (
@@ -114,17 +115,17 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         default="motor_spline",
         translation_context=OWN_WORDS,
     )
-    offered_mode: StringProperty(
+    offered_mode: str = StringProperty(
         description="The mode that was chosen last, for as long as nobody chooses another", options={"HIDDEN"}
     )
-    is_chosen: BoolProperty(
+    is_chosen: bool = BoolProperty(
         description="Whether a mode was chosen since the operator was called", options={"HIDDEN", "SKIP_SAVE"}
     )
-    shared: BoolProperty(
+    shared: bool = BoolProperty(
         name="Key Poses",
         description="Give all bones of a rig keys on the same frames. Otherwise each has its own: fewer keys in all",
     )
-    hold: BoolProperty(
+    hold: bool = BoolProperty(
         name="Hold Feet",
         description="Keep bones that stand on the ground to a quarter of the tolerance while they do",
         default=True,
@@ -148,7 +149,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         for label, text in reduction_rows(cast(bpy.types.Scene, context.scene), animation.reduction_of(targets)):
             labelled(column, label).label(text=text, translate=False)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> Returned:
         targets = list(self.each_target(context))
         if not self.properties.is_property_set("tolerance") or self.tolerance == self.offered:
             self.tolerance = self.offered = first_tolerance(
@@ -202,7 +203,8 @@ def props_and_holders(context: bpy.types.Context) -> tuple[list[Transform], Hold
     return [transform_of(thing) for thing in things if thing != active], [active]
 
 
-class RIGID_MOTION_OT_reduce_into_holds(OnTargets, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_reduce_into_holds(OnTargets):
     bl_idname = "rigid_motion.reduce_into_holds"
     bl_label = "Reduce into Holds"
     bl_description = (
@@ -213,7 +215,7 @@ class RIGID_MOTION_OT_reduce_into_holds(OnTargets, bpy.types.Operator):
     nothing_to_do = n_("Select something with dense keys, as of a recording, and then what held it")
     with_work = staticmethod(partial(with_more_keys_than, count=LEAST - 1))
 
-    tolerance: FloatProperty(
+    tolerance: float = FloatProperty(
         name="Tolerance",
         description=(
             "How far off any point may be on any frame, within the radius around what is held. Recorded hands give way "
@@ -226,14 +228,14 @@ class RIGID_MOTION_OT_reduce_into_holds(OnTargets, bpy.types.Operator):
         precision=4,
         subtype="DISTANCE",
     )
-    least: IntProperty(
+    least: int = IntProperty(
         name="At Least",
         description="The fewest frames on which something is held. For fewer its keys stay as they are",
         default=LEAST,
         min=2,
         soft_max=100,
     )
-    radius: FloatProperty(
+    radius: float = FloatProperty(
         name="Radius",
         description="At 0 each object has the size of its own bounding box, and each bone that of what it moves",
         default=0.0,
@@ -269,27 +271,27 @@ class RIGID_MOTION_OT_reduce_into_holds(OnTargets, bpy.types.Operator):
         return "; ".join(hold_lines(animation.reduction_of(done))) if done else ""
 
 
-class RIGID_MOTION_OT_restore_keys(_OfRigsToo, OnChanged, bpy.types.Operator):
+class RIGID_MOTION_OT_restore_keys(OfRigsToo, OnChanged):
     bl_idname = "rigid_motion.restore_keys"
     bl_label = "Restore Keys"
-    bl_description = "Give back all the keys that there were before they were reduced, to the last handle"
-    kind = REDUCED
-    nothing_to_do = n_("The keys here are not reduced")
+    bl_description = "Give back the keys that there were before they were reduced or cleaned last, to the last handle"
+    kinds = REDUCED, CLEANED
+    nothing_to_do = n_("The keys here are neither reduced nor cleaned")
     verb = staticmethod(animation.restore_keys)
-    summary = n_("back to the keys from before they were reduced")
+    summary = n_("back to the keys from before")
 
 
-class RIGID_MOTION_OT_discard_dense_keys(_OfRigsToo, OnChanged, bpy.types.Operator):
+class RIGID_MOTION_OT_discard_dense_keys(OfRigsToo, OnChanged):
     bl_idname = "rigid_motion.discard_dense_keys"
     bl_label = "Discard Dense Keys"
     bl_description = (
-        "Remove the keys from the file that Restore Keys would give back, once the reduced ones are good. "
-        "The reduced keys stay as they are"
+        "Remove the keys from the file that Restore Keys would give back, once the new ones are good. "
+        "The new keys stay as they are"
     )
-    kind = REDUCED
-    nothing_to_do = n_("The keys here are not reduced")
+    kinds = REDUCED, CLEANED
+    nothing_to_do = n_("The keys here are neither reduced nor cleaned")
     verb = staticmethod(animation.discard_dense_keys)
-    summary = n_("the keys from before they were reduced are removed from the file")
+    summary = n_("the keys from before are removed from the file")
 
 
 CLASSES = (

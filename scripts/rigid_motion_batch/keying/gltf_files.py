@@ -44,7 +44,8 @@ def reduce_gltf(
         document = read_document(job.file) if export is None else _exported(export)
         tolerance = None if how.tolerance is None else how.tolerance.metres(per_unit)
         with side_by_side(doing.work.processes) as run:
-            own = {name: getattr(how, name) for name in ("radius", "shared", "count", "channels", "curves")}
+            names = ("radius", "shared", "count", "channels", "feet", "curves", "meshopt")
+            own = {name: getattr(how, name) for name in names}
             report = reduced(document, Options(tolerance, **own, run=run))
     except GltfError as error:
         raise Unreadable(str(error)) from None

@@ -23,10 +23,15 @@ def add_target_options(parser: argparse.ArgumentParser, which: str) -> None:
         help="only these objects, and of rigs all of their bones; Rig/Hand is one bone; * and ? stand for any letters, "
         f"as in 'Tool*' and 'Rig/*' (all with {which})",
     )
+    add_dry_run(parser)
+
+
+def add_dry_run(parser: argparse.ArgumentParser) -> None:
+    """Add --dry-run."""
     parser.add_argument("--dry-run", action="store_true", help="do everything but write, and say what would be written")
 
 
-def add_file_options(parser: argparse.ArgumentParser) -> None:
+def add_file_options(parser: argparse.ArgumentParser, *, blend: bool = True) -> None:
     """Add a group of options that say where to write."""
     places = parser.add_argument_group("files")
     places.add_argument(
@@ -38,7 +43,8 @@ def add_file_options(parser: argparse.ArgumentParser) -> None:
     places.add_argument(
         "--overwrite", action="store_true", help="replace files that are of others, or were edited since"
     )
-    places.add_argument("--in-place", action="store_true", help="save the .blend files themselves")
+    if blend:
+        places.add_argument("--in-place", action="store_true", help="save the .blend files themselves")
     places.add_argument(
         "--jobs",
         type=whole("number of processes", 0, 999),

@@ -54,7 +54,13 @@ class Reductions:
     """So many keys of each object, or key poses of each rig, instead of a tolerance."""
 
     channels: str
-    """Of glTF files: "all" if every channel keeps a key at least, "needed" otherwise."""
+    """Of glTF files: which channels keep a key though they leave a node as it rests."""
+
+    feet: bool
+    """Of glTF files: True if feet that stand keep to where they stand, however large the tolerance is."""
+
+    meshopt: bool
+    """Of glTF files: True if they are compressed by meshopt."""
 
     axes: str | None
     """Of recordings; None for those of each format."""

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 import bpy
 import numpy as np
 
+from ...blender import channelbag_in
 from ...motion.cubic_keys import CONSTANT, CUBIC, THIRD, CubicKeys, Samples, errors_between, fitted_together, keyed_at
 from ..actions.channels import KeyFields, code_of, key_points, replace_keys
 from ..evaluation.components import LOCATION, PART_OF, ROTATION, ROWS
@@ -211,8 +211,8 @@ def scratch_curve() -> Iterator[bpy.types.FCurve]:
     """Have an F-curve to try keys on, which moves nothing."""
     action = bpy.data.actions.new("Scratch")
     try:
-        strip: Any = action.layers.new("Scratch").strips.new(type="KEYFRAME")
-        yield strip.channelbag(action.slots.new("WORLD", "Scratch"), ensure=True).fcurves.new("scratch")
+        strip = action.layers.new("Scratch").strips.new(type="KEYFRAME")
+        yield channelbag_in(strip, action.slots.new("WORLD", "Scratch")).fcurves.new("scratch")
     finally:
         bpy.data.actions.remove(action)
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 
 from bpy.app.translations import pgettext_n as n_
@@ -22,13 +23,13 @@ from ..edits.apply import Readings, Target, Targets, apply_edit, readable, trans
 from ..edits.mode_keys import set_mode_in
 from ..evaluation.components import PART_OF, SCALE
 from ..evaluation.sources import Source
-from ..transforms import Refused, Transform, transform_of
+from ..transforms import Note, Refused, Transform, transform_of
 from .bake import go_back
 from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, count_of, has_uneven_scale
 from .held_keys import FewerRuns, fewer_runs, write_runs
 from .native_curves import NATIVE, write_keys
-from .originals import REDUCED, Note, Originals, discard_originals, last_change, notes_of
-from .search import NO_FEWER, NOT_SO_MANY, fewer_keys
+from .originals import CLEANED, REDUCED, Originals, discard_originals, last_change, notes_of
+from .search import NO_FEWER, NOT_SO_MANY, NotFewer, fewer_keys
 
 HELD = n_("{name} is held, and is reduced for each time that it is so: by a tolerance, not to a number of keys")
 
@@ -36,7 +37,7 @@ SMOOTH = "motor_spline"
 """The mode that mostly needs the fewest keys."""
 
 FEWEST = "FEWEST"
-"""Asks for `NATIVE` or `SMOOTH`, whichever needs fewer keys."""
+"""Asks for `NATIVE` or `SMOOTH`, whichever needs fewer keys, or a mode that needs fewer than both."""
 
 Plans = dict[Transform, "list[FewerKeys | FewerRuns] | Refused"]
 """The keys that targets are to have in each slot that moves them; or why they cannot."""
@@ -97,7 +98,7 @@ def reduce_keys_of(
         See `edits.apply`.
     mode : str
         What fills in between the keys, one of `rigid_motion.motion.KEYFRAME_MODES`. It is that of all segments.
-        `NATIVE` is Blender's own curves, `FEWEST` these or `SMOOTH`.
+        `NATIVE` is Blender's own curves, `FEWEST` whatever needs the fewest keys.
     tolerance : float
         The largest shell error at any moment, or with native curves on any frame, in the scene's units. Of bones it is
         that in the rig's space, through all that they hang on, and holds for every bone that hangs on a target too.
@@ -116,7 +117,9 @@ def reduce_keys_of(
     Reduction or None
         That of all targets which did not refuse, see `reduction_of`.
     """
-    modes = (NATIVE, SMOOTH) if mode == FEWEST else (mode,)
+    modes: tuple[str, ...] = (mode,)
+    if mode == FEWEST:  # So many keys are so many with each.
+        modes = (NATIVE, SMOOTH) if count else tuple(dict.fromkeys((NATIVE, SMOOTH, *KEYFRAME_MODES)))
     if mode not in (NATIVE, FEWEST) and mode not in KEYFRAME_MODES:
         raise Refused(no_such_mode(mode, KEYFRAME_MODES))
     if not 0.0 < tolerance < math.inf:
@@ -129,12 +132,20 @@ def reduce_keys_of(
 
     def survey(readings: Mapping[Transform, Readings]) -> None:
         for name in modes:
-            found[name] = _plans(
-                readings, mode=name, tolerance=tolerance, radius=radius, shared=shared, hold=hold, count=count
-            )
-            needed[name] = _keys_left(found[name], readings)
+            with suppress(NotFewer):
+                found[name] = _plans(
+                    readings,
+                    mode=name,
+                    tolerance=tolerance,
+                    radius=radius,
+                    shared=shared,
+                    hold=hold,
+                    count=count,
+                    below=min(needed.values()) if name in modes[2:] else math.inf,
+                )
+                needed[name] = _keys_left(found[name], readings)
         nonlocal mode
-        mode = min(needed, key=lambda name: (needed[name], _error_of(found[name])))
+        mode = min(needed, key=lambda name: (needed[name], name in modes[2:], _error_of(found[name])))
 
     def plan(transform: Transform, readings: Readings) -> list[FewerKeys | FewerRuns]:
         result = found[mode][transform]
@@ -161,10 +172,11 @@ def _plans(
     count: int | None,
     shared: bool,
     hold: bool,
+    below: float,
 ) -> Plans:
     """Return plans for all targets, those together that one slot of an object moves: see `fewer_keys`.
 
-    What is held moves with its holder, and so by itself.
+    What is held moves with its holder, and so by itself. `NotFewer` where so many keys are left, or more.
     """
     plans: Plans = {}
     together: dict[tuple, dict[Transform, tuple[Binding, Source]]] = {}
@@ -188,13 +200,16 @@ def _plans(
                 of_runs.append(runs)
     for (obj, *_), members in together.items():
         try:
-            fewer = fewer_keys(obj, members, mode, tolerance, radius, shared=shared, hold=hold, count=count)
+            fewer = fewer_keys(
+                obj, members, mode, tolerance, radius, shared=shared, hold=hold, count=count, below=below
+            )
         except ValueError as problem:
             text = n_("{name} cannot be reduced: {problem}")
             why = problem if isinstance(problem, Refused) else Refused(text, name=obj.name, problem=problem)
             plans |= dict.fromkeys(members, why)
             continue
         for transform, plan in fewer.items():
+            below -= plan.after
             if isinstance(result := plans[transform], list):
                 result.append(plan)
     return plans
@@ -231,7 +246,7 @@ def reduction_of(targets: Targets) -> Reduction | None:
         sum(item.after for item in reductions),
         max(item.largest_error for item in reductions),
         max(rigs, key=lambda rig: rig.frames, default=None),
-        tuple(map(sum, zip(*(item.channel_keys for item in reductions), strict=True))),
+        (sum(item.channel_keys[0] for item in reductions), sum(item.channel_keys[1] for item in reductions)),
         max(item.between for item in reductions),
         reductions[-1].mode,
         reductions[-1].needed,
@@ -250,13 +265,13 @@ def is_reduced(target: Target) -> bool:
 
 
 def restore_keys(targets: Targets, *, refused: list[Refused] | None = None) -> None:
-    """Give all the keys back that there were before they were reduced, to the last handle. See `edits.apply`."""
-    go_back(targets, REDUCED, refused)
+    """Give all the keys back that there were before they were reduced or cleaned last, to the last handle."""
+    go_back(targets, (REDUCED, CLEANED), refused)
 
 
 def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None) -> None:
-    """Remove the keys from the file that there were before they were reduced. See `edits.apply`."""
-    go_back(targets, REDUCED, refused, by=discard_originals)
+    """Remove the keys from the file that `restore_keys` would give back. See `edits.apply`."""
+    go_back(targets, (REDUCED, CLEANED), refused, by=discard_originals)
 
 
 def _write(

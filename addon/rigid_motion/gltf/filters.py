@@ -1,0 +1,101 @@
+"""Filters of meshopt: numbers as whole ones of as few bits as are asked for, and back, element by element.
+
+Elements are arrays of bytes, shape (count, stride).
+Source: the specification of KHR_meshopt_compression, Khronos 2026, appendix B.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+QUATERNION, EXPONENTIAL = "QUATERNION", "EXPONENTIAL"
+
+RANGE = np.sqrt(0.5)
+"""No other component of a unit quaternion than the largest is beyond it."""
+
+MOST_BITS, FEWEST_BITS = 15, 4
+"""Of a component of a quaternion, so that what is shown says which bits are stored."""
+
+INTEGER = np.iinfo(np.int16).max
+
+MANTISSA = 2**23 - 1
+"""The largest, of either sign."""
+
+
+def quaternions_of(elements: np.ndarray) -> np.ndarray:
+    """Return normalised integers (count, 4), x, y, z, w, of three components and which is the fourth."""
+    given = _typed(elements, "<i2").reshape(-1, 4).astype(np.int64)
+    parts = given[:, :3] / (given[:, 3:] | 3) * RANGE
+    fourth = np.sqrt(np.maximum(1.0 - np.sum(parts**2, axis=1), 0.0))
+    places = (given[:, 3:] + np.arange(4)) & 3
+    result = np.empty((len(given), 4))
+    np.put_along_axis(result, places, np.column_stack((fourth, parts)), axis=1)
+    return np.rint(result * INTEGER).astype("<i2")
+
+
+def with_quaternions(values: np.ndarray, bits: int, rank: int = 0) -> np.ndarray:
+    """Return elements (count, 8) for unit quaternions (count, 4), x, y, z, w, in so many bits.
+
+    What is left out of each is its largest component, or with a rank of 1 the second largest, where they are as large.
+    """
+    largest = np.argsort(-np.abs(values), axis=1, kind="stable")[:, rank, None]
+    turned = np.take_along_axis(values, (largest + np.arange(4)) % 4, axis=1)
+    one = 2 ** (bits - 1) - 1
+    parts = np.rint(turned[:, 1:] * np.where(turned[:, :1] < 0.0, -1.0, 1.0) / RANGE * one)
+    fourth = one & ~3 | largest
+    return np.hstack((np.clip(parts, -one, one), fourth)).astype("<i2").view(np.uint8)
+
+
+def floats_of(elements: np.ndarray) -> np.ndarray:
+    """Return floats (count, stride / 4) of mantissas of 24 bits and their exponents."""
+    given = _typed(elements, "<i4")
+    return np.ldexp((given << 8 >> 8).astype(np.float64), given >> 24).astype("<f4")
+
+
+def with_floats(values: np.ndarray, exponents: np.ndarray | int) -> np.ndarray:
+    """Return elements (count, 4 * width) for numbers (count, width), as multiples of powers of 2 (broadcast)."""
+    mantissas = np.clip(np.rint(np.ldexp(values, -np.asarray(exponents))), -MANTISSA, MANTISSA).astype(np.int64)
+    parts = mantissas & 0xFFFFFF | (np.asarray(exponents, dtype=np.int64) & 0xFF) << 24
+    return parts.astype("<u4").view(np.uint8)
+
+
+def _octahedral(elements: np.ndarray) -> np.ndarray:
+    """Return unit vectors, and a fourth number as it is."""
+    integers = _typed(elements, f"<i{elements.shape[1] // 4}")
+    given, largest = integers.astype(np.float64), np.iinfo(integers.dtype).max
+    xy = given[:, :2] / np.where(given[:, 2:3] == 0.0, 1.0, given[:, 2:3])
+    z = 1.0 - np.abs(xy).sum(axis=1, keepdims=True)
+    vectors = np.hstack((xy - np.copysign(np.minimum(z, 0.0), xy), z))
+    vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+    whole = np.copysign(np.floor(np.abs(vectors) * largest + 0.5), vectors)
+    return np.hstack((whole, given[:, 3:])).astype(integers.dtype)
+
+
+def _colours(elements: np.ndarray) -> np.ndarray:
+    """Return red, green, blue and alpha of luma, two chromas and alpha."""
+    kind = f"{elements.shape[1] // 4}"
+    luma, _, _, alpha = _typed(elements, f"<u{kind}").astype(np.int64).T
+    _, orange, green, _ = _typed(elements, f"<i{kind}").astype(np.int64).T
+    widest = 2 ** np.frexp(alpha.astype(np.float64))[1].astype(np.int64) - 1
+    alpha = alpha & widest >> 1
+    parts = np.stack((luma + orange - green, luma + green, luma - orange - green, alpha << 1 | alpha & 1), axis=1)
+    largest = np.iinfo(f"<u{kind}").max
+    scaled = parts * (largest / np.maximum(widest, 1))[:, None]
+    return np.clip(np.floor(scaled + 0.5), 0, largest).astype(f"<u{kind}")
+
+
+def _typed(elements: np.ndarray, kind: str) -> np.ndarray:
+    return np.ascontiguousarray(elements).view(kind)
+
+
+UNDONE: dict[str, tuple[tuple[int, ...], Callable[[np.ndarray], np.ndarray]]]
+UNDONE = {
+    "NONE": ((), lambda elements: elements),
+    "OCTAHEDRAL": ((4, 8), _octahedral),
+    QUATERNION: ((8,), quaternions_of),
+    EXPONENTIAL: ((), floats_of),
+    "COLOR": ((4, 8), _colours),
+}
+"""The strides that each may have, where these are few, and what undoes it."""

@@ -1,0 +1,233 @@
+"""Keys of one track in few bits: values that are fitted to what it shows between them as well, rounded, and mended.
+
+Where rounding, or the fit, takes a track too far off at a few samples, keys near to these are rounded in other ways.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..motion.quaternions import normalise, turned_at
+from .attribute_streams import likely_size
+from .filters import INTEGER, MOST_BITS, RANGE, floats_of, quaternions_of, with_floats, with_quaternions
+from .tracks import TO_WXYZ, TO_XYZW
+
+FEW = 0.05
+"""The share of samples at which keys are too far off, and may be mended."""
+
+FITS, HEAVY, NEARLY = 3, 4.0, 0.8
+"""How often keys are fitted again, and how many times as much samples count then that are so far off, or farther."""
+
+ROUNDS, RARE, FAR = 3, 0.01, 1.6
+"""Of mending, the share of samples up to which it is tried, and how far off these may be."""
+
+SWEEPS, TOWARDS = 12, 0.02
+"""Of a fit, and how much it is drawn to what is shown at a key itself."""
+
+WHOLE_BITS = range(4, MOST_BITS + 1)
+
+EXPONENTS = range(2, -21, -1)
+
+MOVES = [(column, step) for column in range(3) for step in (-1, 1)]
+
+SHARED, OWN, SINGLE = "shared", "own", "single"
+
+Measure = Callable[[np.ndarray, np.ndarray | slice], np.ndarray]
+"""From what is shown at some of the samples (k, width), and which these are, to how far off that is, shape (k,)."""
+
+EVERY = slice(None)
+
+
+class Keys(NamedTuple):
+    """Keys of a track as they are stored, and what they are worth."""
+
+    times: np.ndarray
+    """Shape (n,)."""
+
+    stored: np.ndarray
+    """Of rotations, x, y, z, w, (n, 4); floats of translations, (n, 3)."""
+
+    shown: np.ndarray
+    """What they show at the samples, (m, 4) or (m, 3)."""
+
+    size: float
+    """About how many bytes the values take."""
+
+    kind: str
+    """SHARED with other tracks, OWN or SINGLE."""
+
+
+def fitted(times: np.ndarray, samples: np.ndarray, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return values at times (k,) whose lines are nearest to those (m, width) at samples (m,), in the least squares."""
+    if len(times) == 1:
+        return values.mean(axis=0)[None]
+    count = len(times)
+    segments = np.clip(np.searchsorted(times, samples, side="right") - 1, 0, count - 2)
+    second = np.clip((samples - times[segments]) / np.diff(times)[segments], 0.0, 1.0)
+    first = 1.0 - second
+
+    def summed(before: np.ndarray, behind: np.ndarray) -> np.ndarray:
+        return np.bincount(segments, weights * before, count) + np.bincount(segments + 1, weights * behind, count)
+
+    middle, beside = summed(first**2, second**2), np.bincount(segments, weights * first * second, count)[:-1, None]
+    result = np.stack([np.interp(times, samples, column) for column in values.T], axis=1)
+    drawn = TOWARDS * middle.mean()
+    right = np.stack([summed(first * column, second * column) for column in values.T], axis=1) + drawn * result
+    for sweep in range(2 * SWEEPS):
+        rest = right.copy()
+        rest[1:] -= beside * result[:-1]
+        rest[:-1] -= beside * result[1:]
+        result[sweep % 2 :: 2] = (rest / (middle + drawn)[:, None])[sweep % 2 :: 2]
+    return result
+
+
+@dataclass(eq=False)
+class Aim:
+    """What a track is to show.
+
+    Parameters
+    ----------
+    samples : array, shape (m,)
+    values : array, shape (m, width)
+    reach : float
+        How far off a difference of 1 is, at most.
+    measure : Measure
+        1 is what is allowed.
+    turns : bool
+        Whether these are quaternions.
+    """
+
+    samples: np.ndarray
+    values: np.ndarray
+    reach: float
+    measure: Measure
+    turns: bool
+
+    def __post_init__(self) -> None:
+        self._fits: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+
+    def between(self, keys: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Return what keys show at times (k,), shape (k, width)."""
+        if len(keys) == 1:
+            return np.repeat(values, len(times), axis=0)
+        if self.turns:
+            return turned_at(keys, values, np.clip(times, keys[0], keys[-1]))
+        return np.stack([np.interp(times, keys, column) for column in values.T], axis=1)
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return what it is to show at these times (k,), shape (k, width)."""
+        return self.between(self.samples, self.values, times)
+
+    def fit(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the best values at these times, and how far off they are at the samples without being rounded."""
+        known = times.tobytes()
+        if known not in self._fits:
+            weights = np.ones(len(self.samples))
+            for _ in range(FITS):
+                values = fitted(times, self.samples, self.values, weights)
+                values = normalise(values) if self.turns else values
+                off = self.measure(self.between(times, values, self.samples), EVERY)
+                near = off > NEARLY
+                if len(times) == 1 or not near.any() or near.mean() > FEW:
+                    break
+                weights[near] *= HEAVY
+            self._fits[known] = values, off
+        return self._fits[known]
+
+    def failing(self, times: np.ndarray) -> float:
+        """Return at which share of the samples keys at these times are too far off."""
+        return float((self.fit(times)[1] > 1.0).mean())
+
+    def keys(self, times: np.ndarray, kind: str) -> Keys | None:
+        """Return keys at these times in as few bits as keep to what is allowed, or None."""
+        values, off = self.fit(times)
+        if (off > 1.0).mean() > FEW:
+            return None
+        choices = WHOLE_BITS if self.turns else EXPONENTS
+        room = max(1.0 - float(np.quantile(off, 0.9)), 0.1)
+        likely = next((n for n, bits in enumerate(choices) if self._rounding(bits) <= room), len(choices) - 1)
+        fewer = True
+        result = None
+        while likely < len(choices) and (result := self._rounded(times, values, choices[likely], kind)) is None:
+            likely += 1
+            fewer = False
+        while fewer and likely and (found := self._rounded(times, values, choices[likely - 1], kind)) is not None:
+            result, likely = found, likely - 1
+        return result
+
+    def _rounding(self, bits: int) -> float:
+        """About how far off rounding takes it."""
+        return self.reach * (0.7 * RANGE / (2 ** (bits - 1) - 1) if self.turns else 0.4 * 2.0**bits)
+
+    def _rounded(self, times: np.ndarray, values: np.ndarray, bits: int, kind: str) -> Keys | None:
+        elements = with_quaternions(values[:, TO_XYZW], bits) if self.turns else with_floats(values, bits)
+        shown = self.between(times, self._played(elements), self.samples)
+        if (mended := self._mended(times, elements, shown, bits)) is None:
+            return None
+        elements = mended
+        stored = quaternions_of(elements) if self.turns else floats_of(elements)
+        return Keys(times, stored, shown, likely_size(elements), kind)
+
+    def _played(self, elements: np.ndarray) -> np.ndarray:
+        if self.turns:
+            return (quaternions_of(elements) / INTEGER)[:, TO_WXYZ]
+        return floats_of(elements).astype(np.float64)
+
+    def _moved(
+        self, elements: np.ndarray, bits: int, keys: np.ndarray, columns: np.ndarray | int, steps: np.ndarray | int
+    ) -> np.ndarray:
+        """Return the elements with some numbers of some keys moved by so many of the smallest steps there are."""
+        if self.turns:
+            parts = elements.view("<i2").copy()
+            largest = parts[keys, 3] | 3
+            parts[keys, columns] = np.clip(parts[keys, columns] + steps, -largest, largest)
+            return parts.view(np.uint8)
+        numbers = floats_of(elements).astype(np.float64)
+        numbers[keys, columns] += np.ldexp(steps, bits)
+        return with_floats(numbers, bits)
+
+    def _mended(self, times: np.ndarray, elements: np.ndarray, shown: np.ndarray, bits: int) -> np.ndarray | None:
+        """Return the elements with keys moved near to samples that are too far off; None where some still are."""
+        off, count = self.measure(shown, EVERY), len(times)
+        if count < 3 or off.max() > FAR or (off > 1.0).mean() > RARE:
+            return elements if off.max() <= 1.0 else None
+        segments = np.clip(np.searchsorted(times, self.samples, side="right") - 1, 0, count - 2)
+        for turn in range(ROUNDS):
+            if off.max() <= 1.0:
+                return elements
+            worst = np.zeros(count + 2)
+            np.maximum.at(worst, segments + 1, off)
+            np.maximum.at(worst, segments + 2, off)
+            left, right = (worst[:-2], worst[2:])[:: 1 if turn % 2 else -1]
+            own = worst[1:-1]
+            chosen = np.flatnonzero((own > 1.0) & (own >= left) & (own > right))
+            near = np.zeros(count + 1, dtype=np.int64)
+            near[chosen] = near[chosen + 1] = np.arange(1, len(chosen) + 1)
+            (some,) = np.nonzero(near[segments + 1])
+            owner = near[segments + 1][some] - 1
+            best, least = np.full(len(chosen), -1), own[chosen]
+            for number, (column, step) in enumerate(MOVES):
+                played = self._played(self._moved(elements, bits, chosen, column, step))
+                after = np.zeros(len(chosen))
+                np.maximum.at(after, owner, self.measure(self.between(times, played, self.samples[some]), some))
+                best[after < least], least = number, np.minimum(after, least)
+            better = best >= 0
+            if not better.any():
+                return None
+            columns, steps = np.array(MOVES)[best[better]].T
+            elements = self._moved(elements, bits, chosen[better], columns, steps)
+            shown[:] = self.between(times, self._played(elements), self.samples)
+            off = self.measure(shown, EVERY)
+        return elements if off.max() <= 1.0 else None
+
+    def finest(self, times: np.ndarray) -> Keys:
+        """Return keys at these times as exact as they may be."""
+        measure, self.measure = self.measure, lambda shown, _: np.zeros(len(shown))
+        result = self._rounded(times, self.fit(times)[0], (WHOLE_BITS if self.turns else EXPONENTS)[-1], SHARED)
+        self.measure = measure
+        assert result is not None
+        return result

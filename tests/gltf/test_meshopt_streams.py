@@ -1,0 +1,176 @@
+"""Streams and filters of meshopt are read and written as its own library would have them."""
+
+import numpy as np
+import pytest
+
+from rigid_motion.gltf import attribute_streams, index_streams
+from rigid_motion.gltf.attribute_streams import differences, encoded, encoded_size, likely_size
+from rigid_motion.gltf.filters import UNDONE, floats_of, quaternions_of, with_floats, with_quaternions
+from tests.gltf import meshopt_library
+from tests.gltf.meshopt_library import LIBRARY
+
+# Where the library is: in the newest Blender.
+pytestmark = pytest.mark.once
+needs_library = pytest.mark.skipif(not LIBRARY, reason="the library is in Blender from 5.2 on")
+
+
+def elements_of(count: int, stride: int, wide: int) -> np.ndarray:
+    random = np.random.default_rng(count + stride + wide)
+    steps = random.integers(-wide, wide + 1, (count, stride)) * (random.random((count, stride)) < 0.3)
+    return np.cumsum(steps, axis=0).astype(np.uint8)
+
+
+@pytest.mark.parametrize("count", [1, 16, 17, 257, 1000])
+@pytest.mark.parametrize("stride", [4, 12, 64, 256])
+@pytest.mark.parametrize("wide", [0, 1, 6, 40, 255])
+def test_elements_come_back_as_they_were(count: int, stride: int, wide: int) -> None:
+    elements = elements_of(count, stride, wide)
+    stream = encoded(elements)
+    streams = [stream]
+    assert len(stream) == encoded_size(elements)
+    if LIBRARY:
+        own = meshopt_library.attributes(elements, 0)
+        assert len(stream) <= len(own)
+        assert np.array_equal(meshopt_library.decoded(stream, count, stride), elements)
+        streams += [own, meshopt_library.attributes(elements, 1)]
+    for some in streams:
+        assert np.array_equal(attribute_streams.decoded(some, count, stride), elements)
+
+
+def test_few_elements_take_about_their_share_of_a_stream_with_many_others() -> None:
+    parts = [elements_of(count, 8, 40) for count in (5, 70, 33, 200)]
+    together = encoded_size(np.concatenate(parts))  # Where two meet, it takes more.
+    assert sum(map(likely_size, parts)) == pytest.approx(together, rel=0.15)
+
+
+def test_differences_have_their_sign_in_the_lowest_bit() -> None:
+    assert differences(np.array([[3], [2], [4], [255], [0]], dtype=np.uint8)).ravel().tolist() == [0, 1, 4, 9, 2]
+
+
+@needs_library
+@pytest.mark.parametrize("kind", ["<u2", "<u4", "<f4"])
+def test_channels_of_two_and_of_four_bytes_are_read(kind: str) -> None:
+    """The library chooses how channels are packed by what is in them."""
+    random = np.random.default_rng(1)
+    numbers = np.cumsum(random.normal(size=(700, 4)), axis=0) * 1000.0
+    elements = np.ascontiguousarray(numbers.astype(kind)).view(np.uint8)
+    stream = meshopt_library.attributes(elements, 1)
+    modes = set(stream[-elements.shape[1] // 4 :])
+    assert modes != {0}
+    assert np.array_equal(attribute_streams.decoded(stream, *elements.shape), elements)
+
+
+@needs_library
+@pytest.mark.parametrize("stride", [2, 4])
+@pytest.mark.parametrize("shuffled", [False, True])
+def test_triangles_and_indices_come_back(stride: int, shuffled: bool) -> None:
+    """Triangles may come back turned, with the same corner behind each other one."""
+    random, side = np.random.default_rng(2), np.arange(40 * 39).reshape(40, 39)
+    corners = np.stack(
+        (side[:-1, :-1], side[1:, :-1], side[:-1, 1:], side[:-1, 1:], side[1:, :-1], side[1:, 1:]), axis=-1
+    )
+    triangles = corners.reshape(-1, 3)
+    triangles = random.permutation(random.permutation(triangles.max() + 1)[triangles]) if shuffled else triangles
+    given = triangles.ravel()
+    for are_triangles in (True, False):
+        stream = meshopt_library.indices(given, are_triangles=are_triangles)
+        decoded = index_streams.decoded_triangles if are_triangles else index_streams.decoded_indices
+        result = decoded(stream, len(given), stride).view(f"<u{stride}").ravel()
+        if are_triangles:
+            first = np.argmin(result.reshape(-1, 3), axis=1)[:, None]
+            result = np.take_along_axis(result.reshape(-1, 3), (first + np.arange(3)) % 3, axis=1)
+            first = np.argmin(triangles, axis=1)[:, None]
+            assert np.array_equal(result, np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1))
+        else:
+            assert np.array_equal(result, given)
+
+
+@needs_library
+@pytest.mark.parametrize(
+    ("name", "own", "stride", "bits"),
+    [
+        ("OCTAHEDRAL", "Oct", 4, 8),
+        ("OCTAHEDRAL", "Oct", 4, 5),
+        ("OCTAHEDRAL", "Oct", 8, 12),
+        ("QUATERNION", "Quat", 8, 16),
+        ("QUATERNION", "Quat", 8, 7),
+        ("EXPONENTIAL", "Exp", 16, 15),
+        ("COLOR", "Color", 4, 8),
+        ("COLOR", "Color", 4, 6),
+        ("COLOR", "Color", 8, 12),
+    ],
+)
+def test_filters_are_undone_as_by_the_library(name: str, own: str, stride: int, bits: int) -> None:
+    """To the last whole number: the library works in single precision."""
+    numbers = np.random.default_rng(3).normal(size=(1000, 4))
+    numbers /= np.linalg.norm(numbers[:, : 4 if own == "Quat" else 3], axis=1, keepdims=True)
+    numbers[:, 3] = numbers[:, 3] if own in ("Quat", "Exp") else 0.0
+    elements = meshopt_library.filtered(own, np.abs(numbers) if own == "Color" else numbers, stride, bits)
+    expected = meshopt_library.undone(own, elements)
+    result = UNDONE[name][1](elements)
+    kind = {"Exp": "<f4", "Color": f"<u{stride // 4}"}.get(own, f"<i{stride // 4}")
+    off = np.abs(result.astype(np.float64) - expected.view(kind).astype(np.float64).reshape(result.shape))
+    assert off.max() <= (0 if own == "Exp" else 1)
+    assert (off > 0).mean() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("name", "stride", "elements", "kind", "values"),
+    [
+        (
+            "QUATERNION",
+            8,
+            "825a825a825afc7f7ea57ea5e6edfd7f000000000000ff7f921249c82525fc7f",
+            "<i2",
+            [16383, 16384, 16384, 16384, -3277, 22937, -16384, -16384, 0, 0, 0, 32767, 30256, 3362, -10085, 6724],
+        ),
+        (
+            "EXPONENTIAL",
+            12,
+            "002000f300e0fff1ea3e00e3883e00fc000000f200c8fff5",
+            "<f4",
+            [1.0, -0.25, 2.9999762773513794e-05, 1000.5, 0.0, -7.0],
+        ),
+    ],
+)
+def test_filters_are_undone_without_the_library(name: str, stride: int, elements: str, kind: str, values: list) -> None:
+    given = np.frombuffer(bytes.fromhex(elements), np.uint8).reshape(-1, stride)
+    assert np.frombuffer(UNDONE[name][1](given).tobytes(), kind).tolist() == values
+
+
+@pytest.mark.parametrize("bits", [4, 8, 12, 15])
+def test_quaternions_are_as_near_as_their_bits_allow(bits: int) -> None:
+    values = np.random.default_rng(4).normal(size=(1000, 4))
+    values /= np.linalg.norm(values, axis=1, keepdims=True)
+    result = quaternions_of(with_quaternions(values, bits)) / 32767.0
+    off = np.minimum(np.abs(result - values).max(axis=1), np.abs(result + values).max(axis=1))
+    assert off.max() <= 2.0 * np.sqrt(0.5) / (2 ** (bits - 1) - 1) + 1.0 / 32767.0
+
+
+def test_floats_are_multiples_of_the_power_that_is_asked_for() -> None:
+    values = np.array([[0.1, -2.3, 100.0], [1e-9, 0.0, -1.0]])
+    assert np.array_equal(floats_of(with_floats(values, -6)), np.rint(values * 64.0).astype("<f4") / 64.0)
+
+
+@pytest.mark.slow
+def test_damaged_streams_end_in_an_error_or_in_other_numbers() -> None:
+    random = np.random.default_rng(5)
+    known = [(attribute_streams.decoded, encoded(elements_of(100, 8, 40)), 100, 8)]
+    if LIBRARY:
+        given = random.integers(0, 500, 600)
+        known += [
+            (attribute_streams.decoded, meshopt_library.attributes(elements_of(100, 8, 40), 1), 100, 8),
+            (index_streams.decoded_triangles, meshopt_library.indices(given, are_triangles=True), 600, 4),
+            (index_streams.decoded_indices, meshopt_library.indices(given, are_triangles=False), 600, 4),
+        ]
+    refused = 0
+    for decoded, stream, count, stride in known:
+        for _ in range(300):
+            data = bytearray(stream)
+            for place in random.integers(len(data), size=3):
+                data[place] = random.integers(256)
+            try:
+                assert decoded(bytes(data[: len(data) - random.integers(0, 2)]), count, stride).shape == (count, stride)
+            except (IndexError, KeyError, ValueError):
+                refused += 1
+    assert refused > 100
