@@ -198,7 +198,7 @@ def test_what_was_done_last_is_taken_back_first_and_the_file_keeps_dense_keys_un
     if let_go:
         unbake(obj)
         assert (state(), reduction_of(obj)) == ((before[1][0], False, False), first)
-        with pytest.raises(Refused, match="Tool is not reduced, or has another Action by now"):
+        with pytest.raises(Refused, match="Tool is neither reduced nor cleaned, or has another Action by now"):
             restore_keys(obj)
     else:
         for back, reduction in ((restore_keys, None), (unbake, first), (restore_keys, None)):

@@ -63,3 +63,9 @@ def test_a_flood_is_taken_in_portions(monkeypatch):
     assert 0 < len(port.received()) <= 20
     assert port.received() == []
     port.close()
+
+
+def test_a_socket_that_only_fails_is_looked_at_no_longer_than_a_flood():
+    with sockets.Port("127.0.0.1") as port:
+        port._socket.close()
+        assert port.received() == []

@@ -104,6 +104,17 @@ def test_samples_that_repeat_the_one_before_are_bridged():
     assert shell_error(cleaned.poses, truth)[rows].max() < 0.006
 
 
+@pytest.mark.parametrize(("length", "lost"), [(2, True), (6, True), (9, False)])
+def test_a_pose_that_comes_again_where_others_tremble_is_a_lost_sample_but_not_what_stands_still(length, lost):
+    times, truth = hand(3)
+    shaky = shaken(truth, 3)
+    rows = np.arange(300, 300 + length)
+    positions, quaternions = shaky.positions.copy(), shaky.quaternions.copy()
+    positions[rows], quaternions[rows] = positions[299], quaternions[299]
+    cleaned = clean(times, Poses(positions, quaternions))
+    assert np.flatnonzero(cleaned.repeats).tolist() == (rows.tolist() if lost else [])
+
+
 def test_a_drum_stroke_keeps_its_hit():
     times = np.arange(400) / 100.0
     # A stick that falls and bounces off every second.

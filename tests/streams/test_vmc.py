@@ -29,6 +29,8 @@ from tests.live.performing import PARENTS, PLACES
 from tests.motion.cases import random_quaternions
 from tests.thoroughness import sample
 
+pytestmark = pytest.mark.blender
+
 
 def world(body: Body, poses: Poses) -> Poses:
     """Poses (joints, ...) of a body in the space of its roots."""

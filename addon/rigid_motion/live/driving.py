@@ -11,13 +11,15 @@ to a place by its location and turned by a parent.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import cast
+from typing import Any, cast
 
 import bpy
 import numpy as np
 from mathutils import Quaternion
 
-from ..animation.holds.holders import is_ours, world_of
+from ..animation.holds.holders import is_ours
+from ..animation.holds.placing import world_of
+from ..blender import armature, pose_bones, scene, view_layer
 from ..motion import Poses
 from ..motion.eulers import ORDERS
 from ..motion.humanoid import SPINE, alignments, beside, humanoid_bones, plain_name
@@ -199,7 +201,7 @@ class RigDriver(Driver):
 
     def __init__(self, obj: bpy.types.Object, body: Body, pairs: Mapping[str, str]) -> None:
         super().__init__(obj, body)
-        bones = obj.pose.bones
+        bones = pose_bones(obj)
         joints = [joint for joint in body.joints if pairs.get(joint, "") in bones]
         self.bones = [pairs[joint] for joint in joints]
         self.prefixes = [f'pose.bones["{bpy.utils.escape_identifier(name)}"].' for name in self.bones]
@@ -212,7 +214,7 @@ class RigDriver(Driver):
         self._offsets = beside(in_space, self.follows)[:, None]
         """The pose of each bone with no values, seen from the bone that it follows, or in the armature."""
         _, turn, scale = obj.matrix_basis.decompose()
-        self._turn, self.unit = np.array(turn), max(sum(map(abs, scale)) / 3.0, 1e-9)
+        self._turn, self.unit = np.array(turn), max(sum(map(abs, scale[:])) / 3.0, 1e-9)
         numbers = np.array([body.joints.index(joint) for joint in joints], dtype=np.int64)
         named, sliding = humanoid_bones(body.joints), cast(np.ndarray, body.sliding)[numbers]
         rows = {joint: row for row, joint in enumerate(numbers.tolist())}
@@ -248,8 +250,7 @@ class RigDriver(Driver):
         return placed(inverse(self._offsets), beside(there, self.follows))
 
     def owners(self, obj: bpy.types.Object) -> Iterable[bpy.types.PoseBone | None]:
-        bones = obj.pose.bones if obj.pose else {}
-        return map(bones.get, self.bones)
+        return [obj.pose.bones.get(name) if obj.pose else None for name in self.bones]
 
     def locals(self, values: Poses) -> Poses:
         slides = np.where(self.has_location[:, None, None], values.positions, 0.0)
@@ -258,7 +259,7 @@ class RigDriver(Driver):
 
 def object_of(label: str, body: Body) -> bpy.types.Object | None:
     """Return the object that stands for a body, made where it is missing; None for as long as none can be made."""
-    for obj in bpy.context.scene.objects:
+    for obj in scene().objects:
         if obj.get(MARK) == label and (obj.type == "ARMATURE") == (len(body.joints) > 1):
             return obj
     if len(body.joints) > 1:
@@ -271,7 +272,7 @@ def object_of(label: str, body: Body) -> bpy.types.Object | None:
 def _linked(obj: bpy.types.Object, label: str) -> bpy.types.Object:
     obj[MARK] = label
     obj.rotation_mode = "QUATERNION"
-    bpy.context.scene.collection.objects.link(obj)
+    scene().collection.objects.link(obj)
     return obj
 
 
@@ -283,11 +284,11 @@ def _new_armature(label: str, body: Body) -> bpy.types.Object | None:
         return None
     rest = body.in_root_space(body.rest)
     obj = _linked(bpy.data.objects.new(label, bpy.data.armatures.new(label)), label)
-    active = bpy.context.view_layer.objects.active
+    active = view_layer().objects.active
     selected = bpy.context.selected_objects
-    bpy.context.view_layer.objects.active = obj
+    view_layer().objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
-    bones = [obj.data.edit_bones.new(name) for name in body.joints]
+    bones = [armature(obj).edit_bones.new(name) for name in body.joints]
     for joint, (bone, place, parent) in enumerate(zip(bones, rest.positions, body.parents.tolist(), strict=True)):
         children = rest.positions[body.parents == joint]
         reach = children.mean(axis=0) - place if len(children) else np.zeros(3)
@@ -296,28 +297,28 @@ def _new_armature(label: str, body: Body) -> bpy.types.Object | None:
         bone.head, bone.tail = place, place + (reach if np.linalg.norm(reach) > 1e-4 else (0.0, 0.0, SIZE))
         bone.parent = bones[parent] if parent >= 0 else None
     bpy.ops.object.mode_set(mode="OBJECT")
-    obj.data.display_type = "STICK"
+    armature(obj).display_type = "STICK"
     for other in bpy.context.selected_objects:
         other.select_set(other in selected)
-    bpy.context.view_layer.objects.active = active
+    view_layer().objects.active = active
     return obj
 
 
 def clear(obj: bpy.types.Object, bones: Iterable[str]) -> None:
     """Have nothing on these bones of a rig, and its switches such that it follows them."""
-    for bone in obj.pose.bones:
+    for bone in pose_bones(obj):
         for switch in SWITCHES:
-            if switch in bone:
+            if bone.get(switch) is not None:
                 bone[switch] = 1.0
     for name in bones:
-        if (bone := obj.pose.bones.get(name)) is not None:
-            if bone.rotation_mode == "AXIS_ANGLE":
-                bone.rotation_mode = "QUATERNION"
-            bone.matrix_basis.identity()
-            bone.location, bone.scale = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-            _set(bone, None, (1.0, 0.0, 0.0, 0.0))
+        if (driven := pose_bones(obj).get(name)) is not None:
+            if driven.rotation_mode == "AXIS_ANGLE":
+                driven.rotation_mode = "QUATERNION"
+            driven.matrix_basis.identity()
+            driven.location, driven.scale = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
+            _set(driven, None, (1.0, 0.0, 0.0, 0.0))
     obj.update_tag()
-    bpy.context.view_layer.update()
+    view_layer().update()
 
 
 def _space(obj: bpy.types.Object, bones: list[str]) -> tuple[Poses, np.ndarray]:
@@ -326,7 +327,7 @@ def _space(obj: bpy.types.Object, bones: list[str]) -> tuple[Poses, np.ndarray]:
     rows = {name: row for row, name in enumerate(bones)}
     follows, unsure = np.full(len(bones), -1), []
     for row, name in enumerate(bones):
-        above = obj.pose.bones[name].parent
+        above = pose_bones(obj)[name].parent
         while above is not None and above.name not in rows and not above.constraints:
             above = above.parent
         if above is not None and above.name not in rows:
@@ -336,16 +337,16 @@ def _space(obj: bpy.types.Object, bones: list[str]) -> tuple[Poses, np.ndarray]:
     placed = _placed(obj, bones)
     for row in rows.values() if unsure else ():
         # What hangs on a control by way of constraints is found out by turning the control.
-        _set(obj.pose.bones[bones[row]], None, (np.cos(TRIED / 2), np.sin(TRIED / 2), 0.0, 0.0))
-        bpy.context.view_layer.update()
+        _set(pose_bones(obj)[bones[row]], None, (np.cos(TRIED / 2), np.sin(TRIED / 2), 0.0, 0.0))
+        view_layer().update()
         turned = _placed(obj, bones).quaternions
         for other in unsure:
             cosine = abs(float(placed.quaternions[other] @ turned[other]))
             if other != row and 2.0 * np.arccos(min(cosine, 1.0)) > MOVED:
                 follows[other] = row
-        _set(obj.pose.bones[bones[row]], None, (1.0, 0.0, 0.0, 0.0))
+        _set(pose_bones(obj)[bones[row]], None, (1.0, 0.0, 0.0, 0.0))
     if unsure:
-        bpy.context.view_layer.update()
+        view_layer().update()
     return placed, follows
 
 
@@ -364,7 +365,7 @@ def seen_hand(hand: Hand) -> Poses:
 
 
 def _placed(obj: bpy.types.Object, bones: list[str]) -> Poses:
-    return unscaled(np.array([obj.pose.bones[name].matrix for name in bones], dtype=np.float64).reshape(-1, 4, 4))
+    return unscaled(np.array([pose_bones(obj)[name].matrix for name in bones], dtype=np.float64).reshape(-1, 4, 4))
 
 
 def unscaled(matrices: np.ndarray) -> Poses:
@@ -373,11 +374,11 @@ def unscaled(matrices: np.ndarray) -> Poses:
     return Poses(matrices[..., :3, 3], from_matrices(axes))
 
 
-def _set(owner: bpy.types.Object | bpy.types.PoseBone, place: list[float] | None, rotation: Iterable[float]) -> None:
+def _set(owner: bpy.types.Object | bpy.types.PoseBone, place: list[float] | None, rotation: Sequence[float]) -> None:
     """Set what an object or a bone has: its rotation in whatever mode it turns by."""
     if place is not None:
         owner.location = place
     if owner.rotation_mode == "QUATERNION":
         owner.rotation_quaternion = rotation
     elif owner.rotation_mode in ORDERS:
-        owner.rotation_euler = Quaternion(rotation).to_euler(owner.rotation_mode, owner.rotation_euler)
+        owner.rotation_euler = Quaternion(rotation).to_euler(cast(Any, owner.rotation_mode), owner.rotation_euler)

@@ -15,8 +15,8 @@ from typing import cast
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
+from ..blender import existing, persistent, scene, view_layer
 from ..motion import Poses
 from ..motion.poses import placed
 from ..streams import Body, Keys, Receiver
@@ -24,7 +24,7 @@ from ..streams.playing import Held, Stream
 from ..streams.vmc import VMC
 from .driving import Driver, Hand, RigDriver, object_of, seen_hand
 from .recording import Take
-from .sockets import Port, check_access
+from .sockets import Address, Port, check_access
 from .ticking import Ticking, log
 
 Which = tuple[Stream, str]
@@ -52,6 +52,9 @@ class Settings:
 
     body: str
     """The label of that skeleton, "" for the first that comes."""
+
+    steady: bool = False
+    """Whether what is shown is to be without its trembling."""
 
 
 @dataclass(eq=False)
@@ -127,8 +130,9 @@ class Listening:
         for line in self._receiver.complaints():
             self.complaint = line
             log.warning(line)
-        for address, answer in self._receiver.answers():
-            self._port.send(answer, address)
+        for sender, answer in self._receiver.answers():
+            self._port.send(answer, cast(Address, sender))
+        self._receiver.steady = self._settings().steady
         # They take up room until they are asked for.
         came = self._receiver.keys()
         shown = {
@@ -161,7 +165,8 @@ class Listening:
                 if (label := body.name if number == 1 else f"{body.name} {number}") not in labels
             )
             before = next((other for other, it in self._heard.items() if it.label == label), None)
-            heard = self._heard[which] = self._heard.pop(before, None) or _Heard(label, body, which[0])
+            heard = _Heard(label, body, which[0]) if before is None else self._heard.pop(before)
+            self._heard[which] = heard
             heard.stream, heard.origin = which[0], None
         if heard.body is not body:
             heard.body, heard.driver = body, None
@@ -174,7 +179,7 @@ class Listening:
         held = [heard for heard in present if self._grip(heard) is not None]
         for heard in sorted(present, key=held.__contains__):
             if heard in held[:1]:
-                cast(bpy.types.ViewLayer, bpy.context.view_layer).update()
+                view_layer().update()
             heard.seen = self._seen(heard)
             if heard.driver is not None and not heard.driver.show(heard.seen):
                 heard.driver, heard.is_gone = None, True
@@ -202,7 +207,7 @@ class Listening:
     def _seen(self, heard: _Heard) -> Poses:
         """Return where a body is to be shown (joints,): what is held, in the hand as Blender has it."""
         if (found := self._grip(heard)) is None:
-            return heard.poses
+            return existing(heard.poses)
         holding, hand, grip = found
         return placed(seen_hand(hand) if hand[1] else self._seen(holding)[0], grip)
 
@@ -233,9 +238,8 @@ class Listening:
 
     def record(self, mode: str, tolerance: float) -> None:
         """Keep what comes from now on, from the current frame on."""
-        scene = bpy.context.scene
-        rate = scene.render.fps / scene.render.fps_base
-        self._recording = _Recording(time.monotonic(), scene.frame_current_final, rate, mode, tolerance)
+        render, frame = scene().render, scene().frame_current_final
+        self._recording = _Recording(time.monotonic(), frame, render.fps / render.fps_base, mode, tolerance)
         for heard in self._heard.values():
             heard.origin = None
             if heard.driver is not None and heard.poses is not None:
@@ -243,29 +247,31 @@ class Listening:
 
     def _follow(self, heard: _Heard, now: float) -> None:
         """Record a body from now on, and go on where its sender began again."""
-        recording = self._recording
+        recording = existing(self._recording)
         if heard.origin is None:
             heard.origin = heard.moment - (now - recording.begun)
         if heard.take is None:
             heard.take = Take(
-                heard.driver, recording.mode, recording.tolerance if heard.stream.identity == VMC else None
+                existing(heard.driver), recording.mode, recording.tolerance if heard.stream.identity == VMC else None
             )
             self._add_shown(heard)
 
     def _add_shown(self, heard: _Heard) -> None:
         """Have the picture itself among what is recorded: where it begins, and where it ends."""
-        holder, inside = (heard.held[:2], heard.held.poses) if heard.held else (None, heard.poses)
-        self._add(heard, np.array([heard.moment]), heard.poses[:, None], ([holder], inside[:, None]))
+        poses = existing(heard.poses)
+        holder, inside = (heard.held[:2], heard.held.poses) if heard.held else (None, poses)
+        self._add(heard, np.array([heard.moment]), poses[:, None], ([holder], inside[:, None]))
 
     def _add(self, heard: _Heard, moments: np.ndarray, poses: Poses, in_hands: InHands) -> None:
-        recording, numbers, grips = self._recording, np.zeros(len(moments), dtype=int), poses.copy()
+        recording, take = existing(self._recording), existing(heard.take)
+        numbers, grips = np.zeros(len(moments), dtype=int), poses.copy()
         holders, inside = in_hands
         for holder in dict.fromkeys(filter(None, holders)):
             _, hand, joint = self._hand(heard.stream, holder) or (None, ("", holder[1]), poses[0, 0])
             at = np.array([one == holder for one in holders])
-            numbers[at], grips[:, at] = heard.take.number_of(hand), placed(joint, inside[:, at])
+            numbers[at], grips[:, at] = take.number_of(hand), placed(joint, inside[:, at])
         frames = recording.first_frame + (moments - heard.origin) * recording.frames_a_second
-        heard.take.add(frames, poses, numbers, grips)
+        take.add(frames, poses, numbers, grips)
 
     def _keep(self, keys: Keys) -> None:
         """Record keys, or have those at hand that are not shown yet: a recording may begin before they are."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..animation import Refused, hold_keys, set_mode, write_channel
 from ..animation.evaluation.runs import SOON
+from ..blender import existing
 from ..motion import Poses, reduce_skeleton_keys
 from ..motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
 from ..motion.poses import aligned, joined
@@ -105,7 +106,7 @@ class Take:
         obj = self.driver.object
         if obj is None or not obj.is_editable or self._poses is None:
             return 0
-        data = obj.animation_data or obj.animation_data_create()
+        data = existing(obj.animation_data or obj.animation_data_create())
         if data.action is not None:
             data.action.use_fake_user = True
         data.action = bpy.data.actions.new(f"{obj.name} Live")

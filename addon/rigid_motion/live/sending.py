@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import bpy
 import numpy as np
 
+from ..blender import armature, pose_bones
 from ..motion import Poses
 from ..streams.vmc import Performer, write, write_trackers
 from .driving import unscaled
@@ -29,7 +30,7 @@ class Sending:
     def tick(self, now: float) -> None:
         """Send where everything is."""
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        trackers = {}
+        trackers: dict[str, Poses] = {}
         for name in self._names:
             obj = bpy.data.objects.get((name, None))
             if obj is None:
@@ -45,14 +46,14 @@ class Sending:
             self._outlet.say(datagram)
 
     def _performer(self, obj: bpy.types.Object) -> Performer:
-        bones = obj.data.bones
-        count, performer = self._performers.get(obj.name, (0, None))
-        if count != len(bones):
+        bones = armature(obj).bones
+        known = self._performers.get(obj.name)
+        if known is None or known[0] != len(bones):
             matrices = np.array([bone.matrix_local for bone in bones])
             rest = unscaled(np.array(obj.matrix_basis.to_quaternion().to_matrix().to_4x4()) @ matrices)
-            performer = Performer(tuple(bone.name for bone in bones), rest)
-            self._performers[obj.name] = len(bones), performer
-        return performer
+            known = len(bones), Performer(tuple(bone.name for bone in bones), rest)
+            self._performers[obj.name] = known
+        return known[1]
 
     def close(self) -> None:
         self._outlet.close()
@@ -60,7 +61,7 @@ class Sending:
 
 def _bones(obj: bpy.types.Object) -> Poses:
     """Return where the bones of a rig are in the world, in the order of its armature."""
-    matrices = np.array([obj.pose.bones[bone.name].matrix for bone in obj.data.bones])
+    matrices = np.array([pose_bones(obj)[bone.name].matrix for bone in armature(obj).bones])
     return unscaled(np.array(obj.matrix_world) @ matrices)
 
 

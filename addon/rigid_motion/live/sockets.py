@@ -10,7 +10,7 @@ import ipaddress
 import select
 import socket
 from contextlib import suppress
-from typing import Self
+from typing import Self, cast
 
 LONGEST = 65535
 MOST_AT_ONCE = 2048
@@ -82,7 +82,7 @@ class Port:
         if wait:
             select.select([self._socket], [], [], wait)
         result: list[tuple[bytes, Address]] = []
-        while len(result) < MOST_AT_ONCE:
+        for _ in range(MOST_AT_ONCE):
             try:
                 data, (host, port, *_) = self._socket.recvfrom(LONGEST)
             except BlockingIOError:
@@ -106,7 +106,8 @@ class Outlet(Port):
 
     def __init__(self, host: str, port: int) -> None:
         # Looked up once: a name could take seconds at every datagram.
-        family, *_, self.to = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        family, *_, to = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        self.to = cast(Address, to)
         own = ("::" if family == socket.AF_INET6 else "0.0.0.0") if not is_loopback(host) else self.to[0]
         super().__init__(own)
 

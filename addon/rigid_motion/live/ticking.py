@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import bpy
-from bpy.app.handlers import persistent
 
+from ..blender import persistent
 from ..handlers import append_handlers, remove_handlers
 
 log = logging.getLogger(__package__)

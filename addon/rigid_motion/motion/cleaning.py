@@ -26,7 +26,7 @@ CAP_ROUNDS = 12
 NOTHING = 1e-3
 """Of the tolerance, or else of the radius: what trembles less is still."""
 
-STEADIER = 0.9
+STEADIER = 0.97
 """Of the noise by stamped times has to be left by steady ones for these to be right."""
 
 TREMBLE = 0.25

@@ -23,8 +23,8 @@ ORDER = 3
 ROUNDS = 12
 """In which the size of the jerk is found."""
 
-AROUND = 3
-"""Samples on either side over which it is as large."""
+AROUND = 1
+"""Samples on either side over which it is as large: hits are as short."""
 
 SMOOTHEST = 1e-9
 """Of the jerk that noise makes is always allowed: more would be lost in rounding."""

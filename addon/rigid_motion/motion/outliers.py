@@ -22,8 +22,15 @@ MARGIN = 3
 SPIKE, EACH = 3.5, 2.0
 """By how many times of what is usual here a spike is off at its ends, and each sample of it."""
 
+LONG, OF_LONG = 4, 1.4
+"""So many samples have to be off by so many times as much: hits of a foot look like such, and are none."""
+
 REPEAT = 2.0
 """The same for what is a sample before it once more."""
+
+RARE = 0.1
+"""The share of samples up to which those that repeat the one before are lost ones for certain where others tremble.
+Where there are more, the recording is made of steps."""
 
 STILL = 3.0
 """So many times as much where nothing trembles, as what is usual is not sure there."""
@@ -51,6 +58,7 @@ def outliers(times: np.ndarray, poses: Poses, noise: Trembling) -> tuple[np.ndar
     repeats = np.zeros(len(times), dtype=bool)
     same = poses.positions[1:] == poses.positions[:-1], poses.quaternions[1:] == poses.quaternions[:-1]
     repeats[1:] = same[0].all(axis=1) & same[1].all(axis=1)
+    trembles = bool(noise.position or noise.rotation)
     for length in range(min(MOST_ROWS, len(times) - 4 * MARGIN), 0, -1):
         firsts = np.arange(MARGIN, len(times) - length - MARGIN + 1)
         over = np.zeros(len(firsts))
@@ -59,12 +67,18 @@ def outliers(times: np.ndarray, poses: Poses, noise: Trembling) -> tuple[np.ndar
             over = np.maximum(over, np.where(each > EACH, surprise, 0.0))
             apart = np.maximum(apart, across)
         is_repeated = repeats[firsts[:, None] + np.arange(length)].all(axis=1)
-        enough = np.where(is_repeated, REPEAT, SPIKE) * (1.0 if noise.position or noise.rotation else STILL)
+        enough = np.where(is_repeated, REPEAT, SPIKE) * (1.0 if trembles else STILL)
+        enough *= OF_LONG if length >= LONG else 1.0
         likely = np.flatnonzero((over > enough) & (apart < np.minimum(FITS, over)))
         for row in firsts[likely[np.argsort(-over[likely], kind="stable")]]:
             if not found[row - 1 : row + length + 1].any():
                 found[row : row + length] = True
-    return found & ~repeats, found & repeats
+    lost = repeats & (trembles and 0.0 < repeats.mean() < RARE)
+    # What repeats for longer stands still.
+    edges = np.flatnonzero(np.diff(lost, prepend=False, append=False))
+    for first, end in zip(edges[0::2], edges[1::2], strict=True):
+        lost[first:end] = end - first <= MOST_ROWS
+    return found & ~repeats, (found & repeats) | lost
 
 
 def _surprises(

@@ -18,6 +18,7 @@ from ..motion import Poses
 from ..motion.quaternions import SMALLEST, normalise, turned, turns_between
 from .bodies import Body, Forest
 from .paths import Path
+from .steady import Steady
 from .wire import TICKS
 
 LOOK_BACK, MOST_TRANSITS = 3.0, 512
@@ -256,7 +257,7 @@ class Playback:
         """The Forest of all bodies, None for as long as nothing is known of them."""
         self.path: Path | None = None
         self.begins, self.ends, self.settled = -np.inf, np.inf, np.inf
-        self.fading = Fading()
+        self.fading, self._steady = Fading(), Steady()
         self.moment: float | None = None
         self.kept = -np.inf
         """Until this moment keys were handed out."""
@@ -272,13 +273,14 @@ class Playback:
         """Show nothing behind what came, as the sender has left, unless more comes."""
         self.ends, self.settled = float(self.path.moments[-1]) if self.path else -np.inf, np.inf
 
-    def show(self, now: float) -> Shown | None:
-        """Return what is shown now."""
+    def show(self, now: float, steady: bool = False) -> Shown | None:
+        """Return what is shown now, without its trembling where asked for."""
         self.moment = self.playing.moment(now)
         if self.moment is None or self.path is None or not self.begins <= self.moment <= self.ends:
             return None
         forest, holders = self.forest, self.path.held_at(self.moment)
-        poses = self.fading.show(self.path.pose(self.moment), now, holders)
+        poses = self._steady(self.path, self.moment, self.settled) if steady else self.path.pose(self.moment)
+        poses = self.fading.show(poses, now, holders)
         shown = forest.parted(forest.out_of_hands(poses[:, None], holders[:, None])[:, 0])
         hands = forest.held(holders) if (holders >= 0).any() else {}
         held = {name: Held(body, joint, forest.parted(poses)[name]) for name, (body, joint) in hands.items()}

@@ -38,11 +38,12 @@ MOST_GONE = 256
 class Receiver:
     """Takes datagrams of any number of streams, and shows them until they were silent for long.
 
-    Other programs' VMC is taken as well: it has no delay of its own, and is shown `delay` seconds later.
+    Other programs' VMC is taken as well: it has no delay of its own, and is shown `delay` seconds later. What trembles
+    is shown without that where it is to be `steady`, and no later for it.
     """
 
-    def __init__(self, delay: float = 0.1) -> None:
-        self.delay = delay
+    def __init__(self, delay: float = 0.1, steady: bool = False) -> None:
+        self.delay, self.steady = delay, steady
         self.own = secrets.token_bytes(3)
         """Who answers."""
         self._streams: dict[Stream, Any] = {}
@@ -113,7 +114,7 @@ class Receiver:
     def show(self, now: float) -> dict[Stream, Shown]:
         """Return what every stream shows."""
         self._forget_silent(now)
-        shown = {stream: it.show(now) for stream, it in self._streams.items()}
+        shown = {stream: it.show(now, self.steady) for stream, it in self._streams.items()}
         return {stream: what for stream, what in shown.items() if what}
 
     def leave(self, source: Hashable) -> None:

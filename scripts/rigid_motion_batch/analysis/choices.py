@@ -18,6 +18,8 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from rigid_motion.motion import decimate, reduce_keys, reduce_skeleton_keys, shell_error
+from rigid_motion_batch.recordings.cleaning import JOINT as JOINT
+from rigid_motion_batch.recordings.cleaning import RIGID as RIGID
 from rigid_motion_batch.recordings.clips import Clip
 
 MILLIMETRES = {"mm": 1, "cm": 10, "m": 1000}
@@ -276,10 +278,6 @@ def distinct(choices: Iterable[Choice]) -> list[Choice]:
     for choice in choices:
         first.setdefault(choice.requested, choice)
     return list(first.values())
-
-
-RIGID, JOINT = 0.1, 0.03
-"""Of what a hand holds, and of what is around a joint of a body."""
 
 
 @dataclass(frozen=True)

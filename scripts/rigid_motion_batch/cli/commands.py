@@ -23,6 +23,7 @@ RESEARCH = {
     "benchmark_live": "benchmark_live",
     "live_costs": "live_costs",
     "reduction": "reduction",
+    "cleaning": "cleaning",
     "curve_keys": "curve_keys",
     "glb_sizes": "glb_sizes",
     "rivals": "rivals",
@@ -34,6 +35,7 @@ RESEARCH = {
 COMMANDS = {
     "compare": ("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
     "inspect": ("inspect", "look into recordings: bodies, units, axes, rate, and what looks wrong"),
+    "clean": ("clean", "take the trembling and the spikes out of recordings, within a tolerance"),
     "reduce": ("reduce", "keep the few keys that a motion needs, in glTF and .blend files and of recordings"),
     "bake": ("bake", "turn the in-betweens of .blend files into real keys, or back"),
     "stream": ("stream", "send a motion over a network in real time, or show what arrives"),

@@ -26,7 +26,7 @@ from rigid_motion_batch.palette import THEMES
 from rigid_motion_batch.pipeline.comparison_steps import STAGES
 from rigid_motion_batch.places import ASSETS, from_here
 from rigid_motion_batch.recordings import files_of
-from rigid_motion_batch.recordings.options import add_reading_options, reading_options
+from rigid_motion_batch.recordings.options import add_clean_option, add_reading_options, reading_options
 from rigid_motion_batch.scenes.settings import ANTIALIASING, ENGINES, SceneSettings
 
 DESCRIPTION = """Compare interpolation modes on recorded trajectories.
@@ -137,6 +137,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "are found in a file; can be given several times",
     )
     add_reading_options(parser)
+    add_clean_option(parser)
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument(
         "--jobs",

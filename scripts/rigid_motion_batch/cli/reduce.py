@@ -33,7 +33,7 @@ from rigid_motion_batch.keying.sessions import do_all
 from rigid_motion_batch.keying.work import Doing, Outcome, Work
 from rigid_motion_batch.places import manifest
 from rigid_motion_batch.recordings.gltf import ENDINGS as GLTF
-from rigid_motion_batch.recordings.options import add_reading_options, reading_options
+from rigid_motion_batch.recordings.options import add_clean_option, add_reading_options, reading_options
 from rigid_motion_batch.recordings.reading import JSON, TEXT
 
 IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", *GLTF, ".tsv", ".tum")
@@ -53,6 +53,7 @@ examples:
   python scripts/reduce.py shot.blend --keys 12
   python scripts/reduce.py hand.csv --axes unity --tolerance 5mm --blend --fps 30
   python scripts/reduce.py walk.glb --output small/walk.glb --tolerance 2mm
+  python scripts/reduce.py walk.glb --tolerance 2mm --meshopt
   python scripts/reduce.py walk.glb --curves --tolerance 1mm
   python scripts/reduce.py walk.bvh --curves --tolerance 1mm
   python scripts/reduce.py avatar.vrm wave.vrma --json
@@ -76,7 +77,8 @@ glTF files:
   between them: what is written is played again. What moves no node, or would become larger, is left alone. With --glb,
   .blend and FBX files and recordings become such files: Blender exports them, sampled on every frame as they are shown,
   for glTF knows lines and even turns alone. With --curves, channels that need fewer keys as cubic splines become such.
-  These keep to the tolerance at the keys of the input; how far off they are between, from its lines, is said.
+  These keep to the tolerance at the keys of the input; how far off they are between, from its lines, is said. With
+  --meshopt all of it is compressed, for viewers that read EXT_meshopt_compression; what comes compressed goes out so.
 
 recordings:
   The program reads what compare.py reads; FILE:BODY takes one body of several, FILE:* all. A rigid motion becomes
@@ -159,6 +161,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         metavar="N",
         help="frames a second of .blend and GLB files (the rate of the recording)",
     )
+    add_clean_option(recordings)
     add_reading_options(parser)
     gltf = parser.add_argument_group("glTF files")
     gltf.add_argument("--glb", action="store_true", help="write GLB files of .blend and FBX files and of recordings")
@@ -167,7 +170,19 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         choices=CHANNELS,
         default=CHANNELS[0],
         help="needed: a channel that stays at rest goes, unless another clip of the file moves it or the file has no "
-        "meshes; all: every channel keeps at least one key (%(default)s)",
+        "meshes; moving: it goes without meshes, too; all: every channel keeps at least one key (%(default)s)",
+    )
+    gltf.add_argument(
+        "--meshopt",
+        action="store_true",
+        help="compress the file with EXT_meshopt_compression, and search for the keys that take the fewest bytes then; "
+        "for viewers that read it",
+    )
+    gltf.add_argument(
+        "--feet-may-slide",
+        dest="feet",
+        action="store_false",
+        help="feet that stand may slide as far as the tolerance allows, not only a millimetre",
     )
     add_file_options(parser)
     parser.add_argument(
@@ -318,6 +333,10 @@ def _refuse_odd(options: argparse.Namespace) -> None:
             f"--mode is for .blend files and tables, and {gltf[0].source} knows lines and even turns alone: leave it "
             "out, or add --blend, for a .blend file with that mode"
         )
+    if options.clean is not None and (others := [job for job in jobs if not job.is_recording]):
+        raise ValueError(f"--clean is for recordings, and {others[0].source} is none: leave it out")
+    if options.meshopt and not options.glb and (others := [job for job in jobs if job not in gltf]):
+        raise ValueError(f"--meshopt is for glTF files, and {others[0].source} is none: add --glb, or leave it out")
     if options.objects and jobs and len(jobs) == len(gltf) + len(recorded):
         raise ValueError("--objects is for .blend files: of a recording name one body with FILE:BODY")
 

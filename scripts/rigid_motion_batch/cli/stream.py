@@ -140,7 +140,9 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
     with (
         _room(options) as room,
         Progress() as progress,
-        closing(Receiving(room, options.user, options.fps, options.margin, options.to_blender)) as receiving,
+        closing(
+            Receiving(room, options.user, options.fps, options.margin, options.to_blender, options.clean)
+        ) as receiving,
     ):
         if options.to_vmc:
             to_vmc = vmc.ToVmc(options.to_vmc)

@@ -110,6 +110,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     receiving.add_argument("--output", "-o", type=_file, metavar="FILE", help="what was shown, as .csv or .bvh")
     help = "write the keys that came with the in-betweens of this mode instead"
     receiving.add_argument("--mode", choices=MODES, metavar="MODE", help=help)
+    help = "take the trembling out of what comes on every frame, with what waits to be shown, and no later for it"
+    receiving.add_argument("--clean", action="store_true", help=help)
     help = "hand everything on to the panel Live of Blender, by UDP"
     receiving.add_argument("--to-blender", type=_address, metavar="HOST:PORT", help=help)
     help = "show it to another program by VMC: the first body there is, and rigid bodies as trackers"
@@ -172,6 +174,8 @@ def _check(options: argparse.Namespace) -> None:
             raise ValueError(f"{option} sends to another machine; give --network as well, if that is what you want")
     if options.command != "receive":
         return
+    if options.clean and options.mode:
+        raise ValueError("--mode writes the keys as they came; give --clean without it")
     if (
         options.truth
         and options.output

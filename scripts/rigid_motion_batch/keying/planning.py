@@ -12,14 +12,14 @@ from pathlib import Path
 
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.gltf import ENDINGS as GLTF
-from rigid_motion_batch.recordings.reading import split_source
+from rigid_motion_batch.recordings.reading import JSON, TEXT, split_source
 
 from .records import is_made
 
 ALL = ":*"
 """Behind a recording: all of its bodies."""
 
-NAMES_OF_FILES = {".blend", ".csv", ".tum", *GLTF}
+NAMES_OF_FILES = {".blend", ".bvh", *TEXT, *JSON, *GLTF}
 """Endings that the name of a folder does not have."""
 
 

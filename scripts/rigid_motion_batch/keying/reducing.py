@@ -86,9 +86,10 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_nu
     summary += off(tolerance, reduction.largest_error * unit, unit, by_number=by_number)
     if reduction.between:
         summary += f" on frames, {tolerance.alike(reduction.between * unit, unit)} between them"
-    for mode, count in reduction.needed.items():
-        if mode != reduction.mode:
-            summary += f"; {_named(reduction.mode)}, as {_named(mode)} would leave {count} keys"
+    others = [(_named(mode), count) for mode, count in reduction.needed.items() if mode != reduction.mode]
+    if others:
+        told = " and ".join(f"{name} would leave {count} keys" for name, count in others)
+        summary += f"; {_named(reduction.mode)}, as {told}"
     before, after = reduction.channel_keys
     if after > before:
         summary += f"; channels have {after} keys together, and had {before}"

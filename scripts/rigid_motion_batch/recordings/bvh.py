@@ -24,10 +24,11 @@ from rigid_motion.motion.quaternions import align_signs
 
 from .clips import ClipWarning
 from .euler import quaternions_from_intrinsic_eulers
-from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
+from .recordings import Cells, Selection, Trajectory, TrajectoryError, shown, unique
 from .rest_bodies import LOOKED_AT, RestBody
+from .rewriting import eulers_near, write_text
 from .sizing import sized
-from .tables import is_number, lines_of, parse_rows
+from .tables import HeaderLine, is_number, lines_of, parse_rows
 
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
 
@@ -72,13 +73,13 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     names = [joint.name for joint in joints]
     as_body = selection.requested is None and len(joints) > 1
     taken = names if as_body else selection.of(names)
-    values, frame_time, warnings = _read_motion(path, motion, joints)
+    values, frame_time, warnings, first = _read_motion(path, motion, joints)
     if len(taken) * len(values) > MOST_POSES:
         problem = f"{len(taken)} joints in {len(values)} frames are more than {MOST_POSES} poses"
         raise TrajectoryError(path, problem, f"name one joint with {path}:NAME, or split the recording")
     # What is not finite in the file is not in the poses either, and no news.
     with np.errstate(invalid="ignore", over="ignore"):
-        times = np.arange(len(values)) * frame_time
+        times, as_read = np.arange(len(values)) * frame_time, values[0].copy()
         if count := _add_offsets(joints, values):
             text = (
                 f"positions of {count} joint{'s' * (count > 1)} below the root are near 0 and not near their OFFSETs: "
@@ -88,13 +89,40 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
         rest_body, every = rest_body_of(joints), range(len(joints))
         if as_body:
             local = _local_poses(joints, values, every)
-            return [Trajectory(path.stem, times, local, rest_body=rest_body, warnings=warnings)]
+            cells = _cells(path, first, joints, values, values[0] - as_read)
+            return [Trajectory(path.stem, times, local, rest_body=rest_body, warnings=warnings, cells=cells)]
         poses = world_poses(joints, values, taken)
         some = slice(LOOKED_AT)
         body = Trajectory(path.stem, times[some], _local_poses(joints, values[some], every), rest_body=rest_body)
         body = sized(path, replace(body, warnings=warnings), AXES, unit_given=False)
-    first, *others = (Trajectory(name, times, poses[name], body.metres_per_unit) for name in taken)
-    return [replace(first, remark=body.remark, warnings=body.warnings), *others]
+    taken_first, *others = (Trajectory(name, times, poses[name], body.metres_per_unit) for name in taken)
+    return [replace(taken_first, remark=body.remark, warnings=body.warnings), *others]
+
+
+def _cells(path: Path, line: int, joints: list[Joint], values: np.ndarray, added: np.ndarray) -> Cells:
+    """Return where the numbers of a body are, behind a line; to values (n, channels) so much was added."""
+    labels = [f"{joint.name} {axis}{kind}" for joint in joints for axis, kind in joint.channels]
+    header = HeaderLine(path, line, None, labels)
+
+    def numbers(poses: Poses) -> dict[int, np.ndarray]:
+        result, column = {}, 0
+        for joint, positions, quaternions in zip(joints, poses.positions, poses.quaternions, strict=True):
+            turns = []
+            for axis, kind in joint.channels:
+                if kind == "position":
+                    result[column] = positions[:, "XYZ".index(axis)] - added[column]
+                else:
+                    turns.append((column, axis))
+                column += 1
+            if len(turns) == 3:
+                columns, order = zip(*turns, strict=True)
+                angles = eulers_near(quaternions, "".join(order), np.radians(values[:, columns]))
+                result |= zip(columns, np.degrees(angles).T, strict=True)
+        return result
+
+    return Cells(
+        np.arange(len(values)), values.shape, numbers, lambda target, numbers: write_text(header, target, numbers)
+    )
 
 
 def rest_body_of(joints: list[Joint]) -> RestBody:
@@ -296,7 +324,9 @@ def _read_channels(words: _Words) -> list[tuple[str, str]]:
     return channels
 
 
-def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarray, float, tuple[ClipWarning, ...]]:
+def _read_motion(
+    path: Path, motion: int, joints: list[Joint]
+) -> tuple[np.ndarray, float, tuple[ClipWarning, ...], int]:
     """Read what is behind the line `motion`.
 
     Returns
@@ -306,6 +336,8 @@ def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarr
         Seconds between frames.
     warnings : tuple of ClipWarning
         Where there are more or fewer frames than the file says.
+    line : int
+        The last one before the frames.
     """
     cut: list[tuple[int, str]] = []
     rows = _finished(lines_of(path, after=motion), cut)
@@ -331,7 +363,7 @@ def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarr
         text = f"Frames: says {count:g} and {len(values)} whole rows follow, which are read"
         way_out = "export the BVH again if that is not all"
         warnings.append(ClipWarning(f"{path.name}:{settings[0][0]}: {text}", way_out))
-    return values, frame_time, tuple(warnings)
+    return values, frame_time, tuple(warnings), settings[1][0]
 
 
 def _finished(lines: Iterable[tuple[int, str]], unfinished: list[tuple[int, str]]) -> Iterator[tuple[int, str]]:

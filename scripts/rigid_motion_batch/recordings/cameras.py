@@ -33,7 +33,7 @@ def recognises_images(head: list[str]) -> bool:
 def read_images(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """Read the cameras of COLMAP's images.txt. Of images in folders, each folder is a body."""
     remark = "poses of the world were turned into those of the camera; COLMAP's unit of length may be any (--scale)"
-    header = HeaderLine(path, 0, "\t", COLMAP, rows=_images, inverted=True, axes="opencv", remark=remark)
+    header = HeaderLine(path, 0, "\t", COLMAP, rows=_images, inverted=True, axes="opencv", remark=remark, shift=1)
     return read_below(selection, options, header, "name the folder of each camera's images in front of their names")
 
 

@@ -18,6 +18,7 @@ from rigid_motion.motion import Poses, repair
 from rigid_motion_batch.axes import DESCRIBED, from_blender
 from rigid_motion_batch.command_line import listed, printable
 
+from .cleaning import cleaned_first
 from .clips import Clip, ClipWarning, OtherMotion
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .reading import format_of, read_trajectories, split_source
@@ -134,7 +135,7 @@ def make_clip(
         lost, repairs = losses(repairs, len(trajectory.times))
         warnings += lost
     notes = (*map(str, warnings), *map(str, repairs), *map(printable, drawn))
-    return Clip(
+    clip = Clip(
         name,
         source,
         axes,
@@ -147,6 +148,7 @@ def make_clip(
         warnings=tuple(warnings),
         calibration=calibration,
     )
+    return clip if options.clean is None else cleaned_first(clip, options.clean or None)
 
 
 def _part(source: str, seconds: np.ndarray, options: ReadingOptions) -> slice:

@@ -47,6 +47,9 @@ class Clock:
     ticks: np.ndarray = field(default_factory=lambda: np.empty(0))
     """The numbers in the file."""
 
+    per_second: float = 0.0
+    """How many a second has of them; 0 where they are no numbers in a single column."""
+
 
 def clock_of(
     header: HeaderLine,
@@ -111,7 +114,8 @@ def _clock(header: HeaderLine, column: int, layout: Layout, options: ReadingOpti
     guessed = ""
     if not unit:
         guessed, remark = unit_by_rate(header, ticks[body])
-    return Clock(name, seconds_of(ticks, TICKS[unit or guessed or "s"]), remark, unit=unit, ticks=ticks)
+    per_second = TICKS[unit or guessed or "s"]
+    return Clock(name, seconds_of(ticks, per_second), remark, unit=unit, ticks=ticks, per_second=per_second)
 
 
 def _joined(clocks: list[Clock]) -> list[Clock]:

@@ -89,7 +89,7 @@ def _header(path: Path, options: ReadingOptions) -> HeaderLine:
     cells = [str(place) for place, _ in enumerate(_cells(text), 1)]
     header = HeaderLine(path, row.number - 1, _separator(text), cells)
     if len(cells) in (len(REDWOOD), POSITIONS_ONLY):
-        blocks = replace(header, cells=[str(place) for place in range(1, len(MATRIX) + 1)], rows=_blocks)
+        blocks = replace(header, cells=[str(place) for place in range(1, len(MATRIX) + 1)], rows=_blocks, height=4)
         header = blocks if _names(blocks)[0] else header
         cells = header.cells
     names, warnings = _names(header)

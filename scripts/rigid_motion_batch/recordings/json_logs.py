@@ -14,12 +14,14 @@ https://developer.apple.com/documentation/arkit/arcamera/transform.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from rigid_motion_batch.axes import NERF
 
@@ -28,6 +30,7 @@ from .column_names import column_name
 from .columns import Layout, known_in, layout_of
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, shown
+from .rewriting import DECIMALS
 from .tables import HeaderLine, is_number, read_text
 from .times import FASTEST
 from .tracks import read_below
@@ -91,7 +94,8 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     last = len({way[-1:] for way in found}) == 1
     lists = {".".join(way[: len(way) - last]): poses for way, poses in found.items()}
     rows = cache(partial(_rows, header, keys, layout_of(header, said), lists))
-    header = replace(header, rows=lambda _: rows())
+    write = partial(_write, content, lists, keys)
+    header = replace(header, rows=lambda _: rows(), write=write)
     if len(lists) > 1:
         said = replace(said, columns=(("device", "device"), *(pair for pair in said.columns if pair[0] != "device")))
     return read_below(selection, said, header, "write a list for each")
@@ -161,6 +165,17 @@ def _cell(key: Key) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in key).lstrip(".")
 
 
+def _image(pose: Any) -> str:
+    """Return the name of a pose's image, if it has one."""
+    return str(pose.get("file_path", "")) if isinstance(pose, dict) else ""
+
+
+def _order(poses: Objects) -> list[int]:
+    """Return the places of poses in the order of their images, or as they are."""
+    images = [*map(_image, poses)]
+    return sorted(range(len(poses)), key=lambda place: in_order(images[place]) if any(images) else [])
+
+
 def _rows(header: HeaderLine, keys: list[Key], layout: Layout, lists: Mapping[str, Objects]) -> list[tuple[int, str]]:
     """Return a row for each pose: its body, its number or that of its image, and what it holds.
 
@@ -174,12 +189,8 @@ def _rows(header: HeaderLine, keys: list[Key], layout: Layout, lists: Mapping[st
     texts = {*layout.devices, *layout.times}
     rows = []
     for name, poses in lists.items():
-        images = [str(pose.get("file_path", "")) if isinstance(pose, dict) else "" for pose in poses]
-        order = (
-            sorted(range(len(poses)), key=lambda place: in_order(images[place])) if any(images) else range(len(poses))
-        )
-        for place in order:
-            cells = [name, number_in(images[place], place)]
+        for place in _order(poses):
+            cells = [name, number_in(_image(poses[place]), place)]
             for index, key in enumerate(keys, len(cells)):
                 cell = _text(poses[place], key) if index in needed or index in texts else ""
                 if cell is None or (cell and index not in texts and not is_number(cell)):
@@ -192,6 +203,19 @@ def _rows(header: HeaderLine, keys: list[Key], layout: Layout, lists: Mapping[st
                 cells.append(cell)
             rows.append((place + 1, "\t".join(cells)))
     return rows
+
+
+def _write(content: Any, lists: Mapping[str, Objects], keys: Sequence[Key], target: Path, numbers: np.ndarray) -> None:
+    """Write what was read with other numbers in it, of which those that are NaN are none."""
+    poses = [own[place] for own in lists.values() for place in _order(own)]
+    for row, column in np.argwhere(np.isfinite(numbers)).tolist():
+        *way, last = keys[column - 2]
+        held: Any = poses[row]
+        for key in way:
+            held = held[key]
+        held[last] = round(float(numbers[row, column]), DECIMALS)
+    with target.open("w", encoding="utf-8") as file:
+        json.dump(content, file, indent=1, ensure_ascii=False)
 
 
 def _text(value: Any, key: Key) -> str | None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
@@ -49,6 +50,9 @@ class ReadingOptions:
 
     end: float | None = None
     """Seconds after the first sample: those behind are left out."""
+
+    clean: float | None = None
+    """Metres by which cleaning may move a sample, 0 for any; None where nothing is cleaned."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", tuple((meaning, column) for meaning, column in self.columns))
@@ -140,11 +144,33 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_clean_option(parser: argparse._ActionsContainer) -> None:
+    """Add --clean."""
+    parser.add_argument(
+        "--clean",
+        nargs="?",
+        const=0.0,
+        type=_most_moved,
+        metavar="LENGTH",
+        help="take the trembling and the spikes out of recordings first, and move none but spikes by more than 2mm or "
+        "another length with its unit (any); errors are to what was cleaned",
+    )
+
+
+def _most_moved(text: str) -> float:
+    parts = re.fullmatch(r"(\d{1,6}\.?\d{0,6}|\.\d{1,6})\s*(mm|cm|m)", text.strip().lower())
+    if not parts or not float(parts[1]):
+        raise ValueError(f"{text!r} is no length such as 2mm: write --clean behind the inputs, or --clean=2mm")
+    return float(parts[1]) * {"mm": 1e-3, "cm": 1e-2, "m": 1.0}[parts[2]]
+
+
 def reading_options(options: argparse.Namespace) -> ReadingOptions:
     """Return what the options of that group say. Raises ValueError for some that do not go together."""
     if options.degrees and not options.euler:
         raise ValueError("--degrees is for Euler angles: add their order, such as --euler YXZ")
-    return ReadingOptions(**{field.name: getattr(options, field.name) for field in fields(ReadingOptions)})
+    return ReadingOptions(
+        **{one.name: vars(options)[one.name] for one in fields(ReadingOptions) if one.name in options}
+    )
 
 
 def _columns(text: str) -> tuple[tuple[str, str], ...]:

@@ -143,7 +143,7 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
 
 def _read(result: Format, path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     for name in options.given:
-        if name not in ("scale", "start", "end") and name not in result.honours:
+        if name not in ("scale", "start", "end", "clean") and name not in result.honours:
             problem = f"--{name.replace('_', '-')} means nothing to {result.label}"
             raise TrajectoryError(path, problem, "leave it out, as its files say that themselves")
     trajectories = result.read(path, selection, options) if result.honours else result.read(path, selection)

@@ -5,7 +5,7 @@ Times are seconds; positions are in the unit of the file; quaternions are w, x, 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,26 @@ from .rest_bodies import RestBody
 
 ALL = "*"
 """Name that asks for every body of a file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Where a file has the numbers of a body, for others in their place."""
+
+    rows: np.ndarray
+    """The row of each sample, shape (n,)."""
+
+    shape: tuple[int, int]
+    """Rows and columns of the file."""
+
+    numbers: Callable[[Poses], Mapping[int, np.ndarray]]
+    """A function of poses like those of the trajectory, which returns numbers (n,) by their columns."""
+
+    write: Callable[[Path, np.ndarray], None]
+    """Writes the whole file to a path with numbers of that shape, where NaN stands for what is there."""
+
+    times: Callable[[np.ndarray], Mapping[int, np.ndarray]] | None = None
+    """A function of times (n,), likewise; None where the column is that of others too, or has no numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +76,9 @@ class Trajectory:
 
     axes: str = ""
     """Those that its program has, where they are not those of the format: a name in `axes.DESCRIBED`."""
+
+    cells: Cells | None = None
+    """None where nothing can be written in the place of what was read."""
 
 
 @dataclass(frozen=True, eq=False)

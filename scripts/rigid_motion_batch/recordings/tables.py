@@ -206,6 +206,15 @@ class HeaderLine:
 
     warnings: tuple[ClipWarning, ...] = ()
 
+    shift: int = 0
+    """Cells of a row that the line has not, at its beginning."""
+
+    height: int = 1
+    """Lines of a row."""
+
+    write: Callable[[Path, np.ndarray], None] | None = None
+    """A function that writes the file with other numbers, where lines are no rows."""
+
     @classmethod
     def of(cls, path: Path, number: int, text: str) -> HeaderLine:
         """Return the cells of a line, which may be a comment."""

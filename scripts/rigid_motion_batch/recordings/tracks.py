@@ -6,7 +6,7 @@ angles need their order from the user. A matrix may be transposed, and a positio
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
@@ -14,14 +14,15 @@ import numpy as np
 
 from rigid_motion.motion import Poses, interpolate, repair
 from rigid_motion.motion.poses import inverse
-from rigid_motion.motion.quaternions import from_matrices
+from rigid_motion.motion.quaternions import from_matrices, matrices
 
 from .clips import ClipWarning
-from .clocks import clock_of
+from .clocks import Clock, clock_of
 from .columns import BOTTOM, EULER, MATRIX, POSITION, QUATERNION, Layout, layout_of, metres_of
 from .euler import quaternions_from_intrinsic_eulers
 from .options import ReadingOptions
-from .recordings import Selection, Trajectory, unique
+from .recordings import Cells, Selection, Trajectory, unique
+from .rewriting import eulers_near, write_text
 from .sense import require_one_body
 from .tables import HeaderLine, Table
 
@@ -76,12 +77,18 @@ def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine
             clocks[times] = clock_of(header, times, layout, options, count, body.rows)
         clock = clocks[times]
         held = {one: numbers[body.label(one)][body.rows] for one in body.columns if one != "t"}
-        seconds = clock.seconds[body.rows]
+        seconds, rows = clock.seconds[body.rows], np.arange(count)[body.rows]
         if header.names is None and len(layout.bodies) > 1:
             # Topics of a log share its rows, and need not be in every one.
             there = ~np.isnan([*held.values()]).all(axis=0)
             seconds, held = seconds[there], {one: column[there] for one, column in held.items()}
+            rows = rows[there]
         trajectory = _trajectory(header, body, seconds, held, layout, options)
+        if len(trajectory.times) == len(rows):
+            own_clock = len(times) == 1 and (len(layout.bodies) == 1 or "t" in body.columns)
+            cells = _cells(header, body, held, layout, options, rows, count)
+            cells = replace(cells, times=_times_written(clock, times[0], rows) if own_clock else None)
+            trajectory = replace(trajectory, cells=cells)
         remarks = (trajectory.remark, header.remark, layout.remark, clock.remark)
         trajectory = replace(trajectory, remark="; ".join(filter(None, remarks)), dated=clock.dated)
         require_one_body(trajectory, header.path, way_out, header.number)
@@ -155,6 +162,60 @@ def _trajectory(
         with np.errstate(invalid="ignore", over="ignore"):
             poses = inverse(poses)
     return Trajectory(body.name, times, poses, metres[0], remark, warnings, axes=header.axes)
+
+
+def _cells(
+    header: HeaderLine,
+    body: _Body,
+    held: Mapping[str, np.ndarray],
+    layout: Layout,
+    options: ReadingOptions,
+    rows: np.ndarray,
+    count: int,
+) -> Cells:
+    """Return where a body's numbers are, which are held like this: what `_trajectory` does, the other way round."""
+    metres = metres_of(header, layout, body.columns, options)
+    scale = 1.0 / np.array(metres if len(set(metres)) > 1 else [1.0])
+
+    def numbers(poses: Poses) -> dict[int, np.ndarray]:
+        poses = inverse(poses) if header.inverted else poses
+        places = poses.positions * scale
+        made = dict(zip(POSITION, places.T, strict=True))
+        if "qw" in held:
+            before = np.column_stack([held[item] for item in ("qw", *QUATERNION[:3])])
+            signs = np.where(np.einsum("nk,nk->n", before, poses.quaternions) < 0.0, -1.0, 1.0)
+            made |= zip(("qw", *QUATERNION[:3]), (signs[:, None] * poses.quaternions).T, strict=True)
+        elif "m00" in held:
+            axes = matrices(poses.quaternions).transpose(2, 0, 1)
+            axes = axes if poses.scales is None else axes * poses.scales[:, None, None]
+            bottom = np.column_stack([held.get(item, np.zeros(len(rows))) for item in BOTTOM])
+            if np.any(np.nan_to_num(bottom)) and not np.any(np.nan_to_num([held[axis] for axis in POSITION])):
+                axes, made = axes.transpose(0, 2, 1), dict(zip(BOTTOM, places.T, strict=True))
+            made |= zip(MATRIX, axes.reshape(-1, 9).T, strict=True)
+        else:
+            order = options.intrinsic_order
+            before = np.column_stack([held[f"r{axis.lower()}"] for axis in order])
+            units = [layout.units.get(body.columns[item], "") for item in EULER]
+            unit = np.pi / 180.0 if options.degrees or "deg" in units else 1.0
+            angles = eulers_near(poses.quaternions, order, before * unit) / unit
+            made |= zip((f"r{axis.lower()}" for axis in order), angles.T, strict=True)
+        return {body.columns[item]: column for item, column in made.items()}
+
+    write = header.write or (lambda target, numbers: write_text(header, target, numbers))
+    return Cells(rows, (count, len(header.cells)), numbers, write)
+
+
+def _times_written(clock: Clock, column: int, rows: np.ndarray) -> Callable[[np.ndarray], dict[int, np.ndarray]] | None:
+    """Return a function of times (n,) that returns what stands for them in their column; None where no number does."""
+    if not clock.per_second:
+        return None
+    ticks, seconds = clock.ticks[rows], clock.seconds[rows]
+
+    def written(times: np.ndarray) -> dict[int, np.ndarray]:
+        later = (times - seconds) * clock.per_second
+        return {column: ticks + (np.rint(later) if ticks.dtype != float else later)}
+
+    return written
 
 
 def _of_matrices(

@@ -25,12 +25,15 @@ class Receiving:
     """A receiver in a room, which is a user there.
 
     It shows so many frames a second, and waits `margin` seconds longer for each datagram. All of them go to an address
-    by UDP as well, if one is given, from a port for each user, and its answers go back to them.
+    by UDP as well, if one is given, from a port for each user, and its answers go back to them. It shows things steady
+    where asked to.
     """
 
-    def __init__(self, room: Room, user: str, fps: float, margin: float, to: Address | None = None) -> None:
+    def __init__(
+        self, room: Room, user: str, fps: float, margin: float, to: Address | None = None, steady: bool = False
+    ) -> None:
         self._room, self._fps, self._margin, self._to = room, fps, margin, to
-        self.receiver = Receiver()
+        self.receiver = Receiver(steady=steady)
         self.datagrams, self.bytes = Counter[str](), Counter[str]()
         """Counts for each user."""
         self.on_frame: list[Callable[[Iterable[Shown]], None]] = []

@@ -18,7 +18,7 @@ from rigid_motion.animation import (
     reduction_of,
     restore_keys,
 )
-from rigid_motion.motion import Poses
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.hand_made import AUTOMATIC, LAST, OF_OLD, THIRD, bake_each_frame, hand_made, keys_of
 from tests.animation.bones.poses import shown_of
 from tests.animation.bones.rigs import in_turn
@@ -136,21 +136,32 @@ def test_key_poses_keep_to_a_tolerance(live_file):
     assert apart(shown_of(rig, FRAMES), baked) <= 0.02 * ROUNDED
 
 
-@pytest.mark.parametrize("is_screw", [True, False])
-def test_what_needs_fewer_keys_is_taken_where_that_is_asked_for(live_file, is_screw):
-    obj, frames = new_object(), np.arange(1.0, 101.0)
-    if is_screw:
-        angle = 0.05 * frames / 2.0
-        turns = np.column_stack((np.cos(angle), 0.0 * angle, 0.0 * angle, np.sin(angle)))
-        places = np.column_stack((np.cos(2.0 * angle), np.sin(2.0 * angle), 0.1 * angle))
-    else:
-        turns = np.tile((1.0, 0.0, 0.0, 0.0), (100, 1))
-        places = np.column_stack((np.polyval((1e-5, -1e-3, 2e-2, 0.0), frames), 0.0 * frames, 0.0 * frames))
-    bake_poses(obj, frames, Poses(places, turns))
+ANGLES = 0.025 * FRAMES
+SCREW = Poses(
+    np.column_stack((np.cos(2.0 * ANGLES), np.sin(2.0 * ANGLES), 0.1 * ANGLES)),
+    np.column_stack((np.cos(ANGLES), 0.0 * ANGLES, 0.0 * ANGLES, np.sin(ANGLES))),
+)
+CURVE = Poses(
+    np.column_stack((np.polyval((1e-5, -1e-3, 2e-2, 0.0), FRAMES), 0.0 * FRAMES, 0.0 * FRAMES)),
+    np.tile((1.0, 0.0, 0.0, 0.0), (len(FRAMES), 1)),
+)
+CORNERS = np.linspace(0.0, LAST, 3)
+CORNERED = np.random.default_rng(3).normal(size=(3, 7))
+SCREWS = interpolate(CORNERS, Poses(0.3 * CORNERED[:, :3], CORNERED[:, 3:]), FRAMES, "dq_sclerp")
+
+
+@pytest.mark.parametrize(("poses", "mode"), [(SCREW, "motor_spline"), (CURVE, NATIVE), (SCREWS, "dq_sclerp")])
+def test_what_needs_the_fewest_keys_of_all_is_taken_where_that_is_asked_for(live_file, poses, mode):
+    obj = new_object()
+    bake_poses(obj, FRAMES, poses)
     reduction = reduce_keys_of(obj, FEWEST, TOLERANCE, RADIUS)
-    assert reduction.needed[reduction.mode] == reduction.after == min(reduction.needed.values())
-    assert (reduction.mode == "motor_spline") == is_screw
+    assert reduction.mode == mode
+    assert reduction.needed[mode] == reduction.after == min(reduction.needed.values())
     assert reduction == reduction_of(obj)
+    for other in KEYFRAME_MODES:
+        restore_keys(obj, refused=[])
+        reduce_keys_of(obj, other, TOLERANCE, RADIUS, refused=[])
+        assert len(key_frames(obj)) >= reduction.after
 
 
 def test_what_is_held_gets_curves_in_its_hands(live_file):

@@ -133,6 +133,7 @@ def skeleton(random: np.random.Generator, frames: int) -> str:
 
 
 # The importer leaves its file to the garbage collector.
+@pytest.mark.blender
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 @pytest.mark.parametrize("seed", range(4))
 def test_the_poses_are_those_of_blenders_importer(write, seed: int) -> None:

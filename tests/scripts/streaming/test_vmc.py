@@ -19,7 +19,7 @@ from tests.live.performing import BODY, TIMES_OF_A_SECOND, dance, frames_of_vmc,
 from tests.scripts.bvh_bodies import TIMES, hips_at, write_body
 from tests.scripts.streaming.test_rooms import HERE, PATIENCE, free_port, running
 
-pytestmark = pytest.mark.network
+pytestmark = [pytest.mark.blender, pytest.mark.network]
 
 
 def free_udp_port() -> int:
@@ -121,6 +121,7 @@ def test_what_a_receiver_shows_goes_to_another_program(listener):
         (["send", "a.csv", "--to-vmc", "127.0.0.1:1", "--room", "studio"], "without a room"),
         (["send", "a.csv"], "give --room NAME"),
         (["receive", "--room", "studio", "--to-vmc", "192.0.2.1:39540"], "give --network as well"),
+        (["receive", "--room", "studio", "--clean", "--mode", "motor_spline"], "give --clean without it"),
     ],
 )
 def test_what_does_not_go_together_is_said(arguments, said, capsys):

@@ -1,6 +1,6 @@
 """Other keys for the same motion, and the way back.
 
-originals      what there was before keys were baked or reduced
+originals      what there was before keys were baked, reduced or cleaned
 motions        how objects and bones move with any keys, and how far off that is
 worlds         where things are in the world, frame by frame
 bake           real keys for every frame
@@ -10,6 +10,7 @@ native_curves  fewer Bezier keys, and their handles
 search         the few keys that an object, or the bones of a rig together, need
 held_keys      fewer keys of what is held, run by run
 reducing       the few keys that a recording needs, and the way back
+cleaning       dense keys without their trembling
 into_holds     dense keys in the world to few in the hands that held something
 
 Each module imports only those above it.

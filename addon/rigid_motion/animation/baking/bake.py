@@ -7,7 +7,7 @@ the keys that there were.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import bpy
 import numpy as np
@@ -162,27 +162,27 @@ def _refuse_wishes(step: float, interpolation: str) -> None:
 
 def unbake(targets: Targets, *, refused: list[Refused] | None = None) -> None:
     """Give the keys back that there were before baking, to the last handle. For targets see `edits.apply`."""
-    go_back(targets, BAKED, refused)
+    go_back(targets, (BAKED,), refused)
 
 
 def go_back(
     targets: Targets,
-    kind: str,
+    kinds: Sequence[str],
     refused: list[Refused] | None,
     by: Callable[[Transform, str, Iterable[Binding]], None] = put_back,
 ) -> None:
-    """Give targets, and all that moves by the same Actions, the keys back from before they were changed so.
+    """Give targets, and all that moves by the same Actions, the keys back from before they were changed last.
 
-    Or do something else to what is kept of these, `by` a function.
+    Kinds are the ways in which that may have been. Or do something else to what is kept of these, `by` a function.
     """
 
-    def plan(transform: Transform, readings: Readings) -> list[Binding]:
-        refuse_without_original(transform, kind)
+    def plan(transform: Transform, readings: Readings) -> tuple[str, list[Binding]]:
+        kind = refuse_without_original(transform, *kinds)
         for binding, _ in readings:
             refuse_linked(transform, binding)
-        return [binding for binding, _ in readings]
+        return kind, [binding for binding, _ in readings]
 
-    apply_edit(targets, plan, lambda transform, bindings: by(transform, kind, bindings), refused)
+    apply_edit(targets, plan, lambda transform, planned: by(transform, *planned), refused)
 
 
 def is_baked(target: Target) -> bool:

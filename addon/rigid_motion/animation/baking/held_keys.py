@@ -22,7 +22,8 @@ from ..evaluation.components import MODE_NUMBERS, PART_OF, SCALE
 from ..evaluation.marks import turns_at
 from ..evaluation.sources import SAME_FRAME, Run, Source
 from ..fcurves.keys import LINEAR
-from ..holds.holders import channel_space, holders_of
+from ..holds.holders import holders_of
+from ..holds.placing import channel_space
 from ..transforms import Transform
 from ..transforms.sizes import radius_of, reaches_of, scale_in_scene
 from .fewer_keys import WholeRig, count_of, has_uneven_scale

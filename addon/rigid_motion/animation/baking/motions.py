@@ -7,13 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
+from typing import Any, cast
 
 import bpy
 import numpy as np
 
+from ...blender import existing, pose_bones
 from ...motion import Poses
 from ...motion.affine import AffineMaps, ball_displacement, displacement_over, largest_displacement
-from ...motion.quaternions import matrices, multiply
+from ...motion.poses import placed
+from ...motion.quaternions import align_signs, matrices, multiply
 from ..actions.slots import Slot, slots_alone
 from ..evaluation.bodies import turn_into_quaternions
 from ..evaluation.channel_values import rotation_values
@@ -27,9 +31,6 @@ from ..transforms.sizes import into_scene, radius_of, reaches_of, scale_in_scene
 
 MOVING = {*WIDTHS, "rotation_mode"}
 """Properties of bones that a driver moves them by."""
-
-CHAINS = ("IK", "SPLINE_IK")
-"""Constraints that move bones above the one that has them."""
 
 SMALLEST = 1e-6
 """Errors of single precision, relative to how far something gets."""
@@ -49,7 +50,7 @@ def not_promised(rig: bpy.types.Object) -> tuple[str, ...]:
     driven = {driver.data_path for driver in drivers if not driver.mute}
     animated = {fcurve.data_path for slot in slots_alone(rig) for fcurve in slot.fcurves}
     animated |= {driver.data_path for driver in drivers}
-    bones, followers = rig.pose.bones, set()
+    bones, followers = pose_bones(rig), set()
     for bone in bones:
         if not driven.isdisjoint(f"{bone.path_from_id()}.{name}" for name in MOVING):
             followers.add(bone.name)
@@ -57,7 +58,7 @@ def not_promised(rig: bpy.types.Object) -> tuple[str, ...]:
             switches = {f"{constraint.path_from_id()}.{name}" for name in ("influence", "mute", "enabled")}
             if not animated.isdisjoint(switches) or (not constraint.mute and constraint.influence > 0.0):
                 followers.add(bone.name)
-                if constraint.type in CHAINS:
+                if isinstance(constraint, bpy.types.KinematicConstraint | bpy.types.SplineIKConstraint):
                     # The bone itself is the last of a chain, unless that is to reach for its head.
                     count = constraint.chain_count - getattr(constraint, "use_tail", True)
                     above = bone.parent_recursive[:count] if constraint.chain_count else bone.parent_recursive
@@ -170,19 +171,20 @@ class BodyMotion:
         space: np.ndarray | None = None,
     ) -> None:
         self.joints, self._sources = joints, sources
-        (obj, *bones), size = [joint.carrier for joint in joints], scale_in_scene(joints[0])
+        bones, size = [joint.pose_bone for joint in joints[1:]], scale_in_scene(joints[0])
         self.hierarchy = Hierarchy(bones)
         self.parents = np.append(-1, self.hierarchy.parents + 1)
         if bones:
-            reaches = {} if radius else reaches_of(obj)
+            reaches = {} if radius else reaches_of(joints[0].animated)
             self.radii = np.array([0.0, *(radius / size if radius else reaches[bone.name] for bone in bones)])
         else:
-            self.radii = np.array([(radius or radius_of(obj)) / size])
+            self.radii = np.array([(radius or radius_of(joints[0].carrier)) / size])
         self._curves = {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in slot.fcurves}
         self._parent = AffineMaps(into_scene(joints[0]) if space is None else space, np.zeros(3))
         self.poses = self._look_at(frames)
         """Poses of each joint's channels, each of shape (m,)."""
-        sizes = np.maximum(self.poses[0].scales / (self.poses[0].scales[0] or 1.0), LEAST_SCALE)
+        scales = existing(self.poses[0].scales)
+        sizes = np.maximum(scales / (scales[0] or 1.0), LEAST_SCALE)
         self.unit = float((np.linalg.norm(self.truth.axes[0], 2, axis=(-2, -1)) / sizes).max()) or 1.0
         """The length of the unit of bones, and of an object at its first size, in the scene, at most."""
         sizes = np.sqrt(np.einsum("...ij,...ij->...j", self.truth.axes, self.truth.axes).max(axis=-1))
@@ -213,6 +215,36 @@ class BodyMotion:
         result.poses = result._look_at(frames)
         return result
 
+    def as_chains(self) -> tuple[np.ndarray, Poses, float]:
+        """Return joints as the search has them, with even scale, in chains of bones that inherit all.
+
+        That is their parents (joints,), those of the first in chains being the object; their poses (joints, m); and the
+        part of the tolerance that each chain may take, which still moves with what it hangs on.
+        """
+        own, *of_bones = self.poses
+        own_scales, *bone_scales = (cast(np.ndarray, poses.scales) for poses in self.poses)
+        size = float(own_scales[0]) or 1.0
+        local = [Poses(own.positions / size, own.quaternions, own_scales / size)]
+        grows = any(np.abs(scales - 1.0).max() > SMALLEST for scales in bone_scales)
+        parents = self.parents.copy()
+        for number, poses in enumerate(of_bones, 1):
+            bone: Any = self.joints[number].carrier
+            settings, rest = bone.bone, bone.bone.matrix_local
+            if not settings.use_inherit_rotation or (grows and settings.inherit_scale != "FULL"):
+                parents[number] = 0
+            elif bone.parent:
+                rest = bone.parent.bone.matrix_local.inverted() @ rest
+            if settings.use_connect and bone.parent:
+                poses = replace(poses, positions=np.zeros_like(poses.positions))
+            position, turn, _ = rest.decompose()
+            local.append(placed(Poses(np.array(position), np.array(turn)), poses))
+        scales = np.maximum([poses.scales for poses in local], LEAST_SCALE)
+        positions, quaternions = (np.stack([getattr(p, name) for p in local]) for name in ("positions", "quaternions"))
+        grows = np.abs(scales - 1.0).max() > SMALLEST
+        heads = parents != self.parents
+        chains = 1 + max(np.count_nonzero(heads[[*self.above(number)]]) for number in range(len(heads)))
+        return parents, Poses(positions, align_signs(quaternions), scales if grows else None), chains**-0.5
+
     def _pose(self, numbers: Collection[int]) -> None:
         """Have these joints, and all that hang on them, be where their channels put them: bones in the rig's space."""
         if 0 in numbers:
@@ -229,6 +261,13 @@ class BodyMotion:
             self._channels[number] = maps_now.get(number) or self._recorded[number]
         self._shown |= changed
         self._pose(changed)
+
+    def show_values(self, rows: Mapping[int, np.ndarray]) -> None:
+        """Let joints have these values of their channels (10, m)."""
+        for number, values in rows.items():
+            joint = self.joints[number]
+            self._channels[number] = _placed(joint, values.copy(), joint.original())[1]
+        self._pose(rows)
 
     def now(self) -> AffineMaps:
         """Return where all joints are in the scene by now, shape (joints, m)."""
@@ -275,8 +314,12 @@ class BodyMotion:
         now, truth = self.now(), self.truth
         if weights is None:
             return np.array([largest_displacement(now[n], truth[n], radius) for n, radius in enumerate(self.radii)])
-        balls = (np.full(len(self.frames), radius) for radius in self.radii)
-        return np.array([(ball_displacement(now[n], truth[n], r) * weights[n]).max() for n, r in enumerate(balls)])
+        return (self.displacements() * weights).max(axis=1)
+
+    def displacements(self) -> np.ndarray:
+        """Return how far any point in each joint's ball is displaced, in the scene's units, shape (joints, m)."""
+        now, balls = self.now(), (np.full(len(self.frames), radius) for radius in self.radii)
+        return np.array([ball_displacement(now[n], self.truth[n], radii) for n, radii in enumerate(balls)])
 
     def to_blame(self, number: int, moment: int, among: Iterable[int], share: float) -> list[int]:
         """Return which of these joints, as they were recorded, would take a joint's error at a moment to a share of it.

@@ -1,4 +1,4 @@
-"""Originals: the channels that there were before keys were baked or reduced, kept in the file for the way back.
+"""Originals: the channels from before keys were baked, reduced or cleaned, kept in the file for the way back.
 
 Keys are changed where they are, in their Action, for all that moves by it. The channels from before are kept in an
 Action that nothing moves by, a *keeper*: under data paths that lead nowhere, in a slot that fits no object. So no
@@ -9,36 +9,35 @@ latest last: what was done last is taken back first. A keeper leaves the file wi
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import cast
 
 import bpy
 from bpy.app.translations import pgettext_n as n_
 
+from ...blender import channelbag_in, existing
 from ..actions.channels import copy_fcurve
 from ..actions.slots import Binding, Curves, slots_alone
-from ..transforms import TURNS_PROPERTY, Refused, Transform
+from ..transforms import TURNS_PROPERTY, Note, Refused, Transform
 
-BAKED, REDUCED = "BAKED", "REDUCED"
+BAKED, REDUCED, CLEANED = "BAKED", "REDUCED", "CLEANED"
 """The change that was made to the keys."""
 
 NOT_DONE = {
     BAKED: n_("{name} is not baked, or has another Action by now"),
-    REDUCED: n_("{name} is not reduced, or has another Action by now"),
+    REDUCED: n_("{name} is neither reduced nor cleaned, or has another Action by now"),
 }
 """The reason why something cannot be taken back."""
 
 DONE_SINCE = {
     BAKED: n_("{name} was baked since it was reduced: Un-Bake first"),
     REDUCED: n_("{name} was reduced since it was baked: Restore Keys first"),
+    CLEANED: n_("{name} was cleaned since it was baked: Restore Keys first"),
 }
 """The reason why what was done before cannot be taken back, by what was done last."""
 
-Note = Any
-"""A `ChangedKeys`, see `properties`."""
-
 
 class Originals:
-    """Keeps what there is before keys are `BAKED` or `REDUCED`, in one keeper for all that is done to an Action."""
+    """Keeps what there is before keys are changed, in one keeper for all that is done to an Action."""
 
     def __init__(self, kind: str) -> None:
         self._kind = kind
@@ -58,13 +57,13 @@ class Originals:
             keeper = bpy.data.actions.new(f"{slot.action.name} Original")
             strip = keeper.layers.new("Original").strips.new(type="KEYFRAME")
             # Blender's glTF exporter takes all slots for objects that seem to fit; its FBX exporter asks paths alone.
-            self._keepers[slot.action] = strip.channelbag(keeper.slots.new("WORLD", "Original"), ensure=True)
+            self._keepers[slot.action] = channelbag_in(strip, keeper.slots.new("WORLD", "Original"))
         channelbag, prefix = self._keepers[slot.action], f"kept[{len(self._kept)}]."
         for (path, _), fcurve in _moving(binding).items():
             copy_fcurve(fcurve, channelbag, prefix + path.removeprefix(binding.prefix))
         notes = [user.motion.bakes.add() for user in _noting(binding)]
         for note in notes:
-            note.kind, note.original, note.kept_as = self._kind, channelbag.id_data, prefix
+            note.kind, note.original, note.kept_as = self._kind, cast(bpy.types.Action, channelbag.id_data), prefix
             note.changed, note.handle = slot.key
         return notes
 
@@ -102,13 +101,16 @@ def last_change(transform: Transform) -> str | None:
     return next((note.kind for note in notes_in_use(transform) if note.original is not None), None)
 
 
-def refuse_without_original(transform: Transform, kind: str) -> None:
-    """Raise `Refused` where keys of this kind are not what something was given last, or the original is gone."""
+def refuse_without_original(transform: Transform, *kinds: str) -> str:
+    """Return which of these kinds the keys are of that something was given last. `Refused` where they are of none, or
+    the original is gone.
+    """
     latest = last_change(transform)
-    if latest is None or not any(note.kind == kind and note.original is not None for note in transform.motion.bakes):
-        raise Refused(NOT_DONE[kind], name=transform.name)
-    if latest != kind:
+    if latest is None or not any(note.kind in kinds and note.original is not None for note in transform.motion.bakes):
+        raise Refused(NOT_DONE[kinds[0]], name=transform.name)
+    if latest not in kinds:
         raise Refused(DONE_SINCE[latest], name=transform.name)
+    return latest
 
 
 def put_back(transform: Transform, kind: str, bindings: Iterable[Binding]) -> None:
@@ -162,7 +164,8 @@ def _on(transform: Transform, binding: Binding) -> list[Note]:
 
 def _kept_by(note: Note) -> Curves:
     """Return the channels that a note says are kept, by their paths from what is moved on."""
-    fcurves, prefix = note.original.layers[0].strips[0].channelbags[0].fcurves, note.kept_as
+    strip, prefix = existing(note.original).layers[0].strips[0], note.kept_as
+    fcurves = cast(bpy.types.ActionKeyframeStrip, strip).channelbags[0].fcurves
     kept = (fcurve for fcurve in fcurves if fcurve.data_path.startswith(prefix))
     return {(fcurve.data_path.removeprefix(prefix), fcurve.array_index): fcurve for fcurve in kept}
 
@@ -175,9 +178,10 @@ def _forget_from(first: Note, binding: Binding) -> None:
         numbers = [n for n, note in enumerate(bakes) if (note.changed, note.handle) == binding.slot.key]
         at = next((n for n in numbers if (bakes[n].original, bakes[n].kept_as) == which), len(bakes))
         for number in reversed([n for n in numbers if n >= at]):
-            keepers.add(bakes[number].original)
+            if (keeper := bakes[number].original) is not None:
+                keepers.add(keeper)
             bakes.remove(number)
-    for keeper in keepers - {None}:
+    for keeper in keepers:
         _remove_unused(keeper)
 
 

@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
-from ...motion import Poses, reduce_keys, reduce_skeleton_keys
+from ...blender import pose_bones, scene
+from ...motion import reduce_keys, reduce_skeleton_keys
 from ...motion.contacts import slide, standing
-from ...motion.poses import placed
-from ...motion.quaternions import align_signs
 from ..actions.slots import Binding
 from ..evaluation.sources import SAME_FRAME, Source, distinct
 from ..transforms import Refused, Transform, transform_of
@@ -35,7 +33,7 @@ from .fewer_keys import (
     values_on,
     with_keys,
 )
-from .motions import LEAST_SCALE, SMALLEST, BodyMotion, not_promised, without
+from .motions import BodyMotion, not_promised, without
 from .native_curves import NATIVE, JointCurves, choose_handles, needed, scratch_curve
 
 NO_FEWER = n_("{name} needs its {count} keys to stay within the tolerance: allow a larger one")
@@ -67,6 +65,10 @@ Over = list[tuple[float, int, int]]
 """What is over the tolerance, see `BodyMotion.over`."""
 
 
+class NotFewer(Exception):
+    """As many keys are needed as something else needs, or more."""
+
+
 def fewer_keys(
     obj: bpy.types.Object,
     members: Members,
@@ -77,20 +79,24 @@ def fewer_keys(
     shared: bool,
     hold: bool,
     count: int | None,
+    below: float = math.inf,
     space: np.ndarray | None = None,
 ) -> dict[Transform, FewerKeys]:
     """Return the plans for those of an object and its bones that can have fewer keys.
 
     With a count there are so many keys, or key poses, whatever the tolerance. What is wanted besides, see
     `reduce_keys_of`. `Refused` where none of several can have fewer. With a `space`, see `BodyMotion`, the only member
-    is looked at by itself.
+    is looked at by itself. `NotFewer` where a mode needs so many keys, `below`, even before they are proven.
     """
     body = _Body(obj, members, math.inf if count is not None else tolerance, radius, hold=hold, space=space)
     shared |= count is not None
     if mode == NATIVE:
         fewer = body.curved(count, shared=shared)
     else:
-        fewer = body.proven(body.searched(mode, count, shared=shared), body.with_mode(mode), shared=shared)
+        found = body.searched(mode, count, shared=shared)
+        if sum(min(len(keys), count_of(body.sources[number])) for number, keys in found.items()) >= below:
+            raise NotFewer
+        fewer = body.proven(found, body.with_mode(mode), shared=shared)
     if not fewer and len(members) > 1:
         text = NO_FEWER if count is None else NOT_SO_MANY
         raise NeedsItsKeys(text, name=obj.name, count=np.count_nonzero(body.sampled))
@@ -111,7 +117,7 @@ class _Body:
         space: np.ndarray | None,
     ) -> None:
         self.obj, self.tolerance, self.members = obj, tolerance, members
-        bones = obj.pose.bones if space is None and any(transform.is_part for transform in members) else ()
+        bones = pose_bones(obj) if space is None and any(transform.is_part for transform in members) else ()
         joints = [transform_of(obj), *map(transform_of, bones)] if space is None else list(members)
         self.sources = {number: members[joint][1] for number, joint in enumerate(joints) if joint in members}
         samples = united(map(samples_of, self.sources.values()))
@@ -124,13 +130,13 @@ class _Body:
         self.stands = np.zeros((len(joints), len(self.frames)), dtype=bool)
         """True for the bones that stand on the ground, at each moment."""
         if bones:
-            render = bpy.context.scene.render
+            render = scene().render
             seconds = self.frames * render.fps_base / render.fps
             self.stands[1:] = standing(seconds, self.motion.truth.origins[1:])
         self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
-        self.errors = np.zeros(len(joints))
+        self.errors: np.ndarray = np.zeros(len(joints))
         """The largest displacement of any point in each joint's ball, as was proven last, shape (joints,)."""
-        self.between = np.zeros(len(joints))
+        self.between: np.ndarray = np.zeros(len(joints))
         """The largest displacement at any moment, where errors are those on frames; or nothing, shape (joints,)."""
         self._stretches = self._split(moments(self.frames, list(self.sources.values())))
 
@@ -143,7 +149,7 @@ class _Body:
         """Return the frames of the keys that joints need if all of them are rigid, by their numbers."""
         motion, at = self.motion, np.flatnonzero(self.sampled)
         fixed = [number not in self.sources for number in range(len(motion.joints))]
-        parents, poses, share = self._as_chains()
+        parents, poses, share = motion.as_chains()
         wish: dict[str, Any] = {"budget": count}
         if count is None:
             wish = {"tolerance": self.tolerance * share / motion.unit}
@@ -156,36 +162,6 @@ class _Body:
         return {
             number: self._within_its_keys(times[rows], number) for number, rows in enumerate(keys) if not fixed[number]
         }
-
-    def _as_chains(self) -> tuple[np.ndarray, Poses, float]:
-        """Return joints as the search has them, with even scale, in chains of bones that inherit all.
-
-        That is their parents (joints,), those of the first in chains being the object; their poses (joints, m); and the
-        part of the tolerance that each chain may take, which still moves with what it hangs on.
-        """
-        motion = self.motion
-        own, *of_bones = motion.poses
-        size = own.scales[0] or 1.0
-        local = [Poses(own.positions / size, own.quaternions, own.scales / size)]
-        grows = any(np.abs(poses.scales - 1.0).max() > SMALLEST for poses in of_bones)
-        parents = motion.parents.copy()
-        for number, poses in enumerate(of_bones, 1):
-            bone = motion.joints[number].carrier
-            settings, rest = bone.bone, bone.bone.matrix_local
-            if not settings.use_inherit_rotation or (grows and settings.inherit_scale != "FULL"):
-                parents[number] = 0
-            elif bone.parent:
-                rest = bone.parent.bone.matrix_local.inverted() @ rest
-            if settings.use_connect and bone.parent:
-                poses = replace(poses, positions=np.zeros_like(poses.positions))
-            position, turn, _ = rest.decompose()
-            local.append(placed(Poses(np.array(position), np.array(turn)), poses))
-        scales = np.maximum([poses.scales for poses in local], LEAST_SCALE)
-        positions, quaternions = (np.stack([getattr(p, name) for p in local]) for name in ("positions", "quaternions"))
-        grows = np.abs(scales - 1.0).max() > SMALLEST
-        heads = parents != motion.parents
-        chains = 1 + max(np.count_nonzero(heads[[*motion.above(number)]]) for number in range(len(heads)))
-        return parents, Poses(positions, align_signs(quaternions), scales if grows else None), chains**-0.5
 
     def curved(self, count: int | None, *, shared: bool) -> dict[int, Source]:
         """Return the joints that get fewer keys, and these, with curves of Blender's own: see `proven`.
@@ -283,10 +259,10 @@ class _Body:
             # Of what is not promised, that counts which has fewer keys.
             counted[:] = [n in fewer or joint.carrier.name not in excepted for n, joint in enumerate(joints)]
             motion.show(fewer)
-            slides = (slide(maps.origins, self.stands) for maps in (motion.truth, motion.now()))
+            before, after = (slide(maps.origins, self.stands) for maps in (motion.truth, motion.now()))
             frames = united(source.keyed_frames for source in fewer.values())
-            whole = WholeRig(len(frames), *slides, excepted)
-        largest, between = (float(errors[counted].max()) for errors in (self.errors, self.between))
+            whole = WholeRig(len(frames), before, after, excepted)
+        largest, between = float(self.errors[counted].max()), float(self.between[counted].max())
         return {
             joints[number]: FewerKeys(*self.members[joints[number]], source, largest, whole, between)
             for number, source in fewer.items()

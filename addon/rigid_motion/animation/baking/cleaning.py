@@ -1,0 +1,367 @@
+"""Cleaning dense keys: a recording without its trembling, in the keys that it has, and the way back.
+
+What is cleaned are the poses that channels say, each bone's in the space of its parent; how far anything is moved by
+that is measured in the scene, through all that it hangs on. Frames are those of the Action, lengths the scene's units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, cast
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_n as n_
+
+from ...motion import Poses, Skeleton, clean
+from ...motion.quaternions import conjugate, multiply, rotate, turned, turns_between
+from ...motion.trembling import ORDERS, trembling
+from ..actions.channels import key_fields, set_key_fields
+from ..actions.refusals import refuse_drivers, refuse_linked, refuse_modified
+from ..actions.slots import Binding
+from ..edits.apply import Readings, Targets, apply_edit, readable
+from ..evaluation.bodies import turn_into_quaternions
+from ..evaluation.channel_values import rotation_values
+from ..evaluation.components import LOCATION, PART_OF, ROTATION, ROWS, SCALE
+from ..evaluation.sources import SAME_FRAME, Source
+from ..holds.placing import channel_space
+from ..queries.keyed import frames_in
+from ..transforms import Refused, Transform, transform_of
+from .bake import POINTS
+from .fewer_keys import count_of, united
+from .motions import BodyMotion, continuous_values
+from .originals import CLEANED, Originals
+
+STRENGTH = 3.0
+"""By how many times of its trembling something may be moved: hardly any noise is more."""
+
+LEAST, DENSE = ORDERS[-1] + 2, 2.0
+"""The fewest keys that say how much something trembles, and the most frames from one to the next."""
+
+JOIN = 8
+"""Keys over which what is cleaned goes over into what is not."""
+
+ROUNDS = 12
+"""In which the keys on a frame are drawn back together where something is moved too far."""
+
+WITHIN = 0.999
+"""The part of the tolerance that is used: keys are rounded."""
+
+TOO_FEW = n_("{name} has {count} keys of location and rotation: to tell trembling from motion takes {least}")
+NO_KEY_SELECTED = n_("{name}: no key of location, rotation or scale is selected")
+
+
+class Cleaning(NamedTuple):
+    """What became of an object, or of the bones of a rig together."""
+
+    transforms: Sequence[Transform]
+    trembling: float
+    """How far any point within the radius is off, by the root mean square: of a rig what trembles most."""
+
+    moved: float
+    """How far any point was moved at most, but by spikes."""
+
+    spikes: int
+    """How many keys were off for a moment. They are where the motion around them leads."""
+
+    repeats: int
+    """How many keys were the same as the one before while the thing went on."""
+
+    alone: float
+    """The part of the keys that were left as they are, as motion cannot be told from noise there."""
+
+    before: np.ndarray
+    """Where each of the transforms was in the world on each key, shape (t, m, 3): bones where they end, and cameras
+    that only turn where they look."""
+
+    after: np.ndarray
+    bridged: np.ndarray
+    """Which of these were spikes or repeats, shape (t, m)."""
+
+
+Planned = tuple[Binding, Source, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""What the keys of a slot are to be: those of a source, on frames (m,), which are to be at others (m,); components
+(10, m), and which of them were bridged (m,).
+"""
+
+
+def clean_motion(
+    targets: Targets,
+    strength: float = STRENGTH,
+    radius: float | None = None,
+    *,
+    nearest: float | None = None,
+    selected: bool = False,
+    select_spikes: bool = True,
+    refused: list[Refused] | None = None,
+) -> list[Cleaning]:
+    """Take the trembling and the spikes out of dense keys. Frames, handles and all else of the keys stay.
+
+    Bones of one rig are cleaned together, each in the space of its parent. Scale stays as it is. The keys from before
+    are kept, for `restore_keys`.
+
+    Parameters
+    ----------
+    targets, refused
+        See `edits.apply`.
+    strength : float
+        By how many times of its trembling any point within the radius may be moved, but by spikes. Of bones that is so
+        in the rig's space, for all that hangs on them, too.
+    radius : float, optional
+        In the scene's units. As far as each target reaches, otherwise.
+    nearest : float, optional
+        The radius of cameras: the distance of the nearest thing that they look at; that of the focus, otherwise.
+    selected : bool
+        Clean from the first to the last of the selected keys alone. What is cleaned joins what is not.
+    select_spikes : bool
+        Select the keys that were spikes or repeats, and no others, if there are any.
+
+    Returns
+    -------
+    list of Cleaning
+        One for each object, or rig, that did not refuse.
+    """
+    if not 0.0 < strength < math.inf:
+        text = n_("the keys may be moved by more than 0 times their trembling, not {strength:g}")
+        raise Refused(text, strength=strength)
+    plans: dict[Transform, list[Planned] | Refused] = {}
+    found: list[Cleaning] = []
+    originals = Originals(CLEANED)
+
+    def survey(readings: Mapping[Transform, Readings]) -> None:
+        together: dict[tuple, dict[Transform, tuple[Binding, Source]]] = {}
+        for transform, reading in readings.items():
+            plans[transform] = []
+            try:
+                for binding, source in readable(transform, reading):
+                    _check(transform, binding, source)
+                    together.setdefault((transform.animated, *binding.slot.key), {})[transform] = binding, source
+            except Refused as refusal:
+                plans[transform] = refusal
+        for (obj, *_), members in together.items():
+            around = (nearest or focus_of(obj)) if obj.type == "CAMERA" else radius
+            try:
+                cleaning, planned = _cleaned(obj, members, strength, around, selected=selected)
+            except Refused as refusal:
+                plans.update(dict.fromkeys(members, refusal))
+                continue
+            found.append(cleaning)
+            for transform, one in planned.items():
+                if isinstance(plan := plans[transform], list):
+                    plan.append(one)
+
+    def plan(transform: Transform, _: Readings) -> list[Planned]:
+        if isinstance(result := plans[transform], Refused):
+            raise result
+        if not result:
+            raise Refused(TOO_FEW, name=transform.name, count=0, least=LEAST)
+        return result
+
+    def act(transform: Transform, planned: list[Planned]) -> None:
+        for one in planned:
+            if originals.keep(one[0]):
+                _write(transform, *one, select=select_spikes and any(cleaning.bridged.any() for cleaning in found))
+
+    done = apply_edit(targets, plan, act, refused, survey=survey)
+    return [cleaning for cleaning in found if not done.keys().isdisjoint(cleaning.transforms)]
+
+
+def focus_of(camera: Any) -> float:
+    """Return how far away the focus of a camera, an object, is."""
+    dof = camera.data.dof
+    if dof.focus_object is None:
+        return dof.focus_distance
+    return (dof.focus_object.matrix_world.translation - camera.matrix_world.translation).length
+
+
+def pixels_of(camera: Any, nearest: float) -> float:
+    """Return by how many pixels anything in the picture of a camera, an object, moves at most for each unit of length
+    that a point so far away does.
+    """
+    scene: Any = bpy.context.scene
+    corners = np.array(camera.data.view_frame(scene=scene))
+    pixels = scene.render.resolution_x * scene.render.resolution_percentage / 100.0 / np.ptp(corners[:, 0])
+    if camera.data.type == "ORTHO":
+        return float(pixels)
+    depth = abs(corners[0, 2])
+    # In a corner a turn moves the picture by more.
+    return float(pixels * depth / nearest * (1.0 + (corners[:, :2] ** 2).sum(axis=1).max() / depth**2))
+
+
+def _check(transform: Transform, binding: Binding, source: Source) -> None:
+    """Raise `Refused` where there is nothing dense to clean, or keys do not say where something is."""
+    if source.held is not None:
+        raise Refused(n_("{name} is held: Bake to World first, and clean that"), name=transform.name)
+    refuse_linked(transform, binding)
+    refuse_modified(transform.name, binding)
+    refuse_drivers(transform, binding, source.driven)
+    count = count_of(source)
+    if count < LEAST:
+        raise Refused(TOO_FEW, name=transform.name, count=count, least=LEAST)
+    if (step := float(np.median(np.diff(source.keyed_frames)))) > DENSE:
+        text = n_("{name} has keys {step:g} frames apart: only recordings can be cleaned, with keys on every frame")
+        raise Refused(text, name=transform.name, step=step)
+
+
+def _cleaned(
+    obj: bpy.types.Object,
+    members: Mapping[Transform, tuple[Binding, Source]],
+    strength: float,
+    radius: float | None,
+    *,
+    selected: bool,
+) -> tuple[Cleaning, dict[Transform, Planned]]:
+    """Return what becomes of those that one slot of an object moves, and what their keys are to be."""
+    bones = cast(Any, obj.pose).bones if any(transform.is_part for transform in members) else ()
+    joints = [transform_of(obj), *map(transform_of, bones)]
+    sources = {number: members[joint][1] for number, joint in enumerate(joints) if joint in members}
+    frames = united(source.keyed_frames for source in sources.values())
+    inside = _inside(obj, frames, [binding for binding, _ in members.values()]) if selected else np.ones(len(frames))
+    motion = BodyMotion(joints, next(iter(members.values()))[0].slot, sources, frames, radius)
+    parents, poses, _ = motion.as_chains()
+    # The object, and all that the targets hang on; what is no target is at rest.
+    taking = np.array(sorted({0, *(above for number in sources for above in motion.above(number))}))
+    chain, resting = poses[taking], np.array([number not in sources for number in taking.tolist()])
+    positions, quaternions = chain.positions.copy(), chain.quaternions.copy()
+    positions[resting], quaternions[resting] = positions[resting, :1], quaternions[resting, :1]
+    chain = Poses(positions, quaternions, chain.scales)
+    skeleton = Skeleton(np.where(parents[taking] < 0, -1, np.searchsorted(taking, parents[taking])))
+    reaches = np.array([motion.reach(number) for number in taking.tolist()])
+    floor = _floor(frames, chain, reaches, skeleton)
+    radii = np.where((skeleton.sizes > 1) & (motion.radii[taking] > 0.0), motion.radii[taking], reaches)
+    if floor * motion.unit <= motion.rounding:
+        floor = 0.0
+    tolerance = strength * floor * motion.unit
+    result = clean(frames, chain, WITHIN**2 * tolerance / motion.unit or None, radii, skeleton)
+    out = result.spikes | result.repeats
+    bridged = np.zeros((len(joints), len(frames)), dtype=bool)
+    bridged[taking] = out & (inside > 0.0)
+    if not floor and not bridged.any():
+        raise Refused(n_("{name} does not tremble: there is nothing to clean"), name=obj.name)
+    corrections = {}
+    for at, number in enumerate(taking.tolist()):
+        if number in sources:
+            # From the parent's axes to those of the channels.
+            axes = multiply(motion.poses[number].quaternions[0], conjugate(poses.quaternions[number, 0]))
+            size = 1.0 if number else float(cast(np.ndarray, motion.poses[0].scales)[0]) or 1.0
+            slides = size * rotate(axes, result.poses.positions[at] - chain.positions[at])
+            corrections[number] = slides, turns_between(chain.quaternions[at], result.poses.quaternions[at])
+    start = {number: _values(joints[number], source, frames) for number, source in sources.items()}
+    hangs = bridged.copy()
+    for own in Skeleton(motion.parents).levels[1:]:
+        hangs[own] |= hangs[motion.parents[own]]
+    allowed, share = WITHIN * tolerance, inside
+    for left in range(ROUNDS, -1, -1):
+        shares = {number: np.where(bridged[number], 1.0, share)[:, None] for number in sources}
+        rows = {
+            number: _corrected(joints[number], sources[number], start[number], shares[number], *corrections[number])
+            for number in sources
+        }
+        motion.show_values(rows)
+        off = np.where(hangs, 0.0, motion.displacements())
+        over = off.max(axis=0) / allowed if allowed else np.zeros(len(frames))
+        if (over <= 1.0).all():
+            break
+        share = np.where(over > 1.0, share * WITHIN / over if left > 1 else 0.0, share)
+    numbers = list(sources)
+    world = np.array(channel_space(joints[0], bpy.context.evaluated_depsgraph_get()).translation)
+    # What only turns is seen where a bone ends, and where a camera looks.
+    turns_alone = np.ptp(motion.truth.origins[0], axis=0).max() < tolerance
+    ends = np.array([_end(joints[number], turns_alone * float(motion.radii[number])) for number in numbers])
+    before, after = (maps[numbers].at(ends[:, None]) + world for maps in (motion.truth, motion.now()))
+    at_targets, of_targets = ~resting, inside > 0.0
+    cleaning = Cleaning(
+        [joints[number] for number in numbers],
+        floor * motion.unit,
+        float(off.max()),
+        int((result.spikes[at_targets] & of_targets).sum()),
+        int((result.repeats[at_targets] & of_targets).sum()),
+        float(result.alone[at_targets].mean()),
+        before,
+        after,
+        bridged[numbers],
+    )
+    moved = frames + inside * (result.times - frames)
+    return cleaning, {
+        joints[number]: (*members[joints[number]], frames, moved, rows[number], bridged[number]) for number in numbers
+    }
+
+
+def _end(transform: Transform, reach: float) -> tuple[float, float, float]:
+    carrier: Any = transform.carrier
+    if transform.is_part:
+        return 0.0, carrier.bone.length, 0.0
+    return 0.0, 0.0, -reach if carrier.type == "CAMERA" else 0.0
+
+
+def _inside(obj: bpy.types.Object, frames: np.ndarray, bindings: Sequence[Binding]) -> np.ndarray:
+    """Return the parts (m,) of corrections that are made: all of them within the selected keys, none beyond."""
+    selected = united(frames_in(binding, selected=True) for binding in bindings)
+    if not len(selected):
+        raise Refused(NO_KEY_SELECTED, name=obj.name)
+    first, last = np.searchsorted(frames, selected[[0, -1]] - SAME_FRAME)
+    rows, width = np.arange(len(frames)), min(JOIN, (last - first) / 2.0 + 1e-9)
+    begins = (rows - first) / width if first else np.ones(len(frames))
+    ends = (last - rows) / width if last < len(frames) - 1 else np.ones(len(frames))
+    part = np.clip(np.minimum(begins, ends), 0.0, 1.0)
+    return part**2 * (3.0 - 2.0 * part)
+
+
+def _floor(frames: np.ndarray, poses: Poses, reaches: np.ndarray, skeleton: Skeleton) -> float:
+    """Return how far the point that trembles most is off, by the root mean square, of joints that reach so far."""
+    noises = [trembling(frames, poses[joint])[:2] for joint in range(len(skeleton))]
+    squares = np.array(
+        [(math.sqrt(3.0) * p + math.sqrt(2.0) * r * reach) ** 2 for (p, r), reach in zip(noises, reaches, strict=True)]
+    )
+    for own in skeleton.levels[1:]:
+        squares[own] += squares[skeleton.parents[own]]
+    return math.sqrt(squares.max())
+
+
+def _values(transform: Transform, source: Source, frames: np.ndarray) -> np.ndarray:
+    """Return the components (10, m) of something on frames (m,): those without keys as they are now."""
+    rows, rest = continuous_values(source, frames), transform.components()
+    for part in ROWS.keys() - source.keyed:
+        rows[ROWS[part]] = rest[ROWS[part], None]
+    return rows
+
+
+def _corrected(
+    transform: Transform, source: Source, start: np.ndarray, share: np.ndarray, slides: np.ndarray, turns: np.ndarray
+) -> np.ndarray:
+    """Return components (10, m) with a share (m, 1) of corrections made: slides and rotation vectors (m, 3) in the axes
+    of what is moved.
+    """
+    rows, along = start.copy(), transform.location_axes
+    rows[ROWS[LOCATION]] += (share * (slides if along is None else slides @ along)).T
+    turn_into_quaternions(quaternions := start.copy(), transform.order)
+    turned_on = turned(quaternions[ROWS[ROTATION]].T, share * turns)
+    rows[ROWS[ROTATION]] = rotation_values(turned_on, start[ROWS[ROTATION], 0], transform.order)
+    fixed = [row for row in range(10) if not any(row in keyed for keyed, _ in source.channels)]
+    rows[fixed] = start[fixed]
+    return np.where(share[:, 0] > 0.0, rows, start)
+
+
+def _write(
+    transform: Transform,
+    binding: Binding,
+    source: Source,
+    frames: np.ndarray,
+    moved: np.ndarray,
+    values: np.ndarray,
+    bridged: np.ndarray,
+    *,
+    select: bool,
+) -> None:
+    """Move the keys of location and rotation to their new values, with their handles."""
+    for row in (row for rows, _ in source.channels for row in rows if PART_OF[row] != SCALE):
+        fcurve = binding.curves[transform.channels[row]]
+        fields = key_fields(fcurve.keyframe_points)
+        at = np.searchsorted(frames, fields["co"][:, 0] - SAME_FRAME)
+        by = np.stack((moved[at] - frames[at], values[row, at] - fields["co"][:, 1]), axis=1)
+        for name in POINTS:
+            fields[name] += by.astype(np.float32)
+        for name in ("select_control_point", "select_left_handle", "select_right_handle") if select else ():
+            fields[name][:, 0] = bridged[at]
+        set_key_fields(fcurve, fields)

@@ -1,0 +1,129 @@
+"""Steady: what is shown of a stream without its trembling, by what has come of the moments behind it already.
+
+The likeliest motion through the last samples and those that wait to be shown: its jerk is as large as it is around
+there. Of values y with noise s and third derivatives j the sum of (x - y)^2 / s^2 and h j^2 / J^2 is made least, the
+density J^2 found as in `motion.corrections`. Nothing is shown any later for it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..motion import Poses
+from ..motion.differences import coefficients
+from ..motion.poses import joined
+from ..motion.quaternions import turned, turns_between
+from ..motion.trembling import trembling
+from .paths import Path
+
+LEAST, KNOWN, EVERY = 60, 240, 4
+"""The fewest and the most samples that say how much something trembles, and as how many are shown one joint is looked
+at, as that takes long."""
+
+BEHIND, AHEAD, FEWEST = 12, 8, 12
+"""Samples before and behind the moment that is shown that count, and the fewest of both."""
+
+SPARSE = 0.04
+"""Seconds from sample to sample from which on there are keys, and not all that was seen: these do not tremble."""
+
+ORDER, AROUND, ROUNDS = 3, 3, 10
+"""Of the derivative that is small; samples on either side over which it is as large; rounds in which that is found."""
+
+SMOOTHEST = 1e-9
+"""Of the jerk that noise makes is always allowed."""
+
+FURTHEST, NEARLY_NONE = 2.0, 1e-4
+"""Radians: what is turned further from the rotation that is shown counts by so little."""
+
+
+class Steady:
+    """What a stream's joints were, and how much each of them trembles."""
+
+    def __init__(self) -> None:
+        self._times = np.empty(0)
+        self._poses: Poses = Poses(np.empty((0, 0, 3)), np.empty((0, 0, 4)))
+        self._holders = np.empty((0, 0), dtype=np.int16)
+        self._noise = np.empty((2, 0))
+        """Of places and of rotations of the joints, as standard deviations along an axis; shape (2, joints)."""
+        self._shown, self._settled = 0, np.inf
+
+    def __call__(self, path: Path, moment: float, settled: float) -> Poses:
+        """Return the poses (joints,) of a moment of a path, which is not going to change until `settled`."""
+        poses, count = path.pose(moment), path.poses.shape[0]
+        if self._poses.shape[0] != count or (len(self._times) and path.moments[0] > self._times[-1]):
+            self._times, self._poses = np.empty(0), path.poses[:, :0]
+            self._holders = np.empty((count, 0), dtype=np.int16)
+            self._noise = np.zeros((2, count)) if self._noise.shape[1] != count else self._noise
+        self._take(path, settled)
+        at = int(np.searchsorted(self._times, moment)) - 1
+        window = slice(max(at - BEHIND, 0), at + 1 + AHEAD)
+        times = self._times[window]
+        if at < 0 or len(times) < FEWEST or np.median(np.diff(times)) > SPARSE:
+            return poses
+        if self._shown % EVERY == 0 and len(self._times) >= LEAST:
+            joint = self._shown // EVERY % count
+            self._noise[:, joint] = trembling(self._times, self._poses[joint])[:2]
+        self._shown += 1
+        holders = self._holders[:, window]
+        joints = np.flatnonzero(self._noise.any(axis=0) & (holders == holders[:, :1]).all(axis=1))
+        if not len(joints):
+            return poses
+        first = at - window.start
+        seen = self._poses[joints, window]
+        turns = turns_between(seen.quaternions[:, first, None], seen.quaternions)
+        values = np.concatenate((seen.positions - seen.positions[:, first, None], turns))
+        noise = self._noise[:, joints].ravel()
+        near = np.concatenate((np.ones(turns.shape[:2]), np.linalg.norm(turns, axis=-1) < FURTHEST))
+        moving = noise > 0.0
+        corrections = np.zeros(values.shape)
+        corrections[moving] = steadied(times, values[moving], noise[moving], near[moving]) - values[moving]
+        second = min(first + 1, len(times) - 1)
+        share = (moment - times[first]) / ((times[second] - times[first]) or 1.0)
+        slides, turns = np.split(corrections[:, first] * (1.0 - share) + corrections[:, second] * share, 2)
+        positions, quaternions = poses.positions.copy(), poses.quaternions.copy()
+        positions[joints] += slides
+        quaternions[joints] = turned(quaternions[joints], turns)
+        return Poses(positions, quaternions)
+
+    def _take(self, path: Path, settled: float) -> None:
+        """Remember the samples that are new, those at one moment once, and those anew that might have changed."""
+        stop = int(np.searchsorted(self._times, self._settled, side="right"))
+        kept, last = slice(max(stop - KNOWN, 0), stop), self._times[stop - 1] if stop else -np.inf
+        is_new = (path.moments > last) & (np.diff(path.moments, append=np.inf) > 0.0)
+        holders = np.broadcast_to(path.holders, (len(self._holders), len(is_new)))[:, is_new]
+        self._times = np.append(self._times[kept], path.moments[is_new])
+        self._poses = joined((self._poses[:, kept], path.poses[:, is_new]), axis=1)
+        self._holders = np.concatenate((self._holders[:, kept], holders), axis=1)
+        self._settled = settled
+
+
+def steadied(times: np.ndarray, values: np.ndarray, noise: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Return the likeliest of values (channels, n, 3) at times (n,) with noise (channels,), where `near` (channels, n)
+    counts.
+    """
+    c, count = coefficients(times, ORDER), len(times)
+    rows = np.arange(count - ORDER)
+    around = (np.abs(rows[:, None] - rows) <= AROUND).astype(float)
+    around /= around.sum(axis=0)
+    derivative = np.zeros((len(rows), count))
+    for column in range(ORDER + 1):
+        derivative[rows, rows + column] = c[:, column]
+    steps = (times[ORDER:] - times[:-ORDER]) / ORDER
+    least = SMOOTHEST * steps * np.einsum("nk,nk->n", c, c) * noise[:, None] ** 2
+    precisions = np.where(near, 1.0, NEARLY_NONE) / noise[:, None] ** 2
+
+    def density(found: np.ndarray, determined: np.ndarray | float) -> np.ndarray:
+        squares = steps * ((derivative @ found) ** 2).sum(axis=-1) / 3.0
+        return np.maximum(squares @ around / determined, least)
+
+    densities, found = density(values, 1.0), values
+    for _ in range(ROUNDS):
+        weights = steps / densities
+        matrix = (derivative.T * weights[:, None]) @ derivative
+        matrix[:, np.arange(count), np.arange(count)] += precisions
+        inverse = np.linalg.inv(matrix)
+        found = inverse @ (precisions[..., None] * values)
+        spread = (derivative @ inverse * derivative).sum(axis=-1)
+        determined = np.maximum(np.maximum(1.0 - spread * weights, 0.0) @ around, 1e-9)
+        densities = density(found, determined)
+    return found

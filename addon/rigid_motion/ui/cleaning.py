@@ -1,0 +1,138 @@
+"""*Clean Motion*: dense keys without their trembling, by a slider, beside what they were."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, cast
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from .. import animation
+from ..animation import Cleaning, Refused
+from ..animation.baking.cleaning import LEAST, STRENGTH, focus_of, pixels_of
+from ..animation.queries.polls import with_more_keys_than
+from ..animation.transforms import Transform
+from ..blender import BoolProperty, FloatProperty, StringProperty, with_properties
+from .overlay import cleaned
+from .reducing import OfRigsToo
+from .targets import OnTargets, is_key_editor
+from .wording import length, split
+
+MUCH = 0.25
+"""The part of the keys that has to stay as it is to be spoken of."""
+
+
+@with_properties
+class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
+    bl_idname = "rigid_motion.clean_motion"
+    bl_label = "Clean Motion"
+    bl_description = (
+        "Take the trembling and the spikes out of keys on every frame, and leave hits as they are: of motion capture, "
+        "trackers and solved cameras. Nothing is moved further than by so many times as it trembles, but spikes. "
+        "Restore Keys gives the keys from before back"
+    )
+    nothing_to_do = n_("Nothing here has a key on every frame, as a recording or a solved camera has")
+    with_work = staticmethod(partial(with_more_keys_than, count=LEAST - 1))
+
+    strength: float = FloatProperty(
+        name="Strength",
+        description="By how many times of its trembling anything may be moved at most. Spikes go where they have to",
+        default=STRENGTH,
+        min=0.01,
+        soft_max=5.0,
+        step=10,
+        options={"SKIP_SAVE"},
+    )
+    radius: float = FloatProperty(
+        name="Radius",
+        description="At 0 each object has the size of its own bounding box, and each bone that of what it moves",
+        min=0.0,
+        soft_max=10.0,
+        step=1.0,
+        precision=4,
+        subtype="DISTANCE",
+    )
+    nearest: float = FloatProperty(
+        name="Nearest",
+        description="How far away the nearest thing is that a camera looks at. At 0 that is its focus distance",
+        min=0.0,
+        soft_max=100.0,
+        subtype="DISTANCE",
+    )
+    selected: bool = BoolProperty(
+        name="Selected Keys",
+        description="Clean from the first to the last selected key alone, and join the rest",
+        options={"SKIP_SAVE"},
+    )
+    select_spikes: bool = BoolProperty(
+        name="Select Spikes",
+        description="Leave the keys selected that were spikes, or repeated the one before, where there are any",
+        default=True,
+    )
+    said: str = StringProperty(description="What became of the keys", options={"HIDDEN", "SKIP_SAVE"})
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = split(self.layout)
+        cameras = {getattr(target.carrier, "type", "") == "CAMERA" for target in self.each_target(context)}
+        layout.prop(self, "strength", slider=True)
+        for name in (
+            ("radius",) * (cameras != {True}) + ("nearest",) * (True in cameras) + ("selected", "select_spikes")
+        ):
+            layout.prop(self, name)
+        column = layout.column(align=True)
+        for line in self.said.split("; "):
+            column.label(text=line, translate=False)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Any:
+        self.selected = is_key_editor(context)
+        return self.execute(context)
+
+    def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        cleanings = animation.clean_motion(
+            targets,
+            self.strength,
+            self.radius or None,
+            nearest=self.nearest or None,
+            selected=self.selected,
+            select_spikes=self.select_spikes,
+            refused=refused,
+        )
+        cleaned.show(cleanings)
+        self.said = self._summary(context, cleanings) if cleanings else ""
+        return self.said
+
+    def _summary(self, context: bpy.types.Context, cleanings: list[Cleaning]) -> str:
+        """Return what became of all that was cleaned: lengths, or pixels where it is cameras."""
+        cameras: list[Any] = [one.transforms[0].carrier for one in cleanings]
+        spans = [(one.trembling, one.moved) for one in cleanings]
+        if all(isinstance(camera, bpy.types.Object) and camera.type == "CAMERA" for camera in cameras):
+            by = [pixels_of(camera, self.nearest or focus_of(camera)) for camera in cameras]
+            most = [
+                max(one * pixels for one, pixels in zip(ends, by, strict=True)) for ends in zip(*spans, strict=True)
+            ]
+            trembling, moved = (iface_("{count:.2g} pixels").format(count=pixels) for pixels in most)
+        else:
+            trembling, moved = (
+                length(cast(bpy.types.Scene, context.scene), max(ends), precision=3)
+                for ends in zip(*spans, strict=True)
+            )
+        parts = [
+            rpt_("trembles by {length}").format(length=trembling),
+            rpt_("moved at most {length}").format(length=moved),
+        ]
+        spikes, repeats = sum(one.spikes for one in cleanings), sum(one.repeats for one in cleanings)
+        if spikes:
+            text = n_("{count} keys were spikes") if spikes > 1 else n_("{count} key was a spike")
+            parts.append(rpt_(text).format(count=spikes))
+        if repeats:
+            parts.append(rpt_("repeated keys: {count}").format(count=repeats))
+        if (alone := max(one.alone for one in cleanings)) > MUCH:
+            text = rpt_("{percent:.0f} % of the keys stay nearly as they are: motion cannot be told from noise there")
+            parts.append(text.format(percent=100.0 * alone))
+        return "; ".join(parts)
+
+
+CLASSES = (RIGID_MOTION_OT_clean_motion,)

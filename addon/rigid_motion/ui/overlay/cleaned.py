@@ -1,0 +1,71 @@
+"""What *Clean Motion* does, in the viewport for as long as its settings can be changed: where things were, where they
+are now, and where spikes were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, cast
+
+import bpy
+import gpu
+import numpy as np
+
+from ...animation import Cleaning
+from ...blender import persistent
+from ...handlers import append_handlers, remove_handlers
+from .drawing import TICK, Pen, batch_of
+
+OPERATOR = "RIGID_MOTION_OT_clean_motion"
+
+_cleanings: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+"""Paths before and after (t, m, 3), and which of their places were bridged (t, m)."""
+
+_handle: object = None
+
+
+def show(cleanings: Iterable[Cleaning]) -> None:
+    """Show these from the next redraw on, in place of all others: of a rig the bones that nothing else hangs on."""
+    _cleanings.clear()
+    for one in cleanings:
+        above = {item.carrier.parent for item in one.transforms if item.is_part}
+        ends = np.array([item.carrier not in above for item in one.transforms])
+        _cleanings.append((one.before[ends], one.after[ends], one.bridged[ends]))
+
+
+def draw() -> None:
+    operators = cast(Any, bpy.context.window_manager).operators
+    if not _cleanings or not operators or operators[-1].bl_idname != OPERATOR:
+        return
+    pen = Pen(bpy.context)
+    gpu.state.blend_set("ALPHA")
+    gpu.state.program_point_size_set(True)
+    for before, after, bridged in _cleanings:
+        for lines, color in ((before, pen.look.native_color), (after, pen.look.mode_color)):
+            for line in lines:
+                pen.line(batch_of("LINE_STRIP", line), color, 0.6 * pen.look.line_width)
+        pen.dot(batch_of("POINTS", before[bridged]), pen.look.key_color, TICK)
+    gpu.state.program_point_size_set(False)
+    gpu.state.blend_set("NONE")
+
+
+@persistent
+def _forget(*_: object) -> None:
+    _cleanings.clear()
+
+
+HANDLERS = {"undo_post": _forget, "load_post": _forget}
+
+
+def register() -> None:
+    global _handle
+    append_handlers(HANDLERS)
+    if not bpy.app.background:
+        _handle = bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", "POST_VIEW")
+
+
+def unregister() -> None:
+    if not bpy.app.background:
+        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
+    remove_handlers(HANDLERS)
+    _cleanings.clear()

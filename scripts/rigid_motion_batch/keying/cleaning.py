@@ -1,0 +1,128 @@
+"""What `clean` does to a recording: all of its bodies, in a file like it beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from rigid_motion.motion import Cleaned, shell_error
+from rigid_motion.motion.quaternions import normalise
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.metrics import write_poses
+from rigid_motion_batch.recordings import ReadingOptions, Recording, Trajectory, TrajectoryError, read_trajectories
+from rigid_motion_batch.recordings.cleaning import cleaned_clip, described, fill_in, rows_of
+from rigid_motion_batch.recordings.clip_reading import make_clip
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.recordings import NoMotion
+
+from .planning import ALL
+from .records import FileProblem, is_made
+from .work import Doing
+
+SUFFIX = "-cleaned"
+"""Ending of the names of files that are written."""
+
+WRITTEN = 1e-6
+"""Of the unit of a file: how far what was written may be from what was meant, for it has so many digits."""
+
+TABLES = (".csv", ".tum")
+"""What any rigid motion can become."""
+
+
+@dataclass(frozen=True)
+class Cleaning:
+    """How far what may be moved: plain data."""
+
+    tolerance: Tolerance | None
+    """None where anything may be moved by any length."""
+
+    radius: float | None
+    """Metres around each body or joint; None for what others take."""
+
+    axes: str | None
+    reading: ReadingOptions
+
+
+class Body(NamedTuple):
+    """A body that was cleaned: its samples are these rows of the trajectory with this number."""
+
+    clip: Clip
+    found: Cleaned
+    trajectory: Trajectory
+    rows: np.ndarray
+    number: int
+
+
+def do_cleaning(doing: Doing, how: Cleaning) -> None:
+    """Clean the bodies of a recording that are meant, and write the file with them."""
+    job = doing.job
+    if job.file.stem.endswith(SUFFIX) and is_made(job.file):
+        doing.leave_alone("this was cleaned before")
+        return
+    with doing.failing():
+        try:
+            recording = read_trajectories(job.source, how.reading)
+            if recording.others and not recording.body and recording.trajectories[0].rest_body is None:
+                recording = read_trajectories(f"{job.file}{ALL}", how.reading)
+        except TrajectoryError as error:
+            if job.is_found and isinstance(error, NoMotion):
+                doing.leave_alone(error.problem)
+                return
+            doing.outcome.failed = doing.outcome.unreadable = True
+            doing.outcome.reason = str(error).removeprefix(f"{job.source}: ")
+            doing.note(str(error))
+            return
+        doing.require_free(job.output)
+        done: list[Body] = []
+        for number, trajectory in enumerate(recording.trajectories):
+            try:
+                axes = how.axes or recording.axes
+                clip = make_clip(
+                    trajectory, job.source, trajectory.name, axes, how.reading, measured=recording.measured
+                )
+            except TrajectoryError as error:
+                doing.say(f"{trajectory.name} stays as it is: {error.problem}")
+                continue
+            tolerance = how.tolerance.tolerance(clip) if how.tolerance else None
+            _, found = cleaned_clip(clip, tolerance, how.radius)
+            rows = rows_of(clip, trajectory)
+            body = f"{trajectory.name}: " if len(recording.trajectories) > 1 else ""
+            said = "; ".join(described(clip, found, rows))
+            written = trajectory.cells is None or trajectory.cells.times is not None
+            stays = "; its times stay as stamped" if "clock" in said and not written else ""
+            doing.say(f"{body}{said}{stays}")
+            done.append(Body(clip, found, trajectory, rows, number))
+        if not done:
+            raise FileProblem("no body of it has two poses that can be used: record at least 2")
+        if not doing.work.dry_run:
+            with doing.record.writing(job.output) as beside:
+                _write(beside, recording, done, how, job.output)
+        doing.outcome.objects += len(done)
+        doing.tell_written(job.output)
+
+
+def _write(beside: Path, recording: Recording, done: list[Body], how: Cleaning, output: Path) -> None:
+    """Write a file like the recording, or a table where that is what its name says, and see whether it reads so."""
+    clip, found = done[0].clip, done[0].found
+    if output.suffix.lower() != recording.path.suffix.lower():
+        if clip.rest_body or len(done) > 1:
+            raise FileProblem(f"a table holds one rigid motion: name a {recording.path.suffix} file with --output")
+        write_poses(beside, found.times, found.poses)
+        return
+    way_out = f"name a table, --output {output.stem}.csv, or clean all of the file"
+    if (cells := done[0].trajectory.cells) is None:
+        raise FileProblem(f"this cannot be written as it was read: {way_out}")
+    numbers = np.full(cells.shape, np.nan)
+    for each in done:
+        fill_in(numbers, each.clip, each.found, each.trajectory, each.rows)
+    cells.write(beside, numbers)
+    body = f":{recording.body}" if recording.body else ALL if len(recording.trajectories) > 1 else ""
+    again = read_trajectories(f"{beside}{body}", how.reading).trajectories
+    for each in done:
+        poses = again[each.number].poses[..., each.rows]
+        poses = replace(poses, quaternions=normalise(poses.quaternions))
+        if not shell_error(poses, each.found.poses).max() < WRITTEN:
+            raise FileProblem(f"this cannot be written so that it reads as it was meant: {way_out}")

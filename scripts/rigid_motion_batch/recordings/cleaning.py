@@ -1,0 +1,119 @@
+"""Clips without their trembling and spikes, and what is said of that: see `rigid_motion.motion.clean`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from rigid_motion.motion import Cleaned, clean, repair, standing
+from rigid_motion.motion.contacts import slide
+from rigid_motion_batch.command_line import listed
+
+from .clips import Clip
+from .recordings import Trajectory
+
+RIGID, JOINT = 0.1, 0.03
+"""Metres: the radius of what a hand holds, and of what is around a joint of a body."""
+
+LISTED = 8
+"""Rows that are named."""
+
+MUCH = 0.25
+"""The share of samples that are left alone from which on it is said."""
+
+
+def cleaned_clip(clip: Clip, tolerance: float | None = None, radius: float | None = None) -> tuple[Clip, Cleaned]:
+    """Return a clip without its trembling, and what was found; lengths are in metres."""
+    metres, body = clip.metres_per_unit, clip.rest_body
+    radius = radius or (JOINT if body else RIGID)
+    found = clean(
+        clip.times, clip.poses, tolerance and tolerance / metres, radius / metres, body.skeleton if body else None
+    )
+    return replace(clip, times=found.times, poses=found.poses), found
+
+
+def cleaned_first(clip: Clip, tolerance: float | None) -> Clip:
+    """Return a clip without its trembling, of whose repairs one says so."""
+    cleaned, found = cleaned_clip(clip, tolerance)
+    said = "; ".join(described(clip, found))
+    return replace(cleaned, repairs=(*clip.repairs, f"cleaned first: {said}; keys and errors are to what was cleaned"))
+
+
+def described(clip: Clip, found: Cleaned, rows: np.ndarray | None = None) -> Iterator[str]:
+    """Yield what was found of a clip, and how far it was moved; `rows` (n,) are those of its samples in the file."""
+    rows = np.arange(len(clip.times)) if rows is None else rows
+    metres, body = clip.metres_per_unit, clip.rest_body
+    position, rotation = (float(np.max(each)) for each in found.noise)
+    sizes = [f"{length(metres * position)}"] * (position > 0.0) + [f"{np.degrees(rotation):.2g} degrees"] * (
+        rotation > 0.0
+    )
+    worst = " where it does most" if body and sizes else ""
+    yield f"trembles by {' and '.join(sizes)}{worst}" if sizes else "no trembling to speak of"
+    replaced = found.spikes | found.repeats
+    within = np.where(_below(clip, replaced), 0.0, found.moved)
+    yield f"moved at most {length(metres * float(within.max()))}"
+    kinds = ("a spike", "spikes"), ("a repeat of the one before", "repeats of the one before")
+    for mask, (single, several) in zip((found.spikes, found.repeats), kinds, strict=True):
+        if mask.any():
+            some = rows[mask.reshape(-1, mask.shape[-1]).any(axis=0)]
+            what = f"1 row was {single}" if len(some) == 1 else f"{len(some)} rows were {several}"
+            yield f"{what}: {listed(list(map(str, some)), LISTED)}"
+    if (found.times != clip.times).any():
+        yield "clock trembles"
+    if (share := float(np.mean(found.alone))) > MUCH:
+        yield f"{share:.0%} is left nearly as it is, as motion cannot be told from noise there"
+    if body:
+        before, after = (clip.in_blender(body.skeleton.in_root_space(poses)) for poses in (clip.poses, found.poses))
+        stands = standing(found.times, after.positions)
+        slides = [length(slide(poses.positions, stands)) for poses in (before, after)]
+        yield (
+            f"feet that stand slide by {slides[1]}, and did by {slides[0]}" if stands.any() else "no foot surely stands"
+        )
+
+
+def _below(clip: Clip, marked: np.ndarray) -> np.ndarray:
+    """Return which samples hang on marked ones, or are."""
+    if clip.rest_body is None:
+        return marked
+    marked = marked.copy()
+    for joint in np.flatnonzero(clip.rest_body.parents >= 0).tolist():
+        marked[joint] |= marked[clip.rest_body.parents[joint]]
+    return marked
+
+
+def length(metres: float) -> str:
+    """Return a length as it is spoken of."""
+    return f"{metres:.2g} m" if metres >= 1.0 else f"{1e3 * metres:.2g} mm"
+
+
+def rows_of(clip: Clip, trajectory: Trajectory) -> np.ndarray:
+    """Return the samples of a trajectory that a clip of it has, shape (n,)."""
+    times, _, repairs = repair(trajectory.times, trajectory.poses, trajectory.rate)
+    kept = np.ones(len(trajectory.times), dtype=bool)
+    for done in repairs:
+        kept[done.rows] &= not done.fault.startswith("dropped")
+    first = int(np.searchsorted(times, clip.times[0]))
+    return np.flatnonzero(kept)[first : first + len(clip.times)]
+
+
+def fill_in(numbers: np.ndarray, clip: Clip, found: Cleaned, trajectory: Trajectory, rows: np.ndarray) -> None:
+    """Fill in numbers (rows, columns) of a file with what was moved of a clip, the samples `rows` of a trajectory."""
+    cells = trajectory.cells
+    assert cells is not None
+    poses = replace(
+        trajectory.poses, positions=trajectory.poses.positions.copy(), quaternions=trajectory.poses.quaternions.copy()
+    )
+    changed = np.zeros(poses.shape, dtype=bool)
+    changed[..., rows] = (found.poses.positions != clip.poses.positions).any(axis=-1)
+    changed[..., rows] |= np.abs(found.poses.quaternions - clip.poses.quaternions).max(axis=-1) > 1e-12
+    poses.positions[..., rows, :], poses.quaternions[..., rows, :] = found.poses.positions, found.poses.quaternions
+    moved = changed.reshape(-1, changed.shape[-1]).any(axis=0)
+    with np.errstate(invalid="ignore"):
+        for column, values in cells.numbers(poses).items():
+            numbers[cells.rows[moved], column] = values[moved]
+    if cells.times and (found.times != clip.times).any():
+        later = np.interp(trajectory.times, clip.times, found.times - clip.times)
+        for column, values in cells.times(trajectory.times + later).items():
+            numbers[cells.rows, column] = values

@@ -1,0 +1,230 @@
+"""Cleaned keys, read back from the evaluated scene: nearer to the truth, moved by no more than was said, and the way
+back. Where keys cannot be cleaned, it says why and the way out, and changes nothing.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import (
+    Refused,
+    bake_poses,
+    channelbag_of,
+    clean_motion,
+    discard_dense_keys,
+    key_frames,
+    reduce_keys_of,
+    restore_keys,
+    unbake,
+    write_channel,
+)
+from rigid_motion.animation.baking.cleaning import focus_of, pixels_of
+from rigid_motion.animation.transforms.sizes import reaches_of
+from rigid_motion.motion import Poses, shell_error
+from rigid_motion.motion.quaternions import turned
+from rigid_motion_batch.recordings.world_poses import read_poses
+from tests.animation.bones.poses import shown_poses
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.scenes import key, new_object
+from tests.balls import largest_displacements
+from tests.rigs.recorded import FRAMES, recorded_rig
+
+COUNT, RADIUS, SIZE, TURN = 300, 0.1, 1e-3, 5e-3
+SPIKE = 120
+
+
+def shaky(obj: bpy.types.Object, *, spike: float = 0.0) -> tuple[np.ndarray, Poses]:
+    """Give an object dense keys that tremble, and a spike; return the frames, and what it was without."""
+    random, frames = np.random.default_rng(4), np.arange(1.0, COUNT + 1.0)
+    places = np.stack((np.sin(frames / 20.0), np.cos(frames / 31.0), frames / 500.0), axis=1)
+    angles = np.stack((np.sin(frames / 40.0), 0.0 * frames, np.cos(frames / 50.0)), axis=1)
+    truth = Poses(places, turned(np.tile((1.0, 0.0, 0.0, 0.0), (COUNT, 1)), angles))
+    places = places + SIZE * random.normal(size=places.shape)
+    places[SPIKE] += spike
+    turns = turned(truth.quaternions, TURN * random.normal(size=places.shape))
+    bake_poses(obj, frames, Poses(places, turns), key_type="KEYFRAME")
+    return frames, truth
+
+
+def rms(errors: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def selected_frames(obj: bpy.types.Object) -> list[list[float]]:
+    keys = (fcurve.keyframe_points for fcurve in curves_of(obj).values())
+    return [[key.co[0] for key in points if key.select_control_point] for points in keys]
+
+
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY", "AXIS_ANGLE"])
+@pytest.mark.parametrize("strength", [3.0, 0.5])
+def test_it_trembles_less_and_is_moved_by_no_more_than_was_said(live_file, rotation_mode, strength):
+    obj = new_object(rotation_mode=rotation_mode)
+    obj.delta_location, obj.delta_rotation_euler, obj.delta_scale = (0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (1.0, 1.0, 1.0)
+    obj.delta_rotation_quaternion = (0.8, 0.0, 0.6, 0.0)
+    frames, _ = shaky(obj, spike=0.1)
+    before = read_poses(obj, frames)
+    (cleaning,) = clean_motion(obj, strength, RADIUS)
+    after = read_poses(obj, frames)
+    moved = shell_error(after, before, RADIUS)
+    assert (cleaning.spikes, cleaning.repeats) == (1, 0)
+    assert moved[SPIKE] > 0.1
+    assert np.delete(moved, SPIKE).max() == pytest.approx(cleaning.moved, rel=1e-3)
+    assert cleaning.moved <= strength * cleaning.trembling * (1.0 + 1e-6)
+    # By any point within the radius: of places, and of rotations there.
+    assert cleaning.trembling == pytest.approx(3.0**0.5 * SIZE + 2.0**0.5 * TURN * RADIUS, rel=0.15)
+    assert key_frames(obj).tolist() == frames.tolist()
+    assert selected_frames(obj)[:6] == [[frames[SPIKE]]] * 6
+
+
+def test_it_is_nearer_to_what_it_was(live_file):
+    obj = new_object()
+    frames, truth = shaky(obj, spike=0.1)
+    before = shell_error(read_poses(obj, frames), truth, RADIUS)
+    clean_motion(obj, radius=RADIUS)
+    after = shell_error(read_poses(obj, frames), truth, RADIUS)
+    assert rms(after) < 0.5 * rms(np.delete(before, SPIKE))
+    assert after[SPIKE] < 0.003
+
+
+def test_all_keys_come_back_first_those_that_were_reduced_and_then_those_that_were_cleaned(live_file):
+    obj = new_object()
+    shaky(obj, spike=0.1)
+    shaken = snapshot(obj)
+    clean_motion(obj, radius=RADIUS, select_spikes=False)
+    cleaned = snapshot(obj)
+    assert cleaned != shaken
+    reduce_keys_of(obj, "motor_spline", 0.002, RADIUS)
+    assert len(key_frames(obj)) < COUNT / 5
+    restore_keys(obj)
+    assert snapshot(obj) == cleaned
+    with pytest.raises(Refused, match="Tool is not baked"):
+        unbake(obj)
+    restore_keys(obj)
+    assert snapshot(obj) == shaken
+    assert len(bpy.data.actions) == 1
+    with pytest.raises(Refused, match="neither reduced nor cleaned"):
+        restore_keys(obj)
+    clean_motion(obj, radius=RADIUS, select_spikes=False)
+    discard_dense_keys(obj)
+    assert len(bpy.data.actions) == 1
+    assert snapshot(obj) == cleaned
+
+
+def test_selected_keys_alone_are_cleaned_and_join_the_rest(live_file):
+    obj = new_object()
+    frames, truth = shaky(obj, spike=0.1)
+    before, shaken = read_poses(obj, frames), snapshot(obj)
+    for fcurve in curves_of(obj).values():
+        for point in fcurve.keyframe_points:
+            point.select_control_point = 101.0 <= point.co[0] <= 200.0
+    (cleaning,) = clean_motion(obj, radius=RADIUS, selected=True)
+    after = read_poses(obj, frames)
+    moved = shell_error(after, before, RADIUS)
+    assert cleaning.spikes == 1
+    assert not moved[:101].any()
+    assert not moved[199:].any()
+    assert moved[101:104].max() < 0.5 * rms(moved[110:190])
+    within = slice(110, 190)
+    errors = (shell_error(poses[within], truth[within], RADIUS) for poses in (after, before))
+    assert rms(next(errors)) < 0.6 * rms(np.delete(next(errors), SPIKE - 110))
+    assert shaken.keys() == snapshot(obj).keys()
+    restore_keys(obj)
+    assert snapshot(obj) == shaken
+
+
+def displacements(rig: bpy.types.Object, before: dict, after: dict) -> np.ndarray:
+    """How far any point of each bone's ball was displaced in the rig, shape (bones, n)."""
+    reaches = reaches_of(rig)
+    return np.array(
+        [
+            largest_displacements(
+                after[name][:, :3, 3] - shown[:, :3, 3], (after[name] - shown)[:, :3, :3] * reaches[name]
+            )
+            for name, shown in before.items()
+        ]
+    )
+
+
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "YZX"])
+@pytest.mark.parametrize("chosen", [None, ("Spine", "Hand.L"), ("Arm.R",)], ids=["all", "apart", "one"])
+@pytest.mark.parametrize("strength", [3.0, 0.3])
+def test_no_bone_is_moved_by_more_whatever_it_hangs_on(live_file, rotation_mode, chosen, strength):
+    rig = recorded_rig(rotation_mode)
+    rig.scale = (2.0, 2.0, 2.0)
+    rig.data.bones["Arm.R"].use_inherit_rotation = False
+    bpy.context.view_layer.update()
+    (before,) = shown_poses([rig], FRAMES)
+    shaken = snapshot(rig)
+    bones = [bone for bone in rig.pose.bones if chosen is None or bone.name in chosen]
+    (cleaning,) = clean_motion(bones, strength)
+    assert not cleaning.spikes
+    (after,) = shown_poses([rig], FRAMES)
+    moved = 2.0 * displacements(rig, before, after)
+    assert 0.0 < moved.max() == pytest.approx(cleaning.moved, rel=1e-3)
+    assert cleaning.moved <= strength * cleaning.trembling * (1.0 + 1e-5)
+    kept = {
+        name: keys for name, keys in snapshot(rig).items() if chosen and not any(f'"{b}"' in name[0] for b in chosen)
+    }
+    assert all(shaken[name] == keys for name, keys in kept.items())
+    if strength > 1.0:
+        name = bones[-1].name
+        jerks = [np.abs(np.diff(poses[name][:, :3, 1], n=4, axis=0)).mean() for poses in (before, after)]
+        # An arm in between that is not cleaned goes on trembling.
+        assert jerks[1] < (0.9 if chosen == ("Spine", "Hand.L") else 0.7) * jerks[0]
+
+
+def test_cameras_are_cleaned_in_pixels_of_their_pictures(live_file):
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 1920, 1080, 100
+    camera = new_object("Camera", data=bpy.data.cameras.new("Camera"))
+    camera.data.dof.focus_distance = 4.0
+    frames, _ = shaky(camera)
+    (cleaning,) = clean_motion(camera)
+    assert cleaning.trembling == pytest.approx(3.0**0.5 * SIZE + 2.0**0.5 * TURN * 4.0, rel=0.15)
+    assert focus_of(camera) == 4.0
+    # The centre of the picture, and a corner, where a turn about the camera's axes shows most.
+    at_centre = 1920.0 * camera.data.lens / camera.data.sensor_width / 4.0
+    corner = 1.0 + (camera.data.sensor_width / camera.data.lens / 2.0) ** 2 * (1.0 + (9.0 / 16.0) ** 2)
+    assert pixels_of(camera, 4.0) == pytest.approx(at_centre * corner, rel=1e-4)
+    restore_keys(camera)
+    (nearer,) = clean_motion(camera, nearest=2.0)
+    scene.frame_set(int(frames[-1]))
+    assert nearer.after.shape == (1, len(frames), 3)
+    assert nearer.after[0, -1] == pytest.approx(np.array(camera.matrix_world.translation), abs=1e-5)
+    restore_keys(camera)
+    channels = channelbag_of(camera).fcurves
+    for index in range(3):
+        channels.remove(channels.find("location", index=index))
+    (tripod,) = clean_motion(camera, nearest=2.0)
+    scene.frame_set(int(frames[-1]))
+    place = np.array(camera.matrix_world)[:3] @ (0.0, 0.0, -2.0, 1.0)
+    assert tripod.after[0, -1] == pytest.approx(place, abs=1e-5)
+    empty = new_object("Target")
+    empty.location = (0.0, 0.0, 0.0)
+    camera.data.dof.focus_object = empty
+    assert focus_of(camera) == pytest.approx(camera.matrix_world.translation.length)
+
+
+def test_what_has_no_trembling_or_no_dense_keys_says_so_and_others_are_cleaned(live_file):
+    calm, sparse, few, held = (new_object(name) for name in ("Calm", "Sparse", "Few", "Shaky"))
+    write_channel(calm, "location", FRAMES, np.stack([FRAMES, FRAMES**2 / 90.0, 0.0 * FRAMES], axis=1))
+    key(sparse, np.arange(1.0, 300.0, 10.0))
+    key(few, (1.0, 2.0, 3.0))
+    shaky(held)
+    before, refused = {obj: snapshot(obj) for obj in (calm, sparse, few)}, []
+    (cleaning,) = clean_motion([calm, sparse, few, held], refused=refused)
+    assert [one.name for one in cleaning.transforms] == ["Shaky"]
+    assert sorted(map(str, refused)) == [
+        "Calm does not tremble: there is nothing to clean",
+        "Few has 3 keys of location and rotation: to tell trembling from motion takes 10",
+        "Sparse has keys 10 frames apart: only recordings can be cleaned, with keys on every frame",
+    ]
+    assert all(snapshot(obj) == keys for obj, keys in before.items())
+    for fcurve in curves_of(held).values():
+        fcurve.keyframe_points.foreach_set("select_control_point", [False] * len(fcurve.keyframe_points))
+    with pytest.raises(Refused, match="no key of location, rotation or scale is selected"):
+        clean_motion(held, selected=True)
+    with pytest.raises(Refused, match="more than 0 times their trembling, not 0"):
+        clean_motion(held, 0.0)
