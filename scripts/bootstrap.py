@@ -3,8 +3,11 @@
     python scripts/bootstrap.py compare                     compare the modes, on the recordings in assets/
     python scripts/bootstrap.py compare hand.csv --axes unity
     python scripts/bootstrap.py inspect hand.csv            say what is in a recording, and what looks wrong
+    python scripts/bootstrap.py clean hand.csv              take the trembling and the spikes out of a recording
     python scripts/bootstrap.py paper                       reproduce the paper's figures and its table
     python scripts/bootstrap.py test                        run the tests
+    python scripts/bootstrap.py test --quick                run some of each file of tests, in a minute
+    python scripts/bootstrap.py test -m "not blender"       run those that need no Blender
     python scripts/bootstrap.py test --blender 4.5.15       run the tests on another Blender
     python scripts/bootstrap.py bake shot.blend             turn in-betweens of .blend files into real keys, or back
     python scripts/bootstrap.py reduce walk.glb             keep few keys, in glTF and .blend files and of recordings
@@ -17,13 +20,13 @@
     python scripts/bootstrap.py benchmark                   measure how fast the modes are
     python scripts/bootstrap.py build                       build the extension, dist/rigid_motion-VERSION.zip
     python scripts/bootstrap.py docs                        build the documentation as a site, dist/site
-    python scripts/bootstrap.py types                       check types, and that no package has more errors than before
+    python scripts/bootstrap.py types                       check types, with Python 3.12 or later as NumPy asks for
     python scripts/bootstrap.py environment [DIR]           set up all but Blender, for compare.py inside a Blender
     python scripts/bootstrap.py completion bash             print what has a shell complete `rigid-motion`
 
 The packages go into .venv/ of this checkout; the first run downloads about 500 MB, of which Blender is 400. Where there
-is no Blender for a Python, the commands run that need none: compare --no-video, inspect, stream, tasks. No --help
-needs it, nor does reduce for glTF files. All arguments after the command are passed on to it: `python
+is no Blender for a Python, the commands run that need none: compare --no-video, inspect, clean, stream, tasks. No
+--help needs it, nor does reduce for glTF files. All arguments after the command are passed on to it: `python
 scripts/bootstrap.py compare --help` shows the options of compare.
 """
 
@@ -46,6 +49,7 @@ PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
     "inspect": (["-m", "rigid_motion_batch", "inspect"], ()),
+    "clean": (["-m", "rigid_motion_batch", "clean"], ()),
     "paper": ([ROOT / "scripts" / "research", "paper"], ("benchmark",)),
     "test": (["-m", "pytest"], ("test", "farm", "docs", "stream")),
     "benchmark": ([ROOT / "scripts" / "research", "benchmark"], ("benchmark",)),
@@ -59,7 +63,7 @@ COMMANDS = {
     "examples": ([ROOT / "examples" / "make_examples.py"], ()),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
     "docs": ([ROOT / "scripts" / "build_site.py"], ("benchmark", "docs")),
-    "types": ([ROOT / ".ci" / "check_types.py"], ("types",)),
+    "types": (["-m", "mypy"], ("types",)),
     "completion": (["-m", "rigid_motion_batch", "completion"], ()),
 }
 """Command to what Python runs for it, and the dependency groups of pyproject.toml that it needs."""
@@ -67,12 +71,18 @@ COMMANDS = {
 ENVIRONMENT = "environment"
 """Sets up all but Blender, and prints the folder."""
 
-WITHOUT_BLENDER = ("inspect", "stream", "tasks", "dask", "openjd", "completion", "types")
+WITHOUT_BLENDER = ("inspect", "clean", "stream", "tasks", "dask", "openjd", "completion", "types")
 """Need no Blender."""
+
+IN_ROOT = ("test", "types")
+"""Run in the folder of the project."""
 
 FILMING = ("compare", "bundle")
 NOT_FILMING = {"--no-video", "--blender"}
 """Commands that need none with one of these options."""
+
+TESTED_ALONE = "not blender"
+"""How the marks begin that choose tests which need none, so they run where there is none."""
 
 DRAWING = "paper"
 """Needs Blender for its --help too."""
@@ -113,9 +123,10 @@ def main(arguments: list[str]) -> int:
             return _fail(f"--blender takes one of {', '.join(here)} with Python {PYTHON}")
     alone = command != DRAWING and bool({"--help", "-h"} & {*rest})
     alone = alone or (command == "reduce" and _is_without_blender(rest))
-    if alone and not (blender and _folder(blender).exists()):
+    tested_alone = command == "test" and any(argument.startswith(TESTED_ALONE) for argument in rest)
+    if tested_alone or (alone and not (blender and _folder(blender).exists())):
         blender = None
-    needed = not (alone or command in WITHOUT_BLENDER or (command in FILMING and NOT_FILMING & {*rest}))
+    needed = not (alone or tested_alone or command in WITHOUT_BLENDER or (command in FILMING and NOT_FILMING & {*rest}))
     if needed and blender is None:
         without = "; or add --no-video, for the numbers and the report" if command in FILMING else ""
         fitting = " or ".join(known)
@@ -128,10 +139,10 @@ def main(arguments: list[str]) -> int:
         python = install(blender, _requirements(project, blender, groups))
     if python is None or (needed and not _blender_starts(python)):
         return 1
-    # Paths that a user gives count from where the user is; those of pytest from where its configuration is.
-    folder = ROOT if command == "test" else None
+    # Paths that a user gives count from where the user is; those of pytest and mypy from where their configuration is.
+    folder = ROOT if command in IN_ROOT else None
     variables = environment(os.environ)
-    if run[0] == "-m" and command != "test":
+    if run[0] == "-m" and command not in IN_ROOT:
         variables["PYTHONPATH"] = os.pathsep.join([str(ROOT / "scripts"), *filter(None, [variables.get("PYTHONPATH")])])
     return _become([python, *run, *rest], folder, variables)
 
@@ -247,7 +258,7 @@ def _requirements(project: dict, blender: str | None, groups: tuple[str, ...]) -
 
 
 def _blender_starts(python: Path) -> bool:
-    tried = subprocess.run([str(python), "-c", "import bpy"], capture_output=True, text=True)
+    tried = subprocess.run([str(python), "-c", "import bpy"], capture_output=True, text=True, errors="replace")
     if tried.returncode != 0:
         sys.path.insert(0, str(ROOT / "scripts"))
         from rigid_motion_batch.system_libraries import way_out

@@ -5,8 +5,11 @@ Nothing here needs Blender: `tests/motion` runs with NumPy and pytest alone. Wha
 `pytest_cmdline_main`.
 """
 
+import functools
 import os
+import re
 import signal
+import unittest
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -20,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 os.environ["PYTHONPATH"] = os.pathsep.join(str(ROOT / folder) for folder in ("", "addon", "scripts"))
 """Processes that tests start find what the tests find; pytest has put these on the path of its own alone."""
 
-EVERY_TEST, THOROUGH = "RIGID_MOTION_EVERY_TEST", "RIGID_MOTION_THOROUGH"
+EVERY_TEST, THOROUGH, QUICK = "RIGID_MOTION_EVERY_TEST", "RIGID_MOTION_THOROUGH", "RIGID_MOTION_QUICK"
 
 WORKERS = 8
 """The most that are started: each is a Blender of half a gigabyte, which first collects all tests."""
@@ -34,11 +37,21 @@ BLENDERS_OWN = ("OCIO", "SYCL_UR_USE_LEVEL_ZERO_V2")
 OURS = {"assets", "examples", "research", "rigid_motion", "rigid_motion_batch", "tests"}
 """A part of these that is not there is a fault, and no missing library."""
 
-IN_BLENDER = {"empty_file", "human"}
-"""Fixtures that begin a new file."""
+IN_BLENDER = {"empty_file", "human", "extension_zip", "models"}
+"""Fixtures that need Blender's module."""
+
+NEEDS_BLENDER = re.compile(
+    r"""^(import|from) (bpy|mathutils)|^\w+ = pytest\.importorskip\("bpy|^pytestmark = \[?\s*pytest\.mark\.blender""",
+    re.MULTILINE,
+)
+"""How a file of tests, or the `conftest.py` of a folder, says that all of it needs Blender's module."""
 
 LOST = pytest.StashKey[bool]()
 """Whether a worker ended before its time."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--quick", action="store_true", help="run the first test of each file, with few of many cases")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -94,8 +107,10 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """A shell lets what it runs in the background ignore Ctrl-C, and all that is started from there."""
+    """Begin: a shell lets what it runs in the background ignore Ctrl-C, and all that is started from there."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    if config.option.quick:
+        os.environ[QUICK] = "1"
 
 
 @pytest.hookimpl(trylast=True)
@@ -119,20 +134,41 @@ def pytest_make_collect_report(collector: pytest.Collector):
     return report
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave files alone that need Blender where those are asked for that need none."""
+    return ("not blender" in config.option.markexpr and needs_blender(collection_path)) or None
+
+
+@functools.cache
+def needs_blender(path: Path) -> bool:
+    """Return whether a file of tests needs Blender's module, or a folder, whose `conftest.py` says it for all in it."""
+    file = path / "conftest.py" if path.is_dir() else path
+    says = file.suffix == ".py" and file.is_file() and NEEDS_BLENDER.search(file.read_text(encoding="utf-8"))
+    return bool(says) or (path != ROOT and ROOT in path.parents and needs_blender(path.parent))
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what needs Blender in this process, and what opens windows of it; leave out what is slow.
+    """Mark what needs Blender, and what opens windows of it; leave out what is slow.
 
     Slow tests run where every test has to, in thorough runs, where `-m` chooses, and where their file is named alone.
+    A quick run takes the first test of each file that is not slow, nor is once enough.
     """
     for item in items:
-        if hasattr(item.module, "bpy") or IN_BLENDER & {*item.fixturenames}:
+        if needs_blender(item.path) or IN_BLENDER & {*item.fixturenames}:
             item.add_marker("blender")
         if (ROOT / "tests" / "gui") in item.path.parents:
             item.add_marker("gui")
-    asked_for = os.environ.get(EVERY_TEST) or os.environ.get(THOROUGH) or config.option.markexpr
-    if not asked_for and _has_several_files(config):
-        config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("slow")])
-        items[:] = [item for item in items if not item.get_closest_marker("slow")]
+    asked_for = os.environ.get(EVERY_TEST) or os.environ.get(THOROUGH) or "slow" in config.option.markexpr
+    left_out = {"slow"} if not asked_for and _has_several_files(config) else set()
+    if config.option.quick:
+        left_out = {"slow", "once"}
+    kept = [item for item in items if not any(map(item.get_closest_marker, left_out))]
+    if config.option.quick:
+        # Random edits take their time however few they are.
+        kept = [item for item in kept if not (item.cls and issubclass(item.cls, unittest.TestCase))]
+        kept = [*{item.path: item for item in reversed(kept)}.values()][::-1]
+    config.hook.pytest_deselected(items=[*{*items} - {*kept}])
+    items[:] = kept
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

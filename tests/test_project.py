@@ -3,6 +3,7 @@
 import ast
 import itertools
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -32,7 +33,7 @@ FLOORS = {
 }
 """What each floor of the extension may import beside the standard library and the floors below."""
 
-GROUND = {"handlers"}
+GROUND = {"blender", "handlers"}
 """Modules below all floors, which import none of them."""
 
 
@@ -47,6 +48,7 @@ def imported(path: Path) -> set[str]:
     return result
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("command", [["check"], ["format", "--check"]], ids=["lint", "format"])
 def test_style(command):
     done = subprocess.run([sys.executable, "-m", "ruff", *command, str(ROOT)], capture_output=True, text=True)
@@ -89,12 +91,32 @@ def test_the_blenders_that_are_tested_are_named_everywhere():
     pairs = {(version, python) for python, versions in tested.items() for version in versions}
     assert {*re.findall(r'blender: "(.+?)", python: "(.+?)"', workflow)} == pairs
     newest = [*tested.values()][-1][0]
-    assert f"matrix.blender == '{newest}' && '1'" in workflow
+    assert re.findall(r'blender: "(.+?)", .*thorough', workflow) == [newest]
     for page in ("README.md", "CHANGELOG.md", "docs/index.md", "docs/animators.md"):
         named = re.search(
             r"Blender\S* (4\.5 LTS(?:,| or| and| LTS| [\d.]+)+)", (ROOT / page).read_text(encoding="utf-8")
         )[1]
         assert {*re.findall(r"\d+\.\d+", named)} == {version.rpartition(".")[0] for version, _ in pairs}, page
+
+
+RELEASED = "# Changelog\n\n## 1.2.0 - 2026-12-01\n\n- New\n\n## 1.1.0 - 2026-11-01\n\n- Old\n"
+
+
+@pytest.mark.parametrize(
+    ("tag", "changelog", "said"),
+    [
+        ("v1.1.0", RELEASED, "has version 1.2.0: tag v1.2.0"),
+        ("v1.2.0", RELEASED.replace("2026-12-01", "unreleased"), "## 1.2.0 - YYYY-MM-DD"),
+        ("v1.2.0", RELEASED.replace("- New\n\n", ""), "## 1.2.0 - YYYY-MM-DD"),
+    ],
+    ids=["another version", "no day", "no entry"],
+)
+def test_a_tag_is_released_with_what_the_changelog_says_of_it_or_refused(tag, changelog, said):
+    notes_of = runpy.run_path(str(ROOT / ".ci" / "release_notes.py"))["notes_of"]
+    manifest = 'version = "1.2.0"'
+    assert notes_of("v1.2.0", manifest, RELEASED) == "- New\n"
+    with pytest.raises(ValueError, match=re.escape(said)):
+        notes_of(tag, manifest, changelog)
 
 
 @pytest.mark.parametrize("floor", FLOORS)

@@ -9,6 +9,8 @@ import pytest
 
 from tests.conftest import EVERY_TEST
 
+pytestmark = pytest.mark.once
+
 SLOW = "import pytest\n@pytest.mark.slow\ndef test_slow(): pass"
 SKIPPED = "import pytest\ndef test_skipped(): pytest.skip()"
 LOST_AT_THE_END = """
@@ -43,3 +45,9 @@ def test_a_run_is_red_if_a_test_of_it_was_skipped_or_a_worker_was_lost(tmp_path,
     done = run(tmp_path, files, "-n", "1", "--max-worker-restart", "0")
     assert said in done.stdout, done.stdout + done.stderr
     assert done.returncode == 1
+
+
+def test_a_quick_run_takes_the_first_test_of_each_file_that_is_not_slow(tmp_path):
+    more = "\ndef test_second(): pass\ndef test_third(): assert False"
+    done = run(tmp_path, {"test_a.py": SLOW + more, "test_b.py": more}, "-n", "0", "--quick")
+    assert "2 passed, 3 deselected" in done.stdout, done.stdout + done.stderr

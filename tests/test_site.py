@@ -14,6 +14,8 @@ from rigid_motion import motion
 from rigid_motion_batch.cli.commands import COMMANDS
 from scripts import build_site
 
+pytestmark = pytest.mark.once
+
 LOADING = ("src", "data", "poster")
 """Attributes of what a browser fetches when it opens a page, beside stylesheets and icons."""
 

@@ -12,8 +12,8 @@ Case = TypeVar("Case")
 
 THOROUGH = bool(os.environ.get("RIGID_MOTION_THOROUGH"))
 
-SHARE = 4
-"""Of so many cases one is tried by default."""
+SHARE = 40 if os.environ.get("RIGID_MOTION_QUICK") else 4
+"""Of so many cases one is tried by default, and in a quick run."""
 
 
 def tried(cases: int) -> int:

@@ -114,7 +114,9 @@ def append_lines(path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
     """Add objects to a file with a line of JSON for each: of two who do so at the same time each line stays whole."""
     text = "".join(f"{json.dumps(line)}\n" for line in lines)
     path.parent.mkdir(exist_ok=True)
-    opened = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+    # Windows would write CR LF for LF.
+    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_BINARY", 0)
+    opened = os.open(path, flags, 0o666)
     try:
         os.write(opened, f"\n{text}".encode())  # A line that was cut off ends here.
     finally:

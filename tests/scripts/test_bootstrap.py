@@ -79,6 +79,12 @@ def test_no_blender_is_set_up_for_the_help_of_a_command(installed, command):
     assert installed == [None, None]
 
 
+@pytest.mark.parametrize(("marks", "is_needed"), [("not blender and not once", False), ("blender", True)])
+def test_tests_that_need_no_blender_run_without_one(installed, marks, is_needed):
+    assert bootstrap.main(["test", "-m", marks, "tests/motion"]) == 0
+    assert [blender is not None for blender in installed] == [is_needed]
+
+
 HELPS = """
 import sys
 sys.modules["bpy"] = None

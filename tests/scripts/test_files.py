@@ -1,8 +1,9 @@
+import os
 from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.files import replacing, write_text, written_beside
+from rigid_motion_batch.files import append_lines, replacing, write_text, written_beside
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_beside_it(tmp_path: Path) -> None:
@@ -76,3 +77,15 @@ def test_folders_that_were_made_for_nothing_are_gone(tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError), written_beside(tmp_path / "there" / "new" / "folder" / "keys.csv"):
         raise ZeroDivisionError
     assert [path.name for path in tmp_path.rglob("*")] == ["there"]
+
+
+def test_lines_are_appended_as_they_are_on_systems_that_have_ends_of_their_own(tmp_path, monkeypatch):
+    opened, binary = [], 1 << 30
+    monkeypatch.setattr(os, "O_BINARY", binary, raising=False)
+    plain = os.open
+    monkeypatch.setattr(
+        os, "open", lambda path, flags, mode: opened.append(flags) or plain(path, flags & ~binary, mode)
+    )
+    append_lines(tmp_path / "lines", [{"a": 1}])
+    assert all(flags & binary for flags in opened)
+    assert (tmp_path / "lines").read_bytes() == b'\n{"a": 1}\n'

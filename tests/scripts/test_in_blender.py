@@ -11,6 +11,8 @@ import pytest
 from rigid_motion_batch.cli import in_blender
 from rigid_motion_batch.cli.in_blender import NoEnvironment, elsewhere
 
+pytestmark = pytest.mark.blender
+
 BLENDER = os.environ.get("BLENDER") or shutil.which("blender")
 
 HERE = Path(sys.executable).parents[1]

@@ -13,6 +13,8 @@ from tests.gltf.making import Making, walk
 from tests.scripts.reducing import hand_made, listed, object_file, run, write_csv
 from tests.scripts.stopping import ROOT, start
 
+pytestmark = pytest.mark.blender
+
 KILL = "os.kill(os.getpid(), signal.SIGKILL)"
 
 ON_LINUX = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux has them")

@@ -28,6 +28,7 @@ def imported(room: str) -> tuple[set[str], set[str]]:
     return packages - set(sys.stdlib_module_names), parts
 
 
+@pytest.mark.blender
 @pytest.mark.parametrize("room", ["recordings", "analysis", "scenes"])
 def test_a_worker_needs_numpy_and_blender_alone(room: str) -> None:
     packages, parts = imported(room)

@@ -16,7 +16,10 @@ from tests.scripts.stopping import CRASH, alive, descendants, start
 SOON = 5.0
 """Seconds: on a machine with nothing else to do it is 1.3."""
 
-pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux has them")
+pytestmark = [
+    pytest.mark.blender,
+    pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux has them"),
+]
 
 
 def files(folder: Path) -> list[str]:

@@ -85,7 +85,7 @@ def _blender_ext(*arguments: str) -> None:
     tool = scripts / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
     tags = scripts / "modules" / "_bpy_internal" / "extensions" / "tags.py"
     command = [sys.executable, str(tool), *arguments, f"--valid-tags={tags}"]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace")
     if done.returncode != 0:
         raise BuildError(f"Blender {bpy.app.version_string} refuses the extension:\n{done.stdout}{done.stderr}".strip())
 

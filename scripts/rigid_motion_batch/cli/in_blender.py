@@ -80,7 +80,7 @@ def _lacks(python: Path) -> str:
     # Without what would have it look for modules in this one.
     environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
     try:
-        tried = subprocess.run([python, "-c", code], capture_output=True, text=True, env=environment)
+        tried = subprocess.run([python, "-c", code], capture_output=True, text=True, errors="replace", env=environment)
     except OSError as error:
         return str(error)
     return (tried.stderr.strip() or "it does not start").splitlines()[-1] if tried.returncode else ""

@@ -88,7 +88,7 @@ class Store:
         if self.alone and not any(self.own.glob("*/*")):
             shutil.rmtree(self.own, ignore_errors=True)
         self._lock.release()
-        for folder in self._missing:
+        for folder in (self.own, *self._missing):  # Windows deletes no lock that is held.
             with suppress(OSError):  # There is something in it.
                 folder.rmdir()
 

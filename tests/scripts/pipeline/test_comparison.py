@@ -82,6 +82,7 @@ def test_tables_are_published_and_their_numbers_are_those_of_the_analysis(output
     assert all(repr(row.rms_shell_m) in line for row, line in zip(expected, rows, strict=True))
 
 
+@pytest.mark.blender
 @pytest.mark.slow
 def test_a_film_and_a_page_of_a_clip(output: Path, toss: Path) -> None:
     comparison = planned(toss, choices=(Uniform("5"),), stage=STAGE, about=ABOUT)
@@ -144,6 +145,7 @@ def test_a_film_knows_how_far_its_body_slips_in_the_one_that_holds_it(output: Pa
     assert [*tasks].index("slip of hold-tool in hold-hand") < [*tasks].index("build hold-hand/5")
 
 
+@pytest.mark.blender
 @pytest.mark.slow
 def test_a_whole_body_has_joints_and_films(output: Path, tmp_path: Path) -> None:
     write_body(body := tmp_path / "body.bvh")
@@ -253,6 +255,7 @@ def test_numbers_and_pages_need_no_blender(output: Path, toss: Path) -> None:
     assert {"metrics.csv", "keys_needed.csv", "report.html"} <= {*outputs(output)}
 
 
+@pytest.mark.blender
 def test_without_blender_a_page_shows_a_drill_and_a_line_says_so(output: Path, toss: Path) -> None:
     outcome, listener = compared(output, planned(toss, about=ABOUT, subject="controller", blender=""))
     assert outcome.failures == {}

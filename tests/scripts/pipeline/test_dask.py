@@ -162,6 +162,7 @@ def clips(tmp_path: Path) -> list[Path]:
     return [bad, *(write_toss(tmp_path / "clips" / f"{name}.csv") for name in ("one", "two"))]
 
 
+@pytest.mark.blender
 @pytest.mark.slow
 def test_the_workers_make_what_one_machine_makes_and_say_what_fails(
     cluster: Cluster, clips: list[Path], tmp_path: Path, capfd: pytest.CaptureFixture
@@ -181,6 +182,7 @@ def test_the_workers_make_what_one_machine_makes_and_say_what_fails(
     assert json.loads(capfd.readouterr().out)["tasks"].get("failed", 0) == 0
 
 
+@pytest.mark.blender
 @pytest.mark.slow
 def test_ctrl_c_leaves_no_process_at_work(cluster: Cluster, tmp_path: Path) -> None:
     clips = [write_toss(tmp_path / f"{name}.csv", samples=300) for name in ("one", "two")]
@@ -245,6 +247,7 @@ def test_a_wrong_address_is_said_to_be_one(tmp_path: Path, address: str, complai
         Connecting(tmp_path, address).executor.__enter__()
 
 
+@pytest.mark.blender
 @pytest.mark.slow
 def test_workers_may_come_and_die_and_the_scheduler_too_and_nothing_is_lost(clips: list[Path], tmp_path: Path) -> None:
     (tmp_path / "dask").mkdir()

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from filelock import SoftFileLock
 
 from rigid_motion_batch.pipeline import steps as pipeline_steps
 from rigid_motion_batch.pipeline.executors import Executor
@@ -277,3 +278,19 @@ def test_a_file_without_a_task_that_publishes_it_any_more_can_be_withdrawn(outpu
     with Store(output) as store:
         store.withdraw(["a.txt", "b.txt", "none.txt"])
     assert sorted(contents(output)) == ["b.txt", "c.txt"]
+
+
+def test_a_folder_for_nothing_is_gone_where_a_lock_that_is_held_cannot_be_deleted(output, monkeypatch) -> None:
+    """So it is on Windows, where the lock is deleted as it is released."""
+    plain = os.unlink
+
+    def unlink(path: str, **options: object) -> None:
+        if Path(path).name == "lock" and store._lock.is_locked:
+            raise PermissionError(path)
+        plain(path, **options)
+
+    monkeypatch.setattr("rigid_motion_batch.pipeline.store.FileLock", SoftFileLock)
+    monkeypatch.setattr(os, "unlink", unlink)
+    with Store(output) as store:
+        pass
+    assert not output.exists()

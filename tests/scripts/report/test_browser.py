@@ -21,6 +21,8 @@ from tests.scripts.report.javascript import require
 from tests.scripts.report.runs import RATES, result_of
 from tests.thoroughness import combined, sample
 
+pytestmark = pytest.mark.once
+
 SETTINGS = Settings(0.1, "Rigid Motion 1.0", "compare a.csv b.csv")
 WARNING = ClipWarning("A gap of 183 ms.", "Record again.", 101.25, 101.5)
 PATIENCE = 30.0

@@ -1,7 +1,11 @@
 """The benchmark of modes in Blender does what it says, and its figures are what the page reads."""
 
+import pytest
+
 from research import benchmark_live
 from tests.scripts.research.keeping import written
+
+pytestmark = pytest.mark.blender
 
 
 def test_the_study_writes_what_the_page_reads(tmp_path, empty_file, capsys):

@@ -3,11 +3,14 @@
 from functools import cache
 
 import numpy as np
+import pytest
 
 from research.paper import catching
 from research.paper.catching import CATCH, GRIP, HELD, RATES, RELEASE
 from rigid_motion.motion.quaternions import angle_between, rotate
 from tests.scripts.research.paper.clips import thrown
+
+pytestmark = pytest.mark.blender
 
 
 @cache

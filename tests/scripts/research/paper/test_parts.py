@@ -11,6 +11,8 @@ from research.paper.table import UPDATES
 from rigid_motion_batch.streaming.measuring import HEADERS
 from tests.scripts.research.paper.clips import circling
 
+pytestmark = pytest.mark.blender
+
 CLIP = circling(turns=0.7, rate=90.0, seconds=3.0)
 
 
@@ -19,6 +21,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts.motions, "assets", lambda: {CLIP.name: CLIP})
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small")
 def test_a_part_writes_its_figures(tmp_path: Path) -> None:
     assert parts.main(["--only", "table", "--root", str(tmp_path)]) == 0

@@ -9,6 +9,7 @@ from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.research.paper.clips import circling
 
 
+@pytest.mark.slow
 def test_on_a_pivot_a_screw_needs_no_more_updates_than_tell_which_way_it_turns():
     # 1.6 turns: with four segments each is less than half a turn.
     clip = circling("pivot", turns=1.0)
@@ -16,6 +17,7 @@ def test_on_a_pivot_a_screw_needs_no_more_updates_than_tell_which_way_it_turns()
         assert share * (rate * clip.times[-1] + 1.0) == pytest.approx(5.0)
 
 
+@pytest.mark.slow
 def test_on_a_circle_without_turning_the_screw_is_the_straight_line():
     assert table.needed(circling(turns=0.0))["dq_sclerp"] == pytest.approx([1.0] * 4, rel=0.01)
 
