@@ -29,6 +29,7 @@ extensions = [
     "extensions.excerpts",
     "extensions.mathml",
     "extensions.mode_pages",
+    "extensions.module_map",
     "extensions.names",
     "extensions.repository",
     "extensions.videos",
