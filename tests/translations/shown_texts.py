@@ -72,8 +72,13 @@ def of_class(cls: type) -> Iterator[Message]:
 
 def of_properties(cls: type) -> Iterator[Message]:
     """Names, descriptions and enum items of the properties that are not hidden."""
-    ours = [base for base in cls.__mro__ if base.__module__.startswith(PACKAGE.name)]
-    own = {name for base in ours for name in vars(base).get("__annotations__", {}) if not name.startswith("bl_")}
+    stated: dict[bool, dict[str, object]] = {True: {}, False: {}}
+    for base in cls.__mro__:
+        stated[base.__module__.startswith(PACKAGE.name)].update(vars(base).get("__annotations__", {}))
+    # What Blender's own bases bring, Blender translates.
+    own = {name for name, kind in stated[True].items() if isinstance(kind, bpy.props._PropertyDeferred)} - {
+        *stated[False]
+    }
     rna = operator_type(cls) if issubclass(cls, bpy.types.Operator) else cls.bl_rna
     for prop in rna.properties:
         if prop.identifier not in own or prop.is_hidden:

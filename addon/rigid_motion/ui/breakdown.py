@@ -15,7 +15,6 @@ import gpu
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import FloatProperty
 from gpu_extras.batch import batch_for_shader
 
 from .. import animation
@@ -23,6 +22,7 @@ from ..animation import Refused
 from ..animation.edits.breakdowns import BREAKDOWN, PUSH, RELAX
 from ..animation.queries.polls import with_modes
 from ..animation.transforms import OWN_WORDS, Transform
+from ..blender import FloatProperty, Returned, existing, with_properties
 from .targets import OnTargets, targets_of
 
 WAY = 300.0
@@ -96,11 +96,12 @@ class Slider:
     def show(self, context: bpy.types.Context, label: str) -> None:
         """Draw it into a header of the area until it is hidden; the keys are in the status bar."""
         self._label = label
-        context.area.header_text_set(" ")
+        existing(context.area).header_text_set(" ")
         # Blender takes the texts of a header out where it shows another: the tool header, if there is one.
-        regions = {region.type: region for region in context.area.regions if region.height > 1}
+        shown = (region for region in existing(context.area).regions if region.height > 1)
+        regions: dict[str, bpy.types.Region] = {region.type: region for region in shown}
         kind = "TOOL_HEADER" if "TOOL_HEADER" in regions else "HEADER"
-        self._region, space = regions.get(kind), type(context.space_data)
+        self._region, space = regions.get(kind), type(existing(context.space_data))
         self._handler = space, space.draw_handler_add(self._draw, (), kind, "POST_PIXEL"), kind
         self.tell(context)
 
@@ -111,8 +112,8 @@ class Slider:
             "LMB, Enter: Confirm | Esc, RMB: Cancel | E: Overshoot ({overshoot}) | Ctrl: Steps of 10 % | "
             "Shift: Precision | 0-9: Per Cent"
         ).format(overshoot=overshoot)
-        context.workspace.status_text_set(f"{self._label} {self._number} | {keys}")
-        context.area.tag_redraw()
+        existing(context.workspace).status_text_set(f"{self._label} {self._number} | {keys}")
+        existing(context.area).tag_redraw()
 
     def hide(self, context: bpy.types.Context) -> None:
         """Give header and status bar back."""
@@ -120,8 +121,8 @@ class Slider:
             space, handle, kind = self._handler
             space.draw_handler_remove(handle, kind)
             self._handler = None
-        context.workspace.status_text_set(None)
-        context.area.header_text_set(None)
+        existing(context.workspace).status_text_set(None)
+        existing(context.area).header_text_set(None)
 
     @property
     def _number(self) -> str:
@@ -129,7 +130,7 @@ class Slider:
 
     def _draw(self) -> None:
         region, scale = bpy.context.region, self._scale
-        if region != self._region:
+        if region is None or region != self._region:
             return
         low, high = (-0.25, 1.25) if self.overshoots else (0.0, 1.0)
         way, y = WAY * scale, 0.5 * region.height
@@ -161,10 +162,11 @@ def _draw_box(left: float, bottom: float, right: float, top: float, colour: tupl
     batch.draw(shader)
 
 
+@with_properties
 class _Breakdown(OnTargets):
     """Operators that key a pose by a factor, which the mouse sets where they are invoked."""
 
-    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO", "BLOCKING", "GRAB_CURSOR_X"}
+    bl_options = {"REGISTER", "UNDO", "BLOCKING", "GRAB_CURSOR_X"}  # noqa: RUF012 - Blender reads it
     nothing_to_do = n_(
         "All of it has Blender's own in-betweens: choose a mode first, or take Blender's Pose > In-Betweens"
     )
@@ -172,7 +174,7 @@ class _Breakdown(OnTargets):
     kind: ClassVar[str]
     short: ClassVar[str]
 
-    factor: FloatProperty(
+    factor: float = FloatProperty(
         name="Factor",
         description="How far to go: 0 is the beginning, 1 the end, and beyond that the motion goes on",
         default=0.5,
@@ -188,20 +190,21 @@ class _Breakdown(OnTargets):
         animation.breakdown(targets, self.factor, self.kind, refused=refused)
         return self._summary()
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Returned:
         if context.area is None:
             return self.execute(context)
-        self._targets, self._refused = targets_of(context), []
+        self._targets = targets_of(context)
+        self._refused: list[Refused] = []
         self._breakdowns = animation.Breakdowns(self._targets, self.kind, refused=self._refused)
         if not self._breakdowns:
             return self._finish()
-        self._slider = Slider(self.factor, event.mouse_x, context.preferences.system.ui_scale)
+        self._slider = Slider(self.factor, event.mouse_x, existing(context.preferences).system.ui_scale)
         self._breakdowns.apply(self.factor)
         self._slider.show(context, iface_(self.short, OWN_WORDS))
-        context.window_manager.modal_handler_add(self)
+        existing(context.window_manager).modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Returned:
         if event.type in CANCEL and event.value == "PRESS":
             self.cancel(context)
             return {"CANCELLED"}
@@ -219,7 +222,7 @@ class _Breakdown(OnTargets):
         self._slider.hide(context)
         self._breakdowns.cancel()
 
-    def _finish(self) -> set[str]:
+    def _finish(self) -> Returned:
         def keyed(refused: list[Refused]) -> str:
             refused.extend(self._refused)
             return self._summary()
@@ -232,7 +235,8 @@ class _Breakdown(OnTargets):
         )
 
 
-class RIGID_MOTION_OT_breakdown(_Breakdown, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_breakdown(_Breakdown):
     bl_idname = "rigid_motion.breakdown"
     bl_label = "Breakdown along Mode"
     bl_description = (
@@ -242,7 +246,8 @@ class RIGID_MOTION_OT_breakdown(_Breakdown, bpy.types.Operator):
     short = n_("Breakdown", OWN_WORDS)
 
 
-class RIGID_MOTION_OT_push(_Breakdown, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_push(_Breakdown):
     bl_idname = "rigid_motion.push"
     bl_label = "Push from In-Between of Mode"
     bl_description = "Key a more pronounced pose on the current frame: further away from the in-between of the mode"
@@ -250,7 +255,8 @@ class RIGID_MOTION_OT_push(_Breakdown, bpy.types.Operator):
     short = n_("Push", OWN_WORDS)
 
 
-class RIGID_MOTION_OT_relax(_Breakdown, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_relax(_Breakdown):
     bl_idname = "rigid_motion.relax"
     bl_label = "Relax to In-Between of Mode"
     bl_description = "Key a pose on the current frame that is more like its neighbours: nearer to the mode's in-between"

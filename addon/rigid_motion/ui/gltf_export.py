@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, cast
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.app.translations import pgettext_tip as tip_
-from bpy.props import BoolProperty, FloatProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
+from ..blender import BoolProperty, FloatProperty, Operator, Returned, StringProperty, existing, with_properties
 from ..gltf import GltfError, Options, Report, reduce_file
 
 EXPORTER = "export_scene.gltf"
@@ -28,21 +28,22 @@ NOT_PASSED_ON = {
 """Options of the exporter that this operator sets itself, or that are for its dialog alone; gltfpack would resample."""
 
 
-class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
+@with_properties
+class RIGID_MOTION_OT_export_gltf(Operator, ExportHelper):
     bl_idname = "rigid_motion.export_gltf"
     bl_label = "Export glTF, Reduced"
     bl_description = (
         "Write a GLB file with only the keys that its animations need: nothing that is seen is off by more than the "
         "tolerance in any viewer. All other options are those that glTF 2.0 was exported with last"
     )
-    bl_options: ClassVar[set[str]] = {"REGISTER"}
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
 
     filename_ext = ".glb"
-    filter_glob: StringProperty(
+    filter_glob: str = StringProperty(
         name="File Filter", description="Files that the dialog shows", default="*.glb", options={"HIDDEN"}
     )
 
-    tolerance: FloatProperty(
+    tolerance: float = FloatProperty(
         name="Tolerance",
         description="How far off any vertex, and any point close to a joint, may be in the world, at any time",
         default=0.001,
@@ -53,7 +54,9 @@ class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
         subtype="DISTANCE",
         unit="LENGTH",
     )
-    use_selection: BoolProperty(name="Selected Objects", description="Export selected objects only", default=False)
+    use_selection: bool = BoolProperty(
+        name="Selected Objects", description="Export selected objects only", default=False
+    )
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
@@ -62,8 +65,11 @@ class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
             return False
         return True
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        output = Path(self.filepath)
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Any:
+        return ExportHelper.invoke(self, context, event)
+
+    def execute(self, context: bpy.types.Context) -> Returned:
+        output = Path(cast(Any, self).filepath)
         try:
             with tempfile.TemporaryDirectory() as folder:
                 exported = Path(folder) / output.name
@@ -89,7 +95,7 @@ class RIGID_MOTION_OT_export_gltf(bpy.types.Operator, ExportHelper):
 
 def _last_options(context: bpy.types.Context) -> dict[str, Any]:
     """Return the settings of Blender's exporter as last set in its dialog, but for what is set here."""
-    last = context.window_manager.operator_properties_last(EXPORTER)
+    last = existing(context.window_manager).operator_properties_last(EXPORTER)
     if last is None:
         return {}
     return {

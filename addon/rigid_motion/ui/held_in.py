@@ -17,7 +17,7 @@ from ..animation.evaluation.components import SCALE
 from ..animation.holds.dependencies import follows, node_of
 from ..animation.holds.holders import Holder
 from ..animation.transforms import OWN_WORDS, Transform, prefix_of
-from .holding import RIGID_MOTION_MT_holders, has_been_held, icon_of, name_of, shown_prop
+from .holding import PASS, RIGID_MOTION_MT_holders, has_been_held, icon_of, name_of, shown_prop
 from .wording import degrees, draw_text, hold_lines, labelled, length
 
 FAR_TURNED = math.radians(120)
@@ -60,7 +60,7 @@ def draw(context: Any, layout: Any) -> None:
 def _draw_passing(context: Any, layout: Any, facts: HoldFacts) -> None:
     if facts.switch is not None:
         row: Any = labelled(layout, iface_("Pass", OWN_WORDS))
-        row.prop(context.scene, "rigid_motion_pass", text="")
+        row.prop(context.scene, PASS, text="")
         row.label(text=iface_("at {frame:g}").format(frame=facts.switch), translate=False)
     if apart := apart_text(context.scene, facts):
         labelled(layout).label(text=apart, translate=False)

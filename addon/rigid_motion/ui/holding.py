@@ -15,13 +15,13 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.app.translations import pgettext_tip as tip_
-from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from .. import animation
 from ..animation import HoldFacts, Refused, hold_facts
 from ..animation.evaluation.runs import MOST_FRAMES
 from ..animation.holds.holders import Holder, is_ours
 from ..animation.transforms import OWN_WORDS, Transform, transform_of
+from ..blender import BoolProperty, IntProperty, Menu, StringProperty, with_properties
 from .targets import OnTargets, is_posing
 
 Node = bpy.types.Object | bpy.types.PoseBone
@@ -35,6 +35,10 @@ UNSEEN = {"HIDDEN", "SKIP_SAVE"}
 
 HUES = (4, 7, 2, 6, 1, 3)
 """The theme's colours of strips that holders have in menus and along paths, by their numbers."""
+
+
+PASS = "rigid_motion_pass"
+"""The name of the property of scenes by which panels set over how many frames something passes."""
 
 
 def hue_of(number: int) -> int:
@@ -128,10 +132,11 @@ def candidates(context: bpy.types.Context, prop: Transform) -> Iterator[Node]:
     yield from (node for node in nodes if node not in (prop.carrier, prop.animated))
 
 
+@with_properties
 class _Hold(OnTargets):
     """Operators that key what is selected in the space of something."""
 
-    frames: IntProperty(
+    frames: int = IntProperty(
         name="Pass",
         description="Frames before this one over which it passes from what held it before: 0 at once, to pick up and "
         "put down; 1 to throw; 3 to catch; 4 from hand to hand",
@@ -142,7 +147,6 @@ class _Hold(OnTargets):
         translation_context=OWN_WORDS,
     )
     summary: ClassVar[str]
-    properties: Any
 
     def holder(self, _context: bpy.types.Context) -> tuple[bpy.types.Object | None, str]:
         """Return the object that is to hold, None for the world, and the name of the bone, "" for none."""
@@ -162,7 +166,8 @@ class _Hold(OnTargets):
         return rpt_("{done}, up to its key on frame {until:g}").format(done=text, until=facts.until)
 
 
-class RIGID_MOTION_OT_hold_in(_Hold, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_hold_in(_Hold):
     bl_idname = "rigid_motion.hold_in"
     bl_label = "Hold In"
     bl_description = (
@@ -171,7 +176,7 @@ class RIGID_MOTION_OT_hold_in(_Hold, bpy.types.Operator):
     )
     summary = n_("held in {holder} from frame {frame:g}")
 
-    use_bone: BoolProperty(
+    use_bone: bool = BoolProperty(
         name="Active Bone",
         description="Hold them in the active bone of the rig, and not in the rig as a whole",
         default=True,
@@ -198,16 +203,17 @@ class RIGID_MOTION_OT_hold_in(_Hold, bpy.types.Operator):
             layout.prop(self, "use_bone")
 
 
-class RIGID_MOTION_OT_hold_in_known(_Hold, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_hold_in_known(_Hold):
     bl_idname = "rigid_motion.hold_in_known"
     bl_label = "Hold In"
     bl_description = "Have it held in this from this frame on. It stays where it is"
     summary = RIGID_MOTION_OT_hold_in.summary
 
-    target: StringProperty(
+    target: str = StringProperty(
         name="Target", description="Name of the object that holds, with that of its library", options=UNSEEN
     )
-    bone: StringProperty(name="Bone", description="Name of its bone that holds; empty for none", options=UNSEEN)
+    bone: str = StringProperty(name="Bone", description="Name of its bone that holds; empty for none", options=UNSEEN)
 
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
@@ -240,7 +246,8 @@ class _OfHeld(OnTargets):
         return tip_(cls.nothing_to_do)
 
 
-class RIGID_MOTION_OT_let_go(_OfHeld, _Hold, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_let_go(_OfHeld, _Hold):
     bl_idname = "rigid_motion.let_go"
     bl_label = "Let Go"
     bl_description = (
@@ -250,7 +257,7 @@ class RIGID_MOTION_OT_let_go(_OfHeld, _Hold, bpy.types.Operator):
     summary = n_("let go on frame {frame:g}")
 
 
-class RIGID_MOTION_OT_match_grip(_OfHeld, bpy.types.Operator):
+class RIGID_MOTION_OT_match_grip(_OfHeld):
     bl_idname = "rigid_motion.match_grip"
     bl_label = "Match Grip"
     bl_description = (
@@ -262,7 +269,8 @@ class RIGID_MOTION_OT_match_grip(_OfHeld, bpy.types.Operator):
         return rpt_("the grip as before on frame {frame:g}").format(frame=context.scene.frame_current_final)
 
 
-class RIGID_MOTION_OT_pass_frames(_OfHeld, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_pass_frames(_OfHeld):
     bl_idname = "rigid_motion.pass_frames"
     bl_label = "Pass"
     bl_description = (
@@ -270,7 +278,7 @@ class RIGID_MOTION_OT_pass_frames(_OfHeld, bpy.types.Operator):
         "or before the next one at which another holds it"
     )
 
-    frames: IntProperty(
+    frames: int = IntProperty(
         name="Frames",
         description="0: at once, to pick up and put down. 1: to throw. 3: to catch. 4: from hand to hand",
         default=4,
@@ -317,7 +325,7 @@ def facts_or_none(prop: Transform | None) -> HoldFacts | None:
         return None
 
 
-class RIGID_MOTION_MT_holders(bpy.types.Menu):
+class RIGID_MOTION_MT_holders(Menu):
     bl_label = "Hold In"
     bl_description = "What is to hold it from this frame on: the world, what has held it before, or what is active"
 
@@ -349,7 +357,7 @@ def _draw_holder(layout: Any, target: Any, bone: str, icon: str) -> None:
     properties.target, properties.bone = target.name_full, bone
 
 
-class RIGID_MOTION_MT_hold(bpy.types.Menu):
+class RIGID_MOTION_MT_hold(Menu):
     bl_label = "Hold"
     bl_translation_context = OWN_WORDS
     bl_description = "What holds the selection: pick up, hand over, throw, catch and put down"
@@ -391,7 +399,7 @@ def _set_frames(_scene: bpy.types.Scene, frames: int) -> None:
 
 def register() -> None:
     # Nothing of it is kept: it is the number at the key of what a panel shows.
-    bpy.types.Scene.rigid_motion_pass = IntProperty(
+    frames = IntProperty(
         name="Pass",
         description=RIGID_MOTION_OT_pass_frames.bl_description,
         min=0,
@@ -402,7 +410,8 @@ def register() -> None:
         set=_set_frames,
         translation_context=OWN_WORDS,
     )
+    setattr(bpy.types.Scene, PASS, frames)
 
 
 def unregister() -> None:
-    del bpy.types.Scene.rigid_motion_pass
+    delattr(bpy.types.Scene, PASS)

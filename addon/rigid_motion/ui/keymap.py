@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple, cast
 
 import bpy
 import rna_keymap_ui
 from bpy.app.translations import contexts
 
+from ..blender import existing
 from .menus import RIGID_MOTION_MT_pie_keys, RIGID_MOTION_MT_pie_view
 
 PIE = "wm.call_menu_pie"
@@ -15,7 +16,7 @@ PIE = "wm.call_menu_pie"
 
 class Shortcut(NamedTuple):
     keymap: str
-    space: str
+    space: Literal["EMPTY", "DOPESHEET_EDITOR", "GRAPH_EDITOR"]
     """The space of the keymap."""
 
     menu: str
@@ -32,13 +33,13 @@ _items: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
 
 def register() -> None:
-    configuration = bpy.context.window_manager.keyconfigs.addon
+    configuration = existing(bpy.context.window_manager).keyconfigs.addon
     if configuration is None:
         return
     for shortcut in SHORTCUTS:
         keymap = configuration.keymaps.new(name=shortcut.keymap, space_type=shortcut.space)
         item = keymap.keymap_items.new(PIE, "T", "PRESS", alt=True)
-        item.properties.name = shortcut.menu
+        existing(item.properties).name = shortcut.menu
         _items.append((keymap, item))
 
 
@@ -50,12 +51,12 @@ def unregister() -> None:
 
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     """Draw the shortcuts as the user has them, to be changed."""
-    configuration = context.window_manager.keyconfigs.user
+    configuration = existing(existing(context.window_manager).keyconfigs.user)
     for shortcut in SHORTCUTS:
         keymap = configuration.keymaps.find(shortcut.keymap, space_type=shortcut.space)
         for item in keymap.keymap_items if keymap else ():
-            if item.idname == PIE and item.properties.name == shortcut.menu:
+            if item.idname == PIE and existing(item.properties).name == shortcut.menu:
                 row = layout.column()
                 row.context_pointer_set("keymap", keymap)
-                row.label(text=shortcut.keymap, text_ctxt=contexts.id_windowmanager)
+                row.label(text=shortcut.keymap, text_ctxt=cast(Any, contexts).id_windowmanager)
                 rna_keymap_ui.draw_kmi([], configuration, keymap, item, row, 0)

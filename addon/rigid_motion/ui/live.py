@@ -9,10 +9,24 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.app.translations import pgettext_tip as tip_
-from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ..animation.properties import MODE_ITEMS
 from ..animation.transforms import OWN_WORDS
+from ..blender import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    Operator,
+    PointerProperty,
+    Returned,
+    StringProperty,
+    armature,
+    existing,
+    scene,
+    with_properties,
+)
 from ..live import receiving, sending
 from ..live.driving import matched
 from ..live.sockets import NotAllowed
@@ -33,24 +47,26 @@ def _on_bones(_settings: LiveSettings | LiveBone, _context: bpy.types.Context) -
         listening.look_anew()
 
 
+@with_properties
 class LiveBone(bpy.types.PropertyGroup):
     """A joint of a body, and the bone that it moves. Its name is that of the joint."""
 
-    bone: StringProperty(
+    bone: str = StringProperty(
         name="Bone", description="The bone that this joint moves; none where it is empty", update=_on_bones
     )
 
 
+@with_properties
 class LiveSettings(bpy.types.PropertyGroup):
-    host: StringProperty(
+    host: str = StringProperty(
         name="Address",
         description="Where to listen: 127.0.0.1 for programs on this machine alone, 0.0.0.0 for others, too",
         default=HOST,
     )
-    port: IntProperty(
+    port: int = IntProperty(
         name="Port", description="The UDP port that other programs send to", default=PORT, min=1024, max=65535
     )
-    delay: FloatProperty(
+    delay: float = FloatProperty(
         name="Delay",
         description="By how much the picture of VMC is behind, so that it goes on evenly where data comes unevenly",
         default=0.05,
@@ -60,29 +76,34 @@ class LiveSettings(bpy.types.PropertyGroup):
         subtype="TIME_ABSOLUTE",
         unit="TIME_ABSOLUTE",
     )
-    armature: PointerProperty(
+    steady: bool = BoolProperty(
+        name="Steady",
+        description="Show what comes on every frame without its trembling, by what has come within the delay, and no "
+        "later for it. What is recorded is as it came: Clean Motion takes more out of that",
+    )
+    armature: bpy.types.Object | None = PointerProperty(
         name="Rig",
         description="The armature that a body drives, by the names of its bones. Without, it appears as a new one",
         type=bpy.types.Object,
         poll=lambda _, obj: obj.type == "ARMATURE",
         update=_on_bones,
     )
-    body: StringProperty(
+    body: str = StringProperty(
         name="Body",
         description="Which of several bodies drives the rig. Without, the first that comes",
         update=_on_bones,
     )
-    bones: CollectionProperty(type=LiveBone)
-    bones_of: StringProperty(description="The rig that the table is for", options={"HIDDEN"})
-    active_bone: IntProperty(options={"HIDDEN"})
-    mode: EnumProperty(
+    bones: bpy.types.bpy_prop_collection_idprop[LiveBone] = CollectionProperty(type=LiveBone)
+    bones_of: str = StringProperty(description="The rig that the table is for", options={"HIDDEN"})
+    active_bone: int = IntProperty(options={"HIDDEN"})
+    mode: str = EnumProperty(
         name="Mode",
         description="What fills in between the keys that are recorded",
         items=MODE_ITEMS,
         translation_context=OWN_WORDS,
         default="lerp_slerp",
     )
-    tolerance: FloatProperty(
+    tolerance: float = FloatProperty(
         name="Tolerance",
         description="How far off any bone may be where a recording of VMC, which comes on every frame, is thinned",
         default=0.002,
@@ -92,20 +113,28 @@ class LiveSettings(bpy.types.PropertyGroup):
         precision=4,
         subtype="DISTANCE",
     )
-    to_host: StringProperty(name="Address", description="The machine that VMC is sent to", default=HOST)
-    to_port: IntProperty(
+    to_host: str = StringProperty(name="Address", description="The machine that VMC is sent to", default=HOST)
+    to_port: int = IntProperty(
         name="Port", description="The UDP port that VMC is sent to", default=PORT + 1, min=1, max=65535
     )
 
 
+LIVE = "rigid_motion_live"
+"""The name of the settings on scenes."""
+
+
+def live_settings(scene: bpy.types.Scene | None) -> LiveSettings:
+    return getattr(scene, LIVE)
+
+
 def _settings() -> receiving.Settings:
-    live = bpy.context.scene.rigid_motion_live
-    return receiving.Settings(live.delay, live.armature.name if live.armature else "", live.body)
+    live = live_settings(scene())
+    return receiving.Settings(live.delay, live.armature.name if live.armature else "", live.body, live.steady)
 
 
 def _pairs(body: Body, rig: bpy.types.Object) -> Mapping[str, str]:
     """Return what the table says; it is filled in by names where it is for other joints or for another rig."""
-    live = bpy.context.scene.rigid_motion_live
+    live = live_settings(scene())
     if [item.name for item in live.bones] != list(body.joints) or live.bones_of != rig.name:
         _match(live, body.joints, rig)
     return {item.name: item.bone for item in live.bones if item.bone}
@@ -113,7 +142,7 @@ def _pairs(body: Body, rig: bpy.types.Object) -> Mapping[str, str]:
 
 def _match(live: LiveSettings, joints: tuple[str, ...], rig: bpy.types.Object) -> None:
     global _is_matching
-    result = matched(joints, [bone.name for bone in rig.data.bones])
+    result = matched(joints, [bone.name for bone in armature(rig).bones])
     live.bones.clear()
     live.bones_of = rig.name
     _is_matching = True
@@ -123,18 +152,17 @@ def _match(live: LiveSettings, joints: tuple[str, ...], rig: bpy.types.Object) -
     _is_matching = False
 
 
-class _Registered:
-    bl_options: Any = {"REGISTER"}  # noqa: RUF012 - Blender reads it
-    report: Any
+class _Registered(Operator):
+    bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
 
-    def refuse(self, error: OSError | NotAllowed, text: str, **facts: object) -> Any:
+    def refuse(self, error: OSError | NotAllowed, text: str, **facts: object) -> Returned:
         """Report why a port cannot be opened, and cancel."""
-        is_failed = isinstance(error, OSError)
-        self.report({"ERROR"}, text.format(**facts, why=error.strerror or error) if is_failed else str(error))
+        why = text.format(**facts, why=error.strerror or error) if isinstance(error, OSError) else str(error)
+        self.report({"ERROR"}, why)
         return {"CANCELLED"}
 
 
-class RIGID_MOTION_OT_live_listen(_Registered, bpy.types.Operator):
+class RIGID_MOTION_OT_live_listen(_Registered):
     bl_idname = "rigid_motion.live_listen"
     bl_label = "Listen"
     bl_description = "Show bodies that other programs send to this port: as new objects, or on the rig below"
@@ -143,8 +171,8 @@ class RIGID_MOTION_OT_live_listen(_Registered, bpy.types.Operator):
     def poll(cls, _context: bpy.types.Context) -> bool:
         return receiving.listening() is None
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        live = context.scene.rigid_motion_live
+    def execute(self, context: bpy.types.Context) -> Returned:
+        live = live_settings(context.scene)
         try:
             receiving.start(live.host, live.port, _settings, _pairs)
         except (NotAllowed, OSError) as error:
@@ -161,40 +189,39 @@ class _WhileListening:
         return receiving.listening() is not None
 
 
-class RIGID_MOTION_OT_live_stop(_Registered, _WhileListening, bpy.types.Operator):
+class RIGID_MOTION_OT_live_stop(_WhileListening, _Registered):
     bl_idname = "rigid_motion.live_stop"
     bl_label = "Stop Listening"
     bl_description = "Close the port. Everything stays as it is shown; a recording that is not finished is given up"
 
-    def execute(self, _context: bpy.types.Context) -> set[str]:
+    def execute(self, _context: bpy.types.Context) -> Returned:
         receiving.stop()
         return {"FINISHED"}
 
 
-class RIGID_MOTION_OT_live_record(_Registered, _WhileListening, bpy.types.Operator):
+class RIGID_MOTION_OT_live_record(_WhileListening, _Registered):
     bl_idname = "rigid_motion.live_record"
     bl_label = "Record"
     bl_description = "Keep what comes from now on, from the current frame on, as keys"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        live = context.scene.rigid_motion_live
-        receiving.listening().record(live.mode, live.tolerance)
+    def execute(self, context: bpy.types.Context) -> Returned:
+        live = live_settings(context.scene)
+        existing(receiving.listening()).record(live.mode, live.tolerance)
         return {"FINISHED"}
 
 
-class RIGID_MOTION_OT_live_finish(bpy.types.Operator):
+class RIGID_MOTION_OT_live_finish(Operator):
     bl_idname = "rigid_motion.live_finish"
     bl_label = "Finish Recording"
     bl_description = "Give each body that was recorded an Action with its keys. Reduce Keys then makes them fewer"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender reads it
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
         listening = receiving.listening()
         return listening is not None and listening.is_recording
 
-    def execute(self, _context: bpy.types.Context) -> set[str]:
-        count = receiving.listening().finish()
+    def execute(self, _context: bpy.types.Context) -> Returned:
+        count = existing(receiving.listening()).finish()
         if not count:
             self.report({"WARNING"}, rpt_("Nothing came while it was recorded: no keys"))
             return {"CANCELLED"}
@@ -202,23 +229,22 @@ class RIGID_MOTION_OT_live_finish(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RIGID_MOTION_OT_live_match(_WhileListening, bpy.types.Operator):
+class RIGID_MOTION_OT_live_match(_WhileListening, Operator):
     bl_idname = "rigid_motion.live_match"
     bl_label = "Match Names"
     bl_description = "Fill the table in anew: which bone of the rig each joint moves, as far as names tell"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender reads it
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        live = context.scene.rigid_motion_live
+    def execute(self, context: bpy.types.Context) -> Returned:
+        live = live_settings(context.scene)
         if live.armature is None:
             self.report({"ERROR"}, rpt_("Choose a rig first"))
             return {"CANCELLED"}
         _match(live, tuple(item.name for item in live.bones), live.armature)
-        receiving.listening().look_anew()
+        existing(receiving.listening()).look_anew()
         return {"FINISHED"}
 
 
-class RIGID_MOTION_OT_live_send(_Registered, bpy.types.Operator):
+class RIGID_MOTION_OT_live_send(_Registered):
     bl_idname = "rigid_motion.live_send"
     bl_label = "Send Selected"
     bl_description = (
@@ -231,8 +257,8 @@ class RIGID_MOTION_OT_live_send(_Registered, bpy.types.Operator):
             cls.poll_message_set(tip_("Select objects or rigs first"))
         return bool(context.selected_objects) and sending.sending() is None
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        live = context.scene.rigid_motion_live
+    def execute(self, context: bpy.types.Context) -> Returned:
+        live = live_settings(context.scene)
         try:
             sending.start(live.to_host, live.to_port, context.selected_objects)
         except (NotAllowed, OSError) as error:
@@ -240,7 +266,7 @@ class RIGID_MOTION_OT_live_send(_Registered, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class RIGID_MOTION_OT_live_stop_sending(_Registered, bpy.types.Operator):
+class RIGID_MOTION_OT_live_stop_sending(_Registered):
     bl_idname = "rigid_motion.live_stop_sending"
     bl_label = "Stop Sending"
     bl_description = "Send nothing any more, and close the port"
@@ -249,7 +275,7 @@ class RIGID_MOTION_OT_live_stop_sending(_Registered, bpy.types.Operator):
     def poll(cls, _context: bpy.types.Context) -> bool:
         return sending.sending() is not None
 
-    def execute(self, _context: bpy.types.Context) -> set[str]:
+    def execute(self, _context: bpy.types.Context) -> Returned:
         sending.stop()
         return {"FINISHED"}
 
@@ -257,22 +283,24 @@ class RIGID_MOTION_OT_live_stop_sending(_Registered, bpy.types.Operator):
 class RIGID_MOTION_UL_live_bones(bpy.types.UIList):
     def draw_item(
         self,
-        context: bpy.types.Context,
+        _context: bpy.types.Context | None,
         layout: bpy.types.UILayout,
-        _data: LiveSettings,
-        item: LiveBone,
-        _icon: int,
-        _active: LiveSettings,
-        _active_property: str,
+        _data: object,
+        item: Any,
+        _icon: int | None,
+        _active: object,
+        _active_property: str | None,
+        _index: int | None = None,
+        _filter: int | None = None,
     ) -> None:
         split = layout.split(factor=0.45)
         split.label(text=item.name, translate=False)
-        rig = context.scene.rigid_motion_live.armature
+        rig = live_settings(scene()).armature
         if rig is not None:
             split.prop_search(item, "bone", rig.data, "bones", text="", icon="BONE_DATA")
 
 
-class RIGID_MOTION_PT_live(Folded, bpy.types.Panel):
+class RIGID_MOTION_PT_live(Folded):
     bl_label = "Live"
     bl_description = "Bodies from other programs, over a network: shown, recorded as keys, and sent"
     bl_space_type = "VIEW_3D"
@@ -284,16 +312,19 @@ class RIGID_MOTION_PT_live(Folded, bpy.types.Panel):
             self.layout.operator("rigid_motion.live_stop", text="", icon="PAUSE", emboss=False)
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, live, listening = self.layout, context.scene.rigid_motion_live, receiving.listening()
+        layout, live, listening = self.layout, live_settings(context.scene), receiving.listening()
         column = layout.column(align=True)
         column.enabled = listening is None
         row = column.row(align=True)
         row.prop(live, "host", text="")
         row.prop(live, "port", text="")
         column.prop(live, "delay")
+        layout.prop(live, "steady")
         layout.prop(live, "armature")
-        name, icon = ("listen", "PLAY") if listening is None else ("stop", "PAUSE")
-        layout.operator(f"rigid_motion.live_{name}", icon=icon)
+        if listening is None:
+            layout.operator("rigid_motion.live_listen", icon="PLAY")
+        else:
+            layout.operator("rigid_motion.live_stop", icon="PAUSE")
         if trouble := receiving.running.trouble if listening is None else listening.complaint:
             draw_text(context, layout, trouble, "ERROR")
         if listening is None:
@@ -315,29 +346,29 @@ class RIGID_MOTION_PT_live(Folded, bpy.types.Panel):
             layout.operator("rigid_motion.live_record", icon="REC")
 
 
-class RIGID_MOTION_PT_live_bones(Folded, bpy.types.Panel):
+class RIGID_MOTION_PT_live_bones(Folded):
     bl_label = "Bones"
     bl_space_type = "VIEW_3D"
     bl_parent_id = RIGID_MOTION_PT_live.__name__
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        live = context.scene.rigid_motion_live
+        live = live_settings(context.scene)
         return live.armature is not None and len(live.bones) > 0
 
     def draw(self, context: bpy.types.Context) -> None:
-        live = context.scene.rigid_motion_live
+        live = live_settings(context.scene)
         self.layout.template_list("RIGID_MOTION_UL_live_bones", "", live, "bones", live, "active_bone")
         self.layout.operator("rigid_motion.live_match")
 
 
-class RIGID_MOTION_PT_live_send(Folded, bpy.types.Panel):
+class RIGID_MOTION_PT_live_send(Folded):
     bl_label = "Send"
     bl_space_type = "VIEW_3D"
     bl_parent_id = RIGID_MOTION_PT_live.__name__
 
     def draw(self, context: bpy.types.Context) -> None:
-        live = context.scene.rigid_motion_live
+        live = live_settings(context.scene)
         row = self.layout.row(align=True)
         row.enabled = sending.sending() is None
         row.prop(live, "to_host", text="")
@@ -366,10 +397,10 @@ CLASSES = (
 
 
 def register() -> None:
-    bpy.types.Scene.rigid_motion_live = PointerProperty(type=LiveSettings)
+    setattr(bpy.types.Scene, LIVE, PointerProperty(type=LiveSettings))
 
 
 def unregister() -> None:
     receiving.stop()
     sending.stop()
-    del bpy.types.Scene.rigid_motion_live
+    delattr(bpy.types.Scene, LIVE)

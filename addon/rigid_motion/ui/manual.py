@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
 WEBSITE = "https://example.org/rigid-motion"
@@ -39,6 +41,7 @@ PAGES = (
     ("bpy.ops.rigid_motion.update_path", f"{ANIMATORS}#see-the-motion"),
     ("bpy.ops.rigid_motion.*bake", f"{ANIMATORS}#bake"),
     ("bpy.ops.rigid_motion.reduce_keys", "reduction.md"),
+    ("bpy.ops.rigid_motion.clean_motion", f"{ANIMATORS}#clean-motion"),
     ("bpy.ops.rigid_motion.*_keys", f"{ANIMATORS}#reduce-keys"),
     ("bpy.ops.rigid_motion.refresh", LIMITS),
     ("bpy.ops.rigid_motion.live_*", LIVE),
@@ -60,7 +63,7 @@ def pages() -> tuple[str, tuple[tuple[str, str], ...]]:
 
 def draw(layout: bpy.types.UILayout) -> None:
     """Draw buttons that open the documentation and the website."""
-    row = layout.row()
+    row: Any = layout.row()
     row.operator("wm.url_open", text="Documentation", icon="HELP").url = DOCS + ANIMATORS
     row.operator("wm.url_open", text="Website", icon="URL").url = WEBSITE
 

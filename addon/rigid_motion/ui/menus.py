@@ -14,6 +14,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ..animation.actions.slots import active_fcurves
 from ..animation.evaluation.components import SCALE
 from ..animation.transforms import OWN_WORDS, Transform
+from ..blender import Menu, existing
 from .gltf_export import RIGID_MOTION_OT_export_gltf
 from .holding import RIGID_MOTION_MT_hold
 from .targets import CURRENT, SELECTED, WHOLE, active_target, modes_meant
@@ -44,13 +45,13 @@ def _grows(target: Transform | None) -> bool:
     return target is not None and any(fcurve.data_path == path for fcurve in active_fcurves(target.animated))
 
 
-def _draw_breakdowns(self: Any, _context: bpy.types.Context) -> None:
+def _draw_breakdowns(self: Menu, _context: bpy.types.Context) -> None:
     self.layout.separator()
     for name in ("push", "relax", "breakdown"):
         self.layout.operator(f"rigid_motion.{name}")
 
 
-class _Menu:
+class _Menu(Menu):
     """All there is for one scope; the other one is in a menu of its own."""
 
     bl_label = "Rigid Motion"
@@ -60,7 +61,7 @@ class _Menu:
 
     pie: str
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         layout = self.layout
         layout.operator_context = "INVOKE_REGION_WIN"
         _draw_modes(context, layout, self.scope)
@@ -77,34 +78,34 @@ class _Menu:
         layout.operator("rigid_motion.clear")
         layout.operator("rigid_motion.refresh")
         layout.separator()
-        layout.operator("wm.call_menu_pie", text="Pie Menu").name = self.pie
+        existing(layout.operator("wm.call_menu_pie", text="Pie Menu")).name = self.pie
 
 
-class RIGID_MOTION_MT_view(_Menu, bpy.types.Menu):
+class RIGID_MOTION_MT_view(_Menu):
     bl_description = "How the selected objects or bones move from key to key"
     scope, beside, pie = WHOLE, "RIGID_MOTION_MT_current", "RIGID_MOTION_MT_pie_view"
 
 
-class RIGID_MOTION_MT_keys(_Menu, bpy.types.Menu):
+class RIGID_MOTION_MT_keys(_Menu):
     bl_description = "How objects and bones move on from the selected keys"
     scope, beside, pie = SELECTED, "RIGID_MOTION_MT_whole", "RIGID_MOTION_MT_pie_keys"
 
 
-class RIGID_MOTION_MT_other_keys(bpy.types.Menu):
+class RIGID_MOTION_MT_other_keys(Menu):
     bl_label = "Bake and Reduce"
     bl_description = "More keys for the same motion, or fewer, and back"
 
     def draw(self, _context: Any) -> None:
-        layout: Any = self.layout
+        layout = self.layout
         layout.operator_context = "INVOKE_REGION_WIN"
         layout.operator("rigid_motion.bake", text="Bake to Keys...")
         layout.operator("rigid_motion.unbake")
         layout.separator()
-        for name in ("reduce_keys", "restore_keys", "discard_dense_keys"):
+        for name in ("clean_motion", "reduce_keys", "restore_keys", "discard_dense_keys"):
             layout.operator(f"rigid_motion.{name}")
 
 
-class RIGID_MOTION_MT_current(bpy.types.Menu):
+class RIGID_MOTION_MT_current(Menu):
     bl_label = "Current Segment"
     bl_description = "How the selected objects or bones move between the two keys that the playhead is between"
 
@@ -112,7 +113,7 @@ class RIGID_MOTION_MT_current(bpy.types.Menu):
         _draw_modes(context, self.layout, CURRENT)
 
 
-class RIGID_MOTION_MT_whole(bpy.types.Menu):
+class RIGID_MOTION_MT_whole(Menu):
     bl_label = "All Segments"
     bl_description = "One mode for all segments of the objects and bones that are shown"
 
@@ -135,7 +136,7 @@ SLICES = (
 """In the order of Blender's pies: west, east, south, north, north-west, north-east, south-west, south-east."""
 
 
-class _Pie:
+class _Pie(Menu):
     """One slice for each motion: Blender's own in-betweens on the left, the screw on the right, the smooth one on top.
 
     Where nothing grows, the slice of a mode that differs from another only by that is empty; the blend that does is in
@@ -145,26 +146,26 @@ class _Pie:
     scope: str
     menu: str
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, context: Any) -> None:
         active, pie = active_target(context), self.layout.menu_pie()
         present, grows = modes_meant(context, active, self.scope), _grows(active)
         for mode in SLICES:
             if mode == MORE:
-                pie.operator("wm.call_menu", text="More...").name = self.menu
+                existing(pie.operator("wm.call_menu", text="More...")).name = self.menu
             elif mode == HOLD:
-                pie.operator("wm.call_menu", text="Hold...").name = RIGID_MOTION_MT_hold.__name__
+                existing(pie.operator("wm.call_menu", text="Hold...")).name = RIGID_MOTION_MT_hold.__name__
             elif twin_of(mode, grows=grows):
                 pie.separator()
             else:
                 _draw_mode(pie, mode, self.scope, iface_(LABELS[mode], OWN_WORDS), present)
 
 
-class RIGID_MOTION_MT_pie_view(_Pie, bpy.types.Menu):
+class RIGID_MOTION_MT_pie_view(_Pie):
     bl_label = "Rigid Motion"
     scope, menu = WHOLE, RIGID_MOTION_MT_view.__name__
 
 
-class RIGID_MOTION_MT_pie_keys(_Pie, bpy.types.Menu):
+class RIGID_MOTION_MT_pie_keys(_Pie):
     bl_label = "Rigid Motion of Keys"
     scope, menu = SELECTED, RIGID_MOTION_MT_keys.__name__
 
@@ -180,17 +181,22 @@ CLASSES = (
 )
 
 
-def _draw_in_view(self: Any, _context: bpy.types.Context) -> None:
+def _draw_in_view(self: Menu, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.menu(RIGID_MOTION_MT_view.__name__)
 
 
-def _draw_keys(self: Any, _context: bpy.types.Context) -> None:
+def _draw_keys(self: Menu, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.menu(RIGID_MOTION_MT_keys.__name__)
 
 
-def _draw_export(self: Any, _context: bpy.types.Context) -> None:
+def _draw_clean(self: Menu, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.operator("rigid_motion.clean_motion")
+
+
+def _draw_export(self: Menu, _context: bpy.types.Context) -> None:
     self.layout.operator(RIGID_MOTION_OT_export_gltf.bl_idname, text="glTF, Reduced (.glb)")
 
 
@@ -198,6 +204,7 @@ ENTRIES = {
     "DOPESHEET_MT_key": _draw_keys,
     "DOPESHEET_MT_context_menu": _draw_keys,
     "GRAPH_MT_key": _draw_keys,
+    "GRAPH_MT_key_smoothing": _draw_clean,
     "GRAPH_MT_context_menu": _draw_keys,
     "VIEW3D_MT_object_animation": _draw_in_view,
     "VIEW3D_MT_object_context_menu": _draw_in_view,

@@ -5,13 +5,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator
 from functools import partial
-from typing import ClassVar
 
 import bpy
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.app.translations import pgettext_tip as tip_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from .. import animation
 from ..animation.actions.marks import read_marks
@@ -22,6 +20,16 @@ from ..animation.properties import MODE_ITEMS, TURN_AXIS_ITEMS
 from ..animation.queries.keyed import active_binding
 from ..animation.queries.polls import with_holders, with_in_betweens, with_modes, with_more_keys_than
 from ..animation.transforms import OWN_WORDS, Refused, Transform
+from ..blender import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    Operator,
+    Returned,
+    existing,
+    with_properties,
+)
 from .preferences import DEFAULT_MODE, default_mode
 from .targets import (
     CURRENT,
@@ -48,7 +56,8 @@ def with_what_to_bake(targets: Iterable[Transform]) -> Iterator[Transform]:
     return itertools.chain(with_in_betweens(targets), with_holders(targets))
 
 
-class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_bake(OnTargets):
     bl_idname = "rigid_motion.bake"
     bl_label = "Bake to Keys"
     bl_description = (
@@ -59,7 +68,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
     nothing_to_do = n_("There are no rigid in-betweens to bake: choose a mode first")
     with_work = staticmethod(with_what_to_bake)
 
-    step: FloatProperty(
+    step: float = FloatProperty(
         name="Step",
         description="Frames from one baked key to the next. Below 1 there are keys between the frames, for motion blur",
         default=1.0,
@@ -69,7 +78,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
         step=25,
         precision=2,
     )
-    interpolation: EnumProperty(
+    interpolation: str = EnumProperty(
         name="Interpolation",
         description="What is between baked keys",
         items=[
@@ -78,7 +87,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
         ],
         translation_context=OWN_WORDS,
     )
-    to_world: BoolProperty(
+    to_world: bool = BoolProperty(
         name="To World",
         description=(
             "Have what is held be in the space of its parent, or in the world, as if nothing held it: it no longer "
@@ -87,8 +96,8 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        return context.window_manager.invoke_props_dialog(self, confirm_text="Bake")
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Returned:
+        return existing(context.window_manager).invoke_props_dialog(self, confirm_text="Bake")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = split(self.layout)
@@ -107,16 +116,17 @@ def axis_of_turns(target: Transform) -> str:
     """Return the one of `TURN_AXES` that the turns of a target are about."""
     binding = active_binding(target)
     fcurve = None if binding is None else binding.curves.get(target.turns_channel)
-    marks = read_marks(fcurve) if fcurve is not None else ()
-    return TURN_AXES[(marks[0] - 1) % len(TURN_AXES)] if len(marks) and marks[0] else SCREW_AXIS
+    mark = 0 if fcurve is None else int(max(read_marks(fcurve)[:1], default=0))
+    return TURN_AXES[(mark - 1) % len(TURN_AXES)] if mark else SCREW_AXIS
 
 
-class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_set_turns(OnTargets):
     bl_idname = "rigid_motion.set_turns"
     bl_label = "Set Turns"
     bl_description = "Have the selection make whole turns more from key to key"
 
-    turns: IntProperty(
+    turns: int = IntProperty(
         name="Turns",
         description="Whole turns more than there are without, in the same sense; against it where negative",
         default=1,
@@ -125,14 +135,14 @@ class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
         soft_min=-20,
         soft_max=20,
     )
-    axis: EnumProperty(
+    axis: str = EnumProperty(
         name="Axis",
         description="What the turns are about, in all segments",
         items=TURN_AXIS_ITEMS,
         default=SCREW_AXIS,
         translation_context=OWN_WORDS,
     )
-    on: EnumProperty(
+    on: str = EnumProperty(
         name="Segments",
         description="Which segments get the turns",
         items=SCOPES,
@@ -141,13 +151,13 @@ class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> Returned:
         if not self.properties.is_property_set("on"):
             self.on = SELECTED if is_key_editor(context) else CURRENT
         active = active_target(context)
         if active is not None:
             self.turns, self.axis = active.motion.turns or 1, axis_of_turns(active)
-        return context.window_manager.invoke_props_dialog(self, confirm_text="Set Turns")
+        return existing(context.window_manager).invoke_props_dialog(self, confirm_text="Set Turns")
 
     def draw(self, _context: bpy.types.Context) -> None:
         layout = split(self.layout)
@@ -161,12 +171,13 @@ class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
         return rpt_("{turns} turns more").format(turns=self.turns)
 
 
-class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_set_mode(OnTargets):
     bl_idname = "rigid_motion.set_mode"
     bl_label = "Set Rigid Motion Mode"
     bl_description = "Choose how the selection moves from key to key"
 
-    mode: EnumProperty(
+    mode: str = EnumProperty(
         name="Mode",
         description="What happens between the keys",
         items=MODE_ITEMS,
@@ -174,7 +185,7 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
         translation_context=OWN_WORDS,
         options={"SKIP_SAVE"},
     )
-    on: EnumProperty(
+    on: str = EnumProperty(
         name="Segments",
         description="Which segments get the mode",
         items=SCOPES,
@@ -191,7 +202,7 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
         on = tip_("On: {segments}").format(segments=tip_(SCOPE_NAMES[properties.on], OWN_WORDS))
         return f"{what}.\n{on}"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def execute(self, context: bpy.types.Context) -> Returned:
         if not self.properties.is_property_set("mode"):
             self.mode = default_mode()
         if not self.properties.is_property_set("on"):
@@ -211,12 +222,12 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
         label = rpt_(LABELS[self.mode], OWN_WORDS)
         if list(groups) == [None]:
             return label
-        frames = sorted({frame for group in groups for frame in group})
-        text = rpt_("{mode} from frames {frames}") if len(frames) > 1 else rpt_("{mode} from frame {frames}")
-        return text.format(mode=label, frames=listed([f"{frame:g}" for frame in frames]))
+        begins = sorted({frame for group in groups for frame in group or ()})
+        text = rpt_("{mode} from frames {frames}") if len(begins) > 1 else rpt_("{mode} from frame {frames}")
+        return text.format(mode=label, frames=listed([f"{frame:g}" for frame in begins]))
 
 
-class RIGID_MOTION_OT_copy_mode(OnTargets, bpy.types.Operator):
+class RIGID_MOTION_OT_copy_mode(OnTargets):
     bl_idname = "rigid_motion.copy_mode"
     bl_label = "Copy Mode to Selected"
     bl_description = (
@@ -235,12 +246,13 @@ class RIGID_MOTION_OT_copy_mode(OnTargets, bpy.types.Operator):
         return tip_(cls.nothing_to_do)
 
     def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
-        model = active_target(context)
+        model = existing(active_target(context))
         animation.copy_modes(model, targets, refused=refused)
         return rpt_("modes as {name} has them").format(name=model.name)
 
 
-class RIGID_MOTION_OT_add_cycles(OnTargets, bpy.types.Operator):
+@with_properties
+class RIGID_MOTION_OT_add_cycles(OnTargets):
     bl_idname = "rigid_motion.add_cycles"
     bl_label = "Add Cycles"
     bl_description = (
@@ -252,7 +264,7 @@ class RIGID_MOTION_OT_add_cycles(OnTargets, bpy.types.Operator):
     with_work = staticmethod(partial(with_more_keys_than, count=1))
     leaves_others = True
 
-    mode: EnumProperty(
+    mode: str = EnumProperty(
         name="Cycles",
         description="What each round is to the one before",
         items=[
@@ -268,7 +280,7 @@ class RIGID_MOTION_OT_add_cycles(OnTargets, bpy.types.Operator):
         return rpt_("the motion repeats")
 
 
-class RIGID_MOTION_OT_clear(OnTargets, bpy.types.Operator):
+class RIGID_MOTION_OT_clear(OnTargets):
     bl_idname = "rigid_motion.clear"
     bl_label = "Clear Modes"
     bl_description = "Give the selection Blender's own in-betweens again. Its keys stay as they are"
@@ -279,26 +291,25 @@ class RIGID_MOTION_OT_clear(OnTargets, bpy.types.Operator):
     summary = n_("Blender's own in-betweens")
 
 
-class RIGID_MOTION_OT_unbake(OnChanged, bpy.types.Operator):
+class RIGID_MOTION_OT_unbake(OnChanged):
     bl_idname = "rigid_motion.unbake"
     bl_label = "Un-Bake"
     bl_description = "Give what is baked the Action back that it had before, with its own keys and modes"
-    kind = BAKED
+    kinds = (BAKED,)
     nothing_to_do = n_("Nothing here is baked")
     verb = staticmethod(animation.unbake)
     summary = n_("back to the keys from before baking")
 
 
-class RIGID_MOTION_OT_refresh(bpy.types.Operator):
+class RIGID_MOTION_OT_refresh(Operator):
     bl_idname = "rigid_motion.refresh"
     bl_label = "Refresh In-Betweens"
     bl_description = (
         "Bring all in-betweens of this file up to date with their keys. "
         "Needed only while Live Update is off, in the preferences of the extension"
     )
-    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
-    def execute(self, _context: bpy.types.Context) -> set[str]:
+    def execute(self, _context: bpy.types.Context) -> Returned:
         count = animation.refresh()
         self.report({"INFO"}, rpt_("In-betweens refreshed: {count}").format(count=count))
         return {"FINISHED"}

@@ -16,6 +16,7 @@ from ..animation.properties import TURN_AXIS_ITEMS
 from ..animation.queries.keyed import active_binding, source_of
 from ..animation.queries.segments import SegmentFacts, frame_in_action, is_up_to_date, segment_at
 from ..animation.transforms import OWN_WORDS, Transform, transform_of
+from ..blender import Panel, existing
 from . import held_in, overlay
 from .holding import facts_or_none, name_of, shown_prop
 from .operators import axis_of_turns
@@ -130,13 +131,13 @@ def _most_modifiers(target: Transform) -> int:
     return 0 if binding is None else max((len(fcurve.modifiers) for fcurve in binding.curves.values()), default=0)
 
 
-class InSidebar:
-    bl_region_type: Any = "UI"
+class InSidebar(Panel):
+    bl_region_type = "UI"
     bl_category = "Animation"  # in the viewport Blender has its own tools for animation there
 
 
 class Folded(InSidebar):
-    bl_options: Any = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
 
 
 class _Main(InSidebar):
@@ -151,7 +152,7 @@ class _Main(InSidebar):
         if target is None:
             layout.label(text=NO_BONE)
             return
-        segment, notes = facts_and_notes(target, context.scene.frame_current_final)
+        segment, notes = facts_and_notes(target, existing(context.scene).frame_current_final)
         if is_key_editor(context):
             _draw_mode_menu(
                 labelled(layout, iface_("Selected", OWN_WORDS)), SELECTED, modes_meant(context, target, SELECTED)
@@ -192,7 +193,7 @@ class _Path(Folded):
     bl_label = "Path"
 
     def draw_header(self, context: bpy.types.Context) -> None:
-        self.layout.prop(context.scene.rigid_motion_overlay, "show_paths", text="")
+        self.layout.prop(overlay.overlay_settings(context.scene), "show_paths", text="")
 
     def draw(self, context: bpy.types.Context) -> None:
         overlay.draw_settings(self.layout, context)
@@ -201,7 +202,7 @@ class _Path(Folded):
 def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segment: SegmentFacts) -> None:
     _draw_mode_menu(labelled(layout, iface_("Segment", OWN_WORDS)), CURRENT, {segment.mode})
     frames = f"{segment.first:g} \N{EN DASH} {segment.last:g}"
-    facts = frames, turn(segment), length(context.scene, segment.distance)
+    facts = frames, turn(segment), length(existing(context.scene), segment.distance)
     labelled(layout, iface_("Frames", OWN_WORDS)).label(text=", ".join(facts), translate=False)
 
 
@@ -212,7 +213,7 @@ def _draw_turns(layout: bpy.types.UILayout, target: Transform) -> None:
     if target.motion.turns:
         label = dict(item[:2] for item in TURN_AXIS_ITEMS)[axis_of_turns(target)]
         row.operator_context = "EXEC_REGION_WIN"
-        properties = row.operator_menu_enum(
+        properties: Any = row.operator_menu_enum(
             "rigid_motion.set_turns", "axis", text=iface_(label, OWN_WORDS), translate=False
         )
         properties.turns, properties.on = target.motion.turns, CURRENT
@@ -228,29 +229,32 @@ def _draw_mode_menu(layout: bpy.types.UILayout, scope: str, modes: set[str]) -> 
         if modes
         else iface_("None")
     )
-    layout.operator_menu_enum("rigid_motion.set_mode", "mode", text=text, translate=False).on = scope
+    properties: Any = layout.operator_menu_enum("rigid_motion.set_mode", "mode", text=text, translate=False)
+    properties.on = scope
 
 
 def _draw_reduction(context: bpy.types.Context, layout: bpy.types.UILayout, target: Transform) -> None:
     row = layout.row(align=True)
+    row.operator("rigid_motion.clean_motion")
     row.operator("rigid_motion.reduce_keys", text="Reduce Keys", text_ctxt=OWN_WORDS)
+    row = layout.row(align=True)
     row.operator("rigid_motion.restore_keys", text="Restore Keys", text_ctxt=OWN_WORDS)
     reduction = animation.reduction_of(with_keyed_bones(target))
     if reduction is not None:
         row.operator("rigid_motion.discard_dense_keys", text="", icon="TRASH")
-        text = reduced_to(context.scene, reduction)
+        text = reduced_to(existing(context.scene), reduction)
         labelled(layout, iface_("Keys", OWN_WORDS)).label(text=text, translate=False)
 
 
-def _in_space(base: type, space: str, parent: type | None = None) -> type[bpy.types.Panel]:
+def _in_space(base: type[Panel], space: str, parent: type[Panel] | None = None) -> type[Panel]:
     name = f"RIGID_MOTION_PT_{base.__name__.strip('_').lower()}_{space.lower()}"
     content: dict[str, object] = {"bl_space_type": space}
     if parent is not None:
         content["bl_parent_id"] = parent.__name__
-    return type(name, (base, bpy.types.Panel), content)
+    return type(name, (base,), content)
 
 
-def _panels() -> Iterator[type[bpy.types.Panel]]:
+def _panels() -> Iterator[type[Panel]]:
     for space in SPACES:
         yield (main := _in_space(_Main, space))
         yield _in_space(_Path, space, main)

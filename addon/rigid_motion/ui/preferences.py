@@ -6,14 +6,14 @@ at a resolution scale of 1.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty
 
 from .. import animation
 from ..animation.properties import MODE_ITEMS
 from ..animation.transforms import OWN_WORDS
+from ..blender import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, existing, with_properties
 from . import keymap, manual
 from .wording import split
 
@@ -42,8 +42,8 @@ def preferences() -> RigidMotionPreferences | None:
     """Return the preferences, None while the package is registered without being an extension,
     as in tests of a checkout.
     """
-    addon = bpy.context.preferences.addons.get(EXTENSION)
-    return addon.preferences if addon is not None else None
+    addon = existing(bpy.context.preferences).addons.get(EXTENSION)
+    return cast(RigidMotionPreferences, addon.preferences) if addon is not None else None
 
 
 def default_mode() -> str:
@@ -64,7 +64,7 @@ def _on_live_update(chosen: RigidMotionPreferences, _context: bpy.types.Context)
         animation.refresh()
 
 
-def _color(name: str, description: str, default: tuple[float, float, float, float]) -> object:
+def _color(name: str, description: str, default: Color) -> Color:
     return FloatVectorProperty(
         name=name,
         description=description,
@@ -77,31 +77,34 @@ def _color(name: str, description: str, default: tuple[float, float, float, floa
     )
 
 
+@with_properties
 class RigidMotionPreferences(bpy.types.AddonPreferences):
     bl_idname = EXTENSION
 
-    default_mode: EnumProperty(
+    default_mode: str = EnumProperty(
         name="Default Mode",
         description="What Set Rigid Motion Mode takes where no mode is named: in Search, by a shortcut of your own",
         items=MODE_ITEMS,
         default=DEFAULT_MODE,
         translation_context=OWN_WORDS,
     )
-    live_update: BoolProperty(
+    live_update: bool = BoolProperty(
         name="Live Update",
         description="Follow every edit at once. Otherwise in-betweens stay as they are until Refresh In-Betweens",
         default=True,
         update=_on_live_update,
     )
-    native_color: _color(
+    native_color: Color = _color(
         "Blender's Path", "Color of the path as Blender's own in-betweens have it", DEFAULT_LOOK.native_color
     )
-    mode_color: _color("Mode's Path", "Color of the path as the mode has it", DEFAULT_LOOK.mode_color)
-    key_color: _color(
+    mode_color: Color = _color("Mode's Path", "Color of the path as the mode has it", DEFAULT_LOOK.mode_color)
+    key_color: Color = _color(
         "Selected Keys", "Color of the selected keys on a path. The others are white", DEFAULT_LOOK.key_color
     )
-    tick_color: _color("Ticks", "Color of the marks that are evenly timed along a path", DEFAULT_LOOK.tick_color)
-    line_width: FloatProperty(
+    tick_color: Color = _color(
+        "Ticks", "Color of the marks that are evenly timed along a path", DEFAULT_LOOK.tick_color
+    )
+    line_width: float = FloatProperty(
         name="Line Width",
         description="Width of the paths",
         default=DEFAULT_LOOK.line_width,

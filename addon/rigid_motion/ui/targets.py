@@ -11,7 +11,7 @@ operator that every target refused has changed nothing: it is cancelled, without
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import bpy
 import numpy as np
@@ -21,11 +21,12 @@ from bpy.app.translations import pgettext_tip as tip_
 
 from ..animation import Refused, key_frames, modes_of
 from ..animation.actions.slots import active_fcurves
-from ..animation.baking.originals import BAKED, REDUCED, notes_of
+from ..animation.baking.originals import BAKED, CLEANED, REDUCED, notes_of
 from ..animation.queries.keyed import source_of
 from ..animation.queries.polls import with_more_keys_than
 from ..animation.queries.segments import frame_in_action, segment_at
 from ..animation.transforms import TURNS_PROPERTY, WIDTHS, Transform, split_path, transform_in, transform_of
+from ..blender import Operator, Returned, existing, pose_bones
 from .wording import names_of
 
 KEY_EDITORS = ("DOPESHEET_EDITOR", "GRAPH_EDITOR")
@@ -49,6 +50,7 @@ NOTHING_SHOWN = n_("No keys of location, rotation or scale are shown here")
 LATER = {
     BAKED: n_("These keys were baked since: Un-Bake first"),
     REDUCED: n_("These keys were reduced since: Restore Keys first"),
+    CLEANED: n_("These keys were cleaned since: Restore Keys first"),
 }
 """The reason why what was done before cannot be taken back yet, by what was done last."""
 
@@ -92,7 +94,7 @@ def with_bones_of_rigs(context: bpy.types.Context, targets: Iterable[Transform])
         yield from targets
         return
     if is_key_editor(context):
-        rigs = (obj for obj in selected(context) if obj.type == "ARMATURE")
+        rigs = (obj for obj in selected(context) if isinstance(obj, bpy.types.Object) and obj.type == "ARMATURE")
         targets = (*map(transform_of, rigs), *targets)
     seen: set[Transform] = set()
     for target in targets:
@@ -103,9 +105,9 @@ def with_bones_of_rigs(context: bpy.types.Context, targets: Iterable[Transform])
 
 def with_keyed_bones(target: Transform) -> list[Transform]:
     """Return what has keys of a rig and its bones, where any of its bones has; otherwise the target alone."""
-    if target.is_part or target.carrier.type != "ARMATURE":
+    if target.is_part or target.animated.type != "ARMATURE":
         return [target]
-    keyed = list(with_more_keys_than((target, *map(transform_of, target.carrier.pose.bones)), 0))
+    keyed = list(with_more_keys_than((target, *map(transform_of, pose_bones(target.animated))), 0))
     return keyed if any(item.is_part for item in keyed) else [target]
 
 
@@ -119,7 +121,9 @@ def selected(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.ty
 
 def selected_in_view(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:
     """Return the selected bones of all rigs in Pose Mode while these are posed, else the selected objects."""
-    return list((context.selected_pose_bones if is_posing(context) else context.selected_objects) or ())
+    if is_posing(context):
+        return list(context.selected_pose_bones or ())
+    return list(context.selected_objects or ())
 
 
 def scope_for(context: bpy.types.Context) -> str:
@@ -141,7 +145,7 @@ def frames_meant(context: bpy.types.Context, target: Transform, scope: str) -> F
         raise Refused(
             n_("{name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)"), name=target.name
         )
-    segment = segment_at(source, frame_in_action(target.animated, context.scene.frame_current_final))
+    segment = segment_at(source, frame_in_action(target.animated, existing(context.scene).frame_current_final))
     if segment is None:
         raise Refused(
             n_("{name}: the playhead is not between two keys; move it there, or select keys instead"), name=target.name
@@ -195,16 +199,14 @@ def _shown_in_editor(context: bpy.types.Context) -> Iterator[Transform]:
 
 def _animated_in_editor(context: bpy.types.Context) -> Iterable[bpy.types.Object]:
     """Return the objects that a key editor may show."""
-    if not context.space_data.dopesheet.show_only_selected:
-        return context.view_layer.objects
+    if not existing(cast(bpy.types.SpaceDopeSheetEditor, context.space_data).dopesheet).show_only_selected:
+        return existing(context.view_layer).objects
     active = (context.object,) if context.object is not None else ()
     return dict.fromkeys((*context.selected_objects, *active, *(context.objects_in_mode or ())))
 
 
-class OnTargets:
+class OnTargets(Operator):
     """Operators on the selected objects or bones, or on those that the editor shows."""
-
-    bl_options: Any = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender reads it
 
     nothing_to_do: ClassVar[str] = ""
     """The reason why the operator is greyed out where it has nothing to do on any target."""
@@ -247,7 +249,7 @@ class OnTargets:
             return tip_(cls.nothing_to_do)
         return tip_(NOTHING_SHOWN if is_key_editor(context) else NO_TARGETS)
 
-    def execute(self, context: bpy.types.Context) -> Any:
+    def execute(self, context: bpy.types.Context) -> Returned:
         targets = self.meant(context)
         return self.act(targets, lambda refused: self.do(context, targets, refused))
 
@@ -261,7 +263,7 @@ class OnTargets:
         type(self).verb(targets, refused=refused)
         return rpt_(self.summary)
 
-    def act(self, targets: Sequence[Transform], verb: Callable[[list[Refused]], str]) -> set[str]:
+    def act(self, targets: Sequence[Transform], verb: Callable[[list[Refused]], str]) -> Returned:
         """Do something to all targets at once, and report it.
 
         Parameters
@@ -294,9 +296,9 @@ class OnTargets:
 
 
 class OnChanged(OnTargets):
-    """Operators on targets whose keys were baked or reduced last, while what they had before is still in the file."""
+    """Operators on targets whose keys were changed last in some ways, while those from before are still in the file."""
 
-    kind: ClassVar[str]
+    kinds: ClassVar[Sequence[str]]
 
     @classmethod
     def last_changes(cls, targets: Iterable[Transform]) -> dict[Transform, str]:
@@ -311,14 +313,14 @@ class OnChanged(OnTargets):
     def poll(cls, context: bpy.types.Context) -> bool:
         targets = list(cls.each_target(context))
         changes = cls.last_changes(targets)
-        if cls.kind in changes.values():
+        if not set(cls.kinds).isdisjoint(changes.values()):
             return True
         reason = cls.reason(targets, context)
         for target, later in changes.items():
-            if any(note.kind == cls.kind and note.original is not None for note in target.motion.bakes):
+            if any(note.kind in cls.kinds and note.original is not None for note in target.motion.bakes):
                 reason = tip_(LATER[later])
         cls.poll_message_set(reason)
         return False
 
     def meant(self, context: bpy.types.Context) -> list[Transform]:
-        return [target for target, kind in self.last_changes(self.each_target(context)).items() if kind == self.kind]
+        return [target for target, kind in self.last_changes(self.each_target(context)).items() if kind in self.kinds]

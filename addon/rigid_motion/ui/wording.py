@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import blf
 import bpy
@@ -20,6 +21,7 @@ from ..animation.evaluation.components import LOCATION, ROTATION
 from ..animation.properties import MODE_ITEMS
 from ..animation.queries.segments import NEAR_HALF_TURN, SegmentFacts
 from ..animation.transforms import OWN_WORDS, Transform
+from ..blender import existing
 from ..motion import KEYFRAME_MODES
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
@@ -229,9 +231,8 @@ def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:
     return lines
 
 
-def split(layout: bpy.types.UILayout | None) -> bpy.types.UILayout:
+def split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
     """Return the layout, which then has labels to the left of properties, and no dots to animate them by."""
-    assert layout is not None
     layout.use_property_split = True
     layout.use_property_decorate = False
     return layout
@@ -246,11 +247,11 @@ def labelled(layout: bpy.types.UILayout, label: str = "") -> bpy.types.UILayout:
     return split.row()
 
 
-def draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: str) -> None:
+def draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: Any) -> None:
     """Draw a text that is broken into as many lines as the region's width asks for."""
-    system = context.preferences.system
-    width = context.region.width - MARGIN * system.ui_scale
-    blf.size(0, context.preferences.ui_styles[0].widget.points * system.ui_scale)
+    system = existing(context.preferences).system
+    width = existing(context.region).width - MARGIN * system.ui_scale
+    blf.size(0, existing(context.preferences).ui_styles[0].widget.points * system.ui_scale)
     column = layout.column(align=True)
     column.scale_y = 0.8
     for line in wrapped(iface_(text), lambda line: blf.dimensions(0, line)[0] <= width):

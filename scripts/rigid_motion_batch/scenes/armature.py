@@ -14,6 +14,7 @@ import numpy as np
 from mathutils import Vector
 
 from rigid_motion import animation
+from rigid_motion.blender import armature, pose_bones, view_layer
 from rigid_motion.motion import KEYFRAME_MODES, Poses
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import align_signs, conjugate, multiply, rotate
@@ -92,13 +93,13 @@ class Rig:
         collection: bpy.types.Collection,
         like: Rig | None = None,
     ) -> None:
-        self.obj = bpy.data.objects.new(name, like.obj.data if like else bpy.data.armatures.new(name))
+        self.obj: bpy.types.Object = bpy.data.objects.new(name, like.obj.data if like else bpy.data.armatures.new(name))
         collection.objects.link(self.obj)
-        self.bones = like.bones if like else _with_bones(self.obj, rest, names)
-        bpy.context.view_layer.update()  # A pose comes with it.
-        for bone in self.obj.pose.bones:
+        self.bones: tuple[str, ...] = like.bones if like else _with_bones(self.obj, rest, names)
+        view_layer().update()  # A pose comes with it.
+        for bone in pose_bones(self.obj):
             bone.rotation_mode = "QUATERNION"
-        bones = self.obj.data.bones
+        bones = armature(self.obj).bones
         there = rigid(np.array([bones[bone].matrix_local for bone in self.bones], dtype=np.float64).reshape(-1, 4, 4))
         turns = multiply(conjugate(rest.joints.quaternions), there.quaternions)
         none = np.zeros((len(turns), 3))
@@ -128,7 +129,7 @@ class Rig:
 
     def key(self, bone: int, frames: np.ndarray, channels: Poses) -> None:
         """Key a bone at frames (n,), or set it where it does not vary; its channels have the shape (n,)."""
-        pose_bone = self.obj.pose.bones[self.bones[bone]]
+        pose_bone = pose_bones(self.obj)[self.bones[bone]]
         quaternions = align_signs(channels.quaternions)
         for name, values in (("location", channels.positions), ("rotation_quaternion", quaternions)):
             if len(values) > 1 and np.ptp(values, axis=0).max() > STEADY:
@@ -141,19 +142,19 @@ class Rig:
         """Have what happens between the keys of all bones be that of a mode of `KEYFRAME_MODES`."""
         if mode not in KEYFRAME_MODES:
             raise ValueError(f"{mode} is no mode of keys")
-        keyed = [bone for bone in self.obj.pose.bones if len(animation.key_frames(bone))]
+        keyed = [bone for bone in pose_bones(self.obj) if len(animation.key_frames(bone))]
         if keyed:
             animation.set_mode(keyed, mode)
 
 
 def _with_bones(obj: bpy.types.Object, rest: Rest, names: Iterable[str]) -> tuple[str, ...]:
     """Make the bones of an armature, and return what they are called."""
-    bpy.context.view_layer.objects.active = obj
+    view_layer().objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
     made: list[bpy.types.EditBone] = []
     sides = rotate(rest.joints.quaternions, np.tile((0.0, 0.0, 1.0), (len(rest.parents), 1)))
     for joint, name in enumerate(names):
-        bone = obj.data.edit_bones.new(name)
+        bone = armature(obj).edit_bones.new(name)
         bone.head, bone.tail = rest.joints.positions[joint], rest.tails[joint]
         bone.align_roll(Vector(sides[joint]))
         bone.parent = made[rest.parents[joint]] if rest.parents[joint] >= 0 else None

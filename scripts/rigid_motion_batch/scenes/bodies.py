@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from rigid_motion.blender import action_of, armature, assign, pose_bones
 from rigid_motion.motion import KEYFRAME_MODES, Poses
 from rigid_motion.motion.quaternions import conjugate, rotate
 from rigid_motion_batch.palette import error_hex
@@ -21,7 +22,7 @@ from . import layout, physique, trails
 from .armature import Rest, Rig
 from .lanes import Cast, Lane
 from .materials import ghost, ink, surface
-from .nodes import Group, Socket, apply_group
+from .nodes import Group, Socket, add_attribute, apply_group, node_of
 
 SHADES = 16
 """The number of shades of the bones."""
@@ -123,7 +124,7 @@ class Bodies:
             frames = self.cast.timeline.frames
             self._key(rest_body, [(frames, motion.modes[mode][joint]) for joint in range(len(self.names))])
         if rest_body.obj.animation_data and rest_body.obj.animation_data.action:
-            rest_body.obj.animation_data.action.name = mode
+            action_of(rest_body.obj).name = mode
         self._add_ghost(lane)
         self._dress(rest_body, lane)
         self._add_ground(lane)
@@ -133,7 +134,7 @@ class Bodies:
         self.rig = self.rig or rig
         rig.obj.parent = lane.empty
         rig.obj.show_in_front = True
-        rig.obj.data.display_type = "STICK"
+        armature(rig.obj).display_type = "STICK"
         return rig
 
     @staticmethod
@@ -148,16 +149,15 @@ class Bodies:
             frames, recording = self.cast.timeline.frames, self.motion.recording
             self._key(rig, [(frames, recording[joint]) for joint in range(len(self.names))])
             if rig.obj.animation_data:
-                self.ghost_action = rig.obj.animation_data.action
+                self.ghost_action = action_of(rig.obj)
                 self.ghost_action.name = "recording"
-                self.still = [(bone.location.copy(), bone.rotation_quaternion.copy()) for bone in rig.obj.pose.bones]
+                self.still = [(bone.location.copy(), bone.rotation_quaternion.copy()) for bone in pose_bones(rig.obj)]
         else:
-            rig.obj.animation_data_create().action = self.ghost_action
-            rig.obj.animation_data.action_slot = self.ghost_action.slots[0]
-            for bone, (place, turn) in zip(rig.obj.pose.bones, self.still, strict=True):
+            assign(rig.obj, self.ghost_action)
+            for bone, (place, turn) in zip(pose_bones(rig.obj), self.still, strict=True):
                 bone.location, bone.rotation_quaternion = place, turn
         rest_body = self._carried(f"{lane.mode} recording figure", self.rest_body, rig, lane)
-        rest_body.location = rig.obj.location = self.cast.behind
+        rest_body.location = rig.obj.location = self.cast.behind.tolist()
         rest_body.material_slots[0].link = "OBJECT"
         rest_body.material_slots[0].material = self.ghost
 
@@ -193,7 +193,7 @@ class Bodies:
         mesh.vertices.add(errors.size)
         worst = (errors == errors.max(axis=0)) & (errors > RINGED * self.full)
         for name, values in ((ERROR, errors), (FLASH, self.motion.flashes[mode]), (WORST, worst)):
-            mesh.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", values.T.astype(np.float32).ravel())
+            add_attribute(mesh, name, values.T.astype(np.float32).ravel())
         obj = lane.child(f"{mode} errors", mesh)
         obj.hide_render = True
         return obj
@@ -217,9 +217,10 @@ def ground_grid(motion: BodyMotion, spacing: float) -> bpy.types.Mesh:
     reach = 2.5 * physique.body_size(motion.rest)
     way = motion.places(motion.recording).mean(axis=1)[:, :2]
     low, high = way.min(axis=0) - reach, way.max(axis=0) + reach
-    spacing = max(spacing, float((high - low).max()) / MOST_CELLS)
+    spacing = max(spacing, float(np.max(high - low)) / MOST_CELLS)
     first, last = np.floor(low / spacing).astype(int), np.ceil(high / spacing).astype(int)
-    points, edges = [], []
+    points: list[np.ndarray] = []
+    edges: list[np.ndarray] = []
     for along in (0, 1):
         across = 1 - along
         steps = np.arange(first[along] * GRID_STEPS, last[along] * GRID_STEPS + 1) * spacing / GRID_STEPS
@@ -233,7 +234,7 @@ def ground_grid(motion: BodyMotion, spacing: float) -> bpy.types.Mesh:
     places = np.concatenate(points)
     mesh = bpy.data.meshes.new("Ground")
     mesh.from_pydata(places.tolist(), np.concatenate(edges).tolist(), [])
-    mesh.attributes.new(trails.FRAME, "FLOAT", "POINT").data.foreach_set("value", np.zeros(len(places), np.float32))
+    add_attribute(mesh, trails.FRAME, np.zeros(len(places), np.float32))
     return mesh
 
 
@@ -258,8 +259,8 @@ def _looked_up(group: Group, name: str) -> Socket:
     frame = group.math("SUBTRACT", group.frame(), 1.0)
     # Numbers are cut off to be an index.
     number = group.math("ADD", group.math("MULTIPLY_ADD", frame, group.inputs["Bones"], bone), 0.5)
-    source = group.add("GeometryNodeObjectInfo", group.inputs["Errors"]).node.outputs["Geometry"]
-    sample = group.add("GeometryNodeSampleIndex", source, settings={"data_type": "FLOAT", "domain": "POINT"}).node
+    source = node_of(group.add("GeometryNodeObjectInfo", group.inputs["Errors"])).outputs["Geometry"]
+    sample = node_of(group.add("GeometryNodeSampleIndex", source, settings={"data_type": "FLOAT", "domain": "POINT"}))
     sample.clamp = True
     inputs = {socket.name: socket for socket in sample.inputs if socket.enabled}
     group.tree.links.new(group.attribute(name), inputs["Value"])
@@ -272,7 +273,7 @@ def _colours_group() -> bpy.types.NodeTree:
     group = Group("Colours of errors", Errors="Object", Bones="Float", Shades="Float")
     shade = group.math("MULTIPLY", _looked_up(group, ERROR), group.inputs["Shades"])
     shade = group.math("MINIMUM", group.math("MAXIMUM", shade, 0.0), SHADES - 0.5)
-    geometry = group.add("GeometryNodeSetMaterialIndex", group.inputs["Geometry"]).node
+    geometry = node_of(group.add("GeometryNodeSetMaterialIndex", group.inputs["Geometry"]))
     group.tree.links.new(shade, geometry.inputs["Material Index"])
     return group.finish(geometry.outputs[0])
 
@@ -316,4 +317,4 @@ def _shifted(group: Group, points: Socket) -> Socket:
 
 def _input(socket: Socket, name: str) -> Socket:
     """Return the input of a socket's node that is in use, of several that have the name."""
-    return next(item for item in socket.node.inputs if item.name == name and item.enabled)
+    return next(item for item in node_of(socket).inputs if item.name == name and item.enabled)

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
+from typing import Any, cast
 
 import bpy
 import numpy as np
 
 from rigid_motion.animation import write_channel
+from rigid_motion.blender import action_of, scene, view_layer
 
-from .nodes import Group, Socket, apply_group, input_path
+from .nodes import Group, Socket, apply_group, input_path, node_of
 
 CORNER = 0.012
 
@@ -46,7 +48,7 @@ def words(name: str, text: str, size: float, material: bpy.types.Material, align
     Its outlines stay as the font has them: moved outwards, those of an M cross, which Blender before 5.2 fills as one
     blot.
     """
-    curve = bpy.data.curves.new(name, "FONT")
+    curve: Any = bpy.data.curves.new(name, "FONT")
     curve.body = text
     curve.size = size
     curve.align_x = align
@@ -84,11 +86,11 @@ def put(
 @cache
 def width_of(text: str) -> float:
     """Return how wide `words` of size 1 are."""
-    curve = bpy.data.curves.new("Measured", "FONT")
+    curve = cast(bpy.types.TextCurve, bpy.data.curves.new("Measured", "FONT"))
     curve.body = text
     obj = bpy.data.objects.new("Measured", curve)
-    bpy.context.scene.collection.objects.link(obj)
-    bpy.context.view_layer.update()
+    scene().collection.objects.link(obj)
+    view_layer().update()
     width = float(obj.dimensions.x)
     bpy.data.curves.remove(curve)
     return width
@@ -99,10 +101,11 @@ def readout_group(name: str, decimals: int, material: bpy.types.Material) -> bpy
     group = Group(name, Value="Float")
     string = group.add("FunctionNodeValueToString", group.inputs["Value"], decimals)
     curves = group.add("GeometryNodeStringToCurves", string, 1.0)
-    if "Align X" in curves.node.inputs:  # Blender 5 made it an input.
-        curves.node.inputs["Align X"].default_value = "Right"
+    node = node_of(curves)
+    if "Align X" in node.inputs:  # Blender 5 made it an input.
+        node.inputs["Align X"].default_value = "Right"
     else:
-        curves.node.align_x = "RIGHT"
+        node.align_x = "RIGHT"
     return _lettered(group, curves, material)
 
 
@@ -116,7 +119,7 @@ def decimals_for(largest: float) -> int:
 def choice_group(name: str, texts: Sequence[str], material: bpy.types.Material) -> bpy.types.NodeTree:
     """Return one of some texts, that with the number `Value`, written from the origin on in letters of size 1."""
     group = Group(name, Value="Float")
-    chosen = group.add("GeometryNodeIndexSwitch", settings={"data_type": "STRING"}).node
+    chosen = node_of(group.add("GeometryNodeIndexSwitch", settings={"data_type": "STRING"}))
     while len(chosen.index_switch_items) < len(texts):
         chosen.index_switch_items.new()
     # Numbers are cut off to be an index.
@@ -150,5 +153,5 @@ def readout(
     obj.scale = (size, size, size)
     modifier = apply_group(obj, group, Value=float(values[0]))
     write_channel(obj, input_path(modifier, "Value"), frames, values, interpolation=interpolation)
-    obj.animation_data.action.name = name
+    action_of(obj).name = name
     return obj

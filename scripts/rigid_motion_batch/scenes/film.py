@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import bpy
 
+from rigid_motion import blender
 from rigid_motion_batch.files import written_beside
 from rigid_motion_batch.saving import save_copy
 from rigid_motion_batch.silencing import silenced
@@ -73,7 +75,7 @@ def render_piece(
     """
     scene = _open(blend)
     scene.frame_start, scene.frame_end = first, last
-    video = scene.render.ffmpeg
+    video: Any = scene.render.ffmpeg
     video.codec, video.format = LOSSLESS[:2]
     render_film(scene, path, progress)
 
@@ -116,7 +118,7 @@ def _open(blend: Path) -> bpy.types.Scene:
     """Return the scene of a saved stage, which is opened for it. Its scripts, if it has come by any, do not run."""
     with silenced():
         bpy.ops.wm.open_mainfile(filepath=str(blend), use_scripts=False, load_ui=False)
-    return bpy.context.scene
+    return blender.scene()
 
 
 def save_blend(path: Path) -> None:

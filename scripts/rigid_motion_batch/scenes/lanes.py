@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from rigid_motion.animation import write_channel
+from rigid_motion.blender import action_of, scene
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART, label_of
 from rigid_motion_batch.analysis.reconstructions import Groups, Reconstruction
@@ -172,7 +173,7 @@ class Lanes:
         """Make the lane of modes that are one motion in its cell, in a collection of its own; the first gives names."""
         mode = modes[0]
         self.collection = bpy.data.collections.new(f"Lane {mode}")
-        bpy.context.scene.collection.children.link(self.collection)
+        scene().collection.children.link(self.collection)
         empty = bpy.data.objects.new(f"Lane {mode}", None)
         self.collection.objects.link(empty)
         empty.empty_display_size = 0.05 * self.cast.layout.metres
@@ -191,7 +192,7 @@ class Lanes:
         lane.location = home - focus[0]
         if cast.framing.follows:
             write_channel(lane, "location", cast.timeline.frames, home - focus)
-            lane.animation_data.action.name = lane.name
+            action_of(lane).name = lane.name
 
     def _add_caption(self, modes: tuple[str, ...], cell: layout.Cell) -> None:
         """Add at the top the title and what else is known of the keys,

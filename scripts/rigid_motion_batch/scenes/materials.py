@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 
 from rigid_motion_batch.palette import Theme, linear
@@ -53,8 +55,8 @@ def ink(name: str, colour: str) -> bpy.types.Material:
     return material
 
 
-def _new(name: str) -> tuple[bpy.types.Material, bpy.types.Nodes, bpy.types.Node]:
-    material = bpy.data.materials.new(name)
+def _new(name: str) -> tuple[Any, Any, Any]:
+    material: Any = bpy.data.materials.new(name)
     if material.node_tree is None:  # Blender 5 makes it, and warns of the switch.
         material.use_nodes = True
     nodes = material.node_tree.nodes

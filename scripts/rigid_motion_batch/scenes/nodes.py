@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, cast
 
 import bpy
+import numpy as np
+
+from rigid_motion.blender import existing
 
 Socket = bpy.types.NodeSocket
+
+
+def add_attribute(
+    mesh: bpy.types.Mesh, name: str, values: np.ndarray, domain: Literal["POINT", "FACE"] = "POINT"
+) -> None:
+    """Give each point, or each face, a number of its own. The array's type is that of the attribute."""
+    attribute: Any = mesh.attributes.new(name, "INT" if values.dtype == np.int32 else "FLOAT", domain)
+    attribute.data.foreach_set("value", values)
+
+
+def node_of(socket: Socket) -> Any:
+    """Return the node of a socket, which has what nodes of its kind have."""
+    return socket.node
 
 
 class Group:
@@ -14,7 +30,7 @@ class Group:
 
     def __init__(self, name: str, **inputs: str) -> None:
         """Make a group that takes a geometry and then `inputs`, name to the kind of socket ("Float", "Material")."""
-        self.tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
+        self.tree = cast(Any, bpy.data.node_groups.new(name, "GeometryNodeTree"))
         self.tree.is_modifier = True
         for direction in ("INPUT", "OUTPUT"):
             self.tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
@@ -43,7 +59,7 @@ class Group:
         return self.add("ShaderNodeMath", *values, settings={"operation": operation, "use_clamp": clamp})
 
     def vector(self, operation: str, *values: Any) -> Socket:
-        outputs = self.add("ShaderNodeVectorMath", *values, settings={"operation": operation}).node.outputs
+        outputs = node_of(self.add("ShaderNodeVectorMath", *values, settings={"operation": operation})).outputs
         return outputs["Value" if operation in ("DOT_PRODUCT", "DISTANCE", "LENGTH") else "Vector"]
 
     def attribute(self, name: str) -> Socket:
@@ -52,36 +68,35 @@ class Group:
 
     def frame(self) -> Socket:
         """Return the frame that is shown."""
-        return self.add("GeometryNodeInputSceneTime").node.outputs["Frame"]
+        return node_of(self.add("GeometryNodeInputSceneTime")).outputs["Frame"]
 
     def finish(self, geometry: Socket) -> bpy.types.NodeTree:
         self.tree.links.new(geometry, self.tree.nodes.new("NodeGroupOutput").inputs[0])
-        return self.tree
+        return cast(bpy.types.NodeTree, self.tree)
 
 
-def apply_group(obj: bpy.types.Object, group: bpy.types.NodeTree, **inputs: Any) -> bpy.types.Modifier:
+def apply_group(obj: bpy.types.Object, group: bpy.types.NodeTree, **inputs: Any) -> bpy.types.NodesModifier:
     """Give the object a modifier with the group, and its inputs their values."""
-    modifier = obj.modifiers.new(group.name, "NODES")
+    modifier: Any = obj.modifiers.new(group.name, "NODES")
     modifier.node_group = group
     for name, value in inputs.items():
         if hasattr(modifier, "properties"):
             getattr(modifier.properties.inputs, _identifier(group, name)).value = value
         else:
             modifier[_identifier(group, name)] = value
-    return modifier
+    return cast(bpy.types.NodesModifier, modifier)
 
 
-def input_path(modifier: bpy.types.Modifier, name: str) -> str:
+def input_path(modifier: Any, name: str) -> str:
     """Return the data path, from the object on, by which an input is animated. Blender 5.2 moved it."""
     identifier = _identifier(modifier.node_group, name)
     if hasattr(modifier, "properties"):
-        return getattr(modifier.properties.inputs, identifier).path_from_id("value")
+        return str(getattr(modifier.properties.inputs, identifier).path_from_id("value"))
     return f'modifiers["{modifier.name}"]["{identifier}"]'
 
 
 def _identifier(group: bpy.types.NodeTree, name: str) -> str:
+    items: Any = existing(group.interface).items_tree
     return next(
-        item.identifier
-        for item in group.interface.items_tree
-        if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name
+        item.identifier for item in items if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name
     )

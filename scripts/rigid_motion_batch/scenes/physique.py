@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import cast
 
 import bpy
 import numpy as np
@@ -16,6 +17,7 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings.clips import Clip
 
 from .armature import Rest, Rig
+from .nodes import add_attribute
 
 BONE = "bone"
 """The attribute of a face or point: the number of its bone."""
@@ -88,7 +90,9 @@ class Physique:
     @classmethod
     def _of_solids(cls, rest: Rest) -> Physique:
         size = body_size(rest)
-        vertices, faces, carriers = [], [], []
+        vertices: list[np.ndarray] = []
+        faces: list[tuple[int, ...]] = []
+        carriers: list[np.ndarray] = []
         for bone, head, tail, share in _parts(rest, size):
             corners, own = _solid(head, tail, share, size)
             faces += [tuple(len(vertices) * len(corners) + corner for corner in face) for face in own]
@@ -175,7 +179,7 @@ class Carried:
         """Return a physique. Its faces know their bones."""
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(physique.vertices.tolist(), [], physique.faces)
-        mesh.attributes.new(BONE, "INT", "FACE").data.foreach_set("value", physique.bones.astype(np.int32))
+        add_attribute(mesh, BONE, physique.bones.astype(np.int32), "FACE")
         mesh.polygons.foreach_set("use_smooth", np.full(len(mesh.polygons), physique.smooth))
         mesh.update()
         return cls(mesh, physique.carriers, physique.weights)
@@ -186,7 +190,7 @@ class Carried:
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(rest.joints.positions.tolist(), [], [])
         numbers = np.arange(len(rest.parents))[:, None]
-        mesh.attributes.new(BONE, "INT", "POINT").data.foreach_set("value", numbers[:, 0].astype(np.int32))
+        add_attribute(mesh, BONE, numbers[:, 0].astype(np.int32))
         return cls(mesh, numbers, np.ones(numbers.shape))
 
     def hang_on(self, rig: Rig, obj: bpy.types.Object) -> None:
@@ -199,4 +203,4 @@ class Carried:
                     own = (column == bone) & (shares > 0.0)
                     for share in np.unique(shares[own]).tolist():
                         group.add(vertices[own & (shares == share)].tolist(), share, "ADD")
-        obj.modifiers.new("Armature", "ARMATURE").object = rig.obj
+        cast(bpy.types.ArmatureModifier, obj.modifiers.new("Armature", "ARMATURE")).object = rig.obj

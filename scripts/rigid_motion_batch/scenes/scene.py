@@ -13,11 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Any, cast
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
+from rigid_motion import blender
+from rigid_motion.blender import existing
 from rigid_motion_batch.analysis.reconstructions import Groups, Reconstruction, identical_modes
 from rigid_motion_batch.palette import DARK, linear
 
@@ -72,7 +75,7 @@ def build_scene(
     mesh.transform(Matrix.Scale(enlarged, 4))
     outline = outline * enlarged
 
-    size, middle = float(np.ptp(outline, axis=0).max()), (outline.min(axis=0) + outline.max(axis=0)) / 2.0
+    size, middle = float(np.max(np.ptp(outline, axis=0))), (outline.min(axis=0) + outline.max(axis=0)) / 2.0
     farthest = max(largest_deviation(poses, motion.recording, outline) for poses in motion.modes.values())
     deviation = settings.deviation or magnification(farthest, size)
     deviated = {mode: magnified(poses, motion.recording, deviation, middle) for mode, poses in motion.modes.items()}
@@ -93,7 +96,7 @@ def build_scene(
     legend = _legend(cast, deviation, enlarged, float(reconstruction.radii[0]), crosses=bool(pivot))
     scene = assemble_scene(reconstruction, settings, cast, lanes_of, solids.enter, legend, motion.centre)
     # Our own models are closed: what faces away costs time and is never seen.
-    scene.display.shading.show_backface_culling = settings.subject in MODELS
+    existing(existing(scene.display).shading).show_backface_culling = settings.subject in MODELS
     scene["deviation_shown_times"] = deviation
     return scene
 
@@ -101,7 +104,7 @@ def build_scene(
 def begin(made: Reconstruction, settings: SceneSettings) -> Timeline:
     """Empty the file, name its scene after what is compared, and return the timeline."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.context.scene.name = f"{made.clip.name} {made.choice.name}"
+    blender.scene().name = f"{made.clip.name} {made.choice.name}"
     return Timeline.between(float(made.times[0]), float(made.times[-1]), settings.fps, settings.slow_motion)
 
 
@@ -133,7 +136,7 @@ def assemble_scene(
     reserved : float
         The space to be left free to the right of the legend, in units of the frame's height.
     """
-    scene = bpy.context.scene
+    scene = blender.scene()
     plan = cast.layout
     frame = make_frame(plan.metres)
     lanes = Lanes(cast, frame, enter)
@@ -179,7 +182,7 @@ def make_frame(metres: float) -> bpy.types.Object:
 def _make_header(made: Reconstruction, legend: str, cast: Cast, frame: bpy.types.Object, reserved: float) -> None:
     """Make what is written above and below the lanes: clip, rate and time, and how to read the picture."""
     collection = bpy.data.collections.new("Captions")
-    bpy.context.scene.collection.children.link(collection)
+    blender.scene().collection.children.link(collection)
     collection.objects.link(frame)
     left, line = cast.layout.cells[0].left, 0.5 - layout.MARGIN - 0.042
     right = -left
@@ -208,22 +211,23 @@ def _make_header(made: Reconstruction, legend: str, cast: Cast, frame: bpy.types
 
 def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
     """Make a camera square to the frame, in front of all that moves, with parallel rays."""
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    lens = bpy.data.cameras.new("Camera")
+    camera = bpy.data.objects.new("Camera", lens)
     scene.collection.objects.link(camera)
     scene.camera = camera
     camera.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION
-    camera.location = -layout.AWAY * (depth + metres)
-    camera.data.type = "ORTHO"
-    camera.data.sensor_fit = "VERTICAL"
-    camera.data.ortho_scale = metres
-    camera.data.clip_start = 0.5 * metres
-    camera.data.clip_end = depth + 1.5 * metres
+    camera.location = (-layout.AWAY * (depth + metres)).tolist()
+    lens.type = "ORTHO"
+    lens.sensor_fit = "VERTICAL"
+    lens.ortho_scale = metres
+    lens.clip_start = 0.5 * metres
+    lens.clip_end = depth + 1.5 * metres
 
 
 def make_lights(scene: bpy.types.Scene) -> None:
     """Make two suns for EEVEE and Cycles. Workbench brings its own light."""
     for name, strength, pitch, yaw in (("Key light", 3.0, 40.0, -35.0), ("Fill light", 1.2, 60.0, 50.0)):
-        light = bpy.data.lights.new(name, "SUN")
+        light = cast(bpy.types.SunLight, bpy.data.lights.new(name, "SUN"))
         light.energy = strength
         light.angle = math.radians(5.0)
         obj = bpy.data.objects.new(name, light)
@@ -231,9 +235,7 @@ def make_lights(scene: bpy.types.Scene) -> None:
         scene.collection.objects.link(obj)
 
 
-def set_up_render(
-    scene: bpy.types.Scene, settings: SceneSettings, frames: int, background: str = DARK.background
-) -> None:
+def set_up_render(scene: Any, settings: SceneSettings, frames: int, background: str = DARK.background) -> None:
     """Set engine, size, colours and encoder of a scene of so many frames."""
     scene.frame_start, scene.frame_end = 1, frames
     scene.frame_set(1)
@@ -259,10 +261,10 @@ def set_up_render(
         scene.cycles.use_denoising = False
 
 
-def _smooth_edges(scene: bpy.types.Scene) -> None:
+def _smooth_edges(scene: Any) -> None:
     """Have the compositor soften what is rendered: its antialiasing would take four times as long."""
     if bpy.app.version >= (5, 0):
-        tree = bpy.data.node_groups.new("Smooth edges", "CompositorNodeTree")
+        tree: Any = bpy.data.node_groups.new("Smooth edges", "CompositorNodeTree")
         effects = getattr(scene, "compositor_effects", None)  # Blender 5.3 warns of the one group it had before.
         if effects is None:
             scene.compositing_node_group = tree
@@ -284,7 +286,7 @@ def _smooth_edges(scene: bpy.types.Scene) -> None:
 
 def _set_up_video(scene: bpy.types.Scene) -> None:
     """Set H.264 in an MP4 beside the .blend, wherever that is taken, by Blender's own encoder."""
-    image, video = scene.render.image_settings, scene.render.ffmpeg
+    image, video = existing(scene.render.image_settings), existing(scene.render.ffmpeg)
     if hasattr(image, "media_type"):  # Blender 5 asks for the kind of output first.
         image.media_type = "VIDEO"
     image.file_format = "FFMPEG"
@@ -305,11 +307,9 @@ def _set_background(scene: bpy.types.Scene, background: str) -> None:
     scene.world.color = colour
     if scene.world.node_tree is None:  # Blender 5 makes it, and warns of the switch.
         scene.world.use_nodes = True
-    nodes = scene.world.node_tree.nodes
-    next(node for node in nodes if node.bl_idname == "ShaderNodeBackground").inputs["Color"].default_value = (
-        *colour,
-        1.0,
-    )
+    nodes = existing(scene.world.node_tree).nodes
+    socket: Any = next(node for node in nodes if node.bl_idname == "ShaderNodeBackground").inputs["Color"]
+    socket.default_value = (*colour, 1.0)
 
 
 def _engine_id(engine: str) -> str:

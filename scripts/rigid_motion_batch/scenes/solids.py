@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from rigid_motion.animation import bake_poses
+from rigid_motion.blender import action_of, assign
 from rigid_motion.motion import Poses
 from rigid_motion_batch.palette import colour_on
 
@@ -86,22 +87,21 @@ class Solids:
 
         ghost = lane.child(f"{mode} recording", self.mesh)
         ghost.rotation_mode = "QUATERNION"
-        ghost.delta_location = self.cast.behind
+        ghost.delta_location = self.cast.behind.tolist()
         _paint(ghost, range(len(ghost.material_slots)), self.ghost)
         if self.ghost_action is None:
             bake_poses(ghost, frames, motion.recording[::steps])
-            self.ghost_action = ghost.animation_data.action
+            self.ghost_action = action_of(ghost)
             self.ghost_action.name = "recording"
         else:
-            ghost.animation_data_create().action = self.ghost_action
-            ghost.animation_data.action_slot = self.ghost_action.slots[0]
+            assign(ghost, self.ghost_action)
 
     def _add_actor(self, name: str, lane: Lane, poses: Poses, material: bpy.types.Material) -> None:
         actor = lane.child(name, self.mesh)
         actor.rotation_mode = "QUATERNION"
         _paint(actor, tinted_slots(self.mesh), material)
         bake_poses(actor, self.cast.timeline.frames, poses)
-        actor.animation_data.action.name = name
+        action_of(actor).name = name
         if self.cut_group:
             apply_group(actor, self.cut_group, **self.window)
 

@@ -7,11 +7,13 @@ Scripts in such a file never run: it is read as data.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, cast
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
+from rigid_motion.blender import existing, scene
 from rigid_motion_batch.command_line import listed
 
 from .settings import SubjectError, place_of_subject
@@ -63,7 +65,8 @@ def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:
     before = set(bpy.data.user_map())
     mesh = None
     try:
-        with bpy.data.libraries.load(str(file), link=False) as (source, target):
+        libraries: Any = bpy.data.libraries
+        with libraries.load(str(file), link=False) as (source, target):
             if name not in source.objects:
                 others = listed(sorted(source.objects), 12) or "none"
                 raise SubjectError(f"{file}: has no object {name!r}; it has {others}")
@@ -86,7 +89,7 @@ def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:
 
 def _evaluated_copy(loaded: bpy.types.Object) -> bpy.types.Mesh | None:
     """Return the shape as its scene shows it, sized as in its file; None for what has no faces."""
-    objects = bpy.context.scene.collection.objects
+    objects = scene().collection.objects
     objects.link(loaded)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = loaded.evaluated_get(depsgraph)
@@ -99,7 +102,7 @@ def _evaluated_copy(loaded: bpy.types.Object) -> bpy.types.Mesh | None:
         objects.unlink(loaded)
     if not mesh.polygons:
         return None
-    mesh.transform(Matrix.Diagonal((*size, 1.0)))
+    mesh.transform(Matrix.Diagonal((size.x, size.y, size.z, 1.0)))
     return mesh
 
 
@@ -109,11 +112,11 @@ def _own_materials(mesh: bpy.types.Mesh) -> dict[bpy.types.Material, str]:
     Blender notes in what it loads which file that was, by its full path, and a copy has no such note. Images are
     packed, so that the file that shows the object can be opened elsewhere.
     """
-    names = {}
+    names: dict[bpy.types.Material, str] = {}
     for slot, material in enumerate(mesh.materials):
         if material is not None:
-            mesh.materials[slot] = material.copy()
-            names[mesh.materials[slot]] = material.name
+            copied = mesh.materials[slot] = material.copy()
+            names[existing(copied)] = material.name
     for image in bpy.data.images:
         if image.source == "FILE" and not image.packed_file and Path(bpy.path.abspath(image.filepath)).is_file():
             image.pack()
@@ -148,8 +151,8 @@ def simplified(requested: str, most: int = MOST_TRIANGLES) -> dict[str, np.ndarr
     bpy.ops.wm.read_factory_settings(use_empty=True)
     mesh = load_subject(requested)
     obj = bpy.data.objects.new("Subject", mesh)
-    bpy.context.scene.collection.objects.link(obj)
-    modifier = obj.modifiers.new("Fewer", "DECIMATE")
+    scene().collection.objects.link(obj)
+    modifier = cast(bpy.types.DecimateModifier, obj.modifiers.new("Fewer", "DECIMATE"))
     modifier.use_collapse_triangulate = True
     for _ in range(TRIES):
         result = _surface(obj)
@@ -163,7 +166,7 @@ def simplified(requested: str, most: int = MOST_TRIANGLES) -> dict[str, np.ndarr
 def _surface(obj: bpy.types.Object) -> dict[str, np.ndarray]:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+    mesh = existing(evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph))
     mesh.calc_loop_triangles()
     triangles = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
     slots = np.empty(len(mesh.loop_triangles), dtype=np.int32)

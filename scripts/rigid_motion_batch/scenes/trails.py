@@ -10,7 +10,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from .nodes import Group, Socket
+from .nodes import Group, Socket, add_attribute, node_of
 
 FRAME = "frame"
 FLASH_FRAMES = 6.0
@@ -31,7 +31,7 @@ def polyline(name: str, frames: np.ndarray, points: np.ndarray, *, joined: bool 
     steps = np.arange(len(points))
     edges = np.stack((steps[:-1], steps[1:]), axis=-1) if joined else np.empty((0, 2), dtype=int)
     mesh.from_pydata(points.tolist(), edges.tolist(), [])
-    mesh.attributes.new(FRAME, "FLOAT", "POINT").data.foreach_set("value", frames.astype(np.float32))
+    add_attribute(mesh, FRAME, frames.astype(np.float32))
     return mesh
 
 
@@ -104,8 +104,7 @@ def graph(name: str, frames: np.ndarray, heights: np.ndarray, width: float) -> b
     faces = np.stack((steps, steps + 1, steps + 1 + count, steps + count), axis=-1)
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points.reshape(-1, 3).tolist(), [], faces.tolist())
-    moments = np.tile(frames, 2).astype(np.float32)
-    mesh.attributes.new(FRAME, "FLOAT", "POINT").data.foreach_set("value", moments)
+    add_attribute(mesh, FRAME, np.tile(frames, 2).astype(np.float32))
     return mesh
 
 
@@ -120,7 +119,7 @@ def graph_group() -> bpy.types.NodeTree:
 def _within_picture(group: Group, points: Socket) -> tuple[Socket, Socket]:
     """Return the points within the window, and how much is left of what is drawn there: 1, and 0 at its edge."""
     itself = group.add("GeometryNodeSelfObject")
-    world = group.add("GeometryNodeObjectInfo", itself).node.outputs["Transform"]
+    world = node_of(group.add("GeometryNodeObjectInfo", itself)).outputs["Transform"]
     place = group.add("FunctionNodeTransformPoint", group.add("GeometryNodeInputPosition"), world)
     offset = group.vector("SUBTRACT", place, group.inputs["Middle"])
     shares = [
@@ -146,9 +145,10 @@ def _within_window(group: Group) -> tuple[Socket, Socket]:
 def _tube(group: Group, curve: Socket, profile: Socket, radius: Socket) -> Socket:
     """Return a tube. Blender 5 takes the radius as an input of the tube, Blender 4.5 from the curve."""
     tube = group.add("GeometryNodeCurveToMesh", None, profile)
-    if "Scale" in tube.node.inputs:
-        group.tree.links.new(radius, tube.node.inputs["Scale"])
+    inputs = node_of(tube).inputs
+    if "Scale" in inputs:
+        group.tree.links.new(radius, inputs["Scale"])
     else:
         curve = group.add("GeometryNodeSetCurveRadius", curve, None, radius)
-    group.tree.links.new(curve, tube.node.inputs["Curve"])
+    group.tree.links.new(curve, inputs["Curve"])
     return tube

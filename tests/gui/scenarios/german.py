@@ -17,7 +17,7 @@ from tests.gui.driver import Hand, Steps
 from tests.gui.keyed import cube
 from tests.gui.scenarios.panel_notes import SCREW, extension, key, preferences
 
-NOTHING_REDUCED = "The keys here are not reduced"
+NOTHING_REDUCED = "The keys here are neither reduced nor cleaned"
 
 
 def speak(language: str) -> None:

@@ -8,22 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from itertools import dropwhile
-from typing import Any
+from typing import Any, TypeGuard, cast
 
 import bpy
 import numpy as np
 
+from ...blender import existing
 from ..fcurves.keys import Cycles
 
 
-def is_term(modifier: bpy.types.FModifier) -> bool:
+def is_term(modifier: bpy.types.FModifier) -> TypeGuard[bpy.types.FModifierGenerator]:
     """Return whether a modifier is one of ours."""
     return (
-        modifier.type == "GENERATOR"
+        isinstance(modifier, bpy.types.FModifierGenerator)
         and modifier.use_restricted_range
         and modifier.mode == "POLYNOMIAL_FACTORISED"
         and modifier.use_additive
-        and modifier.coefficients[-2] == 0.0
+        and cast(Any, modifier.coefficients)[-2] == 0.0
     )
 
 
@@ -46,8 +47,8 @@ def on_top(fcurve: bpy.types.FCurve) -> Iterator[bpy.types.FModifier]:
 
 def longest_step(fcurve: bpy.types.FCurve) -> float:
     """Return by how many frames the Stepped modifiers of an F-curve look elsewhere, at most."""
-    steps = [item.frame_step for item in fcurve.modifiers if item.type == "STEPPED" and not item.mute]
-    return float(sum(steps))
+    stepped = (item for item in fcurve.modifiers if isinstance(item, bpy.types.FModifierStepped) and not item.mute)
+    return float(sum(item.frame_step for item in stepped))
 
 
 def misplaced(fcurve: bpy.types.FCurve) -> list[bpy.types.FModifier]:
@@ -68,18 +69,21 @@ def settings_of_others(fcurve: bpy.types.FCurve) -> tuple[float, int]:
 
 
 def _commutes(modifier: bpy.types.FModifier) -> bool:
-    if modifier.type == "NOISE":
+    if isinstance(modifier, bpy.types.FModifierNoise):
         return modifier.blend_type != "MULTIPLY"
-    return modifier.type in ("CYCLES", "STEPPED") or (modifier.type == "FNGENERATOR" and modifier.use_additive)
+    if isinstance(modifier, bpy.types.FModifierFunctionGenerator):
+        return modifier.use_additive
+    return modifier.type in ("CYCLES", "STEPPED")
 
 
 def read_cycles(fcurve: bpy.types.FCurve) -> Cycles | None:
     """Return the Cycles of an F-curve: Blender has one only where it is the first of the modifiers."""
-    modifiers = fcurve.modifiers
-    if not modifiers or modifiers[0].type != "CYCLES" or modifiers[0].mute:
-        return None
-    first = modifiers[0]
-    return Cycles(first.mode_before, first.mode_after, first.cycles_before, first.cycles_after)
+    first = fcurve.modifiers[0] if fcurve.modifiers else None
+    return cycles_of(first) if isinstance(first, bpy.types.FModifierCycles) and not first.mute else None
+
+
+def cycles_of(modifier: bpy.types.FModifierCycles) -> Cycles:
+    return Cycles(modifier.mode_before, modifier.mode_after, modifier.cycles_before, modifier.cycles_after)
 
 
 def add_cycles(fcurve: bpy.types.FCurve, cycles: Cycles) -> None:
@@ -93,10 +97,9 @@ def add_cycles(fcurve: bpy.types.FCurve, cycles: Cycles) -> None:
         modifiers.new("CYCLES")
         for settings in behind:
             _add(fcurve, settings)
-    first = modifiers[0]
-    first.mute = False
-    first.mode_before, first.mode_after = cycles.before, cycles.after
-    first.cycles_before, first.cycles_after = cycles.before_count, cycles.after_count
+    modes = {"mode_before": cycles.before, "mode_after": cycles.after}
+    counts = {"cycles_before": cycles.before_count, "cycles_after": cycles.after_count}
+    set_settings(modifiers[0], {"mute": False, **modes, **counts})
 
 
 def copy_modifier(modifier: bpy.types.FModifier, fcurve: bpy.types.FCurve) -> None:
@@ -112,15 +115,16 @@ def put_behind(fcurve: bpy.types.FCurve, modifier: bpy.types.FModifier) -> None:
 
 
 def _add(fcurve: bpy.types.FCurve, settings: Mapping[str, Any]) -> None:
-    modifier = fcurve.modifiers.new(settings["type"])
+    modifier = existing(fcurve.modifiers.new(settings["type"]))
     set_settings(modifier, settings)
-    for point in settings.get("control_points", ()):
-        set_settings(modifier.control_points.add(point["frame"]), point)
+    if isinstance(modifier, bpy.types.FModifierEnvelope):
+        for point in settings["control_points"]:
+            set_settings(existing(modifier.control_points.add(point["frame"])), point)
 
 
 def _settings_of(modifier: bpy.types.FModifier) -> dict[str, Any]:
     settings = {"type": modifier.type, **settings_of(modifier)}
-    if modifier.type == "ENVELOPE":
+    if isinstance(modifier, bpy.types.FModifierEnvelope):
         settings["control_points"] = [settings_of(point) for point in modifier.control_points]
     return settings
 

@@ -61,7 +61,7 @@ def planned_from(binding: Binding) -> int | None:
     for fcurve in binding.moving.values():
         influences = np.empty(len(fcurve.modifiers), np.float32)
         fcurve.modifiers.foreach_get("influence", influences)
-        count += np.count_nonzero(influences == np.float32(kept))
+        count += int(np.count_nonzero(influences == np.float32(kept)))
     return (round(kept * FRACTIONS) - count) % FRACTIONS
 
 
@@ -112,12 +112,12 @@ def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> 
         for row, (path, index) in channels.items()
         if row not in keyed and PART_OF[row] in names
     }
-    channels, of_turns = read_keys(list(keyed.values())), read_keys(turns)
-    rows, goes_on = list(keyed), any(read.keys.linear or read.keys.cycles is not None for read in channels)
+    reads, of_turns = read_keys(list(keyed.values())), read_keys(turns)
+    rows, goes_on = list(keyed), any(read.keys.linear or read.keys.cycles is not None for read in reads)
     axes = _said_by(of_turns)
     return Source(
-        channels=tuple(([rows[number] for number in read.numbers], read.keys) for read in channels),
-        mode=_modes_in(channels),
+        channels=tuple(([rows[number] for number in read.numbers], read.keys) for read in reads),
+        mode=_modes_in(reads),
         turns=of_turns[0].keys if of_turns else None,
         turns_axis=TURN_AXES[0] if axes is None else replace(axes, numbers=axes.numbers % len(TURN_AXES)),
         seen=binding.slot.seen if goes_on else None,
@@ -128,7 +128,7 @@ def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> 
         original=user.original(),
         location_axes=user.location_axes,
         driven=frozenset(still),
-        held=_held_in(channels),
+        held=_held_in(reads),
     )
 
 

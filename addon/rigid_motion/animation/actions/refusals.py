@@ -9,6 +9,7 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 
+from ...blender import enum_value
 from ..evaluation.components import UNKNOWN
 from ..evaluation.sources import Source
 from ..fcurves.keys import LARGEST, Keys
@@ -23,7 +24,7 @@ MOST_FRAMES = 250_000
 MOST_TURNS = 1000
 """Whole turns from one key to the next."""
 
-ENVELOPE = bpy.types.FModifier.bl_rna.properties["type"].enum_items["ENVELOPE"].value
+ENVELOPE = enum_value(bpy.types.FModifier, "type", "ENVELOPE")
 """The code of this type of modifiers."""
 
 ENVELOPED = n_(
@@ -98,7 +99,7 @@ def refuse_envelope(name: str, fcurve: bpy.types.FCurve) -> None:
     types = np.empty(len(fcurve.modifiers), np.int32)
     # A look at each of them takes longer than all else.
     fcurve.modifiers.foreach_get("type", types)
-    if any(not fcurve.modifiers[number].mute for number in np.flatnonzero(types == ENVELOPE)):
+    if any(not fcurve.modifiers[number].mute for number in np.flatnonzero(types == ENVELOPE).tolist()):
         raise Refused(ENVELOPED, name=name, channel=_label(fcurve.data_path, fcurve.array_index))
 
 

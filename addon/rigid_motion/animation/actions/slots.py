@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
+from typing import cast
 
 import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
+from ...blender import existing
 from ..transforms import TURNS_PROPERTY, WIDTHS, Channel, Transform, split_path, transform_in
 
 Curves = dict[Channel, bpy.types.FCurve]
@@ -78,8 +80,8 @@ class Binding:
     """Its F-curves, those that were made meanwhile included."""
 
     @property
-    def channelbag(self) -> bpy.types.ActionChannelbag | None:
-        return self.slot.channelbag
+    def channelbag(self) -> bpy.types.ActionChannelbag:
+        return existing(self.slot.channelbag)
 
     @property
     def name(self) -> str:
@@ -168,7 +170,7 @@ def slots_in(actions: Iterable[bpy.types.Action]) -> list[Slot]:
     owners = bpy.data.user_map(subset=actions, key_types={"ACTION"}, value_types={"OBJECT"})
     same: dict[tuple[bpy.types.Action, int], list[Slot]] = {}
     for obj in sorted(set().union(*owners.values()), key=lambda obj: obj.name_full):
-        for slot in slots_alone(obj):
+        for slot in slots_alone(cast(bpy.types.Object, obj)):
             if slot.action in actions:
                 same.setdefault(slot.key, []).append(slot)
     return [

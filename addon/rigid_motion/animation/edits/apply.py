@@ -35,8 +35,7 @@ Result = TypeVar("Result")
 
 def transforms_of(targets: Targets) -> list[Transform]:
     """Return the transforms of targets, each once."""
-    single = isinstance(targets, Target)
-    return list(dict.fromkeys(map(transform_of, (targets,) if single else targets)))
+    return list(dict.fromkeys(map(transform_of, (targets,) if isinstance(targets, Target) else targets)))
 
 
 def apply_edit(
@@ -77,11 +76,13 @@ def apply_edit(
 
 def readable(transform: Transform, readings: Readings) -> list[tuple[Binding, Source]]:
     """Return what is keyed of a transform in all of its bindings. `Refused` where one of them cannot be filled in."""
-    for _, source in readings:
+    result = []
+    for binding, source in readings:
         if isinstance(source, Refused):
             raise source
         refuse_numbers(transform.name, source)
-    return list(readings)
+        result.append((binding, source))
+    return result
 
 
 def editable_binding(transform: Transform, bindings: Iterable[Binding]) -> Binding:

@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
-import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
+from ...blender import scene, view_layer
 from ...motion import Poses, interpolate
 from ..actions.channels import key_fields, set_key_fields
 from ..actions.reading import added_values, read
@@ -83,7 +83,7 @@ class _Between:
             transform.turns_channel,
         ]
         curves = {channel: binding.curves.get(channel) for channel in keyed}
-        self.keys = {channel: fcurve and key_fields(fcurve.keyframe_points) for channel, fcurve in curves.items()}
+        self.keys = {channel: key_fields(curve.keyframe_points) if curve else None for channel, curve in curves.items()}
         """The keys of its channels as they were, and of that of turns; None where there is none."""
 
     @property
@@ -128,7 +128,7 @@ class _Between:
 
         Where another key would make another path, one that lies on the path is of type *Breakdown*, and leaves it.
         """
-        components, key_type = self.pose(kind, factor), bpy.context.scene.tool_settings.keyframe_type
+        components, key_type = self.pose(kind, factor), scene().tool_settings.keyframe_type
         if kind == BREAKDOWN and MODE_NUMBERS[self.mode] in DEPENDS_ON_KEYS and not needs_turning(self.source):
             key_type = "BREAKDOWN"
         for row, channel in self.transform.channels.items():
@@ -147,7 +147,7 @@ class Breakdowns:
 
     def __init__(self, targets: Targets, kind: str = BREAKDOWN, *, refused: list[Refused] | None = None) -> None:
         self.kind = kind
-        frame = bpy.context.scene.frame_current_final
+        frame = scene().frame_current_final
 
         def plan(transform: Transform, readings: Readings) -> _Between:
             return _Between(transform, readings, frame)
@@ -167,7 +167,7 @@ class Breakdowns:
         """Let all be as it was, with the poses that had no key yet."""
         with self._edit():
             pass
-        bpy.context.view_layer.update()
+        view_layer().update()
         for between in self._between:
             for part, prop in between.transform.properties.items():
                 setattr(between.transform.carrier, prop, between.posed[ROWS[part]][: WIDTHS[prop]])

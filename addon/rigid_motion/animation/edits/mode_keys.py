@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
+from ...blender import scene
 from ...motion.modes import no_such_mode
 from ..actions.channels import key_points
 from ..actions.marks import write_marks
@@ -143,7 +143,7 @@ def set_turns(
 def on_turns(transform: Transform) -> None:
     """Take an edit of the property of turns as a choice for the segment on the frame that is shown."""
     source, turns = source_of(transform), transform.motion.turns
-    frame = frame_in_action(transform.animated, bpy.context.scene.frame_current_final)
+    frame = frame_in_action(transform.animated, scene().frame_current_final)
     segment = None if source is None else segment_at(source, frame)
     if segment is not None:
         set_turns(transform, turns, (segment.key,))

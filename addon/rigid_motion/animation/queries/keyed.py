@@ -37,7 +37,7 @@ def active_bindings(transforms: Sequence[Transform]) -> dict[Transform, Binding]
     return result
 
 
-def source_of(carrier: bpy.types.Object | Transform) -> Source | None:
+def source_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> Source | None:
     """Return what is keyed in the Action, None where nothing is. `Refused` where rigid motion cannot act on it."""
     binding = active_binding(transform_of(carrier))
     source = None if binding is None else read(binding)
@@ -56,7 +56,7 @@ def sources_of(bindings: Sequence[Binding]) -> list[Source | None]:
     return result
 
 
-def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False) -> np.ndarray:
+def key_frames(carrier: bpy.types.Object | bpy.types.PoseBone | Transform, *, selected: bool = False) -> np.ndarray:
     """Return the frames of location, rotation and scale keys, or of the selected ones alone, shape (n,), rising.
 
     Keys of the channel of turns count among the selected ones.
@@ -65,7 +65,7 @@ def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False)
     return np.empty(0) if binding is None else frames_in(binding, selected=selected)
 
 
-def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[str]:
+def modes_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform, frames: np.ndarray) -> list[str]:
     """Return the modes of the segments at these frames. Without an Action, the mode that is awaited."""
     transform = transform_of(carrier)
     binding = active_binding(transform)

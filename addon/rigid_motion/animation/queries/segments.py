@@ -105,12 +105,12 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
         distance=float(np.linalg.norm(location[:, 1] - location[:, 0])),
         long_way=source.order is None and -1.0 + NEAR < alike < -NEAR,
         is_sure=source.order is not None and bool(np.any(swept > NEAR_HALF_TURN)),
-        two_axes=source.order is not None and np.count_nonzero(swept > HALF_TURN) > 1,
+        two_axes=source.order is not None and int(np.count_nonzero(swept > HALF_TURN)) > 1,
         scales_unevenly=not source.uniform_scale and bool(np.any(np.abs(np.diff(scale)) > NEAR)),
     )
 
 
-def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
+def is_up_to_date(target: bpy.types.Object | bpy.types.PoseBone | Transform, source: Source) -> bool:
     """Return whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
     binding = active_binding(transform_of(target))
     planned = None if binding is None else planned_from(binding)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -84,9 +85,9 @@ def _key_once(binding: Binding, channel: tuple[str, int], frame: float) -> None:
     """Make a channel with one key that has the value of the property."""
     user, (path, index) = binding.users[0], channel
     fcurve = binding.ensure_curve(channel)
-    fellow = next((curve for (other, _), curve in binding.curves.items() if other == path and curve.group), None)
-    if fellow is not None:
-        fcurve.group = ensure_group(binding.channelbag, fellow.group.name)
+    group = next((curve.group for (other, _), curve in binding.curves.items() if other == path and curve.group), None)
+    if group is not None:
+        fcurve.group = ensure_group(binding.channelbag, group.name)
     value = getattr(user.carrier, path.removeprefix(user.prefix))[index]
     fcurve.keyframe_points.insert(frame, value)
 
@@ -121,20 +122,20 @@ def _apply_to(fcurve: bpy.types.FCurve, named: Mapping[str, Term]) -> bool:
 def write(modifier: bpy.types.FModifierGenerator, term: Term) -> bool:
     """Have a modifier be this term. Returns whether it was another one."""
     ends = ("poly_order", len(term.coefficients) // 2), ("frame_start", term.first), ("frame_end", term.last)
-    changed = modifier.coefficients[:] != term.coefficients
+    changed = cast(Any, modifier.coefficients)[:] != term.coefficients
     for name, value in (*SETTINGS, *ends):
         if getattr(modifier, name) != value:
             setattr(modifier, name, value)
             changed = True
     if changed:
-        modifier.coefficients = term.coefficients
+        modifier.coefficients = cast(Any, term.coefficients)
     return changed
 
 
-def _add(modifiers: bpy.types.bpy_prop_collection, named: Mapping[str, Term], *, is_mixed: bool) -> None:
+def _add(modifiers: bpy.types.FCurveModifiers, named: Mapping[str, Term], *, is_mixed: bool) -> None:
     """Add terms to the modifiers of an F-curve; ranges at once where all of these are terms, which is quicker."""
     for name, term in named.items():
-        modifier = modifiers.new("GENERATOR")
+        modifier: Any = modifiers.new("GENERATOR")
         modifier.name, modifier.show_expanded = name, False
         if is_mixed:
             write(modifier, term)

@@ -74,7 +74,8 @@ def _inherited(
     `above` are the axes (n, 3, 3) of its parent, `above_at_rest` and `offset` (3, 3) the parent's at rest and its own
     at rest in that.
     """
-    mode, growth = bone.inherit_scale, 1.0
+    growth: np.ndarray | float = 1.0
+    mode = bone.inherit_scale
     if bone.use_inherit_rotation:
         axes = above
         if mode in ("NONE", "AVERAGE"):

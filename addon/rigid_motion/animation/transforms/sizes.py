@@ -8,6 +8,7 @@ from typing import cast
 import bpy
 import numpy as np
 
+from ...blender import pose_bones, scene
 from ...gltf.sizes import OF_A_BODY, OF_KEY_POSES, SHELL
 from .transform import Transform, transform_of
 
@@ -78,7 +79,7 @@ def drawn_size(obj: bpy.types.Object) -> float:
 
 
 def _some_size() -> float:
-    return SOME_SIZE / metres_per_unit(bpy.context.scene)
+    return SOME_SIZE / metres_per_unit(scene())
 
 
 def metres_per_unit(scene: bpy.types.Scene) -> float:
@@ -98,11 +99,11 @@ def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
     cameras are as large as they are drawn; what has no size at all counts as ten centimetres.
     """
     if isinstance(obj, bpy.types.PoseBone):
-        return reaches_of(obj.id_data)[obj.name] * scale_in_scene(transform_of(obj))
+        return reaches_of(transform_of(obj).animated)[obj.name] * scale_in_scene(transform_of(obj))
     evaluated = _evaluated(obj)
     world = np.array(evaluated.matrix_world)
     if obj.pose is not None and len(obj.pose.bones):
-        heads = np.array([bone.head for bone in evaluated.pose.bones]) @ world[:3, :3].T
+        heads = np.array([bone.head for bone in pose_bones(evaluated)]) @ world[:3, :3].T
         reaches = np.array(list(reaches_of(obj).values())) * size_of(world)
         return float((np.linalg.norm(heads, axis=1) + reaches).max()) or _some_size()
     corners = np.concatenate([_corners(_evaluated(item)) for item in (obj, *obj.children_recursive)])
@@ -126,7 +127,7 @@ def rig_size(rig: bpy.types.Object) -> float:
 
 
 def _extent(rig: bpy.types.Object) -> float:
-    bones = [bone.bone for bone in rig.pose.bones]
+    bones = [bone.bone for bone in pose_bones(rig)]
     reach = max((_length(bone) or _some_size() for bone in bones), default=0.0)
     extent = float(np.ptp(np.array([bone.head_local for bone in bones]), axis=0).max()) if bones else 0.0
     return extent if extent > SAME_PLACE * reach else reach
@@ -154,7 +155,7 @@ def scale_in_scene(transform: Transform) -> float:
 
 def into_scene(transform: Transform) -> np.ndarray:
     """Return what takes the axes of an object's channels to those of the scene, (3, 3): its parents, as they are."""
-    obj = transform.carrier
+    obj = transform.animated
     if obj.parent is None and not obj.constraints:
         return np.eye(3)
     basis, world = np.array(obj.matrix_basis.to_3x3()), np.array(_evaluated(obj).matrix_world.to_3x3())

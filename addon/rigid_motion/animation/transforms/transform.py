@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from functools import cache, lru_cache
+from typing import Protocol, cast
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...blender import existing
 from ...motion.eulers import ORDERS, quaternions_from_extrinsic_eulers
 from ..evaluation.components import LOCATION, REST, ROTATION, ROWS, SCALE
 
@@ -22,7 +24,10 @@ LINKED = n_(
 )
 """The reason why a data-block cannot be edited, and the way out."""
 
-TURNS_PROPERTY = "rigid_motion.turns"
+MOTION = "rigid_motion"
+"""The name of the properties of this extension on objects and pose bones."""
+
+TURNS_PROPERTY = f"{MOTION}.turns"
 """The property by whose keys segments make whole turns more."""
 
 GROUP = "Rigid Motion"
@@ -37,6 +42,25 @@ _BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.')
 
 Channel = tuple[str, int]
 """Data path, from what is animated on, and index."""
+
+
+class Note(Protocol):
+    """A note on keys that were changed, see `properties`."""
+
+    kind: str
+    changed: bpy.types.Action | None
+    handle: int
+    original: bpy.types.Action | None
+    kept_as: str
+    reduction: str
+
+
+class ObjectMotion(Protocol):
+    """What this extension keeps on an object or a pose bone, see `properties`."""
+
+    turns: int
+    awaited: str
+    bakes: bpy.types.bpy_prop_collection_idprop[Note]
 
 
 class Refused(ValueError):
@@ -58,7 +82,7 @@ class Transform:
     def __init__(self, carrier: bpy.types.Object | bpy.types.PoseBone) -> None:
         self.carrier = carrier
         """The object or bone that has the properties."""
-        self.animated: bpy.types.Object = carrier.id_data
+        self.animated = cast(bpy.types.Object, carrier.id_data)
         """The data-block whose Action it is."""
         self.is_part = isinstance(carrier, bpy.types.PoseBone)
         """True if it is a part of its data-block, with a name that can be changed, and not the data-block itself."""
@@ -91,7 +115,7 @@ class Transform:
 
         Without *Local Location* a bone is moved along the axes of its parent, and still turns about its own.
         """
-        bone = self.carrier.bone if self.is_part else None
+        bone = self.pose_bone.bone if self.is_part else None
         # What was just made in Edit Mode has no bone before that is left.
         if bone is None or bone.use_local_location:
             return None
@@ -99,9 +123,14 @@ class Transform:
         return np.array(axes @ bone.parent.matrix_local.to_3x3() if bone.parent else axes)
 
     @property
-    def motion(self) -> bpy.types.PropertyGroup:
+    def pose_bone(self) -> bpy.types.PoseBone:
+        """The carrier, of what is a part."""
+        return cast(bpy.types.PoseBone, self.carrier)
+
+    @property
+    def motion(self) -> ObjectMotion:
         """The properties that this extension keeps on it."""
-        return self.carrier.rigid_motion
+        return getattr(self.carrier, MOTION)
 
     @property
     def rotation(self) -> str:
@@ -140,14 +169,14 @@ class Transform:
 
         The rotation is a unit quaternion.
         """
-        obj, result = self.carrier, REST.copy()
+        obj, result = self.animated, REST.copy()
         if self.is_part:
             return result
         result[ROWS[LOCATION]], result[ROWS[SCALE]] = obj.delta_location, obj.delta_scale
         if obj.rotation_mode in ORDERS:
             angles = np.array([obj.delta_rotation_euler])
             result[ROWS[ROTATION]] = quaternions_from_extrinsic_eulers(angles, obj.rotation_mode)[0]
-        elif obj.rotation_mode == "QUATERNION" and any(obj.delta_rotation_quaternion):
+        elif obj.rotation_mode == "QUATERNION" and any(obj.delta_rotation_quaternion[:]):
             result[ROWS[ROTATION]] = obj.delta_rotation_quaternion.normalized()
         return result
 
@@ -210,6 +239,6 @@ def let_override_be_read(rig: bpy.types.Object) -> None:
     Blender 5 does not read it where the library has nothing of the kind on the bone, not even what is made when it is
     asked for.
     """
-    reference = rig.override_library.reference
-    for bone in () if reference is None or reference.pose is None else reference.pose.bones:
-        bone.rigid_motion  # noqa: B018
+    reference = existing(rig.override_library).reference
+    for bone in reference.pose.bones if isinstance(reference, bpy.types.Object) and reference.pose is not None else ():
+        getattr(bone, MOTION)

@@ -6,32 +6,36 @@ ghosts   poses every few frames         blends   from one place to another
 records  where hands were seen          held     where what is held goes
 cache    what is worked out already     settings what to show
 drawing  lines, dots and ghosts on the screen
+cleaned  what was cleaned, before and after
 """
 
 from __future__ import annotations
 
 import bpy
-from bpy.props import PointerProperty
 
-from . import cache, drawing
-from .settings import RIGID_MOTION_OT_update_path, RigidMotionOverlay, draw_settings, draw_toggle
+from ...blender import PointerProperty
+from . import cache, cleaned, drawing
+from .settings import RIGID_MOTION_OT_update_path, RigidMotionOverlay, draw_settings, draw_toggle, overlay_settings
 
+POPOVER = "VIEW3D_PT_overlay_object"
 CLASSES = (RIGID_MOTION_OT_update_path,)
 
-__all__ = ["CLASSES", "draw_settings", "register", "unregister"]
+__all__ = ["CLASSES", "draw_settings", "overlay_settings", "register", "unregister"]
 
 
 def register() -> None:
     bpy.utils.register_class(RigidMotionOverlay)
-    bpy.types.Scene.rigid_motion_overlay = PointerProperty(type=RigidMotionOverlay)
-    bpy.types.VIEW3D_PT_overlay_object.append(draw_toggle)
+    setattr(bpy.types.Scene, cache.OVERLAY, PointerProperty(type=RigidMotionOverlay))
+    getattr(bpy.types, POPOVER).append(draw_toggle)
     cache.register()
     drawing.register()
+    cleaned.register()
 
 
 def unregister() -> None:
+    cleaned.unregister()
     drawing.unregister()
     cache.unregister()
-    bpy.types.VIEW3D_PT_overlay_object.remove(draw_toggle)
-    del bpy.types.Scene.rigid_motion_overlay
+    getattr(bpy.types, POPOVER).remove(draw_toggle)
+    delattr(bpy.types.Scene, cache.OVERLAY)
     bpy.utils.unregister_class(RigidMotionOverlay)

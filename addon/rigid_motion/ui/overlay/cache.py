@@ -8,19 +8,20 @@ that is merely played, or looked at from elsewhere, costs no more than looking p
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ...animation.actions.channels import selected_keys
 from ...animation.actions.slots import Binding
 from ...animation.evaluation.sources import Source
 from ...animation.queries.keyed import active_bindings, frames_in
 from ...animation.transforms import Transform, transform_of
+from ...blender import existing, original_uid, persistent
 from ...handlers import append_handlers, remove_handlers
 from . import records
 from .ghosts import ghosts_of
@@ -62,6 +63,9 @@ class _Entry:
         return any(record.version != version or record.transform is None for record, version in self.records)
 
 
+OVERLAY = "rigid_motion_overlay"
+"""The name of the overlay's settings on scenes, see `settings`."""
+
 _entries: OrderedDict[tuple[int, str], _Entry] = OrderedDict()
 """By the identity of what is moved; those drawn last come last."""
 
@@ -78,7 +82,7 @@ def paths_of(
     targets: Sequence[Transform], scene: bpy.types.Scene, turned: Mapping[Transform, np.ndarray | None] | None = None
 ) -> list[Path | None]:
     """Return the paths of several targets. `turned` is what stands between the rotation of a bone and its location."""
-    overlay = scene.rigid_motion_overlay
+    overlay: Any = getattr(scene, OVERLAY)
     settings = (
         *(overlay.mode, overlay.tick_step, overlay.axes_size, overlay.ghost_step if overlay.show_ghosts else 0),
         *(scene.frame_start, scene.frame_end),
@@ -87,8 +91,12 @@ def paths_of(
     is_playing = _plays()
     for target in targets:
         entry, turn = _entries.get(target.identity), (turned or {}).get(target)
-        outdated = entry is None or entry.stale or (entry.is_outdated and not is_playing)
-        if outdated or entry.settings != (*settings, b"" if entry.above else _bytes(turn)):
+        if (
+            entry is None
+            or entry.stale
+            or (entry.is_outdated and not is_playing)
+            or entry.settings != (*settings, b"" if entry.above else _bytes(turn))
+        ):
             stale[target] = turn
     if stale:
         carried = Carried()
@@ -117,7 +125,7 @@ def know_from_seeing(targets: Iterable[Transform]) -> bool:
     return any(entry is not None and entry.records for entry in entries)
 
 
-def notice_selection(targets: Iterable[bpy.types.Object | Transform]) -> bool:
+def notice_selection(targets: Iterable[bpy.types.Object | bpy.types.PoseBone | Transform]) -> bool:
     """Return whether keys of these are selected otherwise than in their paths; those are looked at again then.
 
     Selecting is no edit, so Blender's handlers are silent about it.
@@ -154,13 +162,13 @@ def _read(
         return entry
     if is_held(source):
         return _read_held(target, binding, source, entry, settings, before, carried)
-    parents = None if target.animated.animation_data.use_tweak_mode else Parents(target, carried)
+    parents = None if existing(target.animated.animation_data).use_tweak_mode else Parents(target, carried)
     if parents is not None and parents.move_by_keys:
         entry.above, entry.settings = frozenset(parents.ids), (*settings, b"")
     else:
         parents = None
     mode, tick_step, axes_size, ghost_step, *_ = settings
-    point = followed(target.carrier, source, turn) if target.is_part else None
+    point = followed(target.pose_bone, source, turn) if target.is_part else None
     size = axis_length_of(target, source)
     entry.selected = _selection(binding)
     # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
@@ -194,7 +202,7 @@ def _read_held(
 ) -> _Entry:
     """Fill the entry of something that is held. In a strip that is tweaked it has no path."""
     entry.settings = (*settings, b"")
-    if target.animated.animation_data.use_tweak_mode:
+    if existing(target.animated.animation_data).use_tweak_mode:
         return entry
     held = Held(target, source, carried)
     mode, tick_step, axes_size, ghost_step, *_ = settings
@@ -216,7 +224,7 @@ def _read_held(
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if _entries:
         records.note(scene, depsgraph)
-        edited = {update.id.original.session_uid for update in depsgraph.updates}
+        edited = set(map(original_uid, depsgraph.updates))
         for (uid, _), entry in _entries.items():
             entry.stale |= uid in edited or entry.action in edited or not edited.isdisjoint(entry.above)
 
@@ -234,7 +242,7 @@ def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 def _plays() -> bool:
     """Return whether frames pass in any window."""
-    windows = bpy.context.window_manager.windows
+    windows = existing(bpy.context.window_manager).windows
     return any(window.screen.is_animation_playing or window.screen.is_scrubbing for window in windows)
 
 
@@ -250,7 +258,7 @@ def _on_file(*_: object) -> None:
     records.clear()
 
 
-HANDLERS = {
+HANDLERS: dict[str, Callable] = {
     "depsgraph_update_post": _on_update,
     "frame_change_post": _on_frame,
     "undo_post": _on_undo,

@@ -9,20 +9,21 @@ from __future__ import annotations
 
 import functools
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, cast
 from weakref import WeakKeyDictionary
 
 import bpy
 import gpu
 import numpy as np
-from bpy.app.handlers import persistent
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
 from ...animation.queries.segments import frame_in_action
 from ...animation.transforms import Transform, transform_of
+from ...blender import existing, original_uid, persistent, view_layer
 from ...handlers import append_handlers, remove_handlers
 from ..holding import hue_of
 from ..preferences import DEFAULT_LOOK, Color, preferences
@@ -31,7 +32,7 @@ from . import cache
 from .ghosts import Ghosts, shape_of
 from .kinds import space_of
 from .points import PASSING, TICKS, Path, Readable, readable, thinned
-from .settings import RigidMotionOverlay, is_shown
+from .settings import RigidMotionOverlay, is_shown, overlay_settings
 
 log = logging.getLogger(__package__)
 
@@ -135,18 +136,18 @@ class _Batches:
     def of(cls, path: Path) -> _Batches:
         return cls(
             path,
-            native=_batch("LINE_STRIP", thinned(path.native)),
-            desired=None if path.desired is None else _batch("LINE_STRIP", thinned(path.desired)),
-            keys=_batch("POINTS", path.keys[~path.selected]),
-            selected=_batch("POINTS", path.keys[path.selected]),
+            native=batch_of("LINE_STRIP", thinned(path.native)),
+            desired=None if path.desired is None else batch_of("LINE_STRIP", thinned(path.desired)),
+            keys=batch_of("POINTS", path.keys[~path.selected]),
+            selected=batch_of("POINTS", path.keys[path.selected]),
             pieces=tuple(
-                (piece.holder, _batch("LINE_STRIP", thinned(line[piece.first : piece.last + 1])))
+                (piece.holder, batch_of("LINE_STRIP", thinned(line[piece.first : piece.last + 1])))
                 for line in (path.native if path.desired is None else path.desired,)
                 for piece in path.pieces
             ),
         )
 
-    def readable(self, pen: _Pen, *, every_tick: bool) -> Readable:
+    def readable(self, pen: Pen, *, every_tick: bool) -> Readable:
         """Return what of the path can be told apart in the view that is being drawn."""
         projection = np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
         view = projection.tobytes(), pen.size, pen.scale, every_tick
@@ -165,22 +166,27 @@ class _Batches:
             rows = getattr(self.path, name)[chosen]
             is_axes = rows.ndim > 2
             parts = [rows[:, axis].reshape(-1, 3) for axis in range(3)] if is_axes else [rows]
-            self.chosen[key] = tuple(_batch("LINES" if is_axes else "POINTS", part) for part in parts)
+            self.chosen[key] = tuple(batch_of("LINES" if is_axes else "POINTS", part) for part in parts)
         return self.chosen[key]
 
 
+Primitive = Literal["POINTS", "LINES", "LINE_STRIP", "TRIS"]
+
+_own_space: Callable[[], AbstractContextManager[None]] = cast(Any, gpu.matrix.push_pop)
 _batches: WeakKeyDictionary[Path, _Batches] = WeakKeyDictionary()
 
 
-def _batch(kind: str, points: np.ndarray | list) -> Batch:
+def batch_of(kind: Primitive, points: np.ndarray | list) -> Batch:
+    """Return points (n, 3) on the graphics card, to be drawn as lines or dots."""
     if not len(points):
         return None
     # Other shaders draw it, too: all take places alone.
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    return batch_for_shader(shader, kind, {"pos": np.ascontiguousarray(points, dtype=np.float32)})
+    content: Any = {"pos": np.ascontiguousarray(points, dtype=np.float32)}
+    return batch_for_shader(shader, kind, content)
 
 
-class _Pen:
+class Pen:
     """Draws batches in one redraw of one viewport."""
 
     def __init__(self, context: Any) -> None:
@@ -230,12 +236,12 @@ _shapes: dict[tuple[int, str], tuple[Batch, Batch]] = {}
 """The triangles and the edges of ghosts, by the identity of what is moved."""
 
 
-def _draw_ghosts(pen: _Pen, transform: Transform, ghosts: Ghosts, frame: float, color: Color) -> None:
+def _draw_ghosts(pen: Pen, transform: Transform, ghosts: Ghosts, frame: float, color: Color) -> None:
     """Draw all ghosts of something but that of this frame, as the keys have it, in the space of the matrix stack."""
     identity = transform.identity
     if identity not in _shapes:
-        shape = shape_of(transform, bpy.context.view_layer.depsgraph)
-        _shapes[identity] = _batch("TRIS", shape.triangles), _batch("LINES", shape.lines)
+        shape = shape_of(transform, existing(view_layer().depsgraph))
+        _shapes[identity] = batch_of("TRIS", shape.triangles), batch_of("LINES", shape.lines)
     triangles, lines = _shapes[identity]
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     gpu.state.depth_test_set("LESS_EQUAL")
@@ -246,7 +252,7 @@ def _draw_ghosts(pen: _Pen, transform: Transform, ghosts: Ghosts, frame: float, 
             if abs(at - frame) < NEAR:
                 continue
             red, green, blue, opacity = pen.held_color(holder, color)
-            with gpu.matrix.push_pop():
+            with _own_space():
                 gpu.matrix.multiply_matrix(Matrix(matrix))
                 if triangles:
                     shader.uniform_float("color", (red, green, blue, SOLID * opacity))
@@ -271,10 +277,10 @@ def follow_selection() -> None:
     context = bpy.context
     try:
         # While it plays the viewports are drawn anyway, as fast as they can be.
-        if not is_shown(context) or context.screen.is_animation_playing:
+        if not is_shown(context) or existing(context.screen).is_animation_playing:
             return
         if cache.notice_selection(selected_in_view(context)):
-            for window in context.window_manager.windows:
+            for window in existing(context.window_manager).windows:
                 for area in window.screen.areas:
                     if area.type == "VIEW_3D":
                         area.tag_redraw()
@@ -292,14 +298,14 @@ def _complain(problem: Exception) -> None:
 
 def _draw(context: Any) -> None:
     scene, depsgraph = context.scene, context.view_layer.depsgraph
-    settings, targets = scene.rigid_motion_overlay, list(map(transform_of, selected_in_view(context)))
+    settings, targets = overlay_settings(scene), list(map(transform_of, selected_in_view(context)))
     spaces = {target: space_of(target, depsgraph) for target in targets}
     result = cache.paths_of(targets, scene, {target: turned for target, (_, turned) in spaces.items()})
     paths = [(target, path) for target, path in zip(targets, result, strict=True) if path is not None]
     cache.keep_only(len(targets))
     if not paths:
         return
-    pen = _Pen(context)
+    pen = Pen(context)
     native_now, desired_now = [], []
     gpu.state.blend_set("ALPHA")
     gpu.state.depth_test_set("NONE")
@@ -308,7 +314,7 @@ def _draw(context: Any) -> None:
         for target, path in paths:
             space = Matrix() if path.in_world else spaces[target][0]
             frame = frame_in_action(target.animated, scene.frame_current_final)
-            with gpu.matrix.push_pop():
+            with _own_space():
                 gpu.matrix.multiply_matrix(space)
                 if path.ghosts is not None:
                     color = pen.look.native_color if path.desired is None else pen.look.mode_color
@@ -318,17 +324,17 @@ def _draw(context: Any) -> None:
                 _draw_path(pen, path, settings)
             native, desired = path.at(frame)
             if settings.show_native or desired is None:
-                native_now.append(space @ Vector(native))
+                native_now.append(space @ Vector(native.tolist()))
             if desired is not None:
-                desired_now.append(space @ Vector(desired))
-        pen.dot(_batch("POINTS", native_now), pen.look.native_color, NOW)
-        pen.dot(_batch("POINTS", desired_now), pen.look.mode_color, NOW)
+                desired_now.append(space @ Vector(desired.tolist()))
+        pen.dot(batch_of("POINTS", native_now), pen.look.native_color, NOW)
+        pen.dot(batch_of("POINTS", desired_now), pen.look.mode_color, NOW)
     finally:
         gpu.state.program_point_size_set(False)
         gpu.state.blend_set("NONE")
 
 
-def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
+def _draw_path(pen: Pen, path: Path, settings: RigidMotionOverlay) -> None:
     batches = _batches.get(path)
     if batches is None:
         batches = _batches[path] = _Batches.of(path)
@@ -345,7 +351,7 @@ def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
         pen.line(batches.desired, OUTLINE, look.line_width + 2.0)
         for holder, piece in batches.pieces or ((0, batches.desired),):
             pen.line(piece, pen.held_color(holder, look.mode_color), look.line_width)
-        (ticks,) = batches.some("desired_ticks", chosen.desired_ticks)
+        (ticks,) = batches.some("desired_ticks", existing(chosen.desired_ticks))
         pen.dot(ticks, look.tick_color, TICK)
     diameter = KEY if len(path.keys) <= TICKS else TICK
     pen.dot(batches.keys, WHITE, diameter)
@@ -355,7 +361,7 @@ def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
 @persistent
 def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if _shapes:
-        edited = {update.id.original.session_uid for update in depsgraph.updates if update.is_updated_geometry}
+        edited = {original_uid(update) for update in depsgraph.updates if update.is_updated_geometry}
         for identity in [identity for identity in _shapes if identity[0] in edited]:
             del _shapes[identity]
 
@@ -365,7 +371,12 @@ def _on_file(*_: object) -> None:
     _shapes.clear()
 
 
-HANDLERS = {"depsgraph_update_post": _on_update, "undo_post": _on_file, "redo_post": _on_file, "load_post": _on_file}
+HANDLERS: dict[str, Callable] = {
+    "depsgraph_update_post": _on_update,
+    "undo_post": _on_file,
+    "redo_post": _on_file,
+    "load_post": _on_file,
+}
 
 PLACES = (
     (bpy.types.SpaceView3D, draw_paths, "POST_VIEW"),

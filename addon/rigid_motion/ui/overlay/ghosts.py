@@ -16,6 +16,7 @@ from ...animation.evaluation.components import MODE_NUMBERS
 from ...animation.evaluation.sources import Source
 from ...animation.transforms import Transform
 from ...animation.transforms.sizes import drawn_size
+from ...blender import existing
 from ...motion.affine import AffineMaps
 from .parents import Parents
 
@@ -99,7 +100,7 @@ def matrices_of(maps: AffineMaps) -> np.ndarray:
 def in_space_of_path(transform: Transform, maps: AffineMaps, turn: np.ndarray | None) -> AffineMaps:
     """Return where channels that say these maps (n,) put something in the space of its path."""
     origins = maps.origins
-    if transform.is_part and transform.carrier.bone.use_connect and transform.carrier.parent:
+    if transform.is_part and transform.pose_bone.bone.use_connect and transform.pose_bone.parent:
         origins = np.zeros_like(origins)
     return AffineMaps(maps.axes if turn is None else turn @ maps.axes, origins)
 
@@ -107,8 +108,8 @@ def in_space_of_path(transform: Transform, maps: AffineMaps, turn: np.ndarray | 
 def shape_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> Shape:
     """Return what ghosts of something look like."""
     if transform.is_part:
-        return octahedron(transform.carrier.bone.length)
-    obj = transform.carrier.evaluated_get(depsgraph)
+        return octahedron(transform.pose_bone.bone.length)
+    obj = transform.animated.evaluated_get(depsgraph)
     shape = _geometry(obj) if obj.type in GEOMETRY else None
     return shape or _plain(obj)
 
@@ -127,7 +128,7 @@ def octahedron(length: float) -> Shape:
 
 def _geometry(obj: bpy.types.Object) -> Shape | None:
     """Return the triangles and edges of an evaluated object; None where there are none or too many."""
-    mesh = obj.to_mesh()
+    mesh = existing(obj.to_mesh())
     try:
         mesh.calc_loop_triangles()
         count = len(mesh.loop_triangles)
@@ -142,7 +143,7 @@ def _geometry(obj: bpy.types.Object) -> Shape | None:
 
 
 def _read(items: bpy.types.bpy_prop_collection, name: str, kind: type, width: int) -> np.ndarray:
-    result = np.empty(len(items) * width, kind)
+    result: np.ndarray = np.empty(len(items) * width, kind)
     items.foreach_get(name, result)
     return result.reshape(-1, width)
 

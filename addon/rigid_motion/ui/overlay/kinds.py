@@ -6,13 +6,16 @@ frame. The head of a bone that only turns stays where it is: there it is the pat
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Matrix
 
 from ...animation.evaluation.components import LOCATION
 from ...animation.evaluation.sources import Source
-from ...animation.transforms import Transform
+from ...animation.transforms import Transform, transform_of
+from ...blender import pose_bones
 from .parents import unless_same
 from .points import Followed, axis_length_of_object, space_of_object
 
@@ -28,18 +31,20 @@ def space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> t
         What stands between its rotation and that space where these are not the same: where a bone does not inherit the
         rotation or scale of its parent, or is not moved along its own axes. None where they are.
     """
-    rig = bone.id_data.evaluated_get(depsgraph)
-    evaluated = rig.pose.bones[bone.name]
+    rig = transform_of(bone).animated.evaluated_get(depsgraph)
+    evaluated = pose_bones(rig)[bone.name]
     rest, parent = evaluated.bone, evaluated.parent
-    above = {} if parent is None else {"parent_matrix": parent.matrix, "parent_matrix_local": parent.bone.matrix_local}
+    above: Any = (
+        {} if parent is None else {"parent_matrix": parent.matrix, "parent_matrix_local": parent.bone.matrix_local}
+    )
 
     def posed(basis: Matrix) -> Matrix:
         return rest.convert_local_to_pose(basis, rest.matrix_local, **above)
 
     stands = posed(Matrix())
-    space = Matrix.Translation(stands.translation)
+    space = Matrix.Translation(stands.translation[:])
     for column in range(3):
-        unit = Vector(float(row == column) for row in range(3))
+        unit = [float(row == column) for row in range(3)]
         along = posed(Matrix.Translation(unit)).translation - stands.translation
         for row in range(3):
             space[row][column] = along[row]
@@ -67,10 +72,12 @@ def space_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> tuple[Matr
     does.
     """
     if transform.is_part:
-        return space_of_bone(transform.carrier, depsgraph)
-    return space_of_object(transform.carrier, depsgraph), None
+        return space_of_bone(transform.pose_bone, depsgraph)
+    return space_of_object(transform.animated, depsgraph), None
 
 
 def axis_length_of(transform: Transform, source: Source) -> float:
     """Return how long its local axes are."""
-    return (axis_length_of_bone if transform.is_part else axis_length_of_object)(transform.carrier, source)
+    if transform.is_part:
+        return axis_length_of_bone(transform.pose_bone, source)
+    return axis_length_of_object(transform.animated, source)

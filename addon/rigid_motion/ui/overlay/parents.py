@@ -19,6 +19,7 @@ from ...animation.evaluation.sources import Source
 from ...animation.queries.keyed import active_bindings, sources_of
 from ...animation.transforms import Transform, transform_of
 from ...animation.transforms.posing import Hierarchy
+from ...blender import pose_bones
 from ...motion.affine import AffineMaps
 
 SAME = 1e-5
@@ -75,7 +76,7 @@ class Carried:
 
 def _hierarchy(rig: bpy.types.Object) -> tuple[Hierarchy, dict[str, int]]:
     """Return the bones of a rig, and their numbers by name."""
-    return Hierarchy(list(rig.pose.bones)), {bone.name: number for number, bone in enumerate(rig.pose.bones)}
+    return Hierarchy(list(pose_bones(rig))), {bone.name: number for number, bone in enumerate(pose_bones(rig))}
 
 
 class Parents:
@@ -129,8 +130,8 @@ class Parents:
             What stands between the target's rotation and that space, see `space_of_bone`. None where nothing does.
         """
         if not self.target.is_part:
-            return self._carrying(self.target.carrier, frames), None
-        bone, stands = self.target.carrier, identity(len(frames))
+            return self._carrying(self.target.animated, frames), None
+        bone, stands = self.target.pose_bone, identity(len(frames))
         hierarchy, numbers = self._carried.hierarchy(self.target.animated)
         number = numbers[bone.name]
         above = None if bone.parent is None else self._carried.posed(bone.parent, frames)
@@ -144,7 +145,7 @@ class Parents:
     def places(self, frames: np.ndarray) -> AffineMaps:
         """Return where the target itself is in the world on frames (n,)."""
         world = self._world(self.target.animated, frames)
-        return world @ self._carried.posed(self.target.carrier, frames) if self.target.is_part else world
+        return world @ self._carried.posed(self.target.pose_bone, frames) if self.target.is_part else world
 
     def _world(self, obj: bpy.types.Object, frames: np.ndarray) -> AffineMaps:
         return self._carrying(obj, frames) @ self._carried.channels(transform_of(obj), frames)
@@ -155,7 +156,7 @@ class Parents:
             return identity(len(frames))
         carried = self._world(parent, frames)
         if obj.parent_type == "BONE":
-            bone = parent.pose.bones[obj.parent_bone]
+            bone = pose_bones(parent)[obj.parent_bone]
             tail = maps_of(Matrix.Translation((0.0, bone.bone.length, 0.0)))
             carried = carried @ self._carried.posed(bone, frames) @ tail
         return carried @ maps_of(obj.matrix_parent_inverse)
@@ -170,10 +171,10 @@ def _above(target: Transform) -> Iterator[Transform]:
     """Yield all that carries something: the bones that it hangs on, and the objects."""
     obj = target.animated
     if target.is_part:
-        yield from map(transform_of, target.carrier.parent_recursive)
+        yield from map(transform_of, target.pose_bone.parent_recursive)
         yield transform_of(obj)
     while (parent := obj.parent) is not None:
-        if obj.parent_type == "BONE" and (bone := parent.pose.bones.get(obj.parent_bone)) is not None:
+        if obj.parent_type == "BONE" and (bone := pose_bones(parent).get(obj.parent_bone)) is not None:
             yield from map(transform_of, (bone, *bone.parent_recursive))
         yield transform_of(parent)
         obj = parent
@@ -197,18 +198,19 @@ def _hangs_on_a_whole(obj: bpy.types.Object) -> bool:
     """
     if obj.parent is None or obj.parent_type in WHOLE_OBJECTS:
         return True
-    bones = obj.parent.pose.bones if obj.parent_type == "BONE" and obj.parent.pose is not None else {}
-    return obj.parent_bone in bones and not bones[obj.parent_bone].bone.use_relative_parent
+    pose = obj.parent.pose if obj.parent_type == "BONE" else None
+    bone = None if pose is None else pose.bones.get(obj.parent_bone)
+    return bone is not None and not bone.bone.use_relative_parent
 
 
 def _hung(transform: Transform) -> tuple:
     """Return how something hangs on its parent."""
     if not transform.is_part:
-        obj = transform.carrier
-        return obj.parent_type, obj.parent_bone, tuple(map(tuple, obj.matrix_parent_inverse))
-    bone = transform.carrier.bone
+        obj = transform.animated
+        return obj.parent_type, obj.parent_bone, tuple(row[:] for row in obj.matrix_parent_inverse[:])
+    bone = transform.pose_bone.bone
     settings = bone.use_inherit_rotation, bone.inherit_scale, bone.use_local_location, bone.use_connect
-    return (*settings, bone.length, tuple(map(tuple, bone.matrix_local)))
+    return (*settings, bone.length, tuple(row[:] for row in bone.matrix_local[:]))
 
 
 def identity(count: int) -> AffineMaps:

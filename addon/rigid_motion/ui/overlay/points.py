@@ -306,7 +306,7 @@ def axis_length_of_object(obj: bpy.types.Object, source: Source) -> float:
     where the source has a scale.
     """
     drawn = drawn_size(obj)
-    size = np.full(3, drawn) if drawn else 0.5 * np.ptp(np.array(obj.bound_box), axis=0)
+    size: np.ndarray = np.full(3, drawn) if drawn else 0.5 * np.ptp(np.array(obj.bound_box), axis=0)
     if not source.uniform_scale:
         size *= np.abs(np.array(obj.scale) * np.array(obj.delta_scale))
     return float(size.max()) or 1.0

@@ -7,10 +7,19 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ...animation.properties import MODE_ITEMS
 from ...animation.transforms import OWN_WORDS, transform_of
+from ...blender import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    Operator,
+    Returned,
+    existing,
+    with_properties,
+)
 from ..targets import selected_in_view
 from ..wording import draw_text, labelled
 from . import cache
@@ -20,8 +29,9 @@ MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MO
 HIDDEN = n_("Hidden by Viewport Overlays")
 
 
+@with_properties
 class RigidMotionOverlay(bpy.types.PropertyGroup):
-    show_paths: BoolProperty(
+    show_paths: bool = BoolProperty(
         name="Rigid Motion Paths",
         description="Draw the paths of the selected objects or bones: Blender's own, and beside it that of a "
         "rigid-motion mode. Of a bone it is the path of its head, or of its tail where the bone only turns. "
@@ -29,26 +39,26 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
         "and what holds something as it was when its frames were last played",
         options=set(),
     )
-    mode: EnumProperty(
+    mode: str = EnumProperty(
         name="Mode",
         description="The mode to draw. Another one than keyed shows what it would do, and changes nothing",
         items=MODE_CHOICES,
         translation_context=OWN_WORDS,
         options=set(),
     )
-    show_native: BoolProperty(
+    show_native: bool = BoolProperty(
         name="Blender's Path",
         description="Draw Blender's own path too, in its own color",
         default=True,
         options=set(),
     )
-    show_axes: BoolProperty(
+    show_axes: bool = BoolProperty(
         name="Axes",
         description="Draw how it is turned along its path, by its local axes at some of the ticks",
         default=True,
         options=set(),
     )
-    axes_size: FloatProperty(
+    axes_size: float = FloatProperty(
         name="Size",
         description="Length of the axes. At 1 they are half as long as the object or bone is",
         default=1.0,
@@ -56,19 +66,19 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
         soft_max=5.0,
         options=set(),
     )
-    tick_step: IntProperty(
+    tick_step: int = IntProperty(
         name="Frame Step",
         description="Frames from one tick to the next. At 0, as many ticks as can be told apart on the screen",
         min=0,
         soft_max=100,
         options=set(),
     )
-    show_ghosts: BoolProperty(
+    show_ghosts: bool = BoolProperty(
         name="Ghosts",
         description="Draw the selected objects or bones as they are every few frames, in the mode of the path",
         options=set(),
     )
-    ghost_step: IntProperty(
+    ghost_step: int = IntProperty(
         name="Ghost Step",
         description="Frames from one ghost to the next",
         default=5,
@@ -78,17 +88,21 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
 
 
-class RIGID_MOTION_OT_update_path(bpy.types.Operator):
+def overlay_settings(scene: bpy.types.Scene | None) -> RigidMotionOverlay:
+    return getattr(scene, cache.OVERLAY)
+
+
+class RIGID_MOTION_OT_update_path(Operator):
     bl_idname = "rigid_motion.update_path"
     bl_label = "Update Path"
     bl_description = (
         "Play through all frames of the scene once, so that paths know where hands are that follow constraints. "
         "A pose without a key is lost, as it is where frames are played"
     )
-    bl_options: Any = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender reads it
 
-    def execute(self, context: Any) -> Any:
-        scene, before, subframe = context.scene, context.scene.frame_current, context.scene.frame_subframe
+    def execute(self, context: bpy.types.Context) -> Returned:
+        scene = existing(context.scene)
+        before, subframe = scene.frame_current, scene.frame_subframe
         for frame in range(scene.frame_start, scene.frame_end + 1):
             scene.frame_set(frame)
         scene.frame_set(before, subframe=subframe)
@@ -97,7 +111,7 @@ class RIGID_MOTION_OT_update_path(bpy.types.Operator):
 
 def draw_settings(layout: bpy.types.UILayout, context: Any) -> None:
     """Draw the settings of the overlay, for a panel."""
-    settings = context.scene.rigid_motion_overlay
+    settings = overlay_settings(context.scene)
     if (settings.show_paths or settings.show_ghosts) and not is_shown(context):
         draw_text(context, layout, HIDDEN, "INFO")
     if cache.know_from_seeing(map(transform_of, selected_in_view(context))):
@@ -125,12 +139,13 @@ def draw_toggle(panel: Any, context: Any) -> None:
     """Draw the overlay's place among Blender's own, in the viewport's Overlays pop-over."""
     column = panel.layout.column()
     column.active = context.space_data.overlay.show_overlays and context.space_data.overlay.show_motion_paths
-    column.prop(context.scene.rigid_motion_overlay, "show_paths")
-    column.prop(context.scene.rigid_motion_overlay, "show_ghosts", text="Rigid Motion Ghosts")
+    settings = overlay_settings(context.scene)
+    column.prop(settings, "show_paths")
+    column.prop(settings, "show_ghosts", text="Rigid Motion Ghosts")
 
 
 def is_shown(context: Any) -> bool:
     """Return whether the scene, and the viewport if the context is in one, show paths or ghosts."""
-    overlay, settings = getattr(context.space_data, "overlay", None), context.scene.rigid_motion_overlay
+    overlay, settings = getattr(context.space_data, "overlay", None), overlay_settings(context.scene)
     in_view = not isinstance(overlay, bpy.types.View3DOverlay) or (overlay.show_overlays and overlay.show_motion_paths)
     return in_view and (settings.show_paths or settings.show_ghosts)

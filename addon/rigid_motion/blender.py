@@ -1,0 +1,120 @@
+"""What Blender's types leave open and this program knows: that something is there, and which of many kinds it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal, TypeVar, cast
+
+import bpy
+
+T = TypeVar("T")
+Class = TypeVar("Class", bound=type)
+Handler = TypeVar("Handler", bound=Callable[..., object])
+
+Returned = set[Literal["RUNNING_MODAL", "CANCELLED", "FINISHED", "PASS_THROUGH", "INTERFACE"]]
+"""What operators return."""
+
+BoolProperty: Any = bpy.props.BoolProperty
+CollectionProperty: Any = bpy.props.CollectionProperty
+EnumProperty: Any = bpy.props.EnumProperty
+FloatProperty: Any = bpy.props.FloatProperty
+FloatVectorProperty: Any = bpy.props.FloatVectorProperty
+IntProperty: Any = bpy.props.IntProperty
+PointerProperty: Any = bpy.props.PointerProperty
+StringProperty: Any = bpy.props.StringProperty
+
+persistent: Callable[[Handler], Handler] = bpy.app.handlers.persistent
+
+
+def with_properties(cls: Class) -> Class:
+    """Have what Blender takes as properties be typed by what they hold: `count: int = IntProperty()`.
+
+    Blender itself takes them from where types stand: `count: IntProperty()`.
+    """
+    # Blender does not look for properties in bases that are operators themselves.
+    of_bases = [item for base in cls.__mro__[:0:-1] for item in vars(base).get("__annotations__", {}).items()]
+    for name, value in (*of_bases, *vars(cls).items()):
+        if isinstance(value, bpy.props._PropertyDeferred):
+            cls.__annotations__[name] = value
+            if name in vars(cls):
+                delattr(cls, name)
+    return cls
+
+
+class Operator(bpy.types.Operator):
+    """An operator as it is while it is drawn: with a layout. One step of undo unless it says otherwise."""
+
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender reads it
+    layout: bpy.types.UILayout
+
+
+class Panel(bpy.types.Panel):
+    """A panel as it is while it is drawn: with a layout."""
+
+    layout: bpy.types.UILayout
+
+
+class Menu(bpy.types.Menu):
+    """A menu as it is while it is drawn: with a layout."""
+
+    layout: bpy.types.UILayout
+
+
+def existing(value: T | None) -> T:
+    """Return what Blender's types say may be None, where it is not.
+
+    Raises
+    ------
+    TypeError
+        Where it is None.
+    """
+    if value is None:
+        raise TypeError("Blender has none")
+    return value
+
+
+def scene() -> bpy.types.Scene:
+    """Return the scene of the context."""
+    return existing(bpy.context.scene)
+
+
+def view_layer() -> bpy.types.ViewLayer:
+    """Return the view layer of the context."""
+    return existing(bpy.context.view_layer)
+
+
+def pose_bones(rig: bpy.types.Object) -> bpy.types.bpy_prop_collection[bpy.types.PoseBone]:
+    """Return the bones of an armature object as they are posed."""
+    return existing(rig.pose).bones
+
+
+def armature(rig: bpy.types.Object) -> bpy.types.Armature:
+    """Return what an armature object shows."""
+    return cast(bpy.types.Armature, rig.data)
+
+
+def action_of(obj: bpy.types.Object) -> bpy.types.Action:
+    """Return the Action of an object that has one."""
+    return existing(existing(obj.animation_data).action)
+
+
+def channelbag_in(strip: bpy.types.ActionStrip, slot: bpy.types.ActionSlot) -> bpy.types.ActionChannelbag:
+    """Return the channels of a slot in a strip of keys, made where there are none."""
+    return existing(cast(bpy.types.ActionKeyframeStrip, strip).channelbag(slot, ensure=True))
+
+
+def enum_value(cls: type[bpy.types.bpy_struct], name: str, item: str) -> int:
+    """Return the number that stands for an item of an enumeration, a property of a class."""
+    return cast(bpy.types.EnumProperty, cls.bl_rna.properties[name]).enum_items[item].value
+
+
+def original_uid(update: bpy.types.DepsgraphUpdate) -> int:
+    """Return the session id of the data-block that was evaluated anew."""
+    return existing(existing(update.id).original).session_uid
+
+
+def assign(obj: bpy.types.Object, action: bpy.types.Action) -> None:
+    """Have an Action's first slot animate an object."""
+    data = existing(obj.animation_data_create())
+    data.action = action
+    data.action_slot = action.slots[0]
