@@ -77,9 +77,14 @@ def complaints(content: str) -> list[str]:
         elif isinstance(node, ast.Constant) and isinstance(node.value, str):
             node.value = ""
         elif isinstance(node, ast.ClassDef):
-            kinds = re.findall(r"bpy\.types\.(Operator|Menu|Panel|UIList)\b", ast.unparse(node).partition(":")[0])
-            starts = [f"RIGID_MOTION_{KINDS[kind]}_" for kind in kinds]
-            result += [f"names {node.name}" for start in starts if not node.name.startswith(start)]
+            kinds = re.findall(r"\b(Operator|Menu|Panel|UIList)\b", ast.unparse(node).partition(":")[0])
+            starts = [f"RIGID_MOTION_{KINDS[kind]}_" for kind in kinds] or [
+                f"RIGID_MOTION_{k}_" for k in KINDS.values()
+            ]
+            # What is private or has no label is a base of others, which Blender is not given; lists have none.
+            is_given = "UIList" in kinds or "bl_label =" in ast.unparse(node)
+            if is_given and not node.name.startswith((*starts, "_")):
+                result.append(f"names {node.name}")
     for node in tree.body:
         if not isinstance(node, ast.FunctionDef | ast.ClassDef) and "bpy.context" in ast.unparse(node):
             result.append("uses the context while it is imported")
