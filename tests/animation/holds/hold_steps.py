@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -12,7 +11,7 @@ from hypothesis import strategies as st
 
 from rigid_motion import animation
 from tests.animation.editing import SAME_FRAME
-from tests.animation.holds.model import assert_held, poses_in_holders, shown, world_of
+from tests.animation.holds.model import assert_held, poses_in_holders, world_of
 from tests.animation.keyed import HOLD_BITS, Carrier, curves_of, key_frames, snapshot
 from tests.animation.machine import Name, goes_on, shares, while_on
 from tests.animation.tool_steps import WithTools
@@ -100,44 +99,6 @@ class WithHolds(WithTools):
     @while_on(who=shares, over=st.integers(0, 9))
     def choose_over_how_many_frames_it_passes(self, who, over):
         self._if_possible(self._named(who), lambda prop: animation.pass_frames(prop, over))
-
-    def _brought(self, name: str, *, link: bool) -> bpy.types.Object:
-        """An object from a copy of this file, which is there a second time with all that it needs, in the scene."""
-        library = str(Path(self.folder.name) / f"library {self.fresh}.blend")
-        self.fresh += 1
-        bpy.ops.wm.save_as_mainfile(filepath=library, compress=False, copy=True)
-        before = set(bpy.data.objects)
-        with bpy.data.libraries.load(library, link=link) as (_, wanted):
-            wanted.objects = [name]
-        (obj,) = wanted.objects
-        for brought in set(bpy.data.objects) - before:
-            bpy.context.scene.collection.objects.link(brought)
-        return obj
-
-    @while_on(who=shares, is_local=st.booleans())
-    def link_it_for_a_while(self, who, is_local):
-        """It moves as the one that is here, also when it is made local with its Action."""
-        name = self._named(who)
-        frames = self._frames_that_are_seen([name])
-
-        def change() -> None:
-            own, before = self._found(name), set(bpy.data.objects)
-            linked = self._brought(own.id_data.name, link=True)
-            if is_local:
-                linked = linked.make_local()
-                if linked.animation_data is not None and linked.animation_data.action is not None:
-                    linked.animation_data.action.make_local()
-            bpy.context.view_layer.update()
-            both = [own, linked if own == own.id_data else linked.pose.bones[own.name]]
-            here, there = shown(both, frames)
-            error = np.abs(here - there).max() / max(1.0, np.abs(here).max())
-            assert error < 1e-5, f"{name} is off by {error} where it is linked"
-            for obj in set(bpy.data.objects) - before:
-                bpy.data.objects.remove(obj)
-            for library in list(bpy.data.libraries):
-                bpy.data.libraries.remove(library)
-
-        self._edit(change)
 
     @while_on(who=shares)
     def match_grips(self, who):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -164,9 +165,16 @@ class Holding(WithHolds):
     def append(self, who):
         """From a copy of this file, with its holders, which are those that are here by no more than their names."""
         name = self._named(who).split("/")[0]
+        library = str(Path(self.folder.name) / f"library {self.fresh}.blend")
+        self.fresh += 1
+        bpy.ops.wm.save_as_mainfile(filepath=library, compress=False, copy=True)
 
         def change() -> None:
-            self.names += self._names_in(self._brought(name, link=False))
+            with bpy.data.libraries.load(library) as (_, wanted):
+                wanted.objects = [name]
+            (obj,) = wanted.objects
+            bpy.context.scene.collection.objects.link(obj)
+            self.names += self._names_in(obj)
 
         self._edit(change)
 
