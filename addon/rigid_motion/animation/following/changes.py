@@ -55,10 +55,8 @@ def edited_objects(*graphs: bpy.types.Depsgraph) -> set[bpy.types.Object]:
 def _originals(present: Any, blocks: Iterable[bpy.types.ID]) -> set:
     """Return those present in the file that these are evaluated copies of; linked ones of the same names with them."""
     names = {block.name for block in blocks}
-    result = {present.get(name) for name in names} - {None}
-    if names and bpy.data.libraries:
-        result |= {block for block in present if block.library is not None and block.name in names}
-    return result
+    keys = [*names, *((name, library.filepath) for library in bpy.data.libraries for name in names)]
+    return set(map(present.get, keys)) - {None}
 
 
 def add_action(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, added: set[tuple[int, int]]) -> None:
