@@ -17,7 +17,7 @@ from ..animation.queries.polls import with_more_keys_than
 from ..animation.transforms import Transform
 from ..blender import BoolProperty, FloatProperty, StringProperty, with_properties
 from .overlay import cleaned
-from .reducing import OfRigsToo
+from .reducing import OfRigsToo, radius_property
 from .targets import OnTargets, is_key_editor
 from .wording import length, split
 
@@ -46,15 +46,7 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
         step=10,
         options={"SKIP_SAVE"},
     )
-    radius: float = FloatProperty(
-        name="Radius",
-        description="At 0 each object has the size of its own bounding box, and each bone that of what it moves",
-        min=0.0,
-        soft_max=10.0,
-        step=1.0,
-        precision=4,
-        subtype="DISTANCE",
-    )
+    radius: float = radius_property()
     nearest: float = FloatProperty(
         name="Nearest",
         description="How far away the nearest thing is that a camera looks at. At 0 that is its focus distance",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import cast
+from typing import Any, cast
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -24,6 +24,23 @@ from ..animation.transforms.sizes import first_tolerance
 from ..blender import BoolProperty, EnumProperty, FloatProperty, IntProperty, Returned, StringProperty, with_properties
 from .targets import OnChanged, OnTargets, each_target, is_posing, selected_in_view, with_bones_of_rigs
 from .wording import NATIVE_LABEL, hold_lines, labelled, reduction_rows, reduction_summary, split
+
+
+def radius_property(
+    description: str = "At 0 each object has the size of its own bounding box, and each bone that of what it moves",
+    **more: Any,
+) -> Any:
+    """Return the property `radius` of operators that change keys: around what errors count."""
+    return FloatProperty(
+        name="Radius",
+        description=description,
+        min=0.0,
+        soft_max=10.0,
+        step=1.0,
+        precision=4,
+        subtype="DISTANCE",
+        **more,
+    )
 
 
 class OfRigsToo:
@@ -82,18 +99,9 @@ class RIGID_MOTION_OT_reduce_keys(OfRigsToo, OnTargets):
         min=2,
         soft_max=100,
     )
-    radius: float = FloatProperty(
-        name="Radius",
-        description=(
-            "How far out from the origin nothing may be off by more: the larger, the more a rotation counts. "
-            "At 0 each object has the size of its own bounding box, and each bone that of what it moves"
-        ),
-        default=0.0,
-        min=0.0,
-        soft_max=10.0,
-        step=1.0,
-        precision=4,
-        subtype="DISTANCE",
+    radius: float = radius_property(
+        "How far out from the origin nothing may be off by more: the larger, the more a rotation counts. "
+        "At 0 each object has the size of its own bounding box, and each bone that of what it moves",
         options={"SKIP_SAVE"},
     )
     mode: str = EnumProperty(
@@ -235,17 +243,7 @@ class RIGID_MOTION_OT_reduce_into_holds(OnTargets):
         min=2,
         soft_max=100,
     )
-    radius: float = FloatProperty(
-        name="Radius",
-        description="At 0 each object has the size of its own bounding box, and each bone that of what it moves",
-        default=0.0,
-        min=0.0,
-        soft_max=10.0,
-        step=1.0,
-        precision=4,
-        subtype="DISTANCE",
-        options={"SKIP_SAVE"},
-    )
+    radius: float = radius_property(options={"SKIP_SAVE"})
 
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
