@@ -52,6 +52,13 @@ class Program:
         self._socket.close()
 
 
+def free_port() -> int:
+    """Return a UDP port that no other window of the tests listens to."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as tried:
+        tried.bind(("127.0.0.1", 0))
+        return int(tried.getsockname()[1])
+
+
 def rig() -> bpy.types.Object:
     """The rig, asked for anew each time: undo replaces it."""
     return bpy.data.objects["Rig"]
@@ -71,7 +78,7 @@ def scenario(hand: Hand) -> Steps[None]:
     rig().select_set(True)
     rig().show_in_front = True
     live = bpy.context.scene.rigid_motion_live
-    live.armature, live.tolerance = rig(), TOLERANCE
+    live.armature, live.tolerance, live.port = rig(), TOLERANCE, free_port()
     space = view.spaces.active.region_3d
     space.view_location, space.view_distance = (0.0, 0.0, 0.9), 4.0
     bpy.ops.ed.undo_push(message="Rig")

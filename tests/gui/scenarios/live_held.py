@@ -12,7 +12,7 @@ from rigid_motion.motion.poses import placed
 from rigid_motion.streams import Body, Sender
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.scenarios.live_bodies import RATE, Program, rig
+from tests.gui.scenarios.live_bodies import RATE, Program, free_port, rig
 from tests.gui.scenarios.panel_notes import extension
 from tests.live.performing import BODY, JOINTS, dance, in_world, new_rig
 
@@ -70,7 +70,7 @@ def scenario(hand: Hand) -> Steps[None]:
     new_rig()
     rig().show_in_front = True
     live = bpy.context.scene.rigid_motion_live
-    live.armature = rig()
+    live.armature, live.port = rig(), free_port()
     space = view.spaces.active.region_3d
     space.view_location, space.view_distance = (0.2, 0.0, 1.1), 4.0
     bpy.ops.ed.undo_push(message="Rig")
