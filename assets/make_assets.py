@@ -20,7 +20,7 @@ import numpy as np
 ASSETS = Path(__file__).resolve().parent
 sys.path[:0] = [str(ASSETS.parent / folder) for folder in ("addon", "scripts")]
 
-from research.making.motions import GRIP, HOLD, MOTIONS, OTHERS, held_in
+from research.making.motions import GRIP, HOLD, MOTIONS, OTHER_MOTIONS, held_in
 from research.making.tracking import STAMP_ERROR, noisy, table, table_of_devices, tick, track
 
 SEED = 2021
@@ -30,7 +30,7 @@ DRILL_TRIANGLES = 1500
 
 def clip(name: str) -> str:
     """The text of a clip: seconds, metres, and quaternions with the scalar last."""
-    motion = (MOTIONS | OTHERS)[name]
+    motion = (MOTIONS | OTHER_MOTIONS)[name]
     rng = np.random.default_rng((SEED, zlib.crc32(name.encode())))
     times = tick(rng, motion.duration)
     if name == HOLD:
@@ -58,7 +58,7 @@ def main(arguments: list[str] | None = None) -> None:
     output = parser.parse_args(arguments).output
     output.mkdir(parents=True, exist_ok=True)
 
-    for name in (*MOTIONS, *OTHERS):
+    for name in (*MOTIONS, *OTHER_MOTIONS):
         text = clip(name)
         write(output / f"{name}.csv", lambda path, text=text: path.write_text(text, encoding="utf-8", newline="\n"))
 

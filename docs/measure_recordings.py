@@ -29,7 +29,7 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
 from research.pages import ROOT, write_figures
 from research.paper.motions import read_all, read_motion
-from research.paper.table import RADIUS, SAMPLES_AN_UPDATE
+from research.paper.table import SAMPLES_AN_UPDATE, SHELL_RADIUS_M
 from research.studies import files_in
 from rigid_motion.motion import KEYFRAME_MODES, curves, decimate, key_splines
 from rigid_motion.motion.segments import Curves, Segments
@@ -143,7 +143,7 @@ def _assets() -> dict[str, object]:
 def _asset_errors(asset: str, rate: str, modes: Sequence[str]) -> dict[str, float]:
     """By mode, the RMS shell error of an asset that is kept at so many keys a second, in metres."""
     (clip,), _ = read_clips([str(ASSETS / f"{asset}.csv")], "blender")
-    return {row.mode: row.rms_shell_m for row in measured(reconstruct(clip, Uniform(rate), modes, RADIUS)).rows}
+    return {row.mode: row.rms_shell_m for row in measured(reconstruct(clip, Uniform(rate), modes, SHELL_RADIUS_M)).rows}
 
 
 # -- errors of evenly spaced keys --------------------------------------------------------------------------------------
@@ -172,7 +172,7 @@ def _errors_of_clips(clips: Sequence[Clip], part: float) -> dict[str, float]:
     for rate in RATES:
         ratios = []
         for clip in clips:
-            ways, keys = Ways(clip, RADIUS), decimate(clip.times, float(rate))
+            ways, keys = Ways(clip, SHELL_RADIUS_M), decimate(clip.times, float(rate))
             stretch = ways.between(int(keys[0]), int(keys[-1]))
             with mock.patch.object(curves, "_bent", with_part):
                 error = stretch.error(keys, "motor_spline_causal")
@@ -189,9 +189,9 @@ def _needed(clips: Sequence[Clip], modes: Sequence[str], *, fit: bool) -> dict[s
     result = []
     for clip in clips:
         _say(f"keys needed, {clip.name} ...")
-        result.append(_apart(keys_needed(Ways(clip, RADIUS, fit), modes, REFERENCE)))
+        result.append(_apart(keys_needed(Ways(clip, SHELL_RADIUS_M, fit), modes, REFERENCE)))
     means = overall(result)
-    decimations = Ways(clips[0], RADIUS, fit).decimations
+    decimations = Ways(clips[0], SHELL_RADIUS_M, fit).decimations
     shares = {group[0]: means.shares[row] for row, group in enumerate(means.groups)}
     return {
         mode: {

@@ -17,7 +17,7 @@ from rigid_motion_batch.command_line import parser_of
 
 ROOT = Path(__file__).resolve().parents[1]
 
-BESIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "assets/README.md", "examples")
+OTHER_PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "assets/README.md", "examples")
 """What pages show or link to that is not in docs/."""
 
 EPILOG = """
@@ -78,7 +78,7 @@ def stage(folder: Path) -> Path:
     """Copy all that pages are made of, and return the copy of docs/: Sphinx adds a page for each public name to it."""
     pages = folder / "docs"
     shutil.copytree(ROOT / "docs", pages, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
-    for name in BESIDE:
+    for name in OTHER_PAGES:
         (folder / name).parent.mkdir(exist_ok=True)
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, folder / name)

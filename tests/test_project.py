@@ -131,3 +131,28 @@ def test_the_extension_imports_downwards_and_nothing_else(floor):
             inside = 1 <= dots <= depth
             lower = (dots == depth + 1 and name.lstrip(".") in below) or (name == ".." and floor == "ui")
             assert known or inside or lower, f"{path.relative_to(ROOT)} imports {name}"
+
+
+def is_numeric(value: ast.expr) -> bool:
+    """Return whether an expression is a number, or an array or tuple of numbers, as far as can be told from itself."""
+    calls = [ast.unparse(part.func) for part in ast.walk(value) if isinstance(part, ast.Call)]
+    of_numbers = all(re.match(r"(np|math)\.|(float|int|len|max|min|range|round|tuple)$", call) for call in calls)
+    others = ast.Subscript, ast.Dict, ast.JoinedStr, ast.comprehension
+    numbers = [part.value for part in ast.walk(value) if isinstance(part, ast.Constant)]
+    plain = all(isinstance(number, (int, float)) and not isinstance(number, bool) for number in numbers)
+    return bool(numbers) and plain and of_numbers and not any(isinstance(part, others) for part in ast.walk(value))
+
+
+@pytest.mark.once
+def test_numbers_have_names_that_say_what_they_measure():
+    single = [
+        f"{path.relative_to(ROOT)}:{node.lineno}: {name.id}"
+        for folder in ("addon", "scripts")
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, (ast.Assign, ast.AnnAssign)) and node.value and is_numeric(node.value)
+        for target in (node.targets if isinstance(node, ast.Assign) else [node.target])
+        for name in ast.walk(target)
+        if isinstance(name, ast.Name) and name.id.isupper() and "_" not in name.id.strip("_")
+    ]
+    assert not single, "a number with a name of one word: say what it measures, and its unit"

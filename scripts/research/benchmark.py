@@ -29,7 +29,7 @@ from rigid_motion.motion.trigonometry import VECTOR_TANGENT
 
 PROGRAM = "Rigid Motion"
 
-ENOUGH = 2.0  # seconds after which one way of computing a case has been measured well enough
+MIN_MEASURED_S = 2.0  # seconds after which one way of computing a case has been measured well enough
 
 Way = tuple[str, str]
 """A mode, and what computes it."""
@@ -125,7 +125,7 @@ def main(arguments: list[str] | None = None) -> int:
     for case in cases(options.count):
         report(case.title)
         about = {"title": case.title, "in_betweens": case.in_betweens, "key_count": int(np.prod(case.keys.shape))}
-        seconds = interleaved_seconds(ways(case), options.rounds, warm=True, most=ENOUGH)
+        seconds = interleaved_seconds(ways(case), options.rounds, warm=True, most=MIN_MEASURED_S)
         figures["cases"].append({**about, "rates": rates(case, seconds)})
     versions = {"SciPy": scipy.__version__, "pytransform3d": pytransform3d.__version__}
     return publish("benchmark", figures, options, "--rounds", options.rounds, **versions)

@@ -25,8 +25,8 @@ from rigid_motion_batch.scenes.body_scene import registered
 from rigid_motion_batch.silencing import silenced
 
 MODE, NATIVE = "dq_sclerp", "BLENDER"
-CHAIN = 10  # bones from root to tip
-EDITS = 8  # of a key in a row, unmeasured and then measured
+CHAIN_BONES = 10  # bones from root to tip
+EDIT_COUNT = 8  # of a key in a row, unmeasured and then measured
 
 Target = TypeVar("Target", bpy.types.Object, bpy.types.PoseBone)
 Targets = Sequence[bpy.types.Object | bpy.types.PoseBone]
@@ -41,7 +41,7 @@ class Size(NamedTuple):
 
 
 SIZES = {"objects": Size(100, 10, 1000), "bones": Size(100, 10, 1000), "crowd": Size(400, 10, 1000)}
-HELD = Size(100, 4, 1000)  # keys: where they begin, are picked up, are passed on and end
+HELD_SIZE = Size(100, 4, 1000)  # keys: where they begin, are picked up, are passed on and end
 
 
 def scaled(size: Size, scale: float) -> Size:
@@ -91,7 +91,7 @@ def bones_of(size: Size) -> list[bpy.types.PoseBone]:
     rig = bpy.context.view_layer.objects.active = new_object("Rig", bpy.data.armatures.new("Rig"))
     bpy.ops.object.mode_set(mode="EDIT")
     for number in range(size.count):
-        chain, place = divmod(number, CHAIN)
+        chain, place = divmod(number, CHAIN_BONES)
         bone = rig.data.edit_bones.new(f"Bone {number}")
         bone.head, bone.tail = (chain, 0.0, place), (chain, 0.0, place + 1.0)
         bone.parent = rig.data.edit_bones[f"Bone {number - 1}"] if place else None
@@ -149,7 +149,7 @@ def edit(key: bpy.types.Keyframe) -> None:
 
 
 def edit_again(key: bpy.types.Keyframe) -> None:
-    for _ in range(EDITS):
+    for _ in range(EDIT_COUNT):
         edit(key)
 
 
@@ -175,7 +175,9 @@ def costs(kind: str, targets: Targets, size: Size, rounds: int) -> list[dict[str
     again = partial(edit_again, key)
     return [
         beside_native(f"{all_of_them} played, a frame", targets, few, play, lambda: None, size.frames),
-        beside_native(f"one key edited of {all_of_them}, and the view updated", targets, rounds, again, again, EDITS),
+        beside_native(
+            f"one key edited of {all_of_them}, and the view updated", targets, rounds, again, again, EDIT_COUNT
+        ),
         beside_native(f"a step of undo, {all_of_them}", targets, rounds, push, partial(edit, key)),
     ]
 
@@ -247,7 +249,7 @@ def measure(rounds: int, scale: float) -> dict[str, Any]:
         targets = scene(sizes[kind])
         written.append(files(kind, targets, sizes[kind]))
         rows += costs(kind, targets, sizes[kind], rounds)
-    rows += [choosing(sizes["crowd"], max(3, rounds // 8)), holding(scaled(HELD, scale), max(3, rounds // 4))]
+    rows += [choosing(sizes["crowd"], max(3, rounds // 8)), holding(scaled(HELD_SIZE, scale), max(3, rounds // 4))]
     return {"sizes": {name: size._asdict() for name, size in sizes.items()}, "rows": rows, "files": written}
 
 

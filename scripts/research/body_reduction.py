@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from research.decimating import VARIES, DecimatedBody, between
+from research.decimating import MIN_VARIATION, DecimatedBody, between
 from research.studies import interleaved_seconds, report
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion_batch.analysis.choices import Tolerance
@@ -22,7 +22,7 @@ from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 
-WITHIN, RADIUS, HEIGHT = Tolerance("10mm"), 0.03, 1.7
+TOLERANCE, RADIUS_M, HEIGHT_M = Tolerance("10mm"), 0.03, 1.7
 """The errors that are allowed, of the ball at every joint, and what every body's largest extent is made; metres."""
 
 MODE, COMPARED = "motor_spline", (STATE_OF_THE_ART, REFERENCE, "dq_sclerp", "motor_spline")
@@ -30,7 +30,7 @@ WAYS = {"keys of each joint": False, "key poses": True}
 RIVALS = "Blender's curves", "Decimate"
 
 MOST_FRAMES = 1200  # longer recordings are cut off
-LONG = "cmu_01_01"  # the file that is timed uncut
+TIMED_FILE = "cmu_01_01"  # the file that is timed uncut
 
 
 def figures(paths: Sequence[Path]) -> dict[str, Any]:
@@ -39,7 +39,7 @@ def figures(paths: Sequence[Path]) -> dict[str, Any]:
     bodies = [of_height(part_of(clip, 0, min(len(clip.times), MOST_FRAMES) - 1)) for clip in clips.values()]
     pairs = {way: [beside(body, way) for body in bodies] for way in WAYS}
     return {
-        "bodies": [about(body) | {"extent": HEIGHT / body.metres_per_unit} for body in bodies],
+        "bodies": [about(body) | {"extent": HEIGHT_M / body.metres_per_unit} for body in bodies],
         "greedy": [row for body in bodies for row in beside_greedy(body)],
         "beside": [row for of_way in pairs.values() for rows in of_way for row in rows],
         "beside_means": {
@@ -53,7 +53,7 @@ def figures(paths: Sequence[Path]) -> dict[str, Any]:
             for way, of_way in pairs.items()
             if of_way
         },
-        "timing": [row for name in clips.keys() & {LONG} or clips for row in timing(of_height(clips[name]))],
+        "timing": [row for name in clips.keys() & {TIMED_FILE} or clips for row in timing(of_height(clips[name]))],
     }
 
 
@@ -64,14 +64,14 @@ def about(body: Clip) -> dict[str, Any]:
 
 
 def of_height(clip: Clip) -> Clip:
-    """Return the same body, larger or smaller: in the first frame its joints span `HEIGHT` along one of the axes."""
+    """Return the same body, larger or smaller: in the first frame its joints span `HEIGHT_M` along one of the axes."""
     places = clip.rest_body.skeleton.in_root_space(clip.poses[:, :1]).positions
-    return replace(clip, metres_per_unit=HEIGHT / float(np.ptp(places, axis=(0, 1)).max()))
+    return replace(clip, metres_per_unit=HEIGHT_M / float(np.ptp(places, axis=(0, 1)).max()))
 
 
 def reduced(body: Clip, mode: str = MODE, *, shared: bool = True) -> Reconstruction:
     """Return the fewest keys within the tolerance."""
-    return reconstruct(body, WITHIN, [mode], RADIUS, shared=shared)
+    return reconstruct(body, TOLERANCE, [mode], RADIUS_M, shared=shared)
 
 
 # -- key poses ---------------------------------------------------------------------------------------------------------
@@ -85,12 +85,12 @@ def truth_of(body: Clip) -> Poses:
 
 def errors_of(body: Clip, keys: np.ndarray, mode: str) -> np.ndarray:
     """Return the largest error of any joint on every frame, by key poses (k,), in metres, shape (n,)."""
-    radii = np.full(len(body.poses), RADIUS)
-    made = Reconstruction(body, WITHIN, {mode: (keys,) * len(body.poses)}, radii, shared=True)
-    return shell_error(made.shown(mode, body.times), truth_of(body), RADIUS).max(axis=0)
+    radii = np.full(len(body.poses), RADIUS_M)
+    made = Reconstruction(body, TOLERANCE, {mode: (keys,) * len(body.poses)}, radii, shared=True)
+    return shell_error(made.shown(mode, body.times), truth_of(body), RADIUS_M).max(axis=0)
 
 
-def greedy(body: Clip, mode: str = MODE, tolerance: float = WITHIN.metres(1.0)) -> np.ndarray:
+def greedy(body: Clip, mode: str = MODE, tolerance: float = TOLERANCE.metres(1.0)) -> np.ndarray:
     """Put in key poses where the error is largest, until it is small enough; then take out each, in turn, that can go.
 
     They have shape (k,).
@@ -162,7 +162,7 @@ def largest_error(made: Reconstruction) -> float:
 def numbers_of(made: Reconstruction) -> int:
     """Return how many numbers the keys take: for each its time, and the place and the turn where these vary."""
     (keys,), clip = made.keys.values(), made.clip
-    places = np.ptp(clip.poses.positions, axis=1).max(axis=1) * clip.metres_per_unit > VARIES
+    places = np.ptp(clip.poses.positions, axis=1).max(axis=1) * clip.metres_per_unit > MIN_VARIATION
     counts, channels, moves = np.array([*map(len, keys)]), 4 + 3 * places, moving(clip)
     times = len(key_samples(keys)) if made.shared else counts[moves].sum()
     return int(times + (counts * channels)[moves].sum())

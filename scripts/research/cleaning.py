@@ -25,15 +25,15 @@ from rigid_motion.motion.differences import turned_in_world
 from rigid_motion.motion.quaternions import align_signs, normalise
 from rigid_motion_batch.recordings.clip_reading import read_clips
 
-PLACES, TURNS = 1e-3, np.radians(0.3)
-TOLERANCE = 3e-3
-SEEDS = (21, 22)
+PLACE_NOISE_M, TURN_NOISE_RAD = 1e-3, np.radians(0.3)
+TOLERANCE_M = 3e-3
+NOISE_SEEDS = (21, 22)
 KINDS = ("white", "correlated", "spikes", "holds", "clock")
-HITS = 12
-CUTOFFS = np.geomspace(0.5, 60.0, 30)
+HIT_COUNT = 12
+CUTOFFS_HZ = np.geomspace(0.5, 60.0, 30)
 
 HAND, OPTICAL, MADE = "hand", "optical", "made"
-SHORT = 200  # samples: noise is hard to measure
+MIN_NOISE_SAMPLES = 200  # samples: noise is hard to measure
 TRACKS = (
     ("aframe_head.csv", "", 0, HAND),
     ("aframe_right.csv", "", 600, HAND),
@@ -79,8 +79,8 @@ def shaken(kind: str, seed: int, times: np.ndarray, truth: Poses) -> tuple[np.nd
     if kind == "correlated":
         for row in range(1, count):
             noise[:, row] = 0.7 * noise[:, row - 1] + np.sqrt(1.0 - 0.7**2) * noise[:, row]
-    positions = truth.positions + PLACES * noise[0]
-    quaternions = turned_in_world(truth.quaternions, TURNS * noise[1])
+    positions = truth.positions + PLACE_NOISE_M * noise[0]
+    quaternions = turned_in_world(truth.quaternions, TURN_NOISE_RAD * noise[1])
     out = np.zeros(count, dtype=bool)
     share = {"spikes": 0.01, "holds": 0.02}.get(kind, 0.0)
     while np.count_nonzero(out) < share * count:
@@ -157,10 +157,10 @@ def rivals(times: np.ndarray, poses: Poses, truth: Poses) -> dict[str, Poses]:
     place = min(places, key=lambda each: float(np.square(each - truth.positions).sum()))
     turn = min(turns, key=lambda each: float(np.square(normalise(each) - truth.quaternions).sum()))
     return {
-        "Butterworth, tuned": best(by(butterworth(2, cutoff, rate)) for cutoff in CUTOFFS),
+        "Butterworth, tuned": best(by(butterworth(2, cutoff, rate)) for cutoff in CUTOFFS_HZ),
         "One Euro, tuned": Poses(place, normalise(turn)),
         "Blender's Butterworth Smooth": by(butterworth(4, 3.0, rate)),
-        "Blender's Butterworth Smooth, tuned": best(by(butterworth(4, cutoff, rate)) for cutoff in CUTOFFS),
+        "Blender's Butterworth Smooth, tuned": best(by(butterworth(4, cutoff, rate)) for cutoff in CUTOFFS_HZ),
         "Blender's Gaussian Smooth": by(gaussian(6, 0.33)),
         "Blender's Gaussian Smooth, tuned": best(by(gaussian(int(width), 0.33)) for width in widths),
     }
@@ -173,15 +173,15 @@ def rms(poses: Poses, truth: Poses, rows: np.ndarray | slice = slice(None)) -> f
 
 def hardest(truth: Poses) -> np.ndarray:
     """Return the rows with the largest accelerations."""
-    return np.argsort(-np.linalg.norm(np.diff(truth.positions, 2, axis=0), axis=1))[:HITS] + 1
+    return np.argsort(-np.linalg.norm(np.diff(truth.positions, 2, axis=0), axis=1))[:HIT_COUNT] + 1
 
 
 def measure(kind: str, seed: int, name: str, track: str, times: np.ndarray, truth: Poses) -> dict[str, Any]:
     """Return what becomes of a track with such noise. Lengths are in millimetres."""
     stamped, shaky, out = shaken(kind, seed, times, truth)
-    free, capped = clean(stamped, shaky), clean(stamped, shaky, TOLERANCE)
+    free, capped = clean(stamped, shaky), clean(stamped, shaky, TOLERANCE_M)
     left_out = capped.spikes | capped.repeats
-    again = clean(capped.times, capped.poses, TOLERANCE)
+    again = clean(capped.times, capped.poses, TOLERANCE_M)
     hits = hardest(truth)
     errors = {"recorded": shaky, "cleaned": free.poses, **rivals(stamped, shaky, truth)}
     found = free.spikes | free.repeats
@@ -192,10 +192,10 @@ def measure(kind: str, seed: int, name: str, track: str, times: np.ndarray, trut
         "kind": track,
         "rms": {key: 1e3 * rms(each, truth) for key, each in errors.items()},
         "hits": {key: 1e3 * rms(each, truth, hits) for key, each in errors.items()},
-        "floor": (free.noise / (PLACES, TURNS)).tolist(),
+        "floor": (free.noise / (PLACE_NOISE_M, TURN_NOISE_RAD)).tolist(),
         "out": [int(out.sum()), int((found & out).sum()), int((found & ~out).sum()), len(times)],
-        "over": float(capped.moved[~left_out].max() / TOLERANCE),
-        "again": float(again.moved.max() / TOLERANCE),
+        "over": float(capped.moved[~left_out].max() / TOLERANCE_M),
+        "again": float(again.moved.max() / TOLERANCE_M),
         "alone": float(free.alone.mean()),
         "steadied": bool((free.times != stamped).any()),
     }
@@ -223,7 +223,8 @@ def summed_up(rows: list[dict[str, Any]]) -> dict[str, Any]:
             "means": {key: float(np.mean([row["rms"][key] for row in own])) for key in own[0]["rms"]},
             "out": np.sum([row["out"] for row in own], axis=0).tolist(),
             "floor": [
-                spread([row["floor"] for row in own if (row["out"][3] < SHORT) == short]) for short in (False, True)
+                spread([row["floor"] for row in own if (row["out"][3] < MIN_NOISE_SAMPLES) == short])
+                for short in (False, True)
             ],
             "made": {
                 row["track"]: row["hits"]["cleaned"] / row["hits"]["recorded"] for row in own if row["kind"] == MADE
@@ -253,6 +254,6 @@ def main(arguments: list[str] | None = None) -> int:
                 "rows": len(times),
             }
         )
-        rows += [measure(kind, seed, name, track, times, truth) for kind in KINDS for seed in SEEDS]
-    figures = {"tolerance_mm": 1e3 * TOLERANCE, "table": summed_up(rows), "as_recorded": untouched, "runs": len(rows)}
+        rows += [measure(kind, seed, name, track, times, truth) for kind in KINDS for seed in NOISE_SEEDS]
+    figures = {"tolerance_mm": 1e3 * TOLERANCE_M, "table": summed_up(rows), "as_recorded": untouched, "runs": len(rows)}
     return publish("cleaning", figures, options, "FOLDER")

@@ -16,16 +16,16 @@ from typing import Any
 import bpy
 import numpy as np
 
-from research.glb_bodies import RADIUS, export
+from research.glb_bodies import RADIUS_M, export
 from research.glb_playing import animation_bytes, errors_of, opened
 from research.studies import publish, report, study_parser
 from rigid_motion.gltf import Options, reduce_file
 from tests.animation.bones.hand_made import AUTOMATIC, THIRD, hand_made, keys_of
 from tests.gltf.player import File
 
-TOLERANCE = 1e-3  # metres
-RATE = 24
-SEEDS = range(3)
+TOLERANCE_M = 1e-3  # metres
+FRAMES_PER_S = 24
+NOISE_SEEDS = range(3)
 MOVED = ("translation", "rotation")
 
 
@@ -40,11 +40,11 @@ def measure(original: Path, folder: Path, own: dict[str, np.ndarray] | None = No
     """Return what curves and lines make of the clips of a file, of whose nodes the frames of the own keys are known."""
     output, files, sizes = folder / "smaller.glb", {}, [animation_bytes(original)]
     for curves in (False, True):
-        reduce_file(original, output, Options(TOLERANCE, RADIUS, curves=curves))
+        reduce_file(original, output, Options(TOLERANCE_M, RADIUS_M, curves=curves))
         files[curves] = opened(output, None)
         sizes.append(animation_bytes(output))
     truth = opened(original, None)
-    errors = errors_of(truth, files[True], RADIUS)
+    errors = errors_of(truth, files[True], RADIUS_M)
     clip = max((item["name"] for item in truth.json["animations"]), key=lambda name: len(keys_in(truth, name)))
     keys = keys_in(files[True], clip)
     result = {
@@ -57,7 +57,7 @@ def measure(original: Path, folder: Path, own: dict[str, np.ndarray] | None = No
     }
     if own is None:
         return result
-    frames = {channel: np.round(times * RATE) for channel, times in keys.items()}
+    frames = {channel: np.round(times * FRAMES_PER_S) for channel, times in keys.items()}
     result["own"] = sum(len(own[name]) for name, _ in keys)
     result["on_own_frames"] = sum(int(np.isin(rows, own[name]).sum()) for (name, _), rows in frames.items())
     return result
@@ -86,7 +86,7 @@ def main(arguments: list[str] | None = None) -> int:
     hands, bodies = [], []
     with tempfile.TemporaryDirectory() as folder:
         for handles in (THIRD, AUTOMATIC):
-            for seed in SEEDS:
+            for seed in NOISE_SEEDS:
                 report(f"handles: {handles}, {seed}")
                 hands.append(by_hand(handles, seed, Path(folder)))
         for path in options.bodies:

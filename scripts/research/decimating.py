@@ -17,15 +17,15 @@ from rigid_motion.animation.actions.channels import replace_keys
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
-from rigid_motion_batch.scenes.armature import Rest, Rig
+from rigid_motion_batch.scenes.armature import RestFigure, Rig
 
-FREE = 6  # numbers of a key with free handles
-MARGINS = (1e-5, 10.0)  # the smallest and the largest error margin of Decimate, in the units of the channels
-TRIALS = 12  # margins tried for an error, at most
-NEAR = 0.98  # part of the requested error that is as good as equal to it
-CLOSE = 1.01  # two margins whose ratio is less leave the same keys, or nearly
-PARTS = 8  # of a frame, at each of which errors are measured
-VARIES = 1e-4  # a channel that never changes by more does not vary: importers calculate in single precision
+NUMBERS_PER_FREE_KEY = 6  # numbers of a key with free handles
+MARGIN_RANGE = (1e-5, 10.0)  # the smallest and the largest error margin of Decimate, in the units of the channels
+MAX_TRIALS = 12  # margins tried for an error, at most
+MIN_ERROR_RATIO = 0.98  # part of the requested error that is as good as equal to it
+MAX_MARGIN_RATIO = 1.01  # two margins whose ratio is less leave the same keys, or nearly
+PARTS_PER_FRAME = 8  # of a frame, at each of which errors are measured
+MIN_VARIATION = 1e-4  # a channel that never changes by more does not vary: importers calculate in single precision
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,11 @@ class Left:
 
 
 def between(frames: np.ndarray) -> np.ndarray:
-    """Return frames (n,) with the moments between them at which errors are measured, shape (`PARTS` (n - 1) + 1,)."""
+    """Return frames (n,) with the moments between them at which errors are measured, shape (`PARTS_PER_FRAME` (n - 1) +
+    1,).
+    """
     count = len(frames)
-    return np.interp(np.arange(PARTS * (count - 1) + 1) / PARTS, np.arange(count), frames)
+    return np.interp(np.arange(PARTS_PER_FRAME * (count - 1) + 1) / PARTS_PER_FRAME, np.arange(count), frames)
 
 
 def decimate(obj: bpy.types.Object, **options: object) -> None:
@@ -81,7 +83,7 @@ def bend(obj: bpy.types.Object) -> None:
 
 
 def decimated_within(
-    obj: bpy.types.Object, left: Callable[[], Left], largest: float, trials: int = TRIALS
+    obj: bpy.types.Object, left: Callable[[], Left], largest: float, trials: int = MAX_TRIALS
 ) -> Left | None:
     """Return the fewest keys that Decimate leaves whose error is at most this, of straight lines or of curves through
     all keys; None where no margin tried does. For arguments see `Decimations`.
@@ -103,7 +105,7 @@ class Decimations:
     left by the F-curves that it has when it is called.
     """
 
-    def __init__(self, obj: bpy.types.Object, left: Callable[[], Left], trials: int = TRIALS) -> None:
+    def __init__(self, obj: bpy.types.Object, left: Callable[[], Left], trials: int = MAX_TRIALS) -> None:
         self.obj, self.left, self.trials = obj, left, trials
         self.recorded = obj.animation_data.action
         self.tried: dict[float, Left] = {}  # the logarithm of a margin, and what it left
@@ -115,15 +117,15 @@ class Decimations:
         """
         for _ in range(self.trials):
             low, high = self._between(largest)
-            near = any(NEAR * largest <= left.largest <= largest for left in self.tried.values())
-            if near or high - low < np.log(CLOSE):
+            near = any(MIN_ERROR_RATIO * largest <= left.largest <= largest for left in self.tried.values())
+            if near or high - low < np.log(MAX_MARGIN_RATIO):
                 break
             self._try((low + high) / 2.0)
         good = [left for left in self.tried.values() if left.largest <= largest]
         return min(good, key=lambda left: left.keys, default=None)
 
     def _between(self, largest: float) -> tuple[float, float]:
-        low, high = np.log(MARGINS)
+        low, high = np.log(MARGIN_RANGE)
         high = min((margin for margin, left in self.tried.items() if left.largest > largest), default=high)
         within = [margin for margin, left in self.tried.items() if left.largest <= largest and margin < high]
         return max(within, default=low), high
@@ -150,13 +152,15 @@ class DecimatedBody:
         places = joints.positions[roots]
         # Single precision is best around the origin.
         joints.positions[roots] -= (places.min(axis=(0, 1)) + places.max(axis=(0, 1))) / 2.0
-        self.rig = Rig("Body", Rest.of(clip), clip.whole_body.joints, bpy.context.scene.collection)
+        self.rig = Rig("Body", RestFigure.of(clip), clip.whole_body.joints, bpy.context.scene.collection)
         channels = self.rig.channels_of(joints)
         for bone in range(len(self.rig.bones)):
             self.rig.key(bone, frames, channels[bone])
-        self._counted = {curve for curve, values in values_of(self.rig.obj, frames).items() if np.ptp(values) > VARIES}
+        self._counted = {
+            curve for curve, values in values_of(self.rig.obj, frames).items() if np.ptp(values) > MIN_VARIATION
+        }
         self._truth = self.shown()
-        self._truth[:, ::PARTS] = self._skeleton.in_root_space(joints)
+        self._truth[:, ::PARTS_PER_FRAME] = self._skeleton.in_root_space(joints)
 
     def within(self, largest: float) -> Left | None:
         """Return the fewest keys whose error is at most this, from straight lines or curves through all of them."""
@@ -185,4 +189,4 @@ class DecimatedBody:
         """Return the keys that the rig has now, and their largest error."""
         curves = [fcurve for curve, fcurve in fcurves_of(self.rig.obj).items() if curve in self._counted]
         keys = [key.co.x for fcurve in curves for key in fcurve.keyframe_points]
-        return Left(len(set(keys)), len(keys), FREE * len(keys), float(self.errors().max()))
+        return Left(len(set(keys)), len(keys), NUMBERS_PER_FREE_KEY * len(keys), float(self.errors().max()))

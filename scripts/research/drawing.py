@@ -18,13 +18,16 @@ from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.scenes.layout import project
 from rigid_motion_batch.scenes.subject import load_subject, tinted_slots, vertices_of
 
-WIDTH, DOTS_PER_INCH = 1004, 300  # pixels of a column of 8.5 cm
+WIDTH_PX, DOTS_PER_INCH = 1004, 300  # pixels of a column of 8.5 cm
 INK, FAINT, RULE = "#1B2026", "#58626E", "#C9CFD6"
 
-LIGHT, AMBIENT = np.array((-0.42, 0.60, -0.68)), 0.5
+LIGHT_DIRECTION, AMBIENT_RATIO = np.array((-0.42, 0.60, -0.68)), 0.5
 """Where it comes from: right, up, and away from who looks."""
 
-FINER, FILLED = 2, 0.6  # pixels of a model for a pixel of the picture, each way, and how far its points are apart
+MODEL_PIXELS_PER_PIXEL, POINT_SPACING_PX = (
+    2,
+    0.6,
+)  # pixels of a model for a pixel of the picture, each way, and how far its points are apart
 
 
 def picture(width: int, height: int, ground: str = "none", dots_per_inch: int = 100) -> Axes:
@@ -39,7 +42,7 @@ def picture(width: int, height: int, ground: str = "none", dots_per_inch: int = 
 
 def column(height: int) -> Axes:
     """Return a white picture as wide as a column."""
-    return picture(WIDTH, height, "#FFFFFF", DOTS_PER_INCH)
+    return picture(WIDTH_PX, height, "#FFFFFF", DOTS_PER_INCH)
 
 
 def save(axes: Axes, path: Path) -> None:
@@ -77,11 +80,11 @@ class Model:
         normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0])
         facing = normals[:, 2] < 0.0
         corners, normals = corners[facing], normals[facing] / np.linalg.norm(normals[facing], axis=1, keepdims=True)
-        bright = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ LIGHT, 0.0, 1.0)
+        bright = AMBIENT_RATIO + (1.0 - AMBIENT_RATIO) * np.clip(normals @ LIGHT_DIRECTION, 0.0, 1.0)
         colours = np.where((self.tinted | whole)[:, None], to_rgb(colour), self.colours)[facing] * bright[:, None]
-        pixel = 1.0 / (FINER * axes.bbox.height)
+        pixel = 1.0 / (MODEL_PIXELS_PER_PIXEL * axes.bbox.height)
         sizes = np.ptp(corners[..., :2], axis=1).max(axis=1)
-        halvings = np.ceil(np.log2(sizes / (FILLED * pixel))).clip(0.0).astype(int)
+        halvings = np.ceil(np.log2(sizes / (POINT_SPACING_PX * pixel))).clip(0.0).astype(int)
         parts = [(centroids(times) @ corners[halvings == times], halvings == times) for times in set(halvings.tolist())]
         points = np.concatenate([pieces.reshape(-1, 3) for pieces, _ in parts])
         colours = np.concatenate([np.repeat(colours[cut], pieces.shape[1], axis=0) for pieces, cut in parts])

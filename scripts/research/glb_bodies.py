@@ -8,23 +8,23 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-HEIGHT = 1.7
+HEIGHT_M = 1.7
 """Metres."""
 
-RADIUS = 0.03
+RADIUS_M = 0.03
 """Metres: what is looked at around joints of a body of that height; of larger ones in proportion."""
 
 CORNERS = np.array([*itertools.product((-1.0, 1.0), (0.0, 1.0), (-1.0, 1.0))])
-FACES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+BOX_FACES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
 """Of a box; y goes along the bone."""
 
-WIDE = 0.15
+HALF_WIDTH_RATIO = 0.15
 """Half the width of a box, of the length of its bone."""
 
-SHARE = 0.3
+PARENT_WEIGHT = 0.3
 """Of a bone's parent, in the vertices where the bone begins."""
 
-SMILE, SECONDS = 0.02, 2.5
+SMILE_M, SMILE_PERIOD_S = 0.02, 2.5
 """Metres by which the expression moves all vertices, and how often it comes."""
 
 
@@ -32,7 +32,7 @@ def export(path: Path, output: Path, *, as_avatar: bool) -> None:
     """Import an FBX or BVH file with Blender, scale its body, and export it with a key on every frame."""
     rig = _imported(path, 1.0)
     heads = np.array([rig.matrix_world @ bone.head_local for bone in rig.data.bones])
-    rig = _imported(path, HEIGHT / float(np.ptp(heads, axis=0).max()))
+    rig = _imported(path, HEIGHT_M / float(np.ptp(heads, axis=0).max()))
     ends = [frame for action in bpy.data.actions for frame in action.frame_range]
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = int(min(ends)), int(max(ends))
@@ -54,17 +54,17 @@ def _imported(path: Path, scale: float) -> bpy.types.Object:
 def _dress(rig: bpy.types.Object) -> None:
     """Give a rig a skin, a box around each bone, and an expression with a key on every frame."""
     bones, count = list(rig.data.bones), len(CORNERS)
-    boxes = [CORNERS * (WIDE * bone.length, bone.length, WIDE * bone.length) for bone in bones]
+    boxes = [CORNERS * (HALF_WIDTH_RATIO * bone.length, bone.length, HALF_WIDTH_RATIO * bone.length) for bone in bones]
     rests = [np.array(bone.matrix_local) for bone in bones]
     points = [box @ rest[:3, :3].T + rest[:3, 3] for box, rest in zip(boxes, rests, strict=True)]
     mesh = bpy.data.meshes.new("Skin")
-    faces = np.concatenate([FACES + count * number for number in range(len(bones))])
+    faces = np.concatenate([BOX_FACES + count * number for number in range(len(bones))])
     mesh.from_pydata(np.concatenate(points).tolist(), [], faces.tolist())
     body = bpy.data.objects.new("Skin", mesh)
     bpy.context.collection.objects.link(body)
     groups = {bone.name: body.vertex_groups.new(name=bone.name) for bone in bones}
     for number, bone in enumerate(bones):
-        shares = np.where(CORNERS[:, 1] == 0.0, SHARE, 0.0) * bool(bone.parent)
+        shares = np.where(CORNERS[:, 1] == 0.0, PARENT_WEIGHT, 0.0) * bool(bone.parent)
         for vertex, share in enumerate(shares.tolist(), count * number):
             groups[bone.name].add([vertex], 1.0 - share, "REPLACE")
             if share:
@@ -74,8 +74,8 @@ def _dress(rig: bpy.types.Object) -> None:
     body.shape_key_add(name="Basis")
     smile = body.shape_key_add(name="smile")
     for point in smile.data:
-        point.co.x += SMILE
+        point.co.x += SMILE_M
     scene = bpy.context.scene
     for frame in range(scene.frame_start, scene.frame_end + 1):
-        smile.value = max(0.0, float(np.sin(2.0 * np.pi * frame / (SECONDS * scene.render.fps))))
+        smile.value = max(0.0, float(np.sin(2.0 * np.pi * frame / (SMILE_PERIOD_S * scene.render.fps))))
         smile.keyframe_insert("value", frame=frame)

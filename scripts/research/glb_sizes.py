@@ -23,14 +23,14 @@ from typing import Any
 import bpy
 import numpy as np
 
-from research.glb_bodies import HEIGHT, RADIUS, export
+from research.glb_bodies import HEIGHT_M, RADIUS_M, export
 from research.glb_playing import animation_bytes, errors_of, opened, size_of
 from research.pages import FIGURES
 from research.studies import publish, report, study_parser
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.cli import reduce
 
-TOLERANCES = (1e-4, 1e-3, 5e-3)
+TOLERANCES_M = (1e-4, 1e-3, 5e-3)
 
 WAYS = ("", " --curves", " --meshopt", " --meshopt --feet-may-slide --channels moving")
 """Options of reduce."""
@@ -73,13 +73,13 @@ class Measured:
         else:
             export(path, self.exported, as_avatar=group == "avatars")
         self.original = opened(self.exported, tools)
-        self.scale = size_of(self.original) / HEIGHT
+        self.scale = size_of(self.original) / HEIGHT_M
         self.cheapest = cache(self._cheapest)
 
     def ways(self) -> Iterator[tuple[str, Callable[[], dict[str, Any]]]]:
         """Yield the names of all rows, and what makes them."""
         yield EXPORTED, partial(self._row, self.exported)
-        for tolerance in TOLERANCES:
+        for tolerance in TOLERANCES_M:
             within = f"within {1e3 * tolerance:g} mm"
             for way in filter(knows, WAYS):
                 if self.tools or NEEDS_TOOLS not in way:
@@ -95,7 +95,7 @@ class Measured:
         import brotli  # for figures alone: the tests go without
 
         content = path.read_bytes()
-        errors = errors_of(self.original, opened(path, self.tools), RADIUS * self.scale)
+        errors = errors_of(self.original, opened(path, self.tools), RADIUS_M * self.scale)
         millimetres = {name: None if off is None else 1e3 * off / self.scale for name, off in errors.items()}
         sizes = {"animation": animation_bytes(path), "file": len(content), "brotli": len(brotli.compress(content))}
         return {**sizes, **millimetres}
@@ -103,7 +103,7 @@ class Measured:
     def _reduced(self, way: str, tolerance: float) -> dict[str, Any]:
         """Return a row of reduce; one without numbers where it leaves the file alone, which would grow."""
         self.output.unlink(missing_ok=True)
-        given = {"--tolerance": tolerance * self.scale, "--radius": RADIUS * self.scale}
+        given = {"--tolerance": tolerance * self.scale, "--radius": RADIUS_M * self.scale}
         lengths = [part for name, length in given.items() for part in (name, f"{1e3 * length:.6f}mm")]
         arguments = [str(self.exported), "--output", str(self.output), "--overwrite", "--jobs", "0"]
         with redirect_stdout(StringIO()):
@@ -138,7 +138,7 @@ class Measured:
 
         def is_within(*bits: int) -> bool:
             self._pack("-cc", *_kept_in(bits))
-            errors = errors_of(self.original, opened(self.output, self.tools), RADIUS * self.scale, largest)
+            errors = errors_of(self.original, opened(self.output, self.tools), RADIUS_M * self.scale, largest)
             return max(error or 0.0 for error in errors.values()) <= largest
 
         def size(bits: tuple[int, int]) -> int:
@@ -184,7 +184,7 @@ def means(clips: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def beside(clips: list[dict[str, Any]]) -> dict[str, dict[str, dict[str, float]]]:
     """Return the bytes of reduce in those of gltfpack `-cc` within the same tolerance: geometric means over clips."""
     result: dict[str, dict[str, dict[str, float]]] = {}
-    for tolerance in TOLERANCES:
+    for tolerance in TOLERANCES_M:
         within = f"within {1e3 * tolerance:g} mm"
         for way in WAYS:
             found: dict[str, list[float]] = {}

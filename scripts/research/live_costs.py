@@ -18,15 +18,15 @@ from typing import Any
 import numpy as np
 
 from research.live_streams import room
-from research.live_streams.engines import ENGINES, FPS, RATE, Way, by_codec, by_engine, seen, truth_of
+from research.live_streams.engines import ENGINES, PICTURES_PER_S, POSES_PER_S, Way, by_codec, by_engine, seen, truth_of
 from research.live_streams.packings import packed
 from research.studies import files_in, publish, report, study_parser
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import HEADERS, measure
+from rigid_motion_batch.streaming.measuring import HEADER_BYTES, measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
-TOLERANCE = 0.005
+TOLERANCE_M = 0.005
 DELAYS = {0.1: "100 ms", 0.2: "200 ms"}
 
 FLOATS = "float32 at 30 Hz"
@@ -53,7 +53,7 @@ def costs_of(clip: Clip) -> dict[str, Any]:
     times, poses = samples_of(clip)
     body = body_of(clip, poses)
     costs = {
-        f"when needed, {name}": measure([body], times, poses, TOLERANCE, delay)[0] for delay, name in DELAYS.items()
+        f"when needed, {name}": measure([body], times, poses, TOLERANCE_M, delay)[0] for delay, name in DELAYS.items()
     } | packed(body, times, poses)
     ways = {way: {name: cost[key] for name, key in COST.items()} for way, cost in costs.items()}
     return {"name": clip.name, "joints": len(body.joints), "ways": ways}
@@ -79,12 +79,15 @@ def engines(clip: Clip) -> list[dict[str, Any]]:
     """Return what game engines show of a hand and its tool over each link, and what the codec does."""
     times, poses = samples_of(clip)
     truth = truth_of(times, poses[0])
-    frames = np.arange(0.5, float(truth.moments[-1]), 1.0 / FPS)
+    frames = np.arange(0.5, float(truth.moments[-1]), 1.0 / PICTURES_PER_S)
     rows = []
     for label, way in WAYS.items():
         report(label)
-        shown = {engine: (by_engine(engine, truth, way, frames), 2.0 * RATE * (7 * 4 + HEADERS)) for engine in ENGINES}
-        shown["sent when needed"] = by_codec(truth, way, frames, TOLERANCE, next(iter(DELAYS)))
+        shown = {
+            engine: (by_engine(engine, truth, way, frames), 2.0 * POSES_PER_S * (7 * 4 + HEADER_BYTES))
+            for engine in ENGINES
+        }
+        shown["sent when needed"] = by_codec(truth, way, frames, TOLERANCE_M, next(iter(DELAYS)))
         for engine, (poses_shown, size) in shown.items():
             rows.append({"link": label, "by": engine, "bytes": size, **seen(poses_shown, truth, frames)})
     return rows
@@ -101,7 +104,7 @@ def main(arguments: list[str] | None = None) -> int:
     clips = [clip for path in paths for clip in read_clips([str(path)])[0]]
     rows = [costs_of(clip) for clip in clips]
     result = {
-        "tolerance_mm": 1e3 * TOLERANCE,
+        "tolerance_mm": 1e3 * TOLERANCE_M,
         "bodies": table([row for row in rows if row["joints"] > 1]),
         "single": table([row for row in rows if row["joints"] == 1]),
         "engines": engines(next(clip for clip in clips if clip.name == HAND)),

@@ -19,7 +19,17 @@ import bpy
 import numpy as np
 
 from research import body_reduction
-from research.decimating import FREE, NEAR, PARTS, Left, bend, between, decimated_within, fcurves_of, values_of
+from research.decimating import (
+    MIN_ERROR_RATIO,
+    NUMBERS_PER_FREE_KEY,
+    PARTS_PER_FRAME,
+    Left,
+    bend,
+    between,
+    decimated_within,
+    fcurves_of,
+    values_of,
+)
 from research.making.motions import MOTIONS
 from research.studies import EXTENSIONS, files_in, publish, report, study_parser
 from rigid_motion import animation
@@ -36,13 +46,13 @@ from rigid_motion_batch.scenes.body_scene import registered
 
 ROTATION_MODES = ("QUATERNION", "XYZ")
 RIVALS = "curves", "curves_between", "decimate"
-TRIALS = 14  # error margins and tolerances tried until a rival is as good as the reduced poses
-ROUNDING = 1e-4  # the share by which single precision may miss a tolerance
+MAX_TRIALS = 14  # error margins and tolerances tried until a rival is as good as the reduced poses
+ROUNDING_RATIO = 1e-4  # the share by which single precision may miss a tolerance
 
 
 def read(path: Path, rate: float) -> Clip:
-    """Read the first body of a file at so many frames a second, and straight between these at `PARTS` of each, as
-    Blender shows a key on every frame; of a skeleton the root.
+    """Read the first body of a file at so many frames a second, and straight between these at `PARTS_PER_FRAME` of
+    each, as Blender shows a key on every frame; of a skeleton the root.
 
     Raises
     ------
@@ -59,8 +69,8 @@ def read(path: Path, rate: float) -> Clip:
 
 
 def frames_of(clip: Clip) -> np.ndarray:
-    """Return the frames of its poses (n,), from 1 on, of which every `PARTS`th is whole."""
-    return 1.0 + np.arange(len(clip.times)) / PARTS
+    """Return the frames of its poses (n,), from 1 on, of which every `PARTS_PER_FRAME`th is whole."""
+    return 1.0 + np.arange(len(clip.times)) / PARTS_PER_FRAME
 
 
 def import_clip(clip: Clip, rotation_mode: str, keys: np.ndarray | slice = slice(None)) -> bpy.types.Object:
@@ -69,7 +79,7 @@ def import_clip(clip: Clip, rotation_mode: str, keys: np.ndarray | slice = slice
     obj = bpy.data.objects.new(clip.name, None)
     obj.rotation_mode = rotation_mode
     bpy.context.collection.objects.link(obj)
-    animation.bake_poses(obj, frames_of(clip)[::PARTS][keys], clip.poses[::PARTS][keys])
+    animation.bake_poses(obj, frames_of(clip)[::PARTS_PER_FRAME][keys], clip.poses[::PARTS_PER_FRAME][keys])
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
     return obj
@@ -90,7 +100,7 @@ def shown(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
 def recorded(obj: bpy.types.Object, clip: Clip) -> Poses:
     """Return the poses of an object with a key on every frame: on frames the clip's, between them as they are shown."""
     result = shown(obj, frames_of(clip))
-    result[::PARTS] = clip.poses[::PARTS]
+    result[::PARTS_PER_FRAME] = clip.poses[::PARTS_PER_FRAME]
     return result
 
 
@@ -105,13 +115,13 @@ def outcome(obj: bpy.types.Object, truth: Poses, radius: float, *, poses: bool =
         if path.startswith(("location", "rotation"))
     ]
     frames, count = len(set().union(*curves)), sum(map(len, curves))
-    numbers = frames * (1 + len(curves)) if poses else FREE * count
+    numbers = frames * (1 + len(curves)) if poses else NUMBERS_PER_FREE_KEY * count
     return Left(frames, count / len(curves), numbers, float(errors_of(obj, truth, radius).max()))
 
 
 def errors_of(obj: bpy.types.Object, truth: Poses, radius: float) -> np.ndarray:
     """Return how far off an object is shown, in metres, at every part of a frame, shape (n,)."""
-    return shell_error(shown(obj, 1.0 + np.arange(truth.shape[0]) / PARTS), truth, radius)
+    return shell_error(shown(obj, 1.0 + np.arange(truth.shape[0]) / PARTS_PER_FRAME), truth, radius)
 
 
 def blenders_curves(
@@ -123,19 +133,22 @@ def blenders_curves(
     They are searched for as of quaternions. For what Euler angles make of them, and between frames, the tolerance is
     lowered.
     """
-    aim, frames, kept = tolerance, frames_of(clip)[::PARTS], None
-    for _ in range(TRIALS):
-        keys = reduce_keys(frames, clip.poses[::PARTS], REFERENCE, aim, radius)
+    aim, frames, kept = tolerance, frames_of(clip)[::PARTS_PER_FRAME], None
+    for _ in range(MAX_TRIALS):
+        keys = reduce_keys(frames, clip.poses[::PARTS_PER_FRAME], REFERENCE, aim, radius)
         obj = import_clip(clip, rotation_mode, keys)
         bend(obj)
-        left, on_frames = outcome(obj, truth, radius, poses=True), errors_of(obj, truth, radius)[::PARTS].max()
-        if kept is None and on_frames <= tolerance * (1.0 + ROUNDING):
+        left, on_frames = (
+            outcome(obj, truth, radius, poses=True),
+            errors_of(obj, truth, radius)[::PARTS_PER_FRAME].max(),
+        )
+        if kept is None and on_frames <= tolerance * (1.0 + ROUNDING_RATIO):
             kept = left
         if left.largest <= largest and kept:
             return kept, left
         if len(keys) == len(frames):
             break
-        aim *= NEAR * min(largest / left.largest, tolerance / on_frames, 1.0)
+        aim *= MIN_ERROR_RATIO * min(largest / left.largest, tolerance / on_frames, 1.0)
     return kept, None
 
 
@@ -150,9 +163,9 @@ def measure(clip: Clip, rotation_mode: str, tolerance: float, radius: float) -> 
     reduced = outcome(obj, truth, radius, poses=True)
     curves = blenders_curves(clip, truth, rotation_mode, tolerance, radius, max(tolerance, reduced.largest))
     obj = import_clip(clip, rotation_mode)
-    decimated = decimated_within(obj, lambda: outcome(obj, truth, radius), reduced.largest, TRIALS)
+    decimated = decimated_within(obj, lambda: outcome(obj, truth, radius), reduced.largest, MAX_TRIALS)
     rivals = dict(zip(RIVALS, (*curves, decimated), strict=True))
-    about = {"name": clip.name, "frames": len(clip.times[::PARTS]), "reduced": reduced.figures()}
+    about = {"name": clip.name, "frames": len(clip.times[::PARTS_PER_FRAME]), "reduced": reduced.figures()}
     return about | {name: left and left.figures() for name, left in rivals.items()}
 
 

@@ -24,25 +24,25 @@ from rigid_motion_batch.places import ASSETS, from_here
 from rigid_motion_batch.recordings.clips import Clip
 
 MODES = (REFERENCE, STATE_OF_THE_ART, "dq_sclerp", "pga_lerp", "motor_spline")
-RATES = (2, 3, 5, 10, 20, 30)
+KEYS_PER_S = (2, 3, 5, 10, 20, 30)
 """Keys a second."""
 
-RADIUS = 0.1
-LONGEST = 20.0
+SHELL_RADIUS_M = 0.1
+MAX_RECORDING_S = 20.0
 """Seconds of a recording that are looked at."""
 
-LEVERS = (0.1, 0.3, 1.0)
+LEVERS_M = (0.1, 0.3, 1.0)
 """Metres from the hand to the origin of the tool that it holds."""
 
-ROUNDING = 1e-6
+MAX_ROUNDING_M = 1e-6
 """Metres that are none."""
 
 HELD_AT = (5, 10)
 REACHED_AT = 8
-TURNS = (60, 120, 170)
+DOOR_TURNS_DEG = (60, 120, 170)
 """Degrees of a door between two keys."""
 
-HINGE = 0.8
+HINGE_DISTANCE_M = 0.8
 """Metres from the origin of the door."""
 
 
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str]) -> int:
         "left_out": sorted(left_out),
         "errors": errors(clips),
         "slips": slips(clips),
-        "doors": {str(degrees): door(degrees) for degrees in TURNS},
+        "doors": {str(degrees): door(degrees) for degrees in DOOR_TURNS_DEG},
         "other_sign_deg": other_sign(clips),
         "reach_mm": reach(),
     }
@@ -69,7 +69,7 @@ def sampled(clip: Clip, rate: float) -> tuple[np.ndarray, Poses, np.ndarray] | N
 
     None where nearly all would be.
     """
-    count = int(np.searchsorted(clip.times, clip.times[0] + LONGEST))
+    count = int(np.searchsorted(clip.times, clip.times[0] + MAX_RECORDING_S))
     times, poses = clip.times[:count], clip.in_metres(clip.poses[:count])
     if (len(times) - 1) / (times[-1] - times[0]) < 2.0 * rate:
         return None
@@ -81,14 +81,14 @@ def sampled(clip: Clip, rate: float) -> tuple[np.ndarray, Poses, np.ndarray] | N
 def errors(clips: Iterable[Clip]) -> dict[str, Any]:
     """Return the RMS errors of all modes at all rates as shares of those of the reference, and over how many clips."""
     result: dict[str, Any] = {}
-    for rate in RATES:
+    for rate in KEYS_PER_S:
         report(f"{rate} keys a second")
         rows = []
         for clip in clips:
             if (taken := sampled(clip, rate)) and len(taken[2]) > 3:
                 times, poses, keys = taken
                 shown = [interpolate(times[keys], poses[keys], times, mode) for mode in MODES]
-                rows.append([rms(shell_error(one, poses, RADIUS)) for one in shown])
+                rows.append([rms(shell_error(one, poses, SHELL_RADIUS_M)) for one in shown])
         means = geometric_mean(np.array(rows))
         result[str(rate)] = {"clips": len(rows), **dict(zip(MODES, means / means[0], strict=True))}
     return result
@@ -101,7 +101,7 @@ def slips(clips: Iterable[Clip]) -> dict[str, Any]:
     """
     result: dict[str, Any] = {}
     for rate in HELD_AT:
-        for lever in LEVERS:
+        for lever in LEVERS_M:
             grip = np.array((lever, 0.0, 0.0))
             rows = []
             for clip in clips:
@@ -115,8 +115,8 @@ def slips(clips: Iterable[Clip]) -> dict[str, Any]:
                     place = rotate(conjugate(holding.quaternions), held.positions - holding.positions)
                     row.append(np.linalg.norm(place - grip, axis=1).max())
                 rows.append(row)
-            means = 1e3 * geometric_mean(np.maximum(np.array(rows), ROUNDING))
-            means = np.where(means > 1.001e3 * ROUNDING, means, 0.0)
+            means = 1e3 * geometric_mean(np.maximum(np.array(rows), MAX_ROUNDING_M))
+            means = np.where(means > 1.001e3 * MAX_ROUNDING_M, means, 0.0)
             result.setdefault(str(rate), {})[str(lever)] = dict(zip(MODES, means, strict=True))
     return result
 
@@ -127,7 +127,7 @@ def reach() -> dict[str, float]:
     assert taken is not None
     times, poses, keys = taken
     return {
-        mode: 1e3 * rms(shell_error(interpolate(times[keys], poses[keys], times, mode), poses, RADIUS))
+        mode: 1e3 * rms(shell_error(interpolate(times[keys], poses[keys], times, mode), poses, SHELL_RADIUS_M))
         for mode in MODES
     }
 
@@ -136,7 +136,7 @@ def door(degrees: float) -> dict[str, float]:
     """Return how far the hinge of a door leaves its place between two keys, in mm."""
     half = np.radians(degrees) / 2.0
     quaternions = np.array(((1.0, 0.0, 0.0, 0.0), (np.cos(half), 0.0, 0.0, np.sin(half))))
-    hinge = np.array((HINGE, 0.0, 0.0))
+    hinge = np.array((HINGE_DISTANCE_M, 0.0, 0.0))
     keys, result = Poses(rotate(quaternions, hinge), quaternions), {}
     for mode in MODES:
         shown = interpolate([0.0, 1.0], keys, np.linspace(0.0, 1.0, 401), mode)

@@ -42,7 +42,7 @@ DESCRIBED = {
 }
 """What each convention is, in words."""
 
-_LIES = np.sqrt(0.5) * np.array((1.0, -1.0, 0.0, 0.0))
+_Z_UP_TO_OPENGL = np.sqrt(0.5) * np.array((1.0, -1.0, 0.0, 0.0))
 """The turn of a body that has z for up and y for forward, to those of OpenGL."""
 
 
@@ -61,7 +61,7 @@ def to_blender(poses: Poses, axes: str) -> Poses:
         Where there is no such convention.
     """
     if axes == NERF:
-        return Poses(poses.positions, multiply(poses.quaternions, _LIES), poses.scales)
+        return Poses(poses.positions, multiply(poses.quaternions, _Z_UP_TO_OPENGL), poses.scales)
     if axes not in AXES:
         raise ValueError(f"there are no axes named {axes!r}; known are {', '.join(AXES)}")
     return in_other_axes(poses, AXES[axes])
@@ -70,5 +70,5 @@ def to_blender(poses: Poses, axes: str) -> Poses:
 def from_blender(poses: Poses, axes: str) -> Poses:
     """Return the opposite of `to_blender`."""
     if axes == NERF:
-        return Poses(poses.positions, multiply(poses.quaternions, conjugate(_LIES)), poses.scales)
+        return Poses(poses.positions, multiply(poses.quaternions, conjugate(_Z_UP_TO_OPENGL)), poses.scales)
     return in_other_axes(poses, AXES[axes].T)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .analysis.metrics import NOTHING
+from .analysis.metrics import MAX_ROUNDING_M
 
 MODE_COLOURS: dict[str, str] = {
     "bezier": "#E4FCF0",
@@ -122,7 +122,7 @@ def full_colour(errors: Iterable[np.ndarray]) -> float:
     errors = list(errors)
     nearly_all = max(float(np.quantile(some, NEARLY_ALL)) for some in errors)
     largest = max(float(some.max()) for some in errors)
-    return next((size for size in (nearly_all, largest) if size > NOTHING), 1.0)
+    return next((size for size in (nearly_all, largest) if size > MAX_ROUNDING_M), 1.0)
 
 
 def luminance(colour: str) -> float:

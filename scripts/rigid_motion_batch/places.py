@@ -9,8 +9,8 @@ from typing import Any
 
 PACKAGE = Path(__file__).resolve().parent
 
-_UP = PACKAGE.parents[1]
-CHECKOUT = _UP if (_UP / "addon" / "rigid_motion" / "__init__.py").is_file() else None
+_ROOT = PACKAGE.parents[1]
+CHECKOUT = _ROOT if (_ROOT / "addon" / "rigid_motion" / "__init__.py").is_file() else None
 """The root of the checkout that this is in; None where pip has installed it."""
 
 EXTENSION = CHECKOUT / "addon" / "rigid_motion" if CHECKOUT else PACKAGE.with_name("rigid_motion")

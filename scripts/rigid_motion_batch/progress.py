@@ -14,12 +14,12 @@ from typing import Any, Self, TextIO, cast
 
 from rigid_motion_batch.command_line import printable
 
-FARM = "RIGID_MOTION_PROGRESS"
+FARM_VARIABLE = "RIGID_MOTION_PROGRESS"
 """A variable of the environment: "openjd" where a farm listens, to the lines that Open Job Description knows."""
 
 BAR_COLUMNS = 24
 
-INTERVAL = 10.0
+LINE_INTERVAL_S = 10.0
 """Seconds between two plain lines."""
 
 
@@ -79,7 +79,7 @@ class Progress:
     ) -> None:
         self._stream = sys.stderr if stream is None else stream
         self._program = program
-        self._on_farm = os.environ.get(FARM) == "openjd"
+        self._on_farm = os.environ.get(FARM_VARIABLE) == "openjd"
         self._quiet = quiet or self._stream is None
         self._clock = clock
         self._stage: Stage | None = None
@@ -138,7 +138,7 @@ class Progress:
             done, words = 100.0 * stage.fraction, stage.doing or stage.title
             self._stream.write(f"openjd_progress: {done:.1f}\nopenjd_status: {_fitting(words, self._stream)}\n")
             self._stream.flush()
-        elif not self._quiet and (now or self._clock() - self._shown_at >= INTERVAL):
+        elif not self._quiet and (now or self._clock() - self._shown_at >= LINE_INTERVAL_S):
             self._shown_at, self._shown = self._clock(), stage.fraction
             self._stream.write(f"{stage.fraction:4.0%}  {self._line()}\n")
             self._stream.flush()

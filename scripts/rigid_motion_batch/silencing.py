@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 
-OUTPUT, ERRORS = 1, 2
+OUTPUT_DESCRIPTOR, ERRORS_DESCRIPTOR = 1, 2
 """The descriptors of the standard streams."""
 
 
@@ -20,7 +20,7 @@ def silenced(*, errors: bool = False) -> Iterator[None]:
     Otherwise that stays open: where Blender has to abort, its last words are there.
     """
     _flush()
-    streams = (OUTPUT, ERRORS) if errors else (OUTPUT,)
+    streams = (OUTPUT_DESCRIPTOR, ERRORS_DESCRIPTOR) if errors else (OUTPUT_DESCRIPTOR,)
     kept = {stream: os.dup(stream) for stream in streams}
     nothing = os.open(os.devnull, os.O_WRONLY)
     try:

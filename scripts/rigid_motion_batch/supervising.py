@@ -29,21 +29,21 @@ from typing import Any
 
 from .command_line import path_line, printable
 
-VARIABLE = "RIGID_MOTION_SESSION"
+SESSION_VARIABLE = "RIGID_MOTION_SESSION"
 """A variable of the environment: the temporary folder of a child; empty where none could be made."""
 
 JOURNAL = "journal"
 
-GRACE = 1.2
+GRACE_S = 1.2
 """Seconds that the child has after a signal to end by itself."""
 
-LAST = 1.7
+LAST_WAIT_S = 1.7
 """Seconds after which nothing waits for it, although killed: the system may be reading from a disk that is gone."""
 
-LOOK = 0.1
+LOOK_S = 0.1
 """Seconds between two looks at the clock."""
 
-STOPPED = "Stopped. What was written by then is complete."
+STOPPED_TEXT = "Stopped. What was written by then is complete."
 """The message where the child had nothing better to say."""
 
 SHOW_CURSOR = "\x1b[?25h"
@@ -52,7 +52,7 @@ SHOW_CURSOR = "\x1b[?25h"
 PR_SET_PDEATHSIG = 1
 """See prctl(2)."""
 
-ASK = getattr(signal, "SIGUSR1", None)
+ASK_SIGNAL = getattr(signal, "SIGUSR1", None)
 """The signal by which the parent asks its child to end. Any other signal may come to both of them, from a terminal or a
 farm, and would ask twice. On Windows, where there is none, the console sends Ctrl-C to both, and the parent waits."""
 
@@ -63,8 +63,8 @@ _is_child = False
 
 def stop_signals() -> list[signal.Signals]:
     """Return the signals that stop this process. Those that are ignored, as by nohup, go on being ignored."""
-    if _is_child and ASK:
-        return [ASK]
+    if _is_child and ASK_SIGNAL:
+        return [ASK_SIGNAL]
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
     known = [getattr(signal, name) for name in names if hasattr(signal, name)]
     return [item for item in known if signal.getsignal(item) is not signal.SIG_IGN]
@@ -92,23 +92,23 @@ def supervise(program: str) -> int:
 
     def handle(number: int, _: object) -> None:
         received.append((number, time.monotonic()))
-        if len(received) == 1 and child is not None and ASK:
-            child.send_signal(ASK)
+        if len(received) == 1 and child is not None and ASK_SIGNAL:
+            child.send_signal(ASK_SIGNAL)
 
     before = {item: signal.signal(item, handle) for item in stop_signals()}
     try:
         with held_back(before):
             early = bool(received)
             child = subprocess.Popen(_this_command(), env=_environment(folder))
-        if early and ASK:
-            child.send_signal(ASK)
+        if early and ASK_SIGNAL:
+            child.send_signal(ASK_SIGNAL)
         while child.poll() is None:
             with suppress(subprocess.TimeoutExpired):
-                child.wait(LOOK)
+                child.wait(LOOK_S)
             since = time.monotonic() - received[0][1] if received else 0.0
-            if since > GRACE:
+            if since > GRACE_S:
                 child.kill()
-            if since > LAST:
+            if since > LAST_WAIT_S:
                 break
         code = -9 if child.returncode is None else child.returncode
         journal = _Journal(folder)
@@ -137,12 +137,12 @@ def death(code: int) -> str:
 @contextmanager
 def held_back(signals: Iterable[int]) -> Iterator[None]:
     """Hold signals back meanwhile, and in processes that are started meanwhile until these let them through."""
-    if ASK:
+    if ASK_SIGNAL:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     try:
         yield
     finally:
-        if ASK:
+        if ASK_SIGNAL:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
@@ -153,12 +153,12 @@ def begin_child() -> bool:
     """
     global _is_child
     # Programs that the child starts are not to take themselves for children.
-    folder = os.environ.pop(VARIABLE, None)
+    folder = os.environ.pop(SESSION_VARIABLE, None)
     if folder is None:
         return False
     join_session(folder)
     end_with_parent()
-    if ASK:
+    if ASK_SIGNAL:
         parent, signals = os.getppid(), stop_signals()
 
         def relay(number: int, _: object) -> None:
@@ -225,7 +225,7 @@ class _Journal:
 
     def __init__(self, folder: str | None) -> None:
         self.at = ""
-        self.summary = STOPPED
+        self.summary = STOPPED_TEXT
         self.ended = False
         self.prints_paths = True
         self.written: list[str] = []
@@ -280,7 +280,7 @@ def _temporary_folder() -> str | None:
 def _environment(folder: str | None) -> dict[str, str]:
     temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder) if folder else {}
     # Matrices are small here: threads of NumPy's library would wait for one another, and for those of other workers.
-    return {"OPENBLAS_NUM_THREADS": "1", **os.environ, **temporary, VARIABLE: folder or ""}
+    return {"OPENBLAS_NUM_THREADS": "1", **os.environ, **temporary, SESSION_VARIABLE: folder or ""}
 
 
 def _this_command() -> Sequence[str]:

@@ -7,7 +7,17 @@ import pytest
 from numpy.typing import ArrayLike
 
 from assets import make_assets
-from research.making.motions import EDGE, GRIP, HINGE, HOLD, MOTIONS, OTHERS, PITCH, SITE, TIP
+from research.making.motions import (
+    BIT_TIP_M,
+    DOOR_EDGE_M,
+    GRIP,
+    HINGE_M,
+    HOLD,
+    MOTIONS,
+    OTHER_MOTIONS,
+    SCREW_PITCH_M,
+    SITE_M,
+)
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import conjugate, multiply, rotate
 from rigid_motion_batch.recordings.reading import read_trajectories
@@ -36,10 +46,10 @@ def place_of(point: ArrayLike, poses: Poses) -> np.ndarray:
 
 
 def test_the_folder_holds_the_clips_that_the_script_makes_and_no_other_table():
-    assert {path.stem for path in ASSETS.glob("*.csv")} == {*MOTIONS, *OTHERS}
+    assert {path.stem for path in ASSETS.glob("*.csv")} == {*MOTIONS, *OTHER_MOTIONS}
 
 
-@pytest.mark.parametrize("name", [*MOTIONS, *OTHERS])
+@pytest.mark.parametrize("name", [*MOTIONS, *OTHER_MOTIONS])
 def test_the_script_makes_the_kept_clip_again(name):
     assert make_assets.clip(name) == (ASSETS / f"{name}.csv").read_text(encoding="utf-8")
 
@@ -58,7 +68,7 @@ def test_a_failure_while_writing_leaves_the_old_file_whole(tmp_path):
     assert list(tmp_path.iterdir()) == [old]
 
 
-@pytest.mark.parametrize("name", [*MOTIONS, *OTHERS])
+@pytest.mark.parametrize("name", [*MOTIONS, *OTHER_MOTIONS])
 def test_a_clip_has_the_timer_of_a_90_hz_device(name):
     times = recorded(name)[0] if name != HOLD else recorded_in_hand()[0]
     steps = np.diff(times)
@@ -73,14 +83,14 @@ def test_a_clip_has_the_timer_of_a_90_hz_device(name):
 
 def test_the_pivot_keeps_its_tip_in_place_while_the_handle_moves():
     _, poses = recorded("pivot")
-    tip = place_of(TIP, poses)
-    assert np.linalg.norm(tip - SITE, axis=1).max() < 3e-3
+    tip = place_of(BIT_TIP_M, poses)
+    assert np.linalg.norm(tip - SITE_M, axis=1).max() < 3e-3
     assert np.ptp(poses.positions, axis=0).max() > 0.15
 
 
 def test_the_screw_advances_by_its_pitch_with_every_turn():
     _, poses = recorded("screw")
-    tip = place_of(TIP, poses)
+    tip = place_of(BIT_TIP_M, poses)
     # The side of the tool goes round the line of the bit.
     start = poses.quaternions[:1]
     side = rotate(poses.quaternions, np.broadcast_to((1.0, 0.0, 0.0), tip.shape))
@@ -88,13 +98,13 @@ def test_the_screw_advances_by_its_pitch_with_every_turn():
     turns = np.unwrap(np.arctan2(-side @ up, side @ right)) / (2.0 * np.pi)
     assert 2.0 < turns[-1] - turns[0] < 2.3
     advance = (tip - tip[0]) @ forward
-    assert advance[-1] == pytest.approx(PITCH * (turns[-1] - turns[0]), abs=1e-3)
-    assert np.polyfit(turns, advance, 1)[0] == pytest.approx(PITCH, rel=0.15)
+    assert advance[-1] == pytest.approx(SCREW_PITCH_M * (turns[-1] - turns[0]), abs=1e-3)
+    assert np.polyfit(turns, advance, 1)[0] == pytest.approx(SCREW_PITCH_M, rel=0.15)
 
 
 def test_the_door_opens_wide_and_stays_in_its_hinge():
     _, poses = recorded("door")
-    assert np.linalg.norm(place_of(EDGE, poses) - HINGE, axis=1).max() < 5e-3
+    assert np.linalg.norm(place_of(DOOR_EDGE_M, poses) - HINGE_M, axis=1).max() < 5e-3
     opened = np.degrees(2.0 * np.arctan2(poses.quaternions[:, 3], poses.quaternions[:, 0]))
     assert opened.max() == pytest.approx(170.0, abs=0.5)
     assert np.abs(opened[[0, -1]]).max() < 0.5
@@ -164,7 +174,7 @@ def test_the_script_makes_the_kept_model_again(models, name):
 def test_the_bit_of_the_drill_ends_where_the_clips_have_the_tip(models):
     vertices = vertices_of(models["Drill"][0])
     foremost = vertices[vertices[:, 1] > vertices[:, 1].max() - 1e-6]
-    np.testing.assert_allclose(foremost.mean(axis=0), TIP, atol=1e-7)
+    np.testing.assert_allclose(foremost.mean(axis=0), BIT_TIP_M, atol=1e-7)
 
 
 @pytest.mark.parametrize(("name", "length"), [("Drill", 0.22), ("Controller", 0.15)])

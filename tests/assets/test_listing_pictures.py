@@ -28,7 +28,7 @@ def grips(mode: str | None) -> np.ndarray:
     """Where the grip of the hammer is on each frame, from the hand, in lengths of the hammer."""
     hammer = bpy.data.objects.new("Hammer", None)
     bpy.context.scene.collection.objects.link(hammer)
-    return np.array([pose @ listing.GRIP - HAND for pose in listing.swing(hammer, HAND, mode)]) / listing.LENGTH
+    return np.array([pose @ listing.GRIP - HAND for pose in listing.swing(hammer, HAND, mode)]) / listing.HANDLE_LENGTH
 
 
 def test_by_the_screw_the_grip_stays_in_the_hand_which_it_leaves_by_blenders_own_in_betweens(followed):

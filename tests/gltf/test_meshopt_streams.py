@@ -5,7 +5,7 @@ import pytest
 
 from rigid_motion.gltf import attribute_streams, index_streams
 from rigid_motion.gltf.attribute_streams import differences, encoded, encoded_size, likely_size
-from rigid_motion.gltf.filters import UNDONE, floats_of, quaternions_of, with_floats, with_quaternions
+from rigid_motion.gltf.filters import UNDO_BY_FILTER, floats_of, quaternions_of, with_floats, with_quaternions
 from tests.gltf import meshopt_library
 from tests.gltf.meshopt_library import LIBRARY
 
@@ -107,7 +107,7 @@ def test_filters_are_undone_as_by_the_library(name: str, own: str, stride: int, 
     numbers[:, 3] = numbers[:, 3] if own in ("Quat", "Exp") else 0.0
     elements = meshopt_library.filtered(own, np.abs(numbers) if own == "Color" else numbers, stride, bits)
     expected = meshopt_library.undone(own, elements)
-    result = UNDONE[name][1](elements)
+    result = UNDO_BY_FILTER[name][1](elements)
     kind = {"Exp": "<f4", "Color": f"<u{stride // 4}"}.get(own, f"<i{stride // 4}")
     off = np.abs(result.astype(np.float64) - expected.view(kind).astype(np.float64).reshape(result.shape))
     assert off.max() <= (0 if own == "Exp" else 1)
@@ -135,7 +135,7 @@ def test_filters_are_undone_as_by_the_library(name: str, own: str, stride: int, 
 )
 def test_filters_are_undone_without_the_library(name: str, stride: int, elements: str, kind: str, values: list) -> None:
     given = np.frombuffer(bytes.fromhex(elements), np.uint8).reshape(-1, stride)
-    assert np.frombuffer(UNDONE[name][1](given).tobytes(), kind).tolist() == values
+    assert np.frombuffer(UNDO_BY_FILTER[name][1](given).tobytes(), kind).tolist() == values
 
 
 @pytest.mark.parametrize("bits", [4, 8, 12, 15])

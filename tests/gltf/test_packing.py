@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigid_motion.gltf.packed_keys import SHARED, Aim, fitted
+from rigid_motion.gltf.packed_keys import SHARED_TIMES, Aim, fitted
 from rigid_motion.motion.quaternions import normalise
 
 TIMES = np.arange(121) / 30
@@ -24,7 +24,7 @@ def aim(*, turns: bool, allowed: float) -> Aim:
 @pytest.mark.parametrize("allowed", [1e-2, 3e-3, 1e-3])
 def test_keys_are_never_farther_off_than_allowed(turns: bool, allowed: float) -> None:
     own = aim(turns=turns, allowed=allowed)
-    keys, stricter = own.keys(TIMES, SHARED), aim(turns=turns, allowed=allowed / 4).keys(TIMES, SHARED)
+    keys, stricter = own.keys(TIMES, SHARED_TIMES), aim(turns=turns, allowed=allowed / 4).keys(TIMES, SHARED_TIMES)
     assert keys is not None
     assert stricter is not None
     assert own.measure(keys.shown, slice(None)).max() <= 1.0
@@ -33,7 +33,7 @@ def test_keys_are_never_farther_off_than_allowed(turns: bool, allowed: float) ->
 
 @pytest.mark.parametrize("turns", [True, False])
 def test_what_few_keys_cannot_show_is_refused(turns: bool) -> None:
-    assert aim(turns=turns, allowed=1e-3).keys(TIMES[::20], SHARED) is None
+    assert aim(turns=turns, allowed=1e-3).keys(TIMES[::20], SHARED_TIMES) is None
 
 
 def test_lines_are_fitted_exactly() -> None:

@@ -23,7 +23,7 @@ STRETCH = 40
 
 @pytest.fixture(autouse=True)
 def short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(errors, "STRETCH", STRETCH)
+    monkeypatch.setattr(errors, "STRETCH_SAMPLES", STRETCH)
 
 
 def trembling(seed: int, seconds: float = 4.0, joints: int = 3) -> Making:
@@ -63,7 +63,7 @@ def test_all_that_moves_has_keys_where_stretches_meet_and_few_more_elsewhere(tmp
     (result,) = reduced(document, Options(TOLERANCE, RADIUS)).clips
     meeting = np.float32(np.linspace(0, 600, 16).round() / 30.0)
     assert all(np.isin(meeting, track.times).all() for track in result.tracks if len(track.times) > 1)
-    monkeypatch.setattr(errors, "STRETCH", 10**6)
+    monkeypatch.setattr(errors, "STRETCH_SAMPLES", 10**6)
     (whole,) = reduced(document, Options(TOLERANCE, RADIUS)).clips
     assert result.after.keys <= 1.15 * whole.after.keys
 
@@ -98,7 +98,7 @@ def slide(file: File, begin: float, end: float) -> float:
 @pytest.mark.parametrize("stretch", [STRETCH, 10**6], ids=["in stretches", "whole"])
 @pytest.mark.parametrize("how", [{"tolerance": 2e-2}, {"tolerance": 2e-2, "shared": True}, {"count": 60}], ids=str)
 def test_feet_that_stand_across_borders_slide_by_no_more_than_a_millimetre(tmp_path, monkeypatch, how, stretch):
-    monkeypatch.setattr(errors, "STRETCH", stretch)
+    monkeypatch.setattr(errors, "STRETCH_SAMPLES", stretch)
     path, begin, end = standing_body(tmp_path / "body.glb")
     report = reduce_file(path, tmp_path / "out.glb", Options(radius=RADIUS, **how))
     before, after = File(path), File(tmp_path / "out.glb")
@@ -113,7 +113,7 @@ def test_feet_that_stand_across_borders_slide_by_no_more_than_a_millimetre(tmp_p
 
 @pytest.mark.slow
 def test_memory_hardly_grows_with_the_length(tmp_path, monkeypatch):
-    monkeypatch.setattr(errors, "STRETCH", 300)
+    monkeypatch.setattr(errors, "STRETCH_SAMPLES", 300)
 
     def peak(seconds: float) -> int:
         path = walk(4, seconds).write(tmp_path / f"{seconds}.glb")

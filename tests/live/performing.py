@@ -12,7 +12,7 @@ import numpy as np
 from rigid_motion.live import receiving
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.motion.quaternions import turned
-from rigid_motion.streams import Body
+from rigid_motion.streams import StreamBody
 from rigid_motion.streams.vmc import Performer, write
 
 JOINTS = ("Hips", "Spine", "Neck", "Head", "LeftUpperArm", "LeftLowerArm", "LeftHand", "LeftUpperLeg", "LeftLowerLeg")
@@ -26,7 +26,7 @@ PLACES = np.array(
 )
 STILL = np.tile((1.0, 0.0, 0.0, 0.0), (len(JOINTS), 1))
 REST = Poses(PLACES, STILL)
-BODY = Body("dancer", JOINTS, PARENTS, REST)
+BODY = StreamBody("dancer", JOINTS, PARENTS, REST)
 SKELETON = Skeleton(PARENTS)
 TIMES_OF_A_SECOND = np.arange(60) / 60.0
 

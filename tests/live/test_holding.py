@@ -14,7 +14,7 @@ from rigid_motion.live import receiving
 from rigid_motion.live.driving import seen_hand, unscaled
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.poses import inverse, placed
-from rigid_motion.streams import Body, Sender
+from rigid_motion.streams import Sender, StreamBody
 from tests.live.performing import BODY, JOINTS, dance, in_world, new_rig
 from tests.rigs.human import human
 
@@ -63,7 +63,7 @@ def swords() -> Poses:
 def perform(sent, clock, *, holds: bool = True, loss: float = 0.0, on_row=lambda row: None) -> None:
     """Send a dance with a sword, of which a part is lost, and record it from one sample on."""
     there, poses, rng = swords(), dance(TIMES), np.random.default_rng(3)
-    sender = Sender([Body.rigid("sword", radius=RADIUS), BODY], TOLERANCE, DELAY, rate=60.0)
+    sender = Sender([StreamBody.rigid("sword", radius=RADIUS), BODY], TOLERANCE, DELAY, rate=60.0)
     for row, moment in enumerate(TIMES.tolist()):
         if holds:
             sender.hold("sword", hand_at(row) and "dancer", hand_at(row))
@@ -189,7 +189,7 @@ def test_what_comes_is_shown_where_it_is_on_frames_on_which_keys_hold_it(live, s
     perform(sent, clock)
     bpy.context.scene.frame_set(round(frame_of(TAKES[0] + 20)))
     there, poses = swords(), dance(TIMES)
-    sender = Sender([Body.rigid("sword", radius=RADIUS), BODY], TOLERANCE, DELAY, rate=60.0)
+    sender = Sender([StreamBody.rigid("sword", radius=RADIUS), BODY], TOLERANCE, DELAY, rate=60.0)
     for row, moment in enumerate(TIMES[:60].tolist()):
         datagrams = sender.add(moment + 900.0, {"sword": there[row : row + 1], "dancer": poses[:, row]})
         sent.send((sender.describe() if row < 2 else []) + datagrams, clock[0] + row / 60.0)
@@ -250,7 +250,7 @@ def test_what_follows_the_sword_cannot_hold_it_and_that_is_said(live, sent, cloc
 
 
 def test_bodies_hold_one_another_and_skeletons_that_are_held_have_keys_in_the_world(live, sent, clock):
-    glove, sword, poses = Body.rigid("glove"), Body.rigid("sword", radius=RADIUS), dance(TIMES)
+    glove, sword, poses = StreamBody.rigid("glove"), StreamBody.rigid("sword", radius=RADIUS), dance(TIMES)
     there = in_world(poses)[JOINTS.index("LeftHand")]
     sender = Sender([sword, BODY, glove], TOLERANCE, DELAY, rate=60.0)
     sender.hold("sword", "glove")

@@ -10,7 +10,7 @@ from mathutils import Vector
 from rigid_motion.live import receiving
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
-from rigid_motion.streams import Body, Sender
+from rigid_motion.streams import Sender, StreamBody
 from rigid_motion.streams.vmc import write_trackers
 from tests.live.performing import (
     BODY,
@@ -82,7 +82,7 @@ def test_trackers_of_vmc_are_objects_beside_the_performer(live, sent):
 
 def test_rigid_bodies_of_the_codec_are_objects_and_a_skeleton_moves_the_rig(live, sent):
     live.armature = rig = new_rig()
-    ball = Body.rigid("ball")
+    ball = StreamBody.rigid("ball")
     sender = Sender([ball, BODY], 0.005, 0.1, rate=60.0)
     times = np.arange(120) / 60.0
     poses = dance(times)
@@ -98,7 +98,7 @@ def test_rigid_bodies_of_the_codec_are_objects_and_a_skeleton_moves_the_rig(live
 
 def test_what_is_held_is_where_the_hand_that_holds_it_is_shown(live, sent):
     live.armature = rig = new_rig()
-    sword = Body.rigid("sword", radius=0.1)
+    sword = StreamBody.rigid("sword", radius=0.1)
     sender = Sender([sword, BODY], 0.005, 0.1, rate=60.0)
     sender.hold("sword", "dancer", "LeftHand")
     times, hand = np.arange(120) / 60.0, JOINTS.index("LeftHand")
@@ -125,7 +125,7 @@ def test_what_is_held_is_where_the_hand_that_holds_it_is_shown(live, sent):
 
 
 def test_another_version_of_the_wire_is_named_in_the_panel(live, sent):
-    datagram = Sender([Body.rigid("ball")]).describe()[0]
+    datagram = Sender([StreamBody.rigid("ball")]).describe()[0]
     sent.send([bytes([datagram[0] - 16]) + datagram[1:]], 50.0)
     version = datagram[0] // 16
     assert f"sends version {version - 1} of the wire, not {version}: update" in receiving.listening().complaint

@@ -11,7 +11,7 @@ from rigid_motion.animation import channelbag_of, modes_of
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
-from rigid_motion.streams import Body, Sender
+from rigid_motion.streams import Sender, StreamBody
 from tests.live.performing import BODY, dance, frames_of_vmc, heads_of, in_world, new_rig
 
 TIMES = np.arange(240) / 60.0
@@ -80,7 +80,7 @@ def test_what_had_come_and_was_not_shown_when_a_recording_began_is_in_it(live, s
 
 def test_what_comes_by_the_codec_has_keys_at_the_moments_that_were_sent(live, sent, clock):
     live.armature, live.mode = (rig := new_rig()), "lerp_slerp"
-    sender, poses, ball = Sender([BODY, Body.rigid("ball")], 0.005, 0.1, rate=60.0), dance(TIMES), []
+    sender, poses, ball = Sender([BODY, StreamBody.rigid("ball")], 0.005, 0.1, rate=60.0), dance(TIMES), []
     frames = []
     for row, moment in enumerate(TIMES.tolist()):
         ball.append(Poses([[np.sin(moment), 0.0, 1.0]], [[1.0, 0.0, 0.0, 0.0]]))

@@ -8,10 +8,10 @@ from scipy.interpolate import CubicHermiteSpline
 
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.cubic_keys import (
-    CONSTANT,
-    CUBIC,
-    LINEAR,
-    LONGEST,
+    CONSTANT_KIND,
+    CUBIC_KIND,
+    FIRST_SEGMENT_SAMPLES,
+    LINEAR_KIND,
     CubicKeys,
     Samples,
     fitted,
@@ -35,7 +35,7 @@ def hand_made(width: int, seed: int = 0) -> tuple[np.ndarray, CubicKeys]:
         values = np.eye(4)[0] + 0.2 * values
         values /= np.linalg.norm(values, axis=1, keepdims=True)
     slopes = np.gradient(values, TIMES[frames], axis=0)
-    return frames, CubicKeys(TIMES[frames], values, slopes, slopes, np.full(len(frames), CUBIC))
+    return frames, CubicKeys(TIMES[frames], values, slopes, slopes, np.full(len(frames), CUBIC_KIND))
 
 
 def played(keys: CubicKeys, times: np.ndarray, *, are_turns: bool = False) -> np.ndarray:
@@ -68,7 +68,7 @@ def test_keys_of_hand_made_curves_come_back_on_their_own_frames(width):
 
 
 def test_a_segment_that_is_longer_than_any_that_is_tried_is_one():
-    times = np.arange(5 * LONGEST) / 24
+    times = np.arange(5 * FIRST_SEGMENT_SAMPLES) / 24
     keys = fitted(times, (0.01 * times**3 - times)[:, None], 1e-6)
     assert len(keys.times) == 2
 
@@ -79,7 +79,9 @@ def test_steps_are_steps_or_lines_from_one_frame_to_the_next(steps):
     times = np.arange(len(values)) / 30
     keys = fitted(times, values, 1e-2, steps=steps)
     assert (keys.times * 30).round().tolist() == ([0, 100, 200, 299] if steps else [0, 99, 100, 199, 200, 299])
-    assert keys.kinds.tolist() == ([CONSTANT] * 4 if steps else [CONSTANT, LINEAR] * 2 + [CONSTANT] * 2)
+    assert keys.kinds.tolist() == (
+        [CONSTANT_KIND] * 4 if steps else [CONSTANT_KIND, LINEAR_KIND] * 2 + [CONSTANT_KIND] * 2
+    )
     assert np.array_equal(values_at(keys, times), values)
 
 
@@ -88,7 +90,7 @@ def test_holds_are_held_and_lines_are_lines():
     times = np.arange(121) / 30
     keys = fitted(times, np.interp(times * 30, frames, levels)[:, None], 1e-3)
     assert (keys.times * 30).round().tolist() == frames
-    assert keys.kinds[:-1].tolist() == [CONSTANT, LINEAR, CONSTANT]
+    assert keys.kinds[:-1].tolist() == [CONSTANT_KIND, LINEAR_KIND, CONSTANT_KIND]
 
 
 def test_slopes_on_both_sides_of_keys_agree_where_they_may():
@@ -139,7 +141,7 @@ def test_no_sample_is_off_by_more_than_is_allowed(seed, count, width, steps, lin
             turning = Poses(np.zeros((len(keys.times), 3)), align_signs(keys.values))
             segment = np.clip(np.searchsorted(keys.times, times, side="right") - 1, 0, None)
             even = interpolate(keys.times, turning, times, "lerp_slerp").quaternions
-            shown = np.where(keys.kinds[segment, None] == LINEAR, even, shown)
+            shown = np.where(keys.kinds[segment, None] == LINEAR_KIND, even, shown)
         values = values * np.sign(np.einsum("ij,ij->i", shown, values))[:, None]
     assert np.all(np.linalg.norm(shown - values, axis=1) <= allowed * (1 + 1e-9))
     assert np.isin(keys.times, times).all()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import MODES, Poses, reduce_keys, twists
-from rigid_motion.motion.key_costs import Recording
-from rigid_motion.motion.key_search import Search
+from rigid_motion.motion.key_costs import SampleTracks
+from rigid_motion.motion.key_search import KeySearch
 from rigid_motion.motion.key_splines import SplineErrors
 from rigid_motion.motion.quaternions import align_signs
 from tests.motion.bodies import RADIUS, shell_errors, wandering
@@ -66,6 +66,6 @@ def test_long_segments_of_a_smooth_motion_do_not_make_the_search_many_times_as_l
     efforts = []
     for tries in (0, 1):
         looked_at.clear()
-        Search(Recording(times, poses, "motor_spline", RADIUS, 0.9)).within(tries)
+        KeySearch(SampleTracks(times, poses, "motor_spline", RADIUS, 0.9)).within(tries)
         efforts.append(sum(looked_at))
     assert efforts[1] <= 6 * efforts[0]

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses, key_splines
-from rigid_motion.motion.key_costs import Costs, Recording
+from rigid_motion.motion.key_costs import Costs, SampleTracks
 from tests.motion.bodies import RADIUS, shell_errors, wandering
 
 
 def errors_of(times: np.ndarray, poses: Poses, keys: np.ndarray) -> np.ndarray:
-    costs = Costs(Recording(times, poses, "motor_spline", RADIUS), 8)
+    costs = Costs(SampleTracks(times, poses, "motor_spline", RADIUS), 8)
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(keys, 1, constant_values=-1), 4)
     return costs.errors(windows)
 

@@ -119,9 +119,9 @@ def test_a_body_at_rest_has_two_keys(mode, options):
 def test_keys_are_the_same_whatever_is_remembered_or_put_off(mode, monkeypatch):
     times, poses = wandering(200, 7, 0.001)
     keys = reduce_keys(times, poses, mode, 0.02, RADIUS).tolist()
-    monkeypatch.setattr(key_costs, "REMEMBERED", 10)
+    monkeypatch.setattr(key_costs, "MAX_REMEMBERED_SEGMENTS", 10)
     assert reduce_keys(times, poses, mode, 0.02, RADIUS).tolist() == keys
-    monkeypatch.setattr(key_search, "MUCH", 0)
+    monkeypatch.setattr(key_search, "MIN_POSTPONED_POSES", 0)
     assert reduce_keys(times, poses, mode, 0.02, RADIUS).tolist() == keys
 
 

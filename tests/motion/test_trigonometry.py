@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses, interpolate, trigonometry
-from rigid_motion.motion.trigonometry import NARROW, fill_sine_and_cosine
+from rigid_motion.motion.trigonometry import MAX_NARROW_RAD, fill_sine_and_cosine
 
 both_ways = pytest.mark.parametrize("vector_tangent", [False, True], ids=["polynomial", "tangent"])
 
@@ -40,9 +40,9 @@ def test_angles_have_their_sines_and_cosines_to_a_few_units_in_the_last_place(mo
     monkeypatch.setattr(trigonometry, "VECTOR_TANGENT", vector_tangent)
     random = np.random.default_rng(4)
     for narrow in (
-        random.uniform(-NARROW, NARROW, size=20000),
+        random.uniform(-MAX_NARROW_RAD, MAX_NARROW_RAD, size=20000),
         10.0 ** random.uniform(-300.0, 0.0, size=2000),
-        np.array([0.0, -NARROW, NARROW, np.pi / 4.0, 5e-324]),
+        np.array([0.0, -MAX_NARROW_RAD, MAX_NARROW_RAD, np.pi / 4.0, 5e-324]),
     ):
         assert _is_exact(narrow, narrow=True)
     assert _is_exact(random.uniform(-4.0 * np.pi, 4.0 * np.pi, size=20000), narrow=False)

@@ -9,7 +9,7 @@ import pytest
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.cli import compare
-from rigid_motion_batch.pipeline.steps import OWN
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -34,7 +34,7 @@ def run(*arguments: object) -> int:
 
 def shown(folder: Path) -> list[Path]:
     """What lies in an output folder for people."""
-    return sorted(path for path in folder.iterdir() if path.name != OWN)
+    return sorted(path for path in folder.iterdir() if path.name != OWN_FOLDER)
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -66,5 +66,5 @@ def outputs(folder: Path) -> dict[str, bytes]:
     return {
         path.relative_to(folder).as_posix(): path.read_bytes() if path.suffix in (".csv", ".mp4") else b""
         for path in folder.rglob("*")
-        if path.is_file() and OWN not in path.relative_to(folder).parts
+        if path.is_file() and OWN_FOLDER not in path.relative_to(folder).parts
     }

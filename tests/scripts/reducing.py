@@ -9,7 +9,7 @@ from rigid_motion.animation import write_channel
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.cli import reduce
-from rigid_motion_batch.pipeline.steps import OWN
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER
 from rigid_motion_batch.recordings.clips import Clip
 from tests.animation.farm import on_a_farm, played_on_a_farm
 from tests.animation.keyed import curves_of
@@ -88,7 +88,7 @@ def rig_file(path: Path) -> Path:
 
 def listed(folder: Path) -> list[str]:
     """The names in a folder, but for where the program keeps its own files."""
-    return sorted({path.name for path in folder.iterdir()} - {OWN})
+    return sorted({path.name for path in folder.iterdir()} - {OWN_FOLDER})
 
 
 def reduced_name(path: Path) -> Path:

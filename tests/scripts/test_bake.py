@@ -13,7 +13,7 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import set_mode
-from rigid_motion.animation.actions.marks import MOST, write_marks
+from rigid_motion.animation.actions.marks import MAX_MARK, write_marks
 from rigid_motion_batch.keying import jobs
 from tests.animation.farm import played_on_a_farm
 from tests.animation.keyed import curves_of, snapshot
@@ -87,7 +87,7 @@ def fill_shot() -> None:
         for item in refused["Crane"].driver_add(path):
             item.driver.expression = "frame"
     for curve in curves_of(refused["Future"]).values():
-        write_marks(curve, np.array([MOST, 0, 0, 0]))
+        write_marks(curve, np.array([MAX_MARK, 0, 0, 0]))
     curves_of(refused["Huge"])["location", 0].keyframe_points[1].co_ui.y = 3e38
 
 
@@ -203,7 +203,7 @@ def test_a_file_without_modes_is_left_alone(tmp_path, capsys):
 def test_a_file_of_an_older_blender_is_said_to_be_of_this_one_afterwards(tmp_path, capsys, monkeypatch):
     path = one_object_file(tmp_path / "shot.blend", compress=False)
     with_version(path, "405", "0405")
-    monkeypatch.setattr(jobs, "HERE", (9, 0))
+    monkeypatch.setattr(jobs, "THIS_VERSION", (9, 0))
     assert run(path) == 0
     assert "was saved by Blender 4.5; what is written is of Blender 9.0" in capsys.readouterr().err
 

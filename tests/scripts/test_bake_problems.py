@@ -145,7 +145,7 @@ def test_ctrl_c_while_blender_is_loaded_ends_it_at_once(tmp_path):
     done = subprocess.run(
         [*COMMAND, path], capture_output=True, text=True, timeout=60, env=os.environ | {"PYTHONPATH": str(beside)}
     )
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", f"{supervising.STOPPED}\n")
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", f"{supervising.STOPPED_TEXT}\n")
 
 
 def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):

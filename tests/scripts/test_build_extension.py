@@ -91,7 +91,7 @@ def test_what_blender_refuses_is_reported_in_its_words_and_the_old_zip_stays(tmp
     old.parent.mkdir()
     old.write_text("old")
     monkeypatch.setattr(build_extension, "EXTENSION", package)
-    monkeypatch.setattr(build_extension, "BESIDE", (manifest, LICENSE))
+    monkeypatch.setattr(build_extension, "OTHER_FILES", (manifest, LICENSE))
     assert build_extension.main(["--output", str(old.parent)]) == 2
     assert 'missing "tagline"' in capsys.readouterr().err
     assert {path.name: path.read_text() for path in old.parent.iterdir()} == {old.name: "old"}

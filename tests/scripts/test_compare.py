@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from rigid_motion_batch.analysis.modes import COMPARED
 from rigid_motion_batch.cli import compare, tasks
-from rigid_motion_batch.pipeline.steps import OWN
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER
 from rigid_motion_batch.scenes import film
 from tests.balls import largest_displacements
 from tests.scripts.comparing import COLUMNS, ROOT, SMALL, outputs, poses_of, rows_of, run, table, tasks_of, write_toss
@@ -127,7 +127,10 @@ def test_all_numbers_are_in_the_report_before_the_first_frame_is_rendered(short_
     files = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
     tables = {f"toss/{rate}/{name}.csv" for rate in (5, 10) for name in ("keys", *COMPARED)}
     shown = {f"toss/5/comparison.{ending}" for ending in ("mp4", "blend")}
-    assert {str(path) for path in files if path.parts[0] != OWN} == tables | shown | {"metrics.csv", "report.html"}
+    assert {str(path) for path in files if path.parts[0] != OWN_FOLDER} == tables | shown | {
+        "metrics.csv",
+        "report.html",
+    }
     said = capsys.readouterr()
     assert f"films come as they are made: {tmp_path / 'report.html'}" in said.err
     assert said.out.splitlines()[-1] == str((tmp_path / "report.html").resolve())
@@ -166,7 +169,7 @@ def test_a_clip_too_short_for_a_rate_is_left_out_and_for_every_rate_refused(shor
 
 def rendering(output: Path) -> bool:
     """Whether a piece of a film is being rendered."""
-    return any(name.endswith(".mkv") for _, _, names in os.walk(output / OWN / "scratch") for name in names)
+    return any(name.endswith(".mkv") for _, _, names in os.walk(output / OWN_FOLDER / "scratch") for name in names)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for another process")

@@ -9,7 +9,7 @@ from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.held import ChoiceSlips, PairSlips, slips
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.report.pages import write_overview
-from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.report.settings import PageSettings
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.comparing import ROOT, rows_of, run, write_toss
@@ -134,7 +134,7 @@ def test_the_page_of_many_clips_has_the_pairs_and_says_nothing_where_there_are_n
     pairs = [PairSlips("one", "two", (ChoiceSlips(ten, found),))]
     for slipped in ([], pairs, 7 * pairs):
         page, results = tmp_path / "report.html", [result_of(clip, (ten,)) for clip in clips]
-        write_overview(page, results, Settings(0.1, "Rigid Motion", "compare"), {}, slips=slipped)
+        write_overview(page, results, PageSettings(0.1, "Rigid Motion", "compare"), {}, slips=slipped)
         assert ("Held together" in all_text(Page(page))) == bool(slipped)
         assert all_text(Page(page)).count("two in one: largest slip, mm; in the recording itself 0") == len(slipped)
         assert all_text(Page(page)).count("one holds two") == min(len(slipped), 5) + bool(slipped)

@@ -8,7 +8,7 @@ import pytest
 
 from rigid_motion_batch import places
 from rigid_motion_batch.cli import compare
-from rigid_motion_batch.pipeline.steps import OWN
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER
 from tests.scripts.comparing import write_toss
 
 OPTIONS = ("--no-video", "--rates", "5", "--modes", "lerp_slerp", "--jobs", "0")
@@ -20,7 +20,7 @@ def run(*arguments: object) -> int:
 
 def files(folder: Path) -> dict[str, bytes]:
     """All files but the program's own."""
-    result = (path for path in folder.rglob("*") if path.is_file() and OWN not in path.parts)
+    result = (path for path in folder.rglob("*") if path.is_file() and OWN_FOLDER not in path.parts)
     return {str(path.relative_to(folder)): path.read_bytes() for path in result}
 
 
@@ -54,7 +54,7 @@ def refused(capsys: pytest.CaptureFixture, *arguments: object) -> str:
 
 
 def test_without_its_own_folders_it_knows_no_file_for_its_own(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    shutil.rmtree(folder / "out" / OWN)
+    shutil.rmtree(folder / "out" / OWN_FOLDER)
     said = refused(capsys, "toss.csv", "--output", "out")
     assert "lerp_slerp.csv" in said
     assert "were not written by this program" in said

@@ -10,7 +10,7 @@ import pytest
 
 from rigid_motion_batch.cli import compare, job_bundle
 from rigid_motion_batch.cli.job_bundle import below_inputs, write_bundle
-from rigid_motion_batch.pipeline.steps import VERSION, version_here
+from rigid_motion_batch.pipeline.steps import VERSION_VARIABLE, version_here
 from tests.scripts.comparing import outputs, write_toss
 
 OPTIONS = ("--rates", "5", "--modes", "lerp_slerp,motor_spline", "--no-video")
@@ -87,8 +87,8 @@ def test_a_machine_with_another_version_is_told_so(
     share = [str(write_toss(tmp_path / "toss.csv")), "--only", "read", "--no-video", "--output", str(tmp_path / "out")]
     write_bundle(tmp_path, share, tmp_path, tmp_path / "out", {"read": 1})
     variables = json.loads((tmp_path / "template.json").read_text())["jobEnvironments"][0]["variables"]
-    monkeypatch.setenv(VERSION, variables[VERSION])
+    monkeypatch.setenv(VERSION_VARIABLE, variables[VERSION_VARIABLE])
     assert compare.main(share) == 0
-    monkeypatch.setenv(VERSION, "program 0")
+    monkeypatch.setenv(VERSION_VARIABLE, "program 0")
     assert compare.main(share) == 2
     assert f"this machine has {version_here()}, and the bundle is of program 0" in capsys.readouterr().err

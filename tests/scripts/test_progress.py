@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from rigid_motion_batch.progress import FARM, Progress
+from rigid_motion_batch.progress import FARM_VARIABLE, Progress
 
 
 class Clock:
@@ -127,7 +127,7 @@ def test_where_nothing_is_to_be_shown_errors_are() -> None:
 
 
 def test_progress_is_said_as_farms_hear_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(FARM, "openjd")
+    monkeypatch.setenv(FARM_VARIABLE, "openjd")
     stream = io.StringIO()
     with Progress(stream) as progress, progress.stage("Measuring", 8.0) as stage:
         stage.reach(2.0, "toss at 5 keys/s, frame 3 of 12")

@@ -160,7 +160,7 @@ def test_of_key_poses_no_tolerance_is_said(tmp_path):
 
 def test_of_a_long_clip_fewer_moments_are_looked_at(tmp_path, monkeypatch):
     monkeypatch.setattr(views, "MOST_MOMENTS", 100)
-    monkeypatch.setattr(views, "MOST_POSES", 20)
+    monkeypatch.setattr(views, "MAX_POSES", 20)
     source = walk(joints=8).write(tmp_path / "walk.glb")
     assert run(source, "--report", "--tolerance", "2mm") == 0
     shown = played(*clips_in(tmp_path / "report.html"))

@@ -119,7 +119,7 @@ def test_ctrl_c_within_an_importer_or_exporter_is_no_fault_of_the_file(tmp_path)
         raise interrupted
 
     with pytest.raises(KeyboardInterrupt):
-        importing.told(tmp_path / "walk.fbx", "import", importer)
+        importing.run_operator(tmp_path / "walk.fbx", "import", importer)
 
 
 @pytest.mark.parametrize("moment", [0.0, 0.1, 0.4])

@@ -10,24 +10,24 @@ import numpy as np
 
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.quaternions import turned
-from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams import Receiver, Sender, StreamBody
 from rigid_motion.streams.bodies import Forest
-from rigid_motion.streams.coding import BASES, Coder
-from rigid_motion.streams.paths import Path
-from rigid_motion.streams.wire import Motion, read
+from rigid_motion.streams.coding import BASES_TABLE, Coder
+from rigid_motion.streams.paths import KnotPath
+from rigid_motion.streams.wire import EncodedMotion, read
 
 AHEAD = 1000.0
 """By how many seconds the receiver's clock is ahead."""
 
 
-def body(joints: int = 8, radius: float = 0.03) -> Body:
+def body(joints: int = 8, radius: float = 0.03) -> StreamBody:
     """A chain of joints with two branches, a quarter of a metre from each to the next."""
     parents = np.array([-1, *(max(joint - 1 - (joint == joints - 2), 0) for joint in range(1, joints))])
     rest = Poses(np.tile((0.0, 0.0, 0.25), (joints, 1)), np.tile((1.0, 0.0, 0.0, 0.0), (joints, 1)))
-    return Body("performer", tuple(f"joint {joint}" for joint in range(joints)), parents, rest, radius)
+    return StreamBody("performer", tuple(f"joint {joint}" for joint in range(joints)), parents, rest, radius)
 
 
-def dance(own: Body, seconds: float = 6.0, rate: float = 60.0, speed: float = 1.0, seed: int = 1) -> tuple:
+def dance(own: StreamBody, seconds: float = 6.0, rate: float = 60.0, speed: float = 1.0, seed: int = 1) -> tuple:
     """Moments (n,) and poses (joints, n) of smooth motion."""
     rng = np.random.default_rng(seed)
     times, joints = np.arange(round(seconds * rate)) / rate, len(own.joints)
@@ -44,8 +44,8 @@ def dance(own: Body, seconds: float = 6.0, rate: float = 60.0, speed: float = 1.
 
 def backs_of(datagrams: Iterable[bytes]) -> list[int]:
     """What the messages among datagrams build on: 0 nothing, 1 the one before, 2 an earlier one."""
-    messages = [it for it in map(read, datagrams) if isinstance(it, Motion)]
-    return [Coder(message.data).symbol(BASES) for message in messages]
+    messages = [it for it in map(read, datagrams) if isinstance(it, EncodedMotion)]
+    return [Coder(message.data).symbol(BASES_TABLE) for message in messages]
 
 
 @dataclass
@@ -73,7 +73,7 @@ class Outcome:
 
 
 def run(
-    own: Body,
+    own: StreamBody,
     times: np.ndarray,
     poses: Poses,
     *,
@@ -120,7 +120,7 @@ def run(
         while pending and pending[0][0] <= until:
             now, _, back, datagram = heapq.heappop(pending)
             if back:
-                post(sender.hear(datagram, now + set_by(now)), now)
+                post(sender.take_answer(datagram, now + set_by(now)), now)
             elif now >= heard_from:
                 receiver.take(datagram, clock(now), "sender")
                 if answers:
@@ -143,11 +143,11 @@ def run(
             come(now)
             before = now
     if drawn:
-        compare(outcome, own, Path(times, poses), drawn, lag)
+        compare(outcome, own, KnotPath(times, poses), drawn, lag)
     return outcome
 
 
-def compare(outcome: Outcome, own: Body, truth: Path, drawn: list, lag: float | None = None) -> None:
+def compare(outcome: Outcome, own: StreamBody, truth: KnotPath, drawn: list, lag: float | None = None) -> None:
     """Note how far off was what was drawn, from when the motion had begun."""
     drawn = [frame for frame in drawn if frame[1] >= truth.moments[0]]
     outcome.now, outcome.moments = (np.array([frame[number] for frame in drawn]) for number in (0, 1))

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams import Receiver, Sender, StreamBody
 from rigid_motion.streams.coding import Coder, standard_tables
 from rigid_motion.streams.messages import Message
-from rigid_motion.streams.wire import VERSION
+from rigid_motion.streams.wire import WIRE_VERSION
 
 from .links import body, dance
 
@@ -53,7 +53,7 @@ def noted_of(message: Message) -> dict:
 
 def stream() -> dict:
     """The datagrams of two bodies for a second, and what each message says."""
-    own, tool = body(6), Body.rigid("tool", radius=0.1)
+    own, tool = body(6), StreamBody.rigid("tool", radius=0.1)
     times, poses = dance(own, 1.2, 30.0)
     sender, receiver, messages = Sender([own, tool], rate=30.0), Receiver(), []
     sender.identity, receiver.own = IDENTITY, RECEIVER
@@ -80,7 +80,7 @@ def stream() -> dict:
             datagrams.append({"time": time, "bytes": datagram.hex()})
         for _, answer in receiver.answers():
             answers.append({"time": time, "bytes": answer.hex()})
-            sender.hear(answer, time)
+            sender.take_answer(answer, time)
     (keys,) = receiver.keys()
     return {
         "datagrams": datagrams,
@@ -95,4 +95,4 @@ def stream() -> dict:
 
 
 if __name__ == "__main__":
-    VECTORS.write_text(json.dumps({"version": VERSION, "coding": coding(), "stream": stream()}), encoding="utf-8")
+    VECTORS.write_text(json.dumps({"version": WIRE_VERSION, "coding": coding(), "stream": stream()}), encoding="utf-8")

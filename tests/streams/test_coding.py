@@ -10,24 +10,24 @@ import pytest
 
 from research.making import stream_tables
 from rigid_motion.streams.coding import (
-    BASES,
-    FLAGS,
+    BASES_TABLE,
+    FIRST_LONG_MAGNITUDE,
+    FLAG_TABLE_COUNT,
+    FREQUENCY_TOTAL,
     KNOT_COUNTS,
-    LARGEST,
     TABLE_FILE,
-    TOTAL,
     Coder,
     bucket,
     standard_tables,
 )
-from rigid_motion.streams.wire import VERSION
+from rigid_motion.streams.wire import WIRE_VERSION
 
 TABLES_OF_VERSION = 7, "f3f799397ecc2d1e8d24af7602704edb84e8a8217468658dbe4f8c863a7f7477"
 
 
 def table(rng: np.random.Generator, symbols: int) -> tuple[int, ...]:
-    cuts = np.sort(rng.choice(np.arange(1, TOTAL), symbols - 1, replace=False))
-    return (0, *cuts.tolist(), TOTAL)
+    cuts = np.sort(rng.choice(np.arange(1, FREQUENCY_TOTAL), symbols - 1, replace=False))
+    return (0, *cuts.tolist(), FREQUENCY_TOTAL)
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -60,12 +60,12 @@ def test_numbers_of_many_digits_are_read(count: int) -> None:
 
 
 def test_symbols_cost_what_their_frequencies_say() -> None:
-    rng, own = np.random.default_rng(1), (0, 3500, 4000, TOTAL)
-    symbols = rng.choice(3, 4000, p=np.diff(own) / TOTAL)
+    rng, own = np.random.default_rng(1), (0, 3500, 4000, FREQUENCY_TOTAL)
+    symbols = rng.choice(3, 4000, p=np.diff(own) / FREQUENCY_TOTAL)
     encoder = Coder(tables=[own])
     for symbol in symbols.tolist():
         encoder.symbol(0, symbol)
-    ideal = -np.log2(np.diff(own) / TOTAL)[symbols].sum() / 8.0
+    ideal = -np.log2(np.diff(own) / FREQUENCY_TOTAL)[symbols].sum() / 8.0
     assert ideal <= len(encoder.finish()) <= ideal * 1.002 + 2.0
 
 
@@ -82,16 +82,18 @@ def test_any_bytes_are_some_symbols(seed: int) -> None:
 
 def test_the_tables_are_whole() -> None:
     symbols = [len(own) - 1 for own in standard_tables()]
-    assert symbols[:KNOT_COUNTS] == [2] * FLAGS + [LARGEST + 1] * (KNOT_COUNTS - FLAGS)
+    assert symbols[:KNOT_COUNTS] == [2] * FLAG_TABLE_COUNT + [FIRST_LONG_MAGNITUDE + 1] * (
+        KNOT_COUNTS - FLAG_TABLE_COUNT
+    )
     for own in standard_tables():
-        assert (own[0], own[-1]) == (0, TOTAL)
+        assert (own[0], own[-1]) == (0, FREQUENCY_TOTAL)
         assert all(low < high for low, high in itertools.pairwise(own))
     assert symbols[KNOT_COUNTS:] == [32, 21, 4, 4, 3, 2, 2]
 
 
 def test_the_tables_are_those_of_this_version_of_the_wire() -> None:
     assert (
-        VERSION,
+        WIRE_VERSION,
         hashlib.sha256(TABLE_FILE.read_text(encoding="utf-8").encode()).hexdigest(),
     ) == TABLES_OF_VERSION, (
         "whoever has other tables reads other numbers: give the wire another version, and its vectors"
@@ -105,11 +107,11 @@ def test_the_maker_writes_the_file_as_it_is() -> None:
 def test_the_maker_counts_into_tables_that_are_whole_and_keeps_those_without_counts() -> None:
     counts = [np.zeros(len(own) - 1) for own in standard_tables()]
     assert stream_tables.tables_of(counts)[KNOT_COUNTS:] == standard_tables()[KNOT_COUNTS:]
-    counts[BASES][1] = 1e6
+    counts[BASES_TABLE][1] = 1e6
     made = stream_tables.tables_of(counts)
     assert [len(own) for own in made] == [len(own) for own in standard_tables()]
-    assert all((own[0], own[-1]) == (0, TOTAL) and min(np.diff(own)) > 0 for own in made)
-    assert np.diff(made[BASES]).tolist() == [1, TOTAL - 2, 1]
+    assert all((own[0], own[-1]) == (0, FREQUENCY_TOTAL) and min(np.diff(own)) > 0 for own in made)
+    assert np.diff(made[BASES_TABLE]).tolist() == [1, FREQUENCY_TOTAL - 2, 1]
 
 
 def test_buckets() -> None:

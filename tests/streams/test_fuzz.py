@@ -13,11 +13,11 @@ import zlib
 import numpy as np
 import pytest
 
-from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams import Receiver, Sender, StreamBody
 from rigid_motion.streams.coding import Coder
 from rigid_motion.streams.messages import Codec
 from rigid_motion.streams.receiver import MOST_ALL_JOINTS, MOST_STREAMS
-from rigid_motion.streams.wire import VERSION, read, read_description
+from rigid_motion.streams.wire import WIRE_VERSION, read, read_description
 
 from .links import body, dance, run
 
@@ -44,7 +44,7 @@ def damaged(rng: np.random.Generator, genuine: list[bytes]) -> bytes:
     """Random bytes; or a genuine datagram with bits flipped, cut off, prolonged, or put together of two."""
     kind = rng.integers(6)
     if kind == 0:
-        head = bytes([VERSION << 4 | int(rng.integers(5))]) if rng.random() < 0.8 else b""
+        head = bytes([WIRE_VERSION << 4 | int(rng.integers(5))]) if rng.random() < 0.8 else b""
         return head + rng.bytes(int(rng.integers(0, 80)))
     data = bytearray(genuine[rng.integers(len(genuine))])
     if kind in (1, 2):
@@ -78,7 +78,7 @@ def test_any_datagram_does_no_harm(genuine: list[bytes]) -> None:
                 renewed = [datagram[:1] + identity + datagram[4:] for datagram in genuine]
             datagram = damaged(rng, renewed)
             receiver.take(datagram, now, f"stranger {rng.integers(3)}")
-            sender.hear(datagram, now)
+            sender.take_answer(datagram, now)
         shown, expected = receiver.show(now), alone.show(now)
         receiver.keys()
         receiver.answers()
@@ -131,7 +131,7 @@ def packed(text: str) -> bytes:
 
 def test_any_description_is_read_or_none() -> None:
     rng = np.random.default_rng(7)
-    datagram = Sender([body(3), Body.rigid("tool")]).describe()[0]
+    datagram = Sender([body(3), StreamBody.rigid("tool")]).describe()[0]
     genuine = json.loads(zlib.decompress(read(datagram).data, wbits=-15))
 
     def changed(part: object) -> object:

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.poses import joined, placed
-from rigid_motion.streams import Body, Receiver, Sender, Shown
-from rigid_motion.streams.bodies import LEVELS, Forest
-from rigid_motion.streams.coding import BASES, HANDS, Coder
+from rigid_motion.streams import Receiver, Sender, Shown, StreamBody
+from rigid_motion.streams.bodies import LEVER_LEVELS, Forest
+from rigid_motion.streams.coding import BASES_TABLE, HANDS_TABLE, Coder
 from rigid_motion.streams.messages import Codec
-from rigid_motion.streams.paths import Path
-from rigid_motion.streams.sender import LAST
-from rigid_motion.streams.wire import VERSION, Description, Motion, Terms, read, write
+from rigid_motion.streams.paths import KnotPath
+from rigid_motion.streams.sender import MAX_SEQUENCE_NUMBER
+from rigid_motion.streams.wire import WIRE_VERSION, Description, EncodedMotion, Terms, read, write
 from tests.thoroughness import combined, tried
 
 from .links import body, dance
@@ -28,7 +28,7 @@ TURNED = np.array((0.8, 0.3, -0.4, 0.3316624790355400))
 IN_HAND = Poses([[0.05, 0.16, 0.24]], [TURNED])
 """Where the tool is in a hand."""
 
-LEFT, RIGHT, TOOL = (Body.rigid(name, radius=0.1) for name in ("left", "right", "tool"))
+LEFT, RIGHT, TOOL = (StreamBody.rigid(name, radius=0.1) for name in ("left", "right", "tool"))
 SPEED = 3.0
 
 Say = tuple[str, str | None] | tuple[str, str, str]
@@ -36,8 +36,8 @@ Say = tuple[str, str | None] | tuple[str, str, str]
 
 def hands(seconds: float, rate: float = 60.0) -> tuple[np.ndarray, Poses, Poses]:
     """Moments (n,), and the poses (n,) of two hands a metre apart."""
-    times, left = dance(Body.rigid("left"), seconds, rate, SPEED, seed=1)
-    _, right = dance(Body.rigid("right"), seconds, rate, SPEED, seed=2)
+    times, left = dance(StreamBody.rigid("left"), seconds, rate, SPEED, seed=1)
+    _, right = dance(StreamBody.rigid("right"), seconds, rate, SPEED, seed=2)
     right.positions[..., 0] += 1.0
     return times, left[0], right[0]
 
@@ -48,7 +48,7 @@ def in_hand(hand: Poses) -> Poses:
 
 
 def play(
-    bodies: list[Body],
+    bodies: list[StreamBody],
     times: np.ndarray,
     poses: Poses,
     says: dict[int, Say],
@@ -80,7 +80,7 @@ def play(
         while pending and pending[0][0] <= until:
             now, _, back, datagram = heapq.heappop(pending)
             if back:
-                post(sender.hear(datagram, now), now)
+                post(sender.take_answer(datagram, now), now)
                 continue
             receiver.take(datagram, now, "sender")
             if answers:
@@ -124,12 +124,12 @@ def test_what_is_held_does_not_slip_and_costs_next_to_nothing(loss: float, answe
     assert size < of_both
     # As much as the hand alone costs, with a ball that the tool is within.
     reach = float(np.linalg.norm(IN_HAND.positions)) + 0.1
-    _, alone = play([Body.rigid("left", radius=reach)], times, left[None], {}, **settings)
+    _, alone = play([StreamBody.rigid("left", radius=reach)], times, left[None], {}, **settings)
     assert size <= alone + 5.0
     if not loss:
         moments = np.array([what.moment for what in shown])
         there = joined((places(shown, "left")[None], places(shown, "tool")[None]))
-        assert Forest([LEFT, TOOL]).errors(there, Path(times, both).at(moments)).max() <= 0.005 * SLACK
+        assert Forest([LEFT, TOOL]).errors(there, KnotPath(times, both).at(moments)).max() <= 0.005 * SLACK
 
 
 @pytest.mark.parametrize("seed", range(tried(4)))
@@ -173,7 +173,7 @@ def test_what_is_taken_up_and_thrown_is_within_the_tolerance(rate: float, answer
     shown, _ = play([LEFT, TOOL], times, poses, says, answers=answers, fps=1000.0)
     moments = np.array([what.moment for what in shown])
     off = Forest([LEFT, TOOL]).errors(
-        joined((places(shown, "left")[None], places(shown, "tool")[None])), Path(times, poses).at(moments)
+        joined((places(shown, "left")[None], places(shown, "tool")[None])), KnotPath(times, poses).at(moments)
     )
     # Between the two samples around it nobody knows when it was.
     known = ~np.any([(moments > times[row - 1]) & (moments < times[row]) for row in says], axis=0)
@@ -190,7 +190,7 @@ def test_a_joint_of_a_skeleton_holds_what_comes_before_it() -> None:
     held = shown[-1].held["tool"]
     assert (held.body, held.joint) == ("performer", "joint 4")
     forest = Forest([TOOL, own])
-    truth = Path(times, joined((tool[None], poses)))
+    truth = KnotPath(times, joined((tool[None], poses)))
     off = [
         forest.errors(joined([what.poses["tool"], what.poses["performer"]])[:, None], truth.at(np.array([what.moment])))
         for what in shown
@@ -210,7 +210,7 @@ def test_keys_are_in_the_world_and_do_not_go_between_two_hands() -> None:
         for datagram in sender.add(now, joined((left[row : row + 1], right[row : row + 1], tool[row : row + 1]))):
             receiver.take(datagram, now)
         for _, answer in receiver.answers():
-            sender.hear(answer, now)
+            sender.take_answer(answer, now)
         came += receiver.keys()
     moments = np.concatenate([keys.moments for keys in came])
     poses = {name: joined([keys.poses[name][0] for keys in came]) for name in ("left", "right", "tool")}
@@ -240,7 +240,7 @@ def test_keys_are_in_the_world_and_do_not_go_between_two_hands() -> None:
     ],
 )
 def test_what_cannot_be_held_is_refused(tool: str, holder: str, joint: str | None, what: str) -> None:
-    post = Body("post", ("post",), np.array([-1]), LEFT.rest, sliding=np.array([False]))
+    post = StreamBody("post", ("post",), np.array([-1]), LEFT.rest, sliding=np.array([False]))
     bodies = [LEFT, TOOL, body(3), post]
     sender, other = Sender(bodies), Sender(bodies)
     other.identity = sender.identity
@@ -266,7 +266,7 @@ def test_whoever_takes_what_whenever_all_is_shown_where_it_is_in_the_end(
     says: list, loss: float, answers: bool, seed: int
 ) -> None:
     """Datagrams are lost, come twice and in any order until then."""
-    bodies = [LEFT, RIGHT, TOOL, Body.rigid("cup"), body(4)]
+    bodies = [LEFT, RIGHT, TOOL, StreamBody.rigid("cup"), body(4)]
     forest, rng = Forest(bodies), np.random.default_rng(seed)
     sender, receiver, late = Sender(bodies, rate=60.0), Receiver(), []
     dances = [dance(own, 2.4, 60.0, SPEED, number) for number, own in enumerate(bodies)]
@@ -291,7 +291,7 @@ def test_whoever_takes_what_whenever_all_is_shown_where_it_is_in_the_end(
             receiver.take(datagram, now, "sender")
         for _, answer in receiver.answers() if answers else ():
             if rng.random() >= loss or not lossy:
-                for datagram in sender.hear(answer, now):
+                for datagram in sender.take_answer(answer, now):
                     receiver.take(datagram, now, "sender")
         receiver.keys()
         for shown in receiver.show(now).values():
@@ -310,15 +310,15 @@ def test_whoever_takes_what_whenever_all_is_shown_where_it_is_in_the_end(
 def forged(codec: Codec, rng: np.random.Generator, holds: list[tuple[int, int, int]], noise: int) -> bytes:
     """A message that builds on nothing, with something held, and anything behind that."""
     coder = Coder()
-    coder.symbol(BASES, 0)
+    coder.symbol(BASES_TABLE, 0)
     coder.digits(48, int(rng.integers(1 << 20)))
-    coder.symbol(HANDS, 1)
+    coder.symbol(HANDS_TABLE, 1)
     coder.flat(codec.terms.delay, int(rng.integers(codec.terms.delay)))
     coder.flat(len(codec.forest.bodies) + 1, len(holds))
     for owned, joint, level in holds:
         coder.flat(len(codec.forest.bodies), owned)
         coder.flat(len(codec.forest), joint)
-        coder.flat(LEVELS, level)
+        coder.flat(LEVER_LEVELS, level)
     return coder.finish() + rng.bytes(noise)
 
 
@@ -352,13 +352,13 @@ def test_any_hands_do_no_harm(seed: int) -> None:
     for number in range(600):
         holds = sorted(
             {
-                int(own): (int(own), int(rng.integers(len(codec.forest))), int(rng.integers(LEVELS)))
+                int(own): (int(own), int(rng.integers(len(codec.forest))), int(rng.integers(LEVER_LEVELS)))
                 for own in rng.integers(4, size=rng.integers(4))
             }.values()
         )
         data = forged(codec, rng, holds, int(rng.integers(60)))
-        sequence = int(rng.integers(LAST)) if rng.random() < 0.1 else number
-        receiver.take(write(Motion(sender.identity, sequence, data)), number / 60.0, "stranger")
+        sequence = int(rng.integers(MAX_SEQUENCE_NUMBER)) if rng.random() < 0.1 else number
+        receiver.take(write(EncodedMotion(sender.identity, sequence, data)), number / 60.0, "stranger")
         for shown in receiver.show(number / 60.0).values():
             assert all(np.isfinite(own.positions).all() for own in shown.poses.values())
         receiver.keys()
@@ -370,19 +370,21 @@ def test_any_hands_do_no_harm(seed: int) -> None:
 def test_another_version_is_one_line_with_the_way_out() -> None:
     receiver, sender = Receiver(), Sender([LEFT])
     said = [*sender.describe(), *sender.add(0.0, LEFT.rest)]
-    for version, datagram in [(version, datagram) for version in (VERSION - 1, VERSION + 1) for datagram in said]:
+    for version, datagram in [
+        (version, datagram) for version in (WIRE_VERSION - 1, WIRE_VERSION + 1) for datagram in said
+    ]:
         receiver.take(bytes([version << 4 | datagram[0] & 15]) + datagram[1:], 0.0, f"version {version}")
     receiver.take(b"", 0.0)
     receiver.take(b"#bundle\0", 0.0)
     assert receiver.complaints() == [
-        f"version {VERSION - 1} sends version {VERSION - 1} of the wire, not {VERSION}: update the sender",
-        f"version {VERSION + 1} sends version {VERSION + 1} of the wire, not {VERSION}: update this program",
+        f"version {version} sends version {version} of the wire, not {WIRE_VERSION}: update {what}"
+        for version, what in ((WIRE_VERSION - 1, "the sender"), (WIRE_VERSION + 1, "this program"))
     ]
     assert receiver.complaints() == []
-    rng, old = np.random.default_rng(1), bytes([(VERSION - 1) << 4])
+    rng, old = np.random.default_rng(1), bytes([(WIRE_VERSION - 1) << 4])
     for number in range(2000):
         receiver.take(rng.bytes(40), 0.0, f"noise {number}")
-        receiver.take(bytes([int(rng.integers(1, VERSION)) << 4]) + rng.bytes(40), 0.0, f"noise {number}")
+        receiver.take(bytes([int(rng.integers(1, WIRE_VERSION)) << 4]) + rng.bytes(40), 0.0, f"noise {number}")
     assert len(receiver.complaints()) < 10
     for number in range(1000):
         receiver.take(old + said[0][1:], 0.0, number)

@@ -7,7 +7,7 @@ import pytest
 
 from rigid_motion.motion import Poses
 from rigid_motion.streams import Receiver
-from rigid_motion.streams.playing import FORWARD, Fading, Playing
+from rigid_motion.streams.playing import MAX_FORWARD_RATIO, Fading, Playing
 from rigid_motion.streams.vmc import write
 
 DELAY, RATE = 0.1, 60.0
@@ -50,7 +50,7 @@ def test_what_was_shown_too_far_ahead_waits_and_does_not_go_back(speed: float, f
     assert np.diff(np.unwrap(turns)).min() >= -step - 1e-9
     # To wait takes as long as the motion takes to get there.
     for off, ahead, most in ((places, 0.1, 0.005), (np.unwrap(turns), 0.5, 0.02)):
-        assert np.abs(off[round((0.4 + ahead / FORWARD / speed) * fps) :]).max() < most
+        assert np.abs(off[round((0.4 + ahead / MAX_FORWARD_RATIO / speed) * fps) :]).max() < most
 
 
 @pytest.mark.parametrize("looks", [0.35, 1.0, 1.3])

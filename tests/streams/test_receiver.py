@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams import Receiver, Sender, StreamBody
 from rigid_motion.streams.playing import MOST_JOINT_KNOTS
 from tests.thoroughness import combined, tried
 
@@ -135,7 +135,7 @@ def test_a_long_way_with_jitter_loss_and_duplicates(limits: tuple[float, float],
 @pytest.mark.parametrize("seed", range(tried(8)))
 @pytest.mark.parametrize("loss", [0.05, 0.2])
 def test_where_datagrams_are_lost_no_hand_goes_back_against_its_motion(loss: float, seed: int) -> None:
-    own, rng = Body.rigid("hand"), np.random.default_rng(seed)
+    own, rng = StreamBody.rigid("hand"), np.random.default_rng(seed)
     lost = lambda now, count: rng.random() < loss  # noqa: E731
     samples = dance(own, 12.0, speed=4.0, seed=seed)
     outcome = run(own, *samples, lost=lost, latency=0.21, jitter=0.08, seed=seed)
@@ -212,7 +212,7 @@ def test_keys_can_be_recorded() -> None:
         for datagram in sender.add(time, poses[:, row]):
             receiver.take(datagram, time, "sender")
         for _, answer in receiver.answers():
-            sender.hear(answer, time)
+            sender.take_answer(answer, time)
         new = receiver.keys()
         for keys in new:
             moments += keys.moments.tolist()
@@ -227,7 +227,7 @@ def test_keys_can_be_recorded() -> None:
 
 @pytest.mark.slow
 def test_keys_that_nobody_records_are_forgotten() -> None:
-    own = Body.rigid("hand")
+    own = StreamBody.rigid("hand")
     times, poses = dance(own, 60.0, speed=8.0)
     sender, receiver = Sender([own], 0.001, rate=60.0), Receiver()
     for row, time in enumerate(times.tolist()):

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import turned
-from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.bodies import FURTHEST, Forest
-from rigid_motion.streams.paths import Path
-from rigid_motion.streams.sender import GRID, LAST
+from rigid_motion.streams import Receiver, Sender, StreamBody
+from rigid_motion.streams.bodies import MAX_CLOCK_S, Forest
+from rigid_motion.streams.paths import KnotPath
+from rigid_motion.streams.sender import GRID_TICKS, MAX_SEQUENCE_NUMBER
 from rigid_motion.streams.wire import read
 from tests.thoroughness import combined, tried
 
@@ -38,7 +38,7 @@ def test_every_sample_of_a_window_may_need_a_knot() -> None:
     """As of a tracker that trembles, at a long delay."""
     times, rng = np.arange(240) / 120.0, np.random.default_rng(5)
     places = rng.normal(scale=0.02, size=(1, 240, 3))
-    outcome = run(Body.rigid("hand"), times, Poses(places, np.tile((1.0, 0, 0, 0), (1, 240, 1))), delay=0.2)
+    outcome = run(StreamBody.rigid("hand"), times, Poses(places, np.tile((1.0, 0, 0, 0), (1, 240, 1))), delay=0.2)
     assert outcome.errors.max() <= 0.005 * SLACK
 
 
@@ -56,17 +56,17 @@ def test_a_jump_between_two_uneven_samples_is_within_the_tolerance(gap: float) -
     times[30:] += gap - (times[30] - times[29])
     places = np.where(np.arange(60)[:, None] < 30, 0.0, (0.037, 0.029, 0.02))
     poses = Poses(places[None], np.tile((1.0, 0, 0, 0), (1, 60, 1)))
-    outcome = run(Body.rigid("hand"), times, poses, fps=1000.0)
+    outcome = run(StreamBody.rigid("hand"), times, poses, fps=1000.0)
     assert outcome.errors.max() <= 0.005 * SLACK
 
 
-def swing(rate: float) -> tuple[Body, np.ndarray, Poses]:
+def swing(rate: float) -> tuple[StreamBody, np.ndarray, Poses]:
     """A hand on a long arm that gets to 22 m/s."""
     times = np.arange(round(3.0 * rate)) / rate
     angles = 1.6 * np.sin(9.0 * times) ** 3
     turns = np.array(turned(np.tile((1.0, 0, 0, 0), (len(times), 1)), angles[:, None] * (0.0, 0.0, 1.0)))
     places = 1.1 * np.stack((np.cos(angles), np.sin(angles), 0 * angles), axis=-1)
-    return Body.rigid("hand", radius=0.1), times, Poses(places[None], turns[None])
+    return StreamBody.rigid("hand", radius=0.1), times, Poses(places[None], turns[None])
 
 
 @pytest.mark.parametrize(("rate", "uneven", "answers"), combined([60.0, 91.0, 120.0], [0.0, 0.001], [True, False]))
@@ -91,7 +91,7 @@ def test_a_sample_that_is_overdue_is_not_waited_for() -> None:
 
 def test_samples_from_before_what_was_sent_without_them_are_said_all_the_same() -> None:
     own, times, poses = swing(60.0)
-    sender, receiver, truth, polled, largest = Sender([own]), Receiver(), Path(times, poses), 0, 0.0
+    sender, receiver, truth, polled, largest = Sender([own]), Receiver(), KnotPath(times, poses), 0, 0.0
     for row, time in enumerate(times.tolist()):
         # What is overdue is sent, and then the sample comes, late.
         datagrams = sender.poll(time + 0.005) if sender.next < time + 0.005 else []
@@ -99,7 +99,7 @@ def test_samples_from_before_what_was_sent_without_them_are_said_all_the_same() 
         for datagram in [*datagrams, *sender.add(time, poses[:, row])]:
             receiver.take(datagram, time + 0.005)
         for _, answer in receiver.answers():
-            sender.hear(answer, time)
+            sender.take_answer(answer, time)
             assert not read(answer).needs
         for shown in receiver.show(time + 0.005).values():
             off = Forest([own]).errors(shown.poses["hand"][:, None], truth.at(np.array([shown.moment])))
@@ -156,7 +156,7 @@ def test_numbers_that_are_none_are_refused(name: str, value: float) -> None:
 
 @pytest.mark.parametrize("rate", [float("nan"), float("inf"), -30.0, 1e-320, 1e-3, 5e-324])
 def test_rates_that_are_none_are_no_rates(rate: float) -> None:
-    assert Sender([body()], rate=rate).codec.terms.grid == GRID
+    assert Sender([body()], rate=rate).codec.terms.grid == GRID_TICKS
 
 
 @pytest.mark.parametrize("wrong", [0.0, 1e-9, 1e4, float("nan"), np.ones(2), np.array((0.1, 0.1, 0.0))])
@@ -174,7 +174,7 @@ def test_poses_that_are_none_are_refused_by_name_and_change_nothing(place: float
     with pytest.raises(ValueError, match=r"performer, joint 2: a pose needs a place within 10000 m, and a quaternion"):
         sender.add(0.0, Poses(positions, quaternions))
     with pytest.raises(ValueError, match="performer, joint 2 at rest"):
-        Body("performer", own.joints, own.parents, Poses(positions, quaternions))
+        StreamBody("performer", own.joints, own.parents, Poses(positions, quaternions))
     other.identity = sender.identity
     assert sender.add(0.0, own.rest) == other.add(0.0, own.rest)
 
@@ -198,21 +198,24 @@ NUMBERS = st.floats() | st.sampled_from([0.0, 1.0, 5e-324, 1e-310, -1e-200, 1e20
 )
 def test_whatever_numbers_poses_and_times_are_a_sender_goes_on(samples: list, answers: bool) -> None:
     """What it takes is shown within the tolerance once it is still, and what it does not take, it says."""
-    bodies, calm = [Body.rigid("hand"), Body.rigid("tool", radius=1.0)], Poses([[0.5] * 3] * 2, [[0.5] * 4] * 2)
+    bodies, calm = (
+        [StreamBody.rigid("hand"), StreamBody.rigid("tool", radius=1.0)],
+        Poses([[0.5] * 3] * 2, [[0.5] * 4] * 2),
+    )
     sender, receiver = Sender(bodies), Receiver()
 
     def say(datagrams: list[bytes], now: float) -> None:
         for datagram in datagrams:
             receiver.take(datagram, now)
         for _, answer in receiver.answers() if answers else ():
-            sender.hear(answer, now)
+            sender.take_answer(answer, now)
 
     numbers = [(time, np.array(row).reshape(2, 7)) for time, row in samples]
     clock = 0.0
     for row, (time, pose) in enumerate(numbers):
         clock = row / 60.0 if time is None else time
         sound = (np.abs(pose[:, :3]) < 1e4).all() and np.isfinite(pose).all() and pose[:, 3:].any(axis=1).all()
-        with nullcontext() if sound and abs(clock) <= FURTHEST else pytest.raises(ValueError, match="needs"):
+        with nullcontext() if sound and abs(clock) <= MAX_CLOCK_S else pytest.raises(ValueError, match="needs"):
             say(sender.add(clock, Poses(pose[:, :3], pose[:, 3:])), row / 60.0)
         say(sender.poll(sender.next), row / 60.0)
     # Clocks that are set by little again and again are followed for a while.
@@ -229,7 +232,7 @@ def test_a_source_that_leaps_and_then_stops_leaves_keepalives(seed: int) -> None
     rng = np.random.default_rng(seed)
     times = np.arange(60) / 120.0 + rng.uniform(0.0, 0.003, 60)
     places = np.cumsum(rng.normal(0.0, 0.2, (60, 3)), axis=0)
-    sender = Sender([Body.rigid("hand")], tolerance=0.0005)
+    sender = Sender([StreamBody.rigid("hand")], tolerance=0.0005)
     for time, place in zip(times, places, strict=True):
         sender.add(time, Poses(place[None], [[1.0, 0.0, 0.0, 0.0]]))
     said = [len(sender.poll(times[-1] + pause)) for pause in np.arange(0.01, 3.0, 0.01)]
@@ -240,9 +243,9 @@ def test_behind_the_last_sequence_it_begins_again_without_a_sample_too() -> None
     own = body(3)
     sender = Sender([own])
     before = {read(datagram).identity for datagram in sender.add(0.0, own.rest)}
-    sender._sequence = LAST + 1
+    sender._sequence = MAX_SEQUENCE_NUMBER + 1
     said = [read(datagram) for datagram in sender.poll(0.9)]
-    assert [type(datagram).__name__ for datagram in said] == ["Description", "Motion"]
+    assert [type(datagram).__name__ for datagram in said] == ["Description", "EncodedMotion"]
     assert not before & {datagram.identity for datagram in said}
 
 

@@ -9,10 +9,10 @@ import pytest
 
 from rigid_motion.motion import Poses, clean, interpolate, repair, shell_error
 from rigid_motion.motion.quaternions import turned
-from rigid_motion.streams import Body, Receiver, Sender, vmc
-from rigid_motion.streams.paths import Path as Knots
+from rigid_motion.streams import Receiver, Sender, StreamBody, vmc
+from rigid_motion.streams.paths import KnotPath as Knots
 from rigid_motion.streams.playing import Stream
-from rigid_motion.streams.steady import FEWEST, SPARSE, Steady
+from rigid_motion.streams.steady import MIN_KEY_GAP_S, MIN_SAMPLES, Steady
 from rigid_motion_batch.recordings import read_trajectories
 from tests.streams.one_euro import one_euro
 from tests.thoroughness import THOROUGH
@@ -41,9 +41,9 @@ def shaken(truth: Poses) -> Poses:
 
 def shown(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses]:
     """The moments that are shown as each sample comes, and what is shown then."""
-    steady, moments, result = Steady(), times[FEWEST:] - DELAY, []
+    steady, moments, result = Steady(), times[MIN_SAMPLES:] - DELAY, []
     one = Poses(poses.positions[None], poses.quaternions[None])
-    for last, moment in enumerate(moments.tolist(), FEWEST):
+    for last, moment in enumerate(moments.tolist(), MIN_SAMPLES):
         first = max(int(np.searchsorted(times, moment, side="right")) - 1, 0)
         knots = slice(first, last + 1)
         result.append(steady(Knots(times[knots], one[:, knots]), moment, np.inf)[0])
@@ -80,7 +80,7 @@ def test_without_noise_and_with_few_keys_it_is_what_came():
     moments, steady = shown(times, truth)
     as_it_came = interpolate(times, truth, moments, "lerp_slerp")
     assert shell_error(steady, as_it_came, RADIUS).max() < 1e-3 * SIZE
-    few = slice(None, None, int(RATE * SPARSE) + 1)
+    few = slice(None, None, int(RATE * MIN_KEY_GAP_S) + 1)
     moments, steady = shown(times[few], shaken(truth)[few])
     as_it_came = interpolate(times[few], shaken(truth)[few], moments, "lerp_slerp")
     assert shell_error(steady, as_it_came, RADIUS).max() < 1e-9
@@ -121,7 +121,7 @@ def test_where_a_stream_sends_every_sample_it_trembles_less_too():
     times, truth = recorded("pivot")
     poses, errors = shaken(truth), ([], [])
     for steady, which in zip((False, True), errors, strict=True):
-        receiver, sender = Receiver(steady=steady), Sender([Body.rigid("tool")], 0.0005, DELAY, RATE, 0.9 / RATE)
+        receiver, sender = Receiver(steady=steady), Sender([StreamBody.rigid("tool")], 0.0005, DELAY, RATE, 0.9 / RATE)
         for datagram in sender.join():
             receiver.take(datagram, 0.0)
         for time, pose in zip(times.tolist(), poses, strict=True):

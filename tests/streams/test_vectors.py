@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rigid_motion.streams import Receiver
-from rigid_motion.streams.coding import LARGEST, LONG, Coder
+from rigid_motion.streams.coding import FIRST_LONG_MAGNITUDE, LAST_TABLE_BITS, Coder
 from rigid_motion.streams.messages import Codec
-from rigid_motion.streams.wire import Answer, Description, Motion, read, read_description, write
+from rigid_motion.streams.wire import Answer, Description, EncodedMotion, read, read_description, write
 
 from .make_vectors import IDENTITY, RECEIVER, noted_of
 
@@ -41,7 +41,7 @@ def test_messages() -> None:
     assert [body.name for body in forest.bodies] == ["performer", "tool"]
     codec, known = Codec(forest, terms), {}
     messages = {row["data"]: row for row in STREAM["messages"]}
-    for motion in (own for own in read_ones if isinstance(own, Motion)):
+    for motion in (own for own in read_ones if isinstance(own, EncodedMotion)):
         expected = messages[motion.data.hex()]
         message = codec.code(Coder(motion.data), lambda back: known[motion.sequence - back])  # noqa: B023
         assert noted_of(message) | {"data": motion.data.hex()} == expected
@@ -51,7 +51,9 @@ def test_messages() -> None:
     assert {said["kind"] for said in STREAM["messages"]} >= {0, 3}
     assert [len(said["holds"]) for said in STREAM["messages"]].count(1) > 1
     assert any(0 < said["end"] - said["start"] < terms.delay for said in STREAM["messages"])
-    assert max(np.abs(said["groups"]).max() for said in STREAM["messages"]) >= LARGEST + (1 << LONG)
+    assert max(np.abs(said["groups"]).max() for said in STREAM["messages"]) >= FIRST_LONG_MAGNITUDE + (
+        1 << LAST_TABLE_BITS
+    )
 
 
 def test_what_is_shown() -> None:

@@ -13,12 +13,12 @@ from rigid_motion.live.driving import Retargeting, matched
 from rigid_motion.motion import Poses, Skeleton, shell_error
 from rigid_motion.motion.humanoid import HUMANOID, humanoid_bones
 from rigid_motion.motion.quaternions import multiply
-from rigid_motion.streams import Body, Receiver, osc
+from rigid_motion.streams import Receiver, StreamBody, osc
 from rigid_motion.streams.receiver import MOST_STREAMS
 from rigid_motion.streams.vmc import (
     JOINTS,
+    MAX_FRAMES,
     MOST_DEVICES,
-    MOST_FRAMES,
     ROOT,
     Performer,
     write,
@@ -32,7 +32,7 @@ from tests.thoroughness import sample
 pytestmark = pytest.mark.blender
 
 
-def world(body: Body, poses: Poses) -> Poses:
+def world(body: StreamBody, poses: Poses) -> Poses:
     """Poses (joints, ...) of a body in the space of its roots."""
     return Skeleton(body.parents).in_root_space(poses)
 
@@ -273,7 +273,7 @@ def test_of_a_datagram_a_few_frames_are_taken():
     """As of a program that saves them up; more are somebody who wants to keep us busy."""
     frames = [row for number in range(600) for row in (HIPS, osc.write_message("/VMC/Ext/T", number / 60.0))]
     (keys,) = heard([bundled(*frames)]).keys()
-    np.testing.assert_allclose(keys.moments, np.arange(MOST_FRAMES) / 60.0, atol=1e-6)
+    np.testing.assert_allclose(keys.moments, np.arange(MAX_FRAMES) / 60.0, atol=1e-6)
 
 
 def test_any_datagram_does_no_harm():

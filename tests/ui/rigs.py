@@ -8,7 +8,7 @@ import numpy as np
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.ui.overlay.cache import paths_of
 from rigid_motion.ui.overlay.kinds import space_of_bone
-from rigid_motion.ui.overlay.points import Path
+from rigid_motion.ui.overlay.points import DrawnPath
 from tests.animation.bones import rigs
 from tests.animation.bones.rigs import Rest, select_bones
 from tests.animation.scenes import key
@@ -44,7 +44,7 @@ def keyed_rig(name: str = "Rig") -> bpy.types.Object:
     return rig
 
 
-def path_and_space(bone: bpy.types.PoseBone) -> tuple[Path, np.ndarray]:
+def path_and_space(bone: bpy.types.PoseBone) -> tuple[DrawnPath, np.ndarray]:
     """The path of a bone, and the space (4, 4) that the overlay draws it in on the current frame."""
     target = transform_of(bone)
     space, turned = space_of_bone(bone, bpy.context.evaluated_depsgraph_get())

@@ -10,7 +10,7 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate
-from rigid_motion.ui.breakdown import CLASSES, WAY, Slider
+from rigid_motion.ui.breakdown import CLASSES, MOUSE_TRAVEL_PX, Slider
 from tests.animation.keyed import curves_of
 from tests.ui.conftest import FRAMES
 
@@ -53,28 +53,28 @@ def test_without_a_mode_it_is_greyed_out(tool, cls):
 
 def test_the_mouse_moves_the_factor_and_stops_at_the_ends(extension):
     slider = Slider(0.5, 100.0, 1.0)
-    assert slider.handle(event("MOUSEMOVE", "NOTHING", 100.0 + 0.2 * WAY))
+    assert slider.handle(event("MOUSEMOVE", "NOTHING", 100.0 + 0.2 * MOUSE_TRAVEL_PX))
     assert slider.factor == pytest.approx(0.7)
-    slider.handle(event("MOUSEMOVE", "NOTHING", 100.0 + 2.0 * WAY))
+    slider.handle(event("MOUSEMOVE", "NOTHING", 100.0 + 2.0 * MOUSE_TRAVEL_PX))
     assert slider.factor == 1.0
-    slider.handle(event("MOUSEMOVE", "NOTHING", 100.0 + 1.9 * WAY))
+    slider.handle(event("MOUSEMOVE", "NOTHING", 100.0 + 1.9 * MOUSE_TRAVEL_PX))
     assert slider.factor == pytest.approx(0.9), "it comes back at once"
 
 
 def test_shift_is_fine_and_ctrl_goes_in_steps(extension):
     slider = Slider(0.5, 0.0, 1.0)
-    slider.handle(event("MOUSEMOVE", "NOTHING", 0.2 * WAY, shift=True))
+    slider.handle(event("MOUSEMOVE", "NOTHING", 0.2 * MOUSE_TRAVEL_PX, shift=True))
     assert slider.factor == pytest.approx(0.52)
-    slider.handle(event("MOUSEMOVE", "NOTHING", 0.25 * WAY, ctrl=True))
+    slider.handle(event("MOUSEMOVE", "NOTHING", 0.25 * MOUSE_TRAVEL_PX, ctrl=True))
     assert slider.factor == pytest.approx(0.6)
-    slider.handle(event("LEFT_CTRL", "RELEASE", 0.25 * WAY))
+    slider.handle(event("LEFT_CTRL", "RELEASE", 0.25 * MOUSE_TRAVEL_PX))
     assert slider.factor == pytest.approx(0.57)
 
 
 def test_e_lets_it_go_beyond_the_ends(extension):
     slider = Slider(0.5, 0.0, 1.0)
     slider.handle(event("E"))
-    slider.handle(event("MOUSEMOVE", "NOTHING", WAY))
+    slider.handle(event("MOUSEMOVE", "NOTHING", MOUSE_TRAVEL_PX))
     assert slider.factor == pytest.approx(1.5)
     slider.handle(event("E"))
     assert slider.factor == 1.0

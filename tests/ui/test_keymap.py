@@ -43,7 +43,9 @@ def test_the_shortcut_is_in_both_modes_of_the_viewport_and_in_both_key_editors(e
     assert len(keymap.SHORTCUTS) == 4
     for shortcut in keymap.SHORTCUTS:
         items = keymaps.find(shortcut.keymap, space_type=shortcut.space).keymap_items
-        result = [item for item in items if item.idname == keymap.PIE and item.properties.name == shortcut.menu]
+        result = [
+            item for item in items if item.idname == keymap.PIE_OPERATOR and item.properties.name == shortcut.menu
+        ]
         assert [(item.type, bool(item.alt), bool(item.ctrl), bool(item.shift)) for item in result] == [
             ("T", True, False, False)
         ]

@@ -20,16 +20,16 @@ from .evaluation.components import MODE_NAMES, MODE_NUMBERS
 from .evaluation.sources import SCREW_AXIS
 from .following import follower
 from .queries.keyed import mode_shown
-from .transforms import MOTION, OWN_WORDS, Refused, Transform, transform_of
+from .transforms import MOTION_PROPERTY, OWN_WORDS, Refused, Transform, transform_of
 
-FIRST = ("motor_spline", "dq_sclerp")
+FIRST_MODES = ("motor_spline", "dq_sclerp")
 """The modes that menus show first: those to take where nothing speaks for another."""
 
 MODE_ITEMS = [
     ("BLENDER", "Blender", "Blender's own in-betweens: every channel for itself", 0),
     *(
         (name, mode.label, ". ".join(filter(None, (mode.description, mode.same, mode.algebra))), mode.number)
-        for name, mode in sorted(KEYFRAME_MODES.items(), key=lambda item: (*FIRST, item[0]).index(item[0]))
+        for name, mode in sorted(KEYFRAME_MODES.items(), key=lambda item: (*FIRST_MODES, item[0]).index(item[0]))
     ),
 ]
 """The modes as items of an enumeration. Files have the numbers."""
@@ -127,19 +127,19 @@ class RigidMotion(bpy.types.PropertyGroup):
     )
 
 
-CARRIERS = bpy.types.Object, bpy.types.PoseBone
+OWNER_TYPES = bpy.types.Object, bpy.types.PoseBone
 CLASSES = (ChangedKeys, RigidMotion)
 
 
 def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    for carrier in CARRIERS:
-        setattr(carrier, MOTION, PointerProperty(type=RigidMotion, override={"LIBRARY_OVERRIDABLE"}))
+    for carrier in OWNER_TYPES:
+        setattr(carrier, MOTION_PROPERTY, PointerProperty(type=RigidMotion, override={"LIBRARY_OVERRIDABLE"}))
 
 
 def unregister() -> None:
-    for carrier in CARRIERS:
-        delattr(carrier, MOTION)
+    for carrier in OWNER_TYPES:
+        delattr(carrier, MOTION_PROPERTY)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

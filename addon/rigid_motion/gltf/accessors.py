@@ -14,10 +14,10 @@ import numpy as np
 
 from .documents import Document, GltfError, Json, bytes_of, entry, shown, whole
 
-KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+NUMBER_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """Types of components, as NumPy names them."""
 
-COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 MOST_ZEROS = 2**22
 """How many numbers an accessor may have more than the file has bytes: one without a view is made of zeros."""
@@ -25,13 +25,13 @@ MOST_ZEROS = 2**22
 COMPRESSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 """What bytes of a view are not what its accessors say."""
 
-EVERY = slice(None)
+ALL_ROWS = slice(None)
 
-TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+TYPE_BY_COUNT = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
-COMPONENT_TYPES = {kind.lstrip("<"): number for number, kind in KINDS.items()}
+COMPONENT_TYPES = {kind.lstrip("<"): number for number, kind in NUMBER_TYPES.items()}
 
-ALIGNED = 4
+ALIGNMENT_BYTES = 4
 """Bytes: where numbers begin."""
 
 
@@ -60,7 +60,7 @@ class Rows:
         return result.reshape(end - first, *self.shape)[..., self.order]
 
 
-def raw_numbers(document: Document, number: object, rows: slice = EVERY) -> np.ndarray:
+def raw_numbers(document: Document, number: object, rows: slice = ALL_ROWS) -> np.ndarray:
     """Return the numbers of an accessor, or of some of its elements, as they are kept, shape (count, components).
 
     Raises
@@ -79,7 +79,7 @@ def raw_numbers(document: Document, number: object, rows: slice = EVERY) -> np.n
     return _with_sparse(document, accessor, result, f"accessor {number}", rows) if "sparse" in accessor else result
 
 
-def numbers(document: Document, number: object, rows: slice = EVERY) -> np.ndarray:
+def numbers(document: Document, number: object, rows: slice = ALL_ROWS) -> np.ndarray:
     """Return the numbers of an accessor, or of some of its elements, shape (count, components), float64.
 
     Raises
@@ -118,7 +118,7 @@ def _parts(json: Json, number: int) -> Iterator[tuple[Json, int, int]]:
     size, columns = _kind(accessor).itemsize, _columns(accessor)
     if accessor["type"].startswith("MAT"):  # Each column of a matrix begins aligned.
         rows = math.isqrt(columns)
-        width = rows * -(-rows * size // ALIGNED) * ALIGNED
+        width = rows * -(-rows * size // ALIGNMENT_BYTES) * ALIGNMENT_BYTES
     else:
         width = size * columns
     if "bufferView" in accessor:
@@ -131,20 +131,20 @@ def _parts(json: Json, number: int) -> Iterator[tuple[Json, int, int]]:
 
 def _kind(accessor: Json) -> np.dtype:
     kind = accessor.get("componentType")
-    if not isinstance(kind, int) or kind not in KINDS:
+    if not isinstance(kind, int) or kind not in NUMBER_TYPES:
         raise GltfError(f"an accessor has components of the type {shown(kind)}, which glTF does not know")
-    return np.dtype(KINDS[kind])
+    return np.dtype(NUMBER_TYPES[kind])
 
 
 def _columns(accessor: Json) -> int:
     kind = accessor.get("type")
-    if not isinstance(kind, str) or kind not in COMPONENTS:
+    if not isinstance(kind, str) or kind not in COMPONENT_COUNTS:
         raise GltfError(f"an accessor is of the type {shown(kind)}, which glTF does not know")
-    return COMPONENTS[kind]
+    return COMPONENT_COUNTS[kind]
 
 
 def _in_view(
-    document: Document, part: Json, kind: np.dtype, columns: int, count: int, what: str, rows: slice = EVERY
+    document: Document, part: Json, kind: np.dtype, columns: int, count: int, what: str, rows: slice = ALL_ROWS
 ) -> np.ndarray:
     """Return the elements, or some of them, that a part of the document names by its view and an offset in it."""
     view = entry(document.json, "bufferViews", part.get("bufferView"))
@@ -209,7 +209,7 @@ class GrowingView:
         if known not in self._known:
             accessor = self.placed(content) | {"componentType": COMPONENT_TYPES[kind]}
             accessor |= {"normalized": True} if numbers.dtype.kind == "i" else {}
-            accessor |= {"count": len(numbers), "type": TYPES[numbers.shape[1]]}
+            accessor |= {"count": len(numbers), "type": TYPE_BY_COUNT[numbers.shape[1]]}
             self._known[known] = len(self.accessors)
             self.accessors.append(accessor)
         if bounds:
@@ -219,7 +219,7 @@ class GrowingView:
 
     def placed(self, content: bytes) -> Json:
         """Return what an accessor says of where these bytes are, which come behind the others."""
-        self.data += bytes(-len(self.data) % ALIGNED)
+        self.data += bytes(-len(self.data) % ALIGNMENT_BYTES)
         offset = len(self.data)
         self.data += content
         return {"bufferView": self.number} | ({"byteOffset": offset} if offset else {})

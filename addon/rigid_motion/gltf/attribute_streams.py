@@ -11,28 +11,28 @@ from collections.abc import Iterator
 
 import numpy as np
 
-VERSIONS = {0xA0: 0, 0xA1: 1}
+VERSION_BY_FIRST_BYTE = {0xA0: 0, 0xA1: 1}
 """By the first byte of a stream."""
 
-BLOCK_BYTES, BLOCK_ELEMENTS, GROUP = 8192, 256, 16
+BLOCK_BYTES, BLOCK_ELEMENTS, GROUP_ELEMENTS = 8192, 256, 16
 
-TAILS = 32, 24
+MIN_TAIL_BYTES = 32, 24
 """The least bytes at the end of a stream, of which the first element is a part, by version."""
 
-BITS = (0, 2, 4, 8), (0, 1, 2, 4), (1, 2, 4, 8)
+DIFFERENCE_BITS = (0, 2, 4, 8), (0, 1, 2, 4), (1, 2, 4, 8)
 """Of a difference in a group, by the kind of the group: in version 0, and by the control mode in version 1."""
 
-NOTHING, LITERAL = 2, 3
+ZERO_CONTROL, LITERAL_CONTROL = 2, 3
 """Control modes without groups: all differences are 0, and all are whole bytes."""
 
-WIDEST = 24
+MAX_GROUP_BYTES = 24
 """Bytes of a group at most: 16 differences of 4 bits, each of them too large."""
 
 
 def encoded(elements: np.ndarray) -> bytes:
     """Return the stream of elements (count, stride); the stride is a multiple of 4, and 256 at most."""
     stride = elements.shape[1]
-    tail = bytes(max(TAILS[0] - stride, 0)) + elements[0].tobytes()
+    tail = bytes(max(MIN_TAIL_BYTES[0] - stride, 0)) + elements[0].tobytes()
     return b"".join((b"\xa0", *map(_encoded_block, _blocks(elements)), tail))
 
 
@@ -42,7 +42,7 @@ def encoded_size(elements: np.ndarray) -> int:
     for block in _blocks(elements):
         groups, stride = block.shape[0], block.shape[1]
         sizes += stride * -(-groups // 4) + int(_group_sizes(block).min(axis=0).sum())
-    return 1 + sizes + max(TAILS[0], elements.shape[1])
+    return 1 + sizes + max(MIN_TAIL_BYTES[0], elements.shape[1])
 
 
 def likely_size(elements: np.ndarray) -> float:
@@ -50,7 +50,7 @@ def likely_size(elements: np.ndarray) -> float:
     result, stride = 0.0, elements.shape[1]
     for block in _blocks(elements):
         result += float(_group_sizes(block).min(axis=0).sum()) + stride * len(block) / 4
-    return result * len(elements) / (-(-len(elements) // GROUP) * GROUP)
+    return result * len(elements) / (-(-len(elements) // GROUP_ELEMENTS) * GROUP_ELEMENTS)
 
 
 def differences(elements: np.ndarray) -> np.ndarray:
@@ -68,19 +68,19 @@ def _blocks(elements: np.ndarray) -> Iterator[np.ndarray]:
     most, every = _block_elements(stride), differences(elements)
     for first in range(0, count, most):
         block = every[first : first + most]
-        block = np.pad(block, ((0, -len(block) % GROUP), (0, 0)))
-        yield np.moveaxis(block.reshape(-1, GROUP, stride), 1, 2)
+        block = np.pad(block, ((0, -len(block) % GROUP_ELEMENTS), (0, 0)))
+        yield np.moveaxis(block.reshape(-1, GROUP_ELEMENTS, stride), 1, 2)
 
 
 def _block_elements(stride: int) -> int:
-    return min(BLOCK_BYTES // stride // GROUP * GROUP, BLOCK_ELEMENTS)
+    return min(BLOCK_BYTES // stride // GROUP_ELEMENTS * GROUP_ELEMENTS, BLOCK_ELEMENTS)
 
 
 def _group_sizes(block: np.ndarray) -> np.ndarray:
     """Return the bytes of each group in each of its kinds, shape (4, groups, stride)."""
-    nothing = np.where(block.any(axis=-1), GROUP + 1, 0)
-    packed = [2 * bits + np.count_nonzero(block >= 2**bits - 1, axis=-1) for bits in BITS[0][1:3]]
-    return np.stack((nothing, *packed, np.full(nothing.shape, GROUP)))
+    nothing = np.where(block.any(axis=-1), GROUP_ELEMENTS + 1, 0)
+    packed = [2 * bits + np.count_nonzero(block >= 2**bits - 1, axis=-1) for bits in DIFFERENCE_BITS[0][1:3]]
+    return np.stack((nothing, *packed, np.full(nothing.shape, GROUP_ELEMENTS)))
 
 
 def _encoded_block(block: np.ndarray) -> bytes:
@@ -88,21 +88,21 @@ def _encoded_block(block: np.ndarray) -> bytes:
     kinds = _group_sizes(block).argmin(axis=0)
     four = np.pad(kinds, ((0, -groups % 4), (0, 0))).reshape(-1, 4, stride).astype(np.uint8)
     headers = (four << np.array([0, 2, 4, 6], dtype=np.uint8)[:, None]).sum(axis=1, dtype=np.uint8)
-    content = np.zeros((groups, stride, WIDEST), dtype=np.uint8)
+    content = np.zeros((groups, stride, MAX_GROUP_BYTES), dtype=np.uint8)
     used = np.zeros(content.shape, dtype=bool)
     for kind in (1, 2):
         some = kinds == kind
-        bits, differences = BITS[0][kind], block[some]
+        bits, differences = DIFFERENCE_BITS[0][kind], block[some]
         widest, each = 2**bits - 1, 8 // bits
-        parts = np.minimum(differences, widest).reshape(len(differences), GROUP // each, each)
+        parts = np.minimum(differences, widest).reshape(len(differences), GROUP_ELEMENTS // each, each)
         shifts = bits * np.arange(each - 1, -1, -1, dtype=np.uint8)
         packed = (parts << shifts).sum(axis=-1, dtype=np.uint8)
         wide = differences >= widest
         order = np.argsort(~wide, axis=1, kind="stable")
         rest = np.take_along_axis(differences, order, axis=1)
-        content[some] = np.pad(np.hstack((packed, rest)), ((0, 0), (0, WIDEST)))[:, :WIDEST]
-        used[some] = np.arange(WIDEST) < (packed.shape[1] + np.count_nonzero(wide, axis=1))[:, None]
-    content[kinds == 3, :GROUP], used[kinds == 3, :GROUP] = block[kinds == 3], True
+        content[some] = np.pad(np.hstack((packed, rest)), ((0, 0), (0, MAX_GROUP_BYTES)))[:, :MAX_GROUP_BYTES]
+        used[some] = np.arange(MAX_GROUP_BYTES) < (packed.shape[1] + np.count_nonzero(wide, axis=1))[:, None]
+    content[kinds == 3, :GROUP_ELEMENTS], used[kinds == 3, :GROUP_ELEMENTS] = block[kinds == 3], True
     whole = np.hstack((headers.T, np.swapaxes(content, 0, 1).reshape(stride, -1)))
     is_used = np.hstack((np.ones(headers.T.shape, dtype=bool), np.swapaxes(used, 0, 1).reshape(stride, -1)))
     return whole[is_used].tobytes()
@@ -116,7 +116,7 @@ def decoded(data: bytes, count: int, stride: int) -> np.ndarray:
     IndexError, KeyError, ValueError
         Where the stream is none of so many.
     """
-    version = VERSIONS[data[0]]
+    version = VERSION_BY_FIRST_BYTE[data[0]]
     result, place = np.empty((count, stride), dtype=np.uint8), 1
     tail = stride + version * stride // 4
     modes = data[len(data) - stride // 4 :] if version else bytes(stride // 4)
@@ -131,28 +131,28 @@ def decoded(data: bytes, count: int, stride: int) -> np.ndarray:
             own = slice(4 * channel, 4 * channel + 4)
             block[:, own] = _summed(block[:, own], last[own], mode)
         last = block[-1]
-    if place + max(tail, TAILS[version]) != len(data):
+    if place + max(tail, MIN_TAIL_BYTES[version]) != len(data):
         raise ValueError
     return result
 
 
 def _decoded_column(data: bytes, place: int, count: int, control: int, version: int) -> tuple[np.ndarray, int]:
     """Return differences (count,) that begin at a place, and the place behind them."""
-    if control == NOTHING:
+    if control == ZERO_CONTROL:
         return np.zeros(count, dtype=np.uint8), place
-    if control == LITERAL:
+    if control == LITERAL_CONTROL:
         return np.frombuffer(data, np.uint8, count, place), place + count
-    groups = -(-count // GROUP)
+    groups = -(-count // GROUP_ELEMENTS)
     kinds, place = data[place : place + -(-groups // 4)], place + -(-groups // 4)
-    result = np.zeros((groups, GROUP), dtype=np.uint8)
+    result = np.zeros((groups, GROUP_ELEMENTS), dtype=np.uint8)
     for group, own in enumerate(result):
-        bits = BITS[version + control][kinds[group // 4] >> group % 4 * 2 & 3]
+        bits = DIFFERENCE_BITS[version + control][kinds[group // 4] >> group % 4 * 2 & 3]
         if bits == 8:
-            own[:] = np.frombuffer(data, np.uint8, GROUP, place)
-            place += GROUP
+            own[:] = np.frombuffer(data, np.uint8, GROUP_ELEMENTS, place)
+            place += GROUP_ELEMENTS
         elif bits:
             packed = np.frombuffer(data, np.uint8, 2 * bits, place)
-            own[:] = (packed[:, None] >> SHIFTS[bits] & 2**bits - 1).ravel()
+            own[:] = (packed[:, None] >> PART_SHIFTS[bits] & 2**bits - 1).ravel()
             wide = own == 2**bits - 1
             more = int(np.count_nonzero(wide))
             own[wide] = np.frombuffer(data, np.uint8, more, place + 2 * bits) if more else 0
@@ -160,8 +160,8 @@ def _decoded_column(data: bytes, place: int, count: int, control: int, version: 
     return result.ravel()[:count], place
 
 
-SHIFTS = {1: np.arange(8, dtype=np.uint8)} | {
-    bits: np.arange(8 - bits, -1, -bits, dtype=np.uint8) for bits in BITS[0][1:3]
+PART_SHIFTS = {1: np.arange(8, dtype=np.uint8)} | {
+    bits: np.arange(8 - bits, -1, -bits, dtype=np.uint8) for bits in DIFFERENCE_BITS[0][1:3]
 }
 """Of the parts of a byte, the first one first, by their bits."""
 

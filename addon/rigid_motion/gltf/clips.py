@@ -14,13 +14,13 @@ import numpy as np
 
 from ..motion import SeparateKeys, Skeleton
 from ..motion.skeleton_stretches import Run
-from .errors import NOWHERE, PARTS, Feet, World, Worst
+from .errors import NO_SAMPLES, PARTS_PER_GAP, Feet, World, Worst
 from .meshopt import TIME_EXPONENT, packed_size
 from .nodes import by_target
 from .packing import Packing
 from .rewriting import Amount, EveryKey, StoredTrack, amount, key_size, shown, stored
-from .search import Search
-from .settling import Channel, settled, shared_times
+from .search import NodeSearch
+from .settling import SettledChannel, settled, shared_times
 from .tracks import CUBICSPLINE, LINEAR, ROTATION, TRANSLATION, WEIGHTS, Clip, Target, Track, Tracks
 
 OF_INTEGERS = 0.85
@@ -29,21 +29,21 @@ OF_INTEGERS = 0.85
 MORE_SLIDE = 0.001 / 1.7
 """How much farther feet may slide than before, of the size of the body: a millimetre of a grown-up."""
 
-TIGHTER = 0.7
+TIGHTER_TOLERANCE_RATIO = 0.7
 """How much smaller the tolerance of the next search is, where no keys that are put back help."""
 
 FEET_WEIGH = (1.0, 4.0, 16.0, 64.0)
 """How many times the errors of feet that stand count in the search for so many key poses, one after the other."""
 
-ROUNDS = 24
+MAX_PUT_BACK_ROUNDS = 24
 """How often keys are put back where the proof fails."""
 
-LEAST = 0.1
+MIN_TOLERANCE_RATIO = 0.1
 """The share of the tolerance that is worth a search."""
 
 NEEDED_CHANNELS, ALL_CHANNELS, MOVING_CHANNELS = CHANNELS = ("needed", "all", "moving")
 
-NEEDED, LARGER = "all of its keys are needed", "fewer keys would take more bytes"
+NEEDED_REASON, LARGER_REASON = "all of its keys are needed", "fewer keys would take more bytes"
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class ClipReduction:
         assert options.tolerance is not None
         self.tolerance = options.tolerance
         self.before = before
-        channels = [Channel(world, track, self.tolerance) for track in clip.all_tracks]
+        channels = [SettledChannel(world, track, self.tolerance) for track in clip.all_tracks]
         times = self._moments(world, channels)
         self.world = world if np.array_equal(times, world.times) else replace(world, times=times)
         self.given = by_target(clip.pointers)
@@ -174,26 +174,26 @@ class ClipReduction:
         try:
             result = self._so_many(count) if self.dense and count else self._within_tolerance()
         except _LargerError:
-            return self._kept(LARGER)
+            return self._kept(LARGER_REASON)
         if result is None:
-            return self._kept(NEEDED)
+            return self._kept(NEEDED_REASON)
         return self._result(*result)
 
     def _result(self, tracks: list[StoredTrack], worst: Worst) -> ReducedClip:
         after = self._amount(tracks)
-        slides, where = self.feet.slides(self._shown(tracks)), self._told(worst)
+        slides, where = self.feet.slides(self._shown(tracks)), self._node_text(worst)
         return ReducedClip(
             self.clip.number, self.clip.name, tuple(tracks), "", self.before, after, worst.error, where, slides
         )
 
-    def _moments(self, world: World, channels: Sequence[Channel]) -> np.ndarray:
+    def _moments(self, world: World, channels: Sequence[SettledChannel]) -> np.ndarray:
         """Return the times between which all channels run evenly."""
         moved = [
             channel.times for channel in channels if channel.track.path != WEIGHTS and not channel.track.is_constant
         ]
         return np.unique(np.concatenate([world.times, *moved]))
 
-    def _told(self, worst: Worst) -> str:
+    def _node_text(self, worst: Worst) -> str:
         if worst.node < 0:
             return ""
         name = self.world.nodes.document.json["nodes"][worst.node].get("name")
@@ -269,7 +269,7 @@ class ClipReduction:
         if not self.dense:
             return self._proven([])
         search, allowed = self._search(), self.tolerance - self.storing[1]
-        while allowed > LEAST * self.tolerance:
+        while allowed > MIN_TOLERANCE_RATIO * self.tolerance:
             if self.options.shared:
                 samples = [search.key_poses(allowed)] * len(self.dense)
             else:
@@ -277,13 +277,13 @@ class ClipReduction:
             result = self._proven(samples)
             if result is not None:
                 return result
-            allowed *= TIGHTER
+            allowed *= TIGHTER_TOLERANCE_RATIO
         return None
 
-    def _search(self) -> Search:
+    def _search(self) -> NodeSearch:
         """Return a search for the keys of nodes, but for those whose steps are kept."""
         fixed = np.isin(self.world.moving, list(self.stepping))
-        return Search(self.world, {**self.given, **self.settled, **self.dense}, fixed, self.options.run)
+        return NodeSearch(self.world, {**self.given, **self.settled, **self.dense}, fixed, self.options.run)
 
     @cached_property
     def morphed(self) -> tuple[Worst, np.ndarray]:
@@ -330,7 +330,7 @@ class ClipReduction:
         None where the proof fails with more and more of them.
         """
         sound: dict[int, tuple[int, Worst]] = {}
-        for _ in range(ROUNDS):
+        for _ in range(MAX_PUT_BACK_ROUNDS):
             tracks = self._stored(samples)
             self._amount(tracks)
             rows, eighths = self._failures(self._shown(tracks), sound)
@@ -349,15 +349,15 @@ class ClipReduction:
         world = self.world
         rows, samples = self.feet.slips(tracks, self.more_slide)
         if len(rows):
-            return rows, PARTS * samples
-        failures = [(NOWHERE, NOWHERE)]
+            return rows, PARTS_PER_GAP * samples
+        failures = [(NO_SAMPLES, NO_SAMPLES)]
         for number, digest in enumerate(world.digests(tracks)):
             if number in sound and sound[number][0] == digest:
                 continue
-            for parts in (1, PARTS):
+            for parts in (1, PARTS_PER_GAP):
                 worst, rows, numbers = world.worst(tracks, self.morphed, self.tolerance, parts=parts, among=(number,))
                 if len(rows):
-                    failures.append((rows, PARTS // parts * numbers))
+                    failures.append((rows, PARTS_PER_GAP // parts * numbers))
                     break
             else:
                 sound[number] = digest, worst
@@ -367,7 +367,7 @@ class ClipReduction:
     def _with_more(self, samples: list[np.ndarray], rows: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
         """Return samples with those around some eighths, for the nodes of these rows and all that they hang on."""
         desired = np.zeros((len(self.world.moving), len(self.world.times)), dtype=bool)
-        desired[rows, eighths // PARTS] = desired[rows, -(-eighths // PARTS)] = True
+        desired[rows, eighths // PARTS_PER_GAP] = desired[rows, -(-eighths // PARTS_PER_GAP)] = True
         desired = Skeleton(self.world.parents).most_below(desired)
         if self.options.shared:
             desired[:] = desired.any(axis=0)

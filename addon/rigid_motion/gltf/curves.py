@@ -20,23 +20,23 @@ from ..motion.skeleton_stretches import stretches
 from .clips import ClipReduction, ReducedClip
 from .errors import World, Worst
 from .rewriting import StoredTrack, stored
-from .search import Search
-from .settling import Channel
+from .search import NodeSearch
+from .settling import SettledChannel
 from .tracks import CUBICSPLINE, LINEAR, ROTATION, TRANSLATION, WEIGHTS, Target, Track, Tracks
 
-STRETCH, LONG = 500, 2
+STRETCH_FRAMES, MIN_STRETCHES = 500, 2
 """Frames that are searched in one go, where there are more than so many times as many."""
 
-EXACTLY = 1e-6
+MAX_LINE_ERROR = 1e-6
 """What values may differ by where as many keys as wanted are given: what is a line then is one."""
 
-SLOWEST = 1 / 20
+MAX_FRAME_GAP_S = 1 / 20
 """Seconds: frames that are farther apart are keys, with lines in between that count as well."""
 
-ROUNDS = 12
+MAX_PROOF_ROUNDS = 12
 """How often less is allowed where the proof fails."""
 
-LESS, AROUND = 0.5, 2
+TIGHTER_ALLOWANCE_RATIO, TIGHTER_REACH_FRAMES = 0.5, 2
 """How much less, and so many frames around; where feet slide, for as long as they stand."""
 
 
@@ -51,12 +51,12 @@ class CurveReduction(ClipReduction):
         """The curves of stretches, by their numbers and what is allowed there."""
         return {}
 
-    def _moments(self, world: World, channels: Sequence[Channel]) -> np.ndarray:
+    def _moments(self, world: World, channels: Sequence[SettledChannel]) -> np.ndarray:
         """Return the frames: those of keys, and some between keys that are far apart."""
         moving = [channel for channel in channels if channel.track.path != WEIGHTS and not channel.track.is_constant]
         splines = [channel.times for channel in moving if channel.is_curved]
         keys = np.unique(np.concatenate([world.times, *splines, *(channel.track.times for channel in moving)]))
-        parts = np.ceil(np.diff(keys) / SLOWEST).astype(np.int64)
+        parts = np.ceil(np.diff(keys) / MAX_FRAME_GAP_S).astype(np.int64)
         number = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
         between = np.repeat(keys[:-1], parts) + np.repeat(np.diff(keys) / parts, parts) * number
         return np.append(between, keys[-1]).astype(np.float32).astype(np.float64)
@@ -65,7 +65,7 @@ class CurveReduction(ClipReduction):
         if not self.dense:
             return super()._within_tolerance()
         allowed = np.full((len(self.world.moving), len(self.world.times)), self.tolerance)
-        for _ in range(ROUNDS):
+        for _ in range(MAX_PROOF_ROUNDS):
             tracks = self._curved(allowed)
             self._amount(tracks)
             shown = self._shown(tracks)
@@ -75,16 +75,18 @@ class CurveReduction(ClipReduction):
                 worst = max(worst, self.world.morphed(shown)[0])
                 return (tracks, worst) if worst.error <= self.tolerance else None
             for row, sample in zip(rows.tolist(), samples.tolist(), strict=True):
-                allowed[row, max(sample - AROUND, 0) : sample + AROUND + 1] *= LESS
+                allowed[row, max(sample - TIGHTER_REACH_FRAMES, 0) : sample + TIGHTER_REACH_FRAMES + 1] *= (
+                    TIGHTER_ALLOWANCE_RATIO
+                )
             for row, first, end in slips:
                 some = allowed[row, first:end]
-                some[:] = LESS * np.minimum(some, self.more_slide / LESS)
+                some[:] = TIGHTER_ALLOWANCE_RATIO * np.minimum(some, self.more_slide / TIGHTER_ALLOWANCE_RATIO)
         return None
 
     def _key_poses(self, keys: np.ndarray) -> list[StoredTrack]:
         tracks = [stored(track, integers=False) for track in self.settled.values()]
         for (_, path), track in self.dense.items():
-            exactly = np.full(len(self.world.times), EXACTLY)
+            exactly = np.full(len(self.world.times), MAX_LINE_ERROR)
             samples = Samples(track.at(self.world.times), exactly, path == ROTATION)
             tracks.append(stored(_as_track(track, keyed_at(self.world.times, samples, keys)), integers=False))
         return self._spanning(tracks)
@@ -131,7 +133,7 @@ class CurveReduction(ClipReduction):
     def _stretches(self) -> list[slice]:
         """Return the frames whose curves are searched in one go: all channels have keys where they meet."""
         count = len(self.world.times)
-        return stretches(count, STRETCH) if count > LONG * STRETCH else [slice(0, count)]
+        return stretches(count, STRETCH_FRAMES) if count > MIN_STRETCHES * STRETCH_FRAMES else [slice(0, count)]
 
     def _body(self, some: slice, allowed: np.ndarray) -> CurvedBody:
         """Return the nodes of the world at some of the moments as a body."""
@@ -139,7 +141,7 @@ class CurveReduction(ClipReduction):
         nothing, nodes = np.zeros(len(world.moving), dtype=bool), world.moving.tolist()
         curved = np.array([[(node, path) in self.dense for path in (TRANSLATION, ROTATION)] for node in nodes])
         lengths, tracks = world.lengths_above(times), {**self.given, **self.settled, **self.dense}
-        truth, local = (Search(world, own, nothing, map).poses(some) for own in (world.truth, tracks))
+        truth, local = (NodeSearch(world, own, nothing, map).poses(some) for own in (world.truth, tracks))
         local = Poses(local.positions / lengths, align_signs(local.quaternions))
         truth = skeleton.in_root_space(truth)
         return CurvedBody(times, skeleton, truth, local, lengths, world.radii, curved, allowed[:, some], True)

@@ -40,10 +40,10 @@ MOST_BYTES = 2**32 - 1
 
 MOST_CHUNKS = 1000
 
-LARGEST = 2**53
+MAX_WHOLE_NUMBER = 2**53
 """Whole numbers are below it."""
 
-AGAIN = "export it again"
+EXPORT_AGAIN = "export it again"
 
 Json = dict[str, Any]
 
@@ -51,7 +51,7 @@ Json = dict[str, Any]
 class GltfError(ValueError):
     """What is wrong with a file or with what is asked of it, in one line, and what to do about it."""
 
-    def __init__(self, problem: str, way_out: str = AGAIN) -> None:
+    def __init__(self, problem: str, way_out: str = EXPORT_AGAIN) -> None:
         super().__init__(f"{problem}; {way_out}")
         self.problem, self.way_out = problem, way_out
 
@@ -303,7 +303,7 @@ def whole(parent: Json, name: str, default: int | None = None, least: int = 0) -
     number = parent.get(name, default)
     if isinstance(number, float) and number.is_integer():
         number = int(number)
-    if not isinstance(number, int) or isinstance(number, bool) or not least <= number < LARGEST:
+    if not isinstance(number, int) or isinstance(number, bool) or not least <= number < MAX_WHOLE_NUMBER:
         raise GltfError(f"{name} is {shown(number)}, and has to be a whole number from {least} on")
     return number
 

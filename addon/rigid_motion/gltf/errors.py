@@ -16,30 +16,30 @@ import numpy as np
 
 from ..motion import Skeleton
 from ..motion.affine import AffineMaps, ball_displacement, displacement_bound
-from ..motion.contacts import LOW, SLOW, contacts, spans
+from ..motion.contacts import MAX_STANDING_HEIGHT_RATIO, MAX_STANDING_HEIGHTS_PER_S, contacts, spans
 from ..motion.skeleton_stretches import stretches
 from .nodes import Nodes
 from .seen import Seen
 from .tracks import SCALE, WEIGHTS, Tracks
 
-PARTS = 8
+PARTS_PER_GAP = 8
 """Of every gap between keys: that is how closely it is looked at."""
 
-STRETCH, LONG = 1500, 2
+STRETCH_SAMPLES, MIN_STRETCHES = 1500, 2
 """Samples of a clip that are looked at and searched at once, where there are more than so many times as many."""
 
 AT_ONCE = 2**15
 """Poses that are looked at in one go."""
 
-EXACTLY = 64
+EXACT_BATCH_POSES = 64
 """Poses whose displacement is worked out at once, those with the largest bounds first."""
 
-EVEN = 1e-4
+MAX_EVEN_SCALE_RATIO = 1e-4
 """Of a scale: its axes differ by no more where it is even. Programs write some with rounding."""
 
-NOWHERE = np.empty(0, dtype=np.int64)
+NO_SAMPLES = np.empty(0, dtype=np.int64)
 
-UPWARDS = 1
+UP_AXIS = 1
 """The axis of glTF that is."""
 
 
@@ -53,7 +53,7 @@ class Worst:
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class SeenBlock:
     """What is seen of nodes at some moments that follow one another."""
 
     first: int
@@ -102,9 +102,9 @@ class World:
     def stretches(self) -> list[slice]:
         """Moments that are looked at in one go, each from the last of those before on; all, if they are few."""
         count = len(self.times)
-        return stretches(count, STRETCH) if count > LONG * STRETCH else [slice(0, count)]
+        return stretches(count, STRETCH_SAMPLES) if count > MIN_STRETCHES * STRETCH_SAMPLES else [slice(0, count)]
 
-    def blocks(self, *tracks: Tracks, parts: int = 1, among: Collection[int] | None = None) -> Iterator[Block]:
+    def blocks(self, *tracks: Tracks, parts: int = 1, among: Collection[int] | None = None) -> Iterator[SeenBlock]:
         """Yield what moments look like as each of these tracks move the nodes, and so many parts of gaps between.
 
         Where that is asked for, among some of the stretches alone, by their numbers.
@@ -118,7 +118,7 @@ class World:
             near = [self._near(some, stretch) for some in tracks]
             for first in range(stretch.start, end, step):
                 times = self.parted(first, min(first + step, end), parts)
-                yield Block(parts * first, times, tuple(self.worlds(some, times) for some in near))
+                yield SeenBlock(parts * first, times, tuple(self.worlds(some, times) for some in near))
 
     def digests(self, tracks: Tracks) -> list[int]:
         """Return what tells apart, of each stretch, whether tracks have the same keys there."""
@@ -161,7 +161,9 @@ class World:
         """Whether nodes may grow, or become sheared, between moments: by scales that change or are uneven."""
         scales = [track.points for (_, path), track in self.truth.items() if path == SCALE]
         every = [*scales, *self.nodes.rest[SCALE][:, None]]
-        return bool(self.nodes.matrices) or any(len(some) > 1 or np.ptp(some) > EVEN * np.max(some) for some in every)
+        return bool(self.nodes.matrices) or any(
+            len(some) > 1 or np.ptp(some) > MAX_EVEN_SCALE_RATIO * np.max(some) for some in every
+        )
 
     @cached_property
     def _extremes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -171,7 +173,7 @@ class World:
         count = len(self.moving)
         lengths, largest, away = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
         hangs = self.parents >= 0
-        for block in self.blocks(self.truth, parts=PARTS if self._shapes_change else 1):
+        for block in self.blocks(self.truth, parts=PARTS_PER_GAP if self._shapes_change else 1):
             (maps,) = block.maps
             lengths = np.maximum(lengths, np.linalg.norm(maps.axes, axis=-2).max(axis=1))
             largest = np.maximum(largest, _largest(maps.axes).max(axis=1))
@@ -230,7 +232,7 @@ class World:
                 continue
             given = shown.get((node, path))
             keys = track.times if given is None else np.union1d(track.times, given.times)
-            times = parted(keys, PARTS)
+            times = parted(keys, PARTS_PER_GAP)
             there = self.nodes.rest_of(node, path) if given is None else given.at(times)
             morph = self.seen.morphs[node]
             errors = np.abs(there - track.at(times)) @ morph.deltas * self.morph_scale(node)
@@ -245,7 +247,7 @@ class World:
         morphed: tuple[Worst, np.ndarray],
         tolerance: float = np.inf,
         *,
-        parts: int = PARTS,
+        parts: int = PARTS_PER_GAP,
         among: Collection[int] | None = None,
     ) -> tuple[Worst, np.ndarray, np.ndarray]:
         """Return the largest displacement of what is seen, at the moments and at parts of the gaps between them.
@@ -267,15 +269,15 @@ class World:
             Of nodes, and of the times, where the displacement is over the tolerance and a peak.
         """
         largest, besides = morphed
-        rows, numbers = [NOWHERE], [NOWHERE]
+        rows, numbers = [NO_SAMPLES], [NO_SAMPLES]
         for block in self.blocks(shown, self.truth, parts=parts, among=among):
             there, truth = block.maps
             bounds = displacement_bound(there, truth, self.balls[:, None]) + besides[:, None]
             errors = np.zeros(bounds.shape)
             waiting = np.flatnonzero(bounds > min(largest.error, tolerance))
             waiting = waiting[np.argsort(-bounds.flat[waiting])]
-            for begin in range(0, len(waiting), EXACTLY):
-                some = waiting[begin : begin + EXACTLY]
+            for begin in range(0, len(waiting), EXACT_BATCH_POSES):
+                some = waiting[begin : begin + EXACT_BATCH_POSES]
                 if bounds.flat[some[0]] <= min(largest.error, tolerance):
                     break
                 where = row, number = np.unravel_index(some, errors.shape)
@@ -327,16 +329,18 @@ class Feet:
             return np.zeros(shape, dtype=bool)
         heights, lowest = np.empty(len(times)), np.inf
         for block in world.blocks(world.truth):
-            upwards = block.maps[0].origins[self.rows, :, UPWARDS]
+            upwards = block.maps[0].origins[self.rows, :, UP_AXIS]
             heights[block.samples], lowest = np.ptp(upwards, axis=0), min(lowest, float(upwards.min()))
         height, low, slow = float(np.median(heights)), np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
         before = None
         for block in world.blocks(world.truth):
             positions = block.maps[0].origins[self.rows]
-            low[:, block.samples] = positions[..., UPWARDS] - lowest <= LOW * height
+            low[:, block.samples] = positions[..., UP_AXIS] - lowest <= MAX_STANDING_HEIGHT_RATIO * height
             before = positions[:, :1] if before is None else before
             ways = np.linalg.norm(np.diff(np.concatenate((before, positions), axis=1), axis=1), axis=-1)
-            slow[:, block.samples] = ways <= SLOW * height * np.diff(times, prepend=times[0])[block.samples]
+            slow[:, block.samples] = (
+                ways <= MAX_STANDING_HEIGHTS_PER_S * height * np.diff(times, prepend=times[0])[block.samples]
+            )
             before = positions[:, -1:]
         return contacts(times, low, slow[:, 1:])
 
@@ -367,7 +371,7 @@ class Feet:
 
     def slips(self, tracks: Tracks, more: float) -> tuple[np.ndarray, np.ndarray]:
         """Rows of joints and samples at which one slides by more than this farther than before, and began to."""
-        rows, samples = [NOWHERE], [NOWHERE]
+        rows, samples = [NO_SAMPLES], [NO_SAMPLES]
         for (row, first, _), before, after in zip(self.spans, self._before, self._ways(tracks), strict=True):
             padded = np.pad(after, 1)
             peaks = (after > before.max() + more) & (after >= padded[:-2]) & (after >= padded[2:])

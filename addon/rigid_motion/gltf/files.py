@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .clips import ALL_CHANNELS, LARGER, NEEDED_CHANNELS, ClipReduction, Options, ReducedClip, kept
+from .clips import ALL_CHANNELS, LARGER_REASON, NEEDED_CHANNELS, ClipReduction, Options, ReducedClip, kept
 from .curves import CurveReduction
 from .documents import Document, GltfError, damage_refused, read_document
 from .errors import World
@@ -22,21 +22,21 @@ from .references import References
 from .rewriting import StoredTrack, amount_before, made_smaller, shown
 from .seen import Seen
 from .sizes import OF_A_BODY, OF_KEY_POSES, joints_of, shells_of, size_of
-from .tracks import PATHS, WEIGHTS, WIDTHS, Clip, Target, read_clips
+from .tracks import NUMBERS_PER_KEY, PATHS, WEIGHTS, Clip, Target, read_clips
 
-MOST = 0.1
+MAX_TOLERANCE_PER_SIZE = 0.1
 """A tolerance above this share of the size is a mistake, mostly of the unit."""
 
-SOME = 1e-3
+SIZELESS_TOLERANCE = 1e-3
 """The tolerance where nothing has a size."""
 
-NOTE = "rigid_motion"
+NOTE_KEY = "rigid_motion"
 """What the tolerance is noted under, in the extras of the asset."""
 
-SINGLE = 1e-6
+SINGLE_EPS = 1e-6
 """What numbers of single precision that are equal may differ by."""
 
-MOVERS = ("VRMC_node_constraint",)
+MOVING_EXTENSIONS = ("VRMC_node_constraint",)
 """Extensions of nodes by which these follow others."""
 
 UNCLEAR = "an extension that is not known here may say where its bytes are, and meshopt moves them: do it without"
@@ -95,10 +95,10 @@ def reduced(document: Document, options: Options) -> Report:
         size = size_of(nodes, seen, _moved(nodes, clips, PATHS), clips)
     tolerance = options.tolerance
     if tolerance is None:
-        tolerance = (OF_KEY_POSES if options.shared else OF_A_BODY) * size or SOME
-    elif tolerance > MOST * size > 0.0:
+        tolerance = (OF_KEY_POSES if options.shared else OF_A_BODY) * size or SIZELESS_TOLERANCE
+    elif tolerance > MAX_TOLERANCE_PER_SIZE * size > 0.0:
         reason = f"a tolerance of {tolerance:.3g} m is more than a tenth of the size, which is {size:.3g} m"
-        return left_alone(f"{reason}: give one below {MOST * size:.2g} m", size)
+        return left_alone(f"{reason}: give one below {MAX_TOLERANCE_PER_SIZE * size:.2g} m", size)
     options = replace(options, tolerance=tolerance)
     # What shows nothing is a library of clips for bodies that may rest in other ways.
     keeps_all = options.channels == ALL_CHANNELS or (options.channels == NEEDED_CHANNELS and not seen.reaches.any())
@@ -123,7 +123,7 @@ def reduced(document: Document, options: Options) -> Report:
         pack = partial(packed, streams=streams) if options.meshopt else None
         changed, chosen = made_smaller(noted, references, tracks, pack)
         larger = tracks.keys() - chosen
-        result = [kept(it.number, it.name, it.before, LARGER) if it.number in larger else it for it in result]
+        result = [kept(it.number, it.name, it.before, LARGER_REASON) if it.number in larger else it for it in result]
         if not (pack or chosen) or changed.size >= before:
             return left_alone("no clip would become smaller", size, result)
         _require_proven(changed, nodes, seen, clips, {number: tracks[number] for number in chosen})
@@ -138,7 +138,7 @@ def unread(nodes: Nodes, clips: Sequence[Clip]) -> str:
         if clip.unread:
             return f"{clip.name} animates {clip.unread}, and what that moves is not known here"
     for number, node in enumerate(nodes.document.json["nodes"]):
-        for mover in MOVERS:
+        for mover in MOVING_EXTENSIONS:
             if mover in node.get("extensions", {}):
                 return f"node {node.get('name', number)} follows others by {mover}, which is not worked out here"
     return ""
@@ -147,7 +147,7 @@ def unread(nodes: Nodes, clips: Sequence[Clip]) -> str:
 def _noted(document: Document) -> float | None:
     """Return the tolerance that an earlier reduction has noted in a document."""
     extras = document.json.get("asset", {}).get("extras")
-    note = extras.get(NOTE) if isinstance(extras, dict) else None
+    note = extras.get(NOTE_KEY) if isinstance(extras, dict) else None
     tolerance = note.get("tolerance") if isinstance(note, dict) else None
     return tolerance if isinstance(tolerance, float) and tolerance > 0.0 else None
 
@@ -158,7 +158,7 @@ def _with_note(document: Document, tolerance: float) -> Document:
     extras = asset.get("extras", {})
     if not isinstance(extras, dict):
         return document
-    noted = {**asset, "extras": {**extras, NOTE: {"tolerance": tolerance}}}
+    noted = {**asset, "extras": {**extras, NOTE_KEY: {"tolerance": tolerance}}}
     return replace(document, json={**document.json, "asset": noted})
 
 
@@ -178,7 +178,7 @@ def _moved_by(nodes: Nodes, clips: Sequence[Clip]) -> dict[Target, set[int]]:
     for clip in clips:
         for track in clip.all_tracks:
             rest, first = nodes.rest_of(track.node, track.path), track.at(track.times[:1])[0]
-            if not (track.is_constant and len(rest) == len(first) and np.allclose(first, rest, atol=SINGLE)):
+            if not (track.is_constant and len(rest) == len(first) and np.allclose(first, rest, atol=SINGLE_EPS)):
                 result[track.node, track.path].add(clip.number)
     return result
 
@@ -222,7 +222,7 @@ def reduce_file(path: Path, output: Path, options: Options) -> Report:
     return report
 
 
-def _moved(nodes: Nodes, clips: Iterable[Clip], paths: Collection[str] = tuple(WIDTHS)) -> np.ndarray:
+def _moved(nodes: Nodes, clips: Iterable[Clip], paths: Collection[str] = tuple(NUMBERS_PER_KEY)) -> np.ndarray:
     """Return the nodes of which clips move one of the paths, and all that hang on them, parents first."""
     targets = {track.node for clip in clips for track in clip.all_tracks if track.path in paths}
     return nodes.below(np.array(sorted(targets), dtype=np.int64))

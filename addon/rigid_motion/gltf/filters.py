@@ -12,27 +12,27 @@ import numpy as np
 
 QUATERNION, EXPONENTIAL = "QUATERNION", "EXPONENTIAL"
 
-RANGE = np.sqrt(0.5)
+MAX_SMALL_COMPONENT = np.sqrt(0.5)
 """No other component of a unit quaternion than the largest is beyond it."""
 
 MOST_BITS, FEWEST_BITS = 15, 4
 """Of a component of a quaternion, so that what is shown says which bits are stored."""
 
-INTEGER = np.iinfo(np.int16).max
+MAX_INT16 = np.iinfo(np.int16).max
 
-MANTISSA = 2**23 - 1
+MAX_MANTISSA = 2**23 - 1
 """The largest, of either sign."""
 
 
 def quaternions_of(elements: np.ndarray) -> np.ndarray:
     """Return normalised integers (count, 4), x, y, z, w, of three components and which is the fourth."""
     given = _typed(elements, "<i2").reshape(-1, 4).astype(np.int64)
-    parts = given[:, :3] / (given[:, 3:] | 3) * RANGE
+    parts = given[:, :3] / (given[:, 3:] | 3) * MAX_SMALL_COMPONENT
     fourth = np.sqrt(np.maximum(1.0 - np.sum(parts**2, axis=1), 0.0))
     places = (given[:, 3:] + np.arange(4)) & 3
     result = np.empty((len(given), 4))
     np.put_along_axis(result, places, np.column_stack((fourth, parts)), axis=1)
-    return np.rint(result * INTEGER).astype("<i2")
+    return np.rint(result * MAX_INT16).astype("<i2")
 
 
 def with_quaternions(values: np.ndarray, bits: int, rank: int = 0) -> np.ndarray:
@@ -43,7 +43,7 @@ def with_quaternions(values: np.ndarray, bits: int, rank: int = 0) -> np.ndarray
     largest = np.argsort(-np.abs(values), axis=1, kind="stable")[:, rank, None]
     turned = np.take_along_axis(values, (largest + np.arange(4)) % 4, axis=1)
     one = 2 ** (bits - 1) - 1
-    parts = np.rint(turned[:, 1:] * np.where(turned[:, :1] < 0.0, -1.0, 1.0) / RANGE * one)
+    parts = np.rint(turned[:, 1:] * np.where(turned[:, :1] < 0.0, -1.0, 1.0) / MAX_SMALL_COMPONENT * one)
     fourth = one & ~3 | largest
     return np.hstack((np.clip(parts, -one, one), fourth)).astype("<i2").view(np.uint8)
 
@@ -56,7 +56,7 @@ def floats_of(elements: np.ndarray) -> np.ndarray:
 
 def with_floats(values: np.ndarray, exponents: np.ndarray | int) -> np.ndarray:
     """Return elements (count, 4 * width) for numbers (count, width), as multiples of powers of 2 (broadcast)."""
-    mantissas = np.clip(np.rint(np.ldexp(values, -np.asarray(exponents))), -MANTISSA, MANTISSA).astype(np.int64)
+    mantissas = np.clip(np.rint(np.ldexp(values, -np.asarray(exponents))), -MAX_MANTISSA, MAX_MANTISSA).astype(np.int64)
     parts = mantissas & 0xFFFFFF | (np.asarray(exponents, dtype=np.int64) & 0xFF) << 24
     return parts.astype("<u4").view(np.uint8)
 
@@ -90,8 +90,8 @@ def _typed(elements: np.ndarray, kind: str) -> np.ndarray:
     return np.ascontiguousarray(elements).view(kind)
 
 
-UNDONE: dict[str, tuple[tuple[int, ...], Callable[[np.ndarray], np.ndarray]]]
-UNDONE = {
+UNDO_BY_FILTER: dict[str, tuple[tuple[int, ...], Callable[[np.ndarray], np.ndarray]]]
+UNDO_BY_FILTER = {
     "NONE": ((), lambda elements: elements),
     "OCTAHEDRAL": ((4, 8), _octahedral),
     QUATERNION: ((8,), quaternions_of),

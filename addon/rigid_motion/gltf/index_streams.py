@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 
-TRIANGLES, INDICES = 0xE1, 0xD1
+TRIANGLE_BYTE, INDEX_BYTE = 0xE1, 0xD1
 """The first bytes of streams."""
 
-TABLE, PADDING = 16, 4
+CODE_TABLE_BYTES, PADDING_BYTES = 16, 4
 """Bytes at the ends of streams of either kind."""
 
-EXPLICIT, MASK = 15, 0xFFFFFFFF
+FULL_CODE, MASK_32 = 15, 0xFFFFFFFF
 
-RECENT = 16
+RECENT_EDGES = 16
 """Edges, and corners, that a triangle may name."""
 
 
@@ -37,7 +37,7 @@ class _Numbers:
             part = self.byte()
             result |= (part & 127) << shift
             if part < 128:
-                return result & MASK
+                return result & MASK_32
         raise ValueError
 
 
@@ -49,13 +49,13 @@ def decoded_indices(data: bytes, count: int, stride: int) -> np.ndarray:
     IndexError, ValueError
         Where the stream is none of so many.
     """
-    numbers, last, result = _Numbers(data, 1, len(data) - PADDING), [0, 0], np.empty(count, dtype=np.uint32)
-    if data[0] != INDICES:
+    numbers, last, result = _Numbers(data, 1, len(data) - PADDING_BYTES), [0, 0], np.empty(count, dtype=np.uint32)
+    if data[0] != INDEX_BYTE:
         raise ValueError
     for place in range(count):
         number = numbers.number()
         step = ~(number >> 2) if number & 2 else number >> 2
-        result[place] = last[number & 1] = last[number & 1] + step & MASK
+        result[place] = last[number & 1] = last[number & 1] + step & MASK_32
     return _as_bytes(result, stride, numbers)
 
 
@@ -67,10 +67,10 @@ def decoded_triangles(data: bytes, count: int, stride: int) -> np.ndarray:
     IndexError, ValueError
         Where the stream is none of so many.
     """
-    end = len(data) - TABLE
+    end = len(data) - CODE_TABLE_BYTES
     codes, table = data[1 : 1 + count // 3], data[end:]
     numbers = _Numbers(data, 1 + count // 3, end)
-    if data[0] != TRIANGLES or count % 3 or len(codes) != count // 3 or numbers.place > end or any(table[-2:]):
+    if data[0] != TRIANGLE_BYTE or count % 3 or len(codes) != count // 3 or numbers.place > end or any(table[-2:]):
         raise ValueError
     following = last = 0
     edges: list[tuple[int, int]] = []
@@ -79,29 +79,29 @@ def decoded_triangles(data: bytes, count: int, stride: int) -> np.ndarray:
 
     def fresh() -> int:
         nonlocal following
-        following = following + 1 & MASK
-        return following - 1 & MASK
+        following = following + 1 & MASK_32
+        return following - 1 & MASK_32
 
     def explicit() -> int:
         nonlocal last
         number = numbers.number()
-        last = last + (~(number >> 1) if number & 1 else number >> 1) & MASK
+        last = last + (~(number >> 1) if number & 1 else number >> 1) & MASK_32
         return last
 
     def corner(part: int) -> tuple[int, bool]:
         """Return what half a byte says, and whether it is a corner that was not recent."""
-        if part == EXPLICIT:
+        if part == FULL_CODE:
             return explicit(), True
         return (corners[-part], False) if part else (fresh(), True)
 
     for code in codes:
         high, low = code >> 4, code & 15
-        if high < EXPLICIT:
+        if high < FULL_CODE:
             a, b = edges[-1 - high]
             if 0 < low < 13:
                 c = corners[-1 - low]
             else:
-                c = fresh() if not low else explicit() if low == EXPLICIT else last + (-1, 1)[low - 13] & MASK
+                c = fresh() if not low else explicit() if low == FULL_CODE else last + (-1, 1)[low - 13] & MASK_32
                 last = c if low in (13, 14) else last
                 corners.append(c)
             edges += [(c, b), (a, c)]
@@ -109,12 +109,12 @@ def decoded_triangles(data: bytes, count: int, stride: int) -> np.ndarray:
             parts = table[low] if low < 14 else numbers.byte()
             if low >= 14 and not parts:
                 following = 0
-            a = explicit() if low == EXPLICIT else fresh()
+            a = explicit() if low == FULL_CODE else fresh()
             (b, has_b), (c, has_c) = corner(parts >> 4), corner(parts & 15)
             edges += [(b, a), (c, b), (a, c)]
             corners += [a, *([b] if has_b else []), *([c] if has_c else [])]
         result += [a, b, c]
-        del edges[:-RECENT], corners[:-RECENT]
+        del edges[:-RECENT_EDGES], corners[:-RECENT_EDGES]
     return _as_bytes(np.array(result, dtype=np.uint32), stride, numbers)
 
 

@@ -15,16 +15,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .accessors import ALIGNED, COMPRESSIONS, raw_numbers, stored_size
-from .attribute_streams import TAILS, VERSIONS, decoded, differences, encoded, encoded_size
+from .accessors import ALIGNMENT_BYTES, COMPRESSIONS, raw_numbers, stored_size
+from .attribute_streams import MIN_TAIL_BYTES, VERSION_BY_FIRST_BYTE, decoded, differences, encoded, encoded_size
 from .documents import Document, GltfError, Json, as_text, data_uri, entry, objects, whole
 from .filters import (
     EXPONENTIAL,
     FEWEST_BITS,
-    INTEGER,
+    MAX_INT16,
     MOST_BITS,
     QUATERNION,
-    UNDONE,
+    UNDO_BY_FILTER,
     floats_of,
     quaternions_of,
     with_floats,
@@ -33,25 +33,25 @@ from .filters import (
 from .index_streams import decoded_indices, decoded_triangles
 from .references import References, other_slots, sampler_slots, view_slots
 
-BINDING = "inverseBindMatrices"
+INVERSE_BINDS = "inverseBindMatrices"
 
-WIDEST = 256
+MAX_ELEMENT_BYTES = 256
 """Bytes of an element at most."""
 
-DENSEST = 1024
+MAX_EXPANSION_RATIO = 1024
 """Bytes that one of compressed ones is at most."""
 
-MOST = 2**30
+MAX_DOCUMENT_BYTES = 2**30
 """Bytes that all of a document may become."""
 
-NONE, ATTRIBUTES = "NONE", "ATTRIBUTES"
+NO_FILTER, ATTRIBUTES_MODE = "NONE", "ATTRIBUTES"
 
 MODES = {"TRIANGLES": decoded_triangles, "INDICES": decoded_indices}
 
 TRANSFORMS = ("translation", "rotation", "scale", "matrix")
 """What a node may have."""
 
-FRAME = 1 + TAILS[0]
+STREAM_OVERHEAD_BYTES = 1 + MIN_TAIL_BYTES[0]
 """Bytes of a stream beside its elements, but for long ones."""
 
 LEAST_EXPONENT = -100
@@ -96,7 +96,7 @@ def unpacked(document: Document) -> tuple[Document, Streams]:
     found = {number: how for number, view in enumerate(views) if (how := _compression(view))}
     if not found:
         return document, Streams()
-    json, data, room, of_meshes = copy.copy(document.json), bytearray(), MOST, _of_meshes(document.json)
+    json, data, room, of_meshes = copy.copy(document.json), bytearray(), MAX_DOCUMENT_BYTES, _of_meshes(document.json)
     streams = Streams(max(name for name, _ in found.values()))
     json["bufferViews"] = list(views)
     for number, (name, own) in found.items():
@@ -114,7 +114,7 @@ def unpacked(document: Document) -> tuple[Document, Streams]:
         }
         streams.known[content] = name, own, stream
         streams.shares[number] = len(stream) / len(content)
-        data += content + bytes(-len(content) % ALIGNED)
+        data += content + bytes(-len(content) % ALIGNMENT_BYTES)
     json["buffers"] = [*objects(json, "buffers"), {"byteLength": len(data)}]
     return replace(document, json=json, buffers=(*document.buffers, bytes(data))), streams
 
@@ -124,7 +124,7 @@ def _of_meshes(json: Json) -> set[int]:
     views = [accessor.get("bufferView") for accessor in objects(json, "accessors")]
     samplers = [sampler for animation in objects(json, "animations") for sampler in objects(animation, "samplers")]
     named = {sampler.get(name) for sampler in samplers for name in ("input", "output")}
-    named |= {skin.get(BINDING) for skin in objects(json, "skins")}
+    named |= {skin.get(INVERSE_BINDS) for skin in objects(json, "skins")}
     needed = {view for number, view in enumerate(views) if number in named}
     return {view for view in views if isinstance(view, int)} - needed
 
@@ -146,27 +146,27 @@ def _stream(document: Document, own: Json, room: int) -> bytes:
     entry(document.json, "buffers", own.get("buffer"))
     source = document.buffers[own["buffer"]]
     first, length = whole(own, "byteOffset", 0), whole(own, "byteLength", least=1)
-    if source is None or first + length > len(source) or size > DENSEST * length:
+    if source is None or first + length > len(source) or size > MAX_EXPANSION_RATIO * length:
         raise GltfError("it says more than it holds")
     return bytes(source[first : first + length])
 
 
 def _content(own: Json, stream: bytes) -> bytes:
     """Return the bytes of a view of its stream."""
-    mode, name = own.get("mode"), own.get("filter", NONE)
+    mode, name = own.get("mode"), own.get("filter", NO_FILTER)
     count, stride = whole(own, "count"), whole(own, "byteStride")
-    strides, undone = UNDONE.get(name, ((), None)) if isinstance(name, str) else ((), None)
-    fits = stride % 4 == 0 and stride <= WIDEST and stride in (strides or (stride,))
+    strides, undone = UNDO_BY_FILTER.get(name, ((), None)) if isinstance(name, str) else ((), None)
+    fits = stride % 4 == 0 and stride <= MAX_ELEMENT_BYTES and stride in (strides or (stride,))
     if mode in MODES:
-        fits = stride in (2, 4) and name == NONE
-    elif mode != ATTRIBUTES or undone is None:
+        fits = stride in (2, 4) and name == NO_FILTER
+    elif mode != ATTRIBUTES_MODE or undone is None:
         raise GltfError("its mode or filter is not known", "export the file without meshopt")
-    if mode == ATTRIBUTES and stream[0] not in VERSIONS:
+    if mode == ATTRIBUTES_MODE and stream[0] not in VERSION_BY_FIRST_BYTE:
         raise GltfError("it is newer than is known here", "export the file without it")
     try:
         if not fits:
             raise ValueError
-        elements = (decoded if mode == ATTRIBUTES else MODES[mode])(stream, count, stride)
+        elements = (decoded if mode == ATTRIBUTES_MODE else MODES[mode])(stream, count, stride)
         with np.errstate(all="ignore"):
             return undone(elements).tobytes() if undone else b""
     except (ArithmeticError, IndexError, ValueError):
@@ -187,10 +187,10 @@ def filtered(numbers: np.ndarray, most: int = 0) -> Packed | None:
     Floats are multiples of 2 to the power of `most`, or of a smaller one.
     """
     numbers = np.ascontiguousarray(numbers)
-    plain = Packed(NONE, numbers.view(np.uint8))
+    plain = Packed(NO_FILTER, numbers.view(np.uint8))
     if numbers.dtype == np.int16 and numbers.shape[1] == 4:
         for bits in range(FEWEST_BITS, MOST_BITS + 1):
-            first, second = (with_quaternions(numbers / INTEGER, bits, rank) for rank in (0, 1))
+            first, second = (with_quaternions(numbers / MAX_INT16, bits, rank) for rank in (0, 1))
             fits = (quaternions_of(first) == numbers).all(axis=1)
             elements = np.where(fits[:, None], first, second)
             if np.array_equal(quaternions_of(elements), numbers):
@@ -262,7 +262,10 @@ def packed_size(arrays: Sequence[np.ndarray], times: Iterable[int]) -> int:
     """Return how many bytes numbers (count, columns), some of which are times, take in streams with others."""
     times = set(times)
     unique = {(n in times, array.dtype.str, array.shape, array.tobytes()): n for n, array in enumerate(arrays)}
-    return sum(encoded_size(it.elements) - FRAME for it in grouped({n: arrays[n] for n in unique.values()}, times))
+    return sum(
+        encoded_size(it.elements) - STREAM_OVERHEAD_BYTES
+        for it in grouped({n: arrays[n] for n in unique.values()}, times)
+    )
 
 
 class _Buffers:
@@ -274,7 +277,7 @@ class _Buffers:
         self.views: list[Json] = []
 
     def put(self, content: bytes) -> Json:
-        self.data += bytes(-len(self.data) % ALIGNED)
+        self.data += bytes(-len(self.data) % ALIGNMENT_BYTES)
         place = {"buffer": 0, "byteLength": len(content)} | ({"byteOffset": len(self.data)} if self.data else {})
         self.data += content
         return place
@@ -286,7 +289,10 @@ class _Buffers:
 
     def add_stream(self, view: Json, name: str, own: Json, stream: bytes) -> int:
         """Add a view that is compressed to a stream, and return its number."""
-        size, offset = own["count"] * own["byteStride"], -(-self.sizes.get(name, 0) // ALIGNED) * ALIGNED
+        size, offset = (
+            own["count"] * own["byteStride"],
+            -(-self.sizes.get(name, 0) // ALIGNMENT_BYTES) * ALIGNMENT_BYTES,
+        )
         number = 1 + list(self.sizes | {name: 0}).index(name)
         self.sizes[name] = offset + size
         place = {"buffer": number, "byteLength": size} | ({"byteOffset": offset} if offset else {})
@@ -302,8 +308,8 @@ def _without_place(view: Json) -> Json:
 def _own(name: str, elements: np.ndarray) -> Json:
     """Return what an extension says of elements that it compresses."""
     count, stride = elements.shape
-    own = {"count": count, "byteStride": stride, "mode": ATTRIBUTES}
-    return own if name == NONE else own | {"filter": name}
+    own = {"count": count, "byteStride": stride, "mode": ATTRIBUTES_MODE}
+    return own if name == NO_FILTER else own | {"filter": name}
 
 
 def packed(document: Document, streams: Streams) -> Document:
@@ -370,7 +376,7 @@ def _repacked(
     view = document.json["bufferViews"][number]
     if (compression := _compression(view)) is not None:  # Damaged, and of a mesh.
         name, own = compression
-        return buffers.add_stream(view, name, own, _stream(document, own, MOST))
+        return buffers.add_stream(view, name, own, _stream(document, own, MAX_DOCUMENT_BYTES))
     data, first, length = document.buffers[view["buffer"]], whole(view, "byteOffset", 0), whole(view, "byteLength")
     if data is None or first + length > len(data):
         raise GltfError(f"view {number} reaches beyond its buffer")
@@ -378,9 +384,9 @@ def _repacked(
     if content in streams.known:
         return buffers.add_stream(view, *streams.known[content])
     stride = _stride(document, view, containers)
-    if stride and not are_indices and stride % 4 == 0 and stride <= WIDEST and length % stride == 0:
+    if stride and not are_indices and stride % 4 == 0 and stride <= MAX_ELEMENT_BYTES and length % stride == 0:
         elements = np.frombuffer(content, np.uint8).reshape(-1, stride)
-        stream, own = encoded(elements), _own(NONE, elements)
+        stream, own = encoded(elements), _own(NO_FILTER, elements)
         if len(stream) + len(as_text({streams.name: own})) < length:
             return buffers.add_stream(view, streams.name, own, stream)
     return buffers.add(view, content)

@@ -16,12 +16,12 @@ from ..motion import Skeleton
 from ..motion.affine import AffineMaps
 from ..motion.quaternions import matrices, normalise
 from .documents import Document, GltfError, Json, entry, objects, shown
-from .tracks import FARTHEST, LINEAR, ROTATION, SCALE, TO_WXYZ, TRANSLATION, WIDTHS, Track, Tracks
+from .tracks import LINEAR, MAX_NUMBER, NUMBERS_PER_KEY, ROTATION, SCALE, TO_WXYZ, TRANSLATION, Track, Tracks
 
-REST = {TRANSLATION: (0.0, 0.0, 0.0), ROTATION: (0.0, 0.0, 0.0, 1.0), SCALE: (1.0, 1.0, 1.0)}
+REST_VALUES = {TRANSLATION: (0.0, 0.0, 0.0), ROTATION: (0.0, 0.0, 0.0, 1.0), SCALE: (1.0, 1.0, 1.0)}
 """Of a node that says nothing."""
 
-DEEPEST = 1000
+MAX_NODE_DEPTH = 1000
 """How many nodes one may hang on."""
 
 
@@ -38,7 +38,7 @@ class Nodes:
         self.document = document
         nodes = objects(document.json, "nodes")
         self.parents = _parents(nodes)
-        self.rest = {path: _rest(nodes, path) for path in WIDTHS}
+        self.rest = {path: _rest(nodes, path) for path in NUMBERS_PER_KEY}
         """Translation (nodes, 3), rotation (nodes, 4) and scale (nodes, 3)."""
         self.matrices = {
             number: _matrix(node["matrix"], number) for number, node in enumerate(nodes) if "matrix" in node
@@ -104,7 +104,7 @@ class Nodes:
         if node in self.matrices:
             matrix = self.matrices[node][None]
             return AffineMaps(matrix[:, :3, :3], matrix[:, :3, 3])
-        translation, rotation, scale = (self.channel(node, path, tracks, times) for path in WIDTHS)
+        translation, rotation, scale = (self.channel(node, path, tracks, times) for path in NUMBERS_PER_KEY)
         axes = np.moveaxis(matrices(rotation), -1, 0) * scale[:, None, :]
         return AffineMaps(axes, translation)
 
@@ -138,14 +138,14 @@ def _parents(nodes: list[Json]) -> np.ndarray:
         deepest = Skeleton(parents).depths.max() if len(nodes) else 0
     except ValueError as error:
         raise GltfError(str(error).replace("joint", "node")) from None
-    if deepest > DEEPEST:
-        raise GltfError(f"more than {DEEPEST} nodes hang on one another", "export a shorter chain")
+    if deepest > MAX_NODE_DEPTH:
+        raise GltfError(f"more than {MAX_NODE_DEPTH} nodes hang on one another", "export a shorter chain")
     return parents
 
 
 def _rest(nodes: list[Json], path: str) -> np.ndarray:
-    rows = [_vector(node.get(path, REST[path]), number, path) for number, node in enumerate(nodes)]
-    result = np.array(rows, dtype=np.float64).reshape(len(nodes), WIDTHS[path])
+    rows = [_vector(node.get(path, REST_VALUES[path]), number, path) for number, node in enumerate(nodes)]
+    result = np.array(rows, dtype=np.float64).reshape(len(nodes), NUMBERS_PER_KEY[path])
     if path != ROTATION:
         return result
     lengths = np.linalg.norm(result, axis=1)
@@ -155,10 +155,10 @@ def _rest(nodes: list[Json], path: str) -> np.ndarray:
 
 
 def _vector(given: object, node: int, name: str, width: int | None = None) -> list[float]:
-    width = width or WIDTHS[name]
+    width = width or NUMBERS_PER_KEY[name]
     numbers = given if isinstance(given, (list, tuple)) else ()
     if len(numbers) != width or not all(
-        isinstance(number, (int, float)) and abs(number) < FARTHEST for number in numbers
+        isinstance(number, (int, float)) and abs(number) < MAX_NUMBER for number in numbers
     ):
         raise GltfError(f"the {name} of node {node} is {shown(given)}, and not {width} numbers")
     return list(numbers)

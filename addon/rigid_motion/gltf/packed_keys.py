@@ -13,36 +13,36 @@ import numpy as np
 
 from ..motion.quaternions import normalise, turned_at
 from .attribute_streams import likely_size
-from .filters import INTEGER, MOST_BITS, RANGE, floats_of, quaternions_of, with_floats, with_quaternions
+from .filters import MAX_INT16, MAX_SMALL_COMPONENT, MOST_BITS, floats_of, quaternions_of, with_floats, with_quaternions
 from .tracks import TO_WXYZ, TO_XYZW
 
-FEW = 0.05
+MAX_MENDED_RATIO = 0.05
 """The share of samples at which keys are too far off, and may be mended."""
 
-FITS, HEAVY, NEARLY = 3, 4.0, 0.8
+MAX_REFITS, FAR_SAMPLE_WEIGHT, FAR_ERROR_RATIO = 3, 4.0, 0.8
 """How often keys are fitted again, and how many times as much samples count then that are so far off, or farther."""
 
-ROUNDS, RARE, FAR = 3, 0.01, 1.6
+MENDING_ROUNDS, MAX_FAR_RATIO, MAX_FAR_ERROR_RATIO = 3, 0.01, 1.6
 """Of mending, the share of samples up to which it is tried, and how far off these may be."""
 
-SWEEPS, TOWARDS = 12, 0.02
+FIT_SWEEPS, KEY_SAMPLE_WEIGHT = 12, 0.02
 """Of a fit, and how much it is drawn to what is shown at a key itself."""
 
 WHOLE_BITS = range(4, MOST_BITS + 1)
 
-EXPONENTS = range(2, -21, -1)
+GRID_EXPONENTS = range(2, -21, -1)
 
-MOVES = [(column, step) for column in range(3) for step in (-1, 1)]
+ROUNDING_MOVES = [(column, step) for column in range(3) for step in (-1, 1)]
 
-SHARED, OWN, SINGLE = "shared", "own", "single"
+SHARED_TIMES, OWN_TIMES, SINGLE_KEY = "shared", "own", "single"
 
 Measure = Callable[[np.ndarray, np.ndarray | slice], np.ndarray]
 """From what is shown at some of the samples (k, width), and which these are, to how far off that is, shape (k,)."""
 
-EVERY = slice(None)
+ALL_SAMPLES = slice(None)
 
 
-class Keys(NamedTuple):
+class PackedKeys(NamedTuple):
     """Keys of a track as they are stored, and what they are worth."""
 
     times: np.ndarray
@@ -58,7 +58,7 @@ class Keys(NamedTuple):
     """About how many bytes the values take."""
 
     kind: str
-    """SHARED with other tracks, OWN or SINGLE."""
+    """SHARED with other tracks, OWN_TIMES or SINGLE_KEY."""
 
 
 def fitted(times: np.ndarray, samples: np.ndarray, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -75,9 +75,9 @@ def fitted(times: np.ndarray, samples: np.ndarray, values: np.ndarray, weights: 
 
     middle, beside = summed(first**2, second**2), np.bincount(segments, weights * first * second, count)[:-1, None]
     result = np.stack([np.interp(times, samples, column) for column in values.T], axis=1)
-    drawn = TOWARDS * middle.mean()
+    drawn = KEY_SAMPLE_WEIGHT * middle.mean()
     right = np.stack([summed(first * column, second * column) for column in values.T], axis=1) + drawn * result
-    for sweep in range(2 * SWEEPS):
+    for sweep in range(2 * FIT_SWEEPS):
         rest = right.copy()
         rest[1:] -= beside * result[:-1]
         rest[:-1] -= beside * result[1:]
@@ -127,14 +127,14 @@ class Aim:
         known = times.tobytes()
         if known not in self._fits:
             weights = np.ones(len(self.samples))
-            for _ in range(FITS):
+            for _ in range(MAX_REFITS):
                 values = fitted(times, self.samples, self.values, weights)
                 values = normalise(values) if self.turns else values
-                off = self.measure(self.between(times, values, self.samples), EVERY)
-                near = off > NEARLY
-                if len(times) == 1 or not near.any() or near.mean() > FEW:
+                off = self.measure(self.between(times, values, self.samples), ALL_SAMPLES)
+                near = off > FAR_ERROR_RATIO
+                if len(times) == 1 or not near.any() or near.mean() > MAX_MENDED_RATIO:
                     break
-                weights[near] *= HEAVY
+                weights[near] *= FAR_SAMPLE_WEIGHT
             self._fits[known] = values, off
         return self._fits[known]
 
@@ -142,12 +142,12 @@ class Aim:
         """Return at which share of the samples keys at these times are too far off."""
         return float((self.fit(times)[1] > 1.0).mean())
 
-    def keys(self, times: np.ndarray, kind: str) -> Keys | None:
+    def keys(self, times: np.ndarray, kind: str) -> PackedKeys | None:
         """Return keys at these times in as few bits as keep to what is allowed, or None."""
         values, off = self.fit(times)
-        if (off > 1.0).mean() > FEW:
+        if (off > 1.0).mean() > MAX_MENDED_RATIO:
             return None
-        choices = WHOLE_BITS if self.turns else EXPONENTS
+        choices = WHOLE_BITS if self.turns else GRID_EXPONENTS
         room = max(1.0 - float(np.quantile(off, 0.9)), 0.1)
         likely = next((n for n, bits in enumerate(choices) if self._rounding(bits) <= room), len(choices) - 1)
         fewer = True
@@ -161,20 +161,20 @@ class Aim:
 
     def _rounding(self, bits: int) -> float:
         """About how far off rounding takes it."""
-        return self.reach * (0.7 * RANGE / (2 ** (bits - 1) - 1) if self.turns else 0.4 * 2.0**bits)
+        return self.reach * (0.7 * MAX_SMALL_COMPONENT / (2 ** (bits - 1) - 1) if self.turns else 0.4 * 2.0**bits)
 
-    def _rounded(self, times: np.ndarray, values: np.ndarray, bits: int, kind: str) -> Keys | None:
+    def _rounded(self, times: np.ndarray, values: np.ndarray, bits: int, kind: str) -> PackedKeys | None:
         elements = with_quaternions(values[:, TO_XYZW], bits) if self.turns else with_floats(values, bits)
         shown = self.between(times, self._played(elements), self.samples)
         if (mended := self._mended(times, elements, shown, bits)) is None:
             return None
         elements = mended
         stored = quaternions_of(elements) if self.turns else floats_of(elements)
-        return Keys(times, stored, shown, likely_size(elements), kind)
+        return PackedKeys(times, stored, shown, likely_size(elements), kind)
 
     def _played(self, elements: np.ndarray) -> np.ndarray:
         if self.turns:
-            return (quaternions_of(elements) / INTEGER)[:, TO_WXYZ]
+            return (quaternions_of(elements) / MAX_INT16)[:, TO_WXYZ]
         return floats_of(elements).astype(np.float64)
 
     def _moved(
@@ -192,11 +192,11 @@ class Aim:
 
     def _mended(self, times: np.ndarray, elements: np.ndarray, shown: np.ndarray, bits: int) -> np.ndarray | None:
         """Return the elements with keys moved near to samples that are too far off; None where some still are."""
-        off, count = self.measure(shown, EVERY), len(times)
-        if count < 3 or off.max() > FAR or (off > 1.0).mean() > RARE:
+        off, count = self.measure(shown, ALL_SAMPLES), len(times)
+        if count < 3 or off.max() > MAX_FAR_ERROR_RATIO or (off > 1.0).mean() > MAX_FAR_RATIO:
             return elements if off.max() <= 1.0 else None
         segments = np.clip(np.searchsorted(times, self.samples, side="right") - 1, 0, count - 2)
-        for turn in range(ROUNDS):
+        for turn in range(MENDING_ROUNDS):
             if off.max() <= 1.0:
                 return elements
             worst = np.zeros(count + 2)
@@ -210,7 +210,7 @@ class Aim:
             (some,) = np.nonzero(near[segments + 1])
             owner = near[segments + 1][some] - 1
             best, least = np.full(len(chosen), -1), own[chosen]
-            for number, (column, step) in enumerate(MOVES):
+            for number, (column, step) in enumerate(ROUNDING_MOVES):
                 played = self._played(self._moved(elements, bits, chosen, column, step))
                 after = np.zeros(len(chosen))
                 np.maximum.at(after, owner, self.measure(self.between(times, played, self.samples[some]), some))
@@ -218,16 +218,18 @@ class Aim:
             better = best >= 0
             if not better.any():
                 return None
-            columns, steps = np.array(MOVES)[best[better]].T
+            columns, steps = np.array(ROUNDING_MOVES)[best[better]].T
             elements = self._moved(elements, bits, chosen[better], columns, steps)
             shown[:] = self.between(times, self._played(elements), self.samples)
-            off = self.measure(shown, EVERY)
+            off = self.measure(shown, ALL_SAMPLES)
         return elements if off.max() <= 1.0 else None
 
-    def finest(self, times: np.ndarray) -> Keys:
+    def finest(self, times: np.ndarray) -> PackedKeys:
         """Return keys at these times as exact as they may be."""
         measure, self.measure = self.measure, lambda shown, _: np.zeros(len(shown))
-        result = self._rounded(times, self.fit(times)[0], (WHOLE_BITS if self.turns else EXPONENTS)[-1], SHARED)
+        result = self._rounded(
+            times, self.fit(times)[0], (WHOLE_BITS if self.turns else GRID_EXPONENTS)[-1], SHARED_TIMES
+        )
         self.measure = measure
         assert result is not None
         return result

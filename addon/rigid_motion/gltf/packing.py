@@ -15,59 +15,59 @@ from functools import cached_property, partial
 import numpy as np
 
 from ..motion.quaternions import align_signs, conjugate, from_matrices, multiply, normalise, rotate
-from .errors import EVEN, PARTS, Feet, World, parted
+from .errors import MAX_EVEN_SCALE_RATIO, PARTS_PER_GAP, Feet, World, parted
 from .meshopt import TIME_EXPONENT, packed_size
-from .packed_keys import FEW, OWN, SHARED, SINGLE, Aim, Keys
+from .packed_keys import MAX_MENDED_RATIO, OWN_TIMES, SHARED_TIMES, SINGLE_KEY, Aim, PackedKeys
 from .settling import on_lines
 from .tracks import ROTATION, SCALE, TRANSLATION, Target, Tracks
 
-STEP = 2.0**-7
+KEY_TIME_STEP_S = 2.0**-7
 """Seconds between most times of keys."""
 
-RATES = [steps * 2.0**-exponent for exponent in range(7, -3, -1) for steps in (4, 5, 6, 7)]
+SAMPLE_STEPS_S = [steps * 2.0**-exponent for exponent in range(7, -3, -1) for steps in (4, 5, 6, 7)]
 """Seconds between samples at even rates, rising."""
 
-SAMPLES = 2 * 10**5
+MAX_SEARCH_SAMPLES = 2 * 10**5
 """Of all nodes together: about so many are looked at in a search."""
 
-FEWER, SUDDEN, RARE = 4, 2.0, 60
+JUMP_FRAME_STRIDE, MIN_JUMP_ERROR_RATIO, FRAMES_PER_JUMP = 4, 2.0, 60
 """A jump is where a track with every fourth frame is so many times as far off as it is nearly everywhere, and among the
 worst of so many frames."""
 
-TINY = 1e-9
+MIN_USUAL_ERROR = 1e-9
 
 OF_TIME = {True: 1.5, False: 0.95}
-"""About how many bytes the time of a key of its own takes, on a frame or on a multiple of STEP."""
+"""About how many bytes the time of a key of its own takes, on a frame or on a multiple of KEY_TIME_STEP_S."""
 
 OF_RATE = 0.8
 """The same of one that tracks share."""
 
-MENDINGS, FULL = 3, 0.9
+MAX_MENDINGS, MENDING_ERROR_RATIO = 3, 0.9
 """How often keys are put in where too few are, and the share of what is allowed from which it is needed."""
 
-SELDOM = 0.01
+MAX_FAR_SAMPLES_RATIO = 0.01
 """The share of samples at which keys of a grid may be too far off before these are rounded."""
 
-HOPEFUL = 1.2
+MAX_SPARSE_BYTES_RATIO = 1.2
 """How many times as many bytes sparse keys may take, and are tried again."""
 
-LOOSER = (1.6, 1.15, 0.8)
+SPARSE_LINE_FACTORS = (1.6, 1.15, 0.8)
 """How much farther off than it may be a line is through sparse keys before these are fitted, in turn."""
 
-SHARES = ((0.4, 0.85), (0.6, 0.92))
+CARRIED_TOLERANCE_RATIOS = ((0.4, 0.85), (0.6, 0.92))
 """The shares of the tolerance that what the root of a body carries may use up, and at most what others carry that turns
 itself, in turn."""
 
 OF_PLACE = 0.5
 """Of that, what a translation may."""
 
-AIM, STRICTER, STRICTEST = 0.985, 0.93, 0.3
+AIMED_TOLERANCE_RATIO, STRICTER_TOLERANCE_RATIO, MIN_TOLERANCE_RATIO = 0.985, 0.93, 0.3
 """The share of the tolerance that is aimed at, and how much smaller it gets, down to what, where the proof fails."""
 
 OF_SLIDE = 0.5
 """The share of what a foot may slide that it may be off while it stands."""
 
-STIFF = 4.0
+TURN_WEIGHT = 4.0
 """How much what turns with a node counts beside where the nodes are that it carries."""
 
 
@@ -93,7 +93,9 @@ class Packing:
         self.tracks = dict(sorted(tracks.items(), key=lambda item: world.rows[item[0][0]]))
         self.fixed, count = fixed, len(world.times) * len(world.moving)
         # With all times that keys may have.
-        self.samples = np.union1d(parted(world.times, max(min(PARTS, SAMPLES // count), 1)), self.bases[0][0])
+        self.samples = np.union1d(
+            parted(world.times, max(min(PARTS_PER_GAP, MAX_SEARCH_SAMPLES // count), 1)), self.bases[0][0]
+        )
         self.truth = world.worlds(world.truth, self.samples)
         self.users: Counter[bytes] = Counter()
         """How many tracks have keys at the same times, by these."""
@@ -109,11 +111,11 @@ class Packing:
 
     @cached_property
     def grids(self) -> list[np.ndarray]:
-        """Times of samples at even rates, the highest first: frames, every second of them..., and RATES."""
+        """Times of samples at even rates, the highest first: frames, every second of them..., and SAMPLE_STEPS_S."""
         first, last, frames = self.frames[0], self.frames[-1], self.frames
         gap = float(np.median(np.diff(frames)))
         even = [frames, *(np.append(frames[:-1:every], last) for every in (2, 3, 4, 5, 6, 8))]
-        rates = [rate for rate in RATES if 1.05 * gap < rate < (last - first) / 2]
+        rates = [rate for rate in SAMPLE_STEPS_S if 1.05 * gap < rate < (last - first) / 2]
         even += [np.append(np.arange(first, last - rate / 8, rate), last) for rate in rates]
         return sorted((np.union1d(times, self.cuts) for times in even), key=lambda times: -len(times))
 
@@ -126,21 +128,21 @@ class Packing:
     def cuts(self) -> np.ndarray:
         """The frames around sudden jumps, which keys at even rates would smooth away."""
         frames, sudden = self.frames, np.zeros(len(self.frames))
-        for target, track in self.tracks.items() if len(frames) > 2 * FEWER else ():
+        for target, track in self.tracks.items() if len(frames) > 2 * JUMP_FRAME_STRIDE else ():
             values = track.at(frames)
             values = align_signs(values) if target[1] == ROTATION else values
             aim = Aim(frames, values, 1.0, partial(_differ, values), target[1] == ROTATION)
-            off = aim.fit(np.append(frames[:-1:FEWER], frames[-1]))[1]
-            sudden = np.maximum(sudden, off / max(np.quantile(off, 0.98), TINY))
-        most = np.sort(sudden)[-max(len(frames) // RARE, 1)]
-        (jumps,) = np.nonzero((sudden > SUDDEN) & (sudden >= most))
+            off = aim.fit(np.append(frames[:-1:JUMP_FRAME_STRIDE], frames[-1]))[1]
+            sudden = np.maximum(sudden, off / max(np.quantile(off, 0.98), MIN_USUAL_ERROR))
+        most = np.sort(sudden)[-max(len(frames) // FRAMES_PER_JUMP, 1)]
+        (jumps,) = np.nonzero((sudden > MIN_JUMP_ERROR_RATIO) & (sudden >= most))
         return frames[np.unique(np.clip(jumps[:, None] + (-1, 0, 1), 0, len(frames) - 1))]
 
     @cached_property
     def bases(self) -> list[tuple[np.ndarray, float]]:
         """Times of which sparse keys have some, and about how many bytes each of them takes."""
         first, last, frames = self.frames[0], self.frames[-1], self.frames
-        steps = np.union1d(np.append(np.arange(first, last - STEP / 8, STEP), last), self.cuts)
+        steps = np.union1d(np.append(np.arange(first, last - KEY_TIME_STEP_S / 8, KEY_TIME_STEP_S), last), self.cuts)
         return [(steps, OF_TIME[False]), (frames, OF_TIME[True])]
 
     @cached_property
@@ -211,29 +213,32 @@ class Packing:
         """Whether rotations alone say how nodes are turned in the world."""
         rest = self.world.nodes.rest[SCALE][self.world.moving]
         scales = [rest, *(track.points for (_, path), track in self.world.truth.items() if path == SCALE)]
-        even = all(bool((np.ptp(some, axis=1) <= EVEN * some.min(axis=1)).all()) for some in scales)
+        even = all(bool((np.ptp(some, axis=1) <= MAX_EVEN_SCALE_RATIO * some.min(axis=1)).all()) for some in scales)
         return even and not self.world.nodes.matrices
 
-    def trials(self) -> Iterator[dict[Target, Keys]]:
+    def trials(self) -> Iterator[dict[Target, PackedKeys]]:
         """Yield keys of all tracks that may keep to the tolerance, the smallest first; then ever more exact ones.
 
         None where no turn makes up for another.
         """
         if not self.may_aim:
             return
-        found = [(self._size(keys := self._trial(shares, AIM)), number, keys) for number, shares in enumerate(SHARES)]
+        found = [
+            (self._size(keys := self._trial(shares, AIMED_TOLERANCE_RATIO)), number, keys)
+            for number, shares in enumerate(CARRIED_TOLERANCE_RATIOS)
+        ]
         for _, _, keys in sorted(found, key=lambda trial: trial[:2]):
             yield keys
-        strict, shares = AIM * STRICTER, SHARES[min(found)[1]]
-        while strict > STRICTEST:
+        strict, shares = AIMED_TOLERANCE_RATIO * STRICTER_TOLERANCE_RATIO, CARRIED_TOLERANCE_RATIOS[min(found)[1]]
+        while strict > MIN_TOLERANCE_RATIO:
             yield self._trial(shares, strict)
-            strict *= STRICTER
+            strict *= STRICTER_TOLERANCE_RATIO
 
-    def _size(self, keys: Mapping[Target, Keys]) -> int:
+    def _size(self, keys: Mapping[Target, PackedKeys]) -> int:
         arrays = [own.times.astype(np.float32)[:, None] for own in keys.values()]
         return packed_size([*arrays, *(own.stored for own in keys.values())], range(len(arrays)))
 
-    def _trial(self, shares: tuple[float, float], strict: float) -> dict[Target, Keys]:
+    def _trial(self, shares: tuple[float, float], strict: float) -> dict[Target, PackedKeys]:
         """Return keys of all tracks, where no node may be farther off than a strict share of the tolerance."""
         world, keys, most = self.world, {}, strict * self.tolerance
         rotations: list[np.ndarray] = []
@@ -324,7 +329,7 @@ class Packing:
         carried = self.carried[row]
         if not carried or not off.any():
             return self.aimed[row]
-        own = STIFF * (radii[row] ** 2 + sum(radii[child] ** 2 for child in carried if not self.turns[child]))
+        own = TURN_WEIGHT * (radii[row] ** 2 + sum(radii[child] ** 2 for child in carried if not self.turns[child]))
         matrix, right = own * np.eye(3)[None], np.zeros_like(off)
         for child in carried:
             bone = origins[child] - origins[row]
@@ -334,54 +339,56 @@ class Packing:
         turn = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
         return normalise(multiply(np.column_stack((np.ones(len(off)), turn / 2.0)), self.aimed[row]))
 
-    def _best(self, target: Target, aim: Aim) -> Keys:
+    def _best(self, target: Target, aim: Aim) -> PackedKeys:
         """Return the keys that take the fewest bytes, of those that are tried.
 
         What carries others that turn has keys on frames alone: those have to make up for it on frames.
         """
         one, row = self.frames[:1], self.world.rows[target[0]]
-        if not aim.failing(one) and (own := aim.keys(one, SINGLE)) is not None:
+        if not aim.failing(one) and (own := aim.keys(one, SINGLE_KEY)) is not None:
             return own
         is_free = not any(self.turns[child] for child in self.carried[row])
         found, low, grids = [], 0, self.grids if is_free else self.of_frames
         high = len(grids)
         while low < high:  # How many of the grids are fine enough.
             middle = (low + high) // 2
-            low, high = (middle + 1, high) if aim.failing(grids[middle]) < SELDOM else (low, middle)
-        found += [(aim.keys(times, SHARED), self._dear(times)) for times in grids[max(low - 4, 0) : low]]
+            low, high = (middle + 1, high) if aim.failing(grids[middle]) < MAX_FAR_SAMPLES_RATIO else (low, middle)
+        found += [(aim.keys(times, SHARED_TIMES), self._dear(times)) for times in grids[max(low - 4, 0) : low]]
         found += self._mended(aim, grids, low)
         if self.sparse.setdefault(target, True):
             found += self._sparse(aim, self.bases if is_free else self.bases[1:])
         good = [(own.size + dear, own) for own, dear in found if own is not None]
         if not good:
-            return aim.keys(self.samples[::2], OWN) or aim.finest(self.frames)
+            return aim.keys(self.samples[::2], OWN_TIMES) or aim.finest(self.frames)
         least, best = min(good, key=lambda one: one[0])
-        self.sparse[target] = min((size for size, own in good if own.kind == OWN), default=np.inf) <= HOPEFUL * least
+        self.sparse[target] = (
+            min((size for size, own in good if own.kind == OWN_TIMES), default=np.inf) <= MAX_SPARSE_BYTES_RATIO * least
+        )
         return best
 
-    def _mended(self, aim: Aim, grids: list[np.ndarray], low: int) -> Iterator[tuple[Keys | None, float]]:
+    def _mended(self, aim: Aim, grids: list[np.ndarray], low: int) -> Iterator[tuple[PackedKeys | None, float]]:
         """Yield keys of grids that are too coarse in few places, with all frames there, as `_sparse` does."""
         high = len(grids)
         while low < high:
             middle = (low + high) // 2
-            low, high = (middle + 1, high) if aim.failing(grids[middle]) < FEW else (low, middle)
+            low, high = (middle + 1, high) if aim.failing(grids[middle]) < MAX_MENDED_RATIO else (low, middle)
         for times in grids[max(low - 2, 0) : low]:
-            for _ in range(MENDINGS):
-                places = np.searchsorted(self.frames, self.samples[aim.fit(times)[1] > FULL])
+            for _ in range(MAX_MENDINGS):
+                places = np.searchsorted(self.frames, self.samples[aim.fit(times)[1] > MENDING_ERROR_RATIO])
                 near = np.unique(np.clip(places[:, None] + (-2, -1, 0, 1), 0, len(self.frames) - 1))
                 times = np.union1d(times, self.frames[near])
-                if (own := aim.keys(times, OWN)) is not None:
+                if (own := aim.keys(times, OWN_TIMES)) is not None:
                     yield own, OF_TIME[False] * len(times)
                     break
 
-    def _sparse(self, aim: Aim, bases: list[tuple[np.ndarray, float]]) -> Iterator[tuple[Keys | None, float]]:
+    def _sparse(self, aim: Aim, bases: list[tuple[np.ndarray, float]]) -> Iterator[tuple[PackedKeys | None, float]]:
         """Yield sparse keys, and about how many bytes their times take."""
         for base, each in bases:
             values = aim.at(base)
             values = align_signs(values) if aim.turns else values
-            for looser in LOOSER:
+            for looser in SPARSE_LINE_FACTORS:
                 times = base[on_lines(base, values, lambda off: aim.reach * np.linalg.norm(off, axis=1), looser)]
-                if (own := aim.keys(times, OWN)) is not None:
+                if (own := aim.keys(times, OWN_TIMES)) is not None:
                     yield own, each * len(times)
                     break
 

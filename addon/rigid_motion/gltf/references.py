@@ -16,21 +16,21 @@ from typing import Any
 from .documents import Json, objects
 from .tracks import moves_node
 
-INSTANCES = "EXT_mesh_gpu_instancing"
+INSTANCING_EXTENSION = "EXT_mesh_gpu_instancing"
 
-KNOWN = re.compile(
+KNOWN_REFERENCES = re.compile(
     "KHR_(?:materials_.*|texture_(?:transform|basisu)|lights_punctual|mesh_quantization|animation_pointer|xmp|xmp_json_ld"
     "|node_(?:visibility|selectability|hoverability)|draco_mesh_compression|meshopt_compression|techniques_webgl)"
-    f"|EXT_(?:texture_(?:webp|avif)|lights_image_based|meshopt_compression)|{INSTANCES}"
+    f"|EXT_(?:texture_(?:webp|avif)|lights_image_based|meshopt_compression)|{INSTANCING_EXTENSION}"
     "|MSFT_(?:lod|texture_dds|packing_.*)|FB_ngon_encoding|VRM"
     "|VRMC_(?:vrm|vrm_animation|node_constraint|springBone|springBone_extended_collider|materials_.*)"
 )
-"""Extensions that name no accessors but by `INSTANCES`, and views as `bufferView` alone."""
+"""Extensions that name no accessors but by `INSTANCING_EXTENSION`, and views as `bufferView` alone."""
 
-ELSEWHERE = -1
+NO_ANIMATION = -1
 """What is no animation, or a channel that moves no node."""
 
-NUMBERS = re.compile(r"(?<!\d)\d{1,9}(?!\d)")
+NUMBER_PATTERN = re.compile(r"(?<!\d)\d{1,9}(?!\d)")
 
 Slot = tuple[Json, str]
 """A place that names something: what it is in, and by which key."""
@@ -55,7 +55,7 @@ def other_slots(json: Json) -> Iterator[Slot]:
         if "inverseBindMatrices" in skin:
             yield skin, "inverseBindMatrices"
     for node in objects(json, "nodes"):
-        attributes = node.get("extensions", {}).get(INSTANCES, {}).get("attributes", {})
+        attributes = node.get("extensions", {}).get(INSTANCING_EXTENSION, {}).get("attributes", {})
         yield from ((attributes, name) for name in attributes)
 
 
@@ -81,8 +81,8 @@ def unknown(part: Any) -> Iterator[Any]:
             extensions = part.get("extensions")
             extensions = extensions if isinstance(extensions, dict) else {}
             waiting += [below for name, below in part.items() if name not in ("extensions", "extras")]
-            waiting += [content for name, content in extensions.items() if KNOWN.fullmatch(name)]
-            yield from (content for name, content in extensions.items() if not KNOWN.fullmatch(name))
+            waiting += [content for name, content in extensions.items() if KNOWN_REFERENCES.fullmatch(name)]
+            yield from (content for name, content in extensions.items() if not KNOWN_REFERENCES.fullmatch(name))
         elif isinstance(part, list):
             waiting += part
 
@@ -97,11 +97,11 @@ class References:
         """Whether such an extension says where bytes are."""
         self._look_at(list(unknown(json)))
         self.users: dict[int, set[int]] = defaultdict(set)
-        """By the number of an accessor: the animations where tracks may take its place, and ELSEWHERE."""
+        """By the number of an accessor: the animations where tracks may take its place, and NO_ANIMATION."""
         for container, key in other_slots(json):
-            self.users[container[key]].add(ELSEWHERE)
+            self.users[container[key]].add(NO_ANIMATION)
         for number in self.unclear:
-            self.users[number].add(ELSEWHERE)
+            self.users[number].add(NO_ANIMATION)
         for number, animation in enumerate(objects(json, "animations")):
             samplers, channels = objects(animation, "samplers"), objects(animation, "channels")
             stay = {channel.get("sampler") for channel in channels if not moves_node(channel["target"])}
@@ -109,7 +109,7 @@ class References:
                 for key in ("input", "output"):
                     self.users[sampler[key]].add(number)
                     if sampler_number in stay:
-                        self.users[sampler[key]].add(ELSEWHERE)
+                        self.users[sampler[key]].add(NO_ANIMATION)
 
     def _look_at(self, waiting: list[Any]) -> None:
         while waiting:
@@ -120,6 +120,6 @@ class References:
             elif isinstance(part, list):
                 waiting += part
             elif isinstance(part, str):
-                self.unclear.update(map(int, NUMBERS.findall(part)))
+                self.unclear.update(map(int, NUMBER_PATTERN.findall(part)))
             elif isinstance(part, (int, float)) and not isinstance(part, bool) and part == int(part):
                 self.unclear.add(int(part))

@@ -23,10 +23,10 @@ import numpy as np
 from ..motion.quaternions import normalise
 from .accessors import GrowingView, denormalised, parts_of, stored_size
 from .documents import Document, FileBytes, Json, as_text, data_uri, is_data, objects, whole
-from .references import ELSEWHERE, References, Slot, other_slots, sampler_slots, unknown, view_slots
-from .tracks import CUBICSPLINE, LINEAR, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, WIDTHS, Clip, Track, moves_node
+from .references import NO_ANIMATION, References, Slot, other_slots, sampler_slots, unknown, view_slots
+from .tracks import CUBICSPLINE, LINEAR, NUMBERS_PER_KEY, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, Clip, Track, moves_node
 
-ALIGNED = 8
+ALIGNMENT_BYTES = 8
 """Bytes go out of buffers in multiples of it, so that what stays is aligned as it was."""
 
 Range = tuple[int, int]
@@ -35,10 +35,10 @@ Range = tuple[int, int]
 Ranges = dict[int, list[Range]]
 """By the number of a buffer."""
 
-INTEGER = np.iinfo(np.int16).max
+MAX_INT16 = np.iinfo(np.int16).max
 """What stands for 1 where 16-bit integers are normalised."""
 
-NUMBER, SHORT = 4, 2
+FLOAT_BYTES, SHORT_BYTES = 4, 2
 """Bytes."""
 
 
@@ -99,7 +99,7 @@ class _Rewriting:
         of_accessors = [(slot, number) for number, part in enumerate(self.accessors) for slot in view_slots(part)]
         owners = {id(container): number for (container, _), number in of_accessors}
         for container, key in view_slots(self.json):
-            self.view_users[container[key]].append(owners.get(id(container), ELSEWHERE))
+            self.view_users[container[key]].append(owners.get(id(container), NO_ANIMATION))
         for number, animation_tracks in tracks.items():
             self._put(objects(self.json, "animations")[number], animation_tracks)
         self.used_after = Counter(container[key] for container, key in sampler_slots(self.json))
@@ -211,7 +211,7 @@ class _Rewriting:
             contents[buffer] = _without(contents[buffer], cuts[buffer])
         view = self.view.json
         view |= {"buffer": target, "byteLength": len(self.view.data)}
-        padded = contents[target] + bytes(-len(contents[target]) % ALIGNED)
+        padded = contents[target] + bytes(-len(contents[target]) % ALIGNMENT_BYTES)
         if padded:
             view["byteOffset"] = len(padded)
         if self.view.data:
@@ -219,7 +219,7 @@ class _Rewriting:
         else:
             self.views.pop()
         for buffer in changed:
-            contents[buffer] = contents[buffer] or bytes(ALIGNED)
+            contents[buffer] = contents[buffer] or bytes(ALIGNMENT_BYTES)
             described = self.json["buffers"][buffer]
             described["byteLength"] = len(contents[buffer])
             if is_data(described.get("uri")):
@@ -236,7 +236,7 @@ class _Rewriting:
         for number, view in enumerate(self.views[:-1]):
             first, end = _range(view)
             users, spans = set(self.view_users.get(number, ())), list(_spans(view))
-            shared = users & self.unused and ELSEWHERE not in users and number not in self.references.unclear
+            shared = users & self.unused and NO_ANIMATION not in users and number not in self.references.unclear
             if number in removed:
                 goes[view["buffer"]].append((first, end))
             elif not shared or len(spans) > 1:
@@ -314,13 +314,16 @@ def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
     goes, stays = np.cumsum(counts, axis=1) > 0
     free = goes & ~stays
     # Padding between two ranges that go, which nothing names, goes with them.
-    free[1:-1] |= ~stays[1:-1] & free[:-2] & free[2:] & (np.diff(offsets)[1:] < ALIGNED)
+    free[1:-1] |= ~stays[1:-1] & free[:-2] & free[2:] & (np.diff(offsets)[1:] < ALIGNMENT_BYTES)
     result: list[Range] = []
     for first, end in zip(offsets[:-1][free[:-1]].tolist(), offsets[1:][free[:-1]].tolist(), strict=True):
         if result and result[-1][1] == first:
             first = result.pop()[0]
         result.append((first, end))
-    aligned = [(-(-first // ALIGNED) * ALIGNED, end // ALIGNED * ALIGNED) for first, end in result]
+    aligned = [
+        (-(-first // ALIGNMENT_BYTES) * ALIGNMENT_BYTES, end // ALIGNMENT_BYTES * ALIGNMENT_BYTES)
+        for first, end in result
+    ]
     return [(first, end) for first, end in aligned if first < end]
 
 
@@ -358,7 +361,7 @@ def stored(track: Track, *, integers: bool) -> StoredTrack:
     values = track.values[..., TO_XYZW] if track.path == ROTATION else track.values
     values = values.reshape(-1, 1 if track.path == WEIGHTS else values.shape[-1])
     if integers and track.path == ROTATION and track.interpolation == LINEAR:
-        values = np.rint(normalise(values) * INTEGER).astype(np.int16)
+        values = np.rint(normalise(values) * MAX_INT16).astype(np.int16)
     else:
         values = values.astype(np.float32)
     return StoredTrack(track.channel, track.interpolation, track.times.astype(np.float32), values)
@@ -377,7 +380,7 @@ def shown(track: Track, stored: StoredTrack) -> Track:
 
 def key_size(path: str, *, integers: bool) -> int:
     """Return the bytes of the value of a key of rotation or translation."""
-    return (SHORT if integers and path == ROTATION else NUMBER) * WIDTHS[path]
+    return (SHORT_BYTES if integers and path == ROTATION else FLOAT_BYTES) * NUMBERS_PER_KEY[path]
 
 
 def amount(tracks: Iterable[StoredTrack]) -> Amount:
@@ -397,7 +400,7 @@ def amount_before(
     animation = document.json["animations"][clip.number]
     samplers = [animation["samplers"][animation["channels"][track.channel]["sampler"]] for track in clip.tracks]
     accessors = {sampler[key] for sampler in samplers for key in ("input", "output")}
-    own = [number for number in accessors if ELSEWHERE not in references.users[number]]
+    own = [number for number in accessors if NO_ANIMATION not in references.users[number]]
     packed = [(shares or {}).get(document.json["accessors"][number].get("bufferView"), 1.0) for number in own]
     size = sum(stored_size(document.json, number) * share for number, share in zip(own, packed, strict=True))
     return Amount(sum(len(track.times) for track in clip.tracks), round(size))

@@ -15,15 +15,15 @@ from ..motion import Poses, SeparateKeys, Skeleton, reduce_skeleton_keys
 from ..motion.bodies import Body
 from ..motion.quaternions import align_signs, from_matrices
 from ..motion.skeleton_stretches import Run, keys_in_stretches
-from .accessors import EVERY
+from .accessors import ALL_ROWS
 from .errors import World
 from .tracks import ROTATION, TRANSLATION, Tracks
 
-MODE = "lerp_slerp"
+GLTF_MODE = "lerp_slerp"
 """What glTF calls LINEAR."""
 
 
-class Search:
+class NodeSearch:
     """The nodes of a world as a body.
 
     Parameters
@@ -44,13 +44,15 @@ class Search:
         """Return the samples that are keys of each node."""
         world = self.world
         if len(world.stretches) == 1:
-            keys = self._reduced(EVERY, tolerance=tolerance, separate=True, fixed=self.fixed)
+            keys = self._reduced(ALL_ROWS, tolerance=tolerance, separate=True, fixed=self.fixed)
             return cast(tuple[SeparateKeys, ...], keys)
         skeleton, free = Skeleton(world.parents), ~self.fixed
 
         def part(some: slice) -> Body:
             poses = self.poses(some)
-            return Body(world.times[some], poses, skeleton, MODE, world.radii, np.broadcast_to(1.0, poses.shape), free)
+            return Body(
+                world.times[some], poses, skeleton, GLTF_MODE, world.radii, np.broadcast_to(1.0, poses.shape), free
+            )
 
         keys = keys_in_stretches(part, tolerance, True, world.stretches, self.run)
         return cast(tuple[SeparateKeys, ...], keys)
@@ -62,7 +64,7 @@ class Search:
 
     def so_many_key_poses(self, count: int, weights: np.ndarray) -> np.ndarray:
         """Return the samples that are keys of all nodes, whose errors count so many times (n, m)."""
-        return self._shared(EVERY, budget=min(count, len(self.world.times)), weights=weights)
+        return self._shared(ALL_ROWS, budget=min(count, len(self.world.times)), weights=weights)
 
     def _shared(self, samples: slice, **options: Any) -> np.ndarray:
         return cast(np.ndarray, self._reduced(samples, shared=True, **options)[0])
@@ -70,7 +72,7 @@ class Search:
     def _reduced(self, samples: slice, **options: Any) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
         world = self.world
         times, poses = world.times[samples], self.poses(samples)
-        return reduce_skeleton_keys(times, poses, world.parents, MODE, radius=world.radii, **options)
+        return reduce_skeleton_keys(times, poses, world.parents, GLTF_MODE, radius=world.radii, **options)
 
     def poses(self, samples: slice) -> Poses:
         """Return those of the nodes at some of the moments."""

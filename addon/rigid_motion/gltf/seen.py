@@ -17,13 +17,13 @@ import numpy as np
 
 from ..motion.affine import AffineMaps
 from ..motion.quaternions import matrices, normalise
-from .accessors import COMPRESSIONS, EVERY, KINDS, denormalised, numbers, raw_numbers
+from .accessors import ALL_ROWS, COMPRESSIONS, NUMBER_TYPES, denormalised, numbers, raw_numbers
 from .documents import Document, GltfError, Json, entry, objects
 from .nodes import Nodes
-from .references import INSTANCES
+from .references import INSTANCING_EXTENSION
 from .tracks import CUBICSPLINE, TO_WXYZ, WEIGHTS, Clip, Track
 
-OVERSHOOT = 4.0 / 27.0
+MAX_CUBIC_OVERSHOOT = 4.0 / 27.0
 """How far a cubic leaves its end values, at most, for a tangent of 1 at one end."""
 
 
@@ -133,7 +133,7 @@ def _largest_weights(nodes: Nodes, number: int, tracks: list[Track]) -> np.ndarr
         result = np.maximum(result, values.max(axis=0))
         if track.interpolation == CUBICSPLINE:
             gaps, tangents = np.diff(track.times)[:, None], np.abs(track.values[:])
-            beyond = OVERSHOOT * gaps * (tangents[:-1, 2] + tangents[1:, 0])
+            beyond = MAX_CUBIC_OVERSHOOT * gaps * (tangents[:-1, 2] + tangents[1:, 0])
             result = np.maximum(result, (np.maximum(values[:-1], values[1:]) + beyond).max(axis=0))
     return result
 
@@ -145,7 +145,7 @@ def _carried(document: Document, number: int, primitive: Json) -> Iterator[tuple
     """
     node = document.json["nodes"][number]
     if "skin" not in node:
-        yield number, EVERY, _instances(document, node)
+        yield number, ALL_ROWS, _instances(document, node)
         return
     skin = entry(document.json, "skins", node["skin"])
     joints = np.array(skin["joints"], dtype=np.int64)
@@ -157,7 +157,7 @@ def _carried(document: Document, number: int, primitive: Json) -> Iterator[tuple
     names = [name for name in attributes if name.startswith("JOINTS_")]
     if any(_is_compressed(document, attributes[name]) for name in names):
         # Any joint may carry all of it.
-        yield from ((joint, EVERY, maps[[row], None]) for row, joint in enumerate(joints.tolist()))
+        yield from ((joint, ALL_ROWS, maps[[row], None]) for row, joint in enumerate(joints.tolist()))
     elif names:
         of_joints = np.hstack([raw_numbers(document, attributes[name]) for name in names]).astype(np.int64)
         shares = np.hstack([numbers(document, attributes[name.replace("JOINTS", "WEIGHTS")]) for name in names])
@@ -171,12 +171,12 @@ def _carried(document: Document, number: int, primitive: Json) -> Iterator[tuple
 
 
 def _has_instances(node: Json) -> bool:
-    return isinstance(node.get("extensions"), dict) and INSTANCES in node["extensions"]
+    return isinstance(node.get("extensions"), dict) and INSTANCING_EXTENSION in node["extensions"]
 
 
 def _instances(document: Document, node: Json) -> AffineMaps:
     """Where instances of a node's mesh are in its space, shape (instances, 1); itself, where there are none."""
-    attributes = node["extensions"][INSTANCES]["attributes"] if _has_instances(node) else {}
+    attributes = node["extensions"][INSTANCING_EXTENSION]["attributes"] if _has_instances(node) else {}
     given = {name: numbers(document, accessor) for name, accessor in attributes.items() if not name.startswith("_")}
     count = max(map(len, given.values()), default=1)
     axes = np.tile(np.eye(3), (count, 1, 1))
@@ -202,5 +202,5 @@ def _points(document: Document, accessor: object) -> np.ndarray:
         return numbers(document, accessor)
     ends = np.array([described["min"], described["max"]], dtype=np.float64)
     if described.get("normalized") is True:
-        ends = denormalised(ends.astype(KINDS[described["componentType"]]))
+        ends = denormalised(ends.astype(NUMBER_TYPES[described["componentType"]]))
     return corners_of(*ends)

@@ -14,13 +14,13 @@ import numpy as np
 from .errors import World
 from .tracks import CUBICSPLINE, LINEAR, ROTATION, SCALE, STEP, TRANSLATION, WEIGHTS, Target, Track
 
-TIME = 4
+TIME_BYTES = 4
 """Bytes of a key's time."""
 
 AT_ONCE = 2**13
 """Samples that are looked at in one go."""
 
-NOISE = 0.01
+MAX_CONSTANT_RATIO = 0.01
 """A channel that changes by less than this share of the tolerance is constant."""
 
 OF_CHANNELS = 0.1
@@ -29,15 +29,15 @@ OF_CHANNELS = 0.1
 WITHIN_WEIGHTS = 0.005
 """How far off weights of morph targets may be: half a percent of the whole target."""
 
-WIDE = np.radians(15.0)
+MAX_GAP_TURN_RAD = np.radians(15.0)
 """A gap between samples in which a node turns farther is halved: what hangs on it runs in a bow."""
 
-BOW = 0.02
+MAX_BOW_RATIO = 0.02
 """The share of the tolerance by which a spline may leave the line between two samples."""
 
-HALVINGS = 8
+MAX_GAP_HALVINGS = 8
 
-DEAR = 20
+MIN_SAMPLES_PER_SPLINE_KEY = 20
 """Samples for each key of a spline: one that needs more takes fewer bytes as a spline than as lines."""
 
 Measure = Callable[[np.ndarray], np.ndarray]
@@ -103,7 +103,7 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
     def saved(first: int) -> np.ndarray:
         """Return the bytes that each other group needs less together with this one."""
         needed_by_first, needed_by_others = counts - both[first], counts[first] - both[first]
-        result = TIME * both[first] - sizes[first] * needed_by_first - sizes * needed_by_others
+        result = TIME_BYTES * both[first] - sizes[first] * needed_by_first - sizes * needed_by_others
         result[[number == first or not group for number, group in enumerate(groups)]] = -np.inf
         return result
 
@@ -124,7 +124,7 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
     return result
 
 
-class Channel:
+class SettledChannel:
     """A track, and how much of what is allowed differences of its values are, at moments between which it runs evenly.
 
     Parameters
@@ -141,13 +141,13 @@ class Channel:
         self.is_curved = track.interpolation == CUBICSPLINE
         self.times, self.stays = track.times, False
         """Whether it stays a spline."""
-        for _ in range(HALVINGS if track.interpolation != STEP else 0):
+        for _ in range(MAX_GAP_HALVINGS if track.interpolation != STEP else 0):
             halved = self._halved(track.at(self.times))
             middles = ((self.times[:-1] + self.times[1:]) / 2)[halved].astype(np.float32).astype(np.float64)
             more = np.union1d(self.times, middles)
             if len(more) == len(self.times):
                 break
-            self.times, self.stays = more, self.is_curved and len(more) > DEAR * len(track.times)
+            self.times, self.stays = more, self.is_curved and len(more) > MIN_SAMPLES_PER_SPLINE_KEY * len(track.times)
             if self.stays:
                 self.times = track.times
                 break
@@ -163,13 +163,13 @@ class Channel:
         if self.track.path == ROTATION:
             cosines = np.einsum("ij,ij->i", values[1:], values[:-1])
             # A spline that passes near 0 comes out on the other side: nearly a whole turn in no time.
-            result = (cosines if self.is_curved else np.abs(cosines)) < np.cos(WIDE / 2)
+            result = (cosines if self.is_curved else np.abs(cosines)) < np.cos(MAX_GAP_TURN_RAD / 2)
         for share in (0.25, 0.5, 0.75) if self.is_curved else ():
             line = (1.0 - share) * values[:-1] + share * values[1:]
             if self.track.path == ROTATION:
                 line /= np.linalg.norm(line, axis=1, keepdims=True)
             there = self.track.at((1.0 - share) * self.times[:-1] + share * self.times[1:])
-            result |= self.measured(there - line) > BOW
+            result |= self.measured(there - line) > MAX_BOW_RATIO
         return result
 
     def is_at(self, value: np.ndarray, values: np.ndarray) -> bool:
@@ -180,7 +180,7 @@ class Channel:
         if self.track.path == ROTATION:
             # Of both signs, for noise is smaller than what is left of 1 less a cosine.
             off = np.minimum(off, self.measured(values + value))
-        return float(off.max()) <= NOISE
+        return float(off.max()) <= MAX_CONSTANT_RATIO
 
     def measured(self, differences: np.ndarray) -> np.ndarray:
         """How far what the node carries, and what hangs on it, is moved by differences (m, width), of the tolerance."""
@@ -207,7 +207,7 @@ class Channel:
         return np.where(result > 0.0, result, 1.0)
 
 
-def settled(channels: Iterable[Channel], needed: Container[Target]) -> dict[Target, Track | None]:
+def settled(channels: Iterable[SettledChannel], needed: Container[Target]) -> dict[Target, Track | None]:
     """Return the tracks that need no search, and what takes their places: None where the node rests.
 
     Those that are needed keep a key there as well.

@@ -21,10 +21,10 @@ OF_A_BODY = 0.003
 OF_KEY_POSES = 0.02
 """The same for key poses, which are to be few: 35 mm."""
 
-SHELL = 0.03 / 1.7
+MIN_BALL_RADIUS_RATIO = 0.03 / 1.7
 """The least radius of a node's ball, of the size: three centimetres of a grown-up."""
 
-TURN = np.radians(0.5)
+SIZELESS_TURN_RAD = np.radians(0.5)
 """How far off rotations may be where nothing has a size."""
 
 
@@ -62,8 +62,10 @@ def shells_of(nodes: Nodes, moved: np.ndarray, size: float, tolerance: float) ->
     that rotations are kept within an angle.
     """
     if not size:
-        return np.full(len(moved), tolerance / TURN)
-    return np.array([size if shines(nodes.document.json["nodes"][node]) else SHELL * size for node in moved])
+        return np.full(len(moved), tolerance / SIZELESS_TURN_RAD)
+    return np.array(
+        [size if shines(nodes.document.json["nodes"][node]) else MIN_BALL_RADIUS_RATIO * size for node in moved]
+    )
 
 
 def shines(node: dict) -> bool:

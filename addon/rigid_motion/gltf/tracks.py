@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 
 from ..motion.quaternions import normalise, turned_at
-from .accessors import EVERY, MOST_ZEROS, Rows, numbers
+from .accessors import ALL_ROWS, MOST_ZEROS, Rows, numbers
 from .documents import Document, GltfError, Json, bytes_of, entry, objects, shown
 
 TRANSLATION, ROTATION, SCALE, WEIGHTS = PATHS = ("translation", "rotation", "scale", "weights")
 
 LINEAR, STEP, CUBICSPLINE = INTERPOLATIONS = ("LINEAR", "STEP", "CUBICSPLINE")
 
-WIDTHS = {TRANSLATION: 3, ROTATION: 4, SCALE: 3}
+NUMBERS_PER_KEY = {TRANSLATION: 3, ROTATION: 4, SCALE: 3}
 """Numbers of a key."""
 
 TO_WXYZ, TO_XYZW = [3, 0, 1, 2], [1, 2, 3, 0]
@@ -33,7 +33,7 @@ AT_ONCE = 2**14
 MOST_SHARED = 4
 """Numbers of all tracks together, for each byte of a file: a key of 16-bit integers that eight tracks share."""
 
-FARTHEST = 1e30
+MAX_NUMBER = 1e30
 """Numbers beyond it are damage: their squares would be no floats in single precision."""
 
 
@@ -130,7 +130,7 @@ class Track:
         return result + (3 * s**2 - 2 * s**3) * self.values[keys + 1, 1] + (s**3 - s**2) * into
 
 
-POINTER = re.compile(r"/nodes/(\d{1,9})/(translation|rotation|scale|weights)")
+NODE_POINTER = re.compile(r"/nodes/(\d{1,9})/(translation|rotation|scale|weights)")
 
 MAY_MOVE = re.compile(r"/(nodes|meshes|skins)/(?!.*/extensions/)")
 """Pointers of which what is seen may depend."""
@@ -195,7 +195,7 @@ def _clip(document: Document, number: int, times: dict[int, np.ndarray], most: i
         if not isinstance(target, dict):
             raise GltfError(f"{shown(name)}: channel {index} has no target")
         pointer = _pointer(target)
-        known = POINTER.fullmatch(pointer)
+        known = NODE_POINTER.fullmatch(pointer)
         if not moves_node(target) and not known:
             unread = unread or (pointer if MAY_MOVE.match(pointer) else "")
             continue
@@ -239,14 +239,14 @@ def _track(
         known[given] = _times(document, given)
     times, values = known[given], numbers(document, sampler.get("output"))
     width, uneven = divmod(values.size, len(times) * (3 if interpolation == CUBICSPLINE else 1))
-    if uneven or not width or width != WIDTHS.get(path, width) or (path == WEIGHTS) != (values.shape[1] == 1):
+    if uneven or not width or width != NUMBERS_PER_KEY.get(path, width) or (path == WEIGHTS) != (values.shape[1] == 1):
         raise GltfError(f"{len(values)} values do not fit {len(times)} keys of {path}")
     if interpolation == CUBICSPLINE and len(times) < 2:
         raise GltfError("a spline needs two keys at least")
-    if np.abs(values).max() > FARTHEST:
+    if np.abs(values).max() > MAX_NUMBER:
         raise GltfError("it has numbers that are too large")
     shape: tuple[int, ...] = (3, width) if interpolation == CUBICSPLINE else (width,)
-    rows = Rows(document, sampler["output"], len(times), shape, TO_WXYZ if path == ROTATION else EVERY)
+    rows = Rows(document, sampler["output"], len(times), shape, TO_WXYZ if path == ROTATION else ALL_ROWS)
     track = Track(index, node, path, interpolation, times, rows)
     if path == ROTATION and not np.linalg.norm(track.points, axis=1).all():
         raise GltfError("it has a quaternion of length zero")
@@ -262,7 +262,7 @@ def _times(document: Document, number: object) -> np.ndarray:
     if times.shape[1] != 1:
         raise GltfError("its times are no single numbers")
     times = times[:, 0]
-    if np.abs(times).max() > FARTHEST:
+    if np.abs(times).max() > MAX_NUMBER:
         raise GltfError("it has numbers that are too large")
     (cuts,), rising = np.nonzero(np.diff(times) == 0.0), times.copy()
     rising[cuts] = np.nextafter(times[cuts].astype(np.float32), -np.float32(np.inf))

@@ -25,21 +25,21 @@ from ..motion.eulers import ORDERS
 from ..motion.humanoid import SPINE, alignments, beside, humanoid_bones, plain_name
 from ..motion.poses import inverse, placed
 from ..motion.quaternions import conjugate, from_matrices, multiply, rotate
-from ..streams import Body
+from ..streams import StreamBody
 
-MARK = "rigid_motion_live"
+DRIVEN_MARK = "rigid_motion_live"
 """The property of an object that was made for a body: the body's name."""
 
-SIZE = 0.1
+AXES_LENGTH_M = 0.1
 """Metres of the axes that stand for a rigid body, and of bones that end nowhere."""
 
-TRIED = 0.5
+TRIAL_TURN_RAD = 0.5
 """Radians by which a control is turned to see what follows it."""
 
-MOVED = 1e-3
+MIN_FOLLOWING_RAD = 1e-3
 """The angle in radians from which on something that turns has followed."""
 
-SWITCHES = ("IK_FK", "neck_follow", "head_follow")
+RIG_SWITCHES = ("IK_FK", "neck_follow", "head_follow")
 """Properties of Rigify's rigs: at 1 limbs do what their bones are turned to,
 and what hangs on others follows them as a whole."""
 
@@ -148,7 +148,7 @@ class Driver:
     unit = 1.0
     """Metres, of `locals` and `ends`."""
 
-    def __init__(self, obj: bpy.types.Object, body: Body) -> None:
+    def __init__(self, obj: bpy.types.Object, body: StreamBody) -> None:
         self.name, self.body = obj.name, body
 
     @property
@@ -199,7 +199,7 @@ class RigDriver(Driver):
         Which bone each joint moves.
     """
 
-    def __init__(self, obj: bpy.types.Object, body: Body, pairs: Mapping[str, str]) -> None:
+    def __init__(self, obj: bpy.types.Object, body: StreamBody, pairs: Mapping[str, str]) -> None:
         super().__init__(obj, body)
         bones = pose_bones(obj)
         joints = [joint for joint in body.joints if pairs.get(joint, "") in bones]
@@ -257,26 +257,26 @@ class RigDriver(Driver):
         return placed(self._offsets, Poses(slides, values.quaternions))
 
 
-def object_of(label: str, body: Body) -> bpy.types.Object | None:
+def object_of(label: str, body: StreamBody) -> bpy.types.Object | None:
     """Return the object that stands for a body, made where it is missing; None for as long as none can be made."""
     for obj in scene().objects:
-        if obj.get(MARK) == label and (obj.type == "ARMATURE") == (len(body.joints) > 1):
+        if obj.get(DRIVEN_MARK) == label and (obj.type == "ARMATURE") == (len(body.joints) > 1):
             return obj
     if len(body.joints) > 1:
         return _new_armature(label, body)
     obj = bpy.data.objects.new(label, None)
-    obj.empty_display_type, obj.empty_display_size = "ARROWS", SIZE
+    obj.empty_display_type, obj.empty_display_size = "ARROWS", AXES_LENGTH_M
     return _linked(obj, label)
 
 
 def _linked(obj: bpy.types.Object, label: str) -> bpy.types.Object:
-    obj[MARK] = label
+    obj[DRIVEN_MARK] = label
     obj.rotation_mode = "QUATERNION"
     scene().collection.objects.link(obj)
     return obj
 
 
-def _new_armature(label: str, body: Body) -> bpy.types.Object | None:
+def _new_armature(label: str, body: StreamBody) -> bpy.types.Object | None:
     """Return an armature with a bone for each joint, at rest as the joint is.
     Blender makes bones in Edit Mode alone.
     """
@@ -294,7 +294,7 @@ def _new_armature(label: str, body: Body) -> bpy.types.Object | None:
         reach = children.mean(axis=0) - place if len(children) else np.zeros(3)
         if np.linalg.norm(reach) < 1e-4:
             reach = (place - rest.positions[parent]) * 0.5 if parent >= 0 else np.zeros(3)
-        bone.head, bone.tail = place, place + (reach if np.linalg.norm(reach) > 1e-4 else (0.0, 0.0, SIZE))
+        bone.head, bone.tail = place, place + (reach if np.linalg.norm(reach) > 1e-4 else (0.0, 0.0, AXES_LENGTH_M))
         bone.parent = bones[parent] if parent >= 0 else None
     bpy.ops.object.mode_set(mode="OBJECT")
     armature(obj).display_type = "STICK"
@@ -307,7 +307,7 @@ def _new_armature(label: str, body: Body) -> bpy.types.Object | None:
 def clear(obj: bpy.types.Object, bones: Iterable[str]) -> None:
     """Have nothing on these bones of a rig, and its switches such that it follows them."""
     for bone in pose_bones(obj):
-        for switch in SWITCHES:
+        for switch in RIG_SWITCHES:
             if bone.get(switch) is not None:
                 bone[switch] = 1.0
     for name in bones:
@@ -337,12 +337,12 @@ def _space(obj: bpy.types.Object, bones: list[str]) -> tuple[Poses, np.ndarray]:
     placed = _placed(obj, bones)
     for row in rows.values() if unsure else ():
         # What hangs on a control by way of constraints is found out by turning the control.
-        _set(pose_bones(obj)[bones[row]], None, (np.cos(TRIED / 2), np.sin(TRIED / 2), 0.0, 0.0))
+        _set(pose_bones(obj)[bones[row]], None, (np.cos(TRIAL_TURN_RAD / 2), np.sin(TRIAL_TURN_RAD / 2), 0.0, 0.0))
         view_layer().update()
         turned = _placed(obj, bones).quaternions
         for other in unsure:
             cosine = abs(float(placed.quaternions[other] @ turned[other]))
-            if other != row and 2.0 * np.arccos(min(cosine, 1.0)) > MOVED:
+            if other != row and 2.0 * np.arccos(min(cosine, 1.0)) > MIN_FOLLOWING_RAD:
                 follows[other] = row
         _set(pose_bones(obj)[bones[row]], None, (1.0, 0.0, 0.0, 0.0))
     if unsure:

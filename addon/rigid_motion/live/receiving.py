@@ -19,8 +19,8 @@ import numpy as np
 from ..blender import existing, persistent, scene, view_layer
 from ..motion import Poses
 from ..motion.poses import placed
-from ..streams import Body, Keys, Receiver
-from ..streams.playing import Held, Stream
+from ..streams import ReceivedKeys, Receiver, StreamBody
+from ..streams.playing import HeldPoses, Stream
 from ..streams.vmc import VMC
 from .driving import Driver, Hand, RigDriver, object_of, seen_hand
 from .recording import Take
@@ -36,12 +36,12 @@ InHands = tuple[list[tuple[str, str] | None], Poses]
 MOST_AHEAD = 64
 """Messages of a body whose keys wait to be shown."""
 
-Pairs = Callable[[Body, bpy.types.Object], Mapping[str, str]]
+Pairs = Callable[[StreamBody, bpy.types.Object], Mapping[str, str]]
 """The bone of a rig that each joint of a body moves."""
 
 
 @dataclass(frozen=True)
-class Settings:
+class ReceivingSettings:
     """What is asked for."""
 
     delay: float
@@ -62,7 +62,7 @@ class _Heard:
     """A body of a stream."""
 
     label: str
-    body: Body
+    body: StreamBody
     stream: Stream
     driver: Driver | None = None
     is_gone: bool = False
@@ -72,7 +72,7 @@ class _Heard:
     """The poses that are shown of it, shape (joints,), and by the sender's clock when that was."""
     moment: float = 0.0
 
-    held: Held | None = None
+    held: HeldPoses | None = None
     """The joint that holds it, and its pose there."""
     seen: Poses | None = None
     """Where it is shown (joints,): what is held, in the hand of the rig."""
@@ -104,7 +104,7 @@ class _Recording:
 class Listening:
     """A port that is listened to. Raises OSError where it is taken, and NotAllowed."""
 
-    def __init__(self, host: str, port: int, settings: Callable[[], Settings], pairs: Pairs) -> None:
+    def __init__(self, host: str, port: int, settings: Callable[[], ReceivingSettings], pairs: Pairs) -> None:
         self._settings, self._pairs = settings, pairs
         check_access(host)
         self._port = Port(host, port)
@@ -152,7 +152,7 @@ class Listening:
             self._keep(keys)
         self._heard = {which: it for which, it in self._heard.items() if which in shown or it.take}
 
-    def _heard_of(self, which: Which, body: Body, present: Container[Which]) -> _Heard:
+    def _heard_of(self, which: Which, body: StreamBody, present: Container[Which]) -> _Heard:
         """Return what is known of a body. It has a label of its own;
         a sender that begins again goes on with its old one.
         """
@@ -231,7 +231,7 @@ class Listening:
             if heard.driver is not None and heard.seen is not None:
                 heard.driver.show(heard.seen)
 
-    def look_anew(self, for_all: bool = False) -> None:
+    def choose_drivers(self, for_all: bool = False) -> None:
         """Choose anew what shows each body, of those whose object is gone as well where asked to."""
         for heard in self._heard.values():
             heard.driver, heard.is_gone = None, heard.is_gone and not for_all
@@ -273,7 +273,7 @@ class Listening:
         frames = recording.first_frame + (moments - heard.origin) * recording.frames_a_second
         take.add(frames, poses, numbers, grips)
 
-    def _keep(self, keys: Keys) -> None:
+    def _keep(self, keys: ReceivedKeys) -> None:
         """Record keys, or have those at hand that are not shown yet: a recording may begin before they are."""
         for name, poses in keys.poses.items():
             heard = self._heard.get((keys.stream, name))
@@ -307,7 +307,7 @@ class Listening:
 
 @persistent
 def _on_undo(*_: object) -> None:
-    running.thing.look_anew(for_all=True)
+    running.thing.choose_drivers(for_all=True)
 
 
 @persistent
@@ -325,7 +325,7 @@ def listening() -> Listening | None:
     return running.thing
 
 
-def start(host: str, port: int, settings: Callable[[], Settings], pairs: Pairs) -> Listening:
+def start(host: str, port: int, settings: Callable[[], ReceivingSettings], pairs: Pairs) -> Listening:
     """Listen to a port, and to nothing else any more. Raises OSError where it is taken, and NotAllowed."""
     return running.start(lambda: Listening(host, port, settings, pairs))
 

@@ -13,22 +13,22 @@ import bpy
 import numpy as np
 
 from ..animation import Refused, hold_keys, set_mode, write_channel
-from ..animation.evaluation.runs import SOON
+from ..animation.evaluation.runs import PASS_LEAD_FRAMES
 from ..blender import existing
 from ..motion import Poses, reduce_skeleton_keys
 from ..motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
 from ..motion.poses import aligned, joined
-from ..streams.bodies import RADIUS
-from ..streams.paths import Path
+from ..streams.bodies import DEFAULT_RADIUS_M
+from ..streams.paths import KnotPath
 from .driving import Driver, Hand, holder_of
 
-STRETCH = 60
+STRETCH_SAMPLES = 60
 """Samples that are thinned together: a second of most senders. It begins and ends with keys."""
 
-STILL = 1e-6
+MIN_KEYED_CHANGE = 1e-6
 """The least change that takes more than a single key."""
 
-PLAIN = "lerp_slerp"
+PLAIN_MODE = "lerp_slerp"
 """The mode that thinning goes by where keys are to have Blender's own in-betweens."""
 
 
@@ -80,8 +80,8 @@ class Take:
         self._poses = poses if self._poses is None else joined((self._poses, poses), axis=1)
         self._numbers = np.concatenate((self._numbers, numbers[later]))
         self._grips = grips if self._grips is None else joined((self._grips, grips), axis=1)
-        while self._tolerance is not None and len(self._frames) > STRETCH:
-            self._take(STRETCH + 1)
+        while self._tolerance is not None and len(self._frames) > STRETCH_SAMPLES:
+            self._take(STRETCH_SAMPLES + 1)
 
     def _take(self, count: int) -> None:
         """Make keys of so many frames. The last of them is the first of the next stretch."""
@@ -95,8 +95,8 @@ class Take:
         """Return the samples that are keys, of each channel."""
         if self._tolerance is None or len(frames) < 3:
             return [np.arange(len(frames))] * len(values)
-        driver, mode = self.driver, PLAIN if self._mode == "BLENDER" else self._mode
-        poses, radii = aligned(driver.locals(values)), np.maximum(driver.ends, RADIUS / driver.unit)
+        driver, mode = self.driver, PLAIN_MODE if self._mode == "BLENDER" else self._mode
+        poses, radii = aligned(driver.locals(values)), np.maximum(driver.ends, DEFAULT_RADIUS_M / driver.unit)
         tolerance = self._tolerance / driver.unit
         kept = reduce_skeleton_keys(frames, poses, driver.follows, mode, tolerance=tolerance, radius=radii, tries=0)
         return [np.union1d(rows, (0, len(frames) - 1)) for rows in kept]
@@ -155,8 +155,8 @@ def _apart(frames: np.ndarray, numbers: np.ndarray, poses: Poses) -> tuple[np.nd
     """Return frames (n,) and poses (joints, n) of which the last in each hand is so long before the first in the next
     that Blender does not take both for one key.
     """
-    last, path = np.flatnonzero(np.diff(numbers)), Path(frames, poses)
-    until, poses = np.minimum(frames[last], frames[last + 1] - SOON), poses.copy()
+    last, path = np.flatnonzero(np.diff(numbers)), KnotPath(frames, poses)
+    until, poses = np.minimum(frames[last], frames[last + 1] - PASS_LEAD_FRAMES), poses.copy()
     poses[:, last] = path.at(until)
     return np.minimum(frames, np.append(until, np.inf)[np.searchsorted(last, np.arange(len(frames)))]), poses
 
@@ -167,7 +167,10 @@ def _of_all(keys: list[tuple[np.ndarray, Poses]]) -> tuple[np.ndarray, Poses]:
     """
     frames, once = np.unique(np.concatenate([frames for frames, _ in keys]), return_index=True)
     poses = aligned(joined([poses for _, poses in keys])[once])
-    is_still = np.ptp(poses.positions, axis=0).max() < STILL and np.ptp(poses.quaternions, axis=0).max() < STILL
+    is_still = (
+        np.ptp(poses.positions, axis=0).max() < MIN_KEYED_CHANGE
+        and np.ptp(poses.quaternions, axis=0).max() < MIN_KEYED_CHANGE
+    )
     return (frames[:1], poses[:1]) if is_still else (frames, poses)
 
 

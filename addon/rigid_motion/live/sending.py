@@ -16,7 +16,7 @@ from .sockets import Outlet, check_access
 from .ticking import Ticking
 
 
-class Sending:
+class LiveSending:
     """Objects that are sent to an address. Raises OSError where that is none, and NotAllowed."""
 
     def __init__(self, host: str, port: int, objects: Iterable[bpy.types.Object]) -> None:
@@ -68,14 +68,14 @@ def _bones(obj: bpy.types.Object) -> Poses:
 running = Ticking("What is selected cannot be sent")
 
 
-def sending() -> Sending | None:
+def sending() -> LiveSending | None:
     """Return what is sent, if anything is."""
     return running.thing
 
 
-def start(host: str, port: int, objects: Iterable[bpy.types.Object]) -> Sending:
+def start(host: str, port: int, objects: Iterable[bpy.types.Object]) -> LiveSending:
     """Send objects, and nothing else any more. Raises OSError where the address is none, and NotAllowed."""
-    return running.start(lambda: Sending(host, port, objects))
+    return running.start(lambda: LiveSending(host, port, objects))
 
 
 def stop() -> None:

@@ -12,11 +12,11 @@ import socket
 from contextlib import suppress
 from typing import Self, cast
 
-LONGEST = 65535
+MAX_DATAGRAM_BYTES = 65535
 MOST_AT_ONCE = 2048
 """Datagrams that one look at a socket takes out of it: a flood does not stop the viewport."""
 
-PENDING = [1 << bits for bits in range(23, 15, -1)]
+PENDING_BYTES = [1 << bits for bits in range(23, 15, -1)]
 """Bytes that may wait to be looked at, where a viewport is slow: as many as the system allows."""
 
 Address = tuple[str, int]
@@ -68,7 +68,7 @@ class Port:
 
     def _allow_pending(self) -> None:
         """Set how many bytes may be pending: Linux takes what is allowed of what is asked for, others refuse it."""
-        for size in PENDING:
+        for size in PENDING_BYTES:
             with suppress(OSError):
                 self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, size)
                 return
@@ -84,7 +84,7 @@ class Port:
         result: list[tuple[bytes, Address]] = []
         for _ in range(MOST_AT_ONCE):
             try:
-                data, (host, port, *_) = self._socket.recvfrom(LONGEST)
+                data, (host, port, *_) = self._socket.recvfrom(MAX_DATAGRAM_BYTES)
             except BlockingIOError:
                 break
             except OSError:

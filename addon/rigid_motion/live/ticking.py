@@ -14,7 +14,7 @@ from ..handlers import append_handlers, remove_handlers
 
 log = logging.getLogger(__package__)
 
-RATE = 60
+TICKS_PER_S = 60
 """Ticks a second."""
 
 
@@ -66,4 +66,4 @@ class Ticking:
             self.stop()
             self.trouble = str(error)
             return None
-        return 1.0 / RATE
+        return 1.0 / TICKS_PER_S

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .measures import NEWTON_STEPS, TINY
+from .measures import NEWTON_STEPS, ZERO_LENGTH
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,13 +102,13 @@ def ball_displacement(maps: AffineMaps, truth: AffineMaps, radii: np.ndarray) ->
     squares, pulls = sizes**2, sizes * offsets
     # One number squared may be rounded otherwise than as one of several.
     gaps = squares[0] - squares
-    least = np.maximum((pulls - gaps).max(axis=0), TINY)
+    least = np.maximum((pulls - gaps).max(axis=0), ZERO_LENGTH)
     above = least
     for _ in range(NEWTON_STEPS):
         shares = pulls / (above + gaps)
         squared = np.einsum("i...,i...->...", shares, shares)
         slope = np.einsum("i...,i...->...", shares, shares / (above + gaps))
-        above = np.maximum(above + squared / np.maximum(slope, TINY) * (np.sqrt(squared) - 1.0), least)
+        above = np.maximum(above + squared / np.maximum(slope, ZERO_LENGTH) * (np.sqrt(squared) - 1.0), least)
     shares = np.minimum(pulls / (above + gaps), 1.0)
     # What is left of the length goes along the longest axis.
     rest = np.einsum("i...,i...->...", shares[1:], shares[1:])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-REACH = 3
+BLOCK_DIAGONALS = 3
 """Diagonals on either side, and rows of a block."""
 
 
@@ -37,20 +37,20 @@ class Banded:
     """
 
     def __init__(self, diagonal: np.ndarray, coefficients: np.ndarray, weights: np.ndarray) -> None:
-        self._count, blocks = len(diagonal), -(-len(diagonal) // REACH)
-        diagonals = np.zeros((REACH + 1, REACH * blocks))
+        self._count, blocks = len(diagonal), -(-len(diagonal) // BLOCK_DIAGONALS)
+        diagonals = np.zeros((BLOCK_DIAGONALS + 1, BLOCK_DIAGONALS * blocks))
         diagonals[0, self._count :] = 1.0
         diagonals[0, : self._count] = diagonal
-        for apart in range(REACH + 1):
-            for first in range(REACH + 1 - apart):
+        for apart in range(BLOCK_DIAGONALS + 1):
+            for first in range(BLOCK_DIAGONALS + 1 - apart):
                 products = weights * coefficients[:, first] * coefficients[:, first + apart]
                 diagonals[apart, first : first + len(weights)] += products
-        own, next_ = np.zeros((2, blocks, REACH, REACH))
-        for row in range(REACH):
-            for column in range(REACH):
-                own[:, row, column] = diagonals[abs(row - column), min(row, column) :: REACH]
+        own, next_ = np.zeros((2, blocks, BLOCK_DIAGONALS, BLOCK_DIAGONALS))
+        for row in range(BLOCK_DIAGONALS):
+            for column in range(BLOCK_DIAGONALS):
+                own[:, row, column] = diagonals[abs(row - column), min(row, column) :: BLOCK_DIAGONALS]
                 if column <= row:
-                    next_[:, row, column] = diagonals[column + REACH - row, row::REACH]
+                    next_[:, row, column] = diagonals[column + BLOCK_DIAGONALS - row, row::BLOCK_DIAGONALS]
         self._levels: list[_Level] = []
         next_ = next_[:-1]
         while len(own) > 1:
@@ -65,9 +65,9 @@ class Banded:
 
     def solve(self, sides: np.ndarray) -> np.ndarray:
         """Return x of A x = b, for right-hand sides of shape (n, k)."""
-        padded = np.zeros((REACH * -(-self._count // REACH), sides.shape[1]))
+        padded = np.zeros((BLOCK_DIAGONALS * -(-self._count // BLOCK_DIAGONALS), sides.shape[1]))
         padded[: self._count] = sides
-        blocks, odd = padded.reshape(-1, REACH, sides.shape[1]), []
+        blocks, odd = padded.reshape(-1, BLOCK_DIAGONALS, sides.shape[1]), []
         for level in self._levels:
             odd.append(blocks[1::2])
             blocks = blocks[0::2].copy()
@@ -83,7 +83,7 @@ class Banded:
 
     def inverse_diagonals(self) -> np.ndarray:
         """Return the diagonal of the inverse and the three above it, shape (4, n): [k, i] is in row i, column i + k."""
-        own, across = self._last, np.zeros((0, REACH, REACH))
+        own, across = self._last, np.zeros((0, BLOCK_DIAGONALS, BLOCK_DIAGONALS))
         for level in self._levels[::-1]:
             before, behind = level.before, level.behind
             some, after = len(behind), slice(1, 1 + len(behind))
@@ -94,12 +94,14 @@ class Banded:
             to_middle[:some] -= across[:some] @ behind.swapaxes(1, 2)
             across = _woven(to_middle, -before[:some] @ across[:some] - behind @ own[after])
             own = _woven(own, middle)
-        diagonals = np.zeros((REACH + 1, REACH * len(own)))
-        for row in range(REACH):
-            for apart in range(REACH + 1):
+        diagonals = np.zeros((BLOCK_DIAGONALS + 1, BLOCK_DIAGONALS * len(own)))
+        for row in range(BLOCK_DIAGONALS):
+            for apart in range(BLOCK_DIAGONALS + 1):
                 column = row + apart
-                source = own if column < REACH else across
-                diagonals[apart, row : row + REACH * len(source) : REACH] = source[:, row, column % REACH]
+                source = own if column < BLOCK_DIAGONALS else across
+                diagonals[apart, row : row + BLOCK_DIAGONALS * len(source) : BLOCK_DIAGONALS] = source[
+                    :, row, column % BLOCK_DIAGONALS
+                ]
         return diagonals[:, : self._count]
 
 

@@ -18,10 +18,10 @@ from .measures import shell_error
 from .modes import KEYFRAME_MODES, interpolate, mode_named
 from .poses import Poses, numbers, of_each
 
-ALIKE = 1e-6
+MAX_SAME_ERROR_RATIO = 1e-6
 """Errors that differ by less than this share are the same: those of modes that are one motion do."""
 
-ROUNDING = 1e-12
+MAX_ROUNDING_RATIO = 1e-12
 """The same for errors compared with how far the motion gets."""
 
 
@@ -98,7 +98,7 @@ def best_modes(
     errors = np.stack(
         [shell_error(interpolate(times[keys], poses[keys], times[samples], mode), truth, radius) for mode in modes]
     )
-    rounding = ROUNDING * (float(np.abs(truth.positions).max()) + radius)
+    rounding = MAX_ROUNDING_RATIO * (float(np.abs(truth.positions).max()) + radius)
     allowed = None if tolerance is None else tolerance + rounding
     return tuple(modes[best] for best in least_errors(errors, keys - keys[0], rounding, allowed))
 
@@ -125,7 +125,7 @@ def least_errors(
     keys : array of int, shape (k,)
         The samples that are keys, rising from 0.
     rounding : float
-        Errors that differ by no more than this are the same, or by a share of `ALIKE`.
+        Errors that differ by no more than this are the same, or by a share of `MAX_SAME_ERROR_RATIO`.
     tolerance : float, optional
         The largest error at any sample. What passes it is out, unless everything does.
 
@@ -141,7 +141,7 @@ def least_errors(
         excluded = peaks > tolerance
         rms[excluded & ~excluded.all(axis=0)] = np.inf
     best = rms.min(axis=0)
-    return _fewest_changes(rms <= best * (1.0 + ALIKE) + rounding)
+    return _fewest_changes(rms <= best * (1.0 + MAX_SAME_ERROR_RATIO) + rounding)
 
 
 def _fewest_changes(acceptable: np.ndarray) -> np.ndarray:

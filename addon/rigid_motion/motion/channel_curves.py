@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import numpy as np
 
-STEEPEST = 3.0
+MAX_SLOPE_RATIO = 3.0
 """How many times steeper than the line from key to key a cubic may be at either end without leaving their range."""
 
-UNLOCKED = 2
+MAX_UNLOCKED_SLOPES = 2
 """How often Blender lets go of a slope at its limit, at most."""
 
 
@@ -70,7 +70,7 @@ class _Runs:
         (chord, lower), (next_chord, upper) = before, after
         sign = np.sign(chord)
         diagonal, right = 2.0 * (lower + upper), 3.0 * sign * (chord * lower + next_chord * upper)
-        most = STEEPEST * np.minimum(np.abs(chord), np.abs(next_chord))
+        most = MAX_SLOPE_RATIO * np.minimum(np.abs(chord), np.abs(next_chord))
         locked, at, unlocks = np.zeros(len(sign), dtype=bool), np.zeros(len(sign)), np.zeros(len(sign), dtype=int)
         while True:
             slopes = self._solved(lower, diagonal, upper, right, locked, at)
@@ -78,7 +78,7 @@ class _Runs:
             # In runs where any are too steep only those are held at their limit.
             held = high | (low & ~self._any(high))
             pull = right - diagonal * slopes - self._beside(lower, upper, slopes)
-            loose = locked & (unlocks < UNLOCKED) & ~self._any(high | low)
+            loose = locked & (unlocks < MAX_UNLOCKED_SLOPES) & ~self._any(high | low)
             loose &= ((pull > 0.0) & (slopes < most)) | ((pull < 0.0) & (slopes > 0.0))
             if not (held.any() or loose.any()):
                 return sign * slopes

@@ -8,7 +8,7 @@ from numbers import Integral, Real
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .poses import LIMIT, SHORTEST, Poses, numbers
+from .poses import MAX_ABS, MIN_TIME_GAP, Poses, numbers
 
 KEYS_WANTED = "give rising numbers of samples, as reduce_keys and decimate return them, or a mask of all samples"
 
@@ -23,9 +23,9 @@ def check_times(times: np.ndarray, whose: str = "") -> None:
     """Raise a ValueError that names the first of some times (n,) that is not later than the one before it."""
     if times.ndim != 1:
         raise ValueError(f"times of shape {times.shape}: give one row of them, in seconds")
-    if not (finite := np.abs(times) < LIMIT).all():
-        raise ValueError(f"{whose}sample {int(np.argmin(finite))} has a time that is not finite, or beyond {LIMIT:g}")
-    if np.any(early := np.diff(times) <= SHORTEST):
+    if not (finite := np.abs(times) < MAX_ABS).all():
+        raise ValueError(f"{whose}sample {int(np.argmin(finite))} has a time that is not finite, or beyond {MAX_ABS:g}")
+    if np.any(early := np.diff(times) <= MIN_TIME_GAP):
         raise ValueError(f"{whose}sample {int(np.argmax(early)) + 1} is not later than the one before it")
 
 
@@ -35,12 +35,12 @@ def check_recording(times: np.ndarray, poses: Poses, whose: str = "") -> None:
     if times.shape != poses.shape or times.ndim != 1:
         raise ValueError(f"{times.size} times do not fit poses of shape {poses.shape}: one object has a row of each")
     numbers = np.column_stack((times, poses.positions, poses.quaternions))
-    finite = (np.abs(numbers) < LIMIT).all(axis=1)
+    finite = (np.abs(numbers) < MAX_ABS).all(axis=1)
     if not finite.all():
-        raise ValueError(f"{whose}sample {int(np.argmin(finite))} is not finite, or has a number beyond {LIMIT:g}")
+        raise ValueError(f"{whose}sample {int(np.argmin(finite))} is not finite, or has a number beyond {MAX_ABS:g}")
     if not (turns := poses.quaternions.any(axis=1)).all():
         raise ValueError(f"{whose}sample {int(np.argmin(turns))} has a quaternion of length zero")
-    if poses.scales is not None and not (sound := (poses.scales > 1.0 / LIMIT) & (poses.scales < LIMIT)).all():
+    if poses.scales is not None and not (sound := (poses.scales > 1.0 / MAX_ABS) & (poses.scales < MAX_ABS)).all():
         raise ValueError(f"{whose}sample {int(np.argmin(sound))} has a scale that is not a positive number")
     check_times(times, whose)
 
@@ -113,14 +113,16 @@ def check_wishes(tolerance: float | None, budget: int | None, tries: int) -> Non
 
 def check_tolerance(tolerance: float) -> None:
     """Raise a TypeError where the tolerance is no number, a ValueError where it is no length."""
-    if not 1.0 / LIMIT < number(tolerance, "tolerance") < LIMIT:
-        raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / LIMIT:g} to {LIMIT:g}")
+    if not 1.0 / MAX_ABS < number(tolerance, "tolerance") < MAX_ABS:
+        raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / MAX_ABS:g} to {MAX_ABS:g}")
 
 
 def check_radius(radius: float) -> None:
     """Raise a TypeError where the shell's radius is no number, a ValueError where it is no length, nor 0."""
-    if not (1.0 / LIMIT < (given := number(radius, "radius")) < LIMIT or given == 0.0):
-        raise ValueError(f"a radius of {radius} is no length: give 0, or a number from {1.0 / LIMIT:g} to {LIMIT:g}")
+    if not (1.0 / MAX_ABS < (given := number(radius, "radius")) < MAX_ABS or given == 0.0):
+        raise ValueError(
+            f"a radius of {radius} is no length: give 0, or a number from {1.0 / MAX_ABS:g} to {MAX_ABS:g}"
+        )
 
 
 def check_radii(radii: ArrayLike) -> np.ndarray:

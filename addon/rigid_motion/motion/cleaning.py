@@ -12,24 +12,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_poses, check_radii
-from .corrections import LIVELY, Corrections
+from .corrections import MIN_MOTION_PER_NOISE, Corrections
 from .measures import shell_error
 from .modes import interpolate
 from .outliers import outliers
 from .poses import Poses, joined, numbers
 from .skeletons import Skeleton
-from .trembling import ORDERS, Trembling, trembling
+from .trembling import DIFFERENCE_ORDERS, Trembling, trembling
 
 CAP_ROUNDS = 12
 """In which samples that are too far off are drawn back together with the motion around them, and as many alone."""
 
-NOTHING = 1e-3
+MIN_NOISE_RATIO = 1e-3
 """Of the tolerance, or else of the radius: what trembles less is still."""
 
-STEADIER = 0.97
+MAX_STEADY_NOISE_RATIO = 0.97
 """Of the noise by stamped times has to be left by steady ones for these to be right."""
 
-TREMBLE = 0.25
+MAX_STAMP_JITTER_STEPS = 0.25
 """Of a step: standard deviation of stamps from steady times, where there may be such."""
 
 
@@ -138,7 +138,7 @@ def clean(
         raise ValueError(f"a skeleton of {len(skeleton)} joints does not fit poses of {joints.shape[0]}")
     radii = np.broadcast_to(radii, len(skeleton))
     times, trembles = _steadied(times, [joints[joint] for joint in range(len(skeleton))])
-    least = [NOTHING * (tolerance or own) for own in radii.tolist()]
+    least = [MIN_NOISE_RATIO * (tolerance or own) for own in radii.tolist()]
     found = [_Joint(times, joints[own], trembles[own], least[own], radii[own]) for own in range(len(skeleton))]
     cleaned = _within(found, skeleton, radii, tolerance)
     moved = shell_error(skeleton.in_root_space(cleaned), skeleton.in_root_space(joints), radii[:, None])
@@ -161,7 +161,7 @@ class _Joint:
         rows = np.flatnonzero(~self.out)
         self.alone = np.zeros(len(times), dtype=bool)
         self.corrections: Corrections | None = None
-        if len(rows) <= ORDERS[-1] + 1:
+        if len(rows) <= DIFFERENCE_ORDERS[-1] + 1:
             self.spikes, self.repeats, self.out = np.zeros((3, len(times)), dtype=bool)
             return
         if self.out.any():
@@ -171,7 +171,7 @@ class _Joint:
             self.noise = self.noise._replace(here=here)
             self.start = _bridged(times, poses, rows)
         sizes = np.array([[self.noise.position], [self.noise.rotation]])
-        self.alone = ~self.out & ((self.noise.here > LIVELY * sizes) & (sizes > 0.0)).any(axis=0)
+        self.alone = ~self.out & ((self.noise.here > MIN_MOTION_PER_NOISE * sizes) & (sizes > 0.0)).any(axis=0)
         self.corrections = Corrections(times, self.start, self.noise, self.out)
 
 
@@ -225,8 +225,8 @@ def _steadied(times: np.ndarray, joints: list[Poses]) -> tuple[np.ndarray, list[
     counts = np.concatenate(([0.0], np.cumsum(np.maximum(np.rint(steps / np.median(steps)), 1.0))))
     pace, begin = np.polyfit(counts, times, 1)
     steady = begin + pace * counts
-    if not 1e-6 * pace < np.std(times - steady) < TREMBLE * pace:
+    if not 1e-6 * pace < np.std(times - steady) < MAX_STAMP_JITTER_STEPS * pace:
         return times, stamped
     even = [trembling(steady, poses) for poses in joints]
     before, after = (np.array([each[:2] for each in noises]).sum(axis=0) for noises in (stamped, even))
-    return (steady, even) if (after < STEADIER * before).all() else (times, stamped)
+    return (steady, even) if (after < MAX_STEADY_NOISE_RATIO * before).all() else (times, stamped)

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 
 from .poses import numbers
 
-LOW = 0.12
+MAX_STANDING_HEIGHT_RATIO = 0.12
 """How far above the lowest place that any joint gets to what stands is at most, in heights of the body."""
 
-SLOW = 0.06
+MAX_STANDING_HEIGHTS_PER_S = 0.06
 """How fast it is at most, in heights of the body a second: 10 cm a second for a grown-up."""
 
-SHORTEST = 0.1
+MIN_STANDING_S = 0.1
 """Seconds that something stands at least: what only turns back is not standing."""
 
 
@@ -64,15 +64,15 @@ def standing(times: ArrayLike, positions: ArrayLike) -> np.ndarray:
     heights = positions[..., 2]
     height = float(np.median(np.ptp(heights, axis=0)))
     ways = np.linalg.norm(np.diff(positions, axis=1), axis=-1)
-    slow = ways <= SLOW * height * np.diff(times)
-    return contacts(times, heights - heights.min() <= LOW * height, slow)
+    slow = ways <= MAX_STANDING_HEIGHTS_PER_S * height * np.diff(times)
+    return contacts(times, heights - heights.min() <= MAX_STANDING_HEIGHT_RATIO * height, slow)
 
 
 def contacts(times: np.ndarray, low: np.ndarray, slow: np.ndarray) -> np.ndarray:
     """When joints stand that are low at times (joints, n), and slow between them (joints, n - 1)."""
     stands = low & np.concatenate((slow[:, :1], slow), axis=1) & np.concatenate((slow, slow[:, -1:]), axis=1)
     for joint, first, last in spans(stands):
-        if times[last] - times[first] < SHORTEST:
+        if times[last] - times[first] < MIN_STANDING_S:
             stands[joint, first : last + 1] = False
     return stands
 

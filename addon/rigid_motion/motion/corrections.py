@@ -17,19 +17,19 @@ from .differences import coefficients, differences_of_positions, differences_of_
 from .poses import Poses
 from .trembling import Trembling, mean_around
 
-ORDER = 3
+JERK_ORDER = 3
 """Of the derivative that is small: jerk."""
 
-ROUNDS = 12
+JERK_ROUNDS = 12
 """In which the size of the jerk is found."""
 
-AROUND = 1
+JERK_REACH_SAMPLES = 1
 """Samples on either side over which it is as large: hits are as short."""
 
-SMOOTHEST = 1e-9
+MIN_JERK_RATIO = 1e-9
 """Of the jerk that noise makes is always allowed: more would be lost in rounding."""
 
-LIVELY, STIFF, STIFFEST = 1.25, 6, 100.0
+MIN_MOTION_PER_NOISE, STIFFNESS_POWER, MAX_STIFFNESS = 1.25, 6, 100.0
 """Where a recording trembles by more than so many times its noise, that may be motion, and this power of what is above
 keeps samples where they are, up to so many times."""
 
@@ -61,21 +61,21 @@ class Channel:
         """Return how large the jerk is around each sample, where it determines so much of what is found."""
         found = self.differences(self.corrections)
         squares = np.einsum("nc,nc->n", found, found) / 3.0
-        least = SMOOTHEST * self.noise**2 * np.einsum("nk,nk->n", self.coefficients, self.coefficients)
-        return np.maximum(mean_around(self.steps * squares, AROUND) / determined, self.steps * least)
+        least = MIN_JERK_RATIO * self.noise**2 * np.einsum("nk,nk->n", self.coefficients, self.coefficients)
+        return np.maximum(mean_around(self.steps * squares, JERK_REACH_SAMPLES) / determined, self.steps * least)
 
     def settle(self) -> None:
         """Find how large the jerk is, and the corrections for it."""
         c = self.coefficients
-        for _ in range(ROUNDS):
+        for _ in range(JERK_ROUNDS):
             inverse = self.improve().inverse_diagonals()
             spread = np.zeros(len(c))
-            for first in range(ORDER + 1):
-                for second in range(first, ORDER + 1):
+            for first in range(JERK_ORDER + 1):
+                for second in range(first, JERK_ORDER + 1):
                     twice = 1.0 if first == second else 2.0
                     covariances = inverse[second - first, first : first + len(c)]
                     spread += twice * c[:, first] * c[:, second] * covariances
-            determined = mean_around(np.maximum(1.0 - spread * self.steps / self.densities, 0.0), AROUND)
+            determined = mean_around(np.maximum(1.0 - spread * self.steps / self.densities, 0.0), JERK_REACH_SAMPLES)
             self.densities = self._density(np.maximum(determined, 1e-9))
         self.improve()
 
@@ -84,7 +84,7 @@ class Channel:
         weights = self.steps / self.densities
         pulled = weights[:, None] * self.differences(self.corrections)
         gradient = self.precisions[:, None] * self.corrections
-        for own in range(ORDER + 1):
+        for own in range(JERK_ORDER + 1):
             gradient[own : own + len(weights)] += self.coefficients[:, own, None] * pulled
         matrix = Banded(self.precisions, self.coefficients, weights)
         self.corrections = self.corrections - matrix.solve(gradient)
@@ -96,8 +96,8 @@ class Corrections:
 
     def __init__(self, times: np.ndarray, start: Poses, noise: Trembling, out: np.ndarray) -> None:
         self._start = start
-        shares = coefficients(times, ORDER)
-        steps = (times[ORDER:] - times[:-ORDER]) / ORDER
+        shares = coefficients(times, JERK_ORDER)
+        steps = (times[JERK_ORDER:] - times[:-JERK_ORDER]) / JERK_ORDER
 
         def of_places(corrections: np.ndarray) -> np.ndarray:
             return differences_of_positions(start.positions + corrections, shares)
@@ -108,7 +108,7 @@ class Corrections:
         def channel(differences: Callable[[np.ndarray], np.ndarray], size: float, here: np.ndarray) -> Channel | None:
             if not size:
                 return None
-            stiff = np.clip(here / (LIVELY * size), 1.0, STIFFEST) ** STIFF
+            stiff = np.clip(here / (MIN_MOTION_PER_NOISE * size), 1.0, MAX_STIFFNESS) ** STIFFNESS_POWER
             return Channel(differences, shares, steps, size, np.where(out, 0.0, stiff / size**2))
 
         self.places = channel(of_places, noise.position, noise.here[0])

@@ -18,13 +18,13 @@ from .poses import Poses
 from .quaternions import conjugate, multiply, normalise, rotate, turned_at
 from .skeletons import Skeleton
 
-ROUNDING = 1e-3
+ROUNDING_TOLERANCE_RATIO = 1e-3
 """The share of the tolerance that is left for single precision."""
 
-LEAST = 1e-2
+MIN_CHANNEL_TOLERANCE_RATIO = 1e-2
 """The least share of the tolerance that a channel is allowed, where those above it left nothing."""
 
-EARLY = 0.5
+CHAIN_SHARE_POWER = 0.5
 """The power of a joint's share of its chain that its share of the tolerance is: below 1 those above get more."""
 
 
@@ -88,7 +88,7 @@ class CurvedBody:
             parents = self.skeleton.parents[joints]
             np.maximum.at(below, parents, turned[parents] + own[joints] + below[joints])
         whole = above + below
-        return np.divide(above, whole, out=np.ones(len(whole)), where=whole > 0.0) ** EARLY
+        return np.divide(above, whole, out=np.ones(len(whole)), where=whole > 0.0) ** CHAIN_SHARE_POWER
 
 
 class JointCurves(NamedTuple):
@@ -112,7 +112,7 @@ def fitted_body(body: CurvedBody) -> list[JointCurves]:
 class _Fitting:
     def __init__(self, body: CurvedBody) -> None:
         self.body, self.parents = body, body.skeleton.parents
-        self.allowed = (ROUNDING - 1.0) * body.skeleton.most_below(-body.tolerance)
+        self.allowed = (ROUNDING_TOLERANCE_RATIO - 1.0) * body.skeleton.most_below(-body.tolerance)
         shape = body.truth.shape
         self.shown = Poses(np.zeros((*shape, 3)), np.zeros((*shape, 4)))
         """In the roots' space, with curves."""
@@ -159,7 +159,7 @@ class _Fitting:
         body, parent, aims = self.body, self.parents[joint], self.body.truth.quaternions[joint]
         if parent >= 0:
             aims = multiply(conjugate(self.shown.quaternions[parent]), aims)
-        least = LEAST * self.allowed[joint]
+        least = MIN_CHANNEL_TOLERANCE_RATIO * self.allowed[joint]
         allowed = np.maximum(self.allowed[joint] - off, least) / body.radii[joint]
         for other, away in body.carried[joint].items():
             if not body.curved[other, 1]:

@@ -14,45 +14,45 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .quaternions import NARROWEST, align_signs
+from .quaternions import ZERO_ANGLE_RAD, align_signs
 
-CONSTANT, LINEAR, CUBIC = KINDS = (0, 1, 2)
+CONSTANT_KIND, LINEAR_KIND, CUBIC_KIND = SEGMENT_KINDS = (0, 1, 2)
 
-LONGEST = 64
+FIRST_SEGMENT_SAMPLES = 64
 """Samples that a segment spans at first. Such as meet are joined where one does for both."""
 
-HOPELESS = {False: 2.0, True: 1.2}
+HOPELESS_ERROR_RATIOS = {False: 2.0, True: 1.2}
 """No longer segments are tried from a sample once one is so many times as far off as is allowed; of lines, too."""
 
-EXACT = 1.0
+EXACT_SEGMENT_WORTH_KEYS = 1.0
 """How many keys it is worth that a segment is exact, and not just within what is allowed: so keys keep their frames."""
 
-STILL = 1e-3
+MAX_HELD_CHANGE_RATIO = 1e-3
 """A sample that differs by less than this share of what is allowed from that before holds it."""
 
-NEAR = 0.1
+MAX_LINE_ERROR_RATIO = 0.1
 """A line that is within this share of what is allowed is one."""
 
-LENGTHS = 1e-6
+QUATERNION_LENGTH_WEIGHT = 1e-6
 """The weight of a quaternion's length between keys: just enough for there to be one solution."""
 
 
-DAMPING = 1e-7
+SLOPE_DAMPING_WEIGHT = 1e-7
 """The weight of what slopes differ from the line's, relative to samples, where these do not say."""
 
-STEP = 1.5
+JUMP_PRICE_KEYS = 1.5
 """The price of a segment that ends with a jump, in keys."""
 
-THIRD = 1.0 / 3.0
+THIRD_RATIO = 1.0 / 3.0
 """The length of handles, as a share of the segment, with which values are cubics in time."""
 
-NEWTON = 6
+NEWTON_STEPS = 6
 """Steps to the last bit for handles that are not so much longer."""
 
 AT_ONCE = 2**15
 """Samples of segments that are looked at in one go."""
 
-AGREEING = 4
+SLOPE_AGREEMENT_ROUNDS = 4
 """How often slopes on both sides of keys are tried to be made the same."""
 
 
@@ -72,7 +72,7 @@ class CubicKeys(NamedTuple):
     """Slopes per second behind each key, shape (k, n)."""
 
     kinds: np.ndarray
-    """CONSTANT, LINEAR or CUBIC, of the segment behind each key, shape (k,)."""
+    """CONSTANT, LINEAR_KIND or CUBIC_KIND, of the segment behind each key, shape (k,)."""
 
 
 class Samples(NamedTuple):
@@ -90,10 +90,10 @@ class Samples(NamedTuple):
     desired: np.ndarray | None = None
     """What they are to be near, where that is something else, shape (m, n)."""
 
-    handles: float = THIRD
+    handles: float = THIRD_RATIO
     """The length of Bezier handles, 0.3 to 0.5 of the segment: time is then a cubic, too."""
 
-    lengths: float = LENGTHS
+    lengths: float = QUATERNION_LENGTH_WEIGHT
     """The weight of a quaternion's length between keys: with more of it, slopes are no steeper than they need be."""
 
 
@@ -118,12 +118,12 @@ def values_at(keys: CubicKeys, times: np.ndarray) -> np.ndarray:
     )
     kinds = keys.kinds[segment, None]
     held = np.where(s < 1.0, first, second)
-    return np.where(kinds == CUBIC, cubic, np.where(kinds == LINEAR, line, held))
+    return np.where(kinds == CUBIC_KIND, cubic, np.where(kinds == LINEAR_KIND, line, held))
 
 
 def is_of_lines(keys: CubicKeys) -> bool:
     """Whether no segment is curved."""
-    return not np.any(keys.kinds == CUBIC)
+    return not np.any(keys.kinds == CUBIC_KIND)
 
 
 def joined(parts: Sequence[CubicKeys], *, are_turns: bool = False) -> CubicKeys:
@@ -208,10 +208,10 @@ def _bends(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _parameters(s: np.ndarray, handles: float) -> np.ndarray:
     """Return the parameters of Bezier curves at shares s of their time, with handles so long."""
-    if handles == THIRD:
+    if handles == THIRD_RATIO:
         return s
     result = s
-    for _ in range(NEWTON):
+    for _ in range(NEWTON_STEPS):
         off = (((6.0 * handles - 2.0) * result + 3.0 - 9.0 * handles) * result + 3.0 * handles) * result - s
         slope = ((18.0 * handles - 6.0) * result + 6.0 - 18.0 * handles) * result + 3.0 * handles
         result = result - off / slope
@@ -237,14 +237,14 @@ class _Fit:
 
     def still(self) -> np.ndarray:
         """Which samples (m - 1,) the one behind them holds."""
-        least = STILL * np.minimum(self.allowed[1:], self.allowed[:-1])
+        least = MAX_HELD_CHANGE_RATIO * np.minimum(self.allowed[1:], self.allowed[:-1])
         return np.linalg.norm(np.diff(self.values, axis=0), axis=1) <= least
 
     def is_held(self, first: int, end: int) -> bool:
         """Whether a sample stays, up to another one."""
         some = slice(first, end + 1)
         changes = np.linalg.norm(self.values[some] - self.values[first], axis=1) / self.allowed[some]
-        return changes.max() <= NEAR and self.off_line(first, end) <= 1.0 - NEAR
+        return changes.max() <= MAX_LINE_ERROR_RATIO and self.off_line(first, end) <= 1.0 - MAX_LINE_ERROR_RATIO
 
     def off_line(self, first: int, end: int) -> float:
         """How far samples are off the line from one of them to another at most, of what is allowed."""
@@ -254,18 +254,18 @@ class _Fit:
     def errors(self, is_key: np.ndarray) -> np.ndarray:
         """How far samples are off at most, of what is allowed, by the first of a segment and its length less one.
 
-        Shape (m, LONGEST); infinite where that is not known.
+        Shape (m, FIRST_SEGMENT_SAMPLES); infinite where that is not known.
         """
         count = len(self.times)
-        result = np.full((count, LONGEST), np.inf, dtype=np.float32)
+        result = np.full((count, FIRST_SEGMENT_SAMPLES), np.inf, dtype=np.float32)
         alive = np.flatnonzero(is_key[:-1])
-        for length in range(1, min(LONGEST, count - 1) + 1):
+        for length in range(1, min(FIRST_SEGMENT_SAMPLES, count - 1) + 1):
             alive = alive[alive + length < count]
             if not len(alive):
                 break
             errors = self.segments(alive, length)[1]
             result[alive, length - 1] = errors
-            alive = alive[errors <= HOPELESS[self.lines]]
+            alive = alive[errors <= HOPELESS_ERROR_RATIOS[self.lines]]
         return result
 
     def between(self, firsts: np.ndarray, ends: np.ndarray) -> Segments:
@@ -311,7 +311,7 @@ class _Fit:
         if not (self.lines and self.is_turned):
             return first + s * (last - first)
         angle = 2.0 * np.arctan2(np.linalg.norm(last - first, axis=-1), np.linalg.norm(last + first, axis=-1))
-        angle = np.maximum(angle, NARROWEST)[..., None]
+        angle = np.maximum(angle, ZERO_ANGLE_RAD)[..., None]
         return (np.sin((1.0 - s) * angle) * first + np.sin(s * angle) * last) / np.sin(angle)
 
     def _bent(self, rows: np.ndarray, basis: np.ndarray, own: np.ndarray, rest: np.ndarray) -> np.ndarray:
@@ -320,7 +320,7 @@ class _Fit:
         weights = self.weights[rows]
         weighted = np.swapaxes(basis * (weights / weights.max(axis=1, keepdims=True))[..., None], 1, 2)
         if not self.is_turned:
-            return np.linalg.solve(weighted @ basis + DAMPING * np.eye(2), weighted @ rest)
+            return np.linalg.solve(weighted @ basis + SLOPE_DAMPING_WEIGHT * np.eye(2), weighted @ rest)
         rest -= ((1.0 - self.lengths) * np.einsum("kmi,kmi->km", own, rest))[..., None] * own
         pairs = weighted[:, (0, 0, 1)] * np.swapaxes(basis, 1, 2)[:, (0, 1, 1)]
         radial = (pairs @ self.outer[rows]).reshape(count, 3, width, width)
@@ -328,7 +328,7 @@ class _Fit:
         normal = np.empty((count, 2, width, 2, width))
         normal[:, 0, :, 0], normal[:, 1, :, 1] = blocks[:, 0], blocks[:, 2]
         normal[:, 0, :, 1] = normal[:, 1, :, 0] = blocks[:, 1]
-        normal = normal.reshape(count, 2 * width, 2 * width) + DAMPING * np.eye(2 * width)
+        normal = normal.reshape(count, 2 * width, 2 * width) + SLOPE_DAMPING_WEIGHT * np.eye(2 * width)
         right = (weighted @ rest).reshape(count, 2 * width, 1)
         return np.linalg.solve(normal, right).reshape(count, 2, width)
 
@@ -336,13 +336,13 @@ class _Fit:
         """Return curves with keys at these samples (k,)."""
         firsts, ends = keys[:-1], keys[1:]
         bends, errors = self.between(firsts, ends)
-        kinds = np.full(len(keys), CONSTANT)
+        kinds = np.full(len(keys), CONSTANT_KIND)
         kinds[:-1] = self._kinds(firsts, ends, errors, steps=steps)
-        bends[kinds[:-1] != CUBIC] = 0.0
+        bends[kinds[:-1] != CUBIC_KIND] = 0.0
         spans = np.diff(self.times[keys])[:, None]
         chords = np.diff(self.values[keys], axis=0)
-        slopes = (chords[:, None] + bends * (THIRD / self.handles)) / spans[:, None]
-        slopes[kinds[:-1] == CONSTANT] = 0.0
+        slopes = (chords[:, None] + bends * (THIRD_RATIO / self.handles)) / spans[:, None]
+        slopes[kinds[:-1] == CONSTANT_KIND] = 0.0
         slopes = self._agreed(keys, slopes, kinds)
         nothing = np.zeros((1, self.values.shape[1]))
         arriving, leaving = np.concatenate((nothing, slopes[:, 1])), np.concatenate((slopes[:, 0], nothing))
@@ -354,19 +354,23 @@ class _Fit:
         held = still[ends] - still[firsts] == ends - firsts
         stepped = steps & (ends > firsts + 1) & (still[ends - 1] - still[firsts] == ends - 1 - firsts)
         lines = np.array([self.off_line(first, end) for first, end in zip(firsts.tolist(), ends.tolist(), strict=True)])
-        return np.where(held | stepped, CONSTANT, np.where(lines <= np.maximum(errors, NEAR), LINEAR, CUBIC))
+        return np.where(
+            held | stepped,
+            CONSTANT_KIND,
+            np.where(lines <= np.maximum(errors, MAX_LINE_ERROR_RATIO), LINEAR_KIND, CUBIC_KIND),
+        )
 
     def _agreed(self, keys: np.ndarray, slopes: np.ndarray, kinds: np.ndarray) -> np.ndarray:
         """Return slopes (k - 1, 2, n) of segments that are the same on both sides of a key where that is allowed."""
-        curved = kinds[:-1] == CUBIC
+        curved = kinds[:-1] == CUBIC_KIND
         tried = curved[:-1] & curved[1:]
         spans, weights = np.diff(self.times[keys])[:, None], np.diff(self.times[keys])[:, None] ** 3
         shared = (weights[:-1] * slopes[:-1, 1] + weights[1:] * slopes[1:, 0]) / (weights[:-1] + weights[1:])
         chords = np.diff(self.values[keys], axis=0)
-        for _ in range(AGREEING):
+        for _ in range(SLOPE_AGREEMENT_ROUNDS):
             result = slopes.copy()
             result[:-1, 1][tried], result[1:, 0][tried] = shared[tried], shared[tried]
-            bends = (spans[:, None] * result - chords[:, None]) * (self.handles / THIRD)
+            bends = (spans[:, None] * result - chords[:, None]) * (self.handles / THIRD_RATIO)
             wrong = np.zeros(len(slopes), dtype=bool)
             for length in np.unique(np.diff(keys)[curved]).tolist():
                 some = np.flatnonzero(curved & (np.diff(keys) == length))
@@ -390,19 +394,21 @@ def _fewest(fits: Sequence[_Fit], *, steps: bool) -> np.ndarray:
         if all(fit.is_held(first, end) for fit in fits):
             is_key[first + 1 : end], hold[first] = False, end
     errors = np.stack([fit.errors(is_key) for fit in fits]).max(axis=0)
-    price = np.where(errors <= 1.0, 1.0 + EXACT * errors.astype(np.float64) ** 2, np.inf)
-    best = np.full(count + LONGEST, np.inf)
+    price = np.where(errors <= 1.0, 1.0 + EXACT_SEGMENT_WORTH_KEYS * errors.astype(np.float64) ** 2, np.inf)
+    best = np.full(count + FIRST_SEGMENT_SAMPLES, np.inf)
     best[count - 1], following = 0.0, np.zeros(count, dtype=np.int64)
     best[:count][~is_key] = np.inf
     for sample in range(count - 2, -1, -1):
         if not is_key[sample]:
             continue
-        costs = price[sample] + best[sample + 1 : sample + 1 + LONGEST]
+        costs = price[sample] + best[sample + 1 : sample + 1 + FIRST_SEGMENT_SAMPLES]
         nearest = int(np.argmin(costs))
         best[sample], following[sample] = costs[nearest], sample + 1 + nearest
         if hold[sample] >= 0:
             # A step ends with the sample that is another, and is one only where that saves a key.
-            prices = ((hold[sample], 1.0), (hold[sample] + 1, STEP))[: 2 if steps and hold[sample] + 1 < count else 1]
+            prices = ((hold[sample], 1.0), (hold[sample] + 1, JUMP_PRICE_KEYS))[
+                : 2 if steps and hold[sample] + 1 < count else 1
+            ]
             for end, cost in prices:
                 if cost + best[end] < best[sample]:
                     best[sample], following[sample] = cost + best[end], end
@@ -417,7 +423,7 @@ def _fewest(fits: Sequence[_Fit], *, steps: bool) -> np.ndarray:
 def _joined(fits: Sequence[_Fit], keys: np.ndarray) -> np.ndarray:
     """Return keys without those between segments that one that is longer than was tried does for."""
     while True:
-        tried = np.flatnonzero(keys[2:] - keys[:-2] > LONGEST)
+        tried = np.flatnonzero(keys[2:] - keys[:-2] > FIRST_SEGMENT_SAMPLES)
         if not len(tried):
             return keys
         errors = np.max([fit.between(keys[tried], keys[tried + 2])[1] for fit in fits], axis=0)

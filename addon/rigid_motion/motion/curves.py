@@ -20,15 +20,15 @@ from dataclasses import replace
 import numpy as np
 
 from .channel_curves import auto_clamped_slopes
-from .poses import LIMIT
+from .poses import MAX_ABS
 from .quaternions import components
 from .segments import SMALLEST_ANGLE, Basis, Curves, Rows, Segments
 from .trigonometry import fill_sine_and_cosine
 
-LATE = 2.0
+LATE_SEGMENT_RATIO = 2.0
 """How many times as long as the segment before one may take for a stream, before its key counts as late."""
 
-MOST = float(np.log(LIMIT))
+MAX_LOG_SCALE = float(np.log(MAX_ABS))
 """Outside of the keys the logarithm of a scale grows to this at most, and falls to its negative."""
 
 
@@ -136,8 +136,8 @@ def motor_spline_causal(segments: Segments) -> Curves:
 
     A key has the twist of the screw that led to it, and half of what the same share of the screw before would add: all
     of it overshoots. A rest is kept, although nothing told of it when the body arrived there. Nor did anything tell
-    that the next key comes late: where a segment takes more than `LATE` times as long as the one before, the twist
-    that it is left with dies away in that time, and the screw goes on alone.
+    that the next key comes late: where a segment takes more than `LATE_SEGMENT_RATIO` times as long as the one before,
+    the twist that it is left with dies away in that time, and the screw goes on alone.
     """
 
     def at_keys(
@@ -151,12 +151,12 @@ def motor_spline_causal(segments: Segments) -> Curves:
 
     duration = segments.durations
     before = np.concatenate((duration[..., :1], duration[..., :-1]), axis=-1)
-    fades = np.minimum(LATE * before / duration, 1.0)
+    fades = np.minimum(LATE_SEGMENT_RATIO * before / duration, 1.0)
     fades = np.broadcast_to(fades, segments.keys[..., 1:].shape)[..., segments.desired].ravel()
     return replace(_bent(segments, at_keys), fades=None if np.all(fades == 1.0) else fades)
 
 
-SHORT = 1.0 / 16.0
+SHORT_SEGMENT_RATIO = 1.0 / 16.0
 """The part of its neighbour's time up to which a segment passes no twist on."""
 
 
@@ -170,12 +170,14 @@ def twist_shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     for segments of durations h0 and h1: nearly all for the shorter one, whose twist, kept up for as long as the longer
     one takes, leads any distance away. So the shorter one's share is at most short / long: neither segment, in its own
     time, is then given more than |r0| + |r1| of the two screws, wherever on the body that is measured. And it is none
-    up to `SHORT`: so short a segment is often a jump, as where something changes its parent from one frame to the next,
-    which would swing what is beside it by 4/27 of its way. Durations alone decide, for a screw has no length that is
-    the same for all choices of the body's origin.
+    up to `SHORT_SEGMENT_RATIO`: so short a segment is often a jump, as where something changes its parent from one
+    frame to the next, which would swing what is beside it by 4/27 of its way. Durations alone decide, for a screw has
+    no length that is the same for all choices of the body's origin.
     """
     shares = np.clip(after / (before + after), 1.0 - after / before, before / after)
-    return np.where(after <= SHORT * before, 1.0, np.where(before <= SHORT * after, 0.0, shares))
+    return np.where(
+        after <= SHORT_SEGMENT_RATIO * before, 1.0, np.where(before <= SHORT_SEGMENT_RATIO * after, 0.0, shares)
+    )
 
 
 def _bent(
@@ -244,7 +246,7 @@ def similarity_slerp(segments: Segments) -> Curves:
     return Curves(
         quaternions=np.stack((segments.middle, segments.difference), axis=1),
         positions=np.stack((centre, rate.real * along + outward, 2.0 * sideward, -2.0 * outward), axis=1),
-        parameters=np.stack((h, half_growth, mean, -MOST - np.log(mean), MOST - np.log(mean))),
+        parameters=np.stack((h, half_growth, mean, -MAX_LOG_SCALE - np.log(mean), MAX_LOG_SCALE - np.log(mean))),
         basis=basis,
     )
 
@@ -326,7 +328,7 @@ def _geometric_scales(s: np.ndarray, parameters: list[np.ndarray]) -> np.ndarray
     if len(parameters) < 3:
         return None
     growth, middle = parameters[-2:]
-    return np.exp(np.clip(middle + 0.5 * s * growth, -MOST, MOST))
+    return np.exp(np.clip(middle + 0.5 * s * growth, -MAX_LOG_SCALE, MAX_LOG_SCALE))
 
 
 def _growing_share(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -18,7 +18,7 @@ from .trigonometry import fill_sine_and_cosine
 
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
-LOCKED = 1e-7
+MIN_UNLOCKED_LENGTH = 1e-7
 """Below this length a half sum or half difference of angles has no direction: the gimbal is locked."""
 
 
@@ -80,7 +80,7 @@ def _direction(x: np.ndarray, y: np.ndarray, starts: Sequence[int]) -> tuple[np.
     """Return angle of the line through each plane vector, without jumps, and the vector's signed length along it."""
     length = np.sqrt(x * x + y * y)
     angle = np.arctan2(y, x)
-    free = length < LOCKED
+    free = length < MIN_UNLOCKED_LENGTH
     if not free.any():
         line, turns = _unwrapped(angle, np.pi, starts)
         is_odd = turns != 2.0 * np.floor(0.5 * turns)

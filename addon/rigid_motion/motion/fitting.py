@@ -15,13 +15,13 @@ from .modes import MODES, interpolate, mode_named
 from .poses import Poses, aligned, numbers
 from .quaternions import conjugate, multiply, normalise, rotate
 
-STEP = 1e-5
+DIFFERENCE_STEP_RAD = 1e-5
 """Of differences that stand for derivatives: in radians, and as a part of the radius."""
 
-SWEEPS = 4
+KEY_SWEEPS = 4
 """How often every key is moved. The third time gains a hundredth."""
 
-DAMPING = 1e-9
+NORMAL_DAMPING_RATIO = 1e-9
 """What is added to the normal equations, as a part of them: a key may have no samples of its own."""
 
 
@@ -88,7 +88,7 @@ def fit_keys(times: ArrayLike, poses: Poses, keys: ArrayLike, mode: str = "motor
     keys = key_samples(keys, len(times))
     fitting = _Fitting(times, aligned(poses), keys, mode, radius)
     apart = result.behind + result.ahead + 2
-    for _ in range(SWEEPS):
+    for _ in range(KEY_SWEEPS):
         for first in range(min(apart, len(keys))):
             fitting.improve(np.arange(first, len(keys), apart))
     return fitting.fitted
@@ -120,12 +120,15 @@ class _Fitting:
         units = np.repeat((1.0, self.radius), 3)
         for component in range(6):
             step = np.zeros((6, len(chosen)))
-            step[component] = STEP * units[component]
-            slopes[component] = (self.displacements(_moved(self.fitted, chosen, step)) - self.residuals) / STEP
+            step[component] = DIFFERENCE_STEP_RAD * units[component]
+            slopes[component] = (
+                self.displacements(_moved(self.fitted, chosen, step)) - self.residuals
+            ) / DIFFERENCE_STEP_RAD
         normal_matrix = self.sums(np.einsum("apn,bpn->abn", slopes, slopes), chosen).transpose(2, 0, 1)
         gradient = self.sums(np.einsum("apn,pn->an", slopes, self.residuals), chosen).T
         normal_matrix += (
-            np.eye(6) * (DAMPING * np.trace(normal_matrix, axis1=1, axis2=2) + np.finfo(float).tiny)[:, None, None]
+            np.eye(6)
+            * (NORMAL_DAMPING_RATIO * np.trace(normal_matrix, axis1=1, axis2=2) + np.finfo(float).tiny)[:, None, None]
         )
         steps = -np.linalg.solve(normal_matrix, gradient[..., None])[..., 0].T * units[:, None]
         moved = _moved(self.fitted, chosen, steps)

@@ -16,7 +16,7 @@ from .quaternions import normalise
 
 SIDES = {"": "", "L": "Left", "R": "Right"}
 FINGERS = ("Thumb", "Index", "Middle", "Ring", "Little")
-PARTS = {"Proximal": "*Hand", "Intermediate": "Proximal", "Distal": "Intermediate"}
+FINGER_PARENTS = {"Proximal": "*Hand", "Intermediate": "Proximal", "Distal": "Intermediate"}
 
 BONES = (
     ("Hips", "", "torso hips hip pelvis"),
@@ -38,7 +38,7 @@ BONES = (
     *(
         (f"*{finger}{part}", above if above == "*Hand" else f"*{finger}{above}", "")
         for finger in FINGERS
-        for part, above in PARTS.items()
+        for part, above in FINGER_PARENTS.items()
     ),
 )
 """What each bone hangs on, and what else it is called. Parents come first; * stands for a side, Left or Right. Other
@@ -54,13 +54,15 @@ HUMANOID = {
 
 SPINE = ("Spine", "Chest", "UpperChest")
 
-NEXT = {"UpperArm": "LowerArm", "LowerArm": "Hand", "UpperLeg": "LowerLeg", "LowerLeg": "Foot"}
+NEXT_BONES = {"UpperArm": "LowerArm", "LowerArm": "Hand", "UpperLeg": "LowerLeg", "LowerLeg": "Foot"}
 """The bones that rests differ in, and where they point to."""
 
 HELD_OUT = {"LeftArm": (1.0, 0.0, 0.0), "RightArm": (-1.0, 0.0, 0.0)}
 """Where arms point in a T-pose; legs point down."""
 
-_KNOWN = {alias: (bone.strip("*"), rank) for bone, _, names in BONES for rank, alias in enumerate(names.split())}
+_KNOWN_ALIASES = {
+    alias: (bone.strip("*"), rank) for bone, _, names in BONES for rank, alias in enumerate(names.split())
+}
 _TRUNK = re.compile(r"(spine|chest|upperchest|lowerback|abdomen|torso)\d*")
 _FINGER = re.compile(r"(?:hand|f)?(thumb|index|middle|ring|pinky|little)(?:0?([123])|(proximal|intermediate|distal))")
 _MECHANISM = ("def", "org", "mch", "vis", "wgt")
@@ -99,10 +101,10 @@ def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
         if not side and _TRUNK.fullmatch(name) and name != "torso" and (has_fk or not is_rigify):
             trunk.append(number)
         if finger := _FINGER.fullmatch(name):
-            part = list(PARTS)[int(finger[2]) - 1] if finger[2] else finger[3].capitalize()
+            part = list(FINGER_PARENTS)[int(finger[2]) - 1] if finger[2] else finger[3].capitalize()
             bone, rank = finger[1].replace("pinky", "little").capitalize() + part, 0
-        elif name in _KNOWN:
-            bone, rank = _KNOWN[name]
+        elif name in _KNOWN_ALIASES:
+            bone, rank = _KNOWN_ALIASES[name]
         else:
             continue
         bone = SIDES[side] + bone
@@ -138,7 +140,7 @@ def alignments(bones: dict[str, int], first: np.ndarray, second: np.ndarray | No
     for bone in HUMANOID:
         side = bone[: 4 if bone.startswith("Left") else 5 if bone.startswith("Right") else 0]
         part = bone[len(side) :]
-        end = NEXT.get(part) if side else None
+        end = NEXT_BONES.get(part) if side else None
         if end and bone in bones and side + end in bones:
             own, tip = bones[bone], bones[side + end]
             held_out = np.array(HELD_OUT.get(side + part[-3:], (0.0, 0.0, -1.0)))

@@ -19,124 +19,124 @@ from itertools import pairwise
 
 import numpy as np
 
-from .key_costs import Recording
-from .key_links import WITHIN, joined_keys, traded_keys
-from .key_search import ROUNDS, SHORT, Keys, Search, spaced
+from .key_costs import SampleTracks
+from .key_links import MAX_LINK_ERROR_PER_TOLERANCE, joined_keys, traded_keys
+from .key_search import MAX_FULL_START_SAMPLES, MAX_SEARCH_ROUNDS, KeySearch, KeySelection, spaced
 from .key_spread import moved_together, spread_keys
 from .modes import MODES, interpolate
 
-SPREAD = 5, 6
+CANDIDATES_PER_KEY = 5, 6
 """Candidates for each key of a budget, when its keys are first laid out anew.
 
 Where a segment depends on its two keys alone, and where on more.
 """
 
-SPARSER = 3
+CANDIDATE_THINNING = 3
 """How many times as few candidates there are each time after that."""
 
-CALM = 0.005
+MAX_CALM_ERROR_RATIO = 0.005
 """Of the largest error of the first keys: a sample that is off by no more, when it alone is left out, is calm."""
 
-CALMER = 4
+CALM_CANDIDATE_STRIDE = 4
 """Of calm samples, each how many-th is a candidate."""
 
-LENGTHS = 5, 10, 50
+SAMPLES_PER_KEY_LIMITS = 5, 10, 50
 """Samples for each key that settings change at. In the middle, from 10 to 50, there is time for every step.
 
 Where there are fewer, what is done for each key takes longer than looking at samples; where there are more, looking
 at samples takes so long that another try is worth more.
 """
 
-TOGETHER = {0: ((5, 6), (5, 12), (5, 24)), 1: ((2, 6), (3, 12), (2, 24), (2, 48)), 2: ((2, 6), (2, 12))}
+JOINT_MOVES_BY_REACH = {0: ((5, 6), (5, 12), (5, 24)), 1: ((2, 6), (3, 12), (2, 24), (2, 48)), 2: ((2, 6), (2, 12))}
 """How keys are moved together, by the reach of the mode: places for each, and how near to one another."""
 
-STEPS = slice(1, 2), slice(2), slice(None), slice(2)
+STEPS_BY_LENGTH = slice(1, 2), slice(2), slice(None), slice(2)
 """Which of these are done, by the lengths."""
 
 FIRST_STEP = slice(1)
 """The first alone: for splines where there are fewest samples for each key, and after the search for a tolerance."""
 
-TIGHTER, LOOSER = 1.05, 1.6
+TIGHTER_ERROR_PER_TOLERANCE, LOOSER_ERROR_PER_TOLERANCE = 1.05, 1.6
 """The largest error over the tolerance that better keys are then searched for, and the looser one on the way there."""
 
-CLOSING, CLOSINGS = 1.03, 2
+CLOSING_ERROR_PER_TOLERANCE, MAX_CLOSINGS = 1.03, 2
 """The same at last, without a looser one, and how often at most."""
 
-FEW = 8
+MAX_INSERTED_KEYS = 8
 """Keys that are put in at once where each makes the error less; else half of those that are left."""
 
-SWAPPED = 1.15
+MAX_SWAPPED_BUDGET_RATIO = 1.15
 """How many times the budget keys may be in between, for the mean square, to find better places."""
 
-FEWER, NEAR = (0.9, 0.95), 0.03
+FEWER_KEYS_RATIOS, NEAR_KEYS_RATIO = (0.9, 0.95), 0.03
 """Of the keys within a tolerance: how many are tried first, and next, and how near they are to too few at last."""
 
-STEEP = 4.0
+MAX_ERROR_POWER = 4.0
 """The power of the number of keys by which an error mostly falls, or less: what is too far off needs no more tries."""
 
-HOPELESS = 1.25
+HOPELESS_ERROR_PER_TOLERANCE = 1.25
 """The largest error in tolerances of keys that will not come within one, by all that follows."""
 
-MANY = 2**10
+MANY_POSES = 2**10
 """Poses, of more of which only one budget is tried, and of whole bodies none: that found nothing in any of 12 trials,
 and took 2.5 times as long."""
 
 
-def fewest_keys(recording: Recording, budget: int | None, tries: int, *, rms: bool = False) -> np.ndarray:
+def fewest_keys(recording: SampleTracks, budget: int | None, tries: int, *, rms: bool = False) -> np.ndarray:
     """Return fewest samples within the tolerance of a recording, or the best ones within a budget."""
     if len(recording.times) <= 2:
         return np.arange(len(recording.times))
     if budget is not None:
         return BudgetSearch(recording, budget, rms=rms).least(tries)
-    search = Search(recording, rms=rms)
+    search = KeySearch(recording, rms=rms)
     return _of_budgets(search, search.within(tries), tries)
 
 
-def _of_budgets(search: Search, keys: np.ndarray, tries: int) -> np.ndarray:
+def _of_budgets(search: KeySearch, keys: np.ndarray, tries: int) -> np.ndarray:
     """Return the fewest keys whose motion is within the tolerance, of keys to begin with and of some budgets."""
     recording, best, too_few = search.recording, _mended(search, keys), 1
     budgets = tries + 1 if tries else 0
-    if len(recording.times) * recording.poses_each > MANY:
+    if len(recording.times) * recording.poses_each > MANY_POSES:
         budgets = min(tries, 1) if recording.poses_each == 1.0 else 0
     # Where much had to be put in, fewest are near to what was without that.
-    budget = min(math.floor(FEWER[0] * len(best)), 1 + math.ceil(len(keys) / FEWER[0]))
+    budget = min(math.floor(FEWER_KEYS_RATIOS[0] * len(best)), 1 + math.ceil(len(keys) / FEWER_KEYS_RATIOS[0]))
     for _ in range(budgets):
         budget = max(budget, too_few + 1)
-        if budget >= len(best) or len(best) - too_few <= max(1, NEAR * len(best)):
+        if budget >= len(best) or len(best) - too_few <= max(1, NEAR_KEYS_RATIO * len(best)):
             break
         other = BudgetSearch(recording, budget, rms=search.power == 2, enough=1.0)
         other.costs = search.costs  # What is known of segments goes for all budgets.
         fewer = other.least(tries)
         error = _error(search, fewer)
-        if error > WITHIN:
+        if error > MAX_LINK_ERROR_PER_TOLERANCE:
             too_few, fewer = budget, _mended(search, fewer)
         if len(fewer) < len(best):
             best = _without_needless(search, fewer)
             too_few = too_few if too_few < len(best) else 1
-            budget = max(math.floor(FEWER[1] * len(best)), (too_few + len(best)) // 2)
+            budget = max(math.floor(FEWER_KEYS_RATIOS[1] * len(best)), (too_few + len(best)) // 2)
         else:
-            budget = math.ceil(budget * error ** (1.0 / STEEP))
+            budget = math.ceil(budget * error ** (1.0 / MAX_ERROR_POWER))
         if too_few > 1:
-            budget = min(budget, 1 + math.ceil(too_few / FEWER[0]))
+            budget = min(budget, 1 + math.ceil(too_few / FEWER_KEYS_RATIOS[0]))
     return _without_needless(search, best)
 
 
-def _without_needless(search: Search, keys: np.ndarray) -> np.ndarray:
+def _without_needless(search: KeySearch, keys: np.ndarray) -> np.ndarray:
     """Return keys without those that the motion does without, within the tolerance."""
     if not MODES[search.recording.mode].is_reference:
         return search.refined(search.measured(keys)).indices
     inner = (measured := search.measured(keys)).inner
     _, peak = search.evaluate(search.without(measured, inner))
-    for key in keys[inner[(peak.max(axis=1) <= HOPELESS) | (search.power == 2)]]:
+    for key in keys[inner[(peak.max(axis=1) <= HOPELESS_ERROR_PER_TOLERANCE) | (search.power == 2)]]:
         fewer = keys[keys != key]
-        if _error(search, fewer) <= WITHIN:
+        if _error(search, fewer) <= MAX_LINK_ERROR_PER_TOLERANCE:
             keys = fewer
     return keys
 
 
-def _mended(search: Search, keys: np.ndarray) -> np.ndarray:
+def _mended(search: KeySearch, keys: np.ndarray) -> np.ndarray:
     """Return keys with more of them where the motion passes the tolerance."""
-    while _error(search, keys) > WITHIN:
+    while _error(search, keys) > MAX_LINK_ERROR_PER_TOLERANCE:
         errors = _errors(search, keys)
         worst = np.array([first + int(np.argmax(errors[first:second])) for first, second in pairwise(keys.tolist())])
         of_worst = errors[worst]
@@ -144,7 +144,7 @@ def _mended(search: Search, keys: np.ndarray) -> np.ndarray:
     return keys
 
 
-def _errors(search: Search, keys: np.ndarray) -> np.ndarray:
+def _errors(search: KeySearch, keys: np.ndarray) -> np.ndarray:
     """Return how far the whole motion between keys is off at every sample, in tolerances, shape (n,)."""
     recording = search.recording
     if not MODES[recording.mode].is_reference:
@@ -155,22 +155,22 @@ def _errors(search: Search, keys: np.ndarray) -> np.ndarray:
     return errors
 
 
-def _error(search: Search, keys: np.ndarray) -> float:
+def _error(search: KeySearch, keys: np.ndarray) -> float:
     """Return what counts of the errors at all samples."""
     errors = _errors(search, keys)
     return float(np.sqrt(np.square(errors).mean()) if search.power == 2 else errors.max())
 
 
-class BudgetSearch(Search):
+class BudgetSearch(KeySearch):
     """The search for a number of keys, under one mode: for the largest error, or with `rms` for its mean square.
 
     A largest error may be `enough`, in tolerances: then the search ends where it has that, or is far from it.
     """
 
-    def __init__(self, recording: Recording, budget: int, *, rms: bool = False, enough: float = 0.0) -> None:
+    def __init__(self, recording: SampleTracks, budget: int, *, rms: bool = False, enough: float = 0.0) -> None:
         super().__init__(recording, rms=rms)
         self.budget, self.enough = budget, enough
-        self._length = int(np.searchsorted(LENGTHS, len(recording.times) / budget, side="right"))
+        self._length = int(np.searchsorted(SAMPLES_PER_KEY_LIMITS, len(recording.times) / budget, side="right"))
         self._is_short = self._length < 2
         """Whether there are few samples for each key."""
         self._takes_all = self.reach == 0 and self._is_short
@@ -183,7 +183,7 @@ class BudgetSearch(Search):
             return np.array((0, count - 1))
         keys = self.measured(np.arange(count))
         if not self._takes_all:
-            keys = self.thinned(keys, math.inf, SPREAD[min(self.reach, 1)] * self.budget)
+            keys = self.thinned(keys, math.inf, CANDIDATES_PER_KEY[min(self.reach, 1)] * self.budget)
         candidates = keys.indices
         keys = self.thinned(keys, math.inf, self.budget)
         if self.power == 2:
@@ -194,20 +194,20 @@ class BudgetSearch(Search):
         """All samples, but of those that are off by so little when left out alone only every few."""
         samples = np.arange(len(self.recording.times))
         _, peak = self.costs.of(np.stack((samples[:-2], samples[2:]), axis=1))
-        is_lively = samples % CALMER == 0
+        is_lively = samples % CALM_CANDIDATE_STRIDE == 0
         is_lively[1:-1] |= peak > calm
         is_lively[-1] = True
         return samples[is_lively]
 
-    def _least_peak(self, keys: Keys, candidates: np.ndarray, tries: int) -> np.ndarray:
+    def _least_peak(self, keys: KeySelection, candidates: np.ndarray, tries: int) -> np.ndarray:
         """Return the keys with the smallest largest error of all that tries lead to from some."""
         if self._takes_all:
-            candidates = self._lively(CALM * keys.peak.max())
+            candidates = self._lively(MAX_CALM_ERROR_RATIO * keys.peak.max())
         if self.reach and not self._is_short:
             keys = self._settled(keys)
         elif self._length == 2:
             keys = self.moved(keys, math.inf)
-        steps = FIRST_STEP if self.reach and self._length == 0 else STEPS[self._length]
+        steps = FIRST_STEP if self.reach and self._length == 0 else STEPS_BY_LENGTH[self._length]
         samples, result = keys.indices, [keys.indices]
         for _ in range(min(tries, 2 if self.reach and not self._is_short else 1)):
             if self.costs.peak(samples) <= self.enough:
@@ -219,10 +219,10 @@ class BudgetSearch(Search):
             samples = moved[-1]
             if self._takes_all and is_complete:
                 return min(result, key=self.costs.peak)
-            candidates = candidates[::SPARSER]
+            candidates = candidates[::CANDIDATE_THINNING]
         best = min(result, key=self.costs.peak)
         # Without neighbours there is little left to gain, and in long recordings it takes long.
-        is_long = len(self.recording.times) > SHORT and not self.reach
+        is_long = len(self.recording.times) > MAX_FULL_START_SAMPLES and not self.reach
         if is_long or self._is_over(best):
             return best
         if self.reach:
@@ -239,12 +239,12 @@ class BudgetSearch(Search):
     def _is_over(self, best: np.ndarray) -> bool:
         """Whether there is no more to be done for the best keys."""
         peak = self.costs.peak(best)
-        return peak <= self.enough or 0.0 < HOPELESS * self.enough < peak
+        return peak <= self.enough or 0.0 < HOPELESS_ERROR_PER_TOLERANCE * self.enough < peak
 
     def _of_tolerance(self, best: np.ndarray) -> list[np.ndarray]:
         """Return what a search for a tolerance makes of the best keys, brought to the budget."""
-        tolerance = self.costs.peak(best) / TIGHTER
-        keys = self.loosened(self.measured(best), tolerance, LOOSER)
+        tolerance = self.costs.peak(best) / TIGHTER_ERROR_PER_TOLERANCE
+        keys = self.loosened(self.measured(best), tolerance, LOOSER_ERROR_PER_TOLERANCE)
         if len(keys.indices) > self.budget:
             keys = self.thinned(keys, math.inf, self.budget)
         result = [self.filled(keys).indices]
@@ -254,8 +254,8 @@ class BudgetSearch(Search):
 
     def _closed(self, best: np.ndarray) -> np.ndarray:
         """Return the best keys, or better ones that put in a few at the worst places and do without others."""
-        for _ in range(CLOSINGS):
-            tolerance = self.costs.peak(best) / CLOSING
+        for _ in range(MAX_CLOSINGS):
+            tolerance = self.costs.peak(best) / CLOSING_ERROR_PER_TOLERANCE
             if tolerance == 0.0:
                 break
             keys = self.refined(self.densified(self.measured(best), tolerance), tolerance)
@@ -264,7 +264,7 @@ class BudgetSearch(Search):
             best = min(best, self.filled(keys).indices, key=self.costs.peak)
         return best
 
-    def filled(self, keys: Keys, most: int | None = None) -> Keys:
+    def filled(self, keys: KeySelection, most: int | None = None) -> KeySelection:
         """Keys with more of them where the motion is off most, as many as the budget, or this, has left."""
         most = min(most or self.budget, len(self.recording.times))
         columns = np.arange(-2 * self.reach, 2 + 2 * self.reach)
@@ -279,24 +279,24 @@ class BudgetSearch(Search):
             is_better = peak < before
             order = np.argsort(np.where(is_better, -before, peak), kind="stable")
             picked = np.searchsorted(trials, spaced(trials[order], self.spacing, len(keys.indices)))
-            picked = picked[: max((left + 1) // 2, min(left, FEW, np.count_nonzero(is_better[picked])))]
+            picked = picked[: max((left + 1) // 2, min(left, MAX_INSERTED_KEYS, np.count_nonzero(is_better[picked])))]
             keys = self.measured(np.union1d(keys.indices, worst[picked]))
         return keys
 
     def _moved_together(self, samples: np.ndarray, steps: slice) -> list[np.ndarray]:
         """As many keys as the budget, these among them, and what moving them together makes of them step by step."""
         result = [self.filled(self.measured(samples)).indices]
-        for ways, part in TOGETHER[min(self.reach, 2)][steps]:
+        for ways, part in JOINT_MOVES_BY_REACH[min(self.reach, 2)][steps]:
             result.append(moved_together(self.costs, result[-1], ways, part))
         return result
 
-    def _least_squares(self, best: Keys, tries: int) -> np.ndarray:
+    def _least_squares(self, best: KeySelection, tries: int) -> np.ndarray:
         """Return the same for the mean square, from keys that are many enough."""
         result = [best.indices]
         links = tries and self.is_linkable  # The last try.
         for _ in range(tries - bool(links)):
             # Some more where the motion is off most, moved together.
-            more = self.filled(self.measured(best.indices), math.ceil(SWAPPED * self.budget))
+            more = self.filled(self.measured(best.indices), math.ceil(MAX_SWAPPED_BUDGET_RATIO * self.budget))
             more = self.moved(more, math.inf)
             result.append(more.indices)
             best = self._better_of(best, more)
@@ -305,7 +305,7 @@ class BudgetSearch(Search):
             best = self._better_of(best, self.measured(traded))
         return best.indices
 
-    def _better_of(self, best: Keys, other: Keys) -> Keys:
+    def _better_of(self, best: KeySelection, other: KeySelection) -> KeySelection:
         """Of keys and others, brought to the budget, those with the smaller sum of squares."""
         keys = self.measured(other.indices)
         if len(keys.indices) > self.budget:
@@ -313,9 +313,9 @@ class BudgetSearch(Search):
         keys = self.moved(self.filled(self.moved(keys, math.inf)), math.inf)
         return keys if keys.cost.sum() < best.cost.sum() else best
 
-    def _settled(self, keys: Keys) -> Keys:
+    def _settled(self, keys: KeySelection) -> KeySelection:
         """Keys moved to where the sum of the powers of errors is least."""
-        for _ in range(ROUNDS):
+        for _ in range(MAX_SEARCH_ROUNDS):
             before = keys.cost.sum()
             keys = self.moved(keys, math.inf)
             if not keys.cost.sum() < 0.99 * before:

@@ -19,16 +19,16 @@ from .piecewise import blocks
 from .poses import Poses, beyond, packed, reshaped
 from .segments import prepare_within
 
-WORST = 1e30
+MAX_ERROR = 1e30
 """Errors are clipped to this, so that their powers stay finite."""
 
-BATCH = 2**14
+BATCH_POSES = 2**14
 """Poses looked at in one go: few enough for the processor's caches."""
 
 LOOKED_UP = 2**16
 """Segments looked up in one go."""
 
-REMEMBERED = 2**18
+MAX_REMEMBERED_SEGMENTS = 2**18
 """Segments at most, so that long recordings do not fill the memory."""
 
 REMEMBERED_EACH = 16
@@ -38,7 +38,7 @@ Found = tuple[np.ndarray, np.ndarray]
 """The costs and the peaks of segments."""
 
 
-class Recording:
+class SampleTracks:
     """What keys are searched for: tracks of samples, one behind the other, each of which gets keys of its own.
 
     Parameters
@@ -95,7 +95,7 @@ class Costs:
         largest of these errors.
     """
 
-    def __init__(self, recording: Recording, power: int) -> None:
+    def __init__(self, recording: SampleTracks, power: int) -> None:
         self.recording, self.power = recording, power
         mode = MODES[recording.mode]
         self.reach = max(mode.behind, mode.ahead)
@@ -103,10 +103,10 @@ class Costs:
         self.keys = 2 + 2 * self.reach
         """How many keys have a say in a segment. A segment is a row of them: samples, -1 where there is none."""
         self._first = 0 if recording.off_at_keys else 1
-        is_plain = type(recording) is Recording and not recording.off_at_keys
+        is_plain = type(recording) is SampleTracks and not recording.off_at_keys
         is_plain &= recording.poses.scales is None and len(recording.poses.shape) == 1
         self._spline = SplineErrors(recording) if is_plain and recording.mode == "motor_spline" else None
-        self._memory = Memory(min(REMEMBERED, REMEMBERED_EACH * len(recording.times)), 2)
+        self._memory = Memory(min(MAX_REMEMBERED_SEGMENTS, REMEMBERED_EACH * len(recording.times)), 2)
 
     def of(self, segments: np.ndarray) -> Found:
         """Costs and peaks (...) of segments (..., keys), zero where no sample counts."""
@@ -162,7 +162,7 @@ class Costs:
         """Segments (s, keys), a batch at a time, and how many samples there are in each, (s,)."""
         counts = self._counts(rows)
         bounds = math.prod(self.recording.poses.shape[:-1]) * np.append(0, np.cumsum(counts))
-        for some, _ in blocks(bounds, BATCH):
+        for some, _ in blocks(bounds, BATCH_POSES):
             yield rows[some], counts[some]
 
     def _counts(self, rows: np.ndarray) -> np.ndarray:
@@ -175,7 +175,7 @@ class Costs:
         recording, before = self.recording, self.reach
         if self._spline is not None:
             samples, errors = self._spline.errors(rows, counts)
-            return samples, np.minimum(errors, WORST)
+            return samples, np.minimum(errors, MAX_ERROR)
         begins = rows[:, before] + self._first - np.cumsum(counts) + counts
         samples = np.repeat(begins, counts) + np.arange(counts.sum())
         key_times, keys = _with_ends(recording, rows, self.reach)
@@ -184,10 +184,10 @@ class Costs:
         together = keys.shape[:-2]
         within = prepare_within(MODES[recording.mode].curves, key_times, keys, slice(before, before + 1))
         if not together:
-            return samples, np.minimum(recording.errors(samples, within(counts, progress, slice(None))), WORST)
+            return samples, np.minimum(recording.errors(samples, within(counts, progress, slice(None))), MAX_ERROR)
         counts, progress = (np.concatenate([numbers] * math.prod(together)) for numbers in (counts, progress))
         shown = within(counts, progress, slice(None))
-        return samples, np.minimum(recording.errors(samples, reshaped(shown, *together, -1)), WORST)
+        return samples, np.minimum(recording.errors(samples, reshaped(shown, *together, -1)), MAX_ERROR)
 
 
 def _at(numbers: np.ndarray, samples: np.ndarray) -> np.ndarray:
@@ -195,7 +195,7 @@ def _at(numbers: np.ndarray, samples: np.ndarray) -> np.ndarray:
     return numbers[samples] if numbers.ndim else numbers
 
 
-def _with_ends(recording: Recording, rows: np.ndarray, reach: int) -> tuple[np.ndarray, Poses]:
+def _with_ends(recording: SampleTracks, rows: np.ndarray, reach: int) -> tuple[np.ndarray, Poses]:
     """Return times (s, keys) and poses (..., s, keys) of samples; beyond them the motion of the ends goes on.
 
     Blender's curves come to rest there.

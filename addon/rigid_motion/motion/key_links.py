@@ -24,40 +24,40 @@ import numpy as np
 
 from .key_costs import Costs
 
-ALIVE = 1.5
+LIVE_ERROR_PER_TOLERANCE = 1.5
 """Tolerances that a segment may be off by, for it or a longer one to be looked at further."""
 
-WIDTHS = {0: (3, 1), 1: (1, 0)}
+CANDIDATE_WIDTHS_BY_REACH = {0: (3, 1), 1: (1, 0)}
 """By how many samples candidates may be beside keys, by the reach of the mode: as many as the effort allows."""
 
-EFFORT = 100
+MAX_LOOKS_PER_SAMPLE = 100
 """Times that every sample may be looked at, on average."""
 
-PAIRED = 200
+MAX_PAIR_LOOKS_PER_SAMPLE = 200
 """The same for pairs of candidates, where a segment depends on more keys than its two: more finds no fewer keys."""
 
-BESIDE = {0: 2, 1: 0}
+BUDGET_WIDTH_BY_REACH = {0: 2, 1: 0}
 """The same for keys of a budget, whatever the effort."""
 
-NEAR = 1.2
+LIVE_ERROR_PER_LEAST = 1.2
 """How many times the least error so far a segment may be off by for a longer one to be looked at, for these."""
 
-JOINED = 300
+MAX_BUDGET_LOOKS_PER_SAMPLE = 300
 """Times that every sample may be looked at, on average, for these."""
 
-FEWER = 4
+BEST_KEYS_KEPT = 4
 """Of the best keys, where all that were found have too many links for that."""
 
-WITHIN = 1.0 + 1e-12
+MAX_LINK_ERROR_PER_TOLERANCE = 1.0 + 1e-12
 """Tolerances that a link may be off by: those of the keys that were found are among them, whatever the rounding."""
 
-TOGETHER = 8
+BATCH_LENGTHS = 8
 """Lengths of segments that are looked at in one go, though that of some would be enough, where a pose costs little."""
 
-DEAR = 3.0
+MAX_SEGMENT_COST_KEYS = 3.0
 """Prices of a key that a segment may cost: beyond that one more key is worth it."""
 
-PRICES = 8.0
+MAX_PRICE_RATIO = 8.0
 """How many times as high, or as low, the price may be as it is first thought to be."""
 
 PRICE_STEPS = 10
@@ -74,12 +74,18 @@ def linked_keys(costs: Costs, result: list[np.ndarray]) -> np.ndarray:
     result : list of array of int
         Keys that keep to the tolerance, each from the first sample to the last.
     """
-    for width in WIDTHS[costs.reach]:
+    for width in CANDIDATE_WIDTHS_BY_REACH[costs.reach]:
         candidates = beside(costs, result, width)
-        links = _links(costs, candidates, result, 1.0 if costs.reach == 0 else ALIVE, ALIVE**2)
+        links = _links(
+            costs,
+            candidates,
+            result,
+            1.0 if costs.reach == 0 else LIVE_ERROR_PER_TOLERANCE,
+            LIVE_ERROR_PER_TOLERANCE**2,
+        )
         if links is not None:
             _, peak = costs.of(links)
-            links = links[peak <= WITHIN]
+            links = links[peak <= MAX_LINK_ERROR_PER_TOLERANCE]
             keys = _Ways(links, candidates).shortest()
             assert keys is not None  # what was found is a way
             return keys
@@ -107,11 +113,11 @@ def traded_keys(costs: Costs, result: list[np.ndarray], *, budget: int | None = 
         return best
     price = (max(totals) - min(totals)) / (max(counts) - min(counts))
     candidates = beside(costs, result, 0)
-    links = _links(costs, candidates, result, DEAR * price, DEAR**2 * price)
+    links = _links(costs, candidates, result, MAX_SEGMENT_COST_KEYS * price, MAX_SEGMENT_COST_KEYS**2 * price)
     if links is None:
         return best
     (cost, _), ways = costs.of(links), _Ways(links, candidates)
-    low, high = -math.log(PRICES), math.log(PRICES)
+    low, high = -math.log(MAX_PRICE_RATIO), math.log(MAX_PRICE_RATIO)
     for _ in range(PRICE_STEPS):
         middle = 0.5 * (low + high)
         keys = ways.shortest(cost + price * math.exp(middle))
@@ -139,9 +145,9 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
     """
     within = sorted((keys for keys in result if len(keys) <= budget), key=costs.peak)
     best, high = within[0], costs.peak(within[0])
-    for some in (result, within[:FEWER]):
-        candidates = beside(costs, some, BESIDE[costs.reach])
-        links = _links(costs, candidates, some, high, NEAR * high, JOINED)
+    for some in (result, within[:BEST_KEYS_KEPT]):
+        candidates = beside(costs, some, BUDGET_WIDTH_BY_REACH[costs.reach])
+        links = _links(costs, candidates, some, high, LIVE_ERROR_PER_LEAST * high, MAX_BUDGET_LOOKS_PER_SAMPLE)
         if links is not None:
             break
     else:
@@ -173,7 +179,7 @@ def _links(
     result: list[np.ndarray],
     good: float,
     alive: float,
-    effort: float = EFFORT,
+    effort: float = MAX_LOOKS_PER_SAMPLE,
 ) -> np.ndarray | None:
     """Return the links that candidates allow: samples, -1 beyond the ends, (l, keys of a segment); None for many.
 
@@ -199,11 +205,11 @@ def _pairs(
 ) -> np.ndarray | None:
     """Return the candidates that a segment may join, (p, 2), by the first and then the second; None for many."""
     last, reach = len(candidates) - 1, costs.reach
-    left = PAIRED * len(costs.recording.times) * costs.recording.poses_each if reach else math.inf
+    left = MAX_PAIR_LOOKS_PER_SAMPLE * len(costs.recording.times) * costs.recording.poses_each if reach else math.inf
     pairs = [np.searchsorted(candidates, np.stack((keys[:-1], keys[1:]), axis=1)) for keys in result]
     first, gap = np.arange(last), 1
     while len(first):
-        gaps = gap + np.arange(TOGETHER if costs.recording.poses_each == 1.0 else 1)
+        gaps = gap + np.arange(BATCH_LENGTHS if costs.recording.poses_each == 1.0 else 1)
         second = first[:, None] + gaps
         # A segment at the end has no neighbour there; all others have one, if not as far away.
         numbers = first[:, None, None] + gaps[:, None] * np.arange(-reach, 2 + reach)

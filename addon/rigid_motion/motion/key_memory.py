@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-FACTOR = np.uint64(0x9E3779B97F4A7C15)
+HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
 """Spreads segments over the places that they are remembered in: 2^64 over the golden ratio."""
 
 
@@ -29,7 +29,7 @@ class Memory:
         for column in range(rows.shape[1]):
             numbers *= np.uint64(samples + 1)
             numbers += (rows[:, column] + 1).astype(np.uint64)
-        places = ((numbers * FACTOR) >> self._shift).astype(np.int64)
+        places = ((numbers * HASH_FACTOR) >> self._shift).astype(np.int64)
         result = self._found.take(places, axis=0)
         new = np.flatnonzero(self._numbers.take(places) != numbers)
         if len(new):

@@ -19,48 +19,48 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .key_costs import Costs, Found, Recording
+from .key_costs import Costs, Found, SampleTracks
 from .key_links import linked_keys, traded_keys
 
-PEAK = 8
+PEAK_POWER = 8
 """The power of errors whose sum stands for the largest of them: one of two."""
 
-STEPS = {PEAK: np.array((1, -1, 3, -3)), 2: np.array((1, -1, 2, -2, 4, -4, 8, -8))}
+MOVE_STEPS_SAMPLES = {PEAK_POWER: np.array((1, -1, 3, -3)), 2: np.array((1, -1, 2, -2, 4, -4, 8, -8))}
 """By how many samples keys are moved, on trial, for the largest error and for its mean square."""
 
-ROUNDS = 12
+MAX_SEARCH_ROUNDS = 12
 """Of moving keys and taking out more of them, at most."""
 
-NEAR = np.arange(-1, 2)
+NEIGHBOUR_OFFSETS = np.arange(-1, 2)
 """The keys that are moved anew after one of them has changed."""
 
-MOVES = 4
+MOVES_PER_ROUND = 4
 """How often keys are moved in a round."""
 
-GAIN = 1e-4
+MIN_MOVE_GAIN_RATIO = 1e-4
 """The least that moving a key has to gain, as a part of the mean cost of a segment."""
 
-LOOSER = (1.6, 1.3, 1.15)
+LOOSER_TOLERANCE_FACTORS = (1.6, 1.3, 1.15)
 """How many times the tolerance keys may pass while more of them are taken out, before some are put back."""
 
-START = {PEAK: 0.5, 2: 0.25}
+START_TOLERANCE_RATIOS = {PEAK_POWER: 0.5, 2: 0.25}
 """Of the tolerance: a stretch that is off by this at most begins with a key in its middle."""
 
-OTHERS = (0.9, 1.1, 1.25)
+OTHER_TOLERANCE_FACTORS = (0.9, 1.1, 1.25)
 """Of how many times the tolerance keys are found, whose places may be better for the mean square, too."""
 
-MUCH = 2**13
+MIN_POSTPONED_POSES = 2**13
 """Poses to look at in one go, that are worth being put off for what may make some of them needless."""
 
-SHORT = 2**13
+MAX_FULL_START_SAMPLES = 2**13
 """Samples, to which every one of them is a key at first: it takes longer, and finds fewer keys."""
 
-SWEEPS = 8
+MAX_KEY_SWEEPS = 8
 """Of all keys, for those to be changed at once."""
 
 
 @dataclass(eq=False)
-class Keys:
+class KeySelection:
     """Keys among the samples, and what lies between them."""
 
     indices: np.ndarray
@@ -99,11 +99,11 @@ class Keys:
         return np.where(inside, self.indices[result], -1)
 
 
-class Search:
+class KeySearch:
     """The search for keys of recordings under one mode: for the largest error, or with `rms` for its mean square."""
 
-    def __init__(self, recording: Recording, *, rms: bool = False) -> None:
-        self.recording, self.power = recording, 2 if rms else PEAK
+    def __init__(self, recording: SampleTracks, *, rms: bool = False) -> None:
+        self.recording, self.power = recording, 2 if rms else PEAK_POWER
         self.costs = Costs(recording, self.power)
         self.reach = self.costs.reach
         self.spacing = 2 + 2 * self.reach
@@ -115,7 +115,7 @@ class Search:
         if self.power == 2:
             return self._traded(best, tries).indices
         result = [best.indices]
-        for looser in LOOSER[:tries]:
+        for looser in LOOSER_TOLERANCE_FACTORS[:tries]:
             keys = self.loosened(best, 1.0, looser)
             best = self._better(best, keys)
             result.append(keys.indices)
@@ -125,11 +125,11 @@ class Search:
                 best = self.refined(self.measured(linked))
         return best.indices
 
-    def _first(self, tolerance: float) -> Keys:
+    def _first(self, tolerance: float) -> KeySelection:
         """Return what is left of keys that are more than needed."""
         return self.refined(self.thinned(self.started(tolerance), tolerance), tolerance)
 
-    def started(self, tolerance: float) -> Keys:
+    def started(self, tolerance: float) -> KeySelection:
         """Keys to begin with: two for a track where that is enough, else at the ends of stretches of 2, 4, 8 samples...
 
         Stretches double where their errors are a part of the tolerance, and those of both halves were.
@@ -141,7 +141,7 @@ class Search:
         lengths = recording.ends - recording.starts + 1
         is_key, good = ~np.repeat(enough, lengths), ~np.repeat(enough, lengths)
         is_key[recording.starts] = is_key[recording.ends] = ends[recording.ends] = True
-        if count <= SHORT:
+        if count <= MAX_FULL_START_SAMPLES:
             return self.measured(np.flatnonzero(is_key))
         last = np.repeat(recording.ends, lengths)
         places, half = np.arange(count) - np.repeat(recording.starts, lengths), 1
@@ -153,7 +153,7 @@ class Search:
             both = good[begins] & (good[middles] | ends[middles])
             numbers, begins, middles = numbers[both], begins[both], middles[both]
             _, peak = self.costs.of(keys.windows(numbers, np.arange(-reach, 2 + reach)))
-            fine = (peak <= START[self.power] * tolerance) & ~ends[middles]
+            fine = (peak <= START_TOLERANCE_RATIOS[self.power] * tolerance) & ~ends[middles]
             good[:] = False
             good[begins[fine]] = True
             # Half as long as is good enough, for the search to have a choice.
@@ -164,11 +164,11 @@ class Search:
         keys = self.measured(np.flatnonzero(is_key))
         return self.densified(keys, tolerance) if self.power != 2 else keys
 
-    def _traded(self, best: Keys, tries: int) -> Keys:
+    def _traded(self, best: KeySelection, tries: int) -> KeySelection:
         """Keys put together from those of several tolerances, where they are fewer than the best of this one."""
         if not (self.is_linkable and tries):
             return best
-        result = [best.indices, *(self._first(other).indices for other in OTHERS[:tries])]
+        result = [best.indices, *(self._first(other).indices for other in OTHER_TOLERANCE_FACTORS[:tries])]
         traded = traded_keys(self.costs, result)
         return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
 
@@ -177,19 +177,19 @@ class Search:
         """Whether keys of several searches can be put together."""
         return self.reach <= 1 and len(self.recording.starts) == 1
 
-    def measured(self, indices: np.ndarray) -> Keys:
+    def measured(self, indices: np.ndarray) -> KeySelection:
         """Keys at these samples, rising, the outermost of each track among them, and everything between them."""
         keys = self._at(indices)
         numbers, segments = self.segments(keys)
         keys.cost[numbers], keys.peak[numbers] = self.costs.of(segments)
         return keys
 
-    def _at(self, indices: np.ndarray) -> Keys:
+    def _at(self, indices: np.ndarray) -> KeySelection:
         """Return the same, and nothing known of what is between them."""
         recording = self.recording
         first, end = np.searchsorted(indices, recording.starts), np.searchsorted(indices, recording.ends)
         counts = end - first + 1
-        return Keys(
+        return KeySelection(
             indices,
             np.repeat(first, counts),
             np.repeat(end, counts),
@@ -198,12 +198,12 @@ class Search:
             indices >= 0,
         )
 
-    def segments(self, keys: Keys) -> tuple[np.ndarray, np.ndarray]:
+    def segments(self, keys: KeySelection) -> tuple[np.ndarray, np.ndarray]:
         """Return numbers of the keys that segments begin at, (s,), and the samples of all keys with a say in each."""
         numbers = np.flatnonzero(np.arange(len(keys.indices)) < keys.last)
         return numbers, keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
 
-    def densified(self, keys: Keys, tolerance: float) -> Keys:
+    def densified(self, keys: KeySelection, tolerance: float) -> KeySelection:
         """Keys with more of them where the motion is off, each where it is so most, until it keeps to the tolerance."""
         while keys.peak.max() > tolerance:
             errors = self.costs.errors(self.segments(keys)[1])
@@ -216,13 +216,13 @@ class Search:
             keys = self.measured(more)
         return keys
 
-    def loosened(self, keys: Keys, tolerance: float, looser: float) -> Keys:
+    def loosened(self, keys: KeySelection, tolerance: float, looser: float) -> KeySelection:
         """Keys that keep to a tolerance, put back between some that are too few, which find better places."""
         looser *= tolerance
         fewer = self.moved(self.thinned(self.measured(keys.indices), looser), looser)
         return self.refined(self.densified(fewer, tolerance), tolerance)
 
-    def _better(self, best: Keys, other: Keys) -> Keys:
+    def _better(self, best: KeySelection, other: KeySelection) -> KeySelection:
         """Of each track the keys that are fewer."""
         chosen = []
         for start, end in zip(self.recording.starts, self.recording.ends, strict=True):
@@ -232,16 +232,16 @@ class Search:
             chosen.append(other.indices[rows[1]] if takes_other else best.indices[rows[0]])
         return self.measured(np.concatenate(chosen))
 
-    def refined(self, keys: Keys, tolerance: float = 1.0) -> Keys:
+    def refined(self, keys: KeySelection, tolerance: float = 1.0) -> KeySelection:
         """Keys moved and thinned until none can be removed."""
-        for _ in range(ROUNDS):
+        for _ in range(MAX_SEARCH_ROUNDS):
             before = len(keys.indices)
             keys = self.thinned(self.moved(keys, tolerance), tolerance)
             if len(keys.indices) == before:
                 break
         return keys
 
-    def thinned(self, keys: Keys, tolerance: float, fewest: int = 2) -> Keys:
+    def thinned(self, keys: KeySelection, tolerance: float, fewest: int = 2) -> KeySelection:
         """Keys without all those that can be removed, down to the fewest that are wanted."""
         reach = self.reach
         seen = np.zeros(len(keys.indices), dtype=bool)
@@ -269,12 +269,14 @@ class Search:
             seen, cost, peak = seen[left], cost[left], peak[left]
         return keys
 
-    def without(self, keys: Keys, numbers: np.ndarray) -> np.ndarray:
+    def without(self, keys: KeySelection, numbers: np.ndarray) -> np.ndarray:
         """Return samples of the keys around each of some keys, without it, that have a say where it has, (c, m)."""
         columns = np.arange(-1 - 2 * self.reach, 2 + 2 * self.reach)
         return keys.windows(numbers, columns[columns != 0])
 
-    def _removable(self, rise: np.ndarray, peak: np.ndarray, keys: Keys, tolerance: float, most: int) -> np.ndarray:
+    def _removable(
+        self, rise: np.ndarray, peak: np.ndarray, keys: KeySelection, tolerance: float, most: int
+    ) -> np.ndarray:
         """Which of the inner keys go next: those whose removal raises the cost least, far enough from one another."""
         order = np.argsort(rise, kind="stable")
         order = order[: max(1, len(order) // 4)] if self.power == 2 or not math.isfinite(tolerance) else order
@@ -287,13 +289,13 @@ class Search:
             picked = picked[keys.cost.sum() + np.cumsum(rise[picked]) <= allowed]
         return picked
 
-    def _remove(self, keys: Keys, picked: np.ndarray, cost: np.ndarray, peak: np.ndarray) -> None:
+    def _remove(self, keys: KeySelection, picked: np.ndarray, cost: np.ndarray, peak: np.ndarray) -> None:
         """Remove these keys, and set the costs and peaks of the segments that take their place."""
         # The segment from the key before takes the place of two.
         columns = np.concatenate((np.arange(-1 - self.reach, 0), np.arange(1, 1 + self.reach)))
         segments, inside = keys.around(picked, columns)
         keys.cost[segments[inside]], keys.peak[segments[inside]] = cost[picked][inside], peak[picked][inside]
-        near, inside = keys.around(picked, NEAR)
+        near, inside = keys.around(picked, NEIGHBOUR_OFFSETS)
         keys.stale[near[inside]] = True
         removed = np.zeros(len(keys.indices), dtype=np.int64)
         removed[picked] = 1
@@ -303,11 +305,11 @@ class Search:
         for name in ("indices", "cost", "peak", "stale"):
             setattr(keys, name, getattr(keys, name)[left])
 
-    def moved(self, keys: Keys, tolerance: float) -> Keys:
+    def moved(self, keys: KeySelection, tolerance: float) -> KeySelection:
         """As many keys, moved along the recording as long as that lowers the cost by much."""
-        reach, steps = self.reach, STEPS[self.power]
+        reach, steps = self.reach, MOVE_STEPS_SAMPLES[self.power]
         columns, of_segments = np.arange(-1 - 2 * reach, 2 + 2 * reach), np.arange(-1 - reach, 1 + reach)
-        for _ in range(MOVES):
+        for _ in range(MOVES_PER_ROUND):
             inner = keys.inner
             inner = inner[keys.stale[inner]]
             trials = keys.indices[inner, None] + steps
@@ -317,7 +319,10 @@ class Search:
                 break
             windows = keys.windows(inner[rows], columns)
             windows[:, 1 + 2 * reach] += steps[ways]
-            around, enough = self._cost_around(keys, inner[rows]), -GAIN * keys.cost.sum() / len(keys.cost)
+            around, enough = (
+                self._cost_around(keys, inner[rows]),
+                -MIN_MOVE_GAIN_RATIO * keys.cost.sum() / len(keys.cost),
+            )
             rises = functools.partial(self._rises, around=around, tolerance=tolerance)
             cost, peak = self.evaluate(windows, lambda *result, rises=rises, enough=enough: rises(*result) < enough)
             rise = rises(cost, peak)
@@ -336,7 +341,7 @@ class Search:
             keys.cost[segments[inside]], keys.peak[segments[inside]] = cost[chosen][inside], peak[chosen][inside]
             keys.indices = keys.indices.copy()
             keys.indices[picked] += steps[ways[chosen]]
-            near, inside = keys.around(picked, NEAR)
+            near, inside = keys.around(picked, NEIGHBOUR_OFFSETS)
             keys.stale[near[inside]] = True
         return keys
 
@@ -345,7 +350,7 @@ class Search:
         refused = (self.power != 2) & (peak.max(axis=1) > tolerance)
         return np.where(refused, math.inf, cost.sum(axis=1) - around)
 
-    def _cost_around(self, keys: Keys, numbers: np.ndarray) -> np.ndarray:
+    def _cost_around(self, keys: KeySelection, numbers: np.ndarray) -> np.ndarray:
         """Return the sum over the segments that each key influences."""
         segments, inside = keys.around(numbers, np.arange(-1 - self.reach, 1 + self.reach))
         return np.where(inside, keys.cost[segments], 0.0).sum(axis=1)
@@ -359,7 +364,7 @@ class Search:
         rows = np.lib.stride_tricks.sliding_window_view(windows, self.costs.keys, axis=1)
         last = rows.shape[1] - 1
         outer = np.abs(2 * np.arange(last + 1) - last) > 1
-        if promising is None or self.costs.effort(rows[:, outer]) < MUCH:
+        if promising is None or self.costs.effort(rows[:, outer]) < MIN_POSTPONED_POSES:
             return self.costs.of(rows)
         cost, peak = np.zeros((2, *rows.shape[:2]))
         cost[:, ~outer], peak[:, ~outer] = self.costs.of(rows[:, ~outer])
@@ -374,7 +379,7 @@ def spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
     rank[order + distance] = np.arange(len(order))
     picked: list[np.ndarray] = []
     # All at once that are the best in their neighbourhood, and again with what is left.
-    for _ in range(SWEEPS):
+    for _ in range(MAX_KEY_SWEEPS):
         centre = rank[distance - 1 : len(rank) - distance + 1]
         best = functools.reduce(np.minimum, (rank[begin : begin + len(centre)] for begin in range(2 * distance - 1)))
         chosen = np.flatnonzero((centre == best) & (centre < len(order)))

@@ -16,28 +16,28 @@ from .curves import twist_shares
 from .key_memory import Memory
 from .measures import largest_displacement
 from .quaternions import cross
-from .segments import STILL, in_one_place
+from .segments import MAX_SAME_POSE_CHANGE, in_one_place
 
 if TYPE_CHECKING:
-    from .key_costs import Recording
+    from .key_costs import SampleTracks
 
-REMEMBERED = 2**18
+MAX_REMEMBERED_SAMPLES = 2**18
 """Samples between two keys at most, so that long recordings do not fill the memory."""
 
 REMEMBERED_EACH = 200
 """The same for each sample of a shorter recording."""
 
-KNOWN = 2**14
+MAX_KNOWN_PAIRS = 2**14
 """Pairs of keys at most."""
 
 
 class SplineErrors:
     """The errors of `motor_spline` between keys of a recording (n,) without scales, in tolerances."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: SampleTracks) -> None:
         self._recording, self._times, self._rows = recording, recording.times, recording.truth.rows
         # Of two keys the twist from one to the other and whether nothing moves there, and then the poses in between.
-        self._blocks = np.empty((7, min(REMEMBERED, REMEMBERED_EACH * len(self._times))))
+        self._blocks = np.empty((7, min(MAX_REMEMBERED_SAMPLES, REMEMBERED_EACH * len(self._times))))
         self._forget()
 
     def errors(self, rows: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -89,7 +89,7 @@ class SplineErrors:
         result[:6] = twists.logarithm(*_seen_from(begin, end))
         rests = in_one_place(begin[:3], end[:3])
         if rests.any():
-            result[6] = rests & (np.einsum("kp,kp->p", result[:3], result[:3]) < STILL**2)
+            result[6] = rests & (np.einsum("kp,kp->p", result[:3], result[:3]) < MAX_SAME_POSE_CHANGE**2)
         return result
 
     def _progress(self, samples: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -107,7 +107,7 @@ class SplineErrors:
         return self._known.find(pairs, len(self._times), self._work_out)[:, 0].astype(np.int64)
 
     def _forget(self) -> None:
-        self._known, self._used = Memory(KNOWN, 1), 0
+        self._known, self._used = Memory(MAX_KNOWN_PAIRS, 1), 0
 
     def _work_out(self, pairs: np.ndarray) -> np.ndarray:
         """Fill the blocks of two keys (p, 2), and return where they begin, (p, 1).

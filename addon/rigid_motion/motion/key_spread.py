@@ -19,42 +19,42 @@ import numpy as np
 
 from .key_costs import Costs
 
-FIRST = 0.7
+FIRST_ERROR_RATIO = 0.7
 """Of the largest error of keys: what the next ones are first asked for, and less where that is easy."""
 
-LEAST = 1e-6
+MIN_ERROR_RATIO = 1e-6
 """Of it: no less is asked for, where some keys leave no error at all."""
 
-RAISED = 1.15
+RAISED_ERROR_RATIO = 1.15
 """How many times as large the error may be each time that there is no way with few enough keys."""
 
-HALVINGS = 3
+STEP_HALVINGS = 3
 """Of the last step up, by its logarithm."""
 
-ALIVE = 1.5, 1.2
+LIVE_ERROR_RATIOS = 1.5, 1.2
 """Times the error that a segment may be off by, for longer ones from its first key to be looked at.
 
 Where it depends on its two keys alone, and where on more."""
 
-LONGEST = 4, 36
+MAX_SEGMENT_CANDIDATES = 4, 36
 """The most candidates that a segment may reach over: so many times the mean from key to key, and at least so many."""
 
-EFFORT = 200
+MAX_LOOKS_PER_SAMPLE = 200
 """Times that every sample may be looked at for segments, on average."""
 
-EACH = 8
+FULL_REACH_CANDIDATES = 8
 """Candidates that a segment reaches over, up to which it may reach over any number of them: beyond, steps grow."""
 
-TOGETHER = 8
+BATCH_LENGTHS = 8
 """Lengths of segments that are looked at in one go."""
 
 AT_ONCE = 2**13
 """Candidates, or segments, whose possibilities are worked out in one go."""
 
-SHARPNESS = 16
+LARGEST_ERROR_POWER = 16
 """The power of the largest errors of segments whose sum is least for keys that are moved together."""
 
-WAYS = np.array((0, 1, -1, 2, -2))
+KEY_MOVE_STEPS = np.array((0, 1, -1, 2, -2))
 """Where a key may go, in steps towards the worse one of the segments beside it."""
 
 
@@ -80,21 +80,21 @@ def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: 
     """
     ways = _Ways(costs, np.union1d(candidates, keys), keys)
     worst = costs.peak(keys)
-    high = FIRST * worst
+    high = FIRST_ERROR_RATIO * worst
     ways.look(high)
     best = ways.fewest(high, budget)
     low = high
     while best is None:
         if high >= worst:
             return keys, False
-        low, high = high, min(RAISED * high, worst)
+        low, high = high, min(RAISED_ERROR_RATIO * high, worst)
         ways.look(high)
         best = ways.fewest(high, budget)
-    while low == high and low > LEAST * worst:
-        low = high / RAISED
+    while low == high and low > MIN_ERROR_RATIO * worst:
+        low = high / RAISED_ERROR_RATIO
         better = ways.fewest(low, budget)
         best, high = (best, high) if better is None else (better, low)
-    for _ in range(HALVINGS):
+    for _ in range(STEP_HALVINGS):
         middle = math.sqrt(low * high)
         better = ways.fewest(middle, budget)
         low, high, best = (middle, high, best) if better is None else (low, middle, better)
@@ -105,12 +105,15 @@ class _Ways:
     """Segments that join candidates, and how far each is off, looked at as far as errors need it."""
 
     def __init__(self, costs: Costs, candidates: np.ndarray, keys: np.ndarray) -> None:
-        self._costs, self._candidates, self._alive = costs, candidates, ALIVE[min(costs.reach, 1)]
-        longest, lengths = max(LONGEST[0] * -(-len(candidates) // len(keys)), LONGEST[1]), [1]
+        self._costs, self._candidates, self._alive = costs, candidates, LIVE_ERROR_RATIOS[min(costs.reach, 1)]
+        longest, lengths = (
+            max(MAX_SEGMENT_CANDIDATES[0] * -(-len(candidates) // len(keys)), MAX_SEGMENT_CANDIDATES[1]),
+            [1],
+        )
         while lengths[-1] < longest:
-            lengths.append(lengths[-1] + max(1, lengths[-1] // EACH))
+            lengths.append(lengths[-1] + max(1, lengths[-1] // FULL_REACH_CANDIDATES))
         self._lengths = np.array(lengths)
-        self._left = float(EFFORT * len(costs.recording.times) * costs.recording.poses_each)
+        self._left = float(MAX_LOOKS_PER_SAMPLE * len(costs.recording.times) * costs.recording.poses_each)
         # The samples of keys 1, 2... further, before each candidate and after it, -1 beyond the ends.
         number = np.arange(len(keys))
         places = np.interp(candidates, keys, number) + np.array(
@@ -151,7 +154,7 @@ class _Ways:
 
     def _look_from(self, first: np.ndarray, error: float) -> None:
         """Look at the next few lengths of segments from some candidates."""
-        numbers = self._looked[first, None] + np.arange(TOGETHER)
+        numbers = self._looked[first, None] + np.arange(BATCH_LENGTHS)
         second = first[:, None] + self._lengths[np.minimum(numbers, len(self._lengths) - 1)]
         there = (numbers < len(self._lengths)) & (second < len(self._candidates))
         windows = self._windows(np.broadcast_to(first[:, None], second.shape)[there], second[there])
@@ -161,8 +164,8 @@ class _Ways:
         lives = np.logical_and.accumulate(peak <= error, axis=1)
         passed = lives.sum(axis=1)
         self._looked[first] += passed
-        at_end = peak[np.arange(len(first)), np.minimum(passed, TOGETHER - 1)]
-        self._ended[first] = np.where(passed < TOGETHER, at_end, 0.0)
+        at_end = peak[np.arange(len(first)), np.minimum(passed, BATCH_LENGTHS - 1)]
+        self._ended[first] = np.where(passed < BATCH_LENGTHS, at_end, 0.0)
         rows, columns = np.nonzero(lives)
         self._pairs.append(np.stack((first[rows], second[rows, columns])))
         self._peaks.append(peak[rows, columns])
@@ -233,7 +236,7 @@ def moved_together(costs: Costs, keys: np.ndarray, ways: int, part: int) -> np.n
     between, step = np.diff(keys), np.zeros(len(keys), dtype=np.int64)
     step[1:-1] = np.maximum(np.minimum(between[1:], between[:-1]) // part, 1)
     step[1:-1] *= np.where(peak[1:] < peak[:-1], -1, 1)
-    choices = np.clip(keys[:, None] + step[:, None] * WAYS[:ways], keys[0], keys[-1])
+    choices = np.clip(keys[:, None] + step[:, None] * KEY_MOVE_STEPS[:ways], keys[0], keys[-1])
     choices = np.pad(choices, ((reach, reach), (0, 0)), constant_values=-1)
     least, backs = np.zeros((ways,) * (count - 1)), []
     for begin in range(0, len(keys) - 1, AT_ONCE):
@@ -258,5 +261,5 @@ def _of_choices(costs: Costs, choices: np.ndarray, worst: float) -> np.ndarray:
     # Keys must not pass one another.
     rises = ((np.diff(windows, axis=-1) > 0) | (windows[..., 1:] < 0)).all(axis=-1)
     result = np.full(rises.shape, math.inf)
-    result[rises] = np.minimum(costs.of(windows[rises])[1] / worst, 1.0 / np.finfo(float).eps) ** SHARPNESS
+    result[rises] = np.minimum(costs.of(windows[rises])[1] / worst, 1.0 / np.finfo(float).eps) ** LARGEST_ERROR_POWER
     return result

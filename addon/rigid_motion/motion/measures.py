@@ -19,7 +19,7 @@ from .checks import check_poses, check_radii
 from .poses import Poses, numbers
 from .quaternions import angle_between, components, cross
 
-TINY = 1e-150
+ZERO_LENGTH = 1e-150
 """Stands for zero, where only ratios count; its square is still above the smallest float."""
 
 NEWTON_STEPS = 6
@@ -215,20 +215,22 @@ def _displacement_of_growing(d: np.ndarray, v: np.ndarray, radius: np.ndarray, t
 
     Source: Conn, Gould and Toint, "Trust-Region Methods", 2000, section 7.3.
     """
-    v = np.where(_length(v) > TINY, v, np.array((TINY, 0.0, 0.0)).reshape(3, *[1] * (v.ndim - 1)))  # Any axis will do.
+    v = np.where(
+        _length(v) > ZERO_LENGTH, v, np.array((ZERO_LENGTH, 0.0, 0.0)).reshape(3, *[1] * (v.ndim - 1))
+    )  # Any axis will do.
     sine = _length(v)
     axis_along, squared_growth = np.abs(radius - true_radius), (radius - true_radius) ** 2
     squared_chord = 4.0 * radius * true_radius * sine * sine
     axis_across = np.sqrt(squared_growth + squared_chord)
     along, across = np.abs(_dot(d, v)) / sine, _length(cross(d, v)) / sine
     pull_along, pull_across = axis_along * along, axis_across * across
-    least = np.maximum(np.maximum(pull_across, pull_along - squared_chord), TINY)
+    least = np.maximum(np.maximum(pull_across, pull_along - squared_chord), ZERO_LENGTH)
     above = least
     for _ in range(NEWTON_STEPS):
         share_along, share_across = pull_along / (above + squared_chord), pull_across / above
         squared = share_along**2 + share_across**2
         slope = share_along**2 / (above + squared_chord) + share_across**2 / above
-        above = np.maximum(above + squared / np.maximum(slope, TINY) * (np.sqrt(squared) - 1.0), least)
+        above = np.maximum(above + squared / np.maximum(slope, ZERO_LENGTH) * (np.sqrt(squared) - 1.0), least)
     share = np.minimum(pull_along / (above + squared_chord), 1.0)
     return np.hypot(along + axis_along * share, across + axis_across * np.sqrt(1.0 - share * share))
 

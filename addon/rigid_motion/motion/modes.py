@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from . import curves
 from .algebras import cga, dual_quaternions, pga, vector_quaternion
 from .checks import check_flag, check_poses
-from .poses import LIMIT, SHORTEST, Poses, numbers, of_each
+from .poses import MAX_ABS, MIN_TIME_GAP, Poses, numbers, of_each
 from .segments import Curves, Segments, interpolate_along, prepare_within
 
 
@@ -389,14 +389,14 @@ def _checked(key_times: np.ndarray, keys: Poses) -> Poses:
     if key_times.shape not in (keys.shape, keys.shape[-1:]):
         raise ValueError(f"key times of shape {key_times.shape} do not fit keys of shape {keys.shape}")
     lengths = np.sqrt(np.einsum("...i,...i->...", keys.quaternions, keys.quaternions))
-    _require(np.abs(key_times) < LIMIT, f"has a time that is not finite, or beyond {LIMIT:g}")
-    _require(np.diff(key_times, prepend=-np.inf) > SHORTEST, "is not later than the key before it")
-    _require(np.abs(keys.positions) < LIMIT, f"has a position that is not finite, or beyond {LIMIT:g}", 1)
+    _require(np.abs(key_times) < MAX_ABS, f"has a time that is not finite, or beyond {MAX_ABS:g}")
+    _require(np.diff(key_times, prepend=-np.inf) > MIN_TIME_GAP, "is not later than the key before it")
+    _require(np.abs(keys.positions) < MAX_ABS, f"has a position that is not finite, or beyond {MAX_ABS:g}", 1)
     _require(np.isfinite(lengths), "has a quaternion that is not finite")
     _require(lengths > 0.0, "has a quaternion of length zero")
     if keys.scales is not None:
-        valid = (keys.scales > 1.0 / LIMIT) & (keys.scales < LIMIT)
-        _require(valid, f"has a scale that is not a positive number, or beyond {LIMIT:g}")
+        valid = (keys.scales > 1.0 / MAX_ABS) & (keys.scales < MAX_ABS)
+        _require(valid, f"has a scale that is not a positive number, or beyond {MAX_ABS:g}")
     return Poses(keys.positions, keys.quaternions / lengths[..., None], keys.scales)
 
 

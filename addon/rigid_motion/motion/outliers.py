@@ -16,32 +16,32 @@ from .trembling import Trembling
 MOST_ROWS = 6
 """The longest spike, in samples."""
 
-MARGIN = 3
+EXPECTING_SAMPLES = 3
 """Samples on either side that say what is expected."""
 
-SPIKE, EACH = 3.5, 2.0
+MIN_SPIKE_ENDS_RATIO, MIN_SPIKE_SAMPLE_RATIO = 3.5, 2.0
 """By how many times of what is usual here a spike is off at its ends, and each sample of it."""
 
-LONG, OF_LONG = 4, 1.4
+LONG_SPIKE_SAMPLES, LONG_SPIKE_FACTOR = 4, 1.4
 """So many samples have to be off by so many times as much: hits of a foot look like such, and are none."""
 
-REPEAT = 2.0
+MIN_REPEAT_RATIO = 2.0
 """The same for what is a sample before it once more."""
 
-RARE = 0.1
+MAX_REPEATED_RATIO = 0.1
 """The share of samples up to which those that repeat the one before are lost ones for certain where others tremble.
 Where there are more, the recording is made of steps."""
 
-STILL = 3.0
+STILL_FACTOR = 3.0
 """So many times as much where nothing trembles, as what is usual is not sure there."""
 
-FITS = 3.0
+MAX_RETURN_RATIO = 3.0
 """By how many times of what is usual what is behind a spike is off from what was before it, at most."""
 
-USUAL = 12
+USUAL_RUNS = 12
 """Runs on either side that say what is usual: the livelier side does."""
 
-COMMON = 0.8
+USUAL_RATIO = 0.8
 """The share of a recording that is usual, where nothing trembles."""
 
 MEDIAN_NORM = 1.53817
@@ -59,21 +59,21 @@ def outliers(times: np.ndarray, poses: Poses, noise: Trembling) -> tuple[np.ndar
     same = poses.positions[1:] == poses.positions[:-1], poses.quaternions[1:] == poses.quaternions[:-1]
     repeats[1:] = same[0].all(axis=1) & same[1].all(axis=1)
     trembles = bool(noise.position or noise.rotation)
-    for length in range(min(MOST_ROWS, len(times) - 4 * MARGIN), 0, -1):
-        firsts = np.arange(MARGIN, len(times) - length - MARGIN + 1)
+    for length in range(min(MOST_ROWS, len(times) - 4 * EXPECTING_SAMPLES), 0, -1):
+        firsts = np.arange(EXPECTING_SAMPLES, len(times) - length - EXPECTING_SAMPLES + 1)
         over = np.zeros(len(firsts))
         apart = np.zeros(len(firsts))
         for surprise, each, across in _surprises(times, poses, noise, firsts, length):
-            over = np.maximum(over, np.where(each > EACH, surprise, 0.0))
+            over = np.maximum(over, np.where(each > MIN_SPIKE_SAMPLE_RATIO, surprise, 0.0))
             apart = np.maximum(apart, across)
         is_repeated = repeats[firsts[:, None] + np.arange(length)].all(axis=1)
-        enough = np.where(is_repeated, REPEAT, SPIKE) * (1.0 if trembles else STILL)
-        enough *= OF_LONG if length >= LONG else 1.0
-        likely = np.flatnonzero((over > enough) & (apart < np.minimum(FITS, over)))
+        enough = np.where(is_repeated, MIN_REPEAT_RATIO, MIN_SPIKE_ENDS_RATIO) * (1.0 if trembles else STILL_FACTOR)
+        enough *= LONG_SPIKE_FACTOR if length >= LONG_SPIKE_SAMPLES else 1.0
+        likely = np.flatnonzero((over > enough) & (apart < np.minimum(MAX_RETURN_RATIO, over)))
         for row in firsts[likely[np.argsort(-over[likely], kind="stable")]]:
             if not found[row - 1 : row + length + 1].any():
                 found[row : row + length] = True
-    lost = repeats & (trembles and 0.0 < repeats.mean() < RARE)
+    lost = repeats & (trembles and 0.0 < repeats.mean() < MAX_REPEATED_RATIO)
     # What repeats for longer stands still.
     edges = np.flatnonzero(np.diff(lost, prepend=False, append=False))
     for first, end in zip(edges[0::2], edges[1::2], strict=True):
@@ -117,8 +117,8 @@ def _surprises(
             off /= np.sqrt(1.0 + np.einsum("mrk,mrk->mr", shares, shares))
             most = off.max(axis=1)
             # Where nothing trembles all that is usual anywhere is.
-            least = MEDIAN_NORM * smallest or np.quantile(most, COMMON)
-            offs.append(off / np.maximum(least, _usual(most, length + MARGIN))[:, None])
+            least = MEDIAN_NORM * smallest or np.quantile(most, USUAL_RATIO)
+            offs.append(off / np.maximum(least, _usual(most, length + EXPECTING_SAMPLES))[:, None])
         inside, at_first, at_last, *gaps = offs
         surprise = np.minimum(np.minimum(at_first[:, 0], at_last[:, 0]), inside.max(axis=1))
         yield surprise, inside.min(axis=1), np.maximum(*(gap.max(axis=1) for gap in gaps))
@@ -141,7 +141,7 @@ def _shares(known: np.ndarray, asked: np.ndarray) -> np.ndarray:
 def _usual(values: np.ndarray, apart: int) -> np.ndarray:
     """Return what is usual at each of values (n,): the median of some so far before it or behind it, above 0."""
     count = len(values)
-    width = min(USUAL, count)
+    width = min(USUAL_RUNS, count)
     medians = np.median(sliding_window_view(values, width), axis=-1)
     # Near an end, the side that is there counts.
     before, behind = np.arange(count) - apart - width + 1, np.arange(count) + apart

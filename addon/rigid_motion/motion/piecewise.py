@@ -11,17 +11,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-BLOCK = 32768
+BLOCK_SAMPLES = 32768
 """Samples worked on at once: few enough for the processor's caches, enough that NumPy's calls cost little."""
 
-DENSE = 128
+DENSE_RUN_SAMPLES = 128
 """Samples in a row of pieces with equally many each, from which on matrix products beat repeating coefficients."""
 
 DENSE_PIECE = 8
 """Samples of a piece from which on they do."""
 
 
-def blocks(bounds: np.ndarray, size: int = BLOCK) -> Iterator[tuple[slice, slice]]:
+def blocks(bounds: np.ndarray, size: int = BLOCK_SAMPLES) -> Iterator[tuple[slice, slice]]:
     """Slices of pieces and of their samples, of about `size` samples each.
 
     `bounds` (S + 1,) is where the samples of each piece begin, and the end.
@@ -37,7 +37,7 @@ def blocks(bounds: np.ndarray, size: int = BLOCK) -> Iterator[tuple[slice, slice
 def is_dense(counts: np.ndarray) -> bool:
     """Whether `multiply_matrices` is the quicker way for these counts (S,) of samples."""
     runs = 1 + np.count_nonzero(counts[1:] != counts[:-1])
-    return bool(counts.sum() >= max(DENSE * runs, DENSE_PIECE * len(counts)))
+    return bool(counts.sum() >= max(DENSE_RUN_SAMPLES * runs, DENSE_PIECE * len(counts)))
 
 
 def multiply_matrices(matrices: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
@@ -99,7 +99,7 @@ def combine(coefficients: np.ndarray, functions: np.ndarray, counts: np.ndarray,
         multiply_matrices(np.ascontiguousarray(coefficients.transpose(2, 0, 1)), functions, counts, out)
         return
     # Few rows at a time, for repeating multiplies what there is.
-    batch_size = max(1, BLOCK // max(1, functions.shape[1]))
+    batch_size = max(1, BLOCK_SAMPLES // max(1, functions.shape[1]))
     for row in range(0, len(out), batch_size):
         rows = slice(row, row + batch_size)
         np.einsum("kbn,bn->kn", coefficients[rows].repeat(counts, axis=2), functions, out=out[rows])

@@ -17,16 +17,16 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from .quaternions import align_signs, components, conjugate, from_matrices, multiply, rotate, vectors
 
-LIMIT = 1e40
+MAX_ABS = 1e40
 """A number beyond this is damage, not a measurement, and more than Blender can hold. Powers of it are still floats."""
 
-UNEVEN = 1e-3
+MAX_AXES_ERROR_RATIO = 1e-3
 """By what part of the scale the axes of a matrix may differ from three of one length at right angles to one another."""
 
-UNSCALED = 1e-6
+MAX_UNIT_SCALE_ERROR = 1e-6
 """A scale that differs less from 1 is 1: single precision has no better."""
 
-SHORTEST = 1e-30
+MIN_TIME_GAP = 1e-30
 """Between two moments, for the same reason: what happens in less has a speed that is no float."""
 
 
@@ -167,7 +167,7 @@ class Poses:
             scales = np.cbrt(np.linalg.det(axes))
             rotations = axes / scales[..., None, None]
             uneven = np.abs(np.einsum("...ij,...ik->...jk", rotations, rotations) - np.eye(3)).max(axis=(-2, -1))
-            wrong = (scales <= 0.0) | (uneven > UNEVEN)
+            wrong = (scales <= 0.0) | (uneven > MAX_AXES_ERROR_RATIO)
             if wrong.any():
                 index = tuple(map(int, np.argwhere(wrong)[0]))
                 if scales[index] < 0.0:
@@ -177,7 +177,7 @@ class Poses:
                 else:
                     fault = "shears or scales unevenly"
                 raise ValueError(f"the matrix at {index[0] if len(index) == 1 else index} {fault}, which no pose does")
-            scaled = (np.abs(scales - 1.0) > UNSCALED).any()
+            scaled = (np.abs(scales - 1.0) > MAX_UNIT_SCALE_ERROR).any()
             return cls(matrices[..., :3, 3], from_matrices(rotations), scales if scaled else None)
 
     @property

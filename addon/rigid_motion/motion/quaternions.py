@@ -6,16 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-SMALLEST = 1e-12
+ZERO_SINE = 1e-12
 """Stands for the sine of no turn."""
 
-NARROWEST = 1e-9
+ZERO_ANGLE_RAD = 1e-9
 """An angle that stands for none: its sine is itself."""
 
-FEW = 6000
+MAX_COPIED_NUMBERS = 6000
 """Numbers in vectors: up to so many, fewer calls of NumPy are worth copies of their components."""
 
-AFTER, LAST = np.array((1, 2, 0)), np.array((2, 0, 1))
+NEXT_AXES, LAST_AXES = np.array((1, 2, 0)), np.array((2, 0, 1))
 """The axes after each one, and after that."""
 
 
@@ -102,9 +102,9 @@ def from_matrices(rotations: np.ndarray) -> np.ndarray:
 
 def cross(a: np.ndarray | Sequence[np.ndarray], b: np.ndarray | Sequence[np.ndarray]) -> np.ndarray:
     """Return the vector product of vectors (3, ...), components first."""
-    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and a.size <= FEW:
-        product = a.take(AFTER, axis=0) * b.take(LAST, axis=0)
-        product -= a.take(LAST, axis=0) * b.take(AFTER, axis=0)
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and a.size <= MAX_COPIED_NUMBERS:
+        product = a.take(NEXT_AXES, axis=0) * b.take(LAST_AXES, axis=0)
+        product -= a.take(LAST_AXES, axis=0) * b.take(NEXT_AXES, axis=0)
         return product
     product = np.empty((3, *np.broadcast(a[0], b[0]).shape))
     for axis in range(3):
@@ -151,7 +151,7 @@ def turns_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     w = turns[..., 0]
     sine = np.sqrt(np.einsum("...i,...i->...", turns[..., 1:], turns[..., 1:]))
     angle = 2.0 * np.arctan2(sine, np.abs(w))
-    return turns[..., 1:] * (np.where(w < 0.0, -1.0, 1.0) * angle / np.maximum(sine, SMALLEST))[..., None]
+    return turns[..., 1:] * (np.where(w < 0.0, -1.0, 1.0) * angle / np.maximum(sine, ZERO_SINE))[..., None]
 
 
 def turned_at(key_times: np.ndarray, keys: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -160,7 +160,7 @@ def turned_at(key_times: np.ndarray, keys: np.ndarray, times: np.ndarray) -> np.
     first, second = keys[:-1], keys[1:]
     second = np.where(np.einsum("ij,ij->i", first, second)[:, None] < 0.0, -second, second)
     angles = 2.0 * np.arctan2(np.linalg.norm(second - first, axis=1), np.linalg.norm(second + first, axis=1))
-    angles = np.maximum(angles, NARROWEST)
+    angles = np.maximum(angles, ZERO_ANGLE_RAD)
     segments = np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, len(first) - 1)
     share = (times - key_times[segments]) / np.diff(key_times)[segments]
     angles, sines = angles[segments], np.sin(angles)[segments]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .checks import check_flag, check_radius, check_recording, check_wishes
 from .key_budget import fewest_keys
-from .key_costs import Recording
+from .key_costs import SampleTracks
 from .modes import mode_named
 from .poses import Poses, aligned, numbers
 
@@ -104,4 +104,4 @@ def reduce_keys(
     check_radius(radius)
     times = numbers(times, "times")
     check_recording(times, poses)
-    return fewest_keys(Recording(times, aligned(poses), mode, radius, tolerance or 1.0), budget, tries, rms=rms)
+    return fewest_keys(SampleTracks(times, aligned(poses), mode, radius, tolerance or 1.0), budget, tries, rms=rms)

@@ -12,22 +12,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_poses
-from .poses import SHORTEST, Poses, numbers
+from .poses import MIN_TIME_GAP, Poses, numbers
 from .quaternions import align_signs, normalise
 
-GAP = 1.75
+MIN_GAP_INTERVALS = 1.75
 """A pause of more median intervals than this is reported as a gap: timer jitter stays below, a lost sample is above."""
 
 MOST_STRAYS = 0.05
 """The share of the rows that at either end may be strays, whose time is wild, and no part of the recording."""
 
-FAR = 10.0
+MIN_STRAY_DISTANCE_RATIO = 10.0
 """How many times further away than all the rest lasts strays are: nobody waits so long for so few samples."""
 
 MOST_NAMED = 5
 """Rows that are named of one kind of fault."""
 
-LARGEST = 1e30
+MAX_MEASURE = 1e30
 """A number beyond this is damage, and well within what can be interpolated: splines shoot over."""
 
 LARGEST_SCALE = 1e6
@@ -143,7 +143,7 @@ def repair(times: ArrayLike, poses: Poses, rate: float | None = None) -> tuple[n
     keep(forward, f"dropped rows whose time runs backwards, such as {_first(times, ~forward)}")
     near = _near(times)
     keep(near, f"dropped rows whose time is far from that of all others, such as {_first(times, ~near)}")
-    keep(np.diff(times, append=np.inf) > SHORTEST, "dropped rows whose time comes again, keeping the last of each")
+    keep(np.diff(times, append=np.inf) > MIN_TIME_GAP, "dropped rows whose time comes again, keeping the last of each")
 
     lengths = np.linalg.norm(poses.quaternions, axis=-1)
     if (uneven := (np.abs(lengths - 1.0) > UNIT_TOLERANCE).any(axis=of_joints)).any():
@@ -154,7 +154,10 @@ def repair(times: ArrayLike, poses: Poses, rate: float | None = None) -> tuple[n
     if (flips := np.diff(turned, prepend=False).any(axis=of_joints)).any():
         repairs.append(Repair("undid sign flips of quaternions", rows[flips]))
     intervals = np.diff(times)
-    if len(intervals) and (gaps := intervals > GAP * (1.0 / rate if rate else np.median(intervals))).any():
+    if (
+        len(intervals)
+        and (gaps := intervals > MIN_GAP_INTERVALS * (1.0 / rate if rate else np.median(intervals))).any()
+    ):
         longest = f"left gaps as they are, the longest {intervals.max() * 1e3:.0f} ms"
         repairs.append(Repair(longest, rows[1:][gaps]))
     return times, Poses(poses.positions, aligned, poses.scales), repairs
@@ -164,7 +167,7 @@ def _near(times: np.ndarray) -> np.ndarray:
     """Return a mask of rising times without those few at either end that are far from all between."""
     ends = int(MOST_STRAYS * len(times))
     first, last = (times[ends], times[-1 - ends]) if len(times) else (0.0, 0.0)
-    reach = FAR * (last - first) if last > first else np.inf
+    reach = MIN_STRAY_DISTANCE_RATIO * (last - first) if last > first else np.inf
     return (times >= first - reach) & (times <= last + reach)
 
 
@@ -175,7 +178,7 @@ def _first(times: np.ndarray, rows: np.ndarray) -> str:
 
 def _usable(numbers: np.ndarray) -> np.ndarray:
     """Which numbers are there, finite and of a size that anything has: NaN is neither small nor large."""
-    return np.abs(numbers) < LARGEST
+    return np.abs(numbers) < MAX_MEASURE
 
 
 def rising(times: np.ndarray) -> np.ndarray:

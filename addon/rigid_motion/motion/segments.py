@@ -23,22 +23,22 @@ from functools import cached_property
 import numpy as np
 
 from . import series, twists
-from .piecewise import BLOCK, DENSE, blocks, combine, is_dense, multiply_matrices
+from .piecewise import BLOCK_SAMPLES, DENSE_RUN_SAMPLES, blocks, combine, is_dense, multiply_matrices
 from .poses import Poses, aligned, of_rows, reshaped
 from .quaternions import components, cross, multiply, rotate
 
-STILL = 1e-6
+MAX_SAME_POSE_CHANGE = 1e-6
 """Units of length, radians, and growth of the logarithm of scale between two keys that are one pose: what was computed
 for the same pose twice, in single precision, is not quite the same."""
 
-TURN = 1.5
+MAX_PIECE_TURN_RAD = 1.5
 """Radians that a piece of a bent curve may turn by at most, for a series to be the same but for rounding."""
 
-ROWS = 8
+POSE_ROWS = 8
 """Position, quaternion and scale. Also where there is no scale: matrices of eight rows are multiplied quicker."""
 
-NARROW = 4.0 / 3.0
-"""The largest |s| at which psi, 45 degrees at the keys, is no more than the 60 of `trigonometry.NARROW`."""
+MAX_NARROW_S = 4.0 / 3.0
+"""The largest |s| at which psi, 45 degrees at the keys, is no more than the 60 of `trigonometry.MAX_NARROW_RAD`."""
 
 SMALLEST_ANGLE = 1e-150
 """Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
@@ -134,7 +134,7 @@ class Segments:
         if not still.any():
             return still
         turn, growth = self.screws[:3], self.screws[6]
-        return still & (_length(turn) < STILL) & (np.abs(growth) < STILL)
+        return still & (_length(turn) < MAX_SAME_POSE_CHANGE) & (np.abs(growth) < MAX_SAME_POSE_CHANGE)
 
     @cached_property
     def screws(self) -> np.ndarray:
@@ -178,7 +178,9 @@ class Curves:
     """The numbers of each segment that b and c need, shape (parameters, S)."""
 
     basis: Basis
-    """From s (n,), parameters of (n,) each and whether |s| <= NARROW to b above c, (., n), and scales (n,) or None."""
+    """From s (n,), parameters of (n,) each and whether |s| <= MAX_NARROW_S to b above c, (., n), and scales (n,) or
+    None.
+    """
 
     bends: np.ndarray | None = None
     """What is to be added to the twist at either end, with the growth of log scale, shape (7, 2, S), or None."""
@@ -188,9 +190,9 @@ class Curves:
 
     @cached_property
     def matrices(self) -> np.ndarray:
-        """P and Q of each segment in one matrix, shape (S, ROWS, functions in b and c)."""
+        """P and Q of each segment in one matrix, shape (S, POSE_ROWS, functions in b and c)."""
         turning, (_, moving, segments) = self.quaternions.shape[1], self.positions.shape
-        matrices = np.zeros((segments, ROWS, turning + moving))
+        matrices = np.zeros((segments, POSE_ROWS, turning + moving))
         matrices[:, :3, turning:] = self.positions.transpose(2, 0, 1)
         matrices[:, 3:7, :turning] = self.quaternions.transpose(2, 0, 1)
         return matrices
@@ -206,8 +208,8 @@ def interpolate_along(
     shape = keys.shape[:-1] + times.shape[-1:]
     keys = reshaped(keys, -1, keys.shape[-1])
     key_times, times = (np.atleast_2d(rows).reshape(-1, rows.shape[-1]) for rows in (key_times, times))
-    result = np.empty((ROWS, len(keys), times.shape[-1]))
-    batch_size = max(1, BLOCK // (key_times.shape[-1] + times.shape[-1]))
+    result = np.empty((POSE_ROWS, len(keys), times.shape[-1]))
+    batch_size = max(1, BLOCK_SAMPLES // (key_times.shape[-1] + times.shape[-1]))
     for first in range(0, len(keys), batch_size):
         batch = slice(first, first + batch_size)
         batch_key_times, batch_times = (rows if len(rows) == 1 else rows[batch] for rows in (key_times, times))
@@ -216,7 +218,7 @@ def interpolate_along(
 
 
 def _poses(rows: np.ndarray, keys: Poses) -> Poses:
-    """Return the poses (...) in rows (ROWS, ...), with scales where the keys have some."""
+    """Return the poses (...) in rows (POSE_ROWS, ...), with scales where the keys have some."""
     return of_rows(rows if keys.scales is not None else rows[:7])
 
 
@@ -228,7 +230,7 @@ def _fill(
     extrapolate: bool,
     out: np.ndarray,
 ) -> None:
-    """Fill out (ROWS, objects, m) with positions, quaternions and, where the keys have them, scales.
+    """Fill out (POSE_ROWS, objects, m) with positions, quaternions and, where the keys have them, scales.
 
     Key times are (objects or 1, n), keys (objects, n), times (objects or 1, m).
     """
@@ -247,7 +249,7 @@ def _fill(
     mode, reach = curves(segments), np.inf if outside and extrapolate else 1.0
     fill, numbers = _filler(mode, reach), np.stack((segments.start, segments.rate))
     pieces = _pieces(segments, mode.bends) if mode.bends is not None and mode.fades is None and reach <= 1.0 else 0
-    if 0 < DENSE * pieces * segments.start.size <= samples.size:
+    if 0 < DENSE_RUN_SAMPLES * pieces * segments.start.size <= samples.size:
         coefficients = _series(mode, pieces)
         key_times = _divided(key_times, pieces)
         start = np.broadcast_to(key_times[:, :-1], (len(keys), key_times.shape[-1] - 1)).ravel()
@@ -256,7 +258,7 @@ def _fill(
         def fill(piece: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
             multiply_matrices(coefficients[piece], series.powers(s), counts, out)
 
-    _evaluate(fill, numbers, _sample_bounds(key_times, times, len(keys)), local_time, out.reshape(ROWS, -1))
+    _evaluate(fill, numbers, _sample_bounds(key_times, times, len(keys)), local_time, out.reshape(POSE_ROWS, -1))
 
 
 Within = Callable[[np.ndarray, np.ndarray, slice], Poses]
@@ -281,7 +283,7 @@ def prepare_within(
     mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
 
     def within(counts: np.ndarray, progress: np.ndarray, selected: slice) -> Poses:
-        out = np.empty((ROWS, progress.size))
+        out = np.empty((POSE_ROWS, progress.size))
         reach = float(max(2.0 * progress.max() - 1.0, 1.0 - 2.0 * progress.min())) if progress.size else 0.0
         fill, first = _filler(mode, reach), selected.start or 0
 
@@ -296,7 +298,7 @@ def prepare_within(
 
 
 Fill = Callable[[slice, np.ndarray, np.ndarray, np.ndarray], None]
-"""What fills out (ROWS, n) for some of the segments at s (n,), of which the i-th has counts[i]."""
+"""What fills out (POSE_ROWS, n) for some of the segments at s (n,), of which the i-th has counts[i]."""
 
 
 def _evaluate(
@@ -306,12 +308,12 @@ def _evaluate(
     local_time: Callable[..., np.ndarray],
     out: np.ndarray,
 ) -> None:
-    """Fill out (ROWS, m) with what S segments are at the samples between their bounds (S + 1,), a block at once.
+    """Fill out (POSE_ROWS, m) with what S segments are at the samples between their bounds (S + 1,), a block at once.
 
     `local_time` gives s of a slice of samples, from the rows of `numbers` (., S) repeated for each of them.
     """
     all_counts = np.diff(bounds)
-    for segment, sample in blocks(bounds, BLOCK if is_dense(all_counts) else BLOCK // 2):
+    for segment, sample in blocks(bounds, BLOCK_SAMPLES if is_dense(all_counts) else BLOCK_SAMPLES // 2):
         counts = all_counts[segment]
         fill(segment, local_time(sample, *np.repeat(numbers[:, segment], counts, axis=1)), counts, out[:, sample])
 
@@ -321,7 +323,7 @@ def _filler(mode: Curves, reach: float) -> Fill:
 
     def fill(segment: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
         parameters = np.repeat(mode.parameters[:, segment], counts, axis=1)
-        basis, scales = mode.basis(s, [*parameters], reach <= NARROW)
+        basis, scales = mode.basis(s, [*parameters], reach <= MAX_NARROW_S)
         _combine(mode, segment, basis, counts, out)
         if scales is not None:
             out[7] = scales
@@ -336,14 +338,14 @@ def _pieces(segments: Segments, bends: np.ndarray) -> int:
     """How many pieces a segment needs to be cut into for power series."""
     rates = np.concatenate((segments.screws.reshape(7, 1, -1), bends), axis=1)
     turns = np.sqrt(np.einsum("kbs,kbs->bs", rates[:3], rates[:3])) + np.abs(rates[6])
-    return max(1, math.ceil((turns[0] + turns[1:].max(axis=0)).max() / TURN))
+    return max(1, math.ceil((turns[0] + turns[1:].max(axis=0)).max() / MAX_PIECE_TURN_RAD))
 
 
 def _series(mode: Curves, pieces: int) -> np.ndarray:
-    """Every segment's curve in so many pieces as power series, shape (segments * pieces, ROWS, terms)."""
+    """Every segment's curve in so many pieces as power series, shape (segments * pieces, POSE_ROWS, terms)."""
     count = mode.parameters.shape[1]
     moments = series.moments(pieces)
-    values = np.zeros((ROWS, count * moments.size))
+    values = np.zeros((POSE_ROWS, count * moments.size))
     bounds = moments.size * np.arange(count + 1)
     _evaluate(
         _filler(mode, 1.0),
@@ -375,7 +377,7 @@ def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np
 
 
 def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-    """Fill out (ROWS, n) with positions and quaternions: each sample's own coefficients times its basis (., n).
+    """Fill out (POSE_ROWS, n) with positions and quaternions: each sample's own coefficients times its basis (., n).
 
     The i-th of the segments has counts[i] samples, and at least one has any.
     """
@@ -391,7 +393,8 @@ def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray
 def _bend(
     bends: np.ndarray, fades: np.ndarray | None, s: np.ndarray, within: bool, counts: np.ndarray, out: np.ndarray
 ) -> None:
-    """Bend poses (ROWS, n) that run from key to key so that they leave and arrive with these twists (7, 2, S) added.
+    """Bend poses (POSE_ROWS, n) that run from key to key so that they leave and arrive with these twists (7, 2, S)
+    added.
 
     Nothing is changed at the keys. Beyond them the bend goes on at the twist it has there. At each sample `fades` (n,)
     is the part of its segment in which the first of the two dies away.
@@ -424,7 +427,7 @@ def _flat(rows: np.ndarray) -> np.ndarray:
 
 def in_one_place(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Return whether positions (3, ...) are others' but for rounding."""
-    return np.asarray(np.abs(end - begin).max(axis=0) < STILL)
+    return np.asarray(np.abs(end - begin).max(axis=0) < MAX_SAME_POSE_CHANGE)
 
 
 def _length(components: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 from .bodies import Body
-from .key_costs import Recording
+from .key_costs import SampleTracks
 from .measures import largest_displacement
 from .poses import Poses, inverse, packed, placed, reshaped
 from .quaternions import components, conjugate, cross, matrices, multiply
@@ -16,7 +16,7 @@ AT_ONCE = 2**13
 """Joints that are looked at in one go, for the processor's caches."""
 
 
-class Level(Recording):
+class Level(SampleTracks):
     """The error of a sample is the largest of what hangs on its joint.
 
     Parameters
@@ -29,7 +29,7 @@ class Level(Recording):
     tolerance : float
         Of the shell error.
     off_at_keys : bool
-        As `Recording` has it.
+        As `SampleTracks` has it.
     """
 
     def __init__(

@@ -20,30 +20,30 @@ from numpy.typing import ArrayLike
 from .bodies import Body
 from .checks import check_body, check_flag, check_poses, check_wishes, whole_number
 from .key_budget import fewest_keys
-from .key_costs import Recording
+from .key_costs import SampleTracks
 from .modes import MODES, mode_named
-from .poses import LIMIT, Poses, aligned, numbers, packed
+from .poses import MAX_ABS, Poses, aligned, numbers, packed
 from .skeleton_channels import Channels, SeparateKeys, check_separable
-from .skeleton_search import TINY, ChannelKeys, OwnKeys, that_move
+from .skeleton_search import ZERO_WEIGHT, ChannelKeys, OwnKeys, that_move
 from .skeleton_stretches import Run, keys_in_stretches, stretches
 from .skeletons import Skeleton
 
 BUDGET_STEPS = 9
 """Of a search for the tolerance that a budget of keys of their own can keep to."""
 
-FARTHEST = 1.5
+MAX_LOG_TOLERANCE_STEP = 1.5
 """How far the next tolerance is from one that needs too few keys, by its logarithm."""
 
-NARROW = 0.01
+LOG_TOLERANCE_PRECISION = 0.01
 """By how much of it the tolerance is known in the end."""
 
-DEEPEST = 1000
+MAX_JOINT_DEPTH = 1000
 """How many joints a joint with keys of its own may hang on: the work grows with the square of it."""
 
 SHORTEST_STRETCH = 2
 """Samples from one shared key to the next."""
 
-LEAST = 12.0
+MAX_LOG_TOLERANCE_DROP = 12.0
 """How much smaller than that of a body at rest the tolerance may be, by its logarithm."""
 
 
@@ -166,11 +166,11 @@ def reduce_skeleton_keys(
         check_separable(mode, poses)
     if stretch is not None:
         _check_stretch(stretch, mode, shared, tolerance)
-    if not shared and len(times) > 1 and skeleton.depths.max() > DEEPEST:
+    if not shared and len(times) > 1 and skeleton.depths.max() > MAX_JOINT_DEPTH:
         joint = int(np.argmax(skeleton.depths))
         raise ValueError(
             f"joint {joint} hangs on {skeleton.depths[joint]} others, and keys of their own are searched for where it "
-            f"is {DEEPEST} at most: shared=True finds key poses for longer chains"
+            f"is {MAX_JOINT_DEPTH} at most: shared=True finds key poses for longer chains"
         )
 
     def part(some: slice) -> Body:
@@ -219,11 +219,11 @@ def _own_keys_within(search_for: Callable[[float], OwnKeys], budget: int) -> tup
     free = np.flatnonzero(body.free).tolist()
     least = float(body.errors(body.at_rest()).max())
     # The logarithms of tolerances that need more and that need no more keys, and how many by their logarithm.
-    low, high = None, (math.log(max(least, TINY)), math.log(len(free) or 1))
-    lowest = high[0] - LEAST
+    low, high = None, (math.log(max(least, ZERO_WEIGHT)), math.log(len(free) or 1))
+    lowest = high[0] - MAX_LOG_TOLERANCE_DROP
     for _ in range(BUDGET_STEPS):
         logarithm = _between(low, high, math.log(budget))
-        if logarithm < lowest or (low and high[0] - low[0] < NARROW):
+        if logarithm < lowest or (low and high[0] - low[0] < LOG_TOLERANCE_PRECISION):
             break
         search = search_for(math.exp(logarithm))
         count = sum(len(keys) for joint, keys in enumerate(search.found()) if body.free[joint])
@@ -244,12 +244,12 @@ def _between(low: tuple[float, float] | None, high: tuple[float, float], count: 
     counts are no smooth function of tolerances.
     """
     if low is None:
-        return high[0] - FARTHEST
+        return high[0] - MAX_LOG_TOLERANCE_STEP
     share = (count - high[1]) / (low[1] - high[1]) if low[1] > high[1] else 0.5
     return high[0] + min(max(share, 0.25), 0.75) * (low[0] - high[0])
 
 
-class _WholeBody(Recording):
+class _WholeBody(SampleTracks):
     """All joints at once, with the same keys: the error of a sample is the largest of any joint."""
 
     def __init__(self, body: Body, tolerance: float) -> None:
@@ -283,10 +283,10 @@ def _one_for_each(given: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.n
         desired = " or ".join(map(str, shapes))
         raise ValueError(f"{name} of shape {given.shape}: give one number, or an array of shape {desired}")
     given = np.broadcast_to(given, shapes[0]) if given.ndim == 0 else given
-    if not (valid := (given == 0.0) | ((given > 1.0 / LIMIT) & (given < LIMIT))).all():
+    if not (valid := (given == 0.0) | ((given > 1.0 / MAX_ABS) & (given < MAX_ABS))).all():
         joint = np.argwhere(~valid)[0]
         raise ValueError(
-            f"joint {joint[0]} has a {name} of {given[tuple(joint)]}: give 0, or a number from {1.0 / LIMIT:g} to "
-            f"{LIMIT:g}"
+            f"joint {joint[0]} has a {name} of {given[tuple(joint)]}: give 0, or a number from {1.0 / MAX_ABS:g} to "
+            f"{MAX_ABS:g}"
         )
     return given

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from .bodies import Body
-from .key_costs import Recording
-from .key_search import Keys, Search
+from .key_costs import SampleTracks
+from .key_search import KeySearch, KeySelection
 from .poses import Poses, reshaped
 from .skeleton_channels import Channels, changes
 from .skeleton_levels import Level
 
-TINY = 1e-30
+ZERO_WEIGHT = 1e-30
 """Stands for a weight of zero."""
 
 
@@ -66,7 +66,7 @@ class OwnKeys:
         if len(moving):
             times, starts = np.tile(body.times, len(moving)), count * np.arange(len(moving))
             size, share = sizes[moving].ravel(), shares[moving].ravel()
-            search = Search(Recording(times, reshaped(body.poses[moving], -1), body.mode, size, share, starts))
+            search = KeySearch(SampleTracks(times, reshaped(body.poses[moving], -1), body.mode, size, share, starts))
             self._take(moving, search.thinned(search.measured(np.arange(len(times))), 1.0))
 
     def _sizes_and_shares(self) -> tuple[np.ndarray, np.ndarray]:
@@ -77,13 +77,13 @@ class OwnKeys:
         body, skeleton = self.body, self.body.skeleton
         longest_chains = skeleton.longest_chains((that_move(body.poses) & body.free).astype(np.int64))
         shares = (self.tolerance - skeleton.most_below(body.off)) / np.maximum(longest_chains, 1)[:, None]
-        shares /= np.maximum(skeleton.most_below(body.weights), TINY)
+        shares /= np.maximum(skeleton.most_below(body.weights), ZERO_WEIGHT)
         if body.truth.scales is None:
             return body.sizes, shares
         on_joints = (skeleton.parents >= 0)[:, None]
         return body.sizes / body.truth.scales, shares / np.where(on_joints, body.truth.scales[skeleton.parents], 1.0)
 
-    def _take(self, joints: np.ndarray, keys: Keys) -> None:
+    def _take(self, joints: np.ndarray, keys: KeySelection) -> None:
         """Note and show the keys of joints that were tracks."""
         count = len(self.body.times)
         bounds = np.searchsorted(keys.indices, count * np.arange(len(joints) + 1))
@@ -107,7 +107,7 @@ class OwnKeys:
         joints = joints[~rests]
         if len(joints):
             count = len(self.body.times)
-            search = Search(self._level(joints) if rests.any() else level)
+            search = KeySearch(self._level(joints) if rests.any() else level)
             tracks = [count * number + self.keys[joint] for number, joint in enumerate(joints.tolist())]
             self._take(joints, search.refined(search.thinned(search.measured(np.concatenate(tracks)), 1.0)))
 

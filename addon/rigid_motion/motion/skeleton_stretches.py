@@ -18,7 +18,7 @@ from .bodies import Body
 from .measures import shell_error
 from .poses import Poses, aligned, joined
 from .skeleton_channels import NO_TURN, Channels, SeparateKeys, changes
-from .skeleton_search import TINY, ChannelKeys, OwnKeys
+from .skeleton_search import ZERO_WEIGHT, ChannelKeys, OwnKeys
 
 AT_REST = 0.5
 """Of the tolerance: how far off all that rests may be together."""
@@ -71,7 +71,7 @@ def _rests(part: Part, bounds: list[slice], tolerance: float, separate: bool, ru
     errors = np.max([*run(_farthest, ((part(some), separate, reaches, still) for some in bounds))], axis=0)
     chains = skeleton.longest_chains(np.count_nonzero(errors > 0.0, axis=1) * body.free)
     weights = skeleton.most_below(np.max(weighs, axis=0))
-    allowed = AT_REST * tolerance / np.maximum(chains, 1) / np.maximum(weights, TINY)
+    allowed = AT_REST * tolerance / np.maximum(chains, 1) / np.maximum(weights, ZERO_WEIGHT)
     scales = skeleton.in_root_space(still).scales
     if scales is not None and candidates.scales is not None:
         allowed /= np.where(skeleton.parents < 0, 1.0, scales[skeleton.parents])

@@ -18,10 +18,10 @@ from .quaternions import rotate
 AT_ONCE = 2**15
 """Poses that are looked at in one go, for the processor's caches."""
 
-FEW = 64
+MAX_MATRIX_POSES = 64
 """Poses of each joint for which products of matrices are the quicker way."""
 
-_LEFT = np.array(((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)))
+_LEFT_PRODUCT_COMPONENTS = np.array(((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)))
 _LEFT_SIGNS = np.array(((1, -1, -1, -1), (1, 1, -1, 1), (1, 1, 1, -1), (1, -1, 1, 1)))
 """A quaternion q as a matrix, of these components with these signs: matrix(p) @ matrix(q) is matrix(p q)."""
 
@@ -160,7 +160,7 @@ class Skeleton:
         check_poses(poses, "poses")
         if poses.shape[:1] != (len(self),):
             raise ValueError(f"poses of shape {poses.shape} do not fit {len(self)} joints, which come first")
-        if poses.scales is None and poses.quaternions[0].size <= 4 * FEW:
+        if poses.scales is None and poses.quaternions[0].size <= 4 * MAX_MATRIX_POSES:
             return self._few_in_root_space(poses)
         there = packed(poses)
         for part in there.blocks(AT_ONCE):
@@ -169,7 +169,7 @@ class Skeleton:
         return there.of(slice(None))
 
     def _few_in_root_space(self, poses: Poses) -> Poses:
-        turns = poses.quaternions[..., _LEFT] * _LEFT_SIGNS
+        turns = poses.quaternions[..., _LEFT_PRODUCT_COMPONENTS] * _LEFT_SIGNS
         for joints in self.levels[1:]:
             # Equal poses stay equal to the last bit, which a product by @ does not promise.
             turns[joints] = np.einsum("...ij,...jk->...ik", turns[self.parents[joints]], turns[joints])

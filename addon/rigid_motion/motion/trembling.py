@@ -13,19 +13,19 @@ import numpy as np
 from .differences import coefficients, differences
 from .poses import Poses
 
-ORDERS = range(3, 9)
+DIFFERENCE_ORDERS = range(3, 9)
 """Of the differences that are tried."""
 
-QUIET, QUIET_NORM = 0.25, 1.10123
+QUIET_RATIO, QUIET_NORM = 0.25, 1.10123
 """This share of the differences are the quietest, and the norm below which a share of 0.25 of normal vectors (3,) are.
 They leave hits and fast stretches out."""
 
-FALLS = 0.8
+FILTERED_NOISE_RATIO = 0.8
 """Where the highest order has less than this part of what a middle one has, the noise has been filtered out already."""
 
-MIDDLE = 5
+MIDDLE_ORDER = 5
 
-AROUND = 8
+NOISE_REACH_SAMPLES = 8
 """Samples on either side that say how much a recording trembles here."""
 
 
@@ -47,21 +47,21 @@ def trembling(times: np.ndarray, poses: Poses) -> Trembling:
     """
     count = len(times)
     here = np.full((2, count), np.inf)
-    if count <= ORDERS[-1] + 1:
+    if count <= DIFFERENCE_ORDERS[-1] + 1:
         return Trembling(0.0, 0.0, np.zeros((2, count)))
     floors: list[list[float]] = []
-    for order in ORDERS:
+    for order in DIFFERENCE_ORDERS:
         scaled = coefficients(times, order)
         scaled /= np.linalg.norm(scaled, axis=1, keepdims=True)
         floors.append([])
         for channel, each in enumerate(differences(poses, scaled)):
             squares = np.einsum("nc,nc->n", each, each)
-            floors[-1].append(np.sqrt(np.quantile(squares, QUIET)) / QUIET_NORM)
-            level = np.sqrt(mean_around(squares, AROUND) / 3.0)
+            floors[-1].append(np.sqrt(np.quantile(squares, QUIET_RATIO)) / QUIET_NORM)
+            level = np.sqrt(mean_around(squares, NOISE_REACH_SAMPLES) / 3.0)
             for nearest in (np.arange(count) - order // 2, np.arange(count) - (order + 1) // 2):
                 here[channel] = np.minimum(here[channel], level[np.clip(nearest, 0, len(level) - 1)])
     found = np.array(floors)
-    falls = found[-1] < FALLS * found[MIDDLE - ORDERS[0]]
+    falls = found[-1] < FILTERED_NOISE_RATIO * found[MIDDLE_ORDER - DIFFERENCE_ORDERS[0]]
     position, rotation = np.where(falls, 0.0, found.min(axis=0)).tolist()
     return Trembling(position, rotation, here)
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-NARROW = np.pi / 3.0
+MAX_NARROW_RAD = np.pi / 3.0
 """Radians up to which the polynomial is the sine, and the root loses nothing of the cosine."""
 
-_SERIES = (
+_SINE_COEFFICIENTS = (
     -0.16666666666666666,
     0.008333333333332985,
     -0.00019841269840999382,
@@ -21,7 +21,8 @@ _SERIES = (
     1.605689019222814e-10,
     -7.525258784607096e-13,
 )
-"""Of sin(x) / x - 1 in powers of x^2: the smallest relative error of the sine up to `NARROW`, 2.1e-19 (Remez)."""
+"""Of sin(x) / x - 1 in powers of x^2: the smallest relative error of the sine up to `MAX_NARROW_RAD`, 2.1e-19
+(Remez)."""
 
 
 def _has_vector_tangent() -> bool:
@@ -39,13 +40,13 @@ VECTOR_TANGENT = _has_vector_tangent()
 def fill_sine_and_cosine(angles: np.ndarray, sine: np.ndarray, cosine: np.ndarray, *, narrow: bool) -> None:
     """Fill in the sines and the cosines of angles in radians, three arrays that share no memory.
 
-    `narrow` promises that no angle is beyond `NARROW` but for rounding. That is for the caller to know: looked up here,
-    it would depend on all angles what one of them has for a sine, in its last bit.
+    `narrow` promises that no angle is beyond `MAX_NARROW_RAD` but for rounding. That is for the caller to know: looked
+    up here, it would depend on all angles what one of them has for a sine, in its last bit.
     """
     if narrow and not VECTOR_TANGENT:
         np.multiply(angles, angles, out=cosine)
-        np.multiply(cosine, _SERIES[-1], out=sine)
-        for coefficient in _SERIES[-2::-1]:
+        np.multiply(cosine, _SINE_COEFFICIENTS[-1], out=sine)
+        for coefficient in _SINE_COEFFICIENTS[-2::-1]:
             sine += coefficient
             sine *= cosine
         sine += 1.0

@@ -14,7 +14,7 @@ import numpy as np
 from .quaternions import conjugate, cross, multiply, rotate
 from .trigonometry import fill_sine_and_cosine
 
-SMALLEST = 1e-200
+ZERO_ANGLE_SQUARED = 1e-200
 """Stands for the square of an angle of zero, where only ratios count."""
 
 
@@ -22,7 +22,7 @@ def exponential(twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the motions (n) of twists (6, n): unit quaternions (4, n) and translations (3, n)."""
     turn, advance = twists[:3], twists[3:]
     squared = np.einsum("kn,kn->n", turn, turn)
-    np.maximum(squared, SMALLEST, out=squared)
+    np.maximum(squared, ZERO_ANGLE_SQUARED, out=squared)
     angle = np.sqrt(squared)
     sine, quaternions = np.empty_like(angle), np.empty((4, twists.shape[1]))
     fill_sine_and_cosine(0.5 * angle, sine, quaternions[0], narrow=False)
@@ -44,7 +44,7 @@ def logarithm(quaternions: np.ndarray, translations: np.ndarray, *, shortest: bo
     first component is negative.
     """
     sine = np.sqrt(np.einsum("kn,kn->n", quaternions[1:], quaternions[1:]))
-    np.maximum(sine, np.sqrt(SMALLEST), out=sine)
+    np.maximum(sine, np.sqrt(ZERO_ANGLE_SQUARED), out=sine)
     cosine = np.abs(quaternions[0]) if shortest else quaternions[0]
     angle = 2.0 * np.arctan2(sine, cosine)
     ratio = angle / sine

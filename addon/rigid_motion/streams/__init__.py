@@ -36,9 +36,9 @@ Between keys, places go straight and turns about one axis: `lerp_slerp`, and `dq
 seconds, Blender's axes, quaternions w, x, y, z. docs/wire.md has every byte.
 """
 
-from .bodies import Body
-from .playing import Keys, Shown
+from .bodies import StreamBody
+from .playing import ReceivedKeys, Shown
 from .receiver import Receiver
 from .sender import Sender
 
-__all__ = ["Body", "Keys", "Receiver", "Sender", "Shown"]
+__all__ = ["ReceivedKeys", "Receiver", "Sender", "Shown", "StreamBody"]

@@ -20,13 +20,13 @@ from ..motion.humanoid import beside
 from ..motion.poses import joined
 from ..motion.quaternions import normalise
 
-RADIUS = 0.03
+DEFAULT_RADIUS_M = 0.03
 """Of the ball at every joint, in metres, unless it is given."""
 
-SMALLEST, LARGEST = 1e-6, 1e4
+MIN_LENGTH_M, MAX_LENGTH_M = 1e-6, 1e4
 """Metres of radii and tolerances at least; and metres that these are less than, and coordinates of places."""
 
-SHORTEST, FURTHEST = 1e-6, 2e11
+MIN_SAMPLE_GAP_S, MAX_CLOCK_S = 1e-6, 2e11
 """Seconds between two samples at least; and those of a clock, either way: beyond, floats do not tell ticks apart."""
 
 MOST_BODIES, MOST_JOINTS, LONGEST_NAME = 255, 1024, 255
@@ -35,9 +35,9 @@ MOST_BODIES, MOST_JOINTS, LONGEST_NAME = 255, 1024, 255
 MOST_NAMED = 40
 """Joints or bodies that are named to somebody who asks for one that is not there."""
 
-LEVELS = 144
-"""How far what is held is from the joint that holds it: `SMALLEST` times the fourth root of a power of two, which is
-below this one."""
+LEVER_LEVELS = 144
+"""How far what is held is from the joint that holds it: `MIN_LENGTH_M` times the fourth root of a power of two, which
+is below this one."""
 
 
 def checked(poses: Poses, names: Sequence[str]) -> Poses:
@@ -46,15 +46,15 @@ def checked(poses: Poses, names: Sequence[str]) -> Poses:
     Raises ValueError with the name of a joint that is nowhere, or turned by nothing.
     """
     longest = np.abs(poses.quaternions).max(axis=-1, initial=0.0)
-    are_sound = (np.abs(poses.positions) < LARGEST).all(axis=-1) & (longest > 0.0) & np.isfinite(longest)
+    are_sound = (np.abs(poses.positions) < MAX_LENGTH_M).all(axis=-1) & (longest > 0.0) & np.isfinite(longest)
     if not are_sound.all():
-        needs = f"a place within {LARGEST:g} m, and a quaternion of finite numbers, not all of them 0"
+        needs = f"a place within {MAX_LENGTH_M:g} m, and a quaternion of finite numbers, not all of them 0"
         raise ValueError(f"{names[int(np.argmin(are_sound))]}: a pose needs {needs}")
     return Poses(poses.positions, normalise(poses.quaternions / longest[..., None]))
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class StreamBody:
     """A rigid body or a skeleton, at rest.
 
     Raises ValueError where names, parents, radii and poses are not as many or out of range, or a joint comes before its
@@ -71,7 +71,7 @@ class Body:
     rest: Poses
     """Each joint in its parent's space, shape (joints,)."""
 
-    radius: float | np.ndarray = RADIUS
+    radius: float | np.ndarray = DEFAULT_RADIUS_M
     """Of the ball at every joint within which nothing may move off by more than the tolerance, in metres. One for all,
     or one for each, shape (joints,), as what it carries is large.
     """
@@ -87,8 +87,10 @@ class Body:
         if np.any(parents < -1) or np.any(parents >= np.arange(count)):
             raise ValueError(f"{self.name}: a joint needs to come after its parent")
         radii = np.asarray(self.radius, dtype=np.float64)
-        if radii.shape not in ((), (count,)) or not ((radii >= SMALLEST) & (radii < LARGEST)).all():
-            raise ValueError(f"{self.name}: a radius is one for all joints or for each, {SMALLEST:g} to {LARGEST:g} m")
+        if radii.shape not in ((), (count,)) or not ((radii >= MIN_LENGTH_M) & (radii < MAX_LENGTH_M)).all():
+            raise ValueError(
+                f"{self.name}: a radius is one for all joints or for each, {MIN_LENGTH_M:g} to {MAX_LENGTH_M:g} m"
+            )
         names = (self.name, *self.joints)
         if not all(0 < len(name.encode(errors="replace")) <= LONGEST_NAME for name in names):
             raise ValueError(f"{self.name}: a name needs 1 to {LONGEST_NAME} bytes")
@@ -112,7 +114,7 @@ class Body:
         return self.skeleton.in_root_space(poses[:, None])[:, 0]
 
     @classmethod
-    def rigid(cls, name: str, pose: Poses | None = None, radius: float = RADIUS) -> Body:
+    def rigid(cls, name: str, pose: Poses | None = None, radius: float = DEFAULT_RADIUS_M) -> StreamBody:
         """Return a single rigid body, at rest at `pose` (1,), or in the middle of everything."""
         return cls(name, (name,), np.array([-1]), pose or Poses([[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0, 0.0]]), radius)
 
@@ -128,7 +130,7 @@ class Hold(NamedTuple):
 class Forest:
     """All bodies of a sender, as one array of joints, some of them perhaps held by others."""
 
-    def __init__(self, bodies: Sequence[Body]) -> None:
+    def __init__(self, bodies: Sequence[StreamBody]) -> None:
         self.bodies, self.names = tuple(bodies), {body.name for body in bodies}
         if not bodies or len(self.names) < len(bodies):
             raise ValueError("a sender needs bodies, each with a name of its own")
@@ -165,7 +167,7 @@ class Forest:
             roots = self._roots(body)
             if not self.sliding[roots].all():
                 raise ValueError(f"{self.bodies[body].name}: what never changes its place cannot be held")
-            forest.holders[roots], forest._arms[roots] = joint, SMALLEST * 2.0 ** (level / 4.0)
+            forest.holders[roots], forest._arms[roots] = joint, MIN_LENGTH_M * 2.0 ** (level / 4.0)
             forest.rest.positions[roots], forest.rest.quaternions[roots] = 0.0, (1.0, 0.0, 0.0, 0.0)
         forest.parents = np.where(forest.holders >= 0, forest.holders, self.parents)
         forest.skeleton = Skeleton(forest.parents)
@@ -204,8 +206,8 @@ class Forest:
 
     def level(self, body: int, poses: Poses) -> int:
         """Return the level of how far a body is from the joint that holds it, where it has poses (joints,) there."""
-        far = max(np.linalg.norm(poses.positions[self._roots(body)], axis=1).max(), SMALLEST)
-        return min(math.ceil(4.0 * math.log2(far / SMALLEST)), LEVELS - 1)
+        far = max(np.linalg.norm(poses.positions[self._roots(body)], axis=1).max(), MIN_LENGTH_M)
+        return min(math.ceil(4.0 * math.log2(far / MIN_LENGTH_M)), LEVER_LEVELS - 1)
 
     def in_hands(self, poses: Poses) -> Poses:
         """Return poses (joints,) with what is held in the space of what holds it; they have it where roots are."""

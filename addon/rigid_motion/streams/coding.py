@@ -5,9 +5,9 @@ then those within; in each knot joint by joint. By which table a number is coded
 
 The coder is of integers of 32 bits and nothing else, so that every language decodes the same: after the
 carry-propagating range coder of G. N. N. Martin (1979), in the form of LZMA. `low` and `size` say the interval, bytes
-leave it from the top. Tables are cumulative frequencies that rise from 0 to `TOTAL`. To write and to read go by the
-same two methods, so that what is said is written down once: `symbol` takes a table's number and `flat` how many numbers
-are as likely; both return the number, which has to be given only where it is written.
+leave it from the top. Tables are cumulative frequencies that rise from 0 to `FREQUENCY_TOTAL`. To write and to read go
+by the same two methods, so that what is said is written down once: `symbol` takes a table's number and `flat` how many
+numbers are as likely; both return the number, which has to be given only where it is written.
 """
 
 from __future__ import annotations
@@ -20,38 +20,39 @@ from importlib.resources import files
 
 from .bodies import Forest
 
-NEAR, FAR, STALE, UNKNOWN, MIDDLE, FINER, STILL = range(7)
+NEAR_KNOT, FAR_KNOT, STALE_KNOT, UNKNOWN_KNOT, MIDDLE_KNOT, FINER_KNOT, STILL_KNOT = range(7)
 """Kinds of knots. The end of a window is coded against how the message before it goes on, or one before that; against
 an old pose; against rest. Then come the first knot within, the others; and those behind an old pose or rest."""
 
-LARGEST, LONG, MOST_LONGER = 14, 20, 32
+FIRST_LONG_MAGNITUDE, LAST_TABLE_BITS, MAX_EXTRA_BITS = 14, 20, 32
 """Magnitudes from the first on are written in full. The last width that tables say, in bits, stands for itself and
 fewer than so many more: 2^51 of the finest steps of the smallest tolerance are further than anything is.
 """
 
-HISTORIES, NEIGHBOURS, SIZES = 8, 5, 6
+HISTORY_COUNT, NEIGHBOUR_COUNT, SIZE_COUNT = 8, 5, 6
 
-FLAGS = 7 * 2 * HISTORIES * NEIGHBOURS
+FLAG_TABLE_COUNT = 7 * 2 * HISTORY_COUNT * NEIGHBOUR_COUNT
 """Tables that say, for each kind of knot, turns and slides, whether a group is anything but zeros. Behind them are
 those of magnitudes, and then single ones:"""
 
-KNOT_COUNTS = FLAGS + 7 * 2 * HISTORIES * SIZES
-WIDTHS, FINENESS, BASES, ODD, HANDS = (KNOT_COUNTS + number for number in (1, 2, 4, 5, 6))
-"""How many knots a window has besides its end; how many binary digits what is above `LARGEST` has; how fine steps are,
-of rigid bodies alone, and in the next table where joints hang on others; what a message builds on; whether its end is
-between two moments of the grid; and whether anything is in other hands than where the message builds on."""
+KNOT_COUNTS = FLAG_TABLE_COUNT + 7 * 2 * HISTORY_COUNT * SIZE_COUNT
+WIDTHS_TABLE, FINENESS_TABLE, BASES_TABLE, ODD_TABLE, HANDS_TABLE = (KNOT_COUNTS + number for number in (1, 2, 4, 5, 6))
+"""How many knots a window has besides its end; how many binary digits what is above `FIRST_LONG_MAGNITUDE` has; how
+fine steps are, of rigid bodies alone, and in the next table where joints hang on others; what a message builds on;
+whether its end is between two moments of the grid; and whether anything is in other hands than where the message builds
+on."""
 
-FINEST, MOST_KNOTS = 3, 32
+MAX_STEP_HALVINGS, MAX_KNOTS = 3, 32
 """So many times steps are halved at most; and knots of a window."""
 
 MOST_GROUPS = 4096
 """Of all knots of a message together, unless the end alone has more: so much work a datagram can make."""
 
-BITS = 12
-TOTAL = 1 << BITS
+FREQUENCY_BITS = 12
+FREQUENCY_TOTAL = 1 << FREQUENCY_BITS
 """The frequencies of every table add up to this."""
 
-SMALLEST = 1 << 24
+MIN_INTERVAL = 1 << 24
 """Below this the interval is widened by a byte."""
 
 TABLE_FILE = files(__package__) / "tables.json"
@@ -80,9 +81,9 @@ class Coder:
         """The lower end of the interval, all bytes of it, less what is read."""
 
     def symbol(self, table: int, value: int = 0) -> int:
-        own, part = self._tables[table], self._size >> BITS
+        own, part = self._tables[table], self._size >> FREQUENCY_BITS
         if self._reads:
-            value = bisect_right(own, self._share(part, TOTAL)) - 1
+            value = bisect_right(own, self._share(part, FREQUENCY_TOTAL)) - 1
         self._narrow(part, own[value], own[value + 1])
         return value
 
@@ -109,7 +110,7 @@ class Coder:
     def _narrow(self, part: int, first: int, last: int) -> None:
         self._low += part * first
         self._size = part * (last - first)
-        while self._size < SMALLEST:
+        while self._size < MIN_INTERVAL:
             byte = self._data[self._at] if self._at < len(self._data) else 0
             self._low, self._size = (self._low << 8) - byte, self._size << 8
             self._at += 1
@@ -141,16 +142,22 @@ def code(
     sums: list[list[int]] = []
     for number, knot in enumerate(groups):
         if number:
-            kind = STILL if kind in (STALE, UNKNOWN, STILL) else MIDDLE if number == 1 else FINER
+            kind = (
+                STILL_KNOT
+                if kind in (STALE_KNOT, UNKNOWN_KNOT, STILL_KNOT)
+                else MIDDLE_KNOT
+                if number == 1
+                else FINER_KNOT
+            )
             weights = [2 * before + end for before, end in zip(sums[-1], sums[0], strict=True)]
         else:
             weights = [old >> 2 for old in memory]
         own: list[int] = []
         for values, weight, (_, slide, above) in zip(knot, weights, forest.groups, strict=True):
-            of_kind = (kind * 2 + slide) * HISTORIES + bucket(weight, HISTORIES)
+            of_kind = (kind * 2 + slide) * HISTORY_COUNT + bucket(weight, HISTORY_COUNT)
             neighbour = (own[above] if above >= 0 else 0) + (own[-1] if own else 0)
-            if coder.symbol(of_kind * NEIGHBOURS + bucket(neighbour, NEIGHBOURS), int(any(values))):
-                own.append(_code_group(coder, values, FLAGS + of_kind * SIZES))
+            if coder.symbol(of_kind * NEIGHBOUR_COUNT + bucket(neighbour, NEIGHBOUR_COUNT), int(any(values))):
+                own.append(_code_group(coder, values, FLAG_TABLE_COUNT + of_kind * SIZE_COUNT))
             else:
                 values[:] = (0, 0, 0)
                 own.append(0)
@@ -162,14 +169,14 @@ def _code_group(coder: Coder, values: list[int], first_table: int) -> int:
     """Write or read three numbers, and return the sum of their magnitudes."""
     total = 0
     for axis in range(3):
-        size = 0 if axis == 0 else min(1 + bucket(total >> (axis - 1), SIZES - 1), SIZES - 1)
-        magnitude = coder.symbol(first_table + size, min(abs(values[axis]), LARGEST))
-        if magnitude == LARGEST:
-            rest = max(abs(values[axis]) - LARGEST, 0)
-            width = coder.symbol(WIDTHS, min(rest.bit_length(), LONG))
-            width += coder.flat(MOST_LONGER, rest.bit_length() - LONG) if width == LONG else 0
+        size = 0 if axis == 0 else min(1 + bucket(total >> (axis - 1), SIZE_COUNT - 1), SIZE_COUNT - 1)
+        magnitude = coder.symbol(first_table + size, min(abs(values[axis]), FIRST_LONG_MAGNITUDE))
+        if magnitude == FIRST_LONG_MAGNITUDE:
+            rest = max(abs(values[axis]) - FIRST_LONG_MAGNITUDE, 0)
+            width = coder.symbol(WIDTHS_TABLE, min(rest.bit_length(), LAST_TABLE_BITS))
+            width += coder.flat(MAX_EXTRA_BITS, rest.bit_length() - LAST_TABLE_BITS) if width == LAST_TABLE_BITS else 0
             magnitude += coder.digits(width, rest)
         negative = coder.flat(2, int(values[axis] < 0)) if magnitude else 0
         values[axis] = -magnitude if negative else magnitude
         total += magnitude
-    return min(total, 1 << LONG)
+    return min(total, 1 << LAST_TABLE_BITS)

@@ -15,29 +15,31 @@ import numpy as np
 from ..motion import Poses, shell_error
 from ..motion.measures import largest_displacement
 from ..motion.quaternions import components, conjugate, cross, matrices, multiply
-from .coding import FINEST, MOST_GROUPS, MOST_KNOTS
+from .coding import MAX_KNOTS, MAX_STEP_HALVINGS, MOST_GROUPS
 from .messages import Codec, Message
-from .paths import Path, carried
-from .wire import TICKS
+from .paths import KnotPath, carried
+from .wire import TICKS_PER_S
 
-NEAR, MARGINS = 0.97, (0.97, 0.85, 0.7)
+ROUNDING_TOLERANCE_RATIO, SMALLER_TOLERANCE_RATIOS = 0.97, (0.97, 0.85, 0.7)
 """Parts of the tolerance that rounding may use; and that smaller numbers may, one after another, while the outcome is
 off by more."""
 
-AT_END, TAPER = 0.85, 0.4
+END_TOLERANCE_RATIO, TAPER_START_RATIO = 0.85, 0.4
 """Part of that at the end of a window, from where the motion has to go on well by itself; from this part of it on."""
 
-STILL, BEYOND, NOTHING = 0.25, 0.2, 1e-9
+STILL_TOLERANCE_RATIO, STILL_BEYOND_S, MAX_SAME_MOMENT_S = 0.25, 0.2, 1e-9
 """Part of the tolerance within which a body does not move; so many seconds later it is still where it was; and moments
 that are not further apart than so many are the same."""
 
-SLIP = 0.4
+HELD_SLIP_RATIO = 0.4
 """Part of the tolerance by which what is held may be off in the hand, before it is said anew."""
 
 FAR_APART, MOST_PARTS = 0.013, 8
 """Seconds between samples beyond which it is looked at what is shown between them, and into how many parts at most."""
 
-CHOICES = np.array([[1, 1, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=bool)
+SMALLER_NUMBER_CHOICES = np.array(
+    [[1, 1, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=bool
+)
 """Which of three numbers are made smaller by 1, the most first."""
 
 
@@ -49,13 +51,13 @@ class Fitting:
     """
 
     def __init__(
-        self, codec: Codec, shown: Path | None, base: Message, back: int, ticks: int, since: int, samples: Path
+        self, codec: Codec, shown: KnotPath | None, base: Message, back: int, ticks: int, since: int, samples: KnotPath
     ) -> None:
         self._codec, self._forest, self._shown, self._samples = codec, codec.forest, shown, samples
         self._begun, self._ticks = partial(Message, codec, base, back, ticks, since=since), ticks
         self._room, self._takes = min(codec.terms.delay - 1, ticks - since), since > ticks - codec.terms.delay
         """How many ticks before the end knots may be; and whether something changes hands as the window starts."""
-        self._start, self._end = max(ticks - codec.terms.delay, since) / TICKS, ticks / TICKS
+        self._start, self._end = max(ticks - codec.terms.delay, since) / TICKS_PER_S, ticks / TICKS_PER_S
         self._stays = np.zeros(len(codec.forest.groups), dtype=bool)
         """Groups of what stays where it is in a hand."""
 
@@ -66,18 +68,18 @@ class Fitting:
         inside = moments[(moments > self._start) & (moments < self._end)]
         looked = np.concatenate(([self._start], inside, [self._end]))
         ends = self._samples.at(looked[[0, -1]])
-        is_still = self._forest.errors(ends[:, :1], ends[:, 1:]).max() < STILL * tolerance
-        exact = (ticks - looked[not self._takes : -1] * TICKS) / grid
+        is_still = self._forest.errors(ends[:, :1], ends[:, 1:]).max() < STILL_TOLERANCE_RATIO * tolerance
+        exact = (ticks - looked[not self._takes : -1] * TICKS_PER_S) / grid
         # A jump between two cells takes both of them, everything else the nearest.
         for cells in (np.rint(exact), np.concatenate((np.floor(exact), np.ceil(exact)))):
             cells = np.unique(cells.astype(int))[::-1]
             self._cells = cells[(cells > 0) & (cells * grid <= self._room)]
-            self._grid = (ticks - self._cells * grid) / TICKS
-            between = self._grid[np.abs(self._grid[:, None] - looked).min(axis=1) > NOTHING]
+            self._grid = (ticks - self._cells * grid) / TICKS_PER_S
+            between = self._grid[np.abs(self._grid[:, None] - looked).min(axis=1) > MAX_SAME_MOMENT_S]
             self._moments = closely(np.unique(np.concatenate((looked, between))))[not self._takes :]
             if is_still:
                 # It is to come to rest, and not to be put right again and again.
-                self._moments = np.append(self._moments, self._end + BEYOND)
+                self._moments = np.append(self._moments, self._end + STILL_BEYOND_S)
             truth = self._samples.at(self._moments)
             self._truth, self._stays = self._forest.skeleton.in_root_space(truth), self._staying(truth)
             message, error = self._fitted()
@@ -92,20 +94,22 @@ class Fitting:
             return self._stays
         expected = self._begun(0).path.at(self._moments)
         slips = shell_error(expected[held], truth[held], self._forest.reaches[held, None])
-        staying = held[np.where(self._moments <= self._end, slips, 0.0).max(axis=1) <= SLIP * self._codec.tolerance]
+        staying = held[
+            np.where(self._moments <= self._end, slips, 0.0).max(axis=1) <= HELD_SLIP_RATIO * self._codec.tolerance
+        ]
         return np.isin([joint for joint, _, _ in self._forest.groups], staying)
 
     def _fitted(self) -> tuple[Message, float]:
         """Return the message with knots on the grid, and the largest error at the moments (n,) that are looked at."""
         tolerance, cells = self._codec.tolerance, [0]
-        for finer in range(FINEST + 1):
+        for finer in range(MAX_STEP_HALVINGS + 1):
             message, error = self._near(cells, finer)
-            if error <= NEAR * tolerance:
+            if error <= ROUNDING_TOLERANCE_RATIO * tolerance:
                 break
             cells = message.cells
         left = np.maximum(self._end - self._moments, 0.0) / (self._end - self._start)
-        most = tolerance * np.minimum(AT_END + (1.0 - AT_END) * left / TAPER, 1.0)
-        for margin in MARGINS:
+        most = tolerance * np.minimum(END_TOLERANCE_RATIO + (1.0 - END_TOLERANCE_RATIO) * left / TAPER_START_RATIO, 1.0)
+        for margin in SMALLER_TOLERANCE_RATIOS:
             smaller = self._smaller(message, margin * most)
             if smaller[1] <= max(tolerance, error):
                 return smaller
@@ -113,7 +117,7 @@ class Fitting:
 
     def _near(self, cells: list[int], finer: int) -> tuple[Message, float]:
         """Return the numbers nearest to the truth, with knots and, where that is not enough, with more of them."""
-        tolerance, most_knots = self._codec.tolerance, min(MOST_KNOTS, max(MOST_GROUPS // len(self._forest.groups), 1))
+        tolerance, most_knots = self._codec.tolerance, min(MAX_KNOTS, max(MOST_GROUPS // len(self._forest.groups), 1))
         message = self._begun(finer)
         for cell in cells:
             message.say(cell, samples=self._samples, stays=self._stays)
@@ -121,10 +125,10 @@ class Fitting:
             errors = self._look(message)[1]
             error, worst = float(errors.max()), self._moments[np.argmax(errors)]
             free = ~np.isin(self._cells, message.cells)
-            if error <= NEAR * tolerance or not free.any() or len(message.cells) == most_knots:
+            if error <= ROUNDING_TOLERANCE_RATIO * tolerance or not free.any() or len(message.cells) == most_knots:
                 return message, error
             away = np.where(free, np.abs(self._grid - worst), np.inf)
-            good = finer < FINEST or error <= tolerance
+            good = finer < MAX_STEP_HALVINGS or error <= tolerance
             if good and np.abs(message.path.moments[1:] - worst).min() < away.min():
                 return message, error
             message.say(int(self._cells[np.argmin(away)]), samples=self._samples, stays=self._stays)
@@ -185,7 +189,7 @@ def _reduce(values: np.ndarray, errors: np.ndarray, hung: np.ndarray, does: np.n
 
     A step of each number moves places and turns shells: `does`, shape (2, 3 components, 3 numbers, hung, n).
     """
-    fewer = np.concatenate((np.zeros((1, 3), dtype=np.int64), values - CHOICES * np.sign(values)))
+    fewer = np.concatenate((np.zeros((1, 3), dtype=np.int64), values - SMALLER_NUMBER_CHOICES * np.sign(values)))
     before = errors[:, :, hung]
     after = before[:, :, None] + np.einsum("ca,ewahn->ewchn", (fewer - values).astype(np.float64), does)
     # Where it is off by more already, it may not become worse.

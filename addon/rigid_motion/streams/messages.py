@@ -16,15 +16,28 @@ import numpy as np
 from ..motion import Poses
 from ..motion.poses import joined
 from ..motion.quaternions import normalise, turned, turns_between
-from .bodies import LEVELS, Forest, Hold
-from .coding import BASES, FAR, FINENESS, HANDS, KNOT_COUNTS, MOST_GROUPS, NEAR, ODD, STALE, UNKNOWN, Coder, code
-from .paths import Path
-from .wire import TICKS, Terms
+from .bodies import LEVER_LEVELS, Forest, Hold
+from .coding import (
+    BASES_TABLE,
+    FAR_KNOT,
+    FINENESS_TABLE,
+    HANDS_TABLE,
+    KNOT_COUNTS,
+    MOST_GROUPS,
+    NEAR_KNOT,
+    ODD_TABLE,
+    STALE_KNOT,
+    UNKNOWN_KNOT,
+    Coder,
+    code,
+)
+from .paths import KnotPath
+from .wire import TICKS_PER_S, Terms
 
-OLD = TICKS // 2
+OLD_POSE_TICKS = TICKS_PER_S // 2
 """Ticks after which a pose says nothing any more about how the motion goes on."""
 
-MOST_BACK, FURTHEST = 129, 3 * TICKS
+MAX_MESSAGES_BACK, MAX_TICKS_BACK = 129, 3 * TICKS_PER_S
 """What a message builds on is so many messages before it at most, and its end so many ticks."""
 
 TURN_STEP, SLIDE_STEP = 1.0, 0.5
@@ -33,10 +46,10 @@ TURN_STEP, SLIDE_STEP = 1.0, 0.5
 HELD_STEP = 0.125
 """Steps of what is held, in those of the same body where nobody holds it: it is said once, and then goes along."""
 
-NEVER = -(1 << 62)
+NEVER_TICK = -(1 << 62)
 """The tick since which all is in the same hands, where nobody ever took anything."""
 
-NOWHERE = 1e5
+MAX_DISTANCE_M = 1e5
 """Metres from the middle of everything at which nothing is any more."""
 
 
@@ -55,7 +68,7 @@ class Codec:
         parts = np.where(forest.holders >= 0, HELD_STEP, 1.0)
         self.turn_steps = TURN_STEP * self.tolerance / forest.reaches * parts
         self.slide_steps = SLIDE_STEP * self.tolerance * parts
-        self._fineness = FINENESS + bool((forest.parents >= 0).any())
+        self._fineness = FINENESS_TABLE + bool((forest.parents >= 0).any())
         self.rest = Message(self)
         """What is known before any message."""
 
@@ -93,16 +106,16 @@ class Codec:
         that is not known.
         """
         terms, size, said = self.terms, len(self.forest.groups), message or self.rest
-        back = coder.symbol(BASES, min(said.back, 2))
+        back = coder.symbol(BASES_TABLE, min(said.back, 2))
         if back == 2:
-            back += coder.flat(MOST_BACK - 1, said.back - 2)
+            back += coder.flat(MAX_MESSAGES_BACK - 1, said.back - 2)
         base = known(back) if back else self.rest
         if base is None:
             return None
         if back:
             whole, odd = divmod(said.end - base.end, terms.grid)
-            end = base.end + terms.grid * coder.flat(FURTHEST // terms.grid + 1, whole)
-            end += coder.flat(terms.grid, odd) if coder.symbol(ODD, int(odd > 0)) else 0
+            end = base.end + terms.grid * coder.flat(MAX_TICKS_BACK // terms.grid + 1, whole)
+            end += coder.flat(terms.grid, odd) if coder.symbol(ODD_TABLE, int(odd > 0)) else 0
         else:
             end = coder.digits(48, said.end)
             end -= end >> 47 << 48  # of either sign
@@ -140,14 +153,14 @@ class Codec:
         It is the same as where the base ends, or else all of it is there.
         """
         delay, forest = self.terms.delay, self.forest
-        since, holds = (message.since, message.codec.forest.holds) if message else (NEVER, ())
+        since, holds = (message.since, message.codec.forest.holds) if message else (NEVER_TICK, ())
         changes = holds != base.codec.forest.holds or since > max(base.since, end - delay)
-        if not coder.symbol(HANDS, int(changes)):
+        if not coder.symbol(HANDS_TABLE, int(changes)):
             return base.codec, base.since
         since = end - 1 - coder.flat(delay, min(end - since, delay) - 1)
         count = coder.flat(len(forest.bodies) + 1, len(holds))
         said = tuple(
-            Hold(coder.flat(len(forest.bodies), body), coder.flat(len(forest), joint), coder.flat(LEVELS, level))
+            Hold(coder.flat(len(forest.bodies), body), coder.flat(len(forest), joint), coder.flat(LEVER_LEVELS, level))
             for body, joint, level in holds or [Hold(0, 0)] * count
         )
         if any(hold.body <= before.body for before, hold in pairwise(said)):
@@ -174,14 +187,14 @@ class Message:
         back: int = 0,
         end: int = 0,
         finer: int = 0,
-        since: int = NEVER,
+        since: int = NEVER_TICK,
     ) -> None:
         self.codec, self.back, self.end, self.finer, self.since = codec, back, end, finer, since
         self.start = max(end - codec.terms.delay, since)
         """The tick at which the window starts."""
         self.factor = 0.5**finer
         """Of the steps."""
-        self.kind, self._goes_on = UNKNOWN, False
+        self.kind, self._goes_on = UNKNOWN_KNOT, False
         """How the end is coded, a kind of `coding`; and whether that is against what the motion did so far."""
         self.cells: list[int] = []
         """Of each knot, in the order in which they came, how many cells of the grid it is before the end."""
@@ -191,39 +204,39 @@ class Message:
         """Of each the whole numbers (groups, 3)."""
         self.memory: tuple[int, ...] = (0,) * len(codec.forest.groups)
         """How large the residuals of each group were."""
-        self.path = Path(np.zeros(1), codec.forest.rest[:, None])
+        self.path = KnotPath(np.zeros(1), codec.forest.rest[:, None])
         self._taken: np.ndarray | None = None
         """Which joints are in other hands than in the base (joints,), if any are."""
         """From the start of the window to its end: what the motion would do if nothing new came, until that is said."""
         if base:
-            moments = np.array((self.start, end)) / TICKS
+            moments = np.array((self.start, end)) / TICKS_PER_S
             if back:
-                self.kind = STALE if end - base.end > OLD else NEAR if back == 1 else FAR
-                self._goes_on = self.kind in (NEAR, FAR)
+                self.kind = STALE_KNOT if end - base.end > OLD_POSE_TICKS else NEAR_KNOT if back == 1 else FAR_KNOT
+                self._goes_on = self.kind in (NEAR_KNOT, FAR_KNOT)
             poses = base.path.at(moments) if self._goes_on else base.path.poses[:, [-1, -1]]
             forest, taken = codec.forest, codec.forest.holders != base.codec.forest.holders
             if taken.any():
                 self._taken = taken
                 poses[taken] = forest.rest[:, None][taken][:, [0, 0]]
-            self.path = Path(moments, poses, holders=forest.holders[:, None])
+            self.path = KnotPath(moments, poses, holders=forest.holders[:, None])
 
     @property
     def is_somewhere(self) -> bool:
         """Return whether it puts all joints where something can be; otherwise nobody reads it."""
-        return bool(np.abs(self.path.poses.positions).max() < NOWHERE)
+        return bool(np.abs(self.path.poses.positions).max() < MAX_DISTANCE_M)
 
     def say(
         self,
         cell: int,
         numbers: np.ndarray | None = None,
-        samples: Path | None = None,
+        samples: KnotPath | None = None,
         stays: np.ndarray | slice = slice(0),
     ) -> None:
         """Move the end, which comes first and is cell 0, or else a new knot, by whole numbers (groups, 3).
 
         Without numbers it is moved as near to what samples have there as these bring it, but for groups that stay.
         """
-        at, moment = 1, (self.end - cell * self.codec.terms.grid) / TICKS
+        at, moment = 1, (self.end - cell * self.codec.terms.grid) / TICKS_PER_S
         moments, poses = self.path.moments, self.path.poses
         if cell:
             at = int(np.searchsorted(moments, moment, side="right"))
@@ -244,7 +257,7 @@ class Message:
             # Nor how it got into these hands.
             poses[self._taken, 0] = poses[self._taken, 1]
         poses = Poses(poses.positions, normalise(poses.quaternions))
-        self.path = Path(moments, poses, holders=self.path.holders[:, :1]).going_on()
+        self.path = KnotPath(moments, poses, holders=self.path.holders[:, :1]).going_on()
         # What is held goes along, and no way of its own.
         held = self.codec.forest.holders >= 0
         self.path.velocities[held] = self.path.spins[held] = 0.0

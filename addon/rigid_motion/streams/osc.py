@@ -16,14 +16,14 @@ BUNDLE = b"#bundle\0"
 IMMEDIATELY = struct.pack(">Q", 1)
 """The time tag of a bundle that is for now."""
 
-DEEPEST, MOST_MESSAGES = 4, 2048
+MAX_BUNDLE_DEPTH, MAX_MESSAGES = 4, 2048
 """Bundles in one another, and messages of a datagram."""
 
 FORMATS = {"i": ">i", "f": ">f", "h": ">q", "d": ">d"}
 """Types of numbers, as `struct` has them. Beside them are strings: of other types VMC has none."""
 
 
-class Message(NamedTuple):
+class OscMessage(NamedTuple):
     """An address, and what is said to it."""
 
     address: str
@@ -50,10 +50,10 @@ def is_osc(datagram: bytes) -> bool:
     return datagram.startswith((b"/", BUNDLE))
 
 
-def read(datagram: bytes) -> list[Message]:
+def read(datagram: bytes) -> list[OscMessage]:
     """All messages of a datagram, but for those that are damaged or have arguments of other types."""
-    result: list[Message] = []
-    for part in islice(_parts(datagram, DEEPEST), MOST_MESSAGES):
+    result: list[OscMessage] = []
+    for part in islice(_parts(datagram, MAX_BUNDLE_DEPTH), MAX_MESSAGES):
         with suppress(KeyError, ValueError, struct.error):
             result.append(_message(part))
     return result
@@ -76,7 +76,7 @@ def _parts(data: bytes, depth: int) -> Iterator[bytes]:
             at = end + 4
 
 
-def _message(data: bytes) -> Message:
+def _message(data: bytes) -> OscMessage:
     address, at = _text(data, 0)
     tags, at = _text(data, at)
     if address[:1] != "/" or tags[:1] != ",":
@@ -89,7 +89,7 @@ def _message(data: bytes) -> Message:
         else:
             arguments += struct.unpack_from(FORMATS[tag], data, at)
             at += struct.calcsize(FORMATS[tag])
-    return Message(address, tuple(arguments))
+    return OscMessage(address, tuple(arguments))
 
 
 def _text(data: bytes, at: int) -> tuple[str, int]:

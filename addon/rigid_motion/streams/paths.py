@@ -19,19 +19,19 @@ from ..motion import Poses
 from ..motion.poses import joined
 from ..motion.quaternions import turned, turns_between
 
-CARRY = 0.15
-"""Seconds: a motion of velocity v goes on by v * CARRY * (1 - exp(-t / CARRY)) beyond the last knot."""
+CARRY_S = 0.15
+"""Seconds: a motion of velocity v goes on by v * CARRY_S * (1 - exp(-t / CARRY_S)) beyond the last knot."""
 
 Side = Literal["left", "right"]
 
 
 def carried(after: np.ndarray | float) -> np.ndarray:
     """By how many seconds of its velocity a motion goes on, so many seconds after its last knot."""
-    return np.asarray(CARRY * -np.expm1(-np.maximum(after, 0.0) / CARRY))
+    return np.asarray(CARRY_S * -np.expm1(-np.maximum(after, 0.0) / CARRY_S))
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class KnotPath:
     """Knots of all joints: rising moments (knots,), poses (joints, knots), and how the joints move at the last of them,
     by velocities of places and angular velocities (joints, 3), a second.
 
@@ -77,7 +77,7 @@ class Path:
         """Return which joint holds each at a moment, shape (joints,); a single -1 where nothing is ever held."""
         return self.holders[:, self._before(np.array([moment]), "right")[0]]
 
-    def followed(self, other: Path, lost: int = 0) -> Path:
+    def followed(self, other: KnotPath, lost: int = 0) -> KnotPath:
         """Return this path until the start of another, and from there straight to the knots of that.
 
         Where as many windows between them are lost, the motion went on as it was going until the first of these, and
@@ -102,23 +102,23 @@ class Path:
                 moments.insert(1, begin)
                 poses.insert(1, self.at(begin, "left"))
                 held.insert(1, until)
-        return Path(
+        return KnotPath(
             np.concatenate(moments), joined(poses, axis=1), other.velocities, other.spins, np.concatenate(held, axis=1)
         )
 
-    def extended(self, moment: float, poses: Poses) -> Path:
+    def extended(self, moment: float, poses: Poses) -> KnotPath:
         """Return this path with another knot behind the others, of poses (joints,), with nothing ever held."""
-        return Path(np.append(self.moments, moment), joined((self.poses, poses[:, None]), axis=1))
+        return KnotPath(np.append(self.moments, moment), joined((self.poses, poses[:, None]), axis=1))
 
-    def going_on(self) -> Path:
+    def going_on(self) -> KnotPath:
         """Return the same, with the motion going on beyond the last knot as it went since the one before."""
         if len(self.moments) < 2:
             return self
         before, last, span = self.poses[:, -2], self.poses[:, -1], self.moments[-1] - self.moments[-2]
         spins = turns_between(before.quaternions, last.quaternions) / span
-        return Path(self.moments, self.poses, (last.positions - before.positions) / span, spins, self.holders)
+        return KnotPath(self.moments, self.poses, (last.positions - before.positions) / span, spins, self.holders)
 
-    def since(self, moment: float) -> Path:
+    def since(self, moment: float) -> KnotPath:
         """Return the same without knots that nothing from this moment on depends on."""
         kept = max(int(np.searchsorted(self.moments, moment, side="right")) - 1, 0)
-        return Path(self.moments[kept:], self.poses[:, kept:], self.velocities, self.spins, self.holders[:, kept:])
+        return KnotPath(self.moments[kept:], self.poses[:, kept:], self.velocities, self.spins, self.holders[:, kept:])

@@ -15,44 +15,46 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..motion import Poses
-from ..motion.quaternions import SMALLEST, normalise, turned, turns_between
-from .bodies import Body, Forest
-from .paths import Path
+from ..motion.quaternions import ZERO_SINE, normalise, turned, turns_between
+from .bodies import Forest, StreamBody
+from .paths import KnotPath
 from .steady import Steady
-from .wire import TICKS
+from .wire import TICKS_PER_S
 
 LOOK_BACK, MOST_TRANSITS = 3.0, 512
 """Seconds of which the longest transit counts, and of how many datagrams at most."""
 
-FEW, SHORT, SOONER, QUICK = 4, 0.3, 0.05, 0.1
-"""Datagrams at so many times in a row, over so many seconds, that all came so much sooner than the longest, and sooner
-than all but this part of those before: the network is quicker now, and does not only vary."""
+# The network is quicker now, and does not only vary, where datagrams all came sooner than usual:
+MIN_QUICK_DATAGRAMS = 4  # at so many times in a row
+MIN_QUICK_S = 0.3  # over so long
+MIN_SOONER_S = 0.05  # by so much sooner than the longest
+MAX_SOONER_RATIO = 0.1  # and sooner than all but this part of those before
 
-SET = 1.0
+CLOCK_SET_S = 1.0
 """A transit that differs by more than this many seconds is that of another clock; a display may not leap further."""
 
-AHEAD = 0.25
+CLOCK_AHEAD_S = 0.25
 """Seconds by which something comes sooner than all that came lately where the sender's clock was set ahead."""
 
-SETTLING, HURRY = 0.15, 0.6
+SETTLING_S, MAX_HURRY_RATIO = 0.15, 0.6
 """Seconds in which a third of a difference to the moment that should be shown is left; and by which part faster than
 time the moment goes on at most."""
 
-FADE, FORWARD = 0.04, 0.8
+FADE_S, MAX_FORWARD_RATIO = 0.04, 0.8
 """Seconds: as critically damped springs of this time constant, differences to what should be shown fade. And the part
 of the motion that a difference may take away: what was shown too far ahead waits, and never goes back."""
 
-RESTS, NOTHING = 0.05, 1e-5
+MAX_REST_SPEED, MIN_DIFFERENCE = 0.05, 1e-5
 """Metres or radians a second: a motion that is slower is at rest, and differences along it fade as all others. And
 metres or radians: differences that are smaller are over."""
 
-SILENT = 10.0
+MAX_SILENCE_S = 10.0
 """Seconds of silence after which a stream is forgotten."""
 
 MOST_KNOTS, MOST_JOINT_KNOTS = 256, 1 << 14
 """Knots of a stream that wait for `keys`, or as many more as a body of few joints has in so many poses of joints."""
 
-NOBODY = np.full(1, -1, dtype=np.int16)
+NO_HOLDERS = np.full(1, -1, dtype=np.int16)
 """Who holds each joint where nothing is held."""
 
 
@@ -75,7 +77,7 @@ class Playing:
         """Take into account when something was sent and came."""
         transit = arrival - sent
         known = self._transits
-        if known and (abs(transit - known[-1][1]) > SET or arrival < known[-1][0] - SET):
+        if known and (abs(transit - known[-1][1]) > CLOCK_SET_S or arrival < known[-1][0] - CLOCK_SET_S):
             known.clear()
         known.append((arrival, transit))
         while known[0][0] < arrival - LOOK_BACK:
@@ -84,10 +86,14 @@ class Playing:
         by_sent = sorted((when - took, when, took) for when, took in known)
         # What somebody who seldom looks takes out of a socket came at one time.
         last_left = {when: left for left, when, _ in by_sent}
-        begun = min(sorted(last_left.values())[-FEW:][0], by_sent[-1][0] - SHORT)
+        begun = min(sorted(last_left.values())[-MIN_QUICK_DATAGRAMS:][0], by_sent[-1][0] - MIN_QUICK_S)
         recent = [took for left, _, took in by_sent if left >= begun]
         older = sorted(took for left, _, took in by_sent if left < begun)
-        if older and len(last_left) >= FEW and max(recent) < min(older[int(QUICK * len(older))], older[-1] - SOONER):
+        if (
+            older
+            and len(last_left) >= MIN_QUICK_DATAGRAMS
+            and max(recent) < min(older[int(MAX_SOONER_RATIO * len(older))], older[-1] - MIN_SOONER_S)
+        ):
             known.clear()
             known.extend(sorted((when, took) for left, when, took in by_sent if left >= begun))
         self.longest = max(took for _, took in known)
@@ -97,10 +103,10 @@ class Playing:
         """Return by how much the sender's clock was set ahead, 0 if it was not, where this was sent next."""
         before = [(when, took) for when, took in self._transits if when < arrival]
         # Somebody who seldom looks does not know when it came, and a clock of ours that goes back says nothing.
-        if not before or self._transits[-1][0] > arrival or arrival - before[-1][0] > AHEAD:
+        if not before or self._transits[-1][0] > arrival or arrival - before[-1][0] > CLOCK_AHEAD_S:
             return 0.0
         step = min(took for _, took in before) - (arrival - sent)
-        return step if step > AHEAD else 0.0
+        return step if step > CLOCK_AHEAD_S else 0.0
 
     def leap(self, moment: float, step: float) -> None:
         """Leave out so many seconds behind a moment, as soon as it was shown."""
@@ -123,16 +129,16 @@ class Playing:
         passed, self._last = now - self._last, now
         if self._moment is None:
             self._moment, passed = desired, 0.0
-        if abs(passed) > SET and not 0.0 <= now - self._heard <= SET:
+        if abs(passed) > CLOCK_SET_S and not 0.0 <= now - self._heard <= CLOCK_SET_S:
             self._unsure = True
         if self._unsure or passed <= 0.0:
             return self._moment
         gap = desired - self._moment - passed
-        if abs(gap) > SET:
+        if abs(gap) > CLOCK_SET_S:
             self._moment = desired
         else:
             # Somebody who seldom looks is not to overshoot.
-            self._moment += passed + min(max(gap / max(SETTLING, passed), -1.0), HURRY) * passed
+            self._moment += passed + min(max(gap / max(SETTLING_S, passed), -1.0), MAX_HURRY_RATIO) * passed
         return self._moment
 
 
@@ -150,10 +156,10 @@ class Fading:
         self._left, self._rate = np.zeros((2, 2, 1, 3))
         """Differences of places and turns, the latter as rotation vectors, and by how much they change a second. Shape
         (2, joints, 3)."""
-        self._holders = NOBODY
+        self._holders = NO_HOLDERS
         """Which joints held each as that was shown."""
 
-    def changed(self, poses: Poses, holders: np.ndarray = NOBODY) -> None:
+    def changed(self, poses: Poses, holders: np.ndarray = NO_HOLDERS) -> None:
         """Go on from what was shown last, where a new path has poses (joints,) in the hands of holders (joints,)."""
         if self._shown is not None:
             self._path, self._left = poses, _between(poses, self._shown)
@@ -166,7 +172,7 @@ class Fading:
             self._left, self._rate = (np.where(differs[:, None], 0.0, each) for each in (self._left, self._rate))
         self._holders = holders
 
-    def show(self, poses: Poses, now: float, holders: np.ndarray = NOBODY) -> Poses:
+    def show(self, poses: Poses, now: float, holders: np.ndarray = NO_HOLDERS) -> Poses:
         """Poses (joints,) of the path, in the hands of holders (joints,), with what is left of differences."""
         self._take_over(holders)
         passed, self._last = max(now - self._last, 0.0), now
@@ -179,15 +185,15 @@ class Fading:
 
     def _fade(self, step: np.ndarray, passed: float) -> None:
         """Let so many seconds pass, in which the path goes on by steps (2, joints, 3)."""
-        before, decay = self._left, np.exp(-passed / FADE)
-        pull = self._rate + before / FADE
+        before, decay = self._left, np.exp(-passed / FADE_S)
+        pull = self._rate + before / FADE_S
         left = (before + pull * passed) * decay
         length = np.linalg.norm(step, axis=-1, keepdims=True)
-        along = step / np.maximum(length, SMALLEST)
-        back = np.minimum(np.sum((left - before) * along, axis=-1, keepdims=True) + FORWARD * length, 0.0)
-        held = np.where(length > RESTS * passed, back, 0.0) * along
-        self._rate, self._left = pull * decay - left / FADE - held / passed, left - held
-        over = np.abs(self._left).max(axis=(1, 2)) < NOTHING
+        along = step / np.maximum(length, ZERO_SINE)
+        back = np.minimum(np.sum((left - before) * along, axis=-1, keepdims=True) + MAX_FORWARD_RATIO * length, 0.0)
+        held = np.where(length > MAX_REST_SPEED * passed, back, 0.0) * along
+        self._rate, self._left = pull * decay - left / FADE_S - held / passed, left - held
+        over = np.abs(self._left).max(axis=(1, 2)) < MIN_DIFFERENCE
         self._rate[over] = self._left[over] = 0.0
 
 
@@ -203,7 +209,7 @@ class Stream(NamedTuple):
     identity: bytes
 
 
-class Held(NamedTuple):
+class HeldPoses(NamedTuple):
     """Where a body is held: the body and the joint that hold it, and its poses (joints,) with roots in that joint's
     space.
     """
@@ -222,12 +228,12 @@ class Shown(NamedTuple):
 
     stream: Stream
     moment: float
-    bodies: tuple[Body, ...]
+    bodies: tuple[StreamBody, ...]
     poses: dict[str, Poses]
-    held: dict[str, Held] = {}  # noqa: RUF012
+    held: dict[str, HeldPoses] = {}  # noqa: RUF012
 
 
-class Keys(NamedTuple):
+class ReceivedKeys(NamedTuple):
     """What was sent, to be recorded: rising moments (k,) in seconds by the sender's clock, and poses (joints, k).
 
     Roots are in the world, held or not. Where a body changes hands, there is a key just before it. `held` has what is
@@ -236,7 +242,7 @@ class Keys(NamedTuple):
     """
 
     stream: Stream
-    bodies: tuple[Body, ...]
+    bodies: tuple[StreamBody, ...]
     moments: np.ndarray
     poses: dict[str, Poses]
     held: dict[str, tuple[list[tuple[str, str] | None], Poses]] = {}  # noqa: RUF012
@@ -249,20 +255,20 @@ class Playback:
     `settled` is that until which the path is not going to change any more.
     """
 
-    silent = SILENT
+    silent = MAX_SILENCE_S
 
     def __init__(self, stream: Stream, delay: float, heard: float, forest: Forest | None = None) -> None:
         self.stream, self.heard, self.playing = stream, heard, Playing(delay)
         self.forest: Any = forest
         """The Forest of all bodies, None for as long as nothing is known of them."""
-        self.path: Path | None = None
+        self.path: KnotPath | None = None
         self.begins, self.ends, self.settled = -np.inf, np.inf, np.inf
         self.fading, self._steady = Fading(), Steady()
         self.moment: float | None = None
         self.kept = -np.inf
         """Until this moment keys were handed out."""
 
-    def put(self, path: Path) -> None:
+    def put(self, path: KnotPath) -> None:
         """Show a path from now on, of which the knots remain that are to be shown or handed out."""
         self.ends = np.inf
         count = min(max(MOST_JOINT_KNOTS // len(self.forest), MOST_KNOTS), len(path.moments))
@@ -283,10 +289,10 @@ class Playback:
         poses = self.fading.show(poses, now, holders)
         shown = forest.parted(forest.out_of_hands(poses[:, None], holders[:, None])[:, 0])
         hands = forest.held(holders) if (holders >= 0).any() else {}
-        held = {name: Held(body, joint, forest.parted(poses)[name]) for name, (body, joint) in hands.items()}
+        held = {name: HeldPoses(body, joint, forest.parted(poses)[name]) for name, (body, joint) in hands.items()}
         return Shown(self.stream, self.moment, forest.bodies, shown, held)
 
-    def keys(self) -> Keys | None:
+    def keys(self) -> ReceivedKeys | None:
         """Return the knots that are settled and were not handed out yet."""
         moments = self.path.moments if self.path else np.empty(0)
         rows = np.flatnonzero((moments > self.kept) & (moments <= self.settled))
@@ -296,7 +302,7 @@ class Playback:
         # Of knots at one moment the first is what was until then, and the last what is from then on.
         is_last = np.diff(moments[rows], append=np.inf) > 0.0
         is_first = np.insert(is_last[:-1], 0, True)
-        moments = (moments[rows] - np.where(is_last, 0.0, 0.5 / TICKS))[is_first | is_last]
+        moments = (moments[rows] - np.where(is_last, 0.0, 0.5 / TICKS_PER_S))[is_first | is_last]
         rows = rows[is_first | is_last]
         poses, holders = self.path.poses[:, rows], self.path.holders[:, rows]
         seen, inside, held = self.forest.out_of_hands(poses, holders), self.forest.parted(poses), {}
@@ -305,4 +311,4 @@ class Playback:
             hands = [self.forest.held(column) for column in columns.T]
             of_keys = [hands[number] for number in which.ravel().tolist()]
             held = {name: ([one.get(name) for one in of_keys], inside[name]) for name in set().union(*hands)}
-        return Keys(self.stream, self.forest.bodies, moments, self.forest.parted(seen), held)
+        return ReceivedKeys(self.stream, self.forest.bodies, moments, self.forest.parted(seen), held)

@@ -19,10 +19,10 @@ from .bodies import Forest
 from .coding import Coder
 from .messages import Codec, Message
 from .osc import is_osc
-from .paths import Path
-from .playing import AHEAD, Keys, Playback, Shown, Stream
+from .paths import KnotPath
+from .playing import CLOCK_AHEAD_S, Playback, ReceivedKeys, Shown, Stream
 from .vmc import VMC, Performance
-from .wire import NEEDS_DESCRIPTION, NEEDS_REFRESH, TICKS, Answer, Motion, Terms
+from .wire import NEEDS_DESCRIPTION, NEEDS_REFRESH, TICKS_PER_S, Answer, EncodedMotion, Terms
 
 MOST_STREAMS, MOST_ALL_JOINTS = 64, 4096
 """That are remembered, the streams without descriptions for a new one as well; and joints of all streams together."""
@@ -48,7 +48,7 @@ class Receiver:
         """Who answers."""
         self._streams: dict[Stream, Any] = {}
         self._gone: deque[Stream] = deque(maxlen=MOST_GONE)
-        self._waiting: OrderedDict[Stream, deque[tuple[Motion, float]]] = OrderedDict()
+        self._waiting: OrderedDict[Stream, deque[tuple[EncodedMotion, float]]] = OrderedDict()
         """Messages that came before the description, and when."""
         self._complained: dict[Hashable, int] = {}
         """Who sends another version of the wire, and which."""
@@ -76,7 +76,7 @@ class Receiver:
         if read is None or isinstance(read, Answer):
             return
         known = self._streams.get(stream := Stream(source, read.identity))
-        if isinstance(read, Motion):
+        if isinstance(read, EncodedMotion):
             if not known:
                 self._waiting.setdefault(stream, deque(maxlen=MOST_WAITING)).append((read, arrival))
                 self._waiting.move_to_end(stream)
@@ -95,7 +95,7 @@ class Receiver:
         """Note once of each source that it sends another version of the wire."""
         if version and source not in self._complained and len(self._complained) < MOST_STREAMS:
             self._complained[source] = version
-            own, older = wire.VERSION, "this program" if version > wire.VERSION else "the sender"
+            own, older = wire.WIRE_VERSION, "this program" if version > wire.WIRE_VERSION else "the sender"
             who = ":".join(map(str, source)) if isinstance(source, tuple) else source
             self._complaints.append(f"{who} sends version {version} of the wire, not {own}: update {older}")
 
@@ -123,7 +123,7 @@ class Receiver:
             if stream.source == source:
                 it.end()
 
-    def keys(self) -> list[Keys]:
+    def keys(self) -> list[ReceivedKeys]:
         """Return what came since the last call and is not going to change any more."""
         return [keys for it in self._streams.values() if (keys := it.keys())]
 
@@ -151,7 +151,7 @@ class _Coded(Playback):
     """A stream with its description."""
 
     def __init__(self, stream: Stream, forest: Forest, terms: Terms, heard: float) -> None:
-        super().__init__(stream, terms.delay / TICKS, heard, forest)
+        super().__init__(stream, terms.delay / TICKS_PER_S, heard, forest)
         self._codec = Codec(forest, terms)
         self._messages: OrderedDict[int, Message] = OrderedDict()
         """Of messages by their sequence numbers, those that others built on last behind."""
@@ -160,7 +160,7 @@ class _Coded(Playback):
         """Seconds of the newest message: its end, and what it took."""
         self.begins = np.inf
 
-    def take(self, motion: Motion, arrival: float) -> bool:
+    def take(self, motion: EncodedMotion, arrival: float) -> bool:
         """Take a message, if it can be read, and say whether it is a new one."""
         sequence = motion.sequence
         if sequence in self._messages or self._newest - sequence > MOST_MESSAGES:
@@ -174,8 +174,12 @@ class _Coded(Playback):
             self._messages.move_to_end(sequence - read.back)
         if len(self._messages) > MOST_MESSAGES:
             self._messages.popitem(last=False)
-        lost, end = sequence - self._newest - 1, read.end / TICKS
-        if lost == 0 and self._transit - (arrival - end) > AHEAD and (step := self.playing.set_ahead(end, arrival)):
+        lost, end = sequence - self._newest - 1, read.end / TICKS_PER_S
+        if (
+            lost == 0
+            and self._transit - (arrival - end) > CLOCK_AHEAD_S
+            and (step := self.playing.set_ahead(end, arrival))
+        ):
             self.playing.leap(self._end, step)
         if lost >= 0:
             self._newest, self._needs, self._end, self._transit = sequence, 0, end, arrival - end
@@ -186,7 +190,7 @@ class _Coded(Playback):
         self._put(read.path, lost)
         return True
 
-    def _put(self, window: Path, lost: int) -> None:
+    def _put(self, window: KnotPath, lost: int) -> None:
         """Let a window take part in what is shown; before it so many are lost, or it came late where that is < 0."""
         if self.path is None or (lost >= 0 and window.moments[0] < self.begins):
             # How the motion got to the first knot is not known.

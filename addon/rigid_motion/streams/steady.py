@@ -14,25 +14,25 @@ from ..motion.differences import coefficients
 from ..motion.poses import joined
 from ..motion.quaternions import turned, turns_between
 from ..motion.trembling import trembling
-from .paths import Path
+from .paths import KnotPath
 
-LEAST, KNOWN, EVERY = 60, 240, 4
+MIN_NOISE_SAMPLES, MAX_NOISE_SAMPLES, SAMPLES_PER_LOOK = 60, 240, 4
 """The fewest and the most samples that say how much something trembles, and as how many are shown one joint is looked
 at, as that takes long."""
 
-BEHIND, AHEAD, FEWEST = 12, 8, 12
+SAMPLES_BEFORE, SAMPLES_AFTER, MIN_SAMPLES = 12, 8, 12
 """Samples before and behind the moment that is shown that count, and the fewest of both."""
 
-SPARSE = 0.04
+MIN_KEY_GAP_S = 0.04
 """Seconds from sample to sample from which on there are keys, and not all that was seen: these do not tremble."""
 
-ORDER, AROUND, ROUNDS = 3, 3, 10
+JERK_ORDER, JERK_REACH_SAMPLES, JERK_ROUNDS = 3, 3, 10
 """Of the derivative that is small; samples on either side over which it is as large; rounds in which that is found."""
 
-SMOOTHEST = 1e-9
+MIN_JERK_RATIO = 1e-9
 """Of the jerk that noise makes is always allowed."""
 
-FURTHEST, NEARLY_NONE = 2.0, 1e-4
+MAX_TURN_RAD, FAR_TURN_WEIGHT = 2.0, 1e-4
 """Radians: what is turned further from the rotation that is shown counts by so little."""
 
 
@@ -47,7 +47,7 @@ class Steady:
         """Of places and of rotations of the joints, as standard deviations along an axis; shape (2, joints)."""
         self._shown, self._settled = 0, np.inf
 
-    def __call__(self, path: Path, moment: float, settled: float) -> Poses:
+    def __call__(self, path: KnotPath, moment: float, settled: float) -> Poses:
         """Return the poses (joints,) of a moment of a path, which is not going to change until `settled`."""
         poses, count = path.pose(moment), path.poses.shape[0]
         if self._poses.shape[0] != count or (len(self._times) and path.moments[0] > self._times[-1]):
@@ -56,12 +56,12 @@ class Steady:
             self._noise = np.zeros((2, count)) if self._noise.shape[1] != count else self._noise
         self._take(path, settled)
         at = int(np.searchsorted(self._times, moment)) - 1
-        window = slice(max(at - BEHIND, 0), at + 1 + AHEAD)
+        window = slice(max(at - SAMPLES_BEFORE, 0), at + 1 + SAMPLES_AFTER)
         times = self._times[window]
-        if at < 0 or len(times) < FEWEST or np.median(np.diff(times)) > SPARSE:
+        if at < 0 or len(times) < MIN_SAMPLES or np.median(np.diff(times)) > MIN_KEY_GAP_S:
             return poses
-        if self._shown % EVERY == 0 and len(self._times) >= LEAST:
-            joint = self._shown // EVERY % count
+        if self._shown % SAMPLES_PER_LOOK == 0 and len(self._times) >= MIN_NOISE_SAMPLES:
+            joint = self._shown // SAMPLES_PER_LOOK % count
             self._noise[:, joint] = trembling(self._times, self._poses[joint])[:2]
         self._shown += 1
         holders = self._holders[:, window]
@@ -73,7 +73,7 @@ class Steady:
         turns = turns_between(seen.quaternions[:, first, None], seen.quaternions)
         values = np.concatenate((seen.positions - seen.positions[:, first, None], turns))
         noise = self._noise[:, joints].ravel()
-        near = np.concatenate((np.ones(turns.shape[:2]), np.linalg.norm(turns, axis=-1) < FURTHEST))
+        near = np.concatenate((np.ones(turns.shape[:2]), np.linalg.norm(turns, axis=-1) < MAX_TURN_RAD))
         moving = noise > 0.0
         corrections = np.zeros(values.shape)
         corrections[moving] = steadied(times, values[moving], noise[moving], near[moving]) - values[moving]
@@ -85,10 +85,10 @@ class Steady:
         quaternions[joints] = turned(quaternions[joints], turns)
         return Poses(positions, quaternions)
 
-    def _take(self, path: Path, settled: float) -> None:
+    def _take(self, path: KnotPath, settled: float) -> None:
         """Remember the samples that are new, those at one moment once, and those anew that might have changed."""
         stop = int(np.searchsorted(self._times, self._settled, side="right"))
-        kept, last = slice(max(stop - KNOWN, 0), stop), self._times[stop - 1] if stop else -np.inf
+        kept, last = slice(max(stop - MAX_NOISE_SAMPLES, 0), stop), self._times[stop - 1] if stop else -np.inf
         is_new = (path.moments > last) & (np.diff(path.moments, append=np.inf) > 0.0)
         holders = np.broadcast_to(path.holders, (len(self._holders), len(is_new)))[:, is_new]
         self._times = np.append(self._times[kept], path.moments[is_new])
@@ -101,23 +101,23 @@ def steadied(times: np.ndarray, values: np.ndarray, noise: np.ndarray, near: np.
     """Return the likeliest of values (channels, n, 3) at times (n,) with noise (channels,), where `near` (channels, n)
     counts.
     """
-    c, count = coefficients(times, ORDER), len(times)
-    rows = np.arange(count - ORDER)
-    around = (np.abs(rows[:, None] - rows) <= AROUND).astype(float)
+    c, count = coefficients(times, JERK_ORDER), len(times)
+    rows = np.arange(count - JERK_ORDER)
+    around = (np.abs(rows[:, None] - rows) <= JERK_REACH_SAMPLES).astype(float)
     around /= around.sum(axis=0)
     derivative = np.zeros((len(rows), count))
-    for column in range(ORDER + 1):
+    for column in range(JERK_ORDER + 1):
         derivative[rows, rows + column] = c[:, column]
-    steps = (times[ORDER:] - times[:-ORDER]) / ORDER
-    least = SMOOTHEST * steps * np.einsum("nk,nk->n", c, c) * noise[:, None] ** 2
-    precisions = np.where(near, 1.0, NEARLY_NONE) / noise[:, None] ** 2
+    steps = (times[JERK_ORDER:] - times[:-JERK_ORDER]) / JERK_ORDER
+    least = MIN_JERK_RATIO * steps * np.einsum("nk,nk->n", c, c) * noise[:, None] ** 2
+    precisions = np.where(near, 1.0, FAR_TURN_WEIGHT) / noise[:, None] ** 2
 
     def density(found: np.ndarray, determined: np.ndarray | float) -> np.ndarray:
         squares = steps * ((derivative @ found) ** 2).sum(axis=-1) / 3.0
         return np.maximum(squares @ around / determined, least)
 
     densities, found = density(values, 1.0), values
-    for _ in range(ROUNDS):
+    for _ in range(JERK_ROUNDS):
         weights = steps / densities
         matrix = (derivative.T * weights[:, None]) @ derivative
         matrix[:, np.arange(count), np.arange(count)] += precisions

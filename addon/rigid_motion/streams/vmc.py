@@ -18,12 +18,12 @@ from ..motion import Poses
 from ..motion.humanoid import HUMANOID, alignments, beside, humanoid_bones
 from ..motion.poses import in_other_axes
 from ..motion.quaternions import conjugate, multiply
-from .bodies import FURTHEST, LARGEST, LONGEST_NAME, SHORTEST, Body, Forest
-from .osc import Message, read, write_bundle, write_message
-from .paths import Path
-from .playing import SET, Playback, Stream
+from .bodies import LONGEST_NAME, MAX_CLOCK_S, MAX_LENGTH_M, MIN_SAMPLE_GAP_S, Forest, StreamBody
+from .osc import OscMessage, read, write_bundle, write_message
+from .paths import KnotPath
+from .playing import CLOCK_SET_S, Playback, Stream
 
-PORT = 39539
+VMC_PORT = 39539
 """That programs which show a performer listen on."""
 
 VMC, ROOT, PERFORMER = b"/VMC", "Root", "VMC"
@@ -41,7 +41,7 @@ DEVICES = {f"/VMC/Ext/{kind}/Pos" for kind in ("Tra", "Con", "Hmd")}
 MOST_DEVICES, AT_ONCE = 32, 12
 """Devices of a program; and bones of a datagram, which stays below what networks carry in one piece."""
 
-MOST_FRAMES, LATE = 8, 3
+MAX_FRAMES, MAX_LATE_FRAMES = 8, 3
 """Frames of a datagram: what else it has is dropped. And frames in a row, each sent behind the one before, that are
 before what came already: they are not late, but the sender's clock was set back."""
 
@@ -124,10 +124,10 @@ class Performance(Playback):
         """Take a datagram."""
         self._frames = 0
         for message in read(datagram):
-            if self._frames < MOST_FRAMES:
-                self._hear(message, arrival)
+            if self._frames < MAX_FRAMES:
+                self._take_message(message, arrival)
 
-    def _hear(self, message: Message, arrival: float) -> None:
+    def _take_message(self, message: OscMessage, arrival: float) -> None:
         address, (name, *numbers) = message.address, message.arguments or (None,)
         if address == "/VMC/Ext/Root/Pos":
             self._place((PERFORMER, ROOT), numbers, arrival)
@@ -137,7 +137,7 @@ class Performance(Playback):
             devices = {body for body, _ in (*self._newest, *self._frame)} - {PERFORMER}
             if 0 < len(name.encode()) <= LONGEST_NAME and (name in devices or len(devices) < MOST_DEVICES):
                 self._place((name, name), numbers, arrival)
-        elif address == "/VMC/Ext/T" and not numbers and isinstance(name, float | int) and abs(name) <= FURTHEST:
+        elif address == "/VMC/Ext/T" and not numbers and isinstance(name, float | int) and abs(name) <= MAX_CLOCK_S:
             self._has_time = True
             self._sample(float(name), arrival)
 
@@ -145,7 +145,7 @@ class Performance(Playback):
         try:
             x, y, z, w = numbers[3:7]
             length = math.sqrt(x * x + y * y + z * z + w * w)
-            is_sound = 0.5 < length < 2.0 and all(-LARGEST < number < LARGEST for number in numbers[:3])
+            is_sound = 0.5 < length < 2.0 and all(-MAX_LENGTH_M < number < MAX_LENGTH_M for number in numbers[:3])
         except (TypeError, ValueError, OverflowError):
             is_sound = False
         if not is_sound:
@@ -171,7 +171,7 @@ class Performance(Playback):
         if moment is None:
             return
         poses = self._poses(self._joints)
-        self.put(self.path.extended(moment, poses) if self.path else Path(np.array([moment]), poses[:, None]))
+        self.put(self.path.extended(moment, poses) if self.path else KnotPath(np.array([moment]), poses[:, None]))
         self.playing.heard(moment, arrival)
         self.heard = arrival
 
@@ -181,10 +181,10 @@ class Performance(Playback):
         if self.path is None:
             return sent + self._slip
         last, self._slip = float(self.path.moments[-1]), self._slip - self.playing.set_ahead(sent + self._slip, arrival)
-        self._late = (self._late * is_next + 1) if sent + self._slip < last + SHORTEST else 0
-        if self._late >= LATE or sent + self._slip < last - SET:
+        self._late = (self._late * is_next + 1) if sent + self._slip < last + MIN_SAMPLE_GAP_S else 0
+        if self._late >= MAX_LATE_FRAMES or sent + self._slip < last - CLOCK_SET_S:
             # As long behind the last as it came behind that.
-            self._slip, self._late = last + max(arrival - self.heard, SHORTEST) - sent, 0
+            self._slip, self._late = last + max(arrival - self.heard, MIN_SAMPLE_GAP_S) - sent, 0
         moment = sent + self._slip
         return moment if moment > last and not self._late else None
 
@@ -196,11 +196,11 @@ class Performance(Playback):
         """Have bodies of all that was ever said; those of which nothing is new stay the same."""
         before = {(body.name, body.joints): body for body in self.forest.bodies} if self.forest else {}
         bones = [bone for bone in JOINTS if (PERFORMER, bone) in self._newest]
-        bodies = [Body.rigid(name) for name, _ in self._newest if name != PERFORMER]
+        bodies = [StreamBody.rigid(name) for name, _ in self._newest if name != PERFORMER]
         if len(bones) > 1:
             places = self._poses([(PERFORMER, bone) for bone in bones]).positions
             rest = Poses(places, np.tile((1.0, 0.0, 0.0, 0.0), (len(bones), 1)))
             sliding = np.isin(bones, (ROOT, "Hips"))
-            bodies.insert(0, Body(PERFORMER, tuple(bones), np.array(_parents(bones)), rest, sliding=sliding))
+            bodies.insert(0, StreamBody(PERFORMER, tuple(bones), np.array(_parents(bones)), rest, sliding=sliding))
         self._joints = [(body.name, joint) for body in bodies for joint in body.joints]
         self.forest = Forest([before.get((body.name, body.joints), body) for body in bodies])

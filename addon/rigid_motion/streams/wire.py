@@ -14,25 +14,25 @@ from typing import NamedTuple
 import numpy as np
 
 from ..motion import Poses
-from .bodies import LARGEST, SMALLEST, Body, Forest
+from .bodies import MAX_LENGTH_M, MIN_LENGTH_M, Forest, StreamBody
 
-VERSION = 7
+WIRE_VERSION = 7
 
-TICKS = 3600
+TICKS_PER_S = 3600
 """A second, in the unit of all times on the wire: whole numbers of it are the frames of 24, 25, 30, 60, 72, 90, 120."""
 
 NEEDS_DESCRIPTION, NEEDS_REFRESH = 1, 2
 
-LONGEST = 65_000
+MAX_BYTES = 65_000
 """Bytes of a datagram, as UDP carries them: a message of 4096 groups is never longer."""
 
 MOST_DESCRIBED = 1 << 17
 """Bytes of a description, unpacked."""
 
-LONGEST_DELAY = 8 * TICKS
+LONGEST_DELAY = 8 * TICKS_PER_S
 """Ticks of the delay and the grid."""
 
-RAW = -15
+RAW_BITS = -15
 """Of zlib: its DEFLATE alone."""
 
 
@@ -53,7 +53,7 @@ class Description(NamedTuple):
     data: bytes
 
 
-class Motion(NamedTuple):
+class EncodedMotion(NamedTuple):
     """A message, not yet decoded."""
 
     identity: bytes
@@ -77,9 +77,9 @@ class Answer(NamedTuple):
         return bool(there) and not self.needs & NEEDS_DESCRIPTION
 
 
-Datagram = Description | Motion | Answer
+Datagram = Description | EncodedMotion | Answer
 
-KINDS: tuple[type[Datagram], ...] = (Description, Motion, Answer)
+KINDS: tuple[type[Datagram], ...] = (Description, EncodedMotion, Answer)
 LAYOUTS = (Struct("<3s"), Struct("<3sH"), Struct("<3s3sHIB"))
 """Of each kind its fields behind the byte of version and kind, but for the data at the end."""
 
@@ -87,11 +87,11 @@ LAYOUTS = (Struct("<3s"), Struct("<3sH"), Struct("<3s3sHIB"))
 def write(datagram: Datagram) -> bytes:
     kind = KINDS.index(type(datagram))
     fields, data = (datagram, b"") if isinstance(datagram, Answer) else (datagram[:-1], datagram.data)
-    return bytes([VERSION << 4 | kind]) + LAYOUTS[kind].pack(*fields) + data
+    return bytes([WIRE_VERSION << 4 | kind]) + LAYOUTS[kind].pack(*fields) + data
 
 
 def read(datagram: bytes) -> Datagram | None:
-    if not 0 < len(datagram) <= LONGEST or datagram[0] >> 4 != VERSION or datagram[0] & 15 >= len(KINDS):
+    if not 0 < len(datagram) <= MAX_BYTES or datagram[0] >> 4 != WIRE_VERSION or datagram[0] & 15 >= len(KINDS):
         return None
     made, layout = KINDS[datagram[0] & 15], LAYOUTS[datagram[0] & 15]
     if len(datagram) < 1 + layout.size:
@@ -103,10 +103,10 @@ def read(datagram: bytes) -> Datagram | None:
 def other_version(datagram: bytes) -> int | None:
     """Return the version of what is a description of another version, by all that is known of it; None for all else."""
     version, kind = divmod(datagram[0], 16) if datagram else (0, 0)
-    if kind or version in (0, VERSION):
+    if kind or version in (0, WIRE_VERSION):
         return None
     try:
-        return version if zlib.decompressobj(RAW).decompress(datagram[4:], 1) == b"[" else None
+        return version if zlib.decompressobj(RAW_BITS).decompress(datagram[4:], 1) == b"[" else None
     except zlib.error:
         return None
 
@@ -119,24 +119,26 @@ def describe(forest: Forest, terms: Terms) -> bytes:
         rest = np.concatenate((body.rest.positions.round(digits), body.rest.quaternions.round(4)), axis=1)
         columns = (body.parents, np.asarray(body.sliding, dtype=int), rest)
         bodies.append((np.asarray(body.radius).round(6).tolist(), names, *(column.tolist() for column in columns)))
-    return zlib.compress(json.dumps((*terms, bodies), separators=(",", ":")).encode(), 9, RAW)
+    return zlib.compress(json.dumps((*terms, bodies), separators=(",", ":")).encode(), 9, RAW_BITS)
 
 
 def read_description(data: bytes) -> tuple[Forest, Terms] | None:
     """Return the bodies and the terms of a description, or None."""
     try:
-        tolerance, delay, grid, bodies = json.loads(zlib.decompressobj(RAW).decompress(data, MOST_DESCRIBED))
+        tolerance, delay, grid, bodies = json.loads(zlib.decompressobj(RAW_BITS).decompress(data, MOST_DESCRIBED))
         terms, forest = Terms(float(tolerance), int(delay), int(grid)), Forest([_body(*body) for body in bodies])
-        are_sound = SMALLEST <= terms.tolerance < LARGEST and all(0 < ticks <= LONGEST_DELAY for ticks in terms[1:])
+        are_sound = MIN_LENGTH_M <= terms.tolerance < MAX_LENGTH_M and all(
+            0 < ticks <= LONGEST_DELAY for ticks in terms[1:]
+        )
         return (forest, terms) if are_sound else None
     except (zlib.error, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError):
         return None
 
 
-def _body(radii: list[float], names: list[str], parents: object, sliding: object, rest: object) -> Body:
+def _body(radii: list[float], names: list[str], parents: object, sliding: object, rest: object) -> StreamBody:
     """Return a body that is described. Raises whatever is wrong with it."""
     for name in names:
         name.encode()
     rows = np.array(rest, dtype=np.float64)
     above, slides = np.array(parents, dtype=np.int64), np.array(sliding, dtype=bool)
-    return Body(names[0], tuple(names[1:]), above, Poses(rows[:, :3], rows[:, 3:]), np.array(radii), slides)
+    return StreamBody(names[0], tuple(names[1:]), above, Poses(rows[:, :3], rows[:, 3:]), np.array(radii), slides)

@@ -25,13 +25,13 @@ from ..animation.transforms import OWN_WORDS, Transform
 from ..blender import FloatProperty, Returned, existing, with_properties
 from .targets import OnTargets, targets_of
 
-WAY = 300.0
+MOUSE_TRAVEL_PX = 300.0
 """Pixels, at a resolution scale of 1, that the mouse goes from 0 to 1."""
 
-FINE, STEP = 0.1, 0.1
+SHIFT_RATIO, CTRL_STEP = 0.1, 0.1
 """The part of a movement that Shift leaves, and the steps of Ctrl."""
 
-LINE, HANDLE, TEXT = (0.8, 0.8, 0.8, 0.7), (0.28, 0.45, 0.7, 1.0), (0.95, 0.95, 0.95, 1.0)
+LINE_COLOUR, HANDLE_COLOUR, TEXT_COLOUR = (0.8, 0.8, 0.8, 0.7), (0.28, 0.45, 0.7, 1.0), (0.95, 0.95, 0.95, 1.0)
 """Colours, red, green, blue, alpha."""
 
 CONFIRM, CANCEL = {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}, {"RIGHTMOUSE", "ESC"}
@@ -68,13 +68,15 @@ class Slider:
             except ValueError:  # so far it is a sign or a point alone
                 return 0.0
         factor = self._dragged if self.overshoots else min(max(self._dragged, 0.0), 1.0)
-        return round(factor / STEP) * STEP if self._snaps else factor
+        return round(factor / CTRL_STEP) * CTRL_STEP if self._snaps else factor
 
     def handle(self, event: bpy.types.Event) -> bool:
         """Take an event, and say whether it was for the slider."""
         self._snaps = event.ctrl
         if event.type == "MOUSEMOVE":
-            self._dragged += (event.mouse_x - self._x) / (WAY * self._scale) * (FINE if event.shift else 1.0)
+            self._dragged += (
+                (event.mouse_x - self._x) / (MOUSE_TRAVEL_PX * self._scale) * (SHIFT_RATIO if event.shift else 1.0)
+            )
             self._x = event.mouse_x
             if not self.overshoots:
                 # A mouse that comes back from beyond the end moves the factor at once.
@@ -133,17 +135,17 @@ class Slider:
         if region is None or region != self._region:
             return
         low, high = (-0.25, 1.25) if self.overshoots else (0.0, 1.0)
-        way, y = WAY * scale, 0.5 * region.height
+        way, y = MOUSE_TRAVEL_PX * scale, 0.5 * region.height
         left = 0.5 * (region.width - way)
         gpu.state.blend_set("ALPHA")
-        _draw_box(left + low * way, y - scale, left + high * way, y + scale, LINE)
+        _draw_box(left + low * way, y - scale, left + high * way, y + scale, LINE_COLOUR)
         for tick in range(11):
             x, size = left + 0.1 * tick * way, (6.0 if tick % 5 == 0 else 3.0) * scale
-            _draw_box(x - 0.5 * scale, y - size, x + 0.5 * scale, y + size, LINE)
+            _draw_box(x - 0.5 * scale, y - size, x + 0.5 * scale, y + size, LINE_COLOUR)
         at = left + min(max(self.factor, low), high) * way
-        _draw_box(at - 2.0 * scale, y - 9.0 * scale, at + 2.0 * scale, y + 9.0 * scale, HANDLE)
+        _draw_box(at - 2.0 * scale, y - 9.0 * scale, at + 2.0 * scale, y + 9.0 * scale, HANDLE_COLOUR)
         blf.size(0, 11.0 * scale)
-        blf.color(0, *TEXT)
+        blf.color(0, *TEXT_COLOUR)
         beside = 0.25 * way + 12.0 * scale
         for text, x in (
             (self._label, left - beside - blf.dimensions(0, self._label)[0]),

@@ -12,7 +12,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from .. import animation
 from ..animation import Cleaning, Refused
-from ..animation.baking.cleaning import LEAST, STRENGTH, focus_of, pixels_of
+from ..animation.baking.cleaning import MAX_MOVE_PER_NOISE, MIN_NOISE_KEYS, focus_of, pixels_of
 from ..animation.queries.polls import with_more_keys_than
 from ..animation.transforms import Transform
 from ..blender import BoolProperty, FloatProperty, StringProperty, with_properties
@@ -21,7 +21,7 @@ from .reducing import OfRigsToo, radius_property
 from .targets import OnTargets, is_key_editor
 from .wording import length, split
 
-MUCH = 0.25
+MIN_UNTOUCHED_RATIO = 0.25
 """The part of the keys that has to stay as it is to be spoken of."""
 
 
@@ -35,12 +35,12 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
         "Restore Keys gives the keys from before back"
     )
     nothing_to_do = n_("Nothing here has a key on every frame, as a recording or a solved camera has")
-    with_work = staticmethod(partial(with_more_keys_than, count=LEAST - 1))
+    with_work = staticmethod(partial(with_more_keys_than, count=MIN_NOISE_KEYS - 1))
 
     strength: float = FloatProperty(
         name="Strength",
         description="By how many times of its trembling anything may be moved at most. Spikes go where they have to",
-        default=STRENGTH,
+        default=MAX_MOVE_PER_NOISE,
         min=0.01,
         soft_max=5.0,
         step=10,
@@ -121,7 +121,7 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
             parts.append(rpt_(text).format(count=spikes))
         if repeats:
             parts.append(rpt_("repeated keys: {count}").format(count=repeats))
-        if (alone := max(one.alone for one in cleanings)) > MUCH:
+        if (alone := max(one.alone for one in cleanings)) > MIN_UNTOUCHED_RATIO:
             text = rpt_("{percent:.0f} % of the keys stay nearly as they are: motion cannot be told from noise there")
             parts.append(text.format(percent=100.0 * alone))
         return "; ".join(parts)

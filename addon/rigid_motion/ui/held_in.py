@@ -17,16 +17,16 @@ from ..animation.evaluation.components import SCALE
 from ..animation.holds.dependencies import follows, node_of
 from ..animation.holds.holders import Holder
 from ..animation.transforms import OWN_WORDS, Transform, prefix_of
-from .holding import PASS, RIGID_MOTION_MT_holders, has_been_held, icon_of, name_of, shown_prop
+from .holding import PASS_PROPERTY, RIGID_MOTION_MT_holders, has_been_held, icon_of, name_of, shown_prop
 from .wording import degrees, draw_text, hold_lines, labelled, length
 
 FAR_TURNED = math.radians(120)
 """Half a turn is passed either way round; with less than a third of a turn left to it nobody can tell which."""
 
-TOUCHES = 1e-5
+MAX_TOUCHING_DISTANCE = 1e-5
 """Hands that are less apart, in Blender's units, are at one place in single precision."""
 
-GROWS = 1e-4
+MAX_SCALE_ROUNDING = 1e-4
 """Scales that differ by less are the same."""
 
 
@@ -60,7 +60,7 @@ def draw(context: Any, layout: Any) -> None:
 def _draw_passing(context: Any, layout: Any, facts: HoldFacts) -> None:
     if facts.switch is not None:
         row: Any = labelled(layout, iface_("Pass", OWN_WORDS))
-        row.prop(context.scene, PASS, text="")
+        row.prop(context.scene, PASS_PROPERTY, text="")
         row.label(text=iface_("at {frame:g}").format(frame=facts.switch), translate=False)
     if apart := apart_text(context.scene, facts):
         labelled(layout).label(text=apart, translate=False)
@@ -70,7 +70,7 @@ def apart_text(scene: bpy.types.Scene, facts: HoldFacts) -> str:
     """Return how far apart both hands carry it where it passes, "" elsewhere."""
     if facts.apart is None or facts.turned is None or facts.switch is None:
         return ""
-    apart = length(scene, facts.apart if facts.apart > TOUCHES else 0.0, precision=2)
+    apart = length(scene, facts.apart if facts.apart > MAX_TOUCHING_DISTANCE else 0.0, precision=2)
     return iface_("Hands {distance}, {angle} apart at {frame:g}").format(
         distance=apart, angle=degrees(facts.turned), frame=facts.switch
     )
@@ -100,6 +100,8 @@ def _grows(holder: Holder) -> bool:
     path = (prefix_of(holder.bone) if holder.bone else "") + SCALE
     curves = [] if holder.target is None else active_fcurves(holder.target)
     return any(
-        fcurve.data_path == path and len(fcurve.keyframe_points) > 1 and np.ptp(key_points(fcurve)[:, 1]) > GROWS
+        fcurve.data_path == path
+        and len(fcurve.keyframe_points) > 1
+        and np.ptp(key_points(fcurve)[:, 1]) > MAX_SCALE_ROUNDING
         for fcurve in curves
     )

@@ -30,20 +30,20 @@ Node = bpy.types.Object | bpy.types.PoseBone
 FIRST_AND_LAST = n_("Select what is to be held, and last what holds it: an object, or in Pose Mode a bone")
 NOTHING_HELD = n_("Nothing selected is held in anything yet: Hold In")
 
-UNSEEN = {"HIDDEN", "SKIP_SAVE"}
+HIDDEN_OPTIONS = {"HIDDEN", "SKIP_SAVE"}
 """The options of properties that menus set."""
 
-HUES = (4, 7, 2, 6, 1, 3)
+STRIP_COLOUR_NUMBERS = (4, 7, 2, 6, 1, 3)
 """The theme's colours of strips that holders have in menus and along paths, by their numbers."""
 
 
-PASS = "rigid_motion_pass"
+PASS_PROPERTY = "rigid_motion_pass"
 """The name of the property of scenes by which panels set over how many frames something passes."""
 
 
 def hue_of(number: int) -> int:
     """Return the number of the theme's colour of a holder that is not the world."""
-    return HUES[(number - 1) % len(HUES)]
+    return STRIP_COLOUR_NUMBERS[(number - 1) % len(STRIP_COLOUR_NUMBERS)]
 
 
 def icon_of(holder: Holder | None) -> str:
@@ -211,9 +211,11 @@ class RIGID_MOTION_OT_hold_in_known(_Hold):
     summary = RIGID_MOTION_OT_hold_in.summary
 
     target: str = StringProperty(
-        name="Target", description="Name of the object that holds, with that of its library", options=UNSEEN
+        name="Target", description="Name of the object that holds, with that of its library", options=HIDDEN_OPTIONS
     )
-    bone: str = StringProperty(name="Bone", description="Name of its bone that holds; empty for none", options=UNSEEN)
+    bone: str = StringProperty(
+        name="Bone", description="Name of its bone that holds; empty for none", options=HIDDEN_OPTIONS
+    )
 
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
@@ -410,8 +412,8 @@ def register() -> None:
         set=_set_frames,
         translation_context=OWN_WORDS,
     )
-    setattr(bpy.types.Scene, PASS, frames)
+    setattr(bpy.types.Scene, PASS_PROPERTY, frames)
 
 
 def unregister() -> None:
-    delattr(bpy.types.Scene, PASS)
+    delattr(bpy.types.Scene, PASS_PROPERTY)

@@ -11,7 +11,7 @@ from bpy.app.translations import contexts
 from ..blender import existing
 from .menus import RIGID_MOTION_MT_pie_keys, RIGID_MOTION_MT_pie_view
 
-PIE = "wm.call_menu_pie"
+PIE_OPERATOR = "wm.call_menu_pie"
 
 
 class Shortcut(NamedTuple):
@@ -38,7 +38,7 @@ def register() -> None:
         return
     for shortcut in SHORTCUTS:
         keymap = configuration.keymaps.new(name=shortcut.keymap, space_type=shortcut.space)
-        item = keymap.keymap_items.new(PIE, "T", "PRESS", alt=True)
+        item = keymap.keymap_items.new(PIE_OPERATOR, "T", "PRESS", alt=True)
         existing(item.properties).name = shortcut.menu
         _items.append((keymap, item))
 
@@ -55,7 +55,7 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     for shortcut in SHORTCUTS:
         keymap = configuration.keymaps.find(shortcut.keymap, space_type=shortcut.space)
         for item in keymap.keymap_items if keymap else ():
-            if item.idname == PIE and existing(item.properties).name == shortcut.menu:
+            if item.idname == PIE_OPERATOR and existing(item.properties).name == shortcut.menu:
                 row = layout.column()
                 row.context_pointer_set("keymap", keymap)
                 row.label(text=shortcut.keymap, text_ctxt=cast(Any, contexts).id_windowmanager)

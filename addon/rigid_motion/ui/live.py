@@ -30,8 +30,8 @@ from ..blender import (
 from ..live import receiving, sending
 from ..live.driving import matched
 from ..live.sockets import NotAllowed
-from ..streams import Body
-from ..streams.vmc import PORT
+from ..streams import StreamBody
+from ..streams.vmc import VMC_PORT
 from .panels import Folded
 from .wording import draw_text, labelled
 
@@ -44,7 +44,7 @@ _is_matching = False
 
 def _on_bones(_settings: LiveSettings | LiveBone, _context: bpy.types.Context) -> None:
     if (listening := receiving.listening()) is not None and not _is_matching:
-        listening.look_anew()
+        listening.choose_drivers()
 
 
 @with_properties
@@ -64,7 +64,7 @@ class LiveSettings(bpy.types.PropertyGroup):
         default=HOST,
     )
     port: int = IntProperty(
-        name="Port", description="The UDP port that other programs send to", default=PORT, min=1024, max=65535
+        name="Port", description="The UDP port that other programs send to", default=VMC_PORT, min=1024, max=65535
     )
     delay: float = FloatProperty(
         name="Delay",
@@ -115,7 +115,7 @@ class LiveSettings(bpy.types.PropertyGroup):
     )
     to_host: str = StringProperty(name="Address", description="The machine that VMC is sent to", default=HOST)
     to_port: int = IntProperty(
-        name="Port", description="The UDP port that VMC is sent to", default=PORT + 1, min=1, max=65535
+        name="Port", description="The UDP port that VMC is sent to", default=VMC_PORT + 1, min=1, max=65535
     )
 
 
@@ -127,12 +127,12 @@ def live_settings(scene: bpy.types.Scene | None) -> LiveSettings:
     return getattr(scene, LIVE)
 
 
-def _settings() -> receiving.Settings:
+def _settings() -> receiving.ReceivingSettings:
     live = live_settings(scene())
-    return receiving.Settings(live.delay, live.armature.name if live.armature else "", live.body, live.steady)
+    return receiving.ReceivingSettings(live.delay, live.armature.name if live.armature else "", live.body, live.steady)
 
 
-def _pairs(body: Body, rig: bpy.types.Object) -> Mapping[str, str]:
+def _pairs(body: StreamBody, rig: bpy.types.Object) -> Mapping[str, str]:
     """Return what the table says; it is filled in by names where it is for other joints or for another rig."""
     live = live_settings(scene())
     if [item.name for item in live.bones] != list(body.joints) or live.bones_of != rig.name:
@@ -240,7 +240,7 @@ class RIGID_MOTION_OT_live_match(_WhileListening, Operator):
             self.report({"ERROR"}, rpt_("Choose a rig first"))
             return {"CANCELLED"}
         _match(live, tuple(item.name for item in live.bones), live.armature)
-        existing(receiving.listening()).look_anew()
+        existing(receiving.listening()).choose_drivers()
         return {"FINISHED"}
 
 

@@ -121,15 +121,15 @@ class RIGID_MOTION_MT_whole(Menu):
         _draw_modes(context, self.layout, WHOLE)
 
 
-MORE, HOLD = "More", "Hold"
+MORE_LABEL, HOLD_LABEL = "More", "Hold"
 
 SLICES = (
     "BLENDER",
     "dq_sclerp",
-    MORE,
+    MORE_LABEL,
     "motor_spline",
     "lerp_slerp",
-    HOLD,
+    HOLD_LABEL,
     "cga_slerp",
     "pga_lerp",
 )
@@ -150,9 +150,9 @@ class _Pie(Menu):
         active, pie = active_target(context), self.layout.menu_pie()
         present, grows = modes_meant(context, active, self.scope), _grows(active)
         for mode in SLICES:
-            if mode == MORE:
+            if mode == MORE_LABEL:
                 existing(pie.operator("wm.call_menu", text="More...")).name = self.menu
-            elif mode == HOLD:
+            elif mode == HOLD_LABEL:
                 existing(pie.operator("wm.call_menu", text="Hold...")).name = RIGID_MOTION_MT_hold.__name__
             elif twin_of(mode, grows=grows):
                 pie.separator()

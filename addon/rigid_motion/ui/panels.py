@@ -11,7 +11,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from .. import animation
 from ..animation.actions.reading import planned_from
 from ..animation.evaluation.components import LOCATION, PART_OF, ROTATION
-from ..animation.evaluation.sources import Source
+from ..animation.evaluation.sources import KeyedTransform
 from ..animation.properties import TURN_AXIS_ITEMS
 from ..animation.queries.keyed import active_binding, source_of
 from ..animation.queries.segments import SegmentFacts, frame_in_action, is_up_to_date, segment_at
@@ -22,8 +22,8 @@ from .holding import facts_or_none, name_of, shown_prop
 from .operators import axis_of_turns
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_key_editor, modes_meant, with_keyed_bones
 from .wording import (
-    BAKED,
-    DENSE,
+    BAKED_TEXT,
+    DENSE_TEXT,
     KEYED_BONES,
     LABELS,
     MOVED_ALONE,
@@ -31,17 +31,17 @@ from .wording import (
     NO_KEYS,
     NO_SEGMENT,
     OUT_OF_DATE,
-    PARTS,
-    PASSES,
-    RESTS,
-    STRIPS,
+    PART_NAMES,
+    PASSING_TEXT,
+    RESTING_TEXT,
+    STRIPS_TEXT,
     cautions,
     draw_text,
     labelled,
     length,
     listed,
     reduced_to,
-    turn,
+    turn_text,
 )
 
 Notes = list[tuple[str, str]]
@@ -49,7 +49,7 @@ Notes = list[tuple[str, str]]
 
 SPACES = ("VIEW_3D", "DOPESHEET_EDITOR", "GRAPH_EDITOR")
 
-MANY = 64
+MANY_MODIFIERS = 64
 """With more modifiers on a channel Blender plays noticeably slower where many channels have as many."""
 
 
@@ -67,7 +67,7 @@ def facts_and_notes(
         data = target.animated.animation_data
         in_strips = data is not None and any(track.strips for track in data.nla_tracks)
         of_bones = with_keyed_bones(target) != [target]
-        notes.append(("INFO", KEYED_BONES if of_bones else STRIPS if in_strips else NO_KEYS))
+        notes.append(("INFO", KEYED_BONES if of_bones else STRIPS_TEXT if in_strips else NO_KEYS))
     else:
         frame = frame_in_action(target.animated, frame)
         # From a key in one holder to a key in another one there is no motion: it goes on as before, or rests.
@@ -78,10 +78,10 @@ def facts_and_notes(
         notes += [("INFO", text) for text in _moved_alone(source)] if source.is_live else []
         if not animation.is_enabled() and not is_up_to_date(target, source):
             notes.append(("ERROR", OUT_OF_DATE))
-    if (count := _most_modifiers(target)) > MANY:
-        notes.append(("INFO", iface_(DENSE).format(count=count)))
+    if (count := _most_modifiers(target)) > MANY_MODIFIERS:
+        notes.append(("INFO", iface_(DENSE_TEXT).format(count=count)))
     if animation.is_baked(target):
-        notes.append(("INFO", BAKED))
+        notes.append(("INFO", BAKED_TEXT))
     return segment, notes
 
 
@@ -89,7 +89,7 @@ _problem: tuple[tuple, str] = ((), "")
 """The last answer of `problem_of`, which looks at all users; and before it, all that it depends on."""
 
 
-def _read(target: Transform) -> tuple[Source | None, str]:
+def _read(target: Transform) -> tuple[KeyedTransform | None, str]:
     """Return what is keyed, or why rigid motion cannot act on it."""
     global _problem
     try:
@@ -105,15 +105,15 @@ def _read(target: Transform) -> tuple[Source | None, str]:
     return (None if _problem[1] else source), _problem[1]
 
 
-def _between(source: Source, frame: float) -> str:
+def _between(source: KeyedTransform, frame: float) -> str:
     """Return what there is to say of a frame of the Action on which there is no segment."""
     switch = next((one for one in source.switches if one.frame > frame), None)
     if switch is None:
         return NO_SEGMENT
-    return iface_(PASSES if switch.begin < frame else RESTS).format(frame=switch.frame)
+    return iface_(PASSING_TEXT if switch.begin < frame else RESTING_TEXT).format(frame=switch.frame)
 
 
-def _moved_alone(source: Source) -> Iterator[str]:
+def _moved_alone(source: KeyedTransform) -> Iterator[str]:
     """Yield what there is to say of location and rotation where some of their components alone have keys."""
     for part in (LOCATION, ROTATION):
         frames = [
@@ -122,7 +122,9 @@ def _moved_alone(source: Source) -> Iterator[str]:
             if len(keys.times) > 1 and any(PART_OF[row] == part for row in rows)
         ]
         if alone := sorted(set().union(*frames) - set.intersection(*frames)) if frames else ():
-            yield iface_(MOVED_ALONE).format(frames=listed([f"{frame:g}" for frame in alone]), part=iface_(PARTS[part]))
+            yield iface_(MOVED_ALONE).format(
+                frames=listed([f"{frame:g}" for frame in alone]), part=iface_(PART_NAMES[part])
+            )
 
 
 def _most_modifiers(target: Transform) -> int:
@@ -167,7 +169,7 @@ class _Main(InSidebar):
             draw_text(context, layout, text, icon)
         if ("ERROR", OUT_OF_DATE) in notes:
             layout.operator("rigid_motion.refresh")
-        if _most_modifiers(target) > MANY:
+        if _most_modifiers(target) > MANY_MODIFIERS:
             row = layout.row(align=True)
             row.operator("rigid_motion.clear")
             row.operator("rigid_motion.reduce_keys", text="Reduce Keys", text_ctxt=OWN_WORDS)
@@ -202,7 +204,7 @@ class _Path(Folded):
 def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segment: SegmentFacts) -> None:
     _draw_mode_menu(labelled(layout, iface_("Segment", OWN_WORDS)), CURRENT, {segment.mode})
     frames = f"{segment.first:g} \N{EN DASH} {segment.last:g}"
-    facts = frames, turn(segment), length(existing(context.scene), segment.distance)
+    facts = frames, turn_text(segment), length(existing(context.scene), segment.distance)
     labelled(layout, iface_("Frames", OWN_WORDS)).label(text=", ".join(facts), translate=False)
 
 

@@ -15,7 +15,7 @@ from bpy.app.translations import pgettext_n as n_
 
 from .. import animation
 from ..animation import Refused
-from ..animation.baking.into_holds import HAND, LEAST
+from ..animation.baking.into_holds import DEFAULT_HAND_TOLERANCE, DEFAULT_MIN_HOLD_FRAMES
 from ..animation.baking.originals import CLEANED, REDUCED
 from ..animation.properties import MODE_ITEMS
 from ..animation.queries.polls import with_more_keys_than
@@ -221,7 +221,7 @@ class RIGID_MOTION_OT_reduce_into_holds(OnTargets):
         "of its keys back"
     )
     nothing_to_do = n_("Select something with dense keys, as of a recording, and then what held it")
-    with_work = staticmethod(partial(with_more_keys_than, count=LEAST - 1))
+    with_work = staticmethod(partial(with_more_keys_than, count=DEFAULT_MIN_HOLD_FRAMES - 1))
 
     tolerance: float = FloatProperty(
         name="Tolerance",
@@ -229,7 +229,7 @@ class RIGID_MOTION_OT_reduce_into_holds(OnTargets):
             "How far off any point may be on any frame, within the radius around what is held. Recorded hands give way "
             "by a few millimetres"
         ),
-        default=HAND,
+        default=DEFAULT_HAND_TOLERANCE,
         min=1e-6,
         soft_max=1.0,
         step=0.1,
@@ -239,7 +239,7 @@ class RIGID_MOTION_OT_reduce_into_holds(OnTargets):
     least: int = IntProperty(
         name="At Least",
         description="The fewest frames on which something is held. For fewer its keys stay as they are",
-        default=LEAST,
+        default=DEFAULT_MIN_HOLD_FRAMES,
         min=2,
         soft_max=100,
     )

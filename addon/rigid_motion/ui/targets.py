@@ -47,7 +47,7 @@ NO_TARGETS = n_("Select objects or bones with keys first")
 
 NOTHING_SHOWN = n_("No keys of location, rotation or scale are shown here")
 
-LATER = {
+LATER_CHANGE_PROBLEMS = {
     BAKED: n_("These keys were baked since: Un-Bake first"),
     REDUCED: n_("These keys were reduced since: Restore Keys first"),
     CLEANED: n_("These keys were cleaned since: Restore Keys first"),
@@ -318,7 +318,7 @@ class OnChanged(OnTargets):
         reason = cls.reason(targets, context)
         for target, later in changes.items():
             if any(note.kind in cls.kinds and note.original is not None for note in target.motion.bakes):
-                reason = tip_(LATER[later])
+                reason = tip_(LATER_CHANGE_PROBLEMS[later])
         cls.poll_message_set(reason)
         return False
 

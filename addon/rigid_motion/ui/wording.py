@@ -36,22 +36,22 @@ DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 NO_KEYS = n_("No keys of location, rotation or scale yet")
 KEYED_BONES = n_("Its bones have keys. Choose their modes in Pose Mode")
 NO_SEGMENT = n_("No segment on this frame")
-RESTS = n_("At rest up to the key on frame {frame:g}, which is in another space")
-PASSES = n_("Passing over to the key on frame {frame:g}, which is in another space")
-STRIPS = n_("Moved by strips: enter one to see its segments (NLA Editor, Tab)")
-BAKED = n_("Baked to keys. Un-Bake brings its own keys back")
+RESTING_TEXT = n_("At rest up to the key on frame {frame:g}, which is in another space")
+PASSING_TEXT = n_("Passing over to the key on frame {frame:g}, which is in another space")
+STRIPS_TEXT = n_("Moved by strips: enter one to see its segments (NLA Editor, Tab)")
+BAKED_TEXT = n_("Baked to keys. Un-Bake brings its own keys back")
 OUT_OF_DATE = n_("The keys have changed since: Live Update is off, in the preferences")
 NO_BONE = n_("No Bone Active")
-PARTS = {LOCATION: n_("Location"), ROTATION: n_("Rotation")}
+PART_NAMES = {LOCATION: n_("Location"), ROTATION: n_("Rotation")}
 MOVED_ALONE = n_("Key all of {part} (I) at {frames}: only a part of it has a key there, so the motion is not rigid")
-DENSE = n_(
+DENSE_TEXT = n_(
     "{count} modifiers on a channel: with so many segments Blender plays slower. Reduce the keys, or clear the modes"
 )
 
-LABEL = 0.28
+LABEL_WIDTH_RATIO = 0.28
 """The part of the width that labels have."""
 
-MARGIN = 84
+SIDEBAR_MARGIN_PX = 84
 """Pixels of a sidebar that text cannot have, at a resolution scale of 1: tabs, an icon, and the panel's edges."""
 
 
@@ -101,7 +101,7 @@ def degrees(angle: float) -> str:
     return f"{math.degrees(angle):.1f}°"
 
 
-def turn(segment: SegmentFacts) -> str:
+def turn_text(segment: SegmentFacts) -> str:
     """Return by how much a segment turns, to be read: in turns where there are whole ones, else in degrees."""
     if not segment.turns:
         return degrees(segment.turn)
@@ -240,7 +240,7 @@ def split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
 
 def labelled(layout: bpy.types.UILayout, label: str = "") -> bpy.types.UILayout:
     """Return the right-hand part of a row, with a label on the left, in the user's language."""
-    split = layout.split(factor=LABEL)
+    split = layout.split(factor=LABEL_WIDTH_RATIO)
     left = split.row()
     left.alignment = "RIGHT"
     left.label(text=label, translate=False)
@@ -250,7 +250,7 @@ def labelled(layout: bpy.types.UILayout, label: str = "") -> bpy.types.UILayout:
 def draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: Any) -> None:
     """Draw a text that is broken into as many lines as the region's width asks for."""
     system = existing(context.preferences).system
-    width = existing(context.region).width - MARGIN * system.ui_scale
+    width = existing(context.region).width - SIDEBAR_MARGIN_PX * system.ui_scale
     blf.size(0, existing(context.preferences).ui_styles[0].widget.points * system.ui_scale)
     column = layout.column(align=True)
     column.scale_y = 0.8

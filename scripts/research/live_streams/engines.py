@@ -25,22 +25,22 @@ import numpy as np
 from rigid_motion.motion import Poses, rms, shell_error
 from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import align_signs, conjugate, normalise, rotate, turned, turns_between
-from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.paths import Path
-from rigid_motion_batch.streaming.measuring import HEADERS
+from rigid_motion.streams import Receiver, Sender, StreamBody
+from rigid_motion.streams.paths import KnotPath
+from rigid_motion_batch.streaming.measuring import HEADER_BYTES
 
-RATE, FPS, TICK = 30.0, 72.0, 1.0 / 60.0
+POSES_PER_S, PICTURES_PER_S, PHYSICS_TICK_S = 30.0, 72.0, 1.0 / 60.0
 """Poses a second that an engine sends, pictures a second, and Godot's physics tick."""
 
-RADIUS = 0.1
-GRIP = np.array((0.0, 0.3, 0.0))  # the tool's middle in the hand's space
-SETTLED = 3.0  # seconds after which it counts what is shown
+RADIUS_M = 0.1
+GRIP_M = np.array((0.0, 0.3, 0.0))  # the tool's middle in the hand's space
+SETTLED_S = 3.0  # seconds after which it counts what is shown
 
-MOVES, STANDS, FROZEN = 0.2, 0.1, 0.1
+MIN_HAND_SPEED_M_PER_S, MAX_FROZEN_SPEED_RATIO, MIN_FROZEN_S = 0.2, 0.1, 0.1
 """A hand that moves by more than this (m/s) is frozen where it is shown with less than this part of it for so long."""
 
-BACK = 0.005  # metres against the way of the hand from one picture to the next: a jump back
-LAGS = np.arange(0.0, 0.8, 0.005)
+MIN_JUMP_BACK_M = 0.005  # metres against the way of the hand from one picture to the next: a jump back
+LAGS_S = np.arange(0.0, 0.8, 0.005)
 
 Pose = tuple[np.ndarray, np.ndarray]
 """Position (3,) and quaternion (4,)."""
@@ -86,9 +86,9 @@ def without_overtaken(arrivals: Arrivals) -> Arrivals:
 
 def mirror(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
     """Show by snapshot interpolation with dynamic adjustment."""
-    interval, buffer, shown = 1.0 / RATE, [], []
+    interval, buffer, shown = 1.0 / POSES_PER_S, [], []
     local, scale, multiple, last_arrival, before = 0.0, 1.0, 2.0, None, frames[0]
-    drift, taken = _Average(RATE), _Average(2.0 * RATE)
+    drift, taken = _Average(POSES_PER_S), _Average(2.0 * POSES_PER_S)
     for now, come in arriving(arrivals, frames):
         elapsed, before = now - before, now
         for arrival, sent, pose in come:
@@ -138,7 +138,7 @@ class _Average:
 
 def netcode(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
     """Show by lerp of lerp."""
-    offset = float(np.mean([arrival - sent for arrival, sent, _ in arrivals])) + 0.05 + 1.0 / RATE
+    offset = float(np.mean([arrival - sent for arrival, sent, _ in arrivals])) + 0.05 + 1.0 / POSES_PER_S
     waiting, shown, before = [], [], frames[0]
     current = arrivals[0][2]
     start = end = (0.0, current)
@@ -158,14 +158,17 @@ def netcode(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
 def godot(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
     """Show the newest at each physics tick, and between the last two ticks."""
     pose, ticks = arrivals[0][2], []
-    for tick, come in arriving(without_overtaken(arrivals), np.arange(frames[0] - 2.0 * TICK, frames[-1] + TICK, TICK)):
+    for tick, come in arriving(
+        without_overtaken(arrivals),
+        np.arange(frames[0] - 2.0 * PHYSICS_TICK_S, frames[-1] + PHYSICS_TICK_S, PHYSICS_TICK_S),
+    ):
         pose = come[-1][2] if come else pose
         ticks.append((tick, pose))
     shown = []
     for now in frames:
         at = bisect_right(ticks, now, key=lambda known: known[0]) - 1
         (_, first), (moment, second) = ticks[at - 1 : at + 1]
-        shown.append(mix(first, second, (now - moment) / TICK))
+        shown.append(mix(first, second, (now - moment) / PHYSICS_TICK_S))
     return shown
 
 
@@ -179,17 +182,17 @@ ENGINES: dict[str, Callable[[Arrivals, np.ndarray], list[Pose]]] = {
 # -- what comes out ----------------------------------------------------------------------------------------------------
 
 
-def truth_of(times: np.ndarray, hand: Poses) -> Path:
+def truth_of(times: np.ndarray, hand: Poses) -> KnotPath:
     """Return the hand (n,) and the tool in it, as two joints."""
-    tool = Poses(hand.positions + rotate(hand.quaternions, GRIP), hand.quaternions)
+    tool = Poses(hand.positions + rotate(hand.quaternions, GRIP_M), hand.quaternions)
     turns = align_signs(np.stack((hand.quaternions, tool.quaternions)))
-    return Path(times - times[0], Poses(np.stack((hand.positions, tool.positions)), turns))
+    return KnotPath(times - times[0], Poses(np.stack((hand.positions, tool.positions)), turns))
 
 
-def by_engine(engine: str, truth: Path, way: Way, frames: np.ndarray) -> Poses:
+def by_engine(engine: str, truth: KnotPath, way: Way, frames: np.ndarray) -> Poses:
     """Return what an engine shows at each frame (n,), shape (2, n)."""
     rng, shown = np.random.default_rng(7), []
-    sent = np.arange(0.0, truth.moments[-1], 1.0 / RATE)
+    sent = np.arange(0.0, truth.moments[-1], 1.0 / POSES_PER_S)
     for body in truth.at(sent):
         poses = zip(body.positions, body.quaternions, strict=True)
         arrivals = [(way.arrival(time, rng), time, pose) for time, pose in zip(sent.tolist(), poses, strict=True)]
@@ -198,10 +201,10 @@ def by_engine(engine: str, truth: Path, way: Way, frames: np.ndarray) -> Poses:
     return Poses(*(np.array([[pose[part] for pose in body] for body in shown]) for part in (0, 1)))
 
 
-def by_codec(truth: Path, way: Way, frames: np.ndarray, tolerance: float, delay: float) -> tuple[Poses, float]:
+def by_codec(truth: KnotPath, way: Way, frames: np.ndarray, tolerance: float, delay: float) -> tuple[Poses, float]:
     """Return what a receiver shows of one sender of both bodies, and the bytes a second with headers."""
     rng = np.random.default_rng(7)
-    bodies = [Body.rigid("hand", radius=RADIUS), Body.rigid("tool", radius=RADIUS)]
+    bodies = [StreamBody.rigid("hand", radius=RADIUS_M), StreamBody.rigid("tool", radius=RADIUS_M)]
     sender, receiver = Sender(bodies, tolerance, delay), Receiver()
     pending, numbers, size = [], count(), 0
     samples = truth.at(truth.moments)
@@ -210,7 +213,7 @@ def by_codec(truth: Path, way: Way, frames: np.ndarray, tolerance: float, delay:
     def post(datagrams: list[bytes], now: float, back: bool = False) -> None:
         nonlocal size
         for datagram in datagrams:
-            size += 0 if back else len(datagram) + HEADERS
+            size += 0 if back else len(datagram) + HEADER_BYTES
             if np.isfinite(arrival := way.arrival(now, rng)):
                 heapq.heappush(pending, (arrival, next(numbers), back, datagram))
 
@@ -218,7 +221,7 @@ def by_codec(truth: Path, way: Way, frames: np.ndarray, tolerance: float, delay:
         while pending and pending[0][0] <= until:
             now, _, back, datagram = heapq.heappop(pending)
             if back:
-                post(sender.hear(datagram, now), now)
+                post(sender.take_answer(datagram, now), now)
             else:
                 receiver.take(datagram, now)
                 post([answer for _, answer in receiver.answers()], now, back=True)
@@ -238,27 +241,27 @@ def by_codec(truth: Path, way: Way, frames: np.ndarray, tolerance: float, delay:
     return joined(shown, axis=1), size / float(truth.moments[-1])
 
 
-def seen(shown: Poses, truth: Path, frames: np.ndarray) -> dict[str, float]:
+def seen(shown: Poses, truth: KnotPath, frames: np.ndarray) -> dict[str, float]:
     """Compare what was shown at frames (n,) with the truth; slip is the tool's middle from its place in the hand."""
-    kept = frames > SETTLED
+    kept = frames > SETTLED_S
     shown, frames = shown[:, kept], frames[kept]
     hand, tool = shown
-    errors = [shell_error(hand, truth.at(frames - lag)[0], RADIUS) for lag in LAGS]
+    errors = [shell_error(hand, truth.at(frames - lag)[0], RADIUS_M) for lag in LAGS_S]
     best = int(np.argmin([rms(error) for error in errors]))
-    went, goes = (np.diff(it.positions, axis=0) for it in (hand, truth.at(frames - LAGS[best])[0]))
+    went, goes = (np.diff(it.positions, axis=0) for it in (hand, truth.at(frames - LAGS_S[best])[0]))
     speed = np.linalg.norm(goes, axis=-1)
-    moving = speed * FPS > MOVES
-    stands = moving & (np.linalg.norm(went, axis=-1) < STANDS * speed)
+    moving = speed * PICTURES_PER_S > MIN_HAND_SPEED_M_PER_S
+    stands = moving & (np.linalg.norm(went, axis=-1) < MAX_FROZEN_SPEED_RATIO * speed)
     along = np.einsum("ij,ij->i", went, goes) / np.maximum(speed, 1e-9)
     runs = np.diff(np.flatnonzero(np.diff(np.pad(stands, 1).astype(int))))[::2]
-    slips = np.linalg.norm(rotate(conjugate(hand.quaternions), tool.positions - hand.positions) - GRIP, axis=-1)
+    slips = np.linalg.norm(rotate(conjugate(hand.quaternions), tool.positions - hand.positions) - GRIP_M, axis=-1)
     off = 1e3 * errors[best]
     return {
-        "delay": float(LAGS[best]),
+        "delay": float(LAGS_S[best]),
         "rms_mm": rms(off),
         "p98_mm": float(np.percentile(off, 98.0)),
         "largest_mm": float(off.max()),
-        "freezes": int(np.sum(runs >= FROZEN * FPS)),
-        "jumps_back": int(np.sum(moving & (along < -BACK))),
+        "freezes": int(np.sum(runs >= MIN_FROZEN_S * PICTURES_PER_S)),
+        "jumps_back": int(np.sum(moving & (along < -MIN_JUMP_BACK_M))),
         "slip_mm": 1e3 * float(np.percentile(slips, 98.0)),
     }

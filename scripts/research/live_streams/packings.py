@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.streams import Body
+from rigid_motion.streams import StreamBody
 from rigid_motion.streams.bodies import Forest
-from rigid_motion.streams.paths import Path
-from rigid_motion_batch.streaming.measuring import HEADERS, cost
+from rigid_motion.streams.paths import KnotPath
+from rigid_motion_batch.streaming.measuring import HEADER_BYTES, cost
 
 WAYS: dict[str, tuple[float, int | None]] = {
     "float32 at 30 Hz": (30.0, None),
@@ -21,27 +21,27 @@ WAYS: dict[str, tuple[float, int | None]] = {
 }
 """How often all joints are sent, and the bits of each component of a quaternion; None for floats."""
 
-STAMP = 5
+STAMP_BYTES = 5
 """Bytes of a datagram that say whose it is, and when: as few as will do."""
 
-PLACE_BITS, CUBE = 16, 8.0
+PLACE_BITS, CUBE_M = 16, 8.0
 """The bits of each coordinate of a place that is packed, over a cube of so many metres."""
 
 
-def packed(body: Body, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
+def packed(body: StreamBody, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
     """Return what each way costs of samples (n,) of poses (joints, n), and how far off they are."""
-    result, sliding, step = {}, np.asarray(body.sliding), CUBE / (2**PLACE_BITS - 1)
+    result, sliding, step = {}, np.asarray(body.sliding), CUBE_M / (2**PLACE_BITS - 1)
     for label, (rate, bits) in WAYS.items():
         moments = np.arange(times[0], times[-1] + 1.0 / rate, 1.0 / rate)
         # Floats are as good as exact.
-        sent, turn, place = Path(times, poses).at(np.minimum(moments, times[-1])), 4 * 32, 3 * 32
+        sent, turn, place = KnotPath(times, poses).at(np.minimum(moments, times[-1])), 4 * 32, 3 * 32
         if bits:
             turn, place = 2 + 3 * bits, 3 * PLACE_BITS
             rounded = np.where(sliding[:, None, None], np.rint(sent.positions / step) * step, sent.positions)
             sent = Poses(rounded, smallest_three(sent.quaternions, bits))
         size = -(-(len(body.joints) * turn + np.count_nonzero(sliding) * place) // 8)
-        off = Forest([body]).errors(Path(moments, sent).at(times), poses).max(axis=0)
-        result[label] = cost(rate * size, rate * (STAMP + HEADERS), off)
+        off = Forest([body]).errors(KnotPath(moments, sent).at(times), poses).max(axis=0)
+        result[label] = cost(rate * size, rate * (STAMP_BYTES + HEADER_BYTES), off)
     return result
 
 

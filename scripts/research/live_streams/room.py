@@ -11,9 +11,9 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
-RATE = 20.0  # datagrams a second of each user
+DATAGRAMS_PER_S = 20.0  # datagrams a second of each user
 STAMP = struct.Struct("<d")
-SETTLING = 5.0  # seconds in which all have to hear of one another, and that do not count
+SETTLING_S = 5.0  # seconds in which all have to hear of one another, and that do not count
 
 
 def measured(users: int, seconds: float) -> dict[str, float]:
@@ -43,7 +43,7 @@ def measured(users: int, seconds: float) -> dict[str, float]:
         "seconds": seconds,
         "bytes": float(np.mean([len(datagram) for datagram in datagrams])),
         "heard": len(latencies),
-        "expected": round(users * (users - 1) * RATE * seconds),
+        "expected": round(users * (users - 1) * DATAGRAMS_PER_S * seconds),
         "rate": len(latencies) / seconds,
         "median_ms": 1e3 * float(np.median(latencies)),
         "p99_ms": 1e3 * float(np.percentile(latencies, 99.0)),
@@ -55,10 +55,13 @@ def measured(users: int, seconds: float) -> dict[str, float]:
 def _datagrams() -> list[bytes]:
     """Return those of a hand that swings, said anew at every sample."""
     from rigid_motion.motion import Poses
-    from rigid_motion.streams import Body, Sender
+    from rigid_motion.streams import Sender, StreamBody
 
-    times = np.arange(400) / RATE
-    sender, result = Sender([Body.rigid("hand")], 0.002, 0.1, RATE, keepalive=0.9 / RATE), []
+    times = np.arange(400) / DATAGRAMS_PER_S
+    sender, result = (
+        Sender([StreamBody.rigid("hand")], 0.002, 0.1, DATAGRAMS_PER_S, keepalive=0.9 / DATAGRAMS_PER_S),
+        [],
+    )
     for moment, position in zip(times.tolist(), np.sin(times[:, None] * (3.0, 4.1, 2.3)), strict=True):
         result += sender.add(moment, Poses(position[None], np.array(((1.0, 0.0, 0.0, 0.0),))))
     return [datagram for datagram in result if len(datagram) < 200]
@@ -89,15 +92,15 @@ def _run(pipe: Connection, user: int | None, place: str, datagrams: list[bytes],
             session.declare_subscriber("room/*/motion", hear, allowed_origin=zenoh.Locality.REMOTE)
         pipe.send(None)
         start, begun = pipe.recv(), 0.0
-        for number in range(round((seconds + SETTLING) * RATE)):
-            due = start + (number + (user or 0) / 30.0) / RATE
+        for number in range(round((seconds + SETTLING_S) * DATAGRAMS_PER_S)):
+            due = start + (number + (user or 0) / 30.0) / DATAGRAMS_PER_S
             time.sleep(max(due - time.time(), 0.0))
-            if number == SETTLING * RATE:
+            if number == SETTLING_S * DATAGRAMS_PER_S:
                 begun = time.process_time()
             if user is not None:
                 publisher.put(STAMP.pack(time.time()) + datagrams[number % len(datagrams)])
         spent = time.process_time() - begun
         time.sleep(2.0)
         times = np.array(taken).reshape(-1, 2)
-        pipe.send((spent, (times[:, 0] - times[:, 1])[times[:, 1] >= start + SETTLING]))
+        pipe.send((spent, (times[:, 0] - times[:, 1])[times[:, 1] >= start + SETTLING_S]))
         time.sleep(2.0)

@@ -24,17 +24,17 @@ from rigid_motion_batch.scenes.body_scene import registered
 NATIVE, RIGID, KEY = "#F08A3C", "#38B6FF", "#FFB52E"
 GROUND, WORDS, FAINT = "#303030", "#E6E6E6", "#9A9A9A"
 
-LENGTH = 4.3  # from the hammer's origin, in its head, to where the hand holds it
-GRIP = Vector((0.0, 0.0, -LENGTH))  # where that is on the hammer
-SWING = math.radians(62.0)  # how far a key leans to its side
-FIRST, LAST, BETWEEN = 1, 61, 3  # the frames of the keys, and how many ghosts are between them
+HANDLE_LENGTH = 4.3  # from the hammer's origin, in its head, to where the hand holds it
+GRIP = Vector((0.0, 0.0, -HANDLE_LENGTH))  # where that is on the hammer
+SWING_RAD = math.radians(62.0)  # how far a key leans to its side
+FIRST_FRAME, LAST_FRAME, GHOSTS_BETWEEN = 1, 61, 3  # the frames of the keys, and how many ghosts are between them
 
-HANDLE = ((0.0, 0.0, -LENGTH - 0.3), (0.0, 0.0, 0.0), 0.16, "#B98A54")
-HEAD = ((0.27, 0.57, 0.25), (0.51, 0.81, 0.38), (-0.57, -0.27, 0.25), (-0.81, -0.51, 0.38), (-0.35, 0.35, 0.34))
-CYLINDERS = (HANDLE, *(((begin, 0.0, 0.0), (end, 0.0, 0.0), radius, "#C9CED6") for begin, end, radius in HEAD))
+HANDLE = ((0.0, 0.0, -HANDLE_LENGTH - 0.3), (0.0, 0.0, 0.0), 0.16, "#B98A54")
+HEAD_BOXES = ((0.27, 0.57, 0.25), (0.51, 0.81, 0.38), (-0.57, -0.27, 0.25), (-0.81, -0.51, 0.38), (-0.35, 0.35, 0.34))
+CYLINDERS = (HANDLE, *(((begin, 0.0, 0.0), (end, 0.0, 0.0), radius, "#C9CED6") for begin, end, radius in HEAD_BOXES))
 """Both ends, radius and colour, from the back to the front."""
 
-SHADES = np.linspace(-1.0, 1.0, 25)  # across a cylinder
+CYLINDER_SHADES = np.linspace(-1.0, 1.0, 25)  # across a cylinder
 
 
 # -- the icon ----------------------------------------------------------------------------------------------------------
@@ -87,7 +87,7 @@ def _swinging(axes: Axes, x: float, mode: str | None, colours: tuple[str, str], 
     bpy.context.collection.objects.link(hammer)
     hand = Vector((x, 0.0, -1.85))
     poses = swing(hammer, hand, mode)
-    step = (LAST - FIRST) // (BETWEEN + 1)
+    step = (LAST_FRAME - FIRST_FRAME) // (GHOSTS_BETWEEN + 1)
     for pose in poses[step:-1:step]:
         _draw_hammer(axes, pose, colours[1])
     for pose in (poses[0], poses[-1]):
@@ -111,7 +111,7 @@ def swing(hammer: bpy.types.Object, hand: Vector, mode: str | None) -> list[Matr
         Where Blender shows it on each frame.
     """
     hammer.rotation_mode = "QUATERNION"
-    for frame, angle in ((FIRST, -SWING), (LAST, SWING)):
+    for frame, angle in ((FIRST_FRAME, -SWING_RAD), (LAST_FRAME, SWING_RAD)):
         turn = Quaternion((0.0, 1.0, 0.0), angle)
         hammer.rotation_quaternion = turn
         hammer.location = hand - turn @ GRIP
@@ -123,7 +123,7 @@ def swing(hammer: bpy.types.Object, hand: Vector, mode: str | None) -> list[Matr
     if mode is not None:
         animation.set_mode(hammer, mode)
     shown = []
-    for frame in range(FIRST, LAST + 1):
+    for frame in range(FIRST_FRAME, LAST_FRAME + 1):
         bpy.context.scene.frame_set(frame)
         shown.append(hammer.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.copy())
     return shown
@@ -136,8 +136,8 @@ def _draw_hammer(axes: Axes, pose: Matrix, colour: str | None = None) -> None:
         along = (end - begin) / np.linalg.norm(end - begin)
         out = np.array((-along[1], along[0]))
         # Each strip faces as much outwards as it is off the middle; the light comes from the left, above and in front.
-        bright = np.clip(SHADES * (out @ (-0.45, 0.55)) + np.sqrt(1.0 - SHADES**2) * 0.7, 0.0, 1.0)
-        edges = radius * SHADES[:, None] * out
+        bright = np.clip(CYLINDER_SHADES * (out @ (-0.45, 0.55)) + np.sqrt(1.0 - CYLINDER_SHADES**2) * 0.7, 0.0, 1.0)
+        edges = radius * CYLINDER_SHADES[:, None] * out
         strips = np.stack((begin + edges[:-1], end + edges[:-1], end + edges[1:], begin + edges[1:]), axis=1)
         shades = (0.4 + 0.65 * 0.5 * (bright[:-1] + bright[1:]))[:, None] * to_rgb(colour or material)
         axes.add_collection(PolyCollection(strips, facecolors=shades.clip(0.0, 1.0), edgecolors="face", linewidths=0.5))

@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 
 from rigid_motion_batch.scenes.materials import surface
 
-from .motions import TIP
+from .motions import BIT_TIP_M
 
-X, Y, Z = np.eye(3)
+X_AXIS, Y_AXIS, Z_AXIS = np.eye(3)
 
 MATERIALS = {"Mode": ("#CED4DA", 0.0, 0.32), "Metal": ("#CBCED2", 0.7, 0.30), "Rubber": ("#35373C", 0.0, 0.60)}
 """Colour, metallic, roughness."""
@@ -101,41 +101,41 @@ def pad(rows: ArrayLike, side: float, depth: float) -> np.ndarray:
 
 # -- the drill ---------------------------------------------------------------------------------------------------------
 
-BORE = (0.0, 0.0, 1e3 * TIP[2])
-ON_AXIS, ASLANT = (BORE, Y, Z), (BORE, Y, np.array((0.64, 0.0, 0.768)))
+BORE_MM = (0.0, 0.0, 1e3 * BIT_TIP_M[2])
+ON_AXIS, ASLANT_AXES = (BORE_MM, Y_AXIS, Z_AXIS), (BORE_MM, Y_AXIS, np.array((0.64, 0.0, 0.768)))
 
-BARREL = ((-38, 20.6, 21.6), (-10, 22, 23.2), (12, 21.6, 22.8), (32, 19.6, 20.6), (60, 15.6, 15.6))
-BACK = ((-54, 12, 13), (-51, 17, 18), (-46, 20, 21), (-40, 20.6, 21.6))
-COLLAR = ((57, 15.4), (62.4, 15.4), (63.4, 14.4), (63.4, 12.6), (65.4, 12.6), (65.4, 14.6), (70.4, 14.6), (70.4, 10))
-SLEEVE = ((71.4, 13), (72.6, 14.4), (87.4, 14.4), (88.6, 13))
-NOSE = ((88, 12.6), (90.5, 12.6), (91.5, 11.8), (102.5, 7.2), (109.5, 4.2))
-FLUTES = (
+BARREL_MM = ((-38, 20.6, 21.6), (-10, 22, 23.2), (12, 21.6, 22.8), (32, 19.6, 20.6), (60, 15.6, 15.6))
+BACK_MM = ((-54, 12, 13), (-51, 17, 18), (-46, 20, 21), (-40, 20.6, 21.6))
+COLLAR_MM = ((57, 15.4), (62.4, 15.4), (63.4, 14.4), (63.4, 12.6), (65.4, 12.6), (65.4, 14.6), (70.4, 14.6), (70.4, 10))
+SLEEVE_MM = ((71.4, 13), (72.6, 14.4), (87.4, 14.4), (88.6, 13))
+NOSE_MM = ((88, 12.6), (90.5, 12.6), (91.5, 11.8), (102.5, 7.2), (109.5, 4.2))
+FLUTES_MM = (
     (100, 2.8, 2.8),
     (115, 2.8, 2.8),
     *((y, 2.8, 1.5) for y in np.linspace(117, 158, 16)),
-    (1e3 * TIP[1], 0.1, 0.1),
+    (1e3 * BIT_TIP_M[1], 0.1, 0.1),
 )
-GRIP = ((52, 16, 27, 4), (30, 14.4, 19.6, 5), (14, 15, 19.4, 2.8), (-4, 15.6, 19.8, -1), (-40, 14.4, 19, -8))
-DIAL = ((-2, 11), (2.2, 11), (2.2, 8.8), (1.2, 8.4), (3.8, 7.8), (4.6, 7))
-HOSE = ((-30, 1.8, 1.8, 24.1), (14, 1.8, 1.8, 25.4), (58, 1.8, 1.8, 21.3), (80, 1.8, 1.8, 20.2), (115, 1.8, 1.8, 7))
+GRIP_MM = ((52, 16, 27, 4), (30, 14.4, 19.6, 5), (14, 15, 19.4, 2.8), (-4, 15.6, 19.8, -1), (-40, 14.4, 19, -8))
+DIAL_MM = ((-2, 11), (2.2, 11), (2.2, 8.8), (1.2, 8.4), (3.8, 7.8), (4.6, 7))
+HOSE_MM = ((-30, 1.8, 1.8, 24.1), (14, 1.8, 1.8, 25.4), (58, 1.8, 1.8, 21.3), (80, 1.8, 1.8, 20.2), (115, 1.8, 1.8, 7))
 
 
 def drill() -> list[Part]:
     """Return the parts of the drill."""
 
-    def at(x: float, y: float, z: float, axis: np.ndarray = Z, up: np.ndarray = Y) -> Place:
+    def at(x: float, y: float, z: float, axis: np.ndarray = Z_AXIS, up: np.ndarray = Y_AXIS) -> Place:
         return np.array((x, y, z)), axis, up
 
-    grip, height = [*GRIP, (-53, 16.5, 22, -8.4)], BORE[2]
+    grip, height = [*GRIP_MM, (-53, 16.5, 22, -8.4)], BORE_MM[2]
     return [
-        loft("Mode", ON_AXIS, BARREL, exponent=2.5, points=28, count=12),
+        loft("Mode", ON_AXIS, BARREL_MM, exponent=2.5, points=28, count=12),
         loft("Metal", ON_AXIS, ((-41, 18.6, 19.6), (-36, 18.6, 19.6)), exponent=2.7),
-        loft("Rubber", ON_AXIS, BACK, exponent=2.7, count=8),
+        loft("Rubber", ON_AXIS, BACK_MM, exponent=2.7, count=8),
         box("Rubber", at(0, -8, height + 19), (9, 24, 5.6), 1.2),
-        loft("Metal", ON_AXIS, COLLAR),
-        loft("Metal", ON_AXIS, SLEEVE, points=12),
-        loft("Metal", ON_AXIS, NOSE),
-        loft("Metal", ON_AXIS, FLUTES, points=10, twist=-0.26),
+        loft("Metal", ON_AXIS, COLLAR_MM),
+        loft("Metal", ON_AXIS, SLEEVE_MM, points=12),
+        loft("Metal", ON_AXIS, NOSE_MM),
+        loft("Metal", ON_AXIS, FLUTES_MM, points=10, twist=-0.26),
         loft("Mode", at(0, 0, 0), grip, exponent=2.35, points=28, count=18),
         loft("Rubber", at(0, 0, 0), pad(grip[1:], -1, 0.6), exponent=2.35, count=14),
         loft("Rubber", at(0, 0, 0), pad(grip[2:], 1, 0.4), exponent=2.35, count=14),
@@ -144,59 +144,59 @@ def drill() -> list[Part]:
         box("Mode", at(0, 0, -55), (20, 35, 5.5), 3),
         box("Metal", at(0, 0, -61.5), (18.4, 33.4, 2.5), 0.4),
         box("Rubber", at(0, 0, -72), (20, 35, 9.5), 4),
-        box("Metal", at(0, 35, -70, Y, Z), (8, 3.6, 1.8), 0.8),
-        loft("Metal", at(-20.5, 2, height, -X, Z), DIAL),
-        box("Rubber", at(-25.1, 2, height, X, Z), (6.2, 1.6, 1.2), 0.4),
-        box("Rubber", at(-20.6, -24, height, X, Z), (7, 3.4, 1.6), 0.4),
-        *(box("Rubber", at(20.8, -18, height + rise, X, Z), (12, 1.5, 1.4), 0.4) for rise in (-8, -2, 4)),
-        loft("Metal", ASLANT, HOSE, points=8, count=15),
+        box("Metal", at(0, 35, -70, Y_AXIS, Z_AXIS), (8, 3.6, 1.8), 0.8),
+        loft("Metal", at(-20.5, 2, height, -X_AXIS, Z_AXIS), DIAL_MM),
+        box("Rubber", at(-25.1, 2, height, X_AXIS, Z_AXIS), (6.2, 1.6, 1.2), 0.4),
+        box("Rubber", at(-20.6, -24, height, X_AXIS, Z_AXIS), (7, 3.4, 1.6), 0.4),
+        *(box("Rubber", at(20.8, -18, height + rise, X_AXIS, Z_AXIS), (12, 1.5, 1.4), 0.4) for rise in (-8, -2, 4)),
+        loft("Metal", ASLANT_AXES, HOSE_MM, points=8, count=15),
     ]
 
 
 # -- the controller ----------------------------------------------------------------------------------------------------
 
-HANDLE = ((0.0, 40.0, 6.5), np.array((0.0, -0.919, -0.394)), np.array((0.0, -0.394, 0.919)))
-HEAD = (np.array((0.0, 40.0, 18.0)), np.array((0.0, -0.17, 0.985)), np.array((0.0, 0.985, 0.17)))
-PULL = ((0.0, 38.0, 8.0), np.array((0.0, 0.593, -0.805)), np.array((0.0, 0.805, 0.593)))
-RING = (np.array((3.0, 44.0, 23.0)), np.array((0.0, 0.37, 0.929)), np.array((0.0, 0.929, -0.37)))
+HANDLE_MM = ((0.0, 40.0, 6.5), np.array((0.0, -0.919, -0.394)), np.array((0.0, -0.394, 0.919)))
+HEAD_MM = (np.array((0.0, 40.0, 18.0)), np.array((0.0, -0.17, 0.985)), np.array((0.0, 0.985, 0.17)))
+PULL_MM = ((0.0, 38.0, 8.0), np.array((0.0, 0.593, -0.805)), np.array((0.0, 0.805, 0.593)))
+RING_MM = (np.array((3.0, 44.0, 23.0)), np.array((0.0, 0.37, 0.929)), np.array((0.0, 0.929, -0.37)))
 
-SHAFT = ((0, 20, 7, 0), (27, 15.6, 12.4, 5), (42, 14.8, 14.6, 7.8), (59, 14.8, 15.2, 9), (92, 13.2, 13.2, 10.3))
-CAP = ((88, 14.2, 14.2, 10.3), (97, 13.2, 13.2, 10.3), (101, 8, 8, 10.3))
-BODY = ((-17, 21, 22), (-15, 24, 25), (-13, 25, 26), (-4, 25, 26), (-2, 24, 25), (0, 21, 22))
-TRIGGER = ((0, 10, 9, 0), (12.4, 9.6, 7.6, 3.3), (21.5, 9, 5.4, 2.2), (28.6, 8.4, 4, 0), (35.4, 6.8, 2, 0))
-RIM = ((-1, 13), (1.4, 13), (2, 12.4), (2, 11.2), (0.9, 10.8))
-THUMB = ((-1, 10.6), (1.9, 10.6), (2.5, 9.8), (1.7, 4), (1.6, 0.6))
-BUTTON = ((-1, 4.2), (1.9, 4.2), (2.5, 3.4))
-NECK = ((12, 15, 6, -6), (26, 14, 5, -3.5), (40, 17, 5, -0.5))
+SHAFT_MM = ((0, 20, 7, 0), (27, 15.6, 12.4, 5), (42, 14.8, 14.6, 7.8), (59, 14.8, 15.2, 9), (92, 13.2, 13.2, 10.3))
+CAP_MM = ((88, 14.2, 14.2, 10.3), (97, 13.2, 13.2, 10.3), (101, 8, 8, 10.3))
+BODY_MM = ((-17, 21, 22), (-15, 24, 25), (-13, 25, 26), (-4, 25, 26), (-2, 24, 25), (0, 21, 22))
+TRIGGER_MM = ((0, 10, 9, 0), (12.4, 9.6, 7.6, 3.3), (21.5, 9, 5.4, 2.2), (28.6, 8.4, 4, 0), (35.4, 6.8, 2, 0))
+RIM_MM = ((-1, 13), (1.4, 13), (2, 12.4), (2, 11.2), (0.9, 10.8))
+THUMB_MM = ((-1, 10.6), (1.9, 10.6), (2.5, 9.8), (1.7, 4), (1.6, 0.6))
+BUTTON_MM = ((-1, 4.2), (1.9, 4.2), (2.5, 3.4))
+NECK_MM = ((12, 15, 6, -6), (26, 14, 5, -3.5), (40, 17, 5, -0.5))
 
 
 def controller() -> list[Part]:
     """Return the parts of the hand controller."""
-    (middle, axis, ahead), around = RING, np.radians(np.arange(0, 360, 30))
+    (middle, axis, ahead), around = RING_MM, np.radians(np.arange(0, 360, 30))
     band = np.stack((7.2 * np.sin(around), 42 + 2.6 * np.cos(around)), axis=1)
 
     def on_face(x: float, forward: float) -> Place:
-        return HEAD[0] + x * X + forward * HEAD[2], *HEAD[1:]
+        return HEAD_MM[0] + x * X_AXIS + forward * HEAD_MM[2], *HEAD_MM[1:]
 
     def light(angle: float) -> Part:
-        out = np.cos(angle) * X + np.sin(angle) * ahead
+        out = np.cos(angle) * X_AXIS + np.sin(angle) * ahead
         return loft("Metal", (middle + 44.4 * out, out, axis), ((-1, 1.6), (0.5, 1.6), (0.8, 1.2)), points=8)
 
     return [
-        loft("Mode", HANDLE, SHAFT, exponent=2.3, points=28, count=17),
-        loft("Rubber", HANDLE, CAP, exponent=2.3, points=28, count=7),
-        loft("Rubber", HANDLE, pad(SHAFT[1:], -1, 0.6), exponent=2.3, count=12),
-        box("Metal", ((-14.6, 3.1, -3.9), X, HANDLE[1]), (5, 11, 2.4), 1),
-        loft("Mode", HEAD, BODY, exponent=2.2, points=28),
-        loft("Rubber", HEAD, ((-1, 20.6, 21.6), (0.6, 20.6, 21.6)), exponent=2.2, points=28),
-        loft("Metal", on_face(-6.5, 2.0), RIM),
-        loft("Rubber", on_face(-6.5, 2.0), THUMB),
-        loft("Metal", on_face(13.0, 7.5), BUTTON, points=14),
-        loft("Metal", on_face(14.0, -5.0), BUTTON, points=14),
+        loft("Mode", HANDLE_MM, SHAFT_MM, exponent=2.3, points=28, count=17),
+        loft("Rubber", HANDLE_MM, CAP_MM, exponent=2.3, points=28, count=7),
+        loft("Rubber", HANDLE_MM, pad(SHAFT_MM[1:], -1, 0.6), exponent=2.3, count=12),
+        box("Metal", ((-14.6, 3.1, -3.9), X_AXIS, HANDLE_MM[1]), (5, 11, 2.4), 1),
+        loft("Mode", HEAD_MM, BODY_MM, exponent=2.2, points=28),
+        loft("Rubber", HEAD_MM, ((-1, 20.6, 21.6), (0.6, 20.6, 21.6)), exponent=2.2, points=28),
+        loft("Metal", on_face(-6.5, 2.0), RIM_MM),
+        loft("Rubber", on_face(-6.5, 2.0), THUMB_MM),
+        loft("Metal", on_face(13.0, 7.5), BUTTON_MM, points=14),
+        loft("Metal", on_face(14.0, -5.0), BUTTON_MM, points=14),
         loft("Metal", on_face(5.5, -16.0), ((-1, 2.4), (1.4, 2.4), (1.8, 1.8)), points=10),
-        loft("Rubber", PULL, TRIGGER, exponent=3.0, count=11),
-        loft("Mode", RING, band, points=48, endless=True),
-        loft("Mode", (middle, ahead, axis), NECK, exponent=4.0),
+        loft("Rubber", PULL_MM, TRIGGER_MM, exponent=3.0, count=11),
+        loft("Mode", RING_MM, band, points=48, endless=True),
+        loft("Mode", (middle, ahead, axis), NECK_MM, exponent=4.0),
         *map(light, np.radians(np.arange(-48, 229, 23))),
     ]
 

@@ -22,18 +22,18 @@ from rigid_motion.motion.quaternions import multiply, rotate
 
 from .tracking import turn, unsteadiness
 
-TIP = np.array((0.0, 0.160, 0.062))
+BIT_TIP_M = np.array((0.0, 0.160, 0.062))
 """Where the drill's bit ends, in the tool's axes."""
 
 CENTRE_OF_MASS = np.array((0.0, 0.010, 0.030))
 
-GRAVITY = np.array((0.0, 0.0, -9.81))
+GRAVITY_M_PER_S2 = np.array((0.0, 0.0, -9.81))
 
-X, Y, Z = np.eye(3)
+X_AXIS, Y_AXIS, Z_AXIS = np.eye(3)
 
 
 @dataclass(frozen=True)
-class Motion:
+class MadeMotion:
     """A motion: its poses at any times (n,), and how long it takes."""
 
     duration: float
@@ -105,13 +105,13 @@ def held_by(point: np.ndarray, places: np.ndarray, quaternions: np.ndarray) -> P
 
 # ---- reaching --------------------------------------------------------------------------------------------------------
 
-SHOULDER = np.array((0.18, 0.0, 1.40))
-UPPER_ARM, FOREARM, HAND = 0.30, 0.26, 0.08
+SHOULDER_M = np.array((0.18, 0.0, 1.40))
+UPPER_ARM_M, FOREARM_M, HAND_M = 0.30, 0.26, 0.08
 
 JOINT_LAGS = np.array((0.00, 0.00, 0.03, 0.05, 0.08, 0.10, 0.10))
 """The shoulder sets off first, the elbow and the wrist follow."""
 
-POSTURES = np.radians(
+POSTURES_RAD = np.radians(
     # azimuth, elevation and rotation of the upper arm; elbow flexion; pronation; wrist flexion and deviation
     (
         (-6.0, 8.0, 6.0, 82.0, 0.0, 0.0, 0.0),  # at rest beside the body
@@ -128,27 +128,32 @@ REACH_DURATIONS = np.array((0.78, 0.85, 0.70, 0.80, 0.85))
 
 def reach(rng: np.random.Generator, times: np.ndarray) -> Poses:
     """Return five reaches of an arm of seven joint angles: shoulder, elbow and wrist."""
-    angles = POSTURES[0] + strokes(
-        times, REACH_ONSETS[:, None] + JOINT_LAGS, REACH_DURATIONS[:, None], np.diff(POSTURES, axis=0)
+    angles = POSTURES_RAD[0] + strokes(
+        times, REACH_ONSETS[:, None] + JOINT_LAGS, REACH_DURATIONS[:, None], np.diff(POSTURES_RAD, axis=0)
     )
     angles += np.radians(0.25) * unsteadiness(rng, times, len(JOINT_LAGS))
     return arm(angles)
 
 
 def arm(angles: np.ndarray) -> Poses:
-    """Return the pose of the tool for joint angles (n, 7) as in `POSTURES`; with all 0 the arm hangs."""
+    """Return the pose of the tool for joint angles (n, 7) as in `POSTURES_RAD`; with all 0 the arm hangs."""
     azimuth, elevation, rotation, elbow, pronation, flexion, deviation = angles.T
-    upper_arm = chain(about(Z, azimuth), about(X, elevation), about(Z, rotation))
-    forearm = multiply(upper_arm, about(X, elbow))
-    hand = chain(forearm, about(Z, pronation), about(X, flexion), about(Y, deviation))
-    grip = SHOULDER + UPPER_ARM * rotate(upper_arm, -Z) + FOREARM * rotate(forearm, -Z) + HAND * rotate(hand, -Z)
+    upper_arm = chain(about(Z_AXIS, azimuth), about(X_AXIS, elevation), about(Z_AXIS, rotation))
+    forearm = multiply(upper_arm, about(X_AXIS, elbow))
+    hand = chain(forearm, about(Z_AXIS, pronation), about(X_AXIS, flexion), about(Y_AXIS, deviation))
+    grip = (
+        SHOULDER_M
+        + UPPER_ARM_M * rotate(upper_arm, -Z_AXIS)
+        + FOREARM_M * rotate(forearm, -Z_AXIS)
+        + HAND_M * rotate(hand, -Z_AXIS)
+    )
     # The tool points along the hand, which hangs down where the tool is level.
-    return Poses(grip, multiply(hand, turn(-0.5 * np.pi * X)))
+    return Poses(grip, multiply(hand, turn(-0.5 * np.pi * X_AXIS)))
 
 
 # ---- pivoting about the tip ------------------------------------------------------------------------------------------
 
-SITE = np.array((0.02, 0.46, 0.98))
+SITE_M = np.array((0.02, 0.46, 0.98))
 
 
 def pivot(rng: np.random.Generator, times: np.ndarray) -> Poses:
@@ -169,8 +174,8 @@ def pivot(rng: np.random.Generator, times: np.ndarray) -> Poses:
     angles += np.radians(0.35) * unsteadiness(rng, times, 3)
     slips = 0.25e-3 * unsteadiness(rng, times, 3)
     swing, tilt, roll = angles.T
-    quaternions = chain(about(Z, swing), about(X, np.radians(-48.0) + tilt), about(Y, roll))
-    return held_by(TIP, SITE + slips, quaternions)
+    quaternions = chain(about(Z_AXIS, swing), about(X_AXIS, np.radians(-48.0) + tilt), about(Y_AXIS, roll))
+    return held_by(BIT_TIP_M, SITE_M + slips, quaternions)
 
 
 # ---- throwing and catching -------------------------------------------------------------------------------------------
@@ -199,7 +204,7 @@ class Throw:
         """
         start, release, catch, rest = self.moments
         held, released, caught, resting = np.column_stack((self.centres, np.radians(self.angles)))
-        flight, fall = catch - release, np.append(GRAVITY, 0.0)
+        flight, fall = catch - release, np.append(GRAVITY_M_PER_S2, 0.0)
         velocity = (caught - released) / flight - 0.5 * fall * flight
         return [
             Knot(start, held),
@@ -215,8 +220,10 @@ class Throw:
 
 
 RIGHT_HAND, LEFT_HAND = (0.27, 0.38, 1.08), (-0.25, 0.40, 1.08)
-THERE = Throw((0.32, 0.76, 1.34, 1.80), (RIGHT_HAND, (0.24, 0.41, 1.18), (-0.27, 0.40, 1.15), LEFT_HAND), axis=X)
-BACK = Throw(
+THROW_THERE = Throw(
+    (0.32, 0.76, 1.34, 1.80), (RIGHT_HAND, (0.24, 0.41, 1.18), (-0.27, 0.40, 1.15), LEFT_HAND), axis=X_AXIS
+)
+THROW_BACK = Throw(
     (2.20, 2.66, 3.28, 3.76),
     (LEFT_HAND, (-0.22, 0.42, 1.20), (0.30, 0.38, 1.14), RIGHT_HAND),
     axis=np.array((12.0, 4.0, -3.0)) / 13.0,
@@ -225,11 +232,11 @@ BACK = Throw(
 
 def throw(rng: np.random.Generator, times: np.ndarray) -> Poses:
     """Throw from the right hand to the left and back: wind-up, release, a tumble in free flight, catch, absorption."""
-    places = through(THERE.knots() + BACK.knots(), times)[:, :3]
-    turns = [about(way.axis, through(way.knots(), times)[:, 3]) for way in (THERE, BACK)]
-    poses = held_by(CENTRE_OF_MASS, places, chain(*turns, turn(np.radians(12.0) * X)))
+    places = through(THROW_THERE.knots() + THROW_BACK.knots(), times)[:, :3]
+    turns = [about(way.axis, through(way.knots(), times)[:, 3]) for way in (THROW_THERE, THROW_BACK)]
+    poses = held_by(CENTRE_OF_MASS, places, chain(*turns, turn(np.radians(12.0) * X_AXIS)))
 
-    grasp = 1.0 - THERE.airborne(times) - BACK.airborne(times)
+    grasp = 1.0 - THROW_THERE.airborne(times) - THROW_BACK.airborne(times)
     sway = grasp[:, None] * unsteadiness(rng, times, 6)
     turned = multiply(poses.quaternions, turn(np.radians(0.4) * sway[:, 3:]))
     return Poses(poses.positions + 0.8e-3 * sway[:, :3], turned)
@@ -237,7 +244,7 @@ def throw(rng: np.random.Generator, times: np.ndarray) -> Poses:
 
 # ---- driving a screw -------------------------------------------------------------------------------------------------
 
-PITCH = 2.75e-3
+SCREW_PITCH_M = 2.75e-3
 """The advance a turn of a 6.5 mm cancellous bone screw."""
 
 
@@ -250,8 +257,10 @@ def screw(rng: np.random.Generator, times: np.ndarray) -> Poses:
     # The hand pushes a little beside the axis, so the tool leans, and the lean goes round with the turn.
     lean = np.radians(1.4) * np.stack((np.cos(roll), np.zeros_like(roll), np.sin(roll)), axis=-1)
     lean += np.radians(0.3) * unsteadiness(rng, times, 3) * (1.0, 0.0, 1.0)
-    aim, depth = turn(np.radians(-38.0) * X), PITCH * roll / (2.0 * np.pi)
-    return held_by(TIP, SITE + depth[:, None] * rotate(aim, Y), chain(aim, turn(lean), about(Y, roll)))
+    aim, depth = turn(np.radians(-38.0) * X_AXIS), SCREW_PITCH_M * roll / (2.0 * np.pi)
+    return held_by(
+        BIT_TIP_M, SITE_M + depth[:, None] * rotate(aim, Y_AXIS), chain(aim, turn(lean), about(Y_AXIS, roll))
+    )
 
 
 # ---- a tool in a hand ------------------------------------------------------------------------------------------------
@@ -277,7 +286,7 @@ def hold(rng: np.random.Generator, times: np.ndarray) -> Poses:
     moved = strokes(times, table[:, :1], table[:, 1:2], table[:, 2:])
     sway = unsteadiness(rng, times, 6)
     swing, tilt, roll = np.radians(moved[:, 3:] + 0.35 * sway[:, 3:]).T
-    quaternions = chain(about(Z, swing), about(X, np.radians(-20.0) + tilt), about(Y, roll))
+    quaternions = chain(about(Z_AXIS, swing), about(X_AXIS, np.radians(-20.0) + tilt), about(Y_AXIS, roll))
     return Poses(np.array((0.12, 0.30, 1.10)) + moved[:, :3] + 0.8e-3 * sway[:, :3], quaternions)
 
 
@@ -292,7 +301,7 @@ HOLD = "hold"
 
 # ---- a door ----------------------------------------------------------------------------------------------------------
 
-HINGE, EDGE = np.array((-0.40, 0.70, 1.00)), np.array((-0.80, 0.0, 0.0))
+HINGE_M, DOOR_EDGE_M = np.array((-0.40, 0.70, 1.00)), np.array((-0.80, 0.0, 0.0))
 """Where the hinge is, and where it is seen from the tracker at the door's edge."""
 
 
@@ -301,15 +310,15 @@ def door(_: np.random.Generator, times: np.ndarray) -> Poses:
     #         onset, duration, degrees
     table = np.array(((0.3, 0.8, 100.0), (1.25, 0.6, 70.0), (2.3, 0.75, -170.0), (3.05, 0.35, 14.0), (3.4, 0.4, -14.0)))
     opened = strokes(times, table[:, :1], table[:, 1:2], np.radians(table[:, 2:]))
-    return held_by(EDGE, np.broadcast_to(HINGE, (len(times), 3)), about(Z, opened[:, 0]))
+    return held_by(DOOR_EDGE_M, np.broadcast_to(HINGE_M, (len(times), 3)), about(Z_AXIS, opened[:, 0]))
 
 
-OTHERS = {HOLD: Motion(4.6, hold), "door": Motion(4.6, door)}
+OTHER_MOTIONS = {HOLD: MadeMotion(4.6, hold), "door": MadeMotion(4.6, door)}
 """Motions that the page of the paper leaves out."""
 
 MOTIONS = {
-    "reach": Motion(4.7, reach),
-    "pivot": Motion(4.7, pivot),
-    "throw": Motion(4.1, throw),
-    "screw": Motion(4.6, screw),
+    "reach": MadeMotion(4.7, reach),
+    "pivot": MadeMotion(4.7, pivot),
+    "throw": MadeMotion(4.1, throw),
+    "screw": MadeMotion(4.6, screw),
 }

@@ -18,15 +18,15 @@ import numpy as np
 from research.pages import ROOT
 from research.studies import files_in, report
 from rigid_motion.motion import Poses
-from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams import Receiver, Sender, StreamBody
 from rigid_motion.streams.coding import (
-    FLAGS,
-    HISTORIES,
+    FLAG_TABLE_COUNT,
+    FREQUENCY_TOTAL,
+    HISTORY_COUNT,
     KNOT_COUNTS,
-    NEIGHBOURS,
-    SIZES,
+    NEIGHBOUR_COUNT,
+    SIZE_COUNT,
     TABLE_FILE,
-    TOTAL,
     standard_tables,
 )
 from rigid_motion.streams.messages import Message
@@ -38,7 +38,7 @@ SETTINGS = ((0.1, 0.0), (0.2, 0.0), (0.1, 0.06), (0.1, 0.15), (0.2, 0.15), (0.1,
 
 MOST_SECONDS = 15.0  # of a recording, so that long ones do not have all the say
 SINGLE_RADIUS = 0.1  # of the balls of single bodies
-PRIOR = 12.0  # what a table without any counts is worth beside them: as the mean over the kinds of knots
+PRIOR_COUNT = 12.0  # what a table without any counts is worth beside them: as the mean over the kinds of knots
 
 
 class Counting:
@@ -55,7 +55,7 @@ class Counting:
         return value
 
 
-def samples(folder: Path) -> Iterator[tuple[Body, np.ndarray, Poses]]:
+def samples(folder: Path) -> Iterator[tuple[StreamBody, np.ndarray, Poses]]:
     """Yield the motions of a folder and of assets/: a body, times (n,) and poses (joints, n)."""
     paths = [*files_in([folder], (".bvh", ".fbx", ".csv", ".tum")), *sorted((ROOT / "assets").glob("*.csv"))]
     for clip in (clip for path in paths for clip in read_clips([str(path)])[0]):
@@ -65,7 +65,9 @@ def samples(folder: Path) -> Iterator[tuple[Body, np.ndarray, Poses]]:
         yield body_of(clip, poses, None if clip.rest_body else SINGLE_RADIUS), times[kept], poses[:, kept]
 
 
-def count(coder: Counting, body: Body, times: np.ndarray, poses: Poses, delay: float, latency: float | None) -> None:
+def count(
+    coder: Counting, body: StreamBody, times: np.ndarray, poses: Poses, delay: float, latency: float | None
+) -> None:
     """Count the symbols of what a sender says of a motion."""
     sender, receiver = Sender([body], 0.005, delay, even_rate(times)), Receiver()
     write = sender.codec.write
@@ -78,7 +80,7 @@ def count(coder: Counting, body: Body, times: np.ndarray, poses: Poses, delay: f
     on_the_way: list[tuple[float, bytes]] = []
     for number, moment in enumerate(times.tolist()):
         while on_the_way and on_the_way[0][0] <= moment:
-            sender.hear(on_the_way.pop(0)[1], moment)
+            sender.take_answer(on_the_way.pop(0)[1], moment)
         for datagram in sender.add(moment, poses[:, number]):
             receiver.take(datagram, moment)
         if latency is not None:
@@ -88,21 +90,25 @@ def count(coder: Counting, body: Body, times: np.ndarray, poses: Poses, delay: f
 def probabilities(counts: list[np.ndarray]) -> Iterator[np.ndarray]:
     """Yield those of each symbol of each table: what was counted, and beside it what was for all kinds of knots."""
     for table, counted in enumerate(counts):
-        if table < FLAGS:
-            alike = range(table % (HISTORIES * NEIGHBOURS), FLAGS, HISTORIES * NEIGHBOURS)
+        if table < FLAG_TABLE_COUNT:
+            alike = range(table % (HISTORY_COUNT * NEIGHBOUR_COUNT), FLAG_TABLE_COUNT, HISTORY_COUNT * NEIGHBOUR_COUNT)
         elif table < KNOT_COUNTS:
-            alike = range(FLAGS + (table - FLAGS) % (HISTORIES * SIZES), KNOT_COUNTS, HISTORIES * SIZES)
+            alike = range(
+                FLAG_TABLE_COUNT + (table - FLAG_TABLE_COUNT) % (HISTORY_COUNT * SIZE_COUNT),
+                KNOT_COUNTS,
+                HISTORY_COUNT * SIZE_COUNT,
+            )
         else:
             alike = [table]
         # Of symbols that were never seen ever less are expected.
         mean = sum(counts[other] for other in alike) + 4.0 * 0.6 ** np.arange(len(counted))
-        yield (counted + PRIOR * mean / mean.sum()) / (counted.sum() + PRIOR)
+        yield (counted + PRIOR_COUNT * mean / mean.sum()) / (counted.sum() + PRIOR_COUNT)
 
 
 def table_of(probability: np.ndarray) -> tuple[int, ...]:
-    """Return cumulative frequencies that add up to `TOTAL`, none of them 0."""
-    frequencies = 1 + np.floor(probability * (TOTAL - len(probability))).astype(int)
-    frequencies[np.argmax(frequencies)] += TOTAL - frequencies.sum()
+    """Return cumulative frequencies that add up to `FREQUENCY_TOTAL`, none of them 0."""
+    frequencies = 1 + np.floor(probability * (FREQUENCY_TOTAL - len(probability))).astype(int)
+    frequencies[np.argmax(frequencies)] += FREQUENCY_TOTAL - frequencies.sum()
     return (0, *np.cumsum(frequencies).tolist())
 
 

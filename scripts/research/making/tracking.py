@@ -16,7 +16,7 @@ from rigid_motion.motion.quaternions import multiply
 
 HEADER = "t,x,y,z,qx,qy,qz,qw"
 
-RATE = 90.0
+SAMPLES_PER_S = 90.0
 SHORTEST_STEP, LONGEST_STEP = 0.007, 0.017
 
 STAMP_ERROR = 0.3e-3
@@ -29,8 +29,8 @@ def tick(rng: np.random.Generator, duration: float) -> np.ndarray:
 
     Each step is a little uneven; one in fourteen is late by 2 to 6 ms, and the step after it makes up for half of that.
     """
-    count = round(duration * RATE)
-    steps = 1.0 / RATE + 0.60e-3 * rng.standard_normal(count)
+    count = round(duration * SAMPLES_PER_S)
+    steps = 1.0 / SAMPLES_PER_S + 0.60e-3 * rng.standard_normal(count)
     lateness = rng.uniform(2e-3, 6e-3, count) * (rng.random(count) < 1.0 / 14.0)
     steps += lateness
     steps[1:] -= 0.5 * lateness[:-1]

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rigid_motion_batch.analysis.choices import JOINT, Uniform
+from rigid_motion_batch.analysis.choices import JOINT_RADIUS_M, Uniform
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE as BLENDERS
 from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
@@ -29,7 +29,7 @@ from .table import SCREW, has_samples_for, means, shares_of
 MODES = (REFERENCE, BLENDERS, SCREW, "pga_lerp", "motor_spline")
 ERROR_RATES = (5, 10)  # key poses a second at which errors are measured
 
-SEARCHED = 10.0
+SEARCHED_S = 10.0
 """Seconds of a whole body, from its first sample on, for which key poses are searched: every try reduces keys anew."""
 
 EXTENSIONS = (".bvh", ".fbx", ".glb", ".gltf", ".blend")  # of files that may hold a body
@@ -62,8 +62,8 @@ def needed_of(clip: Clip) -> dict[str, dict[str, list[float]]]:
 
     Blender's curves have evenly spaced ones alone.
     """
-    radii = np.full(len(clip.rest_body.joints), JOINT)
-    searched = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SEARCHED, side="right")) - 1)
+    radii = np.full(len(clip.rest_body.joints), JOINT_RADIUS_M)
+    searched = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SEARCHED_S, side="right")) - 1)
     evenly = shares_of(clip, keys_needed(_Evenly(searched, radii), (BLENDERS,), REFERENCE))
     others = tuple(mode for mode in MODES if mode != BLENDERS)
     return evenly | shares_of(clip, keys_needed(Ways(searched, radii), others, REFERENCE))
@@ -84,7 +84,7 @@ def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:
     """
     result = {mode: dict.fromkeys(ERROR_RATES, (np.nan, np.nan)) for mode in MODES}
     for rate in ERROR_RATES:
-        made = reconstruct(clip, Uniform(str(rate)), MODES, JOINT) if has_samples_for(clip, rate) else None
+        made = reconstruct(clip, Uniform(str(rate)), MODES, JOINT_RADIUS_M) if has_samples_for(clip, rate) else None
         for row in measured(made).rows if made else ():
             result[row.mode][rate] = row.rms_shell_m, row.rms_velocity_m_s
     return result

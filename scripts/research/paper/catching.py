@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from research.drawing import FAINT, INK, RULE, Model, column, save, seen, write_legend
-from research.making.motions import HAND, THERE
+from research.making.motions import HAND_M, THROW_THERE
 from rigid_motion.motion import MODES, Poses, interpolate, measure, rms
 from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import multiply, rotate, turned, turns_between
@@ -34,29 +34,29 @@ HELD, MOVED = "held", "lerp_slerp"
 """The tool in the space of the hand, and the mode that fills in hands and flight then."""
 
 ENGINES = ("lerp_slerp", "dq_sclerp", "pga_lerp", "motor_spline", HELD)
-PASS = 1 / 24
+PASS_S = 1 / 24
 """For how long the tool passes from its flight to the hand that catches it, where it is held."""
 
-RATES = (5, 10, 15, 20)  # updates a second
-PHASES = 6  # senders of the same rate that begin one after the other within an interval
+UPDATES_PER_S = (5, 10, 15, 20)  # updates a second
+PHASE_COUNT = 6  # senders of the same rate that begin one after the other within an interval
 
-GRIP = np.array((0.0, -HAND, 0.0))  # where the wrist is, in the axes of the tool that the hand holds
-_, RELEASE, CATCH, _ = THERE.moments
-WITHDRAWN = 0.45  # seconds that the hands take from the throw to rest, and from rest to the catch
-READY = np.array((-0.08, -0.04, -0.04))  # from the catch to where the hand waits for it
-END = 2.55  # what comes after is another throw
+GRIP_M = np.array((0.0, -HAND_M, 0.0))  # where the wrist is, in the axes of the tool that the hand holds
+_, RELEASE, CATCH, _ = THROW_THERE.moments
+WITHDRAWN_S = 0.45  # seconds that the hands take from the throw to rest, and from rest to the catch
+READY_OFFSET_M = np.array((-0.08, -0.04, -0.04))  # from the catch to where the hand waits for it
+END_S = 2.55  # what comes after is another throw
 
-SHOWN = (0.32, 1.90)  # the moments that are shown, from the first to the last
-FPS, SLOWER = 30, 3.0  # of the film
+SHOWN_S = (0.32, 1.90)  # the moments that are shown, from the first to the last
+FILM_FPS, SLOW_MOTION_FACTOR = 30, 3.0  # of the film
 FILM_SIZE = (720, 1220)  # pixels: as the picture, but smaller
-HEIGHT, ROW = 1700, 299  # pixels: of the picture, and of what one mode shows
-METRES = HEIGHT / 250  # that the picture's height spans
+HEIGHT_PX, ROW_PX = 1700, 299  # pixels: of the picture, and of what one mode shows
+HEIGHT_M = HEIGHT_PX / 250  # that the picture's height spans
 TRAIL_SECONDS = 0.7  # of the motion
 
-YAW = np.radians(52.0)
+YAW_RAD = np.radians(52.0)
 """By which the scene is turned for the eye, so that neither the throw nor the tool is seen end on."""
 
-MIDDLE = np.array((0.0, 0.40, 1.14))  # of the throw
+MIDDLE_M = np.array((0.0, 0.40, 1.14))  # of the throw
 LABELS = {HELD: "Straight, in the space of the hand"}
 COLOURS = {mode: colour_of(mode) for mode in ENGINES} | {HELD: "#009E73"}
 HANDS = {"thrower": "#3A6EA5", "catcher": "#7A5C99"}  # with the colours of their controllers
@@ -70,14 +70,14 @@ Bodies = Mapping[str, Poses]
 
 def bodies(clip: Clip) -> tuple[np.ndarray, Bodies]:
     """Return the times of the first throw of a clip, shape (n,), and the poses then."""
-    part = clip.times <= END
+    part = clip.times <= END_S
     times, tool = clip.times[part], clip.poses[part]
-    held = Poses(tool.positions + rotate(tool.quaternions, GRIP), tool.quaternions)
+    held = Poses(tool.positions + rotate(tool.quaternions, GRIP_M), tool.quaternions)
     let_go, caught = _recorded(times)
     throwing, catching = times <= let_go, times >= caught
-    ready = Poses(held[catching].positions[:1] + READY, held[catching].quaternions[:1])
-    thrown = [*times[throwing], let_go + WITHDRAWN, END], joined((held[throwing], held[[0, 0]]))
-    awaited = [times[0] - 1.0, caught - WITHDRAWN, *times[catching]], joined((ready[[0, 0]], held[catching]))
+    ready = Poses(held[catching].positions[:1] + READY_OFFSET_M, held[catching].quaternions[:1])
+    thrown = [*times[throwing], let_go + WITHDRAWN_S, END_S], joined((held[throwing], held[[0, 0]]))
+    awaited = [times[0] - 1.0, caught - WITHDRAWN_S, *times[catching]], joined((ready[[0, 0]], held[catching]))
     hands = {
         hand: interpolate(*keys, times, "motor_spline") for hand, keys in zip(HANDS, (thrown, awaited), strict=True)
     }
@@ -111,7 +111,7 @@ def _held(times: np.ndarray, poses: Bodies, ticks: np.ndarray, shown: Bodies, mo
     flown = interpolate(flying, updates, np.clip(moments, let_go, caught), MOVED)
     thrown, taken = (_tool_in(shown[hand]) for hand in HANDS)
     before = joined((thrown[moments <= let_go], flown[moments > let_go]))
-    share = np.clip((moments - caught) / PASS + 1.0, 0.0, 1.0)
+    share = np.clip((moments - caught) / PASS_S + 1.0, 0.0, 1.0)
     return _straight(before, taken, share * share * (3.0 - 2.0 * share))
 
 
@@ -124,13 +124,13 @@ def _straight(first: Poses, second: Poses, shares: np.ndarray) -> Poses:
 
 def _tool_in(hand: Poses) -> Poses:
     """Return where a hand holds the tool, shape (n,)."""
-    return Poses(hand.positions - rotate(hand.quaternions, GRIP), hand.quaternions)
+    return Poses(hand.positions - rotate(hand.quaternions, GRIP_M), hand.quaternions)
 
 
 def figures(clip: Clip) -> dict[str, dict[int, dict[str, float]]]:
     """Return all modes at all rates."""
     times, poses = bodies(clip)
-    return {mode: {rate: view(times, poses, rate, mode) for rate in RATES} for mode in ENGINES}
+    return {mode: {rate: view(times, poses, rate, mode) for rate in UPDATES_PER_S} for mode in ENGINES}
 
 
 def view(times: np.ndarray, poses: Bodies, rate: int, mode: str) -> dict[str, float]:
@@ -141,8 +141,8 @@ def view(times: np.ndarray, poses: Bodies, rate: int, mode: str) -> dict[str, fl
     as the figure shows it, and "mean_gap" on average over senders that begin one after the other, as are the others.
     """
     result = []
-    for phase in range(PHASES):
-        late = times >= times[0] + phase / (PHASES * rate)
+    for phase in range(PHASE_COUNT):
+        late = times >= times[0] + phase / (PHASE_COUNT * rate)
         result.append(_looked_at(times[late], {body: of_body[late] for body, of_body in poses.items()}, rate, mode))
     errors, slips, gaps = zip(*result, strict=True)
     return {
@@ -156,7 +156,7 @@ def view(times: np.ndarray, poses: Bodies, rate: int, mode: str) -> dict[str, fl
 def _looked_at(times: np.ndarray, poses: Bodies, rate: int, mode: str) -> tuple[np.ndarray, np.ndarray, float]:
     """Return for a sender that begins with the first of these times: shell errors, slips while held, and the gap."""
     let_go, caught = _recorded(times)
-    moments = times[(times >= SHOWN[0]) & (times <= SHOWN[1])]
+    moments = times[(times >= SHOWN_S[0]) & (times <= SHOWN_S[1])]
     shown = shown_of(times, poses, rate, mode, moments)
     truth = interpolate(times, poses["tool"], moments, "dq_sclerp")
     ticks = ticks_of(times, rate)
@@ -181,8 +181,8 @@ def _apart(tool: Poses, hand: Poses) -> np.ndarray:
 
 def frame_moments(caught: float) -> np.ndarray:
     """Return the moments that the frames of the film show, that of the catch among them."""
-    rate = FPS * SLOWER
-    before, after = (np.floor(abs(end - caught) * rate) for end in SHOWN)
+    rate = FILM_FPS * SLOW_MOTION_FACTOR
+    before, after = (np.floor(abs(end - caught) * rate) for end in SHOWN_S)
     return caught + np.arange(-before, after + 1.0) / rate
 
 
@@ -196,33 +196,33 @@ def pictures(clip: Clip) -> tuple[np.ndarray, Callable[[int], Axes]]:
     shown = {
         (mode, rate): {body: _turned(of_body) for body, of_body in shown_of(times, poses, rate, mode, moments).items()}
         for mode in ENGINES
-        for rate in RATES
+        for rate in UPDATES_PER_S
     }
 
     def draw(frame: int) -> Axes:
-        axes = column(HEIGHT)
-        pixels = 1 / HEIGHT
-        left, columns = axes.get_xlim()[0] + 17 * pixels, (np.arange(len(RATES)) - 1.5) * 244 * pixels
-        trail = slice(max(frame - round(TRAIL_SECONDS * FPS * SLOWER), 0), frame + 1)
+        axes = column(HEIGHT_PX)
+        pixels = 1 / HEIGHT_PX
+        left, columns = axes.get_xlim()[0] + 17 * pixels, (np.arange(len(UPDATES_PER_S)) - 1.5) * 244 * pixels
+        trail = slice(max(frame - round(TRAIL_SECONDS * FILM_FPS * SLOW_MOTION_FACTOR), 0), frame + 1)
         axes.text(left, 0.5 - 62 * pixels, "Catching a tool", fontsize=8.5, color=INK)
         axes.text(-left, 0.5 - 62 * pixels, f"{moments[frame]:.2f} s", fontsize=8.5, color=INK, ha="right")
-        for rate, x in zip(RATES, columns, strict=True):
+        for rate, x in zip(UPDATES_PER_S, columns, strict=True):
             axes.text(x, 0.5 - 115 * pixels, f"{rate} updates/s", fontsize=6.5, color=INK, ha="center")
         for row, mode in enumerate(ENGINES):
-            top = 0.5 - (132 + row * ROW) * pixels
+            top = 0.5 - (132 + row * ROW_PX) * pixels
             axes.axhline(top, 0.016, 0.984, color=RULE, linewidth=0.5)
             axes.text(left, top - 35 * pixels, LABELS.get(mode) or label_of(mode), fontsize=6.5, color=INK)
-            for rate, x in zip(RATES, columns, strict=True):
+            for rate, x in zip(UPDATES_PER_S, columns, strict=True):
                 place, view = (x, top - 165 * pixels), shown[mode, rate]
                 for path, width, colour in (
                     (truth, 0.4, FAINT),
                     (view["tool"], 1.0, COLOURS[mode]),
                 ):
-                    axes.plot(*seen(path.positions[trail], place, METRES).T, color=colour, linewidth=width, zorder=-1)
-                tool.draw(axes, truth[frame], place, METRES, DARK.ghost, whole=True)
-                tool.draw(axes, view["tool"][frame], place, METRES, COLOURS[mode], whole=False)
+                    axes.plot(*seen(path.positions[trail], place, HEIGHT_M).T, color=colour, linewidth=width, zorder=-1)
+                tool.draw(axes, truth[frame], place, HEIGHT_M, DARK.ghost, whole=True)
+                tool.draw(axes, view["tool"][frame], place, HEIGHT_M, COLOURS[mode], whole=False)
                 for hand, colour in HANDS.items():
-                    controller.draw(axes, view[hand][frame], place, METRES, colour, whole=False)
+                    controller.draw(axes, view[hand][frame], place, HEIGHT_M, colour, whole=False)
                 axes.text(
                     x + 84 * pixels,
                     top - 73 * pixels,
@@ -254,7 +254,7 @@ def write_film(clip: Clip, path: Path) -> None:
             save(draw(number), frame)
         bpy.ops.wm.read_factory_settings(use_empty=True)
         scene = bpy.context.scene
-        set_up_render(scene, SceneSettings(resolution=FILM_SIZE, fps=FPS), len(moments), "#FFFFFF")
+        set_up_render(scene, SceneSettings(resolution=FILM_SIZE, fps=FILM_FPS), len(moments), "#FFFFFF")
         strip = scene.sequence_editor_create().strips.new_image("Frames", str(frames[0]), 1, 1, fit_method="STRETCH")
         for frame in frames[1:]:
             strip.elements.append(frame.name)
@@ -264,5 +264,5 @@ def write_film(clip: Clip, path: Path) -> None:
 
 def _turned(poses: Poses) -> Poses:
     """Return poses turned for the eye, around the middle of the throw."""
-    turn = layout.yaw_quaternion(YAW)
-    return Poses(rotate(turn, poses.positions - MIDDLE), multiply(turn, poses.quaternions))
+    turn = layout.yaw_quaternion(YAW_RAD)
+    return Poses(rotate(turn, poses.positions - MIDDLE_M), multiply(turn, poses.quaternions))

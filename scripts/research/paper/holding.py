@@ -12,7 +12,7 @@ marked    the same, and all bodies are sent once more at the moments at which a 
 held      the tool in the space of the hand that holds it; in the air it is sent in the world, and once more
           at those moments
 
-A tool is as far off as its end is, `REACH` from the hand. Seconds, metres.
+A tool is as far off as its end is, `REACH_M` from the hand. Seconds, metres.
 """
 
 from __future__ import annotations
@@ -30,31 +30,31 @@ from rigid_motion.motion.poses import inverse, joined, placed
 from rigid_motion.motion.quaternions import rotate, turned, turns_between
 from rigid_motion_batch.recordings.clips import Clip
 
-REACH = 0.3
-GRIP, END = np.array((0.0, 0.0, 0.5 * REACH)), np.array((0.0, 0.0, 0.5 * REACH))
+REACH_M = 0.3
+GRIP_M, TOOL_END_M = np.array((0.0, 0.0, 0.5 * REACH_M)), np.array((0.0, 0.0, 0.5 * REACH_M))
 """The tool's middle in the space of the hand that has it first, and its end in the space of the tool."""
 
-RATES = (30, 20, 15, 12)
+UPDATES_PER_S = (30, 20, 15, 12)
 MODES = ("lerp_slerp", "dq_sclerp", "motor_spline")
 WAYS = ("separate", "together", "marked", "held")
 
-EVERY, AROUND = 0.97, 1.2
+CHANGE_INTERVAL_S, SENT_AROUND_S = 0.97, 1.2
 """From one change of hands to the next that is tried, and what is sent before and after it."""
 
-FLIGHT, GRAVITY = 0.5, np.array((0.0, -9.81, 0.0))
-KINDS = {"handed over": 0.0, "caught": -FLIGHT}
+FLIGHT_S, GRAVITY_M_PER_S2 = 0.5, np.array((0.0, -9.81, 0.0))
+KINDS = {"handed over": 0.0, "caught": -FLIGHT_S}
 """Both kinds of changes of hands, and when the giver lets go."""
 
 LATE = {"giver": 0.0, "tool": 1 / 3, "taker": 2 / 3}
 """By what share of the interval updates of separate streams are late."""
 
-SHOWN = 90.0
+SHOWN_PER_S = 90.0
 """Moments a second that are looked at."""
 
-GOLDEN = 0.618
+PHASE_STEP_RATIO = 0.618
 """Of the interval, by which one sender is later than that of the change before."""
 
-STEP = 0.02
+VELOCITY_STEP_S = 0.02
 """Over which the velocities are measured with which a tool is thrown."""
 
 
@@ -84,19 +84,19 @@ class Change:
         held = self.given(self.poses("giver", np.minimum(times, self.let_go)))
         if self.let_go == 0.0:
             return held
-        before, last = self.given(self.poses("giver", self.let_go + np.array((-STEP, 0.0))))
+        before, last = self.given(self.poses("giver", self.let_go + np.array((-VELOCITY_STEP_S, 0.0))))
         since = np.maximum(times - self.let_go, 0.0)[:, None]
-        velocity = (last.positions - before.positions) / STEP
-        angular = turns_between(before.quaternions, last.quaternions) / STEP
+        velocity = (last.positions - before.positions) / VELOCITY_STEP_S
+        angular = turns_between(before.quaternions, last.quaternions) / VELOCITY_STEP_S
         return Poses(
-            held.positions + velocity * since + 0.5 * GRAVITY * since**2,
+            held.positions + velocity * since + 0.5 * GRAVITY_M_PER_S2 * since**2,
             turned(held.quaternions, angular * since),
         )
 
     @staticmethod
     def given(hand: Poses) -> Poses:
         """Return where the tool is in the giver's hand, shape (n,)."""
-        return Poses(hand.positions + rotate(hand.quaternions, GRIP), hand.quaternions)
+        return Poses(hand.positions + rotate(hand.quaternions, GRIP_M), hand.quaternions)
 
     @cached_property
     def grip(self) -> Poses:
@@ -117,7 +117,7 @@ def measure(clips: Iterable[Clip]) -> dict[str, Any]:
         changes = [change for pair in pairs for change in _changes(*pair, let_go)]
         result["changes"] = len(changes)
         result[kind] = {
-            mode: {way: {rate: _looked_at(changes, mode, way, rate) for rate in RATES} for way in WAYS}
+            mode: {way: {rate: _looked_at(changes, mode, way, rate) for rate in UPDATES_PER_S} for way in WAYS}
             for mode in MODES
         }
     return result
@@ -136,10 +136,10 @@ def _pairs(clips: Iterable[Clip]) -> Iterator[tuple[Clip, Clip]]:
 
 def _changes(giver: Clip, taker: Clip, let_go: float) -> Iterator[Change]:
     first, last = max(giver.times[0], taker.times[0]), min(giver.times[-1], taker.times[-1])
-    times = np.arange(-AROUND, AROUND, 0.5 / SHOWN)
-    for number, moment in enumerate(np.arange(first + AROUND, last - AROUND, EVERY)):
+    times = np.arange(-SENT_AROUND_S, SENT_AROUND_S, 0.5 / SHOWN_PER_S)
+    for number, moment in enumerate(np.arange(first + SENT_AROUND_S, last - SENT_AROUND_S, CHANGE_INTERVAL_S)):
         give, take = (interpolate(it.times, it.poses, moment + times, "dq_sclerp") for it in (giver, taker))
-        change = Change(times, give, take, let_go, number * GOLDEN % 1.0)
+        change = Change(times, give, take, let_go, number * PHASE_STEP_RATIO % 1.0)
         off = change.flown(np.zeros(1)).positions - change.poses("taker", np.zeros(1)).positions
         yield replace(change, taker=Poses(take.positions + off, take.quaternions))
 
@@ -147,7 +147,7 @@ def _changes(giver: Clip, taker: Clip, let_go: float) -> Iterator[Change]:
 def _looked_at(changes: list[Change], mode: str, way: str, rate: float) -> dict[str, float]:
     """Return the figures of all changes, for one mode, way and rate."""
     margin, rows, errors = 2.5 / rate, [], []
-    moments = np.arange(-AROUND + margin, AROUND - margin, 1.0 / SHOWN)
+    moments = np.arange(-SENT_AROUND_S + margin, SENT_AROUND_S - margin, 1.0 / SHOWN_PER_S)
     for change in changes:
         giver, tool, taker = _shown(change, moments, mode, way, rate)
         end, taken = _end(tool), _end(placed(taker, change.grip))
@@ -163,7 +163,7 @@ def _looked_at(changes: list[Change], mode: str, way: str, rate: float) -> dict[
 
 def _shown(change: Change, moments: np.ndarray, mode: str, way: str, rate: float) -> list[Poses]:
     """Return what a receiver shows of the bodies at moments (n,)."""
-    ticks = -AROUND + (change.phase + np.arange(int(2.0 * AROUND * rate) - 1)) / rate
+    ticks = -SENT_AROUND_S + (change.phase + np.arange(int(2.0 * SENT_AROUND_S * rate) - 1)) / rate
     if way == "marked":
         ticks = np.union1d(ticks, (change.let_go, 0.0))
     late = LATE if way == "separate" else dict.fromkeys(LATE, 0.0)
@@ -180,4 +180,4 @@ def _shown(change: Change, moments: np.ndarray, mode: str, way: str, rate: float
 
 
 def _end(tool: Poses) -> np.ndarray:
-    return tool.positions + rotate(tool.quaternions, END)
+    return tool.positions + rotate(tool.quaternions, TOOL_END_M)

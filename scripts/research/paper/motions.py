@@ -20,7 +20,7 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 
-REST = 0.01
+MAX_REST_RMS = 0.01
 """A body is at rest that stays, by the root mean square, so near to its mean pose: less than a hand trembles."""
 
 Read = TypeVar("Read")
@@ -56,7 +56,7 @@ def read_motion(path: Path) -> Clip:
     if clip.rest_body:
         clip = replace(clip, poses=clip.poses[0], rest_body=None)
     moved = spread(clip.in_metres(clip.poses))
-    if moved < REST:
+    if moved < MAX_REST_RMS:
         raise TrajectoryError(path, f"at rest: it stays within {moved * 1e3:.1f} mm of its mean pose", "leave it out")
     return clip
 

@@ -30,7 +30,7 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clips import Clip
 
 from . import bodies, catching, holding, motions, sending, strips, table, timing, triangle
-from .table import PAPER, TIME_SAVED, UPDATES
+from .table import PAPER_RATES_PER_S, TIME_SAVED, UPDATES
 
 EPILOG = """
 examples:
@@ -53,7 +53,9 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--no-video", action="store_true", help="make pictures, but no film")
-    parser.add_argument("--rounds", type=int, default=timing.ROUNDS, metavar="N", help="of the timing (%(default)s)")
+    parser.add_argument(
+        "--rounds", type=int, default=timing.ROUND_COUNT, metavar="N", help="of the timing (%(default)s)"
+    )
     options = parser.parse_args(arguments)
     try:
         for part in options.only:
@@ -85,16 +87,16 @@ def tabulate(options: argparse.Namespace) -> dict[str, Any]:
     return {
         "paper": {
             "rates": UPDATES,
-            "updates": list(PAPER.values()),
+            "updates": list(PAPER_RATES_PER_S.values()),
             "time_saved": TIME_SAVED,
-            "saved": [1.0 - fewer / rate for rate, fewer in PAPER.items()],
+            "saved": [1.0 - fewer / rate for rate, fewer in PAPER_RATES_PER_S.items()],
         },
         "clips": {name: [clip.name for clip in of_set] for name, of_set in sets.items()},
         "samples": {name: sum(len(clip.times) for clip in of_set) for name, of_set in sets.items()},
         "seconds": {name: sum(float(it.times[-1] - it.times[0]) for it in of_set) for name, of_set in sets.items()},
         "left_out": left_out,
         "needed": {
-            of_set: {name: table.means([needed[clip.name][name] for clip in clips]) for name in table.WAYS}
+            of_set: {name: table.means([needed[clip.name][name] for clip in clips]) for name in table.ROW_CHOICES}
             for of_set, clips in sets.items()
         },
         "by_clip": {

@@ -3,7 +3,7 @@
 The even streams are those of the paper, `lerp_slerp` at its rates; the other is the codec of `rigid_motion.streams`,
 over loopback to another process (`streaming.measuring`). It has a tolerance, which is searched for: the one at which
 the RMS shell error is that of the even stream. Bytes are a second's, with those of UDP and IPv4 around each datagram,
-without the description that a receiver gets when it joins. The first `SECONDS` are sent. Seconds, metres.
+without the description that a receiver gets when it joins. The first `SENT_S` are sent. Seconds, metres.
 """
 
 from __future__ import annotations
@@ -12,21 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from research.live_streams.packings import STAMP
+from research.live_streams.packings import STAMP_BYTES
 from rigid_motion.motion import decimate
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
 from rigid_motion_batch.analysis.needed import Ways, part_of
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.streaming.measuring import HEADERS, measure
+from rigid_motion_batch.streaming.measuring import HEADER_BYTES, measure
 from rigid_motion_batch.streaming.sending import body_of, samples_of
 
-from .table import RADIUS, UPDATES, has_samples_for
+from .table import SHELL_RADIUS_M, UPDATES, has_samples_for
 
-DELAYS = (0.1, 0.2)  # by which the picture is behind
-SECONDS = 10.0
+DELAYS_S = (0.1, 0.2)  # by which the picture is behind
+SENT_S = 10.0
 
-TOLERANCES = 1.0, 5.0, 4
+TOLERANCE_RANGE = 1.0, 5.0, 4
 """From this multiple of the smallest requested error to this multiple of the largest, so many."""
 
 PACKINGS = {"7 doubles": 56, "7 singles": 28}
@@ -36,22 +36,22 @@ PACKINGS = {"7 doubles": 56, "7 singles": 28}
 def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, float]:
     """Send a clip over loopback, and return datagrams and bytes a second, and the RMS shell error of what was shown."""
     times, poses = samples_of(clip)
-    cost, _ = measure([body_of(clip, poses, RADIUS)], times, poses, tolerance, delay)
+    cost, _ = measure([body_of(clip, poses, SHELL_RADIUS_M)], times, poses, tolerance, delay)
     size = cost["bytes_a_second_with_headers"]
-    return (size - cost["bytes_a_second"]) / HEADERS, size, 1e-3 * cost["rms_mm"]
+    return (size - cost["bytes_a_second"]) / HEADER_BYTES, size, 1e-3 * cost["rms_mm"]
 
 
 def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:
     """Return by delay and rate of the state of the art the datagrams and the bytes a second that are as good."""
-    clip = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SECONDS, side="right")) - 1)
-    ways = Ways(clip, RADIUS)
+    clip = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SENT_S, side="right")) - 1)
+    ways = Ways(clip, SHELL_RADIUS_M)
     requested = {
         rate: ways.error(decimate(clip.times, rate), REFERENCE) for rate in UPDATES if has_samples_for(clip, rate)
     }
-    low, high, count = TOLERANCES
+    low, high, count = TOLERANCE_RANGE
     tolerances = np.geomspace(low * min(requested.values()), high * max(requested.values()), count)
     result: dict[float, dict[int, tuple[float, float]]] = {}
-    for delay in DELAYS:
+    for delay in DELAYS_S:
         datagrams, size, errors = np.array([sent(clip, float(tolerance), delay) for tolerance in tolerances]).T
         result[delay] = {
             rate: (lowest(datagrams, errors, error), lowest(size, errors, error)) for rate, error in requested.items()
@@ -71,9 +71,9 @@ def lowest(cost: np.ndarray, errors: np.ndarray, requested: float) -> float:
 def costs(clips: list[Clip]) -> dict[str, Any]:
     """Return the geometric means over clips, and the bytes of even streams, for each of the paper's rates."""
     of_clips = {clip.name: costs_of(clip) for clip in clips}
-    even = {name: [rate * (size + STAMP + HEADERS) for rate in UPDATES] for name, size in PACKINGS.items()}
+    even = {name: [rate * (size + STAMP_BYTES + HEADER_BYTES) for rate in UPDATES] for name, size in PACKINGS.items()}
     needed = {}
-    for delay in DELAYS:
+    for delay in DELAYS_S:
         table = np.array([[clip[delay].get(rate, (np.nan,) * 2) for rate in UPDATES] for clip in of_clips.values()])
         datagrams, size = geometric_mean(table).T
         needed[f"{1e3 * delay:.0f}"] = {
@@ -82,4 +82,4 @@ def costs(clips: list[Clip]) -> dict[str, Any]:
             "saved_datagrams": 1.0 - datagrams / UPDATES,
             "saved_bytes": {name: 1.0 - size / of_even for name, of_even in even.items()},
         }
-    return {"seconds": SECONDS, "clips": list(of_clips), "even": even, "needed": needed}
+    return {"seconds": SENT_S, "clips": list(of_clips), "even": even, "needed": needed}

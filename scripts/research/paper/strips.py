@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from research.drawing import FAINT, INK, RULE, Model, column
-from research.making.motions import TIP, about, chain, held_by
+from research.making.motions import BIT_TIP_M, about, chain, held_by
 from rigid_motion.motion import MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between, normalise, rotate
 from rigid_motion_batch.palette import DARK, colour_of
@@ -18,7 +18,7 @@ from rigid_motion_batch.palette import DARK, colour_of
 ENGINES = {"lerp_slerp": "State of the art", "dq_sclerp": "Dual quaternions", "pga_lerp": "Multivectors"}
 """Mode id to what the paper calls it."""
 
-MOMENTS = np.linspace(0.0, 1.0, 7)  # shares of the way
+SHOWN_MOMENTS = np.linspace(0.0, 1.0, 7)  # shares of the way
 
 SWING, AXIS = np.radians(110.0), normalise(np.array((0.0, 0.97, 0.24)))
 """From the first pose to the last, about the line of sight and a little towards it."""
@@ -26,13 +26,13 @@ SWING, AXIS = np.radians(110.0), normalise(np.array((0.0, 0.97, 0.24)))
 UPRIGHT = normalise(np.array((1.0, -1.0, 0.0, 0.0)))  # the bit points down, and the grip away from who looks
 SIDEWAYS = normalise(np.array((1.0, 0.0, 0.0, 1.0)))  # the grip to the left
 
-METRES = 1.56  # that the picture's height spans
+HEIGHT_M = 1.56  # that the picture's height spans
 
 
 def shown() -> dict[str, Poses]:
-    """Return the poses at `MOMENTS` by mode; the tip is at the origin in the first and the last."""
-    keys = held_by(TIP, np.zeros((2, 3)), chain(about(AXIS, np.array((-0.5, 0.5)) * SWING), SIDEWAYS, UPRIGHT))
-    return {mode: interpolate([0.0, 1.0], keys, MOMENTS, mode) for mode in ENGINES}
+    """Return the poses at `SHOWN_MOMENTS` by mode; the tip is at the origin in the first and the last."""
+    keys = held_by(BIT_TIP_M, np.zeros((2, 3)), chain(about(AXIS, np.array((-0.5, 0.5)) * SWING), SIDEWAYS, UPRIGHT))
+    return {mode: interpolate([0.0, 1.0], keys, SHOWN_MOMENTS, mode) for mode in ENGINES}
 
 
 def figures() -> dict[str, float]:
@@ -42,13 +42,13 @@ def figures() -> dict[str, float]:
 
 def tips(poses: Poses) -> np.ndarray:
     """Return how far the tip has left the point that it rests on, shape (7, 3)."""
-    return poses.positions + rotate(poses.quaternions, TIP)
+    return poses.positions + rotate(poses.quaternions, BIT_TIP_M)
 
 
 def draw() -> Axes:
     """Draw the figure."""
     axes, drill, result = column(1000), Model.of("drill"), shown()
-    left, columns = axes.get_xlim()[0] + 0.016, np.linspace(-0.378, 0.345, len(MOMENTS))
+    left, columns = axes.get_xlim()[0] + 0.016, np.linspace(-0.378, 0.345, len(SHOWN_MOMENTS))
     axes.text(left, 0.442, "Interpolation algorithms", fontsize=8.5, color=INK)
     for row, (mode, title) in enumerate(ENGINES.items()):
         foot, poses = 0.2 - row * 0.286, result[mode]
@@ -58,12 +58,12 @@ def draw() -> Axes:
         for moment, (x, tip, angle) in enumerate(zip(columns, tips(poses), turned, strict=True)):
             place, off = (x, foot + 0.028), np.linalg.norm(tip)
             if off > 1e-4:
-                drill.draw(axes, result["dq_sclerp"][moment], place, METRES, DARK.ghost, whole=True)
-            drill.draw(axes, poses[moment], place, METRES, colour_of(mode), whole=False)
+                drill.draw(axes, result["dq_sclerp"][moment], place, HEIGHT_M, DARK.ghost, whole=True)
+            drill.draw(axes, poses[moment], place, HEIGHT_M, colour_of(mode), whole=False)
             axes.plot(*place, "+", color="#C1121F", markersize=4, markeredgewidth=0.7)
             axes.text(x, foot - 0.027, f"{1e3 * off:.0f} mm", fontsize=6, color=INK, ha="center")
             axes.text(x, foot - 0.053, f"{angle:.1f}°", fontsize=6, color=FAINT, ha="center")
-    for x, moment in zip(columns, MOMENTS, strict=True):
+    for x, moment in zip(columns, SHOWN_MOMENTS, strict=True):
         axes.text(x, -0.453, f"{moment:.0%}", fontsize=6, color=FAINT, ha="center")
     legend = "of the way. Cross: the tip's place; mm: how far it is off; pale: turned about it"
     axes.text(left, -0.486, legend, fontsize=6, color=FAINT)

@@ -21,19 +21,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigid_motion.motion import decimate, interpolate
-from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
+from rigid_motion_batch.analysis.metrics import MAX_ROUNDING_M, geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE as BLENDERS
 from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
 from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, Ways, keys_needed
 from rigid_motion_batch.recordings.clips import Clip
 
-PAPER = {30: 20, 20: 10, 15: 7, 12: 5}
+PAPER_RATES_PER_S = {30: 20, 20: 10, 15: 7, 12: 5}
 """The paper's table: updates under its state of the art, and those that it found to look the same with multivectors."""
 
-UPDATES = tuple(PAPER)  # a second of the state of the art, from the most to the fewest
+UPDATES = tuple(PAPER_RATES_PER_S)  # a second of the state of the art, from the most to the fewest
 TIME_SAVED = 0.165  # what the paper saves of the running time for a generated frame, as a share
 
-RADIUS = 0.1  # of the shell, in metres
+SHELL_RADIUS_M = 0.1  # of the shell, in metres
 
 SCREW = "dq_sclerp"
 
@@ -43,7 +43,9 @@ MODES = (REFERENCE, BLENDERS, SCREW, "pga_lerp", "motor_spline", "motor_spline_c
 ADAPTIVE, CHOSEN = (REFERENCE, BLENDERS, "motor_spline"), ", keys where needed"
 """Modes that have their keys where they need them too, and what is added to their names then."""
 
-WAYS = {mode: (mode, DECIMATIONS[0]) for mode in MODES} | {mode + CHOSEN: (mode, DECIMATIONS[1]) for mode in ADAPTIVE}
+ROW_CHOICES = {mode: (mode, DECIMATIONS[0]) for mode in MODES} | {
+    mode + CHOSEN: (mode, DECIMATIONS[1]) for mode in ADAPTIVE
+}
 """Names of the rows, each with its mode and its decimation."""
 
 SAMPLES_AN_UPDATE, NEVER_EXACT = 2.0, 1e-3
@@ -70,9 +72,11 @@ def shares_of(clip: Clip, result: KeysNeeded) -> dict[str, dict[str, list[float]
 
 
 def needed(clip: Clip) -> dict[str, list[float]]:
-    """Return by name, of `WAYS`, what is needed of the updates of the state of the art at `UPDATES`, as shares."""
-    shares = shares_of(clip, keys_needed(Ways(clip, RADIUS), MODES, REFERENCE))
-    return {name: shares[mode][way][: len(UPDATES)] for name, (mode, way) in WAYS.items()}
+    """Return by name, of `ROW_CHOICES`, what is needed of the updates of the state of the art at `UPDATES`, as
+    shares.
+    """
+    shares = shares_of(clip, keys_needed(Ways(clip, SHELL_RADIUS_M), MODES, REFERENCE))
+    return {name: shares[mode][way][: len(UPDATES)] for name, (mode, way) in ROW_CHOICES.items()}
 
 
 def means(shares: Sequence[Sequence[float]], rates: Sequence[float] = UPDATES) -> dict[str, np.ndarray]:
@@ -104,6 +108,6 @@ def bows_of(clip: Clip) -> dict[int, tuple[float, float]]:
         )
         a, b = clip.in_metres(clip.poses[samples]).positions - straight, screw - straight
         across, bow, missed, left = (float(np.sum(product)) for product in (a * b, b * b, a * a, (a - b) ** 2))
-        if min(bow, missed) > len(a) * NOTHING**2:
+        if min(bow, missed) > len(a) * MAX_ROUNDING_M**2:
             result[rate] = across / bow, float(np.sqrt(left / missed))
     return result

@@ -1,6 +1,6 @@
 """The running time of a generated frame, engine against engine in one run.
 
-Two readings of the same work, a hand for each of `USERS` users at `FRAMES_PER_S`:
+Two readings of the same work, a hand for each of `USER_COUNT` users at `FRAMES_PER_S`:
 
 - `Case.filled_in`: this program's own forms, which work a segment out once and then fill its frames;
 - `Case.in_the_algebra`: every frame encoded, interpolated and extracted anew as in the paper, all of them in one array.
@@ -25,18 +25,18 @@ from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
 from rigid_motion_batch.recordings.clips import Clip
 
-from .table import PAPER, UPDATES
+from .table import PAPER_RATES_PER_S, UPDATES
 
 FRAMES_PER_S = 90.0
-USERS = 20
-ROUNDS = 25
-RESAMPLES, SEED, CONFIDENCE = 2000, 2021, 0.95  # of the bootstrap
+USER_COUNT = 20
+ROUND_COUNT = 25
+BOOTSTRAP_RESAMPLES, BOOTSTRAP_SEED, CONFIDENCE_RATIO = 2000, 2021, 0.95  # of the bootstrap
 
-HELD = 3 * 2**20
+WARM_UP_NUMBERS = 3 * 2**20
 """Numbers in an array that is made and let go before a race: the C library of Linux then keeps what NumPy lets go."""
 
 
-def races(clip: Clip, needed: Mapping[str, Mapping[str, list[float]]], rounds: int = ROUNDS) -> dict[str, Any]:
+def races(clip: Clip, needed: Mapping[str, Mapping[str, list[float]]], rounds: int = ROUND_COUNT) -> dict[str, Any]:
     """Race all engines on a clip, the fast ones at each rate of the paper's table.
 
     Parameters
@@ -58,7 +58,7 @@ def races(clip: Clip, needed: Mapping[str, Mapping[str, list[float]]], rounds: i
         paces = {
             "equal": dict.fromkeys(MODES, float(rate)),
             "as good": {mode: needed[mode]["updates"][place] for mode in MODES if mode in needed},
-            "paper": dict.fromkeys(exact, float(PAPER[rate])),
+            "paper": dict.fromkeys(exact, float(PAPER_RATES_PER_S[rate])),
         }
         for pace, updates in paces.items():
             for mode, row in race(clip, Case.filled_in, updates | {REFERENCE: float(rate)}, rounds).items():
@@ -76,7 +76,7 @@ def race(
     the confidence interval, "processor" the mean processor time of a frame in seconds.
     """
     # Otherwise whose arrays are handed back to the system, and fetched again page by page, is a matter of luck.
-    np.zeros(HELD).fill(1.0)
+    np.zeros(WARM_UP_NUMBERS).fill(1.0)
     cases = {mode: case_of(clip, rate) for mode, rate in updates.items()}
     runs = {mode: partial(engine, case, mode) for mode, case in cases.items()}
     wall = {mode: np.array(of_mode) for mode, of_mode in interleaved_seconds(runs, rounds, warm=True).items()}
@@ -94,8 +94,10 @@ def race(
 
 def compared(ratios: np.ndarray) -> dict[str, float]:
     """Return the median over rounds of ratios (n,), and the bounds of its confidence interval."""
-    drawn = np.random.default_rng(SEED).integers(len(ratios), size=(RESAMPLES, len(ratios)))
-    low, high = np.quantile(np.median(ratios[drawn], axis=1), ((1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0))
+    drawn = np.random.default_rng(BOOTSTRAP_SEED).integers(len(ratios), size=(BOOTSTRAP_RESAMPLES, len(ratios)))
+    low, high = np.quantile(
+        np.median(ratios[drawn], axis=1), ((1.0 - CONFIDENCE_RATIO) / 2.0, (1.0 + CONFIDENCE_RATIO) / 2.0)
+    )
     return {"relative": float(np.median(ratios)), "low": float(low), "high": float(high)}
 
 
@@ -103,6 +105,6 @@ def case_of(clip: Clip, rate: float) -> Case:
     """Return the keys of a sender of that rate, alike for all users, and when frames are shown."""
     keys = decimate(clip.times, rate)
     times, poses = clip.times[keys], clip.poses[keys]
-    quaternions = np.tile(align_signs(poses.quaternions), (USERS, 1, 1))
+    quaternions = np.tile(align_signs(poses.quaternions), (USER_COUNT, 1, 1))
     frames = np.arange(times[0], times[-1], 1.0 / FRAMES_PER_S)
-    return Case(clip.name, times, Poses(np.tile(poses.positions, (USERS, 1, 1)), quaternions), frames)
+    return Case(clip.name, times, Poses(np.tile(poses.positions, (USER_COUNT, 1, 1)), quaternions), frames)

@@ -22,7 +22,7 @@ ENGINES = {"lerp": "pga_lerp", "slerp": "pga_slerp"}
 
 COLOURS = {"lerp": "#FFD60A", "slerp": "#1FA63A"}  # of the paper's figure: yellow and green
 
-TRIANGLE = np.array(((-0.30, 0.0, -0.36), (0.40, 0.0, -0.26), (-0.08, 0.0, 0.46)))
+TRIANGLE_M = np.array(((-0.30, 0.0, -0.36), (0.40, 0.0, -0.26), (-0.08, 0.0, 0.46)))
 """The corners in the body's own axes, shape (3, 3)."""
 
 TURN, AXIS = np.radians(150.0), normalise(np.array((-0.45, 0.85, 0.20)))  # of the second pose: an extreme turn
@@ -32,10 +32,10 @@ EXTREMES = Poses(
     normalise(np.array([(1.0, 0.0, 0.0, 0.0), (np.cos(TURN / 2), *np.sin(TURN / 2) * AXIS)])),
 )
 
-SHARES = np.arange(1, IN_BETWEENS + 1) / (IN_BETWEENS + 1.0)  # of the way, without the ends
+WAY_RATIOS = np.arange(1, IN_BETWEENS + 1) / (IN_BETWEENS + 1.0)  # of the way, without the ends
 
 
-def in_betweens(shares: np.ndarray = SHARES) -> dict[str, Poses]:
+def in_betweens(shares: np.ndarray = WAY_RATIOS) -> dict[str, Poses]:
     """Return the poses of either kind at shares of the way (n,)."""
     return {name: interpolate([0.0, 1.0], EXTREMES, shares, mode) for name, mode in ENGINES.items()}
 
@@ -47,7 +47,7 @@ def figures() -> dict[str, float]:
         name: np.diff(np.degrees(angle_between(first, np.concatenate((first, of_kind.quaternions)))))
         for name, of_kind in poses.items()
     }
-    apart = measure(SHARES, poses["lerp"], poses["slerp"])
+    apart = measure(WAY_RATIOS, poses["lerp"], poses["slerp"])
     return {
         "in_betweens": IN_BETWEENS,
         "slerp_step": steps["slerp"][0],
@@ -64,7 +64,7 @@ def draw() -> Axes:
     left = axes.get_xlim()[0] + 0.026
 
     def corners(poses: Poses) -> np.ndarray:
-        points = poses.positions[:, None] + rotate(poses.quaternions[:, None], TRIANGLE[None])
+        points = poses.positions[:, None] + rotate(poses.quaternions[:, None], TRIANGLE_M[None])
         return seen(points, (0.0, 0.02), 3.1)
 
     fine = in_betweens(np.linspace(0.0, 1.0, 200))

@@ -18,8 +18,8 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from rigid_motion.motion import decimate, reduce_keys, reduce_skeleton_keys, shell_error
-from rigid_motion_batch.recordings.cleaning import JOINT as JOINT
-from rigid_motion_batch.recordings.cleaning import RIGID as RIGID
+from rigid_motion_batch.recordings.cleaning import JOINT_RADIUS_M as JOINT_RADIUS_M
+from rigid_motion_batch.recordings.cleaning import RIGID_RADIUS_M as RIGID_RADIUS_M
 from rigid_motion_batch.recordings.clips import Clip
 
 MILLIMETRES = {"mm": 1, "cm": 10, "m": 1000}
@@ -284,10 +284,10 @@ def distinct(choices: Iterable[Choice]) -> list[Choice]:
 class Radii:
     """Plain data, as parameters of tasks."""
 
-    rigid: float = RIGID
+    rigid: float = RIGID_RADIUS_M
     """Of a single rigid body."""
 
-    joint: float = JOINT
+    joint: float = JOINT_RADIUS_M
     """Of every joint of a whole body."""
 
     def of(self, clip: Clip) -> np.ndarray:

@@ -18,16 +18,16 @@ from rigid_motion_batch.recordings.clips import Clip
 from .choices import Choice
 from .reconstructions import Reconstruction
 
-STAYS = 0.005
+MAX_HELD_SLIP_M = 0.005
 """The farthest that a body which is held slips in a recording."""
 
-MOVES = 10.0
+MIN_MOVE_PER_SLIP = 10.0
 """How many times as far both bodies move: what lies on one table does not hold one another."""
 
-GLANCED = 64
+GLANCED_SAMPLES = 64
 """Samples that tell of most pairs that they are none."""
 
-BETWEEN = "dq_sclerp"
+BETWEEN_MODE = "dq_sclerp"
 """How a recording goes on between its samples, where two bodies were not recorded at the same times."""
 
 
@@ -91,20 +91,22 @@ def find_held(clips: Sequence[Clip], radius: float) -> list[tuple[int, int]]:
 
 
 def is_held(holder: Clip, held: Clip, radius: float) -> bool:
-    """Return whether a clip stays within `STAYS` of its place in another, at all times of both, while both move."""
+    """Return whether a clip stays within `MAX_HELD_SLIP_M` of its place in another, at all times of both, while both
+    move.
+    """
     own = holder.times[(holder.times >= held.times[0]) & (holder.times <= held.times[-1])]
     if len(own) < 2:
         return False
-    some = own[np.unique(np.linspace(0, len(own) - 1, GLANCED).astype(int))]
+    some = own[np.unique(np.linspace(0, len(own) - 1, GLANCED_SAMPLES).astype(int))]
     place = seen_from(recorded(holder, some), recorded(held, some))
     # Two places that are as near to their mean are not farther apart than twice that.
-    if shell_error(place, place[np.zeros(len(some), dtype=int)], radius).max() > 2.0 * STAYS:
+    if shell_error(place, place[np.zeros(len(some), dtype=int)], radius).max() > 2.0 * MAX_HELD_SLIP_M:
         return False
     times = common_times(holder.times, held.times)
     poses = [recorded(clip, times) for clip in (holder, held)]
-    if distances(seen_from(*poses), radius).max() > STAYS:
+    if distances(seen_from(*poses), radius).max() > MAX_HELD_SLIP_M:
         return False
-    return all(distances(one, radius).max() > MOVES * STAYS for one in poses)
+    return all(distances(one, radius).max() > MIN_MOVE_PER_SLIP * MAX_HELD_SLIP_M for one in poses)
 
 
 def slips(holder: Reconstruction, held: Reconstruction) -> tuple[Slip, ...]:
@@ -142,7 +144,7 @@ def recorded(clip: Clip, times: np.ndarray) -> Poses:
     """Return the poses of a clip at times (m,) of it, in Blender's axes."""
     after = np.clip(np.searchsorted(clip.times, times), 1, len(clip.times) - 1)
     samples = np.union1d(after - 1, after)
-    return clip.in_blender(interpolate(clip.times[samples], clip.poses[samples], times, BETWEEN))
+    return clip.in_blender(interpolate(clip.times[samples], clip.poses[samples], times, BETWEEN_MODE))
 
 
 def seen_from(holder: Poses, held: Poses) -> Poses:

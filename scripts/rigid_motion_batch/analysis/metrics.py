@@ -26,10 +26,10 @@ from .reconstructions import Ground, MotionErrors, Reconstruction
 BYTES_PER_KEY = 7 * 8
 """A position and a quaternion, as doubles: what the paper sends for an update."""
 
-NOTHING = 1e-9
+MAX_ROUNDING_M = 1e-9
 """An error below this, in metres, is rounding: every sample was a key, or nothing moved."""
 
-BLOCK = 10_000
+BLOCK_ROWS = 10_000
 """Rows of a table that are made at a time."""
 
 FORMS = ("csv", "tum")
@@ -231,7 +231,7 @@ def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str
         for first, lines in lines_of_poses(columns):
             if modes:
                 lines = [
-                    f"{line},{mode}" for line, mode in zip(lines, (*modes, "")[first : first + BLOCK], strict=True)
+                    f"{line},{mode}" for line, mode in zip(lines, (*modes, "")[first : first + BLOCK_ROWS], strict=True)
                 ]
             stream.write("\n".join([*lines, ""]))
 
@@ -249,8 +249,8 @@ def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[st
 
     Numbers take many times their memory as text, and a recording may have hours of them.
     """
-    for first in range(0, len(columns[0]), BLOCK):
-        rows = np.stack([column[first : first + BLOCK] for column in columns], axis=-1).tolist()
+    for first in range(0, len(columns[0]), BLOCK_ROWS):
+        rows = np.stack([column[first : first + BLOCK_ROWS] for column in columns], axis=-1).tolist()
         yield first, [",".join(map(repr, row)) for row in rows]
 
 

@@ -20,7 +20,7 @@ from rigid_motion.motion import decimate, fit_keys, interpolate, reduce_keys, re
 from rigid_motion_batch.recordings.clips import Clip
 
 from .choices import Keys, Uniform
-from .metrics import NOTHING, geometric_mean
+from .metrics import MAX_ROUNDING_M, geometric_mean
 from .modes import REFERENCE
 from .reconstructions import Reconstruction, same_motions
 
@@ -33,10 +33,10 @@ TABLE_RATES = RATES[:4]
 DECIMATIONS = ("uniform", "adaptive", "fitted")
 """The ways to have fewer keys, of which the last is not always tried."""
 
-TRIES = 3
+MAX_FITS = 3
 """How often fewer keys are fitted, to find how few will do."""
 
-NEAR = 0.02
+KEY_COUNT_PRECISION_RATIO = 0.02
 """The search for key poses ends where one knows their number to so much of it: every step reduces keys anew."""
 
 
@@ -153,7 +153,11 @@ class Ways:
         samples = len(self.clip.times)
         best_of = cache(lambda budget: self._best_of(budget, mode))
         start = min(evenly, samples)
-        return best_of(fewest(lambda budget: best_of(budget)[1] <= target, start, samples, too_few=1, near=NEAR))
+        return best_of(
+            fewest(
+                lambda budget: best_of(budget)[1] <= target, start, samples, too_few=1, near=KEY_COUNT_PRECISION_RATIO
+            )
+        )
 
     def _best_of(self, budget: int, mode: str) -> tuple[np.ndarray, float]:
         """Return so many key poses at most, and their error."""
@@ -180,7 +184,7 @@ class Ways:
         They are searched from the adaptive ones on, which have reached this error without.
         """
         clip, best, keys, aim = self.clip, adaptive, adaptive, target
-        for number in range(TRIES):
+        for number in range(MAX_FITS):
             if number:
                 keys = self._reduced(mode, aim)
             fitted = fit_keys(clip.times, clip.poses, keys, mode, float(np.max(self.radius)) / clip.metres_per_unit)
@@ -188,7 +192,7 @@ class Ways:
             error = rms(shell_error(clip.in_metres(filled), clip.in_metres(clip.poses), self.radius))
             if error <= target and len(keys) <= len(best):
                 best, reached = keys, error
-            if error <= NOTHING:
+            if error <= MAX_ROUNDING_M:
                 break
             aim *= target / error
         return best, reached
@@ -232,7 +236,7 @@ def keys_needed(
             reference_keys[place] = len(kept)
             targets[place] = stretch.error(kept, reference)
             errors[:, place] = [stretch.error(kept, group[0]) for group in groups]
-        if targets[place] > NOTHING:
+        if targets[place] > MAX_ROUNDING_M:
             for row, group in enumerate(groups):
                 evenly = kept if reference in group else _fewest_evenly(stretch, group[0], targets[place], kept)
                 result = [(evenly, stretch.error(evenly, group[0]))]

@@ -28,22 +28,22 @@ from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
 
-from .choices import RIGID, Choice, Keys, Uniform
+from .choices import RIGID_RADIUS_M, Choice, Keys, Uniform
 from .modes import BEST_OF, single_modes
 
 Groups = tuple[tuple[str, ...], ...]
 """Modes, those together that are one motion."""
 
-BLOCK = 4096
+BLOCK_SAMPLES = 4096
 """Samples of all joints that are worked on at once."""
 
-STILL = 1e-6
+MAX_STILL_CHANGE = 1e-6
 """A joint none of whose numbers changes by more, in its parent's space, needs one key."""
 
-COMPARED = 512
+COMPARED_SAMPLES = 512
 """Samples, evenly spread, that tell whether two modes are one motion."""
 
-PROBE = 4
+PROBE_KEY_STRIDE = 4
 """Of so many samples one is a key where it is looked which modes are one motion."""
 
 FEWEST_PROBED = 4
@@ -141,8 +141,8 @@ class Reconstruction:
 
     def blocks(self, overlap: int = 0) -> Iterator[slice]:
         """Yield `samples` a block at a time, each with so many of those before it."""
-        for first in range(self.samples.start, self.samples.stop, BLOCK):
-            yield slice(max(self.samples.start, first - overlap), min(first + BLOCK, self.samples.stop))
+        for first in range(self.samples.start, self.samples.stop, BLOCK_SAMPLES):
+            yield slice(max(self.samples.start, first - overlap), min(first + BLOCK_SAMPLES, self.samples.stop))
 
 
 def reconstruct(
@@ -203,14 +203,15 @@ def moving(clip: Clip) -> np.ndarray:
         return np.array([True])
     poses = clip.poses
     ranges = np.ptp(poses.positions, axis=1).max(axis=1) * clip.metres_per_unit, np.ptp(poses.quaternions, axis=1)
-    return (ranges[0] > STILL) | (ranges[1].max(axis=1) > STILL)
+    return (ranges[0] > MAX_STILL_CHANGE) | (ranges[1].max(axis=1) > MAX_STILL_CHANGE)
 
 
 # -- modes that are one motion ----------------------------------------------------------------------------------------
 
 
 def same_motions(clip: Clip, modes: Sequence[str]) -> Groups:
-    """Return the modes in groups that are one motion of this clip, seen with about every `PROBE`th sample as a key.
+    """Return the modes in groups that are one motion of this clip, seen with about every `PROBE_KEY_STRIDE`th sample as
+    a key.
 
     Each is on its own where there are too few samples to see it.
     """
@@ -221,8 +222,8 @@ def same_motions(clip: Clip, modes: Sequence[str]) -> Groups:
 
 
 def probing(clip: Clip) -> Uniform:
-    """About every `PROBE`th sample as a key."""
-    rate = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0]) / PROBE
+    """About every `PROBE_KEY_STRIDE`th sample as a key."""
+    rate = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0]) / PROBE_KEY_STRIDE
     return Uniform(f"{max(rate, 1e-6):.6f}")
 
 
@@ -232,7 +233,7 @@ def identical_modes(made: Reconstruction) -> Groups:
     The same means: apart by less than a millionth of their error, by the shell measure, or than what rounding does.
     Some modes are one curve by theory (ScLERP and the SLERP of motors); this looks whether they were.
     """
-    samples = np.unique(np.linspace(made.samples.start, made.samples.stop - 1, COMPARED).astype(int))
+    samples = np.unique(np.linspace(made.samples.start, made.samples.stop - 1, COMPARED_SAMPLES).astype(int))
     truth = made.truth(samples)
     shown = {mode: made.shown(mode, made.clip.times[samples]) for mode in made.keys}
     return alike(shown, {mode: float(shell_error(poses, truth).max()) for mode, poses in shown.items()})
@@ -351,13 +352,13 @@ def errors_of(made: Reconstruction, mode: str, ground: Ground) -> MotionErrors:
     return MotionErrors(shell, position, rotation, velocity, slid, still, largest, places)
 
 
-STAYS = 0.01
+MAX_PIVOT_DRIFT_M = 0.01
 """Metres from its mean place up to which a point stays: as a pivot does that is held by hand."""
 
-NEAR = 1.0
+MAX_PIVOT_DISTANCE_M = 1.0
 """Metres from the origin of a body to a point of it, at most."""
 
-MOVES = 10.0
+MIN_MOVE_PER_DRIFT = 10.0
 """How many times as far the origin or the shell of a body gets that has such a point: else all of it stays."""
 
 
@@ -371,9 +372,15 @@ def still_point(poses: Poses) -> np.ndarray | None:
     matrices = np.swapaxes(turns - turns.mean(axis=0), 1, 2).reshape(-1, 3)
     point = np.linalg.lstsq(matrices, -ways.ravel(), rcond=1e-3)[0]
     moved = np.max(np.linalg.norm(matrices.reshape(-1, 3, 3) @ point + ways, axis=1))
-    arms = np.max(np.linalg.norm(matrices.reshape(-1, 3, 3), axis=(1, 2))) * RIGID
+    arms = np.max(np.linalg.norm(matrices.reshape(-1, 3, 3), axis=(1, 2))) * RIGID_RADIUS_M
     farthest = max(np.max(np.linalg.norm(ways, axis=1)), arms)
-    return point if moved < STAYS and np.linalg.norm(point) < NEAR and farthest > MOVES * moved else None
+    return (
+        point
+        if moved < MAX_PIVOT_DRIFT_M
+        and np.linalg.norm(point) < MAX_PIVOT_DISTANCE_M
+        and farthest > MIN_MOVE_PER_DRIFT * moved
+        else None
+    )
 
 
 def point_at(poses: Poses, point: np.ndarray) -> np.ndarray:

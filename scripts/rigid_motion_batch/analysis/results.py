@@ -21,7 +21,7 @@ from .reconstructions import Ground, MotionErrors, Reconstruction, errors_of, id
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class MotionResult:
     """What one or several modes make of a clip under a choice of keys: a line of the chart, a lane of the film."""
 
     modes: tuple[str, ...]
@@ -64,7 +64,7 @@ class ChoiceResult:
     first: int
     """The sample of the clip with which those begin that are compared."""
 
-    motions: tuple[Motion, ...]
+    motions: tuple[MotionResult, ...]
 
     keys: Mapping[str, Keys]
     """The keys of every mode."""
@@ -130,7 +130,7 @@ def measured(made: Reconstruction) -> ChoiceResult:
         errors = kept[group[0]]
         poses = _places(errors.places) if clip.rest_body else clip.in_blender(made.filled_in(group[0], made.times))
         motions.append(
-            Motion(
+            MotionResult(
                 group,
                 tuple(rows[mode] for mode in group),
                 key_samples(made.keys[group[0]]),

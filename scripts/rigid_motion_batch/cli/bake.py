@@ -17,15 +17,15 @@ SCRIPT = "bake.py"
 PROGRAM = program_of(SCRIPT)
 
 from rigid_motion_batch.keying.options import EXIT_CODES, add_file_options, add_target_options, refuse_odd_places
-from rigid_motion_batch.keying.planning import Job, named_file, planned
+from rigid_motion_batch.keying.planning import InputJob, named_file, planned
 from rigid_motion_batch.keying.records import is_made
 from rigid_motion_batch.keying.sessions import do_all
-from rigid_motion_batch.keying.work import Doing, Work
+from rigid_motion_batch.keying.work import RunningJob, Work
 
 BAKED, UNBAKED = "-baked", "-unbaked"
 """Endings of the names of files that are written."""
 
-STEPS = 0.01, 1e6
+STEP_RANGE_FRAMES = 0.01, 1e6
 """Frames from key to key: keys closer than that are one key to Blender."""
 
 EPILOG = """
@@ -64,7 +64,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys = parser.add_argument_group("keys")
     keys.add_argument(
         "--step",
-        type=bounded("number of frames", *STEPS),
+        type=bounded("number of frames", *STEP_RANGE_FRAMES),
         metavar="N",
         help="frames from key to key; 0.25 for keys between the frames (1)",
     )
@@ -105,7 +105,7 @@ class Bake(Work):
     step: float
     interpolation: str
 
-    def do(self, doing: Doing) -> None:
+    def do(self, doing: RunningJob) -> None:
         from rigid_motion_batch.keying.baking import baking
         from rigid_motion_batch.keying.jobs import do_blend
 
@@ -117,21 +117,21 @@ class Unbake(Work):
 
     doing, done = "Un-baking", "un-baked"
 
-    def do(self, doing: Doing) -> None:
+    def do(self, doing: RunningJob) -> None:
         from rigid_motion_batch.keying.baking import unbaking
         from rigid_motion_batch.keying.jobs import do_blend
 
         do_blend(doing, unbaking())
 
 
-def _planned(options: argparse.Namespace) -> list[Job]:
+def _planned(options: argparse.Namespace) -> list[InputJob]:
     suffix = UNBAKED if options.unbake else BAKED
     named = named_file(options.output, options.files, (".blend",))
 
-    def job_of(source: str, folder: Path) -> Job:
+    def job_of(source: str, folder: Path) -> InputJob:
         file = Path(source)
         made = file if options.in_place else named or folder / f"{file.stem}{suffix}{file.suffix.lower()}"
-        return Job(source, made.parent, made)
+        return InputJob(source, made.parent, made)
 
     def is_result(path: Path) -> bool:
         if options.unbake:

@@ -34,10 +34,10 @@ To install it: drag it into a Blender window, or Edit > Preferences > Get Extens
 Exit code: 0 done, 2 it could not be built, or Blender calls it invalid.
 """
 
-BESIDE = (MANIFEST, LICENSE)
+OTHER_FILES = (MANIFEST, LICENSE)
 """Files that go into the zip beside the package."""
 
-EPOCH = (1980, 1, 1, 0, 0, 0)
+ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)
 """The time of every file in the zip, the earliest that a zip can hold: the same bytes whenever it is built."""
 
 
@@ -71,7 +71,7 @@ def _stage(folder: Path) -> None:
     """Lay out the extension as it is to be in the zip."""
     try:
         shutil.copytree(EXTENSION, folder, ignore=shutil.ignore_patterns("__pycache__", "py.typed"))
-        for path in BESIDE:
+        for path in OTHER_FILES:
             shutil.copy(path, folder)
     except FileNotFoundError as error:
         raise BuildError(f"{error.filename} is missing; `git checkout` brings it back") from error
@@ -97,7 +97,7 @@ def _repack(built: Path, package: Path) -> None:
         zipfile.ZipFile(package, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target,
     ):
         for name in sorted(source.namelist()):
-            entry = zipfile.ZipInfo(name, EPOCH)
+            entry = zipfile.ZipInfo(name, ZIP_EPOCH)
             entry.create_system, entry.external_attr = 3, 0o644 << 16  # Unix, also when built on Windows
             entry.compress_type = zipfile.ZIP_DEFLATED
             target.writestr(entry, source.read(name))

@@ -15,11 +15,11 @@ from rigid_motion_batch.analysis.choices import Tolerance, radius_in_metres
 from rigid_motion_batch.command_line import INSTALLED, Parser, bounded, not_empty
 from rigid_motion_batch.keying.cleaning import SUFFIX, TABLES, Cleaning, do_cleaning
 from rigid_motion_batch.keying.options import EXIT_CODES, add_dry_run, add_file_options
-from rigid_motion_batch.keying.planning import Job, file_and_body, named_file, planned
+from rigid_motion_batch.keying.planning import InputJob, file_and_body, named_file, planned
 from rigid_motion_batch.keying.records import is_made
 from rigid_motion_batch.keying.reductions import name_of
 from rigid_motion_batch.keying.sessions import do_all
-from rigid_motion_batch.keying.work import Doing, Work
+from rigid_motion_batch.keying.work import RunningJob, Work
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.recordings.gltf import ENDINGS as GLTF
 from rigid_motion_batch.recordings.options import add_reading_options, reading_options
@@ -31,7 +31,7 @@ IN_FOLDERS = (".bvh", ".chan", ".csv", ".g2o", ".tsv", ".tum")
 
 ANIMATED = (".blend", ".fbx", *GLTF)
 
-FOCAL = 2667.0
+DEFAULT_FOCAL_PX = 2667.0
 """Pixels: a lens of 50 mm on 36 mm, 1920 pixels wide, as cameras in Blender begin."""
 
 EPILOG = f"""
@@ -70,10 +70,10 @@ class Clean(Work):
     doing, done = "Cleaning", "cleaned"
     how: Cleaning
 
-    def needs_blender(self, job: Job) -> bool:  # noqa: ARG002 - none does
+    def needs_blender(self, job: InputJob) -> bool:  # noqa: ARG002 - none does
         return False
 
-    def do(self, doing: Doing) -> None:
+    def do(self, doing: RunningJob) -> None:
         do_cleaning(doing, self.how)
 
 
@@ -109,7 +109,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
         "--focal",
         type=bounded("focal length", 1.0, 1e6),
         metavar="PIXELS",
-        help=f"with --pixels: the focal length in pixels ({FOCAL:.0f}, for 50 mm on 36 mm and 1920 pixels)",
+        help=f"with --pixels: the focal length in pixels ({DEFAULT_FOCAL_PX:.0f}, for 50 mm on 36 mm and 1920 pixels)",
     )
     add_reading_options(parser)
     add_file_options(parser, blend=False)
@@ -133,21 +133,21 @@ def _how_far(options: argparse.Namespace) -> tuple[Tolerance | None, float | Non
         raise ValueError("--pixels is a tolerance itself: leave out --tolerance and --radius")
     if not options.nearest:
         raise ValueError("--pixels needs to know how near anything is: --nearest 2m")
-    length = options.pixels * options.nearest / (options.focal or FOCAL)
+    length = options.pixels * options.nearest / (options.focal or DEFAULT_FOCAL_PX)
     return Tolerance(f"{1e3 * length:.6f}mm"), options.nearest
 
 
-def _planned(options: argparse.Namespace) -> list[Job]:
+def _planned(options: argparse.Namespace) -> list[InputJob]:
     first, _ = file_and_body(options.inputs[0])
     named = named_file(options.output, options.inputs, (first.suffix.lower(), *TABLES))
 
-    def job_of(source: str, folder: Path) -> Job:
+    def job_of(source: str, folder: Path) -> InputJob:
         file, body = file_and_body(source)
         made = named or folder / f"{name_of(file, body)}{SUFFIX}{file.suffix}"
         problem = ""
         if file.suffix.lower() in ANIMATED:
             problem = "this is animated, and not recorded: open or import it in Blender, and use Clean Motion"
-        return Job(source, made.parent, made, is_recording=True, problem=problem)
+        return InputJob(source, made.parent, made, is_recording=True, problem=problem)
 
     def is_result(path: Path) -> bool:
         return path.stem.endswith(SUFFIX) or is_made(path)

@@ -27,14 +27,14 @@ from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline.comparison import IN_BLENDER, TABLES, ComparisonPlan
 from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor, processors
 from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, explain, share_of, survey
-from rigid_motion_batch.pipeline.steps import VERSION, RunError, version_here
+from rigid_motion_batch.pipeline.steps import VERSION_VARIABLE, RunError, version_here
 from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.pipeline.studies import Comparison
 from rigid_motion_batch.places import brings, manifest
-from rigid_motion_batch.progress import FARM, Progress
+from rigid_motion_batch.progress import FARM_VARIABLE, Progress
 from rigid_motion_batch.report.held import slip_sentences, still_sentences
 from rigid_motion_batch.report.numbers import error_is
-from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.report.settings import PageSettings
 from rigid_motion_batch.scenes.settings import MODELS, SubjectError
 from rigid_motion_batch.supervising import blender_program, report
 from rigid_motion_batch.system_libraries import missing_for_rendering, way_out, without_blender
@@ -43,13 +43,13 @@ from . import terminal
 
 PROGRAM = program_of(SCRIPT)
 
-SAYING = ("--explain", "--json", "--open", "--quiet")
+TEXT_OPTIONS = ("--explain", "--json", "--open", "--quiet")
 """Options that are about what is printed, and are no part of the command that a report names."""
 
-DRAWING = steps.STAGES[steps.STAGES.index("build") :]
+DRAWING_STAGES = steps.STAGES[steps.STAGES.index("build") :]
 """Stages after all is measured."""
 
-STARTING = 120.0
+BLENDER_START_S = 120.0
 """Seconds that a Blender has to say which it is."""
 
 
@@ -57,12 +57,12 @@ def main(arguments: list[str]) -> int:
     """Run a comparison, and return the exit code."""
     options = parse(arguments)
     try:
-        if (requested := os.environ.get(VERSION)) and requested != (result := version_here()):
+        if (requested := os.environ.get(VERSION_VARIABLE)) and requested != (result := version_here()):
             raise RunError(f"this machine has {result}, and the bundle is of {requested}")
         if not find_spec("vl_convert"):
             raise RunError(f"this needs the module vl_convert, which {brings('compare', 'compare')} brings")
         blender = _blender(options)
-        said = [argument for argument in arguments if argument not in SAYING]
+        said = [argument for argument in arguments if argument not in TEXT_OPTIONS]
         comparison = comparison_of(options, as_typed(PROGRAM, said, options.inputs), blender)
         output = options.output or free_folder(options.inputs)
         if not options.overwrite:
@@ -106,7 +106,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         fit=options.fit,
         stage=stage,
         every_film=options.films == ALL,
-        about=Settings(
+        about=PageSettings(
             options.radius.rigid,
             f"{manifest()['name']} {manifest()['version']}",
             command,
@@ -159,7 +159,7 @@ def version_of(blender: str) -> str:
     """Return the version of a Blender program, "5.2.3". Raises RunError if it cannot be run or is no Blender."""
     reason = "this does not say that it is Blender"
     try:
-        ended = subprocess.run([blender, "--version"], capture_output=True, timeout=STARTING, check=False)
+        ended = subprocess.run([blender, "--version"], capture_output=True, timeout=BLENDER_START_S, check=False)
         if said := re.search(rb"^Blender (\d+\.\d+\.\d+)", ended.stdout, re.MULTILINE):
             return said[1].decode()
     except (OSError, ValueError, subprocess.TimeoutExpired) as error:
@@ -206,7 +206,7 @@ class _Comparing:
             self._do("Reading", self.plan.reading)
             if self.work.interrupted or self.work.problem or self.options.only:
                 return self._end()
-        notes = self.plan.look_into()
+        notes = self.plan.inspect_clips()
         warnings = [
             "; ".join(filter(None, (f"{study.name}: {warning.text}", warning.way_out)))
             for study in self.plan.studies
@@ -218,7 +218,7 @@ class _Comparing:
             self._say_nothing_to_compare()
             return 2
         if self.options.only:
-            if self.options.only in DRAWING:
+            if self.options.only in DRAWING_STAGES:
                 self.plan.conclude()
             self._do(self.options.only.capitalize(), self.plan.tasks)
             if self.options.only == "report":
@@ -314,7 +314,7 @@ class _Comparing:
             holds = "The report holds what was ready" if there else "There is no new report yet"
             print(f"Stopped. {holds}; the same command goes on from here.", file=sys.stderr)
         # After a failure a farm would not begin the stages behind it: what is missing is the report's to say.
-        failed = outcome.failures and not (os.environ.get(FARM) == "openjd" and self.options.only != "report")
+        failed = outcome.failures and not (os.environ.get(FARM_VARIABLE) == "openjd" and self.options.only != "report")
         code = 130 if outcome.interrupted else 2 if outcome.problem else int(bool(failed))
         if self.options.json:
             print(json.dumps(self._as_data(page if there else None, code), indent=1, ensure_ascii=False), flush=True)
@@ -354,7 +354,7 @@ def _explain(plan: ComparisonPlan, store: Store, options: argparse.Namespace) ->
         if options.only != "read":
             lines.append("What follows from these recordings is known when they have been read.")
     elif options.only != "read":
-        plan.look_into()
+        plan.inspect_clips()
         plan.conclude()
         lines += reasons(plan.tasks)
         if plan.comparison.stage and any(not store.index_of(task.key) for task in plan.measuring()):

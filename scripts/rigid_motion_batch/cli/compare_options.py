@@ -10,8 +10,8 @@ from dataclasses import fields
 from rigid_motion.motion import MODES
 from rigid_motion_batch.analysis.choices import (
     EVERYWHERE,
-    JOINT,
-    RIGID,
+    JOINT_RADIUS_M,
+    RIGID_RADIUS_M,
     Budget,
     Choice,
     Tolerance,
@@ -118,7 +118,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=read_radii,
         default=EVERYWHERE,
         metavar="LENGTH",
-        help=f"radius of the shell error: 3cm, or 0.03 for metres ({RIGID}, around the joints of bodies {JOINT})",
+        help=f"radius of the shell error: 3cm, or 0.03 for metres ({RIGID_RADIUS_M}, around the joints of bodies "
+        f"{JOINT_RADIUS_M})",
     )
     parser.add_argument(
         "--against",

@@ -7,7 +7,7 @@ from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
-from rigid_motion_batch.pipeline.steps import OWN, RunError
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER, RunError
 from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.places import output_folder
 from rigid_motion_batch.recordings import TrajectoryError
@@ -47,7 +47,7 @@ def _is_same(folder: Path, sources: list[str]) -> bool:
 
 def _held(folder: Path) -> dict[str, str] | None:
     """Return the recordings that a folder holds the comparison of, and their digests; None where it holds none."""
-    return Store(folder).noted(RECORD) if (folder / OWN).is_dir() else None
+    return Store(folder).noted(RECORD) if (folder / OWN_FOLDER).is_dir() else None
 
 
 def _places(sources: list[str], folder: Path) -> list[str]:

@@ -15,15 +15,15 @@ from dataclasses import asdict
 from rigid_motion_batch.command_line import INSTALLED, Parser, complain, listed, not_empty, printable
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.recordings import TrajectoryError, files_of
-from rigid_motion_batch.recordings.inspecting import Contents, Inspection, Trembling, inspect
+from rigid_motion_batch.recordings.inspecting import Contents, Inspection, MeasuredTrembling, inspect
 from rigid_motion_batch.recordings.options import add_reading_options, reading_options
 
 PROGRAM = f"{'python scripts/bootstrap.py' if CHECKOUT else INSTALLED} inspect"
 
-LISTED = 12
+MAX_LISTED_NAMES = 12
 """Names of bodies or joints in a line."""
 
-WIDTH = 100
+LINE_CHARACTERS = 100
 """Characters of a line."""
 
 EPILOG = f"""
@@ -80,7 +80,7 @@ def _lines(result: Inspection) -> Iterator[str]:
     size = f"{result.bytes / 1e6:.1f} MB" if result.bytes >= 1e6 else f"{result.bytes / 1e3:.1f} KB"
     yield printable(f"{result.source}: {result.format}, {size}")
     if len(result.bodies) > 1:
-        yield from _row("bodies", f"{listed(result.bodies, LISTED)} ({len(result.bodies)})")
+        yield from _row("bodies", f"{listed(result.bodies, MAX_LISTED_NAMES)} ({len(result.bodies)})")
     axes = f"{result.axes.name} ({result.axes.described}), {result.axes.known_from}"
     if result.axes.others:
         axes += f"; {result.contents[0].up} seems to be up, as in {' and '.join(result.axes.others)}: --axes"
@@ -97,7 +97,7 @@ def _lines(result: Inspection) -> Iterator[str]:
 def _body(body: Contents) -> Iterator[str]:
     timing, size = body.timing, body.size
     if body.joints:
-        yield from _row("  joints", f"{listed(body.joints, LISTED)} ({len(body.joints)})")
+        yield from _row("  joints", f"{listed(body.joints, MAX_LISTED_NAMES)} ({len(body.joints)})")
     samples = f"{timing.samples} in {timing.seconds:.4g} s"
     if timing.recorded != timing.samples:
         samples += f", of {timing.recorded} in the file"
@@ -122,17 +122,17 @@ def _body(body: Contents) -> Iterator[str]:
             yield from _row("", f"-> {warning.way_out}")
 
 
-def _trembling(found: Trembling) -> str:
+def _trembling(found: MeasuredTrembling) -> str:
     text = "not to be told from motion"
     if found.position or found.rotation:
         text = f"by {1e3 * found.position:.2g} mm and {found.rotation:.2g} degrees"
     if found.spikes:
         text += f"; {len(found.spikes)} samples are spikes or repeat the one before: at "
-        text += f"{listed([f'{time:.4g} s' for time in found.spikes], LISTED)}"
+        text += f"{listed([f'{time:.4g} s' for time in found.spikes], MAX_LISTED_NAMES)}"
     return text
 
 
 def _row(name: str, text: str) -> list[str]:
     return textwrap.wrap(
-        text, WIDTH, initial_indent=f"  {name:<11}", subsequent_indent=" " * 13, break_on_hyphens=False
+        text, LINE_CHARACTERS, initial_indent=f"  {name:<11}", subsequent_indent=" " * 13, break_on_hyphens=False
     )

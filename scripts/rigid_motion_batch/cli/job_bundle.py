@@ -20,22 +20,22 @@ from rigid_motion_batch.cli.compare_options import without
 from rigid_motion_batch.command_line import complain, parser_of, program_of, whole
 from rigid_motion_batch.files import write_text
 from rigid_motion_batch.pipeline.comparison_steps import STAGES
-from rigid_motion_batch.pipeline.steps import VERSION, version_here
+from rigid_motion_batch.pipeline.steps import VERSION_VARIABLE, version_here
 from rigid_motion_batch.places import PACKAGE, output_folder
 
 SCRIPT = "job_bundle.py"
 PROGRAM = program_of(SCRIPT)
 
-PARTS = 16
+DEFAULT_TASKS = 16
 """Tasks that a stage is split into, unless requested otherwise."""
 
 MOST_PARTS = 1024
 """Values of a parameter, in Open Job Description."""
 
-FILMING = ("build", "render", "encode")
+FILM_STAGES = ("build", "render", "encode")
 """The stages at the end of which there are films."""
 
-WHOLE = ("slip", "report")
+WHOLE_STAGES = ("slip", "report")
 """The stages that are not split."""
 
 INPUTS = "{{Param.Inputs}}"
@@ -60,8 +60,8 @@ def main(arguments: list[str]) -> int:
         complain(PROGRAM, "--scheduler, --only and --explain are for a run of compare.py itself; leave them out")
         return 2
     output = (options.output or output_folder("comparison")).absolute()
-    stages = [stage for stage in STAGES if options.stage or stage not in FILMING]
-    parts = {stage: 1 if stage in WHOLE else own.parts for stage in stages}
+    stages = [stage for stage in STAGES if options.stage or stage not in FILM_STAGES]
+    parts = {stage: 1 if stage in WHOLE_STAGES else own.parts for stage in stages}
     try:
         rest, inputs = below_inputs(without(rest, "-o", "--output"))
         values = write_bundle(own.bundle.absolute(), rest, inputs, output, parts)
@@ -86,7 +86,7 @@ def write_bundle(
     """
     template = json.loads(Path(__file__).with_name("job_template.json").read_text(encoding="utf-8"))
     template["name"] = output.name
-    template["jobEnvironments"][0]["variables"][VERSION] = version_here()
+    template["jobEnvironments"][0]["variables"][VERSION_VARIABLE] = version_here()
     for before, (stage, count) in zip(["", *parts], parts.items(), strict=False):
         share = "--output", "{{Param.Output}}", "--only", stage, "--part", f"{{{{Task.Param.Part}}}}/{count}"
         command = ["-m", "rigid_motion_batch", "compare", *arguments, *share]
@@ -142,7 +142,7 @@ def _parse(arguments: list[str]) -> tuple[argparse.Namespace, list[str]]:
     parser.add_argument(
         "--parts",
         type=whole("number of tasks", 1, MOST_PARTS),
-        default=PARTS,
+        default=DEFAULT_TASKS,
         metavar="N",
         help=f"tasks that each stage is split into, at most {MOST_PARTS} (%(default)s)",
     )

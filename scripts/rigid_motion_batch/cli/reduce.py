@@ -23,14 +23,14 @@ PROGRAM = program_of(SCRIPT)
 from rigid_motion.gltf.clips import CHANNELS
 from rigid_motion.gltf.sizes import OF_A_BODY, OF_KEY_POSES
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.analysis.choices import RIGID, Tolerance, radius_in_metres
+from rigid_motion_batch.analysis.choices import RIGID_RADIUS_M, Tolerance, radius_in_metres
 from rigid_motion_batch.keying.gltf_files import do_gltf
 from rigid_motion_batch.keying.options import EXIT_CODES, add_file_options, add_target_options, refuse_odd_places
-from rigid_motion_batch.keying.planning import NAMES_OF_FILES, Job, file_and_body, named_file, planned
-from rigid_motion_batch.keying.records import FileProblem, Record, is_made, refuse_read_only
-from rigid_motion_batch.keying.reductions import GLB_SUFFIX, RATES, SUFFIX, TOLERANCE, Reductions, name_of
+from rigid_motion_batch.keying.planning import NAMES_OF_FILES, InputJob, file_and_body, named_file, planned
+from rigid_motion_batch.keying.records import FileProblem, InputRecord, is_made, refuse_read_only
+from rigid_motion_batch.keying.reductions import FRAME_RATE_RANGE, GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, name_of
 from rigid_motion_batch.keying.sessions import do_all
-from rigid_motion_batch.keying.work import Doing, Outcome, Work
+from rigid_motion_batch.keying.work import Outcome, RunningJob, Work
 from rigid_motion_batch.places import manifest
 from rigid_motion_batch.recordings.gltf import ENDINGS as GLTF
 from rigid_motion_batch.recordings.options import add_clean_option, add_reading_options, reading_options
@@ -43,7 +43,7 @@ MODE = "motor_spline"
 
 PAGE = "report.html"
 
-MOST = 1000000
+MAX_KEYS = 1000000
 """Keys that can be asked for: Blender's last frame."""
 
 EPILOG = """
@@ -124,7 +124,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--keys",
         "--key-poses",
         dest="count",
-        type=whole("number of keys", 2, MOST),
+        type=whole("number of keys", 2, MAX_KEYS),
         metavar="N",
         help="instead of a tolerance: N keys of each object, or N key poses of each rig, where the error is smallest",
     )
@@ -143,7 +143,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         metavar="LENGTH",
         help="how far around the origin of each object, bone and node no point is off by more: 3cm, or 0.03 for "
         "metres (as far as what it carries reaches, and 3 cm of a grown-up at least, in proportion; in glTF files what "
-        f"a node carries counts in any case; for rigid recordings {RIGID})",
+        f"a node carries counts in any case; for rigid recordings {RIGID_RADIUS_M})",
     )
     keys.add_argument(
         "--shared", action="store_true", help="key poses: all bones of a rig get their keys on the same frames"
@@ -157,7 +157,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     recordings.add_argument("--blend", action="store_true", help="also write rigid motions as .blend files")
     recordings.add_argument(
         "--fps",
-        type=whole("number of frames a second", *RATES),
+        type=whole("number of frames a second", *FRAME_RATE_RANGE),
         metavar="N",
         help="frames a second of .blend and GLB files (the rate of the recording)",
     )
@@ -230,7 +230,7 @@ def _page(options: argparse.Namespace, command: str) -> Callable[[Sequence[Outco
     from rigid_motion_batch.report.reduced import write_reduced
 
     path = options.report
-    record = Record(path.parent, path, overwrite=options.overwrite)
+    record = InputRecord(path.parent, path, overwrite=options.overwrite)
     try:
         record.refuse_to_replace(path)
         refuse_read_only(path)
@@ -257,12 +257,12 @@ class Reduce(Work):
     doing, done = "Reducing", "reduced"
     how: Reductions
 
-    def needs_blender(self, job: Job) -> bool:
+    def needs_blender(self, job: InputJob) -> bool:
         if job.is_recording and not (self.how.blend or self.how.glb or self.how.curves):
             return not job.problem and job.file.suffix.lower() not in (*TEXT, *JSON)
         return not job.problem and (job.is_recording or not _is_gltf(job.file))
 
-    def do(self, doing: Doing) -> None:
+    def do(self, doing: RunningJob) -> None:
         if doing.job.is_recording:
             from rigid_motion_batch.keying.recordings import do_recording
 
@@ -280,7 +280,7 @@ class Reduce(Work):
             do_blend(doing, reducing(self.how, self.objects))
 
 
-def _planned(options: argparse.Namespace) -> list[Job]:
+def _planned(options: argparse.Namespace) -> list[InputJob]:
     """Return what is to be done: a body of a file is a recording,
     and so is a glTF file of which a .blend file is to be made.
 
@@ -298,17 +298,17 @@ def _planned(options: argparse.Namespace) -> list[Job]:
         raise ValueError(f"--output {options.output}: add --glb, and {first} becomes a GLB file")
     named = named_file(options.output, options.inputs, endings)
 
-    def job_of(source: str, folder: Path) -> Job:
+    def job_of(source: str, folder: Path) -> InputJob:
         folder = named.parent if named else folder
         if source.lower().endswith(whole):
             file = Path(source)
             made = file if options.in_place else named or folder / f"{file.stem}{GLB_SUFFIX}{kind_of(file)}"
-            return Job(source, made.parent, made)
+            return InputJob(source, made.parent, made)
         name, suffix = name_of(*file_and_body(source)), GLB_SUFFIX if options.glb else SUFFIX
         made = named.with_suffix("") if named else folder / f"{name}{suffix}"
         kind = named.suffix.lower() if named else ""
         possible = (".glb",) if options.glb else tuple(dict.fromkeys((kind or ".csv", ".blend")))
-        return Job(source, folder, made, possible, kind, is_recording=True)
+        return InputJob(source, folder, made, possible, kind, is_recording=True)
 
     return planned(options.inputs, None if named else options.output, IN_FOLDERS, _is_result, job_of)
 
@@ -341,7 +341,7 @@ def _refuse_odd(options: argparse.Namespace) -> None:
         raise ValueError("--objects is for .blend files: of a recording name one body with FILE:BODY")
 
 
-def _refuse_beside_glb(options: argparse.Namespace, jobs: list[Job]) -> None:
+def _refuse_beside_glb(options: argparse.Namespace, jobs: list[InputJob]) -> None:
     """Raise ValueError for options that say nothing of GLB files."""
     for option in ("--mode", "--blend", "--in-place", "--objects", "--discard"):
         if getattr(options, option[2:].replace("-", "_")):

@@ -10,33 +10,33 @@ from contextlib import closing, contextmanager, nullcontext
 
 from rigid_motion.live.sockets import Port
 from rigid_motion.motion import rms
-from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams import Receiver, Sender, StreamBody
 from rigid_motion.streams.bodies import Forest
-from rigid_motion.streams.paths import Path
-from rigid_motion.streams.sender import KEEPALIVE
+from rigid_motion.streams.paths import KnotPath
+from rigid_motion.streams.sender import KEEPALIVE_S
 from rigid_motion_batch.command_line import complain, path_line
 from rigid_motion_batch.progress import Progress
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming import vmc
-from rigid_motion_batch.streaming.measuring import HEADERS
+from rigid_motion_batch.streaming.measuring import HEADER_BYTES
 from rigid_motion_batch.streaming.receiving import Receiving
-from rigid_motion_batch.streaming.rooms import EVERYWHERE, HERE, MOTION, Room, opened
-from rigid_motion_batch.streaming.sending import Sending, even_rate, found_held, hand_of, samples_of, together
-from rigid_motion_batch.streaming.written import Motion, Tracks, write_motions
+from rigid_motion_batch.streaming.rooms import ANY_ADDRESS, LOOPBACK_ADDRESS, MOTION, Room, opened
+from rigid_motion_batch.streaming.sending import RoomSending, even_rate, found_held, hand_of, samples_of, together
+from rigid_motion_batch.streaming.written import ReceivedMotion, Tracks, write_motions
 from rigid_motion_batch.supervising import report, stop_signals
 
 from . import stream_measure
-from .stream_options import DELAY, PROGRAM, parse
+from .stream_options import DEFAULT_DELAY_S, PROGRAM, parse
 
-LOOK = 0.2
+ROUTER_LOOK_S = 0.2
 """Seconds after which a router looks up."""
 
-FRAME = 0.01
+PERFORMER_LOOK_S = 0.01
 """Seconds after which what another program performs is looked at."""
 
-ALMOST = 0.9
+DUE_INTERVAL_RATIO = 0.9
 """Part of the interval of an even stream after which a key is due."""
 
 
@@ -67,15 +67,15 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
         return
     clips = _read(options.recordings, options)
     rate = options.rate
-    if options.to_vmc and not rate and clips[0].samples_a_second > vmc.RATE:
-        rate = vmc.RATE
+    if options.to_vmc and not rate and clips[0].samples_a_second > vmc.MAX_FRAMES_PER_S:
+        rate = vmc.MAX_FRAMES_PER_S
     bodies, moments, poses = together(clips, rate)
     if options.to_vmc:
         with Progress() as progress, progress.stage("Playing", float(moments[-1] - moments[0])) as stage:
             _say(f"datagrams: {vmc.play(bodies[0], moments, poses, options.to_vmc, stopped, stage.reach)}")
         return
-    delay = options.delay or (1.0 / options.rate if options.rate else DELAY)
-    keepalive = ALMOST / options.rate if options.rate else KEEPALIVE
+    delay = options.delay or (1.0 / options.rate if options.rate else DEFAULT_DELAY_S)
+    keepalive = DUE_INTERVAL_RATIO / options.rate if options.rate else KEEPALIVE_S
     tolerance, rate = options.tolerance.tolerance(clips[0]), options.rate or even_rate(moments)
     sender = Sender(bodies, tolerance, delay, rate, keepalive)
     held = [(tool, hand_of(hand)) for tool, hand in options.held or ()] or found_held(clips)
@@ -85,7 +85,7 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
         _say(f"{options.user} sends {', '.join(body.name for body in bodies)} to {options.room}")
         _say(*(f"{', '.join(filter(None, hand))} holds {tool}" for tool, hand in held))
         with progress.stage("Sending", float(moments[-1] - moments[0])) as stage:
-            sending = Sending(room, options.user, sender)
+            sending = RoomSending(room, options.user, sender)
 
             def reach(done: float) -> None:
                 stage.reach(done, f"{sending.datagrams} datagrams")
@@ -94,7 +94,7 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
             if stopped:
                 stage.total = max(stage.done, 1e-9)
         a_second = 1.0 / max(seconds, 1e-9)
-        headers = HEADERS * sending.datagrams
+        headers = HEADER_BYTES * sending.datagrams
         _say(
             f"joined: {sending.joined}",
             f"datagrams: {sending.datagrams}",
@@ -105,17 +105,17 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
 
 def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
     """Send what another program performs until that is to end. Raises what says why it could not be."""
-    tolerance, delay = options.tolerance.metres(1.0), options.delay or DELAY
-    sending: Sending | None = None
+    tolerance, delay = options.tolerance.metres(1.0), options.delay or DEFAULT_DELAY_S
+    sending: RoomSending | None = None
     receiver = Receiver()
-    sent: tuple[Body, ...] = ()
+    sent: tuple[StreamBody, ...] = ()
     with _room(options) as room, Port(port=options.from_vmc) as port:
         _say(f"{options.user} listens to port {port.number} and sends to {options.room}")
         while not stopped:
             for keys in vmc.performed(port, receiver):
                 ahead = float(keys.moments[-1]) - time.monotonic()
                 if sending is None:
-                    sending = Sending(room, options.user, Sender(keys.bodies, tolerance, delay), ahead)
+                    sending = RoomSending(room, options.user, Sender(keys.bodies, tolerance, delay), ahead)
                 elif keys.bodies is not sent:  # Bones or trackers came that were not there before.
                     sending.sender = Sender(keys.bodies, tolerance, delay)
                     sending.say(sending.sender.join())
@@ -124,9 +124,9 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
                     poses = {name: poses[:, sample] for name, poses in keys.poses.items()}
                     sending.say(sending.sender.add(moment, poses))
             if sending:
-                sending.answer(FRAME)
+                sending.answer(PERFORMER_LOOK_S)
             else:
-                time.sleep(FRAME)
+                time.sleep(PERFORMER_LOOK_S)
         if sending is None:
             raise ValueError(f"nothing came by VMC at port {port.number}; give the other program this port")
         room.send(options.user, MOTION, None)
@@ -159,7 +159,7 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
         with progress.stage("Receiving", options.seconds) if options.seconds else nullcontext() as stage:
             if stage:
                 receiving.on_frame.append(lambda _: stage.reach(options.seconds - (until - time.monotonic())))
-            receiving.hear(until, stopped)
+            receiving.listen_until(until, stopped)
             if stage:
                 stage.total = max(stage.done, 1e-9)
     for user, datagrams in receiving.datagrams.items():
@@ -180,10 +180,10 @@ def router(options: argparse.Namespace, stopped: list[int]) -> None:
     """Bring together all who come."""
     session = opened("router", options.at, options.network, options.config)
     try:
-        _say(f"Router at {options.at or options.config or (EVERYWHERE if options.network else HERE)}")
+        _say(f"Router at {options.at or options.config or (ANY_ADDRESS if options.network else LOOPBACK_ADDRESS)}")
         until = time.monotonic() + (options.seconds or float("inf"))
         while not stopped and time.monotonic() < until:
-            time.sleep(min(LOOK, max(until - time.monotonic(), 0.0)))
+            time.sleep(min(ROUTER_LOOK_S, max(until - time.monotonic(), 0.0)))
     finally:
         session.close()
 
@@ -223,7 +223,7 @@ def _read(recordings: list[str], options: argparse.Namespace) -> list[Clip]:
     return clips
 
 
-def _error(motion: Motion, truth: Clip | None) -> str:
+def _error(motion: ReceivedMotion, truth: Clip | None) -> str:
     """Return how far off a motion is, as text; nothing where the truth has other joints."""
     if truth is None:
         return ""
@@ -231,7 +231,11 @@ def _error(motion: Motion, truth: Clip | None) -> str:
     within = (motion.times >= times[0]) & (motion.times <= times[-1])
     if len(motion.body.joints) != len(poses) or not within.any():
         return ", which are not those of --truth"
-    off = Forest([motion.body]).errors(motion.poses[:, within], Path(times, poses).at(motion.times[within])).max(axis=0)
+    off = (
+        Forest([motion.body])
+        .errors(motion.poses[:, within], KnotPath(times, poses).at(motion.times[within]))
+        .max(axis=0)
+    )
     return f", error {1000.0 * rms(off):.2f} mm RMS, {1000.0 * float(off.max()):.2f} mm at most"
 
 

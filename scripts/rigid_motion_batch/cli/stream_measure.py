@@ -14,7 +14,7 @@ from typing import cast
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.streams import Body
+from rigid_motion.streams import StreamBody
 from rigid_motion_batch.analysis.choices import Tolerance, radius_in_metres
 from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.axes import from_blender
@@ -104,7 +104,7 @@ def run_held(options: argparse.Namespace, clips: list[Clip]) -> None:
         print(f"{way}: {numbers['bytes_a_second_with_headers']:.0f} bytes a second with headers{slip}")
 
 
-def write(path: Path, clip: Clip, body: Body, times: np.ndarray, shown: Poses) -> None:
+def write(path: Path, clip: Clip, body: StreamBody, times: np.ndarray, shown: Poses) -> None:
     """Write what was shown in the units and axes of the recording."""
     there = from_blender(shown, clip.axes)
     there = Poses(there.positions / clip.metres_per_unit, there.quaternions)

@@ -14,11 +14,11 @@ from rigid_motion.motion import MODES
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.command_line import Parser, as_called, bounded, program_of
 from rigid_motion_batch.recordings.options import add_reading_options, reading_options
-from rigid_motion_batch.streaming.rooms import HERE, PORT, ROOM, USER
+from rigid_motion_batch.streaming.rooms import LOOPBACK_ADDRESS, ROOM, ROUTER_PORT, USER
 
 from . import stream_measure
 
-DELAY = 0.1
+DEFAULT_DELAY_S = 0.1
 """Seconds, unless they are given."""
 
 ENDINGS = (".csv", ".bvh")
@@ -97,7 +97,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     help = "largest error: 5mm, 0.5cm (%(default)s)"
     sending.add_argument("--tolerance", type=Tolerance, default="5mm", metavar="LENGTH", help=help)
     sending.add_argument("--rate", type=_positive, metavar="HZ", help="send a key at each of so many ticks a second")
-    help = f"seconds by which it is shown later ({DELAY}; with --rate one interval)"
+    help = f"seconds by which it is shown later ({DEFAULT_DELAY_S}; with --rate one interval)"
     sending.add_argument("--delay", type=_delay, metavar="S", help=help)
     help = "a body that another, or its joint HAND:JOINT, holds, by their names (what is found to be held by a body)"
     sending.add_argument("--held", nargs=2, action="append", metavar=("TOOL", "HAND"), help=help)
@@ -194,7 +194,7 @@ def _add_room(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def _add_place(parser: argparse.ArgumentParser, what: str) -> None:
-    help = f"{what}: HOST, HOST:PORT, or as Zenoh writes it, tls/HOST:PORT ({HERE}:{PORT})"
+    help = f"{what}: HOST, HOST:PORT, or as Zenoh writes it, tls/HOST:PORT ({LOOPBACK_ADDRESS}:{ROUTER_PORT})"
     parser.add_argument("--at", metavar="ADDRESS", help=help)
     help = "find others on the local network, and be found by them; without it nobody reaches this machine"
     parser.add_argument("--network", action="store_true", help=help)
@@ -221,12 +221,12 @@ def _named(pattern: re.Pattern[str], what: str) -> Callable[[str], str]:
 def _address(text: str) -> tuple[str, int]:
     host, _, port = text.rpartition(":")
     if not (host and port.isascii() and port.isdecimal() and 0 < int(port) <= 65535):
-        raise ValueError(f"{text!r} is no address; give one such as {HERE}:39539")
+        raise ValueError(f"{text!r} is no address; give one such as {LOOPBACK_ADDRESS}:39539")
     return host.strip("[]"), int(port)
 
 
 def _port(text: str) -> int:
-    return _address(f"{HERE}:{text}")[1]
+    return _address(f"{LOOPBACK_ADDRESS}:{text}")[1]
 
 
 def _file(text: str) -> Path:

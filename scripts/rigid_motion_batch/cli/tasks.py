@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rigid_motion_batch.command_line import complain, parser_of, printable, program_of
-from rigid_motion_batch.pipeline.steps import OWN
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER
 from rigid_motion_batch.pipeline.store import Store
 
 SCRIPT = "tasks"
@@ -29,7 +29,7 @@ def main(arguments: list[str]) -> int:
     listing.add_argument("output", type=Path, metavar="OUTPUT", help="the output folder")
     listing.add_argument("--failed", action="store_true", help="only those that failed, with what Python said")
     options = parser.parse_args(arguments)
-    if not (options.output / OWN).is_dir():
+    if not (options.output / OWN_FOLDER).is_dir():
         complain(program_of(SCRIPT), f"{options.output}: no comparison was made in this folder")
         return 2
     store = Store(options.output, alone=False)

@@ -24,7 +24,7 @@ RMS, WORST, KEYS = "rms_shell_m", "max_shell_m", "keys_per_s"
 PLACES = {measure.metric: place for place, measure in enumerate(MEASURES)}
 """Of measures among the numbers."""
 
-WIDE = 120
+DEFAULT_COLUMNS = 120
 """Columns of what is no terminal."""
 
 
@@ -115,7 +115,7 @@ def table_of(lines: Sequence[Line]) -> Table:
 def show(*what: Table | str) -> None:
     """Print tables and lines; without colours where the stream is no terminal, or NO_COLOR is set."""
     stream = sys.stdout
-    console = Console(file=stream, highlight=False, width=None if stream.isatty() else WIDE)
+    console = Console(file=stream, highlight=False, width=None if stream.isatty() else DEFAULT_COLUMNS)
     with console.capture() as captured:
         for item in what:
             console.print(item, markup=False, soft_wrap=isinstance(item, str) and not stream.isatty())

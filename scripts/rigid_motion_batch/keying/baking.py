@@ -13,13 +13,13 @@ from rigid_motion.animation.evaluation.sources import Marks
 from rigid_motion.animation.queries.keyed import frames_in, segment_modes
 from rigid_motion.animation.transforms import Transform
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.keying.jobs import Action, Result
+from rigid_motion_batch.keying.jobs import Operation, Result
 
-FEW = 4
+MAX_NAMED_BONES = 4
 """As many bones are named; of more it is said how many they are."""
 
 
-def baking(step: float, interpolation: str) -> Action:
+def baking(step: float, interpolation: str) -> Operation:
     """Return the action that makes keys of this interpolation on every `step` frames."""
 
     def bake(targets: Sequence[Transform]) -> Result:
@@ -31,10 +31,10 @@ def baking(step: float, interpolation: str) -> Action:
         )
         return _result(targets, modes, problems | _by_target(refusals, fit), f", frames {begin:g} to {end:g}")
 
-    return Action(with_rigid_segments, bake)
+    return Operation(with_rigid_segments, bake)
 
 
-def unbaking() -> Action:
+def unbaking() -> Operation:
     """Return the action that brings back the keys from before."""
 
     def unbake(targets: Sequence[Transform]) -> Result:
@@ -42,7 +42,7 @@ def unbaking() -> Action:
         animation.unbake(targets, refused=refusals)
         return _result(targets, modes_of(targets), _by_target(refusals, targets))
 
-    return Action(lambda targets: list(filter(animation.is_baked, targets)), unbake)
+    return Operation(lambda targets: list(filter(animation.is_baked, targets)), unbake)
 
 
 def _result(
@@ -71,12 +71,12 @@ def with_rigid_segments(targets: Sequence[Transform]) -> list[Transform]:
     return [target for target in targets if target in rigid]
 
 
-def _has_rigid_segments(place: Binding) -> bool:
+def _has_rigid_segments(binding: Binding) -> bool:
     """Return whether a segment of a slot has another mode than Blender's own, be it one that nobody knows."""
-    modes = modes_said(place)
+    modes = modes_said(binding)
     if isinstance(modes, Marks):
         return bool(modes.numbers[:-1].any())
-    return modes != 0 and len(frames_in(place)) > 1
+    return modes != 0 and len(frames_in(binding)) > 1
 
 
 def modes_of(targets: Sequence[Transform]) -> dict[Transform, str]:
@@ -96,7 +96,7 @@ def described(modes: Mapping[Transform, str]) -> str:
     """Return which modes targets have: one by itself, several bones by mode, and few of them by name."""
     if len(modes) == 1:
         return f", {next(iter(modes.values()))}"
-    if len(modes) > FEW:
+    if len(modes) > MAX_NAMED_BONES:
         return "".join(f"; {count} {mode}" for mode, count in Counter(modes.values()).most_common())
     bones: dict[str, list[str]] = {}
     for target, mode in modes.items():

@@ -15,15 +15,15 @@ from rigid_motion_batch.files import written_beside
 from rigid_motion_batch.saving import save_copy
 from rigid_motion_batch.silencing import silenced
 
-from .records import FileProblem, Record, Unreadable, changed_at, not_written
+from .records import FileProblem, InputRecord, Unreadable, changed_at, not_written
 
-HERE = bpy.app.version[:2]
+THIS_VERSION = bpy.app.version[:2]
 """The Blender that this runs in."""
 
 MAGIC = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
 """The bytes that .blend files begin with: as they are, compressed, and compressed by a Blender before 3.0."""
 
-NAMED = 5
+MAX_NAMED_DATA = 5
 """As many of the data that are missing from a library are named."""
 
 MAY_HOLD_OBJECTS = (bpy.types.Collection, bpy.types.Scene)
@@ -64,10 +64,10 @@ def open_file(path: Path) -> None:
         raise Unreadable(
             f"Blender cannot read this file, which looks damaged ({reason}): take a copy of it, or its NAME.blend1"
         ) from None
-    if (newer := cast(Any, bpy.data.version)[:2]) > HERE:
+    if (newer := cast(Any, bpy.data.version)[:2]) > THIS_VERSION:
         # Blender opens it all the same, and would leave out on saving what it does not know.
         raise Unreadable(
-            f"this was saved by Blender {named(newer)}, and this is {named(HERE)}: take that one or a later one"
+            f"this was saved by Blender {named(newer)}, and this is {named(THIS_VERSION)}: take that one or a later one"
         )
 
 
@@ -82,7 +82,9 @@ def missing_data() -> Missing:
             continue
         path = os.path.normpath(bpy.path.abspath(library.filepath))
         is_there = os.path.exists(path)
-        missing = listed((f"{cast(bpy.types.Struct, block.bl_rna).name} {block.name}" for block in blocks), NAMED)
+        missing = listed(
+            (f"{cast(bpy.types.Struct, block.bl_rna).name} {block.name}" for block in blocks), MAX_NAMED_DATA
+        )
         result.libraries.append(
             f"library {path} {'cannot be read, or lacks something' if is_there else 'was not found'} "
             f"({missing}): "
@@ -123,7 +125,7 @@ def only_overridden() -> set[bpy.types.Object]:
     return linked
 
 
-def write_file(output: Path, record: Record | None, opened: int | None = None) -> None:
+def write_file(output: Path, record: InputRecord | None, opened: int | None = None) -> None:
     """Save what is open, whole or not at all; in place of its file, which is kept as NAME.blend1, without a record.
 
     Parameters

@@ -20,12 +20,12 @@ from rigid_motion_batch.recordings.recordings import NoMotion
 
 from .planning import ALL
 from .records import FileProblem, is_made
-from .work import Doing
+from .work import RunningJob
 
 SUFFIX = "-cleaned"
 """Ending of the names of files that are written."""
 
-WRITTEN = 1e-6
+MAX_WRITTEN_ROUNDING = 1e-6
 """Of the unit of a file: how far what was written may be from what was meant, for it has so many digits."""
 
 TABLES = (".csv", ".tum")
@@ -46,7 +46,7 @@ class Cleaning:
     reading: ReadingOptions
 
 
-class Body(NamedTuple):
+class CleanedBody(NamedTuple):
     """A body that was cleaned: its samples are these rows of the trajectory with this number."""
 
     clip: Clip
@@ -56,7 +56,7 @@ class Body(NamedTuple):
     number: int
 
 
-def do_cleaning(doing: Doing, how: Cleaning) -> None:
+def do_cleaning(doing: RunningJob, how: Cleaning) -> None:
     """Clean the bodies of a recording that are meant, and write the file with them."""
     job = doing.job
     if job.file.stem.endswith(SUFFIX) and is_made(job.file):
@@ -76,7 +76,7 @@ def do_cleaning(doing: Doing, how: Cleaning) -> None:
             doing.note(str(error))
             return
         doing.require_free(job.output)
-        done: list[Body] = []
+        done: list[CleanedBody] = []
         for number, trajectory in enumerate(recording.trajectories):
             try:
                 axes = how.axes or recording.axes
@@ -94,7 +94,7 @@ def do_cleaning(doing: Doing, how: Cleaning) -> None:
             written = trajectory.cells is None or trajectory.cells.times is not None
             stays = "; its times stay as stamped" if "clock" in said and not written else ""
             doing.say(f"{body}{said}{stays}")
-            done.append(Body(clip, found, trajectory, rows, number))
+            done.append(CleanedBody(clip, found, trajectory, rows, number))
         if not done:
             raise FileProblem("no body of it has two poses that can be used: record at least 2")
         if not doing.work.dry_run:
@@ -104,7 +104,7 @@ def do_cleaning(doing: Doing, how: Cleaning) -> None:
         doing.tell_written(job.output)
 
 
-def _write(beside: Path, recording: Recording, done: list[Body], how: Cleaning, output: Path) -> None:
+def _write(beside: Path, recording: Recording, done: list[CleanedBody], how: Cleaning, output: Path) -> None:
     """Write a file like the recording, or a table where that is what its name says, and see whether it reads so."""
     clip, found = done[0].clip, done[0].found
     if output.suffix.lower() != recording.path.suffix.lower():
@@ -124,5 +124,5 @@ def _write(beside: Path, recording: Recording, done: list[Body], how: Cleaning, 
     for each in done:
         poses = again[each.number].poses[..., each.rows]
         poses = replace(poses, quaternions=normalise(poses.quaternions))
-        if not shell_error(poses, each.found.poses).max() < WRITTEN:
+        if not shell_error(poses, each.found.poses).max() < MAX_WRITTEN_ROUNDING:
             raise FileProblem(f"this cannot be written so that it reads as it was meant: {way_out}")

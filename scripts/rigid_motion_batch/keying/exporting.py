@@ -13,7 +13,7 @@ import rigid_motion
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.fbx import ADDON as FBX_ADDON
 from rigid_motion_batch.recordings.fbx import refuse_damaged
-from rigid_motion_batch.recordings.importing import enabled, told
+from rigid_motion_batch.recordings.importing import enabled, run_operator
 from rigid_motion_batch.recordings.scene_bodies import refuse_too_large
 from rigid_motion_batch.silencing import silenced
 
@@ -21,7 +21,7 @@ from .blend_files import missing_data, open_file
 from .gltf_files import do_gltf
 from .records import FileProblem, Unreadable
 from .reductions import Reductions
-from .work import Doing
+from .work import RunningJob
 
 GLTF_ADDON = "io_scene_gltf2"
 
@@ -30,7 +30,7 @@ def export_glb(path: Path) -> None:
     """Write the open file as GLB, every animation sampled on every frame, a clip for an Action. Raises FileProblem."""
     try:
         with enabled(path, GLTF_ADDON), _asking_extension():
-            told(path, "export", lambda: bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB"))
+            run_operator(path, "export", lambda: bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB"))
     except TrajectoryError as error:
         raise FileProblem(error.problem) from None
 
@@ -47,7 +47,7 @@ def _asking_extension() -> Iterator[None]:
         addons.remove(entry)
 
 
-def export_file(doing: Doing, how: Reductions) -> None:
+def export_file(doing: RunningJob, how: Reductions) -> None:
     """Open or import a .blend or FBX file, and write what it shows as GLB with few keys."""
     job = doing.job
 
@@ -74,7 +74,7 @@ def _import_fbx(path: Path) -> None:
         with silenced():
             bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         with enabled(path, FBX_ADDON):
-            told(path, "import", lambda: bpy.ops.import_scene.fbx(filepath=str(path.absolute())))
+            run_operator(path, "import", lambda: bpy.ops.import_scene.fbx(filepath=str(path.absolute())))
     except TrajectoryError as error:
         raise Unreadable(error.problem) from None
     except OSError as error:

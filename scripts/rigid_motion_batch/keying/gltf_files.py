@@ -22,10 +22,10 @@ from rigid_motion_batch.supervising import end_with_parent
 from .planning import place_of
 from .records import Unreadable
 from .reductions import Reductions, as_length, as_text, doubt, off
-from .work import ClipNumbers, Doing, Numbers
+from .work import ClipNumbers, Numbers, RunningJob
 
 
-def do_gltf(doing: Doing, how: Reductions, export: Callable[[Path], None] | None = None) -> None:
+def do_gltf(doing: RunningJob, how: Reductions, export: Callable[[Path], None] | None = None) -> None:
     """Read a file, or what `export` makes of it at a path, reduce its clips, and write it."""
     with doing.failing():
         doing.require_free(doing.job.output)
@@ -33,7 +33,11 @@ def do_gltf(doing: Doing, how: Reductions, export: Callable[[Path], None] | None
 
 
 def reduce_gltf(
-    doing: Doing, how: Reductions, output: Path, export: Callable[[Path], None] | None = None, per_unit: float = 1.0
+    doing: RunningJob,
+    how: Reductions,
+    output: Path,
+    export: Callable[[Path], None] | None = None,
+    per_unit: float = 1.0,
 ) -> None:
     """Reduce without refusals of places; raises FileProblem. A tolerance without a unit is in `per_unit` metres.
 
@@ -79,7 +83,7 @@ def reduce_gltf(
     doing.tell_written(output)
 
 
-def _write(doing: Doing, output: Path, document: Document, report: Report) -> None:
+def _write(doing: RunningJob, output: Path, document: Document, report: Report) -> None:
     files, folder = report.document.files(output.name), doing.job.file.parent
     if document.chunks is None:
         doing.outcome.read = [folder / name for name, path in document.companions(folder).items() if path]

@@ -12,7 +12,7 @@ import bpy
 
 from rigid_motion.animation.transforms import Transform, transform_of
 from rigid_motion_batch.keying.blend_files import (
-    HERE,
+    THIS_VERSION,
     missing_data,
     named,
     only_overridden,
@@ -20,10 +20,10 @@ from rigid_motion_batch.keying.blend_files import (
     write_file,
 )
 from rigid_motion_batch.keying.records import changed_at, refuse_read_only
-from rigid_motion_batch.keying.work import ClipNumbers, Doing, Outcome
+from rigid_motion_batch.keying.work import ClipNumbers, Outcome, RunningJob
 
 
-def do_blend(doing: Doing, action: Action) -> None:
+def do_blend(doing: RunningJob, action: Operation) -> None:
     """Open a file, do what is in it, and write it. Where that fails, nothing in it counts as done."""
     with doing.failing():
         _do_file(doing, action)
@@ -34,7 +34,7 @@ def do_blend(doing: Doing, action: Action) -> None:
         )
 
 
-def _do_file(doing: Doing, action: Action) -> None:
+def _do_file(doing: RunningJob, action: Operation) -> None:
     job, outcome = doing.job, doing.outcome
     if not job.in_place:
         doing.record.refuse_to_replace(job.output)
@@ -51,14 +51,14 @@ def _do_file(doing: Doing, action: Action) -> None:
     if not outcome.done:
         doing.leave_alone(f"{'nothing could be' if outcome.refused else 'nothing to be'} {doing.work.done}")
         return
-    if (before := cast(Any, bpy.data.version)[:2]) < HERE:
-        doing.say(f"was saved by Blender {named(before)}; what is written is of Blender {named(HERE)}")
+    if (before := cast(Any, bpy.data.version)[:2]) < THIS_VERSION:
+        doing.say(f"was saved by Blender {named(before)}; what is written is of Blender {named(THIS_VERSION)}")
     if not doing.work.dry_run:
         write_file(job.output, None if job.in_place else doing.record, changed)
     doing.tell_written(job.output)
 
 
-def _do_objects(doing: Doing, action: Action, missing: dict[bpy.types.Object, str]) -> None:
+def _do_objects(doing: RunningJob, action: Operation, missing: dict[bpy.types.Object, str]) -> None:
     asked, overridden = doing.work.objects, only_overridden()
     for obj in [obj for obj in bpy.data.objects if obj not in overridden]:
         if obj in missing:
@@ -73,14 +73,14 @@ def _do_objects(doing: Doing, action: Action, missing: dict[bpy.types.Object, st
                 _do_targets(doing, action, concerned)
 
 
-def _begin(doing: Doing, fitting: set[str]) -> None:
+def _begin(doing: RunningJob, fitting: set[str]) -> None:
     """Note which names and patterns there is something to do for."""
     if not doing.outcome.matched:  # Only a file in which there is something to do is written.
         refuse_read_only(doing.job.output)
     doing.outcome.matched |= fitting
 
 
-def _do_targets(doing: Doing, action: Action, targets: Sequence[Transform]) -> None:
+def _do_targets(doing: RunningJob, action: Operation, targets: Sequence[Transform]) -> None:
     """Do an object, or bones of a rig."""
     library = targets[0].animated.library
     if library is not None:
@@ -138,7 +138,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Action:
+class Operation:
     """What is done to targets, such as baking."""
 
     concerned: Callable[[Sequence[Transform]], list[Transform]]

@@ -16,22 +16,22 @@ from rigid_motion.animation.transforms import transform_of
 from rigid_motion_batch.keying.jobs import Result
 from rigid_motion_batch.keying.records import FileProblem
 from rigid_motion_batch.keying.reducing import reduced
-from rigid_motion_batch.keying.reductions import RATES, Reductions
+from rigid_motion_batch.keying.reductions import FRAME_RATE_RANGE, Reductions
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.objects import LAST_FRAME
-from rigid_motion_batch.scenes.armature import Rest, Rig
+from rigid_motion_batch.scenes.armature import RestFigure, Rig
 from rigid_motion_batch.silencing import silenced
 
-CLOSEST = 0.01
+MIN_KEY_GAP_FRAMES = 0.01
 """Frames between keys that Blender takes for two."""
 
 ON_A_FRAME = 1e-3
 """The distance from a whole frame within which samples are put on it."""
 
-SINGLE = float(np.finfo(np.float32).eps)
+SINGLE_PRECISION_RATIO = float(np.finfo(np.float32).eps)
 """By what share numbers of Blender are off."""
 
-ARROW = 0.2
+AXES_LENGTH_M = 0.2
 """Metres: how large the axes are drawn that move as a rigid body did."""
 
 
@@ -39,9 +39,14 @@ def rate_of(clip: Clip) -> float:
     """Return frames a second with a sample on every frame; of one that is not even,
     the whole number next to its rate.
     """
-    whole = float(np.clip(round(clip.samples_a_second), *RATES))
+    whole = float(np.clip(round(clip.samples_a_second), *FRAME_RATE_RANGE))
     even = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0])
-    return even if RATES[0] <= even <= RATES[1] and _are_on_frames(clip, even) > _are_on_frames(clip, whole) else whole
+    return (
+        even
+        if FRAME_RATE_RANGE[0] <= even <= FRAME_RATE_RANGE[1]
+        and _are_on_frames(clip, even) > _are_on_frames(clip, whole)
+        else whole
+    )
 
 
 def _are_on_frames(clip: Clip, rate: float) -> bool:
@@ -66,10 +71,10 @@ def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
     frames = frames_of(clip, rate)
     if frames[-1] > LAST_FRAME:
         raise FileProblem(f"at {rate:g} frames a second this has more than {LAST_FRAME} frames: give a smaller --fps")
-    if float(np.diff(frames).min()) < CLOSEST:
+    if float(np.diff(frames).min()) < MIN_KEY_GAP_FRAMES:
         raise FileProblem(f"at {rate:g} frames a second some samples are on one frame to Blender: thin them out")
     farthest = float(np.abs(clip.in_metres(clip.poses).positions).max())
-    if farthest * SINGLE > tolerance:
+    if farthest * SINGLE_PRECISION_RATIO > tolerance:
         raise FileProblem(
             f"this is up to {farthest:.3g} m from its origin, where Blender's numbers are coarser than the tolerance: "
             "move the origin nearer in the recording"
@@ -124,7 +129,7 @@ def key_body(clip: Clip, frames: np.ndarray, how: Reductions, name: str) -> Resu
 
 def _axes(name: str) -> bpy.types.Object:
     obj = bpy.data.objects.new(name, None)
-    obj.empty_display_type, obj.empty_display_size = "ARROWS", ARROW
+    obj.empty_display_type, obj.empty_display_size = "ARROWS", AXES_LENGTH_M
     obj.rotation_mode = "QUATERNION"
     cast(bpy.types.Scene, bpy.context.scene).collection.objects.link(obj)
     return obj
@@ -133,7 +138,7 @@ def _axes(name: str) -> bpy.types.Object:
 def _rig(clip: Clip, frames: np.ndarray, name: str) -> Rig:
     """Return a rig in the open file with a key for every sample of a whole body, on frames (n,)."""
     scene, rest_body = cast(bpy.types.Scene, bpy.context.scene), clip.whole_body
-    rest = Rest.of(clip)
+    rest = RestFigure.of(clip)
     rig = Rig(name, rest, rest_body.joints, scene.collection)
     channels = rig.channels_of(clip.in_blender(clip.poses))
     for bone in range(len(rig.bones)):

@@ -24,7 +24,7 @@ NAMES_OF_FILES = {".blend", ".bvh", *TEXT, *JSON, *GLTF}
 
 
 @dataclass(frozen=True)
-class Job:
+class InputJob:
     """An input to be done."""
 
     source: str
@@ -91,8 +91,8 @@ def planned(
     output: Path | None,
     endings: tuple[str, ...],
     made: Callable[[Path], bool],
-    job_of: Callable[[str, Path], Job],
-) -> list[Job]:
+    job_of: Callable[[str, Path], InputJob],
+) -> list[InputJob]:
     """Return what is to be done, in the order of the inputs and of the paths in folders;
     a file that is named twice is one.
 
@@ -108,7 +108,7 @@ def planned(
     job_of : callable
         Given an input and the folder of its result.
     """
-    jobs: dict[object, Job] = {}
+    jobs: dict[object, InputJob] = {}
     for given in inputs:
         if not os.path.isdir(given):
             job = job_of(given, output or file_and_body(given)[0].parent)
@@ -125,7 +125,7 @@ def planned(
             nothing = f"there is nothing to be done in this folder: name one with {', '.join(endings)} files, or a file"
             problems = {given: nothing}
         for place, problem in problems.items():
-            jobs.setdefault(place, Job(place, Path(place), Path(place), problem=problem))
+            jobs.setdefault(place, InputJob(place, Path(place), Path(place), problem=problem))
     return list(_settled(list(jobs.values())))
 
 
@@ -151,11 +151,11 @@ def place_of(path: Path) -> str:
     return os.path.normcase(os.path.realpath(path))  # Path.resolve of Python 3.11 fails where links go in circles.
 
 
-def _identity(job: Job) -> object:
+def _identity(job: InputJob) -> object:
     return (place_of(job.file), file_and_body(job.source)[1]) if job.is_recording else place_of(job.file)
 
 
-def _settled(jobs: list[Job]) -> Iterator[Job]:
+def _settled(jobs: list[InputJob]) -> Iterator[InputJob]:
     """Yield the jobs without what this program made of others; what would be written over another is a problem."""
     outputs = {place_of(path) for job in jobs if not job.in_place for path in _outputs(job)}
     jobs = [job for job in jobs if place_of(job.file) not in outputs or not is_made(job.file)]
@@ -172,7 +172,7 @@ def _settled(jobs: list[Job]) -> Iterator[Job]:
         yield job
 
 
-def _outputs(job: Job) -> list[Path]:
+def _outputs(job: InputJob) -> list[Path]:
     """Return the files that may be written, as far as one can say before a recording is read."""
     some = not job.source.endswith(ALL)
     return [job.output.with_name(f"{job.output.name}{ending}") for ending in job.endings if some]

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion import reduce_keys
-from rigid_motion_batch.analysis.choices import RIGID
+from rigid_motion_batch.analysis.choices import RIGID_RADIUS_M
 from rigid_motion_batch.analysis.metrics import write_poses
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.keying.gltf_files import reduce_gltf
@@ -21,14 +21,14 @@ from rigid_motion_batch.keying.planning import ALL
 from rigid_motion_batch.keying.records import FileProblem, Unreadable
 from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, name_of, off
 from rigid_motion_batch.keying.sessions import counted
-from rigid_motion_batch.keying.work import ClipNumbers, Doing
+from rigid_motion_batch.keying.work import ClipNumbers, RunningJob
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names, read_source
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.recordings import NoMotion
 
 
-def do_recording(doing: Doing, how: Reductions) -> None:
+def do_recording(doing: RunningJob, how: Reductions) -> None:
     """Read a recording, and write the keys of each of its bodies."""
     job, outcome = doing.job, doing.outcome
     clips: list[Clip] = []
@@ -55,12 +55,12 @@ def do_recording(doing: Doing, how: Reductions) -> None:
 class _Clip:
     """A body whose keys are written."""
 
-    def __init__(self, doing: Doing, how: Reductions, clip: Clip, name: str) -> None:
+    def __init__(self, doing: RunningJob, how: Reductions, clip: Clip, name: str) -> None:
         self.doing, self.clip, self.name = doing, clip, name
         # Key poses are few by what is large for the body.
         self.given, self.tolerance = how.tolerance, how.tolerance or TOLERANCE
         self.how = how if how.shared else replace(how, tolerance=self.tolerance)
-        self.radius = how.radius or RIGID
+        self.radius = how.radius or RIGID_RADIUS_M
 
     def do(self, output: Path) -> None:
         """Write the keys, into files that are called as `output` and may have to end as the job says."""

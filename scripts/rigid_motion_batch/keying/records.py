@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from rigid_motion_batch.files import append_lines, lines_of, written_beside
-from rigid_motion_batch.pipeline.steps import OWN, sha256_in, sha256_of
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER, sha256_in, sha256_of
 
 NAME = "keyed.jsonl"
 
 
-class Record:
+class InputRecord:
     """What was made of an input.
 
     Parameters
@@ -35,7 +35,7 @@ class Record:
 
     def __init__(self, folder: Path, source: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         self.folder, self.overwrite = folder, overwrite
-        self._file = folder / OWN / NAME
+        self._file = folder / OWN_FOLDER / NAME
         self._source = _from(folder, source)
 
     def refuse_to_replace(self, path: Path) -> None:
@@ -98,7 +98,7 @@ class Record:
 
 def is_made(path: Path) -> bool:
     """Return whether a file is as this program has written it, by the record of its folder."""
-    return _is_among(path, path.name, _lines_of(path.parent / OWN / NAME))
+    return _is_among(path, path.name, _lines_of(path.parent / OWN_FOLDER / NAME))
 
 
 def _is_among(path: Path, name: str, lines: Iterable[Mapping[str, Any]]) -> bool:

@@ -13,29 +13,29 @@ from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
 from rigid_motion.animation.transforms.sizes import first_tolerance, metres_per_unit, rig_size
 from rigid_motion_batch.analysis.choices import Tolerance
-from rigid_motion_batch.keying.jobs import Action, Result, title_of
+from rigid_motion_batch.keying.jobs import Operation, Result, title_of
 from rigid_motion_batch.keying.reductions import Reductions, as_length, doubt, off
 from rigid_motion_batch.keying.sessions import counted
 from rigid_motion_batch.keying.work import ClipNumbers
 
-FEWEST = 2
+MIN_KEYS = 2
 """So many keys are as few as a motion has."""
 
 
-def reducing(how: Reductions, asked: Sequence[str] | None = None) -> Action:
+def reducing(how: Reductions, asked: Sequence[str] | None = None) -> Operation:
     """Return the action that makes fewer keys for what has more than two; and for what was asked for by its very name,
     if only to say why not.
     """
 
     def concerned(targets: Sequence[Transform]) -> list[Transform]:
-        keyed = set(with_more_keys_than(targets, FEWEST))
+        keyed = set(with_more_keys_than(targets, MIN_KEYS))
         named = set(asked or ())
         return [target for target in targets if target in keyed or (target.name in named and not _has_bones(target))]
 
     def reduce(targets: Sequence[Transform]) -> Result:
         return reduced(targets, how)
 
-    return Action(concerned, reduce, whole_rigs=True)
+    return Operation(concerned, reduce, whole_rigs=True)
 
 
 def reduced(targets: Sequence[Transform], how: Reductions) -> Result:

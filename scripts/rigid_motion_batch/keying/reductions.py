@@ -10,10 +10,10 @@ from rigid_motion_batch.recordings import ReadingOptions
 from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.rest_bodies import unit_of
 
-RATES = 1, 240
+FRAME_RATE_RANGE = 1, 240
 """Frames a second that a .blend file may be given for the rate of its recording."""
 
-LEAST = 1e-6
+MIN_TOLERANCE_MM = 1e-6
 """Millimetres: no tolerance is smaller."""
 
 TOLERANCE = Tolerance("5mm")
@@ -22,7 +22,7 @@ TOLERANCE = Tolerance("5mm")
 SUFFIX, GLB_SUFFIX = "-keys", "-reduced"
 """Endings of the names of files that are written, and of GLB files."""
 
-MANY = 8
+MIN_BODY_JOINTS = 8
 """So many joints or bones make a body, whose size says something of its unit; a prop has any size."""
 
 
@@ -88,7 +88,7 @@ def name_of(file: Path, body: str | None) -> str:
 def as_length(metres: float) -> Tolerance:
     """Return a length as a user would write it."""
     number, unit = (metres, "m") if metres >= 1.0 else (1e3 * metres, "mm")
-    return Tolerance(f"{max(number, LEAST):.6f}{unit}")
+    return Tolerance(f"{max(number, MIN_TOLERANCE_MM):.6f}{unit}")
 
 
 def as_text(metres: float) -> str:
@@ -101,7 +101,7 @@ def doubt(size: float, joints: int, tolerance: Tolerance | None, per_unit: float
     mostly nothing.
     """
     name, length = unit_of(size)
-    if joints < MANY or tolerance is None or not tolerance.is_length or length == 1.0:
+    if joints < MIN_BODY_JOINTS or tolerance is None or not tolerance.is_length or length == 1.0:
         return ""
     meant = tolerance.metres(per_unit) / (per_unit * length)
     return f"; it is {size:.3g} m large in this file: if these are {name}, give --tolerance {meant:.6g}"

@@ -26,12 +26,12 @@ from rigid_motion_batch.places import EXTENSION
 from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.supervising import blender_program, report
 
-from .planning import Job
+from .planning import InputJob
 from .records import FileProblem
 from .reductions import as_text
-from .work import Doing, Outcome, Work
+from .work import Outcome, RunningJob, Work
 
-NAMED = 5
+MAX_NAMED_FAILURES = 5
 """The number of failed inputs that are named again at the end, where there are more inputs than that."""
 
 ROOMS = (
@@ -61,17 +61,17 @@ class Keyed(steps.Step, rooms=ROOMS):
     version: str
     """The version of Blender, where it is needed."""
 
-    job: Job | None = None
+    job: InputJob | None = None
     """The input, which has no part in the key: the same in another place is done."""
 
-    def make(self, job: steps.Job) -> dict[str, Outcome]:
-        given = cast(Job, self.job)
+    def make(self, job: steps.StepJob) -> dict[str, Outcome]:
+        given = cast(InputJob, self.job)
         blender: AbstractContextManager[None] = nullcontext()
         if self.work.needs_blender(given):
             import bpy  # noqa: F401  It brings addon_utils.
 
             blender = _extension()
-        doing = Doing(self.work, given, lambda text: append_lines(job.place / "notes", [{"note": text}]))
+        doing = RunningJob(self.work, given, lambda text: append_lines(job.place / "notes", [{"note": text}]))
         with blender:
             self.work.do(doing)
         return {"outcome": doing.outcome}
@@ -79,7 +79,7 @@ class Keyed(steps.Step, rooms=ROOMS):
 
 def do_all(
     program: str,
-    jobs: Sequence[Job],
+    jobs: Sequence[InputJob],
     work: Work,
     workers: int | None = None,
     *,
@@ -158,14 +158,16 @@ def do_all(
 class _Session:
     """Inputs that are being done."""
 
-    def __init__(self, jobs: Sequence[Job], work: Work, executor: Executor, progress: Progress, scratch: Path) -> None:
+    def __init__(
+        self, jobs: Sequence[InputJob], work: Work, executor: Executor, progress: Progress, scratch: Path
+    ) -> None:
         self._jobs, self._work, self._executor, self._note = jobs, work, executor, progress.note
         self._scratch = scratch
         self._outcomes: dict[int, Outcome] = {}
         """By the places of the inputs."""
         self._at_work: dict[int, str] = {}
         """Places of inputs to the keys of their results."""
-        self._futures: dict[Future[Made], tuple[int, steps.Job]] = {}
+        self._futures: dict[Future[Made], tuple[int, steps.StepJob]] = {}
 
     @property
     def in_order(self) -> list[Outcome]:
@@ -181,7 +183,7 @@ class _Session:
         self._show(stage)
 
     def _wait(self, stage: Stage) -> None:
-        ended, _ = wait(self._futures, steps.INTERVAL, FIRST_COMPLETED)
+        ended, _ = wait(self._futures, steps.LOOK_INTERVAL_S, FIRST_COMPLETED)
         for future in ended:
             self._end(future, *self._futures.pop(future))
         self._show(stage)
@@ -198,7 +200,7 @@ class _Session:
         summary = _summary(self.in_order, len(self._jobs), self._work, interrupted=True)
         report(at=", ".join(job.source for job in at_work), summary=summary)
 
-    def _begin(self, place: int, job: Job, stage: Stage) -> None:
+    def _begin(self, place: int, job: InputJob, stage: Stage) -> None:
         """Have an input done, unless it is done already or cannot be."""
         if job.problem:
             self._note(f"{job.source}: {job.problem}")
@@ -215,12 +217,12 @@ class _Session:
                 outcome.add_written(path)
             return
         step = replace(cast(Keyed, task.step), work=self._work, job=job)
-        request = steps.Job(replace(task, step=step), self._scratch / str(place), job.folder)
+        request = steps.StepJob(replace(task, step=step), self._scratch / str(place), job.folder)
         self._at_work[place] = key
         self._show(stage)
         self._futures[self._executor.submit(request)] = place, request
 
-    def _end(self, future: Future[Made], place: int, request: steps.Job) -> None:
+    def _end(self, future: Future[Made], place: int, request: steps.StepJob) -> None:
         """Take what came of an input."""
         job, key = self._jobs[place], self._at_work.pop(place)
         for line in lines_of(request.place / "notes"):  # Also of one that was killed.
@@ -235,13 +237,13 @@ class _Session:
             outcome.reason = f"{loss(error, request)}: leave it out, or see whether Blender opens it"
             self._note(f"{job.source}: {outcome.reason}")
         else:
-            if key and outcome.is_whole and not self._work.dry_run:
+            if key and outcome.is_complete and not self._work.dry_run:
                 facts = {"matched": sorted(outcome.matched), "numbers": asdict(outcome.numbers)}
                 self._work.record_of(job).keep(key, outcome.written, outcome.beside, outcome.read, facts)
         self._outcomes[place] = outcome
 
 
-def _task(work: Work, job: Job) -> steps.Task:
+def _task(work: Work, job: InputJob) -> steps.Task:
     """Return what has the key of a result: the input, these options, the version of the program and of Blender."""
     blender = ""
     if work.needs_blender(job):
@@ -285,7 +287,7 @@ def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted
             bool(outcome.written) and not outcome.done and outcome.old is None for outcome in outcomes
         ),
         "left alone": sum(outcome.state == "left alone" for outcome in outcomes),
-        "failed" + f" ({printable(listed(failed, NAMED))})" * (count > NAMED): len(failed),
+        "failed" + f" ({printable(listed(failed, MAX_NAMED_FAILURES))})" * (count > MAX_NAMED_FAILURES): len(failed),
         "incomplete": sum(outcome.incomplete for outcome in outcomes),
         "not reached": interrupted * (count - len(outcomes)),
     }

@@ -16,17 +16,17 @@ from typing import Any
 import numpy as np
 
 from rigid_motion.gltf import Document, ReducedClip, Report
-from rigid_motion.gltf.errors import PARTS, World
+from rigid_motion.gltf.errors import PARTS_PER_GAP, World
 from rigid_motion.gltf.nodes import Nodes, steadied
 from rigid_motion.gltf.seen import Seen
 from rigid_motion.gltf.sizes import joints_of, shells_of
 from rigid_motion.gltf.tracks import Clip, Tracks, read_clips
 from rigid_motion.motion.affine import AffineMaps, ball_displacement
 from rigid_motion_batch.files import write_text
-from rigid_motion_batch.pipeline.steps import OWN
-from rigid_motion_batch.report.reduced import Shown, clip_data
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER
+from rigid_motion_batch.report.reduced import ShownClip, clip_data
 
-from .reductions import MANY
+from .reductions import MIN_BODY_JOINTS
 
 MOST_MOMENTS = 30_000
 """At which errors are looked at; of longer clips fewer than eighths between keys."""
@@ -34,7 +34,7 @@ MOST_MOMENTS = 30_000
 MOST_JOINTS = 200
 """That are drawn of a clip, those first that the others hang on."""
 
-MOST_POSES, RATE = 900, 60
+MAX_POSES, MAX_POSES_PER_S = 900, 60
 """That are drawn of a clip, and how many a second at most."""
 
 TO_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -42,7 +42,7 @@ TO_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 def place_of_views(output: Path) -> Path:
     """Return where the views of a file that is written are kept for pages."""
-    return output.parent / OWN / f"{output.name}.views"
+    return output.parent / OWN_FOLDER / f"{output.name}.views"
 
 
 def views_of(before: Document, report: Report, radius: float | None) -> list[dict[str, Any]]:
@@ -90,25 +90,25 @@ class _View:
 
     joints: np.ndarray
 
-    def shown(self, clip: Clip, written: Clip, made: ReducedClip) -> Shown:
+    def shown(self, clip: Clip, written: Clip, made: ReducedClip) -> ShownClip:
         """Return where joints are at moments that are drawn, and errors at all that were looked at."""
         world = self.world
-        parts = int(np.clip(MOST_MOMENTS // len(world.times), 1, PARTS))
+        parts = int(np.clip(MOST_MOMENTS // len(world.times), 1, PARTS_PER_GAP))
         times = world.parted(0, len(world.times), parts)
         errors, worst_rows = np.zeros(len(times)), np.zeros(len(times), dtype=np.int64)
         for block in world.blocks(world.truth, parts=parts):
             off = self._errors(block.times, block.maps[0])
             errors[block.samples], worst_rows[block.samples] = off.max(axis=0), off.argmax(axis=0)
         worst = int(np.argmax(errors))
-        count = min(MOST_POSES, int(RATE * (times[-1] - times[0])) + 2)
+        count = min(MAX_POSES, int(MAX_POSES_PER_S * (times[-1] - times[0])) + 2)
         even = np.searchsorted(times, np.linspace(times[0], times[-1], count), side="right") - 1
         drawn, moments = self._drawn(), np.unique(np.append(even, worst))
         before = world.worlds(world.truth, times[moments])
         after = self.nodes.worlds(world.moving, self.tracks, times[moments])
         parents = self._parents(drawn)
-        radii = world.balls[drawn] if len(drawn) < MANY else None
+        radii = world.balls[drawn] if len(drawn) < MIN_BODY_JOINTS else None
         nodes = world.nodes.document.json["nodes"]
-        return Shown(
+        return ShownClip(
             clip.name,
             [str(nodes[world.moving[row]].get("name", "")) for row in drawn.tolist()],
             *_with_axes(parents, [_points(maps[drawn], radii) for maps in (before, after)]),

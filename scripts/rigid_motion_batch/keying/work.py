@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Self
 
 from rigid_motion_batch.supervising import report
 
-from .planning import Job
-from .records import FileProblem, Record, Unreadable, refuse_read_only
+from .planning import InputJob
+from .records import FileProblem, InputRecord, Unreadable, refuse_read_only
 
 Note = Callable[[str], None]
 """Writes a line for the user."""
@@ -46,15 +46,15 @@ class Work(ABC):
         """Return what the options say, and the fields that a kind of work has of its own."""
         return cls(options.objects, options.overwrite, options.dry_run, **own)
 
-    def record_of(self, job: Job) -> Record:
+    def record_of(self, job: InputJob) -> InputRecord:
         """Return what is known of what was made of an input."""
-        return Record(job.folder, job.source, overwrite=self.overwrite)
+        return InputRecord(job.folder, job.source, overwrite=self.overwrite)
 
-    def needs_blender(self, job: Job) -> bool:  # noqa: ARG002 - some do
+    def needs_blender(self, job: InputJob) -> bool:  # noqa: ARG002 - some do
         return True
 
     @abstractmethod
-    def do(self, doing: Doing) -> None:
+    def do(self, doing: RunningJob) -> None:
         """Do one input, and write what comes of it."""
 
 
@@ -147,15 +147,15 @@ class Outcome:
         return "left alone" if not self.written else "written" if self.old is None else "already written"
 
     @property
-    def is_whole(self) -> bool:
+    def is_complete(self) -> bool:
         """Return whether something was written, and nothing is left to be done."""
         return bool(self.written) and not (self.failed or self.refused or self.incomplete)
 
 
-class Doing:
+class RunningJob:
     """An input while it is done: what is said of it, and what comes of it."""
 
-    def __init__(self, work: Work, job: Job, note: Note) -> None:
+    def __init__(self, work: Work, job: InputJob, note: Note) -> None:
         self.work, self.job, self.note = work, job, note
         self.title = job.source
         self.record = work.record_of(job)

@@ -22,7 +22,7 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import clip_names
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 from rigid_motion_batch.recordings.reading import split_source
-from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.report.settings import PageSettings
 from rigid_motion_batch.scenes.settings import SceneSettings, place_of_subject
 from rigid_motion_batch.scenes.timeline import Timeline
 
@@ -40,7 +40,7 @@ SLIPS = "slip.csv"
 ON_ONE_PAGE = 24
 """Number of clips up to which all are on one page; more have a page each."""
 
-PIECE = 60
+MAX_PIECE_FRAMES = 60
 """Frames of a film that are rendered by one task at most: a long film keeps many processors busy, and little is lost
 where one is interrupted."""
 
@@ -92,7 +92,7 @@ class ComparisonPlan:
         step = kind(source, comparison.axes, comparison.reading, blender, comparison.against, called)
         return Task(step, f"read {source}", inputs=inputs, seconds=0.3)
 
-    def look_into(self) -> list[str]:
+    def inspect_clips(self) -> list[str]:
         """See what clips there are in the recordings that were read, and return what the user should know of them.
 
         Raises RunError where a pair that is said to be held is none.
@@ -262,7 +262,7 @@ class ComparisonPlan:
         )
         yield building
         count = Timeline.between(*study.choices[choice], stage.fps, stage.slow_motion).count
-        pieces = math.ceil(count / PIECE)
+        pieces = math.ceil(count / MAX_PIECE_FRAMES)
         firsts = [1 + count * number // pieces for number in range(pieces + 1)]
         rendering: list[Task] = []
         for first, following in itertools.pairwise(firsts):
@@ -308,7 +308,7 @@ class ComparisonPlan:
         yield self._page(steps.Overview, keys, pages)
 
     def _page(self, kind: type[Page], parts: dict[Part, str], pages: Iterable[str] = (), **how: Any) -> Task:
-        step = kind(tuple(parts), cast(Settings, self.comparison.about), **how)
+        step = kind(tuple(parts), cast(PageSettings, self.comparison.about), **how)
         place = f"{step.folder}/" if step.folder else ""
         return Task(
             step,

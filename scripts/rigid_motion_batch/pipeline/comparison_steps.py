@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Any, cast
 from rigid_motion_batch.analysis.choices import Choice, Radii
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 from rigid_motion_batch.recordings.options import ReadingOptions
-from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.report.settings import PageSettings
 from rigid_motion_batch.scenes.settings import SceneSettings, SubjectError
 
 from . import values
-from .steps import Job, Step, TaskError
+from .steps import Step, StepJob, TaskError
 
 if TYPE_CHECKING:
     from rigid_motion_batch.analysis.held import PairSlips
@@ -41,7 +41,7 @@ PAGE_DATA = "report_data/"
 
 
 @contextmanager
-def _told(what: str) -> Iterator[None]:
+def _raising_task_errors(what: str) -> Iterator[None]:
     """Raise what Blender cannot do as an error of the task."""
     try:
         yield
@@ -69,7 +69,7 @@ class Read(Step, rooms=RECORDINGS, stage="read"):
     called: str = ""
     """The name of that motion."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         import numpy as np
 
         from rigid_motion_batch.recordings import TrajectoryError, clip_reading
@@ -122,7 +122,7 @@ class Measure(Step, rooms=ANALYSIS, stage="measure"):
     form: str = "csv"
     """The form of the tables of poses."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         from rigid_motion_batch.analysis import metrics, results
         from rigid_motion_batch.analysis.reconstructions import reconstruct
         from rigid_motion_batch.files import write_rows
@@ -150,7 +150,7 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
     reference: str
     """The mode that the others are to be as good as."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         from rigid_motion_batch.analysis import needed
         from rigid_motion_batch.analysis.modes import single_modes
         from rigid_motion_batch.files import write_rows
@@ -178,7 +178,7 @@ class MeasureSlips(Step, rooms=ANALYSIS, stage="slip", partial=True):
     radii: Radii
     shared: bool = False
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         from rigid_motion_batch.analysis import held
         from rigid_motion_batch.analysis.results import made_again
         from rigid_motion_batch.files import write_rows
@@ -206,7 +206,7 @@ class Tabulate(Step, rooms=("analysis", "files.py"), stage="report", partial=Tru
     rows: str
     """The name of the part of the table in every result."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         from rigid_motion_batch.analysis.metrics import join_tables
 
         join_tables(job.folder / "table.csv", [folder / self.rows for folder in job.results])
@@ -233,7 +233,7 @@ class Build(Step, rooms=SCENES, stage="build", blender=True):
     version: str
     """The version of Blender."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         from rigid_motion_batch.analysis.held import PairSlips
         from rigid_motion_batch.analysis.results import made_again
         from rigid_motion_batch.scenes.body_scene import build_body_scene
@@ -245,7 +245,7 @@ class Build(Step, rooms=SCENES, stage="build", blender=True):
         pairs = [values.read(PairSlips, folder / "slips") for folder in job.results[2:]]
         slips = [row for pair in pairs for some in pair.choices if some.choice == result.choice for row in some.rows]
         findings = findings_of(result.rows, slips)
-        with _told(f"{clip.name} {result.choice.phrase}: no video"):
+        with _raising_task_errors(f"{clip.name} {result.choice.phrase}: no video"):
             made = made_again(clip, result, radii, shared=self.shared)
             if clip.rest_body is None:
                 build_scene(made, self.settings, findings)
@@ -261,22 +261,22 @@ class Render(Step, rooms=SCENES, stage="render", blender=True):
     first: int
     last: int
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         from rigid_motion_batch.scenes.film import render_piece
 
-        with _told(f"{self.title}: no video"):
+        with _raising_task_errors(f"{self.title}: no video"):
             render_piece(job.results[0] / BLEND, self.first, self.last, job.folder / PIECE, job.progress)
 
 
 class Encode(Render, stage="encode"):
     """Join the pieces of a film. Before: its scene, and the pieces."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         from rigid_motion_batch.scenes.film import join_pieces
 
         scene, *others = job.results
         pieces = [folder / PIECE for folder in others]
-        with _told(f"{self.title}: no video"):
+        with _raising_task_errors(f"{self.title}: no video"):
             join_pieces(scene / BLEND, pieces, job.folder / FILM, job.progress)
 
 
@@ -290,12 +290,12 @@ class Subject(Step, rooms=SCENES, stage="report", blender=True):
     version: str
     """The version of Blender."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         import numpy as np
 
         from rigid_motion_batch.scenes.subject import simplified
 
-        with _told("the report shows a drill"):
+        with _raising_task_errors("the report shows a drill"):
             np.savez(job.folder / MESH, **cast(dict[str, Any], simplified(self.requested)))
 
 
@@ -319,7 +319,7 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
     parts: tuple[Part, ...]
     """Parts of the tasks before it, clip by clip, and the films last; these may be still to come."""
 
-    settings: Settings
+    settings: PageSettings
     coming: bool = False
     """True if films are still being made."""
 
@@ -333,7 +333,7 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
     def clips(self) -> list[str]:
         return list(dict.fromkeys(part.clip.name for part in self.parts if part.clip.name))
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         import numpy as np
 
         from rigid_motion_batch.report.data import Mesh
@@ -359,7 +359,7 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
             advance=self._counted(job),
         )
 
-    def _results(self, job: Job) -> Iterator[ClipResult]:
+    def _results(self, job: StepJob) -> Iterator[ClipResult]:
         """Yield the results before a page, one clip in memory at a time, without those that could not be made."""
         from rigid_motion_batch.analysis.needed import KeysNeeded
         from rigid_motion_batch.analysis.results import clip_result
@@ -373,7 +373,7 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
                 keys = values.read(KeysNeeded, needed / "needed") if needed else None
                 yield clip_result(clip.read(recording), result, keys)
 
-    def _slips(self, job: Job) -> list[PairSlips]:
+    def _slips(self, job: StepJob) -> list[PairSlips]:
         """Return what was found of the pairs before a page."""
         from rigid_motion_batch.analysis.held import PairSlips
 
@@ -381,7 +381,7 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
         folders = [folder for part, folder in before if part.what == "slips" and folder]
         return [values.read(PairSlips, folder / "slips") for folder in folders]
 
-    def _counted(self, job: Job) -> Callable[[], None]:
+    def _counted(self, job: StepJob) -> Callable[[], None]:
         """Return a function that reports of every clip that it is on the page."""
         total = len(self.clips)
         done = iter(range(1, total + 1))
@@ -391,7 +391,7 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
 class Overview(Page):
     """Write the page of many clips. Before: what `parts` says, and then their pages."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         from rigid_motion_batch.report.pages import write_overview
 
         there = zip(self.clips, job.before[len(self.parts) :], strict=True)

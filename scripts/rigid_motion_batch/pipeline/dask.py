@@ -22,20 +22,20 @@ from distributed import Client, Security, get_worker
 from distributed.comm import connect
 
 from .executors import Executor, Made, ProcessExecutor
-from .steps import INTERVAL, Job, RunError, version_here
+from .steps import LOOK_INTERVAL_S, RunError, StepJob, version_here
 
-CONNECTING = 5.0
+CONNECTING_S = 5.0
 """Seconds that a scheduler has to answer."""
 
 UNREACHABLE = (OSError, RuntimeError, TimeoutError, CancelledError)
 """Errors that Dask raises where its scheduler does not answer."""
 
 
-def do(job: Job) -> Made:
+def do(job: StepJob) -> Made:
     """Do a job on a worker, in a process of its own, which ends with the worker, or where the job is cancelled."""
     worker = get_worker()
     key, future = worker.get_current_task(), _processes(worker.state.nthreads).submit(job)
-    while not wait([future], INTERVAL).done:
+    while not wait([future], LOOK_INTERVAL_S).done:
         task = worker.state.tasks.get(key)
         if (task is None or task.state == "cancelled") and future.cancel():
             break
@@ -96,7 +96,7 @@ class DaskExecutor(Executor):
         self._waits = not threads
         return sum(self._fit.values())
 
-    def submit(self, job: Job) -> Future[Made]:
+    def submit(self, job: StepJob) -> Future[Made]:
         self._jobs = {future: address for future, address in self._jobs.items() if not future.done()}
         busy = Counter(self._jobs.values())
         address = max(self._fit, key=lambda address: self._fit[address] - busy[address])
@@ -117,9 +117,9 @@ class DaskExecutor(Executor):
             logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
             # A client that finds nobody goes on trying for long, and someone else's server may keep it waiting.
-            knocking = connect(self._address, timeout=CONNECTING, **Security().get_connection_args("client"))
-            asyncio.run(asyncio.wait_for(knocking, CONNECTING + 1.0))
-            self._client = Client(self._address, timeout=CONNECTING, set_as_default=False, name="rigid-motion")
+            knocking = connect(self._address, timeout=CONNECTING_S, **Security().get_connection_args("client"))
+            asyncio.run(asyncio.wait_for(knocking, CONNECTING_S + 1.0))
+            self._client = Client(self._address, timeout=CONNECTING_S, set_as_default=False, name="rigid-motion")
         except (OSError, ValueError, ImportError, TypeError) as error:  # The last one where tls:// has no certificates.
             raise RunError(
                 f"{self._address}: no Dask scheduler answers there ({error}); start one with `dask scheduler`, and "

@@ -28,7 +28,7 @@ from typing import Any, cast
 from rigid_motion_batch.places import EXTENSION, PACKAGE
 from rigid_motion_batch.supervising import death, end_with_parent, held_back, join_session, session
 
-from .steps import Job, TaskError, sha256_in, sha256_of
+from .steps import StepJob, TaskError, sha256_in, sha256_of
 
 Made = dict[str, Any]
 """The `folder` that a job has made, its `files` with size, time of change and digest, the `seconds` that it took, and
@@ -50,7 +50,7 @@ class Executor(AbstractContextManager["Executor"]):
     capacity = 1
     """Number of jobs that it takes at a time."""
 
-    def submit(self, job: Job) -> Future[Made]:
+    def submit(self, job: StepJob) -> Future[Made]:
         """Begin a job. Its future raises TaskError where it failed, and others where who did it is gone: see `loss`."""
         future: Future[Made] = Future()
         try:
@@ -83,7 +83,7 @@ class ProcessExecutor(Executor):
         self._pools: dict[Any, Future[Made]] = {}
         """The last job of each pool."""
 
-    def submit(self, job: Job) -> Future[Made]:
+    def submit(self, job: StepJob) -> Future[Made]:
         with held_back({signal.SIGINT}):  # Ctrl-C reaches this process alone, which decides what comes of it.
             idle = (pool for pool, last in self._pools.items() if last.done() and pool.active)
             pool = next(idle, None) or self._new_pool()
@@ -103,7 +103,7 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def loss(error: BaseException, job: Job) -> str:
+def loss(error: BaseException, job: StepJob) -> str:
     """Return how it came that a job has no result, and no error of its own: it may be tried again."""
     if isinstance(error, CancelledError):
         return "its worker is gone"
@@ -114,7 +114,7 @@ def loss(error: BaseException, job: Job) -> str:
     return ": ".join(filter(None, [f"its process {how}", printed.rpartition("\n")[2][:200]]))
 
 
-def perform(job: Job) -> Made:
+def perform(job: StepJob) -> Made:
     """Do a job. Raises TaskError, and CalledProcessError where a Blender died."""
     if job.blender and job.task.step.blender:
         return _made_by_blender(job)
@@ -128,7 +128,7 @@ def perform(job: Job) -> Made:
         raise problem from None
 
 
-def _make(job: Job) -> Made:
+def _make(job: StepJob) -> Made:
     """Have the files of a job written."""
     started, task = time.perf_counter(), job.task
     job.folder.mkdir(parents=True)
@@ -147,7 +147,7 @@ def _make(job: Job) -> Made:
     return {"folder": job.folder, "files": files, "seconds": time.perf_counter() - started, "facts": facts or {}}
 
 
-def _problem(error: Exception, job: Job) -> TaskError:
+def _problem(error: Exception, job: StepJob) -> TaskError:
     """Return an error as one of the task, with its place in the program where nobody foresaw it."""
     if isinstance(error, TaskError):
         return error
@@ -176,7 +176,7 @@ def _begin(command: str) -> None:
     _print_to(os.devnull)
 
 
-def _perform(job: Job) -> Made:
+def _perform(job: StepJob) -> Made:
     """Do a job in a worker. What is printed meanwhile is kept: of a worker that dies these are the last words."""
     with suppress(OSError):
         os.chdir(job.here)
@@ -198,7 +198,7 @@ def _print_to(path: str | Path) -> None:
 # -- in a Blender of the user's ---------------------------------------------------------------------------------------
 
 
-def _made_by_blender(job: Job) -> Made:
+def _made_by_blender(job: StepJob) -> Made:
     """Have a job done by a Blender of its own."""
     job.place.mkdir(parents=True, exist_ok=True)
     (job.place / "job").write_bytes(pickle.dumps(replace(job, blender="")))

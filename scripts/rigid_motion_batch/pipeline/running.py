@@ -22,13 +22,13 @@ from rigid_motion_batch.command_line import listed
 from rigid_motion_batch.progress import Progress
 
 from .executors import FULL_OR_FORBIDDEN, Executor, Made, loss
-from .steps import INTERVAL, Job, RunError, Task, TaskError
+from .steps import LOOK_INTERVAL_S, RunError, StepJob, Task, TaskError
 from .store import Store
 from .values import plain
 
 Plan = Callable[[], Iterable[Task]]
 
-ATTEMPTS = 3
+MAX_ATTEMPTS = 3
 """Number of times that a task is begun whose process dies."""
 
 STATES = "done", "up to date", "failed", "skipped", "not begun or stopped"
@@ -117,7 +117,7 @@ class Run:
         self._open: set[str] = set()
         """The keys of tasks that are met, and not settled."""
         self._waiting: list[Task] = []
-        self._at_work: dict[Future[Made], tuple[Task, Job]] = {}
+        self._at_work: dict[Future[Made], tuple[Task, StepJob]] = {}
         self._losses: Counter[str] = Counter()
         self._done = 0.0
         """Seconds of tasks that have come to their end."""
@@ -158,8 +158,8 @@ class Run:
                 self._waiting.remove(task)
                 self._begin(task)
             if not capacity:
-                time.sleep(INTERVAL)
-            wait(self._at_work, INTERVAL, FIRST_COMPLETED)
+                time.sleep(LOOK_INTERVAL_S)
+            wait(self._at_work, LOOK_INTERVAL_S, FIRST_COMPLETED)
             ended = [future for future in self._at_work if future.done()]  # Also those that an executor cancels.
             for future in ended:
                 self._end(future, *self._at_work.pop(future))
@@ -184,11 +184,11 @@ class Run:
             self._close(task, SKIPPED)
         else:
             folders = [self.store.results / key if key else None for key in before]
-            job = Job(task, self.store.new_scratch(), self.store.output, folders, self.blender)
+            job = StepJob(task, self.store.new_scratch(), self.store.output, folders, self.blender)
             self._show(task)
             self._at_work[self.executor.submit(job)] = task, job
 
-    def _end(self, future: Future[Made], task: Task, job: Job) -> None:
+    def _end(self, future: Future[Made], task: Task, job: StepJob) -> None:
         """Take what came of a job."""
         try:
             made = future.result()
@@ -199,11 +199,11 @@ class Run:
         except (CancelledError, Exception) as error:
             self._losses[task.key] += 1
             said = f"{task.name}: {loss(error, job)}"
-            if self._losses[task.key] < ATTEMPTS:
+            if self._losses[task.key] < MAX_ATTEMPTS:
                 self.progress.note(f"{said}; trying again")
                 self._waiting.insert(0, task)
             else:
-                self._fail(task, f"{said}; given up after {ATTEMPTS} attempts")
+                self._fail(task, f"{said}; given up after {MAX_ATTEMPTS} attempts")
         else:
             self._settle(task, made)
         shutil.rmtree(job.place, ignore_errors=True)

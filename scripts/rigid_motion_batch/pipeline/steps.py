@@ -23,13 +23,13 @@ from rigid_motion_batch import places
 
 from .values import plain
 
-OWN = ".rigid-motion"
+OWN_FOLDER = ".rigid-motion"
 """The folder in an output folder where the pipeline keeps its own files."""
 
-VERSION = "RIGID_MOTION_VERSION"
+VERSION_VARIABLE = "RIGID_MOTION_VERSION"
 """A variable of the environment: the version that this program is to have, of those at work at one plan."""
 
-INTERVAL = 0.2
+LOOK_INTERVAL_S = 0.2
 """Seconds between two looks at tasks that are being done."""
 
 
@@ -67,7 +67,7 @@ class Step:
             setattr(cls, name, value)
         dataclass(frozen=True)(cls)
 
-    def make(self, job: Job) -> Mapping[str, Any] | None:
+    def make(self, job: StepJob) -> Mapping[str, Any] | None:
         """Write the files of the result into the job's folder, and return facts for JSON, if there are any."""
         raise NotImplementedError
 
@@ -110,7 +110,7 @@ class Task:
 
 
 @dataclass
-class Job:
+class StepJob:
     """A task that is done somewhere, with its files: what goes to a worker, and what its step is given.
 
     All that is written meanwhile is below `place`, which may be missing; the result's files go into `folder`, which is

@@ -32,13 +32,13 @@ from rigid_motion_batch.command_line import listed
 from rigid_motion_batch.files import append_lines, lines_of, write_text
 
 from .executors import Made
-from .steps import OWN, RunError, Task, sha256_in, sha256_of
+from .steps import OWN_FOLDER, RunError, Task, sha256_in, sha256_of
 from .values import plain
 
 INDEX = ".index.json"
 """Index of a result: its files with size, time of change and digest; what it was made of, and in how long."""
 
-KEPT = 7 * 86400.0
+KEPT_S = 7 * 86400.0
 """Seconds that a result is kept that the last plan did not ask for, and what a process was making that was killed."""
 
 UNREADABLE = (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError)
@@ -55,7 +55,7 @@ class Store:
 
     def __init__(self, output: Path, *, alone: bool = True, overwrite: bool = False) -> None:
         self.output, self.alone, self.overwrite = output.absolute(), alone, overwrite
-        self.own = self.output / OWN
+        self.own = self.output / OWN_FOLDER
         self.results, self._published, self._scratches = map(self.own.joinpath, ("results", "published", "scratch"))
         self._lock = FileLock(self.own / "lock", blocking=False)
         self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
@@ -121,7 +121,7 @@ class Store:
         except (OSError, ValueError):
             return ""
         inside = os.path.realpath(path).removeprefix(os.path.realpath(self.output) + os.sep).replace(os.sep, "/")
-        if inside.startswith(f"{OWN}/") or self._digests_at(inside):
+        if inside.startswith(f"{OWN_FOLDER}/") or self._digests_at(inside):
             raise RunError(f"{path}: this input was written by a run into this folder; choose another --output")
         place, seen = os.path.abspath(path), [status.st_size, status.st_mtime_ns, status.st_ctime_ns]
         self._inputs |= dict.fromkeys([(status.st_dev, status.st_ino), (link.st_dev, link.st_ino)], place)
@@ -261,7 +261,7 @@ def _seen(path: str) -> list[int]:
 
 def _old(folder: Path) -> list[Path]:
     """Return what was made in a folder before so long a time that it is kept no more."""
-    return [path for path in folder.glob("*") if time.time() - _changed_at(path) > KEPT]
+    return [path for path in folder.glob("*") if time.time() - _changed_at(path) > KEPT_S]
 
 
 def _changed_at(path: Path) -> float:

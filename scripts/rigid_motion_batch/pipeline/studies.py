@@ -15,7 +15,7 @@ from rigid_motion_batch.command_line import did_you_mean, listed
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS, ReadingOptions
 from rigid_motion_batch.recordings.reading import split_source
-from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.report.settings import PageSettings
 from rigid_motion_batch.scenes.settings import MODELS, SceneSettings
 
 from .comparison_steps import ClipOf
@@ -72,7 +72,7 @@ class Comparison:
     every_film: bool = False
     """True if there is a film of every choice of keys, otherwise only of the one that the verdict speaks of."""
 
-    about: Settings | None = None
+    about: PageSettings | None = None
     """Facts of the run that pages show; None for a run without pages."""
 
     subject: str = next(iter(MODELS))

@@ -25,7 +25,7 @@ from .objects import LAST_FRAME, probe
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import ALL, Selection, Trajectory, TrajectoryError, shown
 from .rigs import armature_of, in_blender, whole_body
-from .sampling import LEAD, OF_OBJECTS, Moments, merged, sampled
+from .sampling import JUMP_STEPS, OF_OBJECTS, Moments, merged, sampled
 
 if TYPE_CHECKING:
     import bpy
@@ -33,15 +33,15 @@ if TYPE_CHECKING:
 OF_BONES = "pose.bones["
 """The beginning of the data paths of everything that a driver may drive in a bone."""
 
-FEW = 5
+MAX_LISTED_BONES = 5
 """Bones of a rig that are listed where one has to be named."""
 
-STEADY = 1e-4
+MAX_STEADY_SCALE_RATIO = 1e-4
 """Share by which a scale may differ that is one and the same: single precision, through a chain of bones."""
 
 
 @dataclass(frozen=True)
-class Body:
+class BlendBody:
     """Object that is followed, or a bone of its pose."""
 
     obj: bpy.types.Object
@@ -78,7 +78,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
     with in_blender(path, "save it again from Blender"), _without_scripts(), _opened(path) as (objects, scenes):
         if not scenes:
             raise TrajectoryError(path, "no scene in this file", "save the file from Blender itself")
-        bodies = {name: Body(obj) for name, obj in objects.items()}
+        bodies = {name: BlendBody(obj) for name, obj in objects.items()}
         animated = [name for name, body in bodies.items() if body.frames_of_keys() is not None]
         selection.match([*objects, *_bones_of(objects)])
         requested = selection.requested or ""
@@ -89,7 +89,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
         # Of all objects those that are animated, and of one any whose bones are as well.
         every = selection.requested == ALL
         moving = [name for name in objects if name in animated or (with_keys[name] and not every)]
-        few = [f"{name}/{bone}" for name, bones in with_keys.items() for bone in bones[:FEW]]
+        few = [f"{name}/{bone}" for name, bones in with_keys.items() for bone in bones[:MAX_LISTED_BONES]]
         more = sum(map(len, with_keys.values())) - len(few)
         still = [name for name in objects if name not in moving]
         taken = selection.of(moving, unlisted=[*few, *still], more=more)
@@ -105,7 +105,7 @@ def _bones_of(objects: dict[str, bpy.types.Object]) -> Iterator[str]:
             yield from (f"{name}/{bone}" for bone in armature_of(obj).bones.keys())  # noqa: SIM118 - it runs over bones
 
 
-def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object]) -> Body | None:
+def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object]) -> BlendBody | None:
     """Return the bone called OBJECT/BONE, either of which may have slashes. None if there is no such object.
 
     Raises
@@ -115,7 +115,9 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
     """
     ends = [index for index, character in enumerate(requested) if character == "/"]
     split = [
-        Body(objects[requested[:end]], requested[end + 1 :]) for end in reversed(ends) if requested[:end] in objects
+        BlendBody(objects[requested[:end]], requested[end + 1 :])
+        for end in reversed(ends)
+        if requested[:end] in objects
     ]
     rigs = [body for body in split if body.obj.type == "ARMATURE"]
     for body in rigs:
@@ -125,19 +127,21 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
         rig, missing = rigs[0].obj, rigs[0].bone or ""
         problem, bones = f"{shown(rig.name)} has no bone {shown(missing)}", armature_of(rig).bones.keys()
         wanted = missing.casefold()
-        near = sorted(bones, key=lambda bone: -SequenceMatcher(None, bone.casefold(), wanted, False).ratio())[:FEW]
+        near = sorted(bones, key=lambda bone: -SequenceMatcher(None, bone.casefold(), wanted, False).ratio())[
+            :MAX_LISTED_BONES
+        ]
         way_out = f"of its {len(bones)} bones the nearest by name: {listed(near)}"
         raise TrajectoryError(path, problem, way_out if bones else "it has none at all")
     if split and (obj := split[0].obj).is_missing:
         problem = f"{shown(obj.name)} is missing from {cast('bpy.types.Library', obj.library).filepath}"
         raise TrajectoryError(path, problem, "bring that file back, or tell Blender where it is now")
     if alone := [rig for rig, obj in objects.items() if obj.type == "ARMATURE" and requested in armature_of(obj).bones]:
-        problem = f"no body named {shown(requested)}, only a bone of {listed(alone, FEW)}"
+        problem = f"no body named {shown(requested)}, only a bone of {listed(alone, MAX_LISTED_BONES)}"
         raise TrajectoryError(path, problem, f"name it with {path}:{alone[0]}/{requested}")
     return None
 
 
-def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
+def _sample(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
     from .world_poses import read_poses
 
     moments, metres = _moments(path, body, scenes)
@@ -158,11 +162,11 @@ def _sample_whole(path: Path, rig: bpy.types.Object, scenes: list[bpy.types.Scen
     if not armature_of(rig).bones:
         raise TrajectoryError(path, f"{shown(rig.name)} has no bones at all", "name another object of the file")
     # What moves any bone counts.
-    moments, metres = _moments(path, Body(rig, armature_of(rig).bones[0].name), scenes, rig.name)
+    moments, metres = _moments(path, BlendBody(rig, armature_of(rig).bones[0].name), scenes, rig.name)
     return whole_body(path, rig, rig.name, moments, metres, scale)
 
 
-def _moments(path: Path, body: Body, scenes: list[bpy.types.Scene], name: str = "") -> tuple[Moments, float]:
+def _moments(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], name: str = "") -> tuple[Moments, float]:
     """Return when a body is looked at, and the metres of a unit."""
     scene = next((scene for scene in scenes if scene in body.obj.users_scene), scenes[0])
     keyed = body.frames_of_keys()
@@ -174,18 +178,18 @@ def _moments(path: Path, body: Body, scenes: list[bpy.types.Scene], name: str = 
     if not (rate > 0 and base > 0.0):
         raise TrajectoryError(path, f"{rate} / {base:g} is no frame rate", "set it in the Output Properties")
     whole = np.arange(np.floor(first), np.ceil(last) + 1.0)
-    keys, straight = moments_of(body.obj, LEAD)
+    keys, straight = moments_of(body.obj, JUMP_STEPS)
     units = scene.unit_settings
     return Moments(
         merged(whole, keys, 1.0), rate / base, straight=straight
     ), 1.0 if units.system == "NONE" else units.scale_length
 
 
-def _remark(body: Body, poses: Poses) -> str:
+def _remark(body: BlendBody, poses: Poses) -> str:
     """Return what the size of its rig does to a bone."""
     if body.bone is None or poses.scales is None:
         return ""
-    if not np.allclose(poses.scales, poses.scales[0], rtol=STEADY, atol=0.0):
+    if not np.allclose(poses.scales, poses.scales[0], rtol=MAX_STEADY_SCALE_RATIO, atol=0.0):
         return ""
     size = f"{poses.scales[0]:.4g} times its own size"
     return f"{body.name} is {size} all along, and so are the shell of its errors (--radius) and what a video shows"

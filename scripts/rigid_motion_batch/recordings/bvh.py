@@ -38,13 +38,13 @@ AXES = "opengl"
 MOST_JOINTS = 3000
 """Joints of a body, three times what the most detailed rigs have. With more, what follows takes minutes."""
 
-DEEPEST = 500
+MAX_JOINT_DEPTH = 500
 """Joints that hang on one another: five times what the longest tails have."""
 
 MOST_POSES = 50_000_000
 """Poses of all joints together: a file may hold any number of joints and frames in little space."""
 
-NEARER = 0.5
+ADDED_OFFSET_RATIO = 0.5
 """Times its distance from the OFFSET that a position is from 0, where it is meant to be added to that."""
 
 LONGEST_NAME = 100
@@ -190,7 +190,7 @@ def _add_offsets(joints: list[Joint], values: np.ndarray) -> int:
             places += own
             columns, offsets = [place for place, _ in own], np.array([offset for _, offset in own])
             away = [np.median(np.abs(values[:, columns] - some), axis=0).sum() for some in (0.0, offsets)]
-            near.append(away[0] < NEARER * away[1])
+            near.append(away[0] < ADDED_OFFSET_RATIO * away[1])
     if 2 * sum(near) <= len(near):
         return 0
     for place, offset in places:
@@ -276,8 +276,8 @@ def _read_hierarchy(path: Path) -> tuple[list[Joint], int]:
     while (word := words.next("MOTION")).upper() != "MOTION":
         if len(joints) > MOST_JOINTS:
             words.fail(f"more than {MOST_JOINTS} joints", "export fewer, such as one body at a time")
-        if len(opened) > DEEPEST:
-            words.fail(f"more than {DEEPEST} joints hang on one another", "export a shorter chain")
+        if len(opened) > MAX_JOINT_DEPTH:
+            words.fail(f"more than {MAX_JOINT_DEPTH} joints hang on one another", "export a shorter chain")
         joint = joints[opened[-1]] if opened and opened[-1] is not None else None
         match word.upper():
             case "ROOT" if not opened:

@@ -14,20 +14,20 @@ from rigid_motion_batch.command_line import listed
 from .clips import Clip
 from .recordings import Trajectory
 
-RIGID, JOINT = 0.1, 0.03
+RIGID_RADIUS_M, JOINT_RADIUS_M = 0.1, 0.03
 """Metres: the radius of what a hand holds, and of what is around a joint of a body."""
 
-LISTED = 8
+MAX_LISTED_ROWS = 8
 """Rows that are named."""
 
-MUCH = 0.25
+MIN_UNTOUCHED_RATIO = 0.25
 """The share of samples that are left alone from which on it is said."""
 
 
 def cleaned_clip(clip: Clip, tolerance: float | None = None, radius: float | None = None) -> tuple[Clip, Cleaned]:
     """Return a clip without its trembling, and what was found; lengths are in metres."""
     metres, body = clip.metres_per_unit, clip.rest_body
-    radius = radius or (JOINT if body else RIGID)
+    radius = radius or (JOINT_RADIUS_M if body else RIGID_RADIUS_M)
     found = clean(
         clip.times, clip.poses, tolerance and tolerance / metres, radius / metres, body.skeleton if body else None
     )
@@ -59,10 +59,10 @@ def described(clip: Clip, found: Cleaned, rows: np.ndarray | None = None) -> Ite
         if mask.any():
             some = rows[mask.reshape(-1, mask.shape[-1]).any(axis=0)]
             what = f"1 row was {single}" if len(some) == 1 else f"{len(some)} rows were {several}"
-            yield f"{what}: {listed(list(map(str, some)), LISTED)}"
+            yield f"{what}: {listed(list(map(str, some)), MAX_LISTED_ROWS)}"
     if (found.times != clip.times).any():
         yield "clock trembles"
-    if (share := float(np.mean(found.alone))) > MUCH:
+    if (share := float(np.mean(found.alone))) > MIN_UNTOUCHED_RATIO:
         yield f"{share:.0%} is left nearly as it is, as motion cannot be told from noise there"
     if body:
         before, after = (clip.in_blender(body.skeleton.in_root_space(poses)) for poses in (clip.poses, found.poses))

@@ -21,10 +21,10 @@ from rigid_motion_batch.command_line import listed, printable
 from .cleaning import cleaned_first
 from .clips import Clip, ClipWarning, OtherMotion
 from .options import AS_THE_FILE_SAYS, ReadingOptions
+from .plausibility import breaks, calibration_pose, losses
 from .reading import format_of, read_trajectories, split_source
 from .recordings import Trajectory, TrajectoryError, shown
 from .rest_bodies import in_parents, repaired
-from .sense import breaks, calibration_pose, losses
 
 LONGEST_NAME = 80
 """Characters of a clip's name: folders below folders have to fit what file systems allow."""
@@ -207,7 +207,7 @@ def _safe(name: str) -> str:
     return f"clip-{safe}" if safe.casefold().split(".")[0] in DEVICES else safe
 
 
-ROUNDED = 6e-4
+MAX_TIME_ROUNDING_S = 6e-4
 """Seconds that a motion may begin later or end sooner: times are often rounded to milliseconds."""
 
 
@@ -238,7 +238,7 @@ def with_against(clip: Clip, source: str, name: str, axes: str | None, options: 
         raise TrajectoryError(source, f"{len(others)} bodies", "name the one that moves as the recording does")
     other = others[0]
     result = OtherMotion(name, other.times, _as_in(clip, other, source))
-    first, last = np.searchsorted(clip.times, other.times[[0, -1]] + (-ROUNDED, ROUNDED))
+    first, last = np.searchsorted(clip.times, other.times[[0, -1]] + (-MAX_TIME_ROUNDING_S, MAX_TIME_ROUNDING_S))
     if last - first < 2:
         problem = f"it lasts from {_span(other.times)}, and {clip.source} from {_span(clip.times)}"
         raise TrajectoryError(source, problem, "give both the same clock")

@@ -13,8 +13,8 @@ import numpy as np
 
 from rigid_motion_batch.command_line import listed
 
-from .columns import Layout, require_time_unit
-from .options import TICKS, ReadingOptions
+from .columns import RowLayout, require_time_unit
+from .options import TICKS_PER_S_BY_UNIT, ReadingOptions
 from .recordings import TrajectoryError, shown
 from .tables import HeaderLine, Table
 from .times import kind_of_times, seconds_of, seconds_of_dates, unit_by_rate, whole_ticks
@@ -54,7 +54,7 @@ class Clock:
 def clock_of(
     header: HeaderLine,
     columns: Sequence[int],
-    layout: Layout,
+    layout: RowLayout,
     options: ReadingOptions,
     count: int,
     body: np.ndarray | slice,
@@ -96,7 +96,9 @@ def clock_of(
     return replace(result, remark="; ".join(filter(None, (said, result.remark))))
 
 
-def _clock(header: HeaderLine, column: int, layout: Layout, options: ReadingOptions, body: np.ndarray | slice) -> Clock:
+def _clock(
+    header: HeaderLine, column: int, layout: RowLayout, options: ReadingOptions, body: np.ndarray | slice
+) -> Clock:
     """Return the times of one column."""
     table, name = Table(header, {"t": column}), header.cells[column]
     kind = kind_of_times(table)
@@ -114,7 +116,7 @@ def _clock(header: HeaderLine, column: int, layout: Layout, options: ReadingOpti
     guessed = ""
     if not unit:
         guessed, remark = unit_by_rate(header, ticks[body])
-    per_second = TICKS[unit or guessed or "s"]
+    per_second = TICKS_PER_S_BY_UNIT[unit or guessed or "s"]
     return Clock(name, seconds_of(ticks, per_second), remark, unit=unit, ticks=ticks, per_second=per_second)
 
 
@@ -124,8 +126,8 @@ def _joined(clocks: list[Clock]) -> list[Clock]:
     for clock in clocks:
         before = result[-1] if result else clock
         counted = (before.unit, clock.unit) == ("s", "ns") and bool(np.all(np.rint(before.ticks) == before.ticks))
-        if counted and np.all((clock.ticks >= 0) & (clock.ticks < TICKS["ns"])):
-            seconds = (before.ticks - before.ticks.min()) + clock.ticks / TICKS["ns"]
+        if counted and np.all((clock.ticks >= 0) & (clock.ticks < TICKS_PER_S_BY_UNIT["ns"])):
+            seconds = (before.ticks - before.ticks.min()) + clock.ticks / TICKS_PER_S_BY_UNIT["ns"]
             result[-1] = Clock(f"{before.name} and {clock.name}", seconds)
             continue
         result.append(clock)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import cast
 
-from .options import TICKS
+from .options import TICKS_PER_S_BY_UNIT
 
 LONGEST_NAME = 100
 """Characters. What is longer is no name of a column that is known."""
@@ -38,7 +38,7 @@ UNIT_OF = {spelling: unit for unit, spellings in UNITS.items() for spelling in s
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 """Units of length."""
 
-UNITS_AS_WORDS = {word for word, unit in UNIT_OF.items() if unit not in TICKS} - {"in", "feet"}
+UNITS_AS_WORDS = {word for word, unit in UNIT_OF.items() if unit not in TICKS_PER_S_BY_UNIT} - {"in", "feet"}
 """Units that need no brackets to be distinguished from parts of a body."""
 
 KINDS = {
@@ -54,7 +54,7 @@ KIND_OF = {word: kind for kind, words in KINDS.items() if kind != "matrix" for w
 NUMBERED = KIND_OF | dict.fromkeys(KINDS["matrix"].split(), "matrix")
 """Words that a number behind them makes an axis of. Before a letter those of matrices mean nothing."""
 
-LEADING = ("p", "q", "t")
+LEADING_LETTERS = ("p", "q", "t")
 """Letters that tell the kind where a name begins with them. An r is rather the right side."""
 
 TURNS = ("roll", "pitch", "yaw")
@@ -164,8 +164,8 @@ def _without_brackets(text: str) -> tuple[str, str]:
 
 def _time(words: list[str], unit: str) -> ColumnName | None:
     parts = " ".join(TIME_WITH_UNIT.sub(r"\1 \2", word) for word in words).split()
-    units = [UNIT_OF[word] for word in parts if UNIT_OF.get(word) in TICKS]
-    others = [word for word in parts if UNIT_OF.get(word) not in TICKS]
+    units = [UNIT_OF[word] for word in parts if UNIT_OF.get(word) in TICKS_PER_S_BY_UNIT]
+    others = [word for word in parts if UNIT_OF.get(word) not in TICKS_PER_S_BY_UNIT]
     # A plain s is a scale; any other unit of time tells that this is one.
     timely = not TIME.isdisjoint(others) or (bool(units) and words != ["s"])
     if not timely or not WITH_TIME.issuperset(others):
@@ -187,7 +187,7 @@ def _pose(words: list[str], unit: str, taken: set[int]) -> ColumnName | None:
         return _numbered(words, unit, taken) if words[-1:] and words[-1].isdecimal() else None
     place = axes[-1]
     of_kinds = {other for other, word in enumerate(words) if len(word) > 1 and word in KIND_OF}
-    leading = place > 1 and not of_kinds and words[0] in LEADING  # p_RS_R_x, q_wo_w
+    leading = place > 1 and not of_kinds and words[0] in LEADING_LETTERS  # p_RS_R_x, q_wo_w
     of_kinds |= {0} if leading else set()
     taken |= of_kinds | {place}
     if words[place] in TURNS:

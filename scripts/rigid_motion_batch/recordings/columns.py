@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from rigid_motion_batch.command_line import listed
 
 from .column_names import DEVICES, METRES, TURNS, ColumnName, column_name, unit_in
-from .options import TICKS, ReadingOptions
+from .options import TICKS_PER_S_BY_UNIT, ReadingOptions
 from .recordings import NoMotion, TrajectoryError, shown
 from .tables import HeaderLine, is_number
 
@@ -26,7 +26,7 @@ BOTTOM = ("m30", "m31", "m32")
 
 OPTIONAL = ("scale", *BOTTOM)
 
-KNOWN = "t, time, timestamp_ms; x, px, pos_x, position.x; qw, rot_w, rotation.w"
+KNOWN_NAMES = "t, time, timestamp_ms; x, px, pos_x, position.x; qw, rot_w, rotation.w"
 """Text of an error on the names that are known."""
 
 MOST_FOUND = 12
@@ -40,7 +40,7 @@ NOT_POSES = {"v", "vel", "velocity", "linear", "angular", "acc", "accel", "accel
 
 
 @dataclass(frozen=True)
-class Layout:
+class RowLayout:
     """Layout of a row: where everything is, as indices."""
 
     times: tuple[int, ...]
@@ -52,7 +52,9 @@ class Layout:
     """
 
     units: Mapping[int, str]
-    """Units of the columns that tell theirs: a name in `TICKS` or `column_names.METRES`, "deg", "rad", or unknown."""
+    """Units of the columns that tell theirs: a name in `TICKS_PER_S_BY_UNIT` or `column_names.METRES`, "deg", "rad", or
+    unknown.
+    """
 
     devices: tuple[int, ...] = ()
     """Columns that may tell whose the row is, the likeliest first."""
@@ -65,7 +67,7 @@ Found = dict[str, list[int]]
 """Meanings in a body, each to all columns that could be it, by their names."""
 
 
-def layout_of(header: HeaderLine, options: ReadingOptions) -> Layout:
+def layout_of(header: HeaderLine, options: ReadingOptions) -> RowLayout:
     """Return what the columns of a header are.
 
     Raises
@@ -125,7 +127,7 @@ def layout_of(header: HeaderLine, options: ReadingOptions) -> Layout:
     remarks = [text for label, result in bodies.items() if label not in whole and (text := _lacking(label, result))]
     numbered = [columns["qw"] for columns in where.values() if "qw" in columns and axes[columns["qw"]].isdecimal()]
     remarks += [f"{shown(cells[index])} is taken for w" for index in numbered[:1]]
-    return Layout(tuple(times), where, units, tuple(devices), "; ".join(remarks[-MOST_REMARKS:]))
+    return RowLayout(tuple(times), where, units, tuple(devices), "; ".join(remarks[-MOST_REMARKS:]))
 
 
 def names_of(header: HeaderLine) -> list[ColumnName | None]:
@@ -276,7 +278,7 @@ def _missing(
             "say which is which: --columns rx=roll,ry=pitch,rz=yaw in ROS, rx=pitch,ry=yaw,rz=roll in Unity",
         )
     others = ",".join(f"{item}=NAME" for item in missing[:3]) + ",..." * (len(missing) > 3)
-    way_out = header.advice or f"known are {KNOWN}; or --columns {others}"
+    way_out = header.advice or f"known are {KNOWN_NAMES}; or --columns {others}"
     if not any(names) and not explicit:
         problem = f"no column has a known name (found {columns_found(cells)})"
         if all(map(is_number, cells)):
@@ -294,11 +296,15 @@ def columns_found(cells: Sequence[str]) -> str:
 
 def require_time_unit(header: HeaderLine, unit: str) -> None:
     """Raise TrajectoryError where the unit of time is none that is known. Of dates it is no matter: `t [hh:mm:ss]`."""
-    if unit and unit not in TICKS:
-        raise header.error(f"{shown(unit)} is no unit of time that is known", f"--time-unit {', '.join(TICKS)}")
+    if unit and unit not in TICKS_PER_S_BY_UNIT:
+        raise header.error(
+            f"{shown(unit)} is no unit of time that is known", f"--time-unit {', '.join(TICKS_PER_S_BY_UNIT)}"
+        )
 
 
-def metres_of(header: HeaderLine, layout: Layout, columns: Mapping[str, int], options: ReadingOptions) -> list[float]:
+def metres_of(
+    header: HeaderLine, layout: RowLayout, columns: Mapping[str, int], options: ReadingOptions
+) -> list[float]:
     """Return the metres of a unit in each of the columns x, y and z, of which those are metres that say nothing.
 
     Raises TrajectoryError for a unit of length that is not known.

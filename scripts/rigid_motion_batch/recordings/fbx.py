@@ -70,36 +70,36 @@ def _without_images() -> Iterator[None]:
 
 MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
 
-FIRST = len(MAGIC) + 4
+FIRST_RECORD_BYTE = len(MAGIC) + 4
 """Byte where the records begin, behind the version."""
 
-OLDEST = 7100
+MIN_FBX_VERSION = 7100
 """Version that Blender's importer takes, and later ones."""
 
 SINCE_WIDE = 7500
 """Version since which places and numbers have 8 bytes each, and not 4."""
 
-DEEPEST = 100
+MAX_RECORD_DEPTH = 100
 """Records within records; importers go 10 deep."""
 
-SIZES = {b"Z": 1, b"C": 1, b"B": 1, b"Y": 2, b"I": 4, b"F": 4, b"D": 8, b"L": 8}
+BYTES_BY_TYPE = {b"Z": 1, b"C": 1, b"B": 1, b"Y": 2, b"I": 4, b"F": 4, b"D": 8, b"L": 8}
 """Bytes of the properties that are one number."""
 
-ITEMS = {b"b": 1, b"c": 1, b"i": 4, b"l": 8, b"f": 4, b"d": 8}
+ITEM_BYTES_BY_TYPE = {b"b": 1, b"c": 1, b"i": 4, b"l": 8, b"f": 4, b"d": 8}
 """Bytes of a number in those that are many."""
 
-DENSEST = 1032
+MAX_EXPANSION_RATIO = 1032
 """Bytes that zlib makes of one at most."""
 
-HARMLESS = 1 << 24
+MAX_HARMLESS_BYTES = 1 << 24
 """Bytes. What cannot become more is not unpacked to see."""
 
 
 def refuse_damaged(path: Path) -> None:
     """Raise TrajectoryError where a file is no binary FBX, is cut off, or says more than it holds."""
     with path.open("rb") as file:
-        head = file.read(FIRST)
-        if head.startswith(MAGIC) and len(head) == FIRST:
+        head = file.read(FIRST_RECORD_BYTE)
+        if head.startswith(MAGIC) and len(head) == FIRST_RECORD_BYTE:
             with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
                 _Records(path, content).walk()
             return
@@ -112,14 +112,14 @@ class _Records:
     def __init__(self, path: Path, content: mmap.mmap) -> None:
         self.path, self.content = path, content
         (version,) = struct.unpack_from("<I", content, len(MAGIC))
-        if version < OLDEST:
-            problem = f"this is FBX {version / 1000:.1f}, and Blender imports {OLDEST / 1000:.1f} and later"
+        if version < MIN_FBX_VERSION:
+            problem = f"this is FBX {version / 1000:.1f}, and Blender imports {MIN_FBX_VERSION / 1000:.1f} and later"
             raise TrajectoryError(path, problem, "export it as FBX 2011 or later")
         self.head = struct.Struct("<QQQB" if version >= SINCE_WIDE else "<IIIB")
         self.unpacked = 0
 
     def walk(self) -> None:
-        place = FIRST
+        place = FIRST_RECORD_BYTE
         ends: list[int] = []
         zeros = self.head.size
         try:
@@ -139,7 +139,7 @@ class _Records:
                     self.fail("a part of it is longer than the whole")
                 if place < end:
                     ends.append(end)
-                    if len(ends) > DEEPEST or end - place < zeros:
+                    if len(ends) > MAX_RECORD_DEPTH or end - place < zeros:
                         self.fail("its parts are not one in another")
         except struct.error:
             self.fail("it ends too soon")
@@ -148,15 +148,15 @@ class _Records:
         for _ in range(count):
             kind = self.content[place : place + 1]
             place += 1
-            if kind in SIZES:
-                place += SIZES[kind]
+            if kind in BYTES_BY_TYPE:
+                place += BYTES_BY_TYPE[kind]
             elif kind in (b"R", b"S"):
                 (length,) = struct.unpack_from("<I", self.content, place)
                 place += 4 + length
-            elif kind in ITEMS:
+            elif kind in ITEM_BYTES_BY_TYPE:
                 length, packed, size = struct.unpack_from("<III", self.content, place)
                 place += 12
-                self._refuse_false_size(place, length * ITEMS[kind], size, packed == 1)
+                self._refuse_false_size(place, length * ITEM_BYTES_BY_TYPE[kind], size, packed == 1)
                 place += size
             else:
                 self.fail("there are properties of no known kind" if kind else "it ends too soon")
@@ -168,9 +168,9 @@ class _Records:
         if self.unpacked > LARGEST_FILE:
             problem = f"its numbers are more than {LARGEST_FILE} bytes"
             raise TrajectoryError(self.path, problem, "export the skeleton without its meshes, or split the recording")
-        if requested > size * DENSEST if packed else requested != size:
+        if requested > size * MAX_EXPANSION_RATIO if packed else requested != size:
             self.fail("a list of numbers is not as long as it says")
-        if not packed or size * DENSEST <= HARMLESS:
+        if not packed or size * MAX_EXPANSION_RATIO <= MAX_HARMLESS_BYTES:
             return
         try:
             made = len(zlib.decompressobj().decompress(self.content[place : place + size], requested + 1))

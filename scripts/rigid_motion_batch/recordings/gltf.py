@@ -19,7 +19,7 @@ from rigid_motion.gltf.files import unread
 from rigid_motion.gltf.meshopt import decompressed
 from rigid_motion.gltf.nodes import Nodes, steadied
 from rigid_motion.gltf.sizes import joints_of, shines
-from rigid_motion.gltf.tracks import LINEAR, STEP, WIDTHS, Clip, Track, Tracks, read_clips
+from rigid_motion.gltf.tracks import LINEAR, NUMBERS_PER_KEY, STEP, Clip, Track, Tracks, read_clips
 from rigid_motion.motion import Poses
 from rigid_motion.motion.affine import AffineMaps
 from rigid_motion.motion.poses import joined
@@ -28,13 +28,13 @@ from rigid_motion_batch.command_line import listed
 
 from .bvh import MOST_JOINTS
 from .gltf_skins import skin_of
-from .key_moments import NOISE
+from .key_moments import MAX_SAME_VALUE_RATIO
 from .matrices import filled, rigid_of, scales_of
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, unique
 from .rest_bodies import RestBody, likely_metres, tails_of
 from .sampling import (
-    LEAD,
+    JUMP_STEPS,
     OF_JOINTS,
     OF_OBJECTS,
     Moments,
@@ -44,7 +44,7 @@ from .sampling import (
     refuse_too_many,
     sampled,
 )
-from .scene_bodies import LISTED, SceneBodies, parents_among, parents_first, refuse_too_large, with_above
+from .scene_bodies import MAX_LISTED_NAMES, SceneBodies, parents_among, parents_first, refuse_too_large, with_above
 
 ENDINGS = (".glb", ".gltf", ".vrm", ".vrma")
 """Of glTF files: avatars and animations for them, VRM and VRMA, are GLB files."""
@@ -52,10 +52,10 @@ ENDINGS = (".glb", ".gltf", ".vrm", ".vrma")
 WITHOUT_A_RATE = 60.0
 """Samples a second where keys come too seldom or too often to tell."""
 
-FPS = 120.0
+COUNTED_FPS = 120.0
 """Moments are counted in frames of so many a second: keys at 24, 30 or 60 a second are on whole ones."""
 
-CUT = 1e-6
+CUT_FRAMES = 1e-6
 """Frames from one key to another at the same time."""
 
 MOST_NODES = 100_000
@@ -205,8 +205,8 @@ class _Scene:
         # What does not move is looked at for as long as everything else does.
         timing = tracks or [_on_frames(track) for clip in self.clips for track in _placing(clip)]
         moments = _moments(self.path, len(chosen), timing)
-        names = listed([clip.name for clip in taken], LISTED)
-        takes = f"took its take {names}; others: {listed(left, LISTED)}" if left else ""
+        names = listed([clip.name for clip in taken], MAX_LISTED_NAMES)
+        takes = f"took its take {names}; others: {listed(left, MAX_LISTED_NAMES)}" if left else ""
         remark = "; ".join(filter(None, (takes, self._unread)))
         needed = with_above(self.nodes.parents, chosen)
         rows = {node: row for row, node in enumerate(needed)}
@@ -223,33 +223,33 @@ class _Scene:
 
 def _placing(clip: Clip) -> Iterator[Track]:
     """Yield what moves, turns or scales nodes."""
-    return (track for track in clip.all_tracks if track.path in WIDTHS)
+    return (track for track in clip.all_tracks if track.path in NUMBERS_PER_KEY)
 
 
 def _on_frames(track: Track) -> Track:
     """Return a track whose keys are on frames where they nearly are: files have them in single precision."""
-    frames = on_frames(FPS * track.times)
-    frames[:-1] -= CUT * (np.diff(frames) <= 0.0)
-    return replace(track, times=frames / FPS)
+    frames = on_frames(COUNTED_FPS * track.times)
+    frames[:-1] -= CUT_FRAMES * (np.diff(frames) <= 0.0)
+    return replace(track, times=frames / COUNTED_FPS)
 
 
 def _jumps(track: Track) -> np.ndarray:
     """Return whether a track jumps at each of its keys but the first, shape (n - 1,)."""
-    cuts = np.diff(track.times) < 2.0 * CUT / FPS
+    cuts = np.diff(track.times) < 2.0 * CUT_FRAMES / COUNTED_FPS
     if track.interpolation != STEP:
         return cuts
-    return cuts | (np.abs(np.diff(track.points, axis=0)) > NOISE).any(axis=1)
+    return cuts | (np.abs(np.diff(track.points, axis=0)) > MAX_SAME_VALUE_RATIO).any(axis=1)
 
 
 def _moments(path: Path, joints: int, tracks: Sequence[Track]) -> Moments:
     """Return when joints are looked at that tracks move."""
-    keys = [FPS * track.times for track in tracks]
+    keys = [COUNTED_FPS * track.times for track in tracks]
     first, last = min(own[0] for own in keys), max(own[-1] for own in keys)
-    step = FPS / (rate_of(keys, FPS) or WITHOUT_A_RATE)
+    step = COUNTED_FPS / (rate_of(keys, COUNTED_FPS) or WITHOUT_A_RATE)
     refuse_too_many(path, joints, (last - first) / step + 1.0)
-    jumps = [own[1:][_jumps(track)] - LEAD * step for own, track in zip(keys, tracks, strict=True)]
+    jumps = [own[1:][_jumps(track)] - JUMP_STEPS * step for own, track in zip(keys, tracks, strict=True)]
     straight = all(track.interpolation in (LINEAR, STEP) for track in tracks)
-    return moments_between(first, last, FPS, step, np.concatenate([*keys, *jumps]), straight=straight)
+    return moments_between(first, last, COUNTED_FPS, step, np.concatenate([*keys, *jumps]), straight=straight)
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,7 +272,7 @@ class _Played:
     def __call__(self, frames: np.ndarray) -> Poses:
         """Return the nodes on frames (n,), shape (nodes, n); objects with scales."""
         count = max(AT_ONCE // len(self.line), 1)
-        blocks = (frames[first : first + count] / FPS for first in range(0, len(frames), count))
+        blocks = (frames[first : first + count] / COUNTED_FPS for first in range(0, len(frames), count))
         maps = (self.nodes.worlds(self.line, self.tracks, times)[self.rows] for times in blocks)
         return joined([_poses(some, self.turn) for some in maps], axis=1)
 

@@ -14,10 +14,10 @@ from rigid_motion.gltf.documents import GltfError, Json, entry, objects
 from rigid_motion.gltf.nodes import Nodes
 from rigid_motion.motion.affine import AffineMaps
 
-from .rest_bodies import CARRIERS, MOST_VERTICES, Skin
+from .rest_bodies import MAX_JOINTS_PER_VERTEX, MOST_VERTICES, Skin
 from .scene_bodies import with_above
 
-TRIANGLES = 4
+TRIANGLES_MODE = 4
 """The mode of primitives whose every three vertices are a triangle."""
 
 DRACO = "KHR_draco_mesh_compression"
@@ -74,7 +74,7 @@ def _carried(nodes: Nodes, rows: dict[int, int]) -> Iterator[tuple[Json, np.ndar
             joints, maps = line[-1:], nodes.resting[[number]]
         carriers = np.array([rows.get(joint, 0) for joint in joints])
         for primitive in objects(entry(json, "meshes", node["mesh"]), "primitives"):
-            if primitive.get("mode", TRIANGLES) == TRIANGLES and "POSITION" in primitive["attributes"]:
+            if primitive.get("mode", TRIANGLES_MODE) == TRIANGLES_MODE and "POSITION" in primitive["attributes"]:
                 yield primitive, carriers, maps
 
 
@@ -89,11 +89,14 @@ def _part(nodes: Nodes, primitive: Json, carriers: np.ndarray, maps: AffineMaps)
     else:
         corners = np.arange(len(points))
     names = [name for name in attributes if name.startswith("JOINTS_")] if len(maps.origins) > 1 else []
-    joints, weights = np.zeros((len(points), CARRIERS), dtype=np.int64), np.zeros((len(points), CARRIERS))
+    joints, weights = (
+        np.zeros((len(points), MAX_JOINTS_PER_VERTEX), dtype=np.int64),
+        np.zeros((len(points), MAX_JOINTS_PER_VERTEX)),
+    )
     if names:
         given = np.hstack([raw_numbers(document, attributes[name]) for name in names]).astype(np.int64)
         shares = np.hstack([numbers(document, attributes[name.replace("JOINTS", "WEIGHTS")]) for name in names])
-        strongest = np.argsort(-shares, axis=1, kind="stable")[:, :CARRIERS]
+        strongest = np.argsort(-shares, axis=1, kind="stable")[:, :MAX_JOINTS_PER_VERTEX]
         joints, weights = (np.take_along_axis(some, strongest, axis=1) for some in (given, shares))
     weights[weights.sum(axis=1) <= 0.0, 0] = 1.0
     weights /= weights.sum(axis=1, keepdims=True)

@@ -27,25 +27,25 @@ from .recordings import Selection, Trajectory, TrajectoryError
 from .tables import HeaderLine, Table, header_lines, is_number, lines_of
 from .tracks import read_below
 
-FEWEST = 3
+MIN_ROW_NUMBERS = 3
 """Numbers in a row that is one of a recording."""
 
 LOOKED_AT = 500
 """Rows that tell what the columns are."""
 
-MOST = 0.9
+MIN_ALIKE_RATIO = 0.9
 """The share of them that have to be alike."""
 
-NEAR = 0.02
+MAX_AXES_ERROR = 0.02
 """How far from 1 lengths may be, and from 0 the products of axes, in files of few digits."""
 
-TUM = 8
+TUM_NUMBERS = 8
 """Numbers in a row of TUM."""
 
-UNSURE = 0.75
+MIN_FIRST_LARGER_RATIO = 0.75
 """The share of rows in which the first number of four is larger than the last, from which on it may be w."""
 
-EXACTLY = 1e-6
+MAX_UNTURNED_W_ERROR = 1e-6
 """How far from 1 the w of a body may be that has not turned yet, as trackers begin."""
 
 POSITIONS_ONLY = 4
@@ -54,10 +54,10 @@ POSITIONS_ONLY = 4
 REDWOOD = ("source", "target", "frame")
 """What stands in front of each matrix in files of Redwood and Open3D."""
 
-SMALLEST = 1e-12
+MIN_AXIS_LENGTH = 1e-12
 """Length that axes have at least."""
 
-NINE = [0, 1, 2, 4, 5, 6, 8, 9, 10]
+ROTATION_COLUMNS = [0, 1, 2, 4, 5, 6, 8, 9, 10]
 """The axes in the rows of a matrix."""
 
 POSITION = [ColumnName("position", axis) for axis in "xyz"]
@@ -70,7 +70,7 @@ def recognises(head: list[str]) -> bool:
     """Return whether the first row, comments aside, consists of numbers."""
     row = next((line for line in head if line.strip() and not line.lstrip().startswith("#")), "")
     cells = _cells(row)
-    return len(cells) >= FEWEST and all(map(is_number, cells))
+    return len(cells) >= MIN_ROW_NUMBERS and all(map(is_number, cells))
 
 
 def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
@@ -130,11 +130,11 @@ def _names(header: HeaderLine) -> tuple[list[ColumnName], tuple[ClipWarning, ...
     table = _numbers(header)
     width = table.shape[1]
     for first in (1, 0):
-        if width - first >= 12 and _mostly(_is_rotation, table[:, first:][:, NINE]):
+        if width - first >= 12 and _mostly(_is_rotation, table[:, first:][:, ROTATION_COLUMNS]):
             return [*TIME[:first], *MATRIX[: 16 if width - first >= 16 else 12]], ()
-    for first in (1, 0) if width >= TUM else (0,) if width == TUM - 1 else ():
+    for first in (1, 0) if width >= TUM_NUMBERS else (0,) if width == TUM_NUMBERS - 1 else ():
         before, block = TIME[:first], table[:, first:]
-        if _mostly(_is_unit, block[:, 3:7]) or (width == TUM and not _mostly(_is_unit, block[:, :4])):
+        if _mostly(_is_unit, block[:, 3:7]) or (width == TUM_NUMBERS and not _mostly(_is_unit, block[:, :4])):
             order, warnings = _order(header, block[:, 3:7], 4 + first)
             return [*before, *POSITION, *order], warnings
         if _mostly(_is_unit, block[:, :4]):
@@ -156,18 +156,18 @@ def _mostly(fits: Callable[[np.ndarray], np.ndarray], rows: np.ndarray) -> bool:
     """Return whether nearly all rows, those aside that are empty or nothing but zeros, are of a kind."""
     known = rows[np.isfinite(rows).all(axis=1) & rows.any(axis=1)]
     with np.errstate(over="ignore", invalid="ignore"):
-        return len(known) > 0 and bool(fits(known).mean() >= MOST)
+        return len(known) > 0 and bool(fits(known).mean() >= MIN_ALIKE_RATIO)
 
 
 def _is_unit(rows: np.ndarray) -> np.ndarray:
-    return np.abs(np.linalg.norm(rows, axis=1) - 1.0) < NEAR
+    return np.abs(np.linalg.norm(rows, axis=1) - 1.0) < MAX_AXES_ERROR
 
 
 def _is_rotation(rows: np.ndarray) -> np.ndarray:
     """Return which rows of nine numbers are axes at right angles, of one length."""
     axes = rows.reshape(-1, 3, 3)
-    axes = axes / np.maximum(np.linalg.norm(axes, axis=2).mean(axis=1), SMALLEST)[:, None, None]
-    return np.abs(axes @ axes.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < NEAR
+    axes = axes / np.maximum(np.linalg.norm(axes, axis=2).mean(axis=1), MIN_AXIS_LENGTH)[:, None, None]
+    return np.abs(axes @ axes.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < MAX_AXES_ERROR
 
 
 def _quaternion(order: str) -> list[ColumnName]:
@@ -180,8 +180,8 @@ def _order(header: HeaderLine, four: np.ndarray, place: int) -> tuple[list[Colum
     if header.path.suffix.lower() == ".tum" or not len(first):
         return _quaternion("xyzw"), ()
     commas = header.separator == ","
-    at_first = bool(first[0] >= last[0] if commas else first[0] > 1.0 - EXACTLY)
-    if not commas and not at_first and np.mean(first > last) < UNSURE:
+    at_first = bool(first[0] >= last[0] if commas else first[0] > 1.0 - MAX_UNTURNED_W_ERROR)
+    if not commas and not at_first and np.mean(first > last) < MIN_FIRST_LARGER_RATIO:
         return _quaternion("xyzw"), ()
     taken, other = ("wxyz", "xyzw") if at_first else ("xyzw", "wxyz")
     columns = ",".join(f"q{axis}={place + number}" for number, axis in enumerate(other))

@@ -25,8 +25,8 @@ from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, keys_of, mo
 from .objects import body_of_objects, refuse_far_frames, single_object
 from .recordings import Selection, Trajectory, TrajectoryError
 from .rigs import armature_of, in_blender, joints_of, single_joints, whole_body
-from .sampling import LEAD, Moments, moments_between, rate_of
-from .scene_bodies import LISTED, SceneBodies, parents_among
+from .sampling import JUMP_STEPS, Moments, moments_between, rate_of
+from .scene_bodies import MAX_LISTED_NAMES, SceneBodies, parents_among
 
 if TYPE_CHECKING:
     import bpy
@@ -126,7 +126,7 @@ class _Scene:
         refuse_far_frames(self.path, self.names[own[0]], np.array([first, last]))
         rate = self.scene.render.fps / self.scene.render.fps_base
         step = rate / max(rate, rate_of(keys, rate) or 0.0)
-        looks = [moments_of(obj, LEAD * step) for obj in objects]
+        looks = [moments_of(obj, JUMP_STEPS * step) for obj in objects]
         frames, straight = np.concatenate([frames for frames, _ in looks]), all(straight for _, straight in looks)
         return moments_between(first, last, rate, step, frames, straight=straight)
 
@@ -135,7 +135,7 @@ class _Scene:
         obj, data = self.nodes[own[0]][0], self.nodes[own[0]][0].animation_data
         left, takes = _other_takes(obj, data.action, self.scene) if data and data.action else [], ""
         if data and data.action and left:
-            takes = f"took its take {data.action.name}; others: {listed(left, LISTED)}"
+            takes = f"took its take {data.action.name}; others: {listed(left, MAX_LISTED_NAMES)}"
         return replace(trajectory, remark="; ".join(filter(None, (trajectory.remark, remark, takes))))
 
 
@@ -210,7 +210,7 @@ def _imported(
         # Importers go by what the window shows: an override is not enough for the mode that they edit bones in.
         window.scene = scene
         with enabled(path, addon):
-            told(path, "import", importer)
+            run_operator(path, "import", importer)
         for obj in scene.objects:
             _only_its_action(obj, scene)
         yield scene, {obj: _own_name(obj.name, taken) for obj in scene.objects}
@@ -220,7 +220,7 @@ def _imported(
         bpy.data.batch_remove(new)
 
 
-def told(path: Path, what: str, do: Callable[[], object]) -> None:
+def run_operator(path: Path, what: str, do: Callable[[], object]) -> None:
     """Have Blender "import" or "export" a file. Raises TrajectoryError with what it says where it cannot."""
     try:
         with silenced(), redirect_stderr(io.StringIO()), warnings.catch_warnings():

@@ -12,7 +12,7 @@ import numpy as np
 
 from rigid_motion.motion.outliers import outliers
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion.motion.repair import GAP
+from rigid_motion.motion.repair import MIN_GAP_INTERVALS
 from rigid_motion.motion.trembling import trembling
 from rigid_motion_batch.axes import AXES, DESCRIBED, NERF
 
@@ -27,7 +27,7 @@ from .sizing import axis_up, leading
 
 UNIT_NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches", "ft": "feet"}
 
-EVEN = 0.1
+MAX_EVEN_INTERVAL_RATIO = 0.1
 """Part of the median by which the middle nine tenths of all intervals differ, at most, where samples are even."""
 
 ABOVE_THE_FLOOR = 0.3, 2.5
@@ -96,7 +96,7 @@ class Size:
 
 
 @dataclass(frozen=True)
-class Trembling:
+class MeasuredTrembling:
     """What no motion explains in a body that was measured: see `rigid_motion.motion.clean`."""
 
     position: float
@@ -131,7 +131,7 @@ class Contents:
 
     warnings: tuple[ClipWarning, ...]
 
-    trembling: Trembling | None
+    trembling: MeasuredTrembling | None
     """None for whole bodies, and what was animated."""
 
 
@@ -212,7 +212,7 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
     return Inspection(source, result.label, size, bodies, taken, tuple(contents), tuple(unreadable), note)
 
 
-def _contents(clip: Clip, trajectory: Trajectory, unit: Unit, trembling: Trembling | None) -> Contents:
+def _contents(clip: Clip, trajectory: Trajectory, unit: Unit, trembling: MeasuredTrembling | None) -> Contents:
     said = {str(warning) for warning in clip.warnings}
     return Contents(
         trajectory.name,
@@ -228,12 +228,12 @@ def _contents(clip: Clip, trajectory: Trajectory, unit: Unit, trembling: Trembli
     )
 
 
-def _trembling(clip: Clip) -> Trembling:
+def _trembling(clip: Clip) -> MeasuredTrembling:
     noise = trembling(clip.times, clip.poses)
     found = np.logical_or(*outliers(clip.times, clip.poses, noise))
     sizes = np.array([noise.position * clip.metres_per_unit, np.degrees(noise.rotation)])
     position, rotation = np.where(sizes > LEAST_TREMBLING, sizes, 0.0).tolist()
-    return Trembling(position, rotation, tuple(clip.times[found].tolist()))
+    return MeasuredTrembling(position, rotation, tuple(clip.times[found].tolist()))
 
 
 def _unit(clip: Clip, trajectory: Trajectory, result: Format, options: ReadingOptions) -> Unit:
@@ -264,8 +264,8 @@ def _timing(clip: Clip, recorded: int) -> Timing:
         rate=clip.samples_a_second,
         shortest=float(steps.min()),
         longest=float(steps.max()),
-        even=bool(low >= 1.0 - EVEN and high <= 1.0 + EVEN),
-        gaps=int(np.count_nonzero(steps > GAP * median)),
+        even=bool(low >= 1.0 - MAX_EVEN_INTERVAL_RATIO and high <= 1.0 + MAX_EVEN_INTERVAL_RATIO),
+        gaps=int(np.count_nonzero(steps > MIN_GAP_INTERVALS * median)),
     )
 
 

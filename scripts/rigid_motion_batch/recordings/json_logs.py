@@ -27,18 +27,18 @@ from rigid_motion_batch.axes import NERF
 
 from .cameras import in_order, number_in
 from .column_names import column_name
-from .columns import Layout, known_in, layout_of
+from .columns import RowLayout, known_in, layout_of
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, shown
-from .rewriting import DECIMALS
+from .rewriting import WRITTEN_DECIMALS
 from .tables import HeaderLine, is_number, read_text
-from .times import FASTEST
+from .times import MAX_SAMPLES_PER_S
 from .tracks import read_below
 
 LARGEST_FILE = 1 << 28
 """Bytes: two hours of a headset and two controllers at 90 Hz. All of a file is in memory, at ten times its size."""
 
-DEEPEST = 4
+MAX_OBJECT_DEPTH = 4
 """Objects inside of objects that are looked into."""
 
 LOOKED_AT = 16
@@ -47,7 +47,7 @@ LOOKED_AT = 16
 MOST_VALUES = 1000
 """Values of a pose that are looked at."""
 
-VECTORS = (3, 4, 9, 12, 16)
+VECTOR_LENGTHS = (3, 4, 9, 12, 16)
 """Numbers of a list that is a vector, a quaternion or a matrix."""
 
 RECORD3D = ("qx", "qy", "qz", "qw", "x", "y", "z")
@@ -108,7 +108,7 @@ def _lists(content: Any, way: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str,
             content = [dict(zip(RECORD3D, item, strict=True)) for item in content]
         if any(isinstance(item, dict) for item in content[:LOOKED_AT]):
             yield way, content
-    elif isinstance(content, dict) and len(way) < DEEPEST:
+    elif isinstance(content, dict) and len(way) < MAX_OBJECT_DEPTH:
         columns = {key: item for key, item in content.items() if isinstance(item, list) and len(item) > 1}
         if len(columns) > 1 and len({*map(len, columns.values())}) == 1:
             # Columns of numbers are poses, too.
@@ -140,17 +140,17 @@ def _header(
     elif first and tuple(first[0]) == RECORD3D:
         axes = "opengl"
     timed = any(name and name.kind == "time" for name in names) or options.frame_rate
-    if not timed and isinstance(rate, int | float) and 0.0 < rate < FASTEST:
+    if not timed and isinstance(rate, int | float) and 0.0 < rate < MAX_SAMPLES_PER_S:
         options = replace(options, frame_rate=float(rate), time_unit=None)
     return HeaderLine(path, 0, "\t", cells, names=names, axes=axes), keys, options
 
 
 def _keys(value: Any, way: Key = ()) -> Iterator[Key]:
     """Yield the ways to all values of a pose that can be those of columns."""
-    if isinstance(value, dict) and len(way) < DEEPEST:
+    if isinstance(value, dict) and len(way) < MAX_OBJECT_DEPTH:
         for key, item in value.items():
             yield from _keys(item, (*way, key))
-    elif isinstance(value, list) and len(value) in VECTORS:
+    elif isinstance(value, list) and len(value) in VECTOR_LENGTHS:
         for place, item in enumerate(value):
             rows = enumerate(item) if isinstance(item, list) and len(item) in (3, 4) else [(None, item)]
             for column, number in rows:
@@ -176,7 +176,9 @@ def _order(poses: Objects) -> list[int]:
     return sorted(range(len(poses)), key=lambda place: in_order(images[place]) if any(images) else [])
 
 
-def _rows(header: HeaderLine, keys: list[Key], layout: Layout, lists: Mapping[str, Objects]) -> list[tuple[int, str]]:
+def _rows(
+    header: HeaderLine, keys: list[Key], layout: RowLayout, lists: Mapping[str, Objects]
+) -> list[tuple[int, str]]:
     """Return a row for each pose: its body, its number or that of its image, and what it holds.
 
     Raises
@@ -213,7 +215,7 @@ def _write(content: Any, lists: Mapping[str, Objects], keys: Sequence[Key], targ
         held: Any = poses[row]
         for key in way:
             held = held[key]
-        held[last] = round(float(numbers[row, column]), DECIMALS)
+        held[last] = round(float(numbers[row, column]), WRITTEN_DECIMALS)
     with target.open("w", encoding="utf-8") as file:
         json.dump(content, file, indent=1, ensure_ascii=False)
 

@@ -21,19 +21,19 @@ TRANSFORMS = ("location", "rotation_", "scale", "delta_")
 BONE_CHANNEL = re.compile(r'pose\.bones\["(?P<name>(?:\\.|[^"\\])*)"\]\.(?:location|rotation_|scale)', re.DOTALL)
 """The data paths of the channels that move a pose bone, whose name is escaped in them."""
 
-CONSTANT, LINEAR = 0, 1
+CONSTANT_CODE, LINEAR_CODE = 0, 1
 """Blender's numbers of the interpolations of keys."""
 
 MOST_KEYS = 1_000_000
 """Keys of a strip with all of its repeats; keys of one with more are left to looking between samples."""
 
 
-NOISE = 1e-5
+MAX_SAME_VALUE_RATIO = 1e-5
 """Share by which values may differ that are one and the same: of the largest of a curve, or of 1."""
 
 
 @dataclass(frozen=True, eq=False)
-class Keys:
+class CurveKeys:
     """The keys of an F-curve."""
 
     frames: np.ndarray
@@ -67,7 +67,7 @@ def curves_that_move(
             yield fcurve
 
 
-def keys_of(fcurve: bpy.types.FCurve) -> Keys:
+def keys_of(fcurve: bpy.types.FCurve) -> CurveKeys:
     """Return the keys of an F-curve, by their frames."""
     points = fcurve.keyframe_points
     places, kinds = np.empty(2 * len(points), dtype=np.float32), np.empty(len(points), dtype=np.int32)
@@ -76,9 +76,9 @@ def keys_of(fcurve: bpy.types.FCurve) -> Keys:
     frames, values = places.reshape(-1, 2).T.astype(np.float64)
     order = np.argsort(frames, kind="stable")
     frames, values, kinds = frames[order], values[order], kinds[order]
-    changes = np.abs(np.diff(values)) > NOISE * np.abs(values).max(initial=1.0)
-    jumps = np.append(False, (kinds[:-1] == CONSTANT) & changes)[: len(frames)]
-    return Keys(frames, jumps, bool(np.isin(kinds, (CONSTANT, LINEAR)).all()), bool(changes.any()))
+    changes = np.abs(np.diff(values)) > MAX_SAME_VALUE_RATIO * np.abs(values).max(initial=1.0)
+    jumps = np.append(False, (kinds[:-1] == CONSTANT_CODE) & changes)[: len(frames)]
+    return CurveKeys(frames, jumps, bool(np.isin(kinds, (CONSTANT_CODE, LINEAR_CODE)).all()), bool(changes.any()))
 
 
 def with_parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
@@ -129,7 +129,7 @@ def _of_strips(strips: Iterable[bpy.types.NlaStrip], lead: float) -> Iterator[np
                 yield _in_strip(strip, keys_of(fcurve), lead)
 
 
-def _in_strip(strip: bpy.types.NlaStrip, keys: Keys, lead: float) -> np.ndarray:
+def _in_strip(strip: bpy.types.NlaStrip, keys: CurveKeys, lead: float) -> np.ndarray:
     """Return where a strip puts the keys of its Action, in each of its repeats, which begin with a jump as a rule."""
     first, last, scale = strip.action_frame_start, strip.action_frame_end, abs(strip.scale)
     length = (last - first) * scale

@@ -14,7 +14,7 @@ from rigid_motion.motion.quaternions import align_signs, from_matrices
 SHORTEST_AXIS = 1e-12
 """Length below which an axis has no direction: bones are hidden by scaling them to nothing."""
 
-STEADY = 1e-4
+MAX_STEADY_SCALE_RATIO = 1e-4
 """Share by which a scale may differ that is one and the same: single precision, through a chain of matrices."""
 
 
@@ -45,7 +45,7 @@ def scales_of(axes: np.ndarray) -> np.ndarray:
 def growing(poses: Poses) -> Poses:
     """Return poses (n,) without their scales if these are the same all along: the unit that a file was made in."""
     scales = poses.scales
-    steady = scales is None or np.allclose(scales, scales[0], rtol=STEADY, atol=0.0)
+    steady = scales is None or np.allclose(scales, scales[0], rtol=MAX_STEADY_SCALE_RATIO, atol=0.0)
     return Poses(poses.positions, poses.quaternions) if steady else poses
 
 

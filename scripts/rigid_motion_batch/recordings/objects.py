@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 LAST_FRAME = 1048574
 """Last frame that Blender has; a damaged file could, and would keep it at work for hours."""
 
-BLOCK = 256
+BLOCK_FRAMES = 256
 """Frames whose matrices are kept at once."""
 
 
@@ -115,9 +115,9 @@ def poses_on(
     refuse_far_frames(path, name, frames)
     refuse_too_many(path, count, len(frames))
     scene, depsgraph, parts = cast("bpy.types.Scene", bpy.context.scene), bpy.context.evaluated_depsgraph_get(), []
-    for first in range(0, len(frames), BLOCK):
+    for first in range(0, len(frames), BLOCK_FRAMES):
         block = []
-        for frame in frames[first : first + BLOCK].tolist():
+        for frame in frames[first : first + BLOCK_FRAMES].tolist():
             whole = int(np.floor(frame))
             scene.frame_set(whole, subframe=frame - whole)
             block.append(matrices_at(depsgraph))

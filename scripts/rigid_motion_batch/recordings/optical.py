@@ -53,10 +53,10 @@ ROT = tuple(map(str, range(9)))
 AS_ANGLES = 0.01
 """How far a matrix may be from that of the angles beside it."""
 
-EMPTY = ' ,;\t"'
+EMPTY_CHARACTERS = ' ,;\t"'
 """What stands around the only cell of a row."""
 
-MIXED = "export each body to a file of its own"
+EXPORT_ALONE = "export each body to a file of its own"
 
 
 def recognises_motive(head: list[str]) -> bool:
@@ -99,7 +99,7 @@ def read_motive(path: Path, selection: Selection) -> list[Trajectory]:
         warnings = (ClipWarning("its poses are in the space of a parent", "export with Coordinate Space: Global"),)
     cells = [*rows[-1], *[""] * (len(names) - len(axes))]
     header = HeaderLine(path, line, separator, cells, names=names, advice=advice, warnings=warnings)
-    return read_below(selection, replace(AS_THE_FILE_SAYS, euler=euler or None), header, MIXED)
+    return read_below(selection, replace(AS_THE_FILE_SAYS, euler=euler or None), header, EXPORT_ALONE)
 
 
 def _labels(bodies: Iterable[tuple[str, str]]) -> dict[tuple[str, str], str]:
@@ -141,7 +141,7 @@ def recognises_vicon(head: list[str]) -> bool:
 
 def read_vicon(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """Read the objects or segments of the first table that has any."""
-    title = next((number for number, line in lines_of(path) if line.strip(EMPTY) in VICON[:2]), None)
+    title = next((number for number, line in lines_of(path) if line.strip(EMPTY_CHARACTERS) in VICON[:2]), None)
     rows = [] if title is None else list(islice(lines_of(path, after=title), 3))
     if len(rows) < 3:
         raise TrajectoryError(path, "no table of Objects or Segments in it", "export these from Vicon, with the header")
@@ -155,13 +155,13 @@ def read_vicon(path: Path, selection: Selection, options: ReadingOptions) -> lis
         name = column_name(cell)
         names.append(name and replace(name, body=label if place > 1 else ""))
     if not options.frame_rate and not options.time_unit:
-        options = replace(options, frame_rate=_rate(path, rate.strip(EMPTY), rate_line))
-    return read_below(selection, options, replace(header, names=names, rows=_until_blank), MIXED)
+        options = replace(options, frame_rate=_rate(path, rate.strip(EMPTY_CHARACTERS), rate_line))
+    return read_below(selection, options, replace(header, names=names, rows=_until_blank), EXPORT_ALONE)
 
 
 def _until_blank(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
     """Return the rows of a table, behind which may be others."""
-    return takewhile(lambda row: bool(row[1].strip(EMPTY)), lines)
+    return takewhile(lambda row: bool(row[1].strip(EMPTY_CHARACTERS)), lines)
 
 
 def _rate(path: Path, text: str, line: int) -> float:
@@ -199,7 +199,9 @@ def read_qualisys(path: Path, selection: Selection, options: ReadingOptions) -> 
         names.append(name and replace(name, body=label, unit=unit) if body >= 0 else name)
     if all(name is None or name.kind != "time" for name in names) and not (options.frame_rate or options.time_unit):
         options = replace(options, frame_rate=_rate(path, (settings.get("FREQUENCY") or [""])[0], 1))
-    return read_below(selection, options, _turned(HeaderLine(path, number, "\t", cells, names=names), names), MIXED)
+    return read_below(
+        selection, options, _turned(HeaderLine(path, number, "\t", cells, names=names), names), EXPORT_ALONE
+    )
 
 
 def _turned(header: HeaderLine, names: Sequence[ColumnName | None]) -> HeaderLine:

@@ -15,7 +15,7 @@ from typing import Any
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.command_line import number
 
-TICKS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+TICKS_PER_S_BY_UNIT = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 """Units of time, and how many there are in a second."""
 
 MEANINGS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz", "rx", "ry", "rz", "scale", "device")
@@ -30,7 +30,7 @@ class ReadingOptions:
     """Pairs of a name in `MEANINGS` and the column's name in the file. They go before what names are taken to mean."""
 
     time_unit: str | None = None
-    """A name in `TICKS`; times are taken to be in it, whatever the file says of them."""
+    """A name in `TICKS_PER_S_BY_UNIT`; times are taken to be in it, whatever the file says of them."""
 
     scale: float | None = None
     """Metres for each unit of the positions, whatever the file says of them."""
@@ -62,8 +62,8 @@ class ReadingOptions:
                 raise ValueError(f"a column cannot mean {meaning!r}; known are {', '.join(MEANINGS)}")
             if meanings.count(meaning) > 1:
                 raise ValueError(f"two columns for {meaning}; name one")
-        if self.time_unit is not None and self.time_unit not in TICKS:
-            raise ValueError(f"there is no unit of time {self.time_unit!r}; known are {', '.join(TICKS)}")
+        if self.time_unit is not None and self.time_unit not in TICKS_PER_S_BY_UNIT:
+            raise ValueError(f"there is no unit of time {self.time_unit!r}; known are {', '.join(TICKS_PER_S_BY_UNIT)}")
         if self.scale is not None and not 0.0 < self.scale < math.inf:
             raise ValueError(f"a unit cannot be {self.scale} metres long; give a number such as 0.01 for centimetres")
         if self.euler is not None and sorted(self.euler) not in (list("XYZ"), list("xyz")):
@@ -114,7 +114,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         metavar="t=NAME,...",
         help="columns of CSVs by name: t, x, y, z, qx, qy, qz, qw, rx, ry, rz (Euler angles), scale, device",
     )
-    group.add_argument("--time-unit", choices=TICKS, help="unit of the times, whatever the file says")
+    group.add_argument("--time-unit", choices=TICKS_PER_S_BY_UNIT, help="unit of the times, whatever the file says")
     group.add_argument(
         "--frame-rate",
         type=_field("frame_rate", number),

@@ -13,12 +13,12 @@ from rigid_motion_batch.command_line import did_you_mean
 
 from . import blend, bvh, cameras, fbx, gltf, headless, json_logs, named_csv, optical
 from .options import AS_THE_FILE_SAYS, ReadingOptions
+from .plausibility import implausibilities
 from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
-from .sense import doubts
 from .sizing import sized
 from .tables import encoding_of
 
-HEAD = 65536
+HEAD_BYTES = 65536
 """Bytes of a file that are looked at to tell its format."""
 
 
@@ -56,17 +56,17 @@ TEXT = (".csv", ".tsv", ".txt", ".tum", ".chan", ".g2o")
 
 JSON = (".json",)
 
-COUNTED = ("time_unit", "frame_rate", "euler", "degrees")
-TABLE = ("columns", *COUNTED)
+VALUE_OPTIONS = ("time_unit", "frame_rate", "euler", "degrees")
+TABLE = ("columns", *VALUE_OPTIONS)
 
 # Of the formats that share an extension the first that recognises the content reads it. The last one needs not: it
 # takes the rest, and says what is wrong with it.
 FORMATS = (
     Format("Motive CSV", TEXT, optical.read_motive, optical.recognises_motive),
-    Format("Vicon CSV", TEXT, optical.read_vicon, optical.recognises_vicon, COUNTED),
-    Format("Qualisys TSV", TEXT, optical.read_qualisys, optical.recognises_qualisys, COUNTED),
-    Format("COLMAP images", TEXT, cameras.read_images, cameras.recognises_images, COUNTED, says_unit=False),
-    Format("g2o graph", TEXT, cameras.read_graph, cameras.recognises_graph, COUNTED, says_unit=False),
+    Format("Vicon CSV", TEXT, optical.read_vicon, optical.recognises_vicon, VALUE_OPTIONS),
+    Format("Qualisys TSV", TEXT, optical.read_qualisys, optical.recognises_qualisys, VALUE_OPTIONS),
+    Format("COLMAP images", TEXT, cameras.read_images, cameras.recognises_images, VALUE_OPTIONS, says_unit=False),
+    Format("g2o graph", TEXT, cameras.read_graph, cameras.recognises_graph, VALUE_OPTIONS, says_unit=False),
     Format("rows of numbers (TUM, KITTI)", TEXT, headless.read, headless.recognises, TABLE, says_unit=False),
     Format("CSV with named columns", TEXT, named_csv.read, honours=TABLE, says_unit=False),
     Format("JSON", JSON, json_logs.read, honours=TABLE, says_unit=False),
@@ -78,7 +78,7 @@ FORMATS = (
 
 ENDINGS = tuple(dict.fromkeys(extension for known in FORMATS for extension in known.extensions))
 
-INSTEAD = {
+OTHER_FORMATS = {
     ".abc .usd .usda .usdc .usdz": "open it in Blender, and name the .blend",
     ".amc .asf .mvnx": "convert it to BVH or FBX",
     ".bag": "export the poses: rostopic echo -b FILE -p /TOPIC > poses.csv",
@@ -154,7 +154,7 @@ def _read(result: Format, path: Path, selection: Selection, options: ReadingOpti
     if not result.measured:
         return trajectories
     takes_unit = "time_unit" in result.honours
-    found = [doubts(trajectory, time_unit=takes_unit and not trajectory.dated) for trajectory in trajectories]
+    found = [implausibilities(trajectory, time_unit=takes_unit and not trajectory.dated) for trajectory in trajectories]
     return [replace(item, warnings=(*item.warnings, *more)) for item, more in zip(trajectories, found, strict=True)]
 
 
@@ -214,11 +214,11 @@ def format_of(path: Path) -> Format:
     candidates = [known for known in FORMATS if path.suffix.lower() in known.extensions]
     if not candidates:
         problem = f"unknown extension {shown(path.suffix)}"
-        ways = [way for endings, way in INSTEAD.items() if path.suffix.lower() in endings.split()]
+        ways = [way for endings, way in OTHER_FORMATS.items() if path.suffix.lower() in endings.split()]
         raise TrajectoryError(path, problem, ways[0] if ways else f"known are {', '.join(ENDINGS)}")
     if len(candidates) > 1:
         with path.open("rb") as file:
-            head = file.read(HEAD)
+            head = file.read(HEAD_BYTES)
         lines = head.decode(encoding_of(head), errors="replace").splitlines() or [""]
         for candidate in candidates[:-1]:
             if candidate.recognises and candidate.recognises(lines):

@@ -14,7 +14,7 @@ import numpy as np
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import conjugate, rotate
-from rigid_motion.motion.repair import LARGEST
+from rigid_motion.motion.repair import MAX_MEASURE
 
 UNITS = (
     ("metres", 1.0),
@@ -36,10 +36,10 @@ GROWN_UP = 0.9, 2.3
 HIGHEST_HIPS = 1.3
 """Metres above the floor, beyond which the lowest joint of a body that stands on it is not."""
 
-TYPICAL = 1.7
+TYPICAL_HEIGHT_M = 1.7
 """Metres; where no unit makes a body that large, that is taken which comes nearest."""
 
-PLAUSIBLE = 0.5, 2.5
+PLAUSIBLE_HEIGHTS_M = 0.5, 2.5
 """Metres: children and giants. A body of another size is hardly in the unit that was guessed."""
 
 MOST_NAMED = 5
@@ -48,22 +48,22 @@ MOST_NAMED = 5
 MOST_VERTICES = 200_000
 """A body with more is shown without its skin."""
 
-CARRIERS = 4
+MAX_JOINTS_PER_VERTEX = 4
 """Joints that carry a vertex; more are left out, the weaker ones."""
 
-BESIDE = 0.3
+MAX_ROOT_DISTANCE_RATIO = 0.3
 """How far a root is from its body, of the size of that, up to which it is a part of it."""
 
-LOOSE = 0.05
+MIN_LOOSE_MOVE_RATIO = 0.05
 """How far all moves that hangs on a root which stands, of the size of the body, where nothing is joined to it."""
 
-NOTHING = 1e-9
+ZERO_SIZE = 1e-9
 """The size of what has none, in any unit."""
 
 LOOKED_AT = 64
 """Moments of a motion that tell what moves in it."""
 
-STILL = 1e-6
+MAX_SAME_NUMBER_RATIO = 1e-6
 """Share by which numbers differ that are the same: single precision."""
 
 
@@ -126,7 +126,7 @@ def repaired(rest_body: RestBody) -> tuple[RestBody, tuple[str, ...]]:
     Where a joint is at rest, and where its bone ends, decides about nothing but how it is drawn.
     """
     places, tails, skin, done = rest_body.rest.positions, rest_body.tails, rest_body.skin, []
-    wrong = ~(np.abs(np.concatenate((places, tails), axis=1)) < LARGEST).all(axis=1)
+    wrong = ~(np.abs(np.concatenate((places, tails), axis=1)) < MAX_MEASURE).all(axis=1)
     if wrong.any():
         names = ", ".join(np.array(rest_body.joints)[wrong][:MOST_NAMED].tolist())
         more = ", ..." if np.count_nonzero(wrong) > MOST_NAMED else ""
@@ -134,7 +134,7 @@ def repaired(rest_body: RestBody) -> tuple[RestBody, tuple[str, ...]]:
         places, tails = (np.where(wrong[:, None], 0.0, some) for some in (places, tails))
         ends = None if rest_body.ends is None else np.where(wrong, 0.0, rest_body.ends)
         rest_body = replace(rest_body, rest=Poses(places, rest_body.rest.quaternions), tails=tails, ends=ends)
-    if skin is not None and not (np.abs(skin.vertices) < LARGEST).all():
+    if skin is not None and not (np.abs(skin.vertices) < MAX_MEASURE).all():
         done.append("left out a skin with numbers that are missing, not finite or too large")
         rest_body = replace(rest_body, skin=None)
     return rest_body, tuple(done)
@@ -169,7 +169,9 @@ def carrying(parents: np.ndarray, places: np.ndarray) -> np.ndarray:
     for joint in np.flatnonzero(result)[::-1].tolist():
         hanging = np.flatnonzero(parents == joint)
         if len(hanging) == 1 and not result[hanging[0]]:
-            result[joint] = np.median(np.linalg.norm(places[hanging[0]] - places[joint], axis=-1)) > BESIDE * size
+            result[joint] = (
+                np.median(np.linalg.norm(places[hanging[0]] - places[joint], axis=-1)) > MAX_ROOT_DISTANCE_RATIO * size
+            )
     return result
 
 
@@ -201,7 +203,7 @@ def few_of(places: np.ndarray) -> np.ndarray:
 
 def _travels(places: np.ndarray) -> np.ndarray:
     """Return which joints are not always at the same place, shape (joints,)."""
-    return np.ptp(places, axis=1).max(axis=-1) > STILL * np.abs(places).max(axis=(1, 2), initial=1.0)
+    return np.ptp(places, axis=1).max(axis=-1) > MAX_SAME_NUMBER_RATIO * np.abs(places).max(axis=(1, 2), initial=1.0)
 
 
 def _beside(parents: np.ndarray, places: np.ndarray, moves: np.ndarray, root: int) -> list[int]:
@@ -212,7 +214,7 @@ def _beside(parents: np.ndarray, places: np.ndarray, moves: np.ndarray, root: in
     gone = np.linalg.norm(places[hanging] - places[hanging, :1], axis=-1).max(axis=1)
     size = float(np.median(np.ptp(places[moves], axis=0).max(axis=-1)))
     apart = float(np.median(np.linalg.norm(places[moves] - places[root], axis=-1).min(axis=0)))
-    loose = gone.min() > LOOSE * size or gone.max() > BESIDE * size
+    loose = gone.min() > MIN_LOOSE_MOVE_RATIO * size or gone.max() > MAX_ROOT_DISTANCE_RATIO * size
     if not loose and not (gone.max() > 0.0 and apart > size):
         return []
     middle, result = places[moves].mean(axis=0), [root]
@@ -234,12 +236,12 @@ def size_of(parents: np.ndarray, places: np.ndarray) -> float:
 
 def unit_of(size: float) -> tuple[str, float]:
     """Return the unit that a body of this size is likely to be in: what it is called, and its length in metres."""
-    if size < NOTHING or IN_METRES[0] <= size <= IN_METRES[1]:
+    if size < ZERO_SIZE or IN_METRES[0] <= size <= IN_METRES[1]:
         return UNITS[0]
     for name, length in UNITS:
         if GROWN_UP[0] <= size * length <= GROWN_UP[1]:
             return name, length
-    return min(UNITS, key=lambda unit: abs(np.log(size * unit[1] / TYPICAL)))
+    return min(UNITS, key=lambda unit: abs(np.log(size * unit[1] / TYPICAL_HEIGHT_M)))
 
 
 def unit_above_floor(size: float, lowest: float, highest: float) -> tuple[str, float, str]:

@@ -12,7 +12,7 @@ from rigid_motion.motion.eulers import extrinsic_eulers_from_quaternions
 
 from .tables import CELL, HeaderLine, Table
 
-DECIMALS = 9
+WRITTEN_DECIMALS = 9
 """Of numbers that are written: nanometres where lengths are metres."""
 
 ENCODINGS = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
@@ -65,7 +65,7 @@ def write_text(header: HeaderLine, target: Path, numbers: np.ndarray) -> None:
 
 
 def _text(value: float, before: str, separator: str | None) -> str:
-    text = f"{value:.{DECIMALS}f}".rstrip("0").rstrip(".")
+    text = f"{value:.{WRITTEN_DECIMALS}f}".rstrip("0").rstrip(".")
     return text.replace(".", ",") if "," in before and separator != "," else text
 
 

@@ -20,7 +20,7 @@ from rigid_motion.motion.quaternions import conjugate, rotate
 from .matrices import filled, rigid
 from .objects import matrix_of, poses_on, probe
 from .recordings import Trajectory, TrajectoryError, shown
-from .rest_bodies import CARRIERS, MOST_VERTICES, RestBody, Skin, likely_metres
+from .rest_bodies import MAX_JOINTS_PER_VERTEX, MOST_VERTICES, RestBody, Skin, likely_metres
 from .sampling import OF_JOINTS, Moments, sampled
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def in_blender(path: Path, again: str) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class Joints:
+class RigJoints:
     """The bones of an armature that count."""
 
     names: tuple[str, ...]
@@ -71,7 +71,7 @@ def armature_of(rig: bpy.types.Object) -> bpy.types.Armature:
     return cast("bpy.types.Armature", rig.data)
 
 
-def joints_of(rig: bpy.types.Object) -> Joints:
+def joints_of(rig: bpy.types.Object) -> RigJoints:
     """Return the bones that deform, if any do, or else all; parents before their children."""
     bones = list(armature_of(rig).bones)  # Blender lists the hierarchy from its roots on.
     kept = [bone for bone in bones if bone.use_deform] or bones
@@ -82,7 +82,7 @@ def joints_of(rig: bpy.types.Object) -> Joints:
         nearest[bone.name] = numbers.get(bone.name, above)
     parents = [nearest[bone.parent.name] if bone.parent else -1 for bone in kept]
     left = tuple(bone.name for bone in bones if bone.name not in numbers)
-    return Joints(tuple(numbers), np.array(parents, dtype=np.int64), left)
+    return RigJoints(tuple(numbers), np.array(parents, dtype=np.int64), left)
 
 
 def whole_body(
@@ -220,7 +220,7 @@ def _rows(path: Path, seen: bpy.types.Object, bones: Sequence[str]) -> np.ndarra
 
 def _rest_body(
     rig: bpy.types.Object,
-    joints: Joints,
+    joints: RigJoints,
     matrices: dict[bpy.types.Object, np.ndarray],
     meshes: Sequence[bpy.types.Object],
     *,
@@ -318,13 +318,16 @@ def _carriers(mesh: bpy.types.Mesh, joint_of_group: Sequence[int]) -> tuple[np.n
         for group in vertex.groups
         if group.group < len(joint_of_group) and joint_of_group[group.group] >= 0 and group.weight > 0.0
     ]
-    joints, weights = np.zeros((len(mesh.vertices), CARRIERS), dtype=np.int64), np.zeros((len(mesh.vertices), CARRIERS))
+    joints, weights = (
+        np.zeros((len(mesh.vertices), MAX_JOINTS_PER_VERTEX), dtype=np.int64),
+        np.zeros((len(mesh.vertices), MAX_JOINTS_PER_VERTEX)),
+    )
     if entries:
         owners, carriers, shares = (np.array(column) for column in zip(*entries, strict=True))
         order = np.lexsort((-shares, owners))
         owners, carriers, shares = owners[order], carriers[order], shares[order]
         rank = np.arange(len(owners)) - np.searchsorted(owners, owners)
-        strong = rank < CARRIERS
+        strong = rank < MAX_JOINTS_PER_VERTEX
         joints[owners[strong], rank[strong]] = carriers[strong]
         weights[owners[strong], rank[strong]] = shares[strong]
     alone = weights.sum(axis=1) == 0.0

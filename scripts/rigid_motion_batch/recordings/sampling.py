@@ -25,58 +25,58 @@ from .matrices import filled, growing
 from .recordings import Trajectory, TrajectoryError
 from .rest_bodies import RestBody, in_parents
 
-WITHIN = 1e-3
+MAX_GAP_ERROR_M = 1e-3
 """Metres that what lies between two samples may be off."""
 
 OF_JOINTS, OF_OBJECTS = 0.03, 0.1
 """Metres around a joint and an object in which all points count, as in comparisons."""
 
-SEEN = 0.6
+HALVING_ERROR_RATIO = 0.6
 """The share of that at which a gap is halved: of a cubic curve, the looks see at least three quarters of the most."""
 
-LOOKS = np.array([0.25, 0.75])
+LOOK_PLACES = np.array([0.25, 0.75])
 """Places in a gap that are looked at. Half-way an ease in and out would seem to be a straight line."""
 
 HALF_WAY = np.array([0.5])
 """Place where curves of straight lines are looked at: what several of them make together bends to one side."""
 
-WIDE = np.radians(20.0)
+MAX_LINE_TURN_RAD = np.radians(20.0)
 """A turn from sample to sample that is wider is looked at as if it were eased: quaternions on a line ease it."""
 
-HALVINGS = 8
+MAX_GAP_HALVINGS = 8
 """Number of times that a gap may be halved."""
 
-CLOSEST = 0.0125
+MIN_KEY_GAP_STEPS = 0.0125
 """Keys that are closer, in steps of the recording, are one: to Blender a hundredth of a frame is none."""
 
-LEAD = 2.0 * CLOSEST
+JUMP_STEPS = 2.0 * MIN_KEY_GAP_STEPS
 """Steps that a jump takes."""
 
-SAME = 2e-3
+MAX_SAME_GAP_STEPS = 2e-3
 """Steps by which gaps may differ that are the same: F-curves keep frames in single precision."""
 
-FASTEST, SLOWEST = 240.0, 5.0
+MAX_KEYS_PER_S, MIN_KEYS_PER_S = 240.0, 5.0
 """Keys a second that are taken to be the rate of a file."""
 
-ROUND = 2e-4
+MAX_ROUND_RATE_ERROR = 2e-4
 """Share by which a rate may be off a whole number that is one: 29.97 is none."""
 
 ON_A_FRAME = 1e-4
 """Distance from a whole frame within which a key is on it."""
 
-MULTIPLE = 0.05
+MAX_MULTIPLE_ERROR = 0.05
 """Share of the least gap between keys by which others may miss its multiples."""
 
-THINNED = 4.0
+MAX_SAMPLES_PER_KEY = 4.0
 """Number of samples that a key may stand for where keys were thinned."""
 
-FLIP = np.radians(60.0)
+MIN_FLIP_RAD = np.radians(60.0)
 """Turn between two frames, and back, beyond which angles have jumped by a whole turn."""
 
 MOST_ADDED = 20
 """Samples for each that there is without; noise may ask for any number."""
 
-BLOCK = 256
+BLOCK_GAPS = 256
 """Gaps that are looked into at once."""
 
 
@@ -111,16 +111,16 @@ def merged(even: np.ndarray, keys: np.ndarray, step: float) -> np.ndarray:
     """
     keys = np.unique(keys[(keys > even[0]) & (keys < even[-1])])
     kept: list[float] = []
-    for key in keys[away(keys, even) >= CLOSEST * step].tolist():
-        if not kept or key - kept[-1] >= CLOSEST * step:
+    for key in keys[away(keys, even) >= MIN_KEY_GAP_STEPS * step].tolist():
+        if not kept or key - kept[-1] >= MIN_KEY_GAP_STEPS * step:
             kept.append(key)
     return np.sort(np.concatenate((even, kept)))
 
 
 def moments_between(first: float, last: float, fps: float, step: float, keys: np.ndarray, *, straight: bool) -> Moments:
     """Return even frames from the first key to the last one, and all keys (n,) between, in any order."""
-    even = first + step * np.arange(int((last - first) / step + SAME) + 1)
-    if last - even[-1] > SAME * step:
+    even = first + step * np.arange(int((last - first) / step + MAX_SAME_GAP_STEPS) + 1)
+    if last - even[-1] > MAX_SAME_GAP_STEPS * step:
         even = np.append(even, last)
     frames = on_frames(merged(even, keys, step))
     return Moments(frames, fps, float(frames[0]), step, straight)
@@ -143,10 +143,12 @@ def rate_of(keys: Iterable[np.ndarray], fps: float) -> float | None:
         gaps = np.diff(frames)
         if len(gaps := gaps[gaps > ON_A_FRAME]):
             times = gaps / gaps.min()
-            even = np.abs(times - np.rint(times)).max() < MULTIPLE and times.mean() < THINNED
+            even = np.abs(times - np.rint(times)).max() < MAX_MULTIPLE_ERROR and times.mean() < MAX_SAMPLES_PER_KEY
             rate = fps / (gaps.sum() / np.rint(times).sum() if even else float(np.median(gaps)))
-            rates[bool(even)].append(float(round(rate)) if abs(rate - round(rate)) < ROUND * rate else rate)
-    of_recordings = [[rate for rate in some if SLOWEST <= rate <= FASTEST] for some in rates.values()]
+            rates[bool(even)].append(
+                float(round(rate)) if abs(rate - round(rate)) < MAX_ROUND_RATE_ERROR * rate else rate
+            )
+    of_recordings = [[rate for rate in some if MIN_KEYS_PER_S <= rate <= MAX_KEYS_PER_S] for some in rates.values()]
     return max(of_recordings[0] or of_recordings[1], default=None)
 
 
@@ -248,17 +250,20 @@ def sampled(
     """
     gaps = _Gaps(look, Skeleton(parents), radius / metres, moments.straight)
     frames, poses = moments.frames, look(moments.frames)
-    allowed, most = SEEN * WITHIN / metres, min((1 + MOST_ADDED) * len(frames), MOST_POSES // len(parents))
-    closest, longest = CLOSEST * moments.step, moments.step * (1.0 + SAME)
+    allowed, most = (
+        HALVING_ERROR_RATIO * MAX_GAP_ERROR_M / metres,
+        min((1 + MOST_ADDED) * len(frames), MOST_POSES // len(parents)),
+    )
+    closest, longest = MIN_KEY_GAP_STEPS * moments.step, moments.step * (1.0 + MAX_SAME_GAP_STEPS)
     unsure, before, flips = np.arange(len(frames) - 1), len(frames), 0
     left: dict[float, float] = {}
-    for halving in range(HALVINGS + 1):
+    for halving in range(MAX_GAP_HALVINGS + 1):
         errors, turned = gaps.errors(frames, poses, unsure)
         lengths = np.diff(frames)[unsure]
-        over = (turned > FLIP) & (lengths <= longest) if halving == 0 else np.zeros(len(unsure), dtype=bool)
+        over = (turned > MIN_FLIP_RAD) & (lengths <= longest) if halving == 0 else np.zeros(len(unsure), dtype=bool)
         flips += int(np.count_nonzero(over))
         off = (errors > allowed) & ~over
-        halved = off & (lengths > 2.1 * closest) & (halving < HALVINGS)
+        halved = off & (lengths > 2.1 * closest) & (halving < MAX_GAP_HALVINGS)
         if len(frames) + np.count_nonzero(halved) > most:
             halved[:] = False
         left |= dict(zip(frames[unsure[off & ~halved]].tolist(), errors[off & ~halved].tolist(), strict=True))
@@ -270,7 +275,7 @@ def sampled(
         frames = np.insert(frames, split + 1, middles)
         begins = split + np.arange(len(split))
         unsure = np.ravel((begins, begins + 1), order="F")
-    off = {frame: error for frame, error in left.items() if error > WITHIN / metres}
+    off = {frame: error for frame, error in left.items() if error > MAX_GAP_ERROR_M / metres}
     return Sampled(frames, poses, len(frames) - before, max(off.values(), default=0.0), tuple(sorted(off)), flips)
 
 
@@ -286,13 +291,13 @@ class _Gaps:
     def errors(self, frames: np.ndarray, poses: Poses, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the largest distance and angle of any joint in these gaps (n,) between samples, shape (n,) each."""
         errors, angles = np.zeros(len(gaps)), np.zeros(len(gaps))
-        for first in range(0, len(gaps), BLOCK):
-            rows = np.arange(first, min(first + BLOCK, len(gaps)))
+        for first in range(0, len(gaps), BLOCK_GAPS):
+            rows = np.arange(first, min(first + BLOCK_GAPS, len(gaps)))
             begin, end = poses[:, gaps[rows]], poses[:, gaps[rows] + 1]
             with np.errstate(invalid="ignore", over="ignore"):
                 turns = angle_between(begin.quaternions, end.quaternions)
-            eased = ~(np.nan_to_num(turns).max(axis=0) < WIDE) | (not self.straight)
-            for some, looks in ((eased, LOOKS), (~eased, HALF_WAY)):
+            eased = ~(np.nan_to_num(turns).max(axis=0) < MAX_LINE_TURN_RAD) | (not self.straight)
+            for some, looks in ((eased, LOOK_PLACES), (~eased, HALF_WAY)):
                 if some.any():
                     places = frames[gaps[rows[some]]], frames[gaps[rows[some]] + 1]
                     result = self._off(*places, begin[:, some], end[:, some], looks)

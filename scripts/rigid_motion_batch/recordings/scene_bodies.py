@@ -1,7 +1,7 @@
 """Bodies of a file that holds a scene: whole ones of joints, objects that move alone, and which of them is requested.
 
-A whole body is the bones of a skeleton, or without one at least `FEWEST` nodes that move and hang on one another. What
-else moves, such as a prop or a camera, is a single rigid body.
+A whole body is the bones of a skeleton, or without one at least `MIN_MOVING_NODES` nodes that move and hang on one
+another. What else moves, such as a prop or a camera, is a single rigid body.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from rigid_motion_batch.command_line import listed
 from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError, unique
 from .tables import LARGEST_FILE
 
-FEWEST, GENERATIONS = 5, 3
+MIN_MOVING_NODES, MIN_GENERATIONS = 5, 3
 """Nodes that move, and how many of them hang on one another, that are a body: a car and its wheels are none."""
 
-LISTED = 5
+MAX_LISTED_NAMES = 5
 """Names that a remark tells."""
 
 
@@ -123,7 +123,7 @@ class SceneBodies:
             raise NoMotion(self.path, problem, "export what moves, a skeleton or objects, together with its animation")
         largest, alone = next(iter(self.moving), None), self._called(self.alone)
         if selection.requested is None and largest is not None:
-            others = listed([*self.moving[1:], *alone], LISTED)
+            others = listed([*self.moving[1:], *alone], MAX_LISTED_NAMES)
             remark = f"took {largest} of {len(self.moving) + len(alone)} bodies; others: {others}" if others else ""
             return [scene.whole(self.path.stem, self.wholes[largest], remark)]
         joints = self.wholes[largest] if largest is not None else ()
@@ -172,7 +172,9 @@ def jointed(parents: np.ndarray, moves: np.ndarray, belongs: np.ndarray) -> list
                 top[node], depth[node] = top[above[node]], depth[above[node]] + int(moves[node])
             groups.setdefault(int(top[node]), []).append(node)
     return [
-        own for own in groups.values() if np.count_nonzero(moves[own]) >= FEWEST and np.max(depth[own]) >= GENERATIONS
+        own
+        for own in groups.values()
+        if np.count_nonzero(moves[own]) >= MIN_MOVING_NODES and np.max(depth[own]) >= MIN_GENERATIONS
     ]
 
 

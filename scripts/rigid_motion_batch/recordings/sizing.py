@@ -9,14 +9,23 @@ import numpy as np
 
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.motion.humanoid import humanoid_bones
-from rigid_motion.motion.repair import LARGEST
+from rigid_motion.motion.repair import MAX_MEASURE
 from rigid_motion_batch.axes import AXES
 
 from .clips import ClipWarning
 from .recordings import Trajectory, shown
-from .rest_bodies import LOOKED_AT, NOTHING, PLAUSIBLE, STILL, RestBody, part_of_body, sureness, unit_above_floor
+from .rest_bodies import (
+    LOOKED_AT,
+    MAX_SAME_NUMBER_RATIO,
+    PLAUSIBLE_HEIGHTS_M,
+    ZERO_SIZE,
+    RestBody,
+    part_of_body,
+    sureness,
+    unit_above_floor,
+)
 
-TALLER = 1.5
+MIN_UPRIGHT_RATIO = 1.5
 """Times the other extents that a body has along the axis that is up."""
 
 
@@ -32,14 +41,14 @@ def sized(path: Path, trajectory: Trajectory, axes: str, *, unit_given: bool) ->
     size, heights = float(np.ptp(places, axis=0).max()), places @ AXES[axes][2]
     unit, length, why = unit_above_floor(size, float(heights.min()), float(heights.max()))
     metres = size * length
-    if size < NOTHING or (unit_given and length == 1.0):
+    if size < ZERO_SIZE or (unit_given and length == 1.0):
         return trajectory
     remark, warnings = trajectory.remark, trajectory.warnings
     if length != 1.0:
         taken = f"{shown(path.name)} is {size:.4g} units large, which are taken for {unit}: {metres:.3g} m"
         taken += f", {why or sureness(size, length)} (otherwise: --scale METRES)"
         remark = "; ".join(filter(None, (taken, remark)))
-    if not PLAUSIBLE[0] <= metres <= PLAUSIBLE[1]:
+    if not PLAUSIBLE_HEIGHTS_M[0] <= metres <= PLAUSIBLE_HEIGHTS_M[1]:
         doubt = f"it is {metres:.3g} m large if its unit, which the file does not tell, is that of {unit}"
         warnings += (ClipWarning(doubt, "if not, say how long it is: --scale METRES"),)
     return replace(trajectory, metres_per_unit=trajectory.metres_per_unit * length, remark=remark, warnings=warnings)
@@ -52,7 +61,7 @@ def whole_places(body: RestBody, poses: Poses) -> np.ndarray | None:
     every = -(-poses.shape[1] // LOOKED_AT)
     with np.errstate(invalid="ignore", over="ignore"):
         places = body.skeleton.in_root_space(poses[:, ::every]).positions
-    whole = (np.abs(places) < LARGEST).all(axis=(0, 2))
+    whole = (np.abs(places) < MAX_MEASURE).all(axis=(0, 2))
     return places[:, whole] if whole.any() else None
 
 
@@ -62,7 +71,7 @@ def _first_whole(skeleton: Skeleton, poses: Poses) -> np.ndarray | None:
         # What is not finite, or far beyond all measure, is for the repair to say.
         with np.errstate(invalid="ignore", over="ignore"):
             places = skeleton.in_root_space(poses[:, first : first + LOOKED_AT]).positions
-        whole = np.flatnonzero((np.abs(places) < LARGEST).all(axis=(0, 2)))
+        whole = np.flatnonzero((np.abs(places) < MAX_MEASURE).all(axis=(0, 2)))
         if len(whole):
             return places[:, whole[0]]
     return None
@@ -82,7 +91,7 @@ def axis_up(body: RestBody, poses: Poses) -> str:
         return "xyz"[best.pop()] if len(best) == 1 else ""
     extents = np.ptp(places[part_of_body(body.parents, whole_places(body, poses))], axis=0)
     largest = int(np.argmax(extents))
-    return "xyz"[largest] if extents[largest] > TALLER * np.delete(extents, largest).max() else ""
+    return "xyz"[largest] if extents[largest] > MIN_UPRIGHT_RATIO * np.delete(extents, largest).max() else ""
 
 
 def leading(body: RestBody, poses: Poses) -> Poses:
@@ -103,4 +112,4 @@ def leading(body: RestBody, poses: Poses) -> Poses:
 
 def _stands(poses: Poses) -> bool:
     parts = poses.positions, poses.quaternions
-    return all(np.ptp(part, axis=0).max() <= STILL * np.abs(part).max(initial=1.0) for part in parts)
+    return all(np.ptp(part, axis=0).max() <= MAX_SAME_NUMBER_RATIO * np.abs(part).max(initial=1.0) for part in parts)

@@ -29,7 +29,7 @@ from .recordings import TrajectoryError, shown
 
 SEPARATORS = (",", ";", "\t")
 
-NOTHING = " \t,;\r\v\f"
+BLANK_CHARACTERS = " \t,;\r\v\f"
 """What a row without a number consists of."""
 
 UNITS_BELOW = {"", "-", "1", *UNIT_OF}
@@ -47,13 +47,13 @@ LONGEST_LINE = 1 << 22
 MOST_COLUMNS = 100_000
 """Ten thousand bodies have fewer."""
 
-PIECE = 1 << 18
+PIECE_BYTES = 1 << 18
 """Bytes that are read at once."""
 
-BLOCK = 1 << 14
+BLOCK_ROWS = 1 << 14
 """Rows that are parsed at once."""
 
-DAMAGED = "delete this line if it is damaged, as the last one of a recording that was cut off"
+DAMAGED_ADVICE = "delete this line if it is damaged, as the last one of a recording that was cut off"
 """The way out of a line that is not like the others."""
 
 MOST_COMMENTS = 100
@@ -91,7 +91,7 @@ class Table:
         lines = lines_of(self.header.path, after=self.header.number)
         for number, line in self.header.rows(lines) if self.header.rows else lines:
             line = line.strip(" ")
-            if line.strip(NOTHING) and line[0] != "#":
+            if line.strip(BLANK_CHARACTERS) and line[0] != "#":
                 yield number, flattened(line, self.header.separator) if self.header.vectors else line
 
 
@@ -146,7 +146,7 @@ def _pieces(path: Path, largest: int) -> Iterator[str]:
         file.seek(0)
         data = b"start"
         while data:
-            data = file.read(PIECE)
+            data = file.read(PIECE_BYTES)
             try:
                 piece = decoder.decode(data, final=not data)
             except UnicodeDecodeError as error:
@@ -313,7 +313,7 @@ def parse_rows(
     pick = itemgetter(*indices) if len(indices) > 1 else lambda cells: [cells[indices[0]]]
     rows, count = iter(rows), 0
     blocks: list[np.ndarray] = [np.empty((0, len(columns)))]
-    while block := list(islice(rows, BLOCK)):
+    while block := list(islice(rows, BLOCK_ROWS)):
         count += len(block)
         if count > MOST_ROWS:
             problem = f"more than {MOST_ROWS} rows"
@@ -329,7 +329,7 @@ def parse_rows(
                 raise TrajectoryError(path, problem, way_out, number)
             if len(cells) < needed:
                 problem = f"{len(cells)} columns where {needed} are needed"
-                raise TrajectoryError(path, problem, DAMAGED, number)
+                raise TrajectoryError(path, problem, DAMAGED_ADVICE, number)
             try:
                 if "_" in line:
                     raise ValueError("Python's own way of writing numbers")
@@ -351,7 +351,7 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
         return float(cell.replace(",", "."))
     except ValueError:
         problem = f"{name} is {shown(cell.strip())}, not a number"
-        raise TrajectoryError(path, problem, DAMAGED, line) from None
+        raise TrajectoryError(path, problem, DAMAGED_ADVICE, line) from None
 
 
 CELL = re.compile(r'"?[(\[{]([^()\[\]{}"]*)[)\]}]"?|"([^"]*)"')

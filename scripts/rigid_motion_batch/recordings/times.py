@@ -16,34 +16,34 @@ from functools import lru_cache
 
 import numpy as np
 
-from rigid_motion.motion.repair import LARGEST
+from rigid_motion.motion.repair import MAX_MEASURE
 
-from .options import TICKS
+from .options import TICKS_PER_S_BY_UNIT
 from .recordings import TrajectoryError, shown
-from .tables import DAMAGED, HeaderLine, Table, is_number
+from .tables import DAMAGED_ADVICE, HeaderLine, Table, is_number
 
-SLOWEST = 5.0
+MIN_SAMPLES_PER_S = 5.0
 """Samples a second. Of poses there are hardly ever fewer: the slowest recordings of people that are known have 15."""
 
-FASTEST = 5000.0
+MAX_SAMPLES_PER_S = 5000.0
 """Samples a second. Trackers with markers reach 1000 to 2000; no device for poses has more."""
 
 TOO_SLOW = 0.5
 """Samples a second. A hand is elsewhere after two seconds: no one records it so, and times in other units look so."""
 
-ENOUGH = 2
+MIN_UNIT_STEPS = 2
 """Steps of time that tell a unit. A file of two samples says nothing of it."""
 
 SINCE_1970 = 1e9, 4e9
 """Seconds from 1970 to 2001 and to 2096, between which clocks are that count from there."""
 
-EXACT = 2.0**53
+MAX_EXACT_INTEGER = 2.0**53
 """Number beyond which a float64 leaves out whole numbers, such as nanoseconds since 1970."""
 
 LARGEST_WHOLE = 2.0**62
 """Number beyond which the difference of two whole numbers might be none that fits 64 bits."""
 
-WILD = 10.0
+MIN_WILD_TIME_RATIO = 10.0
 """Times further from the median than half of all others that a wild time is; of even times all are within two."""
 
 LONG_NAMES = {"ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
@@ -59,13 +59,13 @@ def typical_interval(times: np.ndarray) -> float:
 
 
 def _steps_forward(times: np.ndarray) -> np.ndarray:
-    steps = np.diff(times[np.abs(times) < LARGEST])
+    steps = np.diff(times[np.abs(times) < MAX_MEASURE])
     return steps[steps > 0.0]
 
 
 def whole_ticks(table: Table, ticks: np.ndarray) -> np.ndarray:
     """Return the column t of a table as whole numbers where a float64 cannot hold it, and as it is otherwise."""
-    if EXACT < np.nanmax(np.abs(ticks), initial=0.0) < LARGEST_WHOLE:
+    if MAX_EXACT_INTEGER < np.nanmax(np.abs(ticks), initial=0.0) < LARGEST_WHOLE:
         # With fractions, or without a number in some row, they are not whole, and as near as floats are.
         with suppress(ValueError, OverflowError):
             return np.fromiter((int(cell) for _, cell in table.cells("t")), np.int64)
@@ -86,11 +86,11 @@ def seconds_of(ticks: np.ndarray, a_second: float) -> np.ndarray:
 
 def earliest(ticks: np.ndarray) -> float:
     """Return the earliest time, without wild ones."""
-    usable = ticks[np.abs(ticks) < LARGEST]
+    usable = ticks[np.abs(ticks) < MAX_MEASURE]
     if not len(usable):
         return 0.0
     away = np.abs(usable - np.median(usable))
-    return usable[away <= WILD * np.median(away)].min(initial=usable[np.argmin(away)])
+    return usable[away <= MIN_WILD_TIME_RATIO * np.median(away)].min(initial=usable[np.argmin(away)])
 
 
 def unit_by_rate(header: HeaderLine, ticks: np.ndarray) -> tuple[str, str]:
@@ -105,22 +105,24 @@ def unit_by_rate(header: HeaderLine, ticks: np.ndarray) -> tuple[str, str]:
         Where the times are in none of these, or numbers of rows.
     """
     interval = typical_interval(ticks)
-    if len(_steps_forward(ticks)) < ENOUGH:
+    if len(_steps_forward(ticks)) < MIN_UNIT_STEPS:
         return "", ""
     usual = abs(float(np.nanmedian(ticks)))
-    if interval <= 1.0 / TOO_SLOW and usual < EXACT:
+    if interval <= 1.0 / TOO_SLOW and usual < MAX_EXACT_INTEGER:
         return "", ""
     if np.all(np.diff(ticks) == 1):
         problem = f"t counts up by 1 from {ticks[0]:.0f}: these are numbers of rows or keys, not times"
         raise header.error(problem, "say how many rows a second there are, --frame-rate 90, or name a column of times")
-    dated = [unit for unit in TICKS if SINCE_1970[0] < usual / TICKS[unit] < SINCE_1970[1]]
-    likely = dated or [unit for unit in LONG_NAMES if SLOWEST <= TICKS[unit] / interval <= FASTEST]
+    dated = [unit for unit in TICKS_PER_S_BY_UNIT if SINCE_1970[0] < usual / TICKS_PER_S_BY_UNIT[unit] < SINCE_1970[1]]
+    likely = dated or [
+        unit for unit in LONG_NAMES if MIN_SAMPLES_PER_S <= TICKS_PER_S_BY_UNIT[unit] / interval <= MAX_SAMPLES_PER_S
+    ]
     if likely == ["s"]:
         return "", ""
     if not likely:
         problem = f"t goes in steps of {interval:.4g}: as seconds that is one sample in {interval:.3g} s"
-        raise header.error(problem, f"say what it counts: --time-unit {', '.join(TICKS)}")
-    rate = TICKS[likely[0]] / interval
+        raise header.error(problem, f"say what it counts: --time-unit {', '.join(TICKS_PER_S_BY_UNIT)}")
+    rate = TICKS_PER_S_BY_UNIT[likely[0]] / interval
     said = f"times are taken for {LONG_NAMES[likely[0]]}, {rate:.3g} samples a second"
     return likely[0], f"{said}, as seconds would be {interval:.3g} s apart (otherwise: --time-unit)"
 
@@ -141,14 +143,14 @@ MIDNIGHT = datetime(1970, 1, 1, tzinfo=UTC)
 LEAP_SECOND = 60
 """The last second of some minutes."""
 
-DAY = 86_400
+DAY_S = 86_400
 """Seconds."""
 
-FURTHEST = 2**61 // 10**9
+MAX_MEDIAN_DISTANCE_S = 2**61 // 10**9
 """Seconds from the median, 73 years. What is further is wild, and counts as so far: the difference of any two times is
 then a whole number of nanoseconds that fits 64 bits."""
 
-MISSING = -1
+MISSING_TIME_NS = -1
 """Value instead of nanoseconds, where a row has no time."""
 
 LONGEST_SHOWN = 40
@@ -195,15 +197,15 @@ def seconds_of_dates(table: Table, kind: str) -> np.ndarray:
         With the number of the line, for what is no such time.
     """
     moments = np.fromiter(_moments(table, kind), np.dtype((np.int64, 2)))
-    known = moments[:, 1] != MISSING
+    known = moments[:, 1] != MISSING_TIME_NS
     seconds, nanoseconds = moments[known].T
     if kind.startswith(CLOCK_TIME):
         seconds = _through_midnights(seconds)
     times = np.full(len(moments), np.nan)
     if len(seconds):
-        away = np.clip(seconds - int(np.median(seconds)), -FURTHEST, FURTHEST)
+        away = np.clip(seconds - int(np.median(seconds)), -MAX_MEDIAN_DISTANCE_S, MAX_MEDIAN_DISTANCE_S)
         ticks = away * 10**9 + nanoseconds
-        times[known] = (ticks - earliest(ticks)) / TICKS["ns"]
+        times[known] = (ticks - earliest(ticks)) / TICKS_PER_S_BY_UNIT["ns"]
     return times
 
 
@@ -212,7 +214,7 @@ def _moments(table: Table, kind: str) -> Iterator[tuple[int, int]]:
     for number, cell in table.cells("t"):
         match = MOMENT.fullmatch(cell)
         if match is None and _is_missing(cell):
-            yield 0, MISSING
+            yield 0, MISSING_TIME_NS
             continue
         try:
             if match is None:
@@ -223,10 +225,10 @@ def _moments(table: Table, kind: str) -> Iterator[tuple[int, int]]:
                 raise ValueError(second)
         except ValueError:
             problem = f"t is {shown(cell, LONGEST_SHOWN)}, not {kind.partition(' with')[0]}"
-            raise TrajectoryError(table.header.path, problem, DAMAGED, number) from None
+            raise TrajectoryError(table.header.path, problem, DAMAGED_ADVICE, number) from None
         if _kind(match) != kind:
             problem = f"t is {shown(cell, LONGEST_SHOWN)}, not {kind} as before"
-            raise TrajectoryError(table.header.path, problem, DAMAGED, number)
+            raise TrajectoryError(table.header.path, problem, DAMAGED_ADVICE, number)
         yield seconds, int((fraction or "").ljust(9, "0"))
 
 
@@ -239,12 +241,12 @@ def _minute(day: str | None, hour: str, minute: str, offset: str | None) -> int:
 
 def _through_midnights(seconds: np.ndarray) -> np.ndarray:
     """Return clock times (n,) as seconds since the first midnight, also those that come back from the next day."""
-    seconds = seconds % DAY  # An offset from UTC may lead out of the day.
+    seconds = seconds % DAY_S  # An offset from UTC may lead out of the day.
     steps = np.diff(seconds)
-    days = np.cumsum((steps < -DAY // 2).astype(np.int64) - (steps > DAY // 2))
+    days = np.cumsum((steps < -DAY_S // 2).astype(np.int64) - (steps > DAY_S // 2))
     # Before the first day there is none: what goes up there is a gap.
     days -= np.minimum(np.minimum.accumulate(days), 0)
-    return seconds + DAY * np.concatenate(([0], days))[: len(seconds)]
+    return seconds + DAY_S * np.concatenate(([0], days))[: len(seconds)]
 
 
 def _kind(match: re.Match[str]) -> str:

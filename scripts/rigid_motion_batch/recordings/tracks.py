@@ -18,12 +18,12 @@ from rigid_motion.motion.quaternions import from_matrices, matrices
 
 from .clips import ClipWarning
 from .clocks import Clock, clock_of
-from .columns import BOTTOM, EULER, MATRIX, POSITION, QUATERNION, Layout, layout_of, metres_of
+from .columns import BOTTOM, EULER, MATRIX, POSITION, QUATERNION, RowLayout, layout_of, metres_of
 from .euler import quaternions_from_intrinsic_eulers
 from .options import ReadingOptions
+from .plausibility import require_one_body
 from .recordings import Cells, Selection, Trajectory, unique
 from .rewriting import eulers_near, write_text
-from .sense import require_one_body
 from .tables import HeaderLine, Table
 
 MOST_LABELS = 0.5
@@ -38,15 +38,15 @@ LARGEST_RADIANS = 4.0 * np.pi
 SMALLEST_DEGREES = np.pi
 """Angles that are all below this, and said to be degrees, may be radians."""
 
-SKEWED = 0.02
+MAX_SKEW_SINE = 0.02
 """How far from right angles, as a sine, axes may be that are those of a rotation, in files of few digits."""
 
-RIGID = 1e-3
+MAX_RIGID_SCALE_RATIO = 1e-3
 """Part by which a matrix may scale and does not."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Body:
+class _TrackedBody:
     """One body of the file: its columns, and its rows."""
 
     name: str
@@ -96,7 +96,7 @@ def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine
     return trajectories
 
 
-def _bodies(header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
+def _bodies(header: HeaderLine, layout: RowLayout, named: bool) -> list[_TrackedBody]:
     """Return all bodies in the order of columns and rows; `named` is whether the user named their column."""
     columns = {f"device {index}": index for index in layout.devices}
     groups = _devices(Table(header, columns), named)
@@ -106,7 +106,10 @@ def _bodies(header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
         for prefix, columns in layout.bodies.items()
     ]
     names = unique([name for name, *_ in bodies])
-    return [_Body(name, prefix, columns, rows) for name, (_, prefix, columns, rows) in zip(names, bodies, strict=True)]
+    return [
+        _TrackedBody(name, prefix, columns, rows)
+        for name, (_, prefix, columns, rows) in zip(names, bodies, strict=True)
+    ]
 
 
 def _devices(table: Table, named: bool) -> dict[str, np.ndarray | slice]:
@@ -136,10 +139,10 @@ def _codes(cells: Iterator[tuple[int, str]]) -> tuple[dict[str, int], np.ndarray
 
 def _trajectory(
     header: HeaderLine,
-    body: _Body,
+    body: _TrackedBody,
     times: np.ndarray,
     held: Mapping[str, np.ndarray],
-    layout: Layout,
+    layout: RowLayout,
     options: ReadingOptions,
 ) -> Trajectory:
     metres = metres_of(header, layout, body.columns, options)
@@ -166,9 +169,9 @@ def _trajectory(
 
 def _cells(
     header: HeaderLine,
-    body: _Body,
+    body: _TrackedBody,
     held: Mapping[str, np.ndarray],
-    layout: Layout,
+    layout: RowLayout,
     options: ReadingOptions,
     rows: np.ndarray,
     count: int,
@@ -230,14 +233,14 @@ def _of_matrices(
         scales = np.cbrt(np.linalg.det(rotations))
         rotations = rotations / scales[:, None, None]
         squares = np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
-        good = (scales > 0.0) & (squares < 2.0 * SKEWED)
+        good = (scales > 0.0) & (squares < 2.0 * MAX_SKEW_SINE)
         if len(good) and not good.any():
             raise header.error(
                 "the nine numbers of each row are no rotation", "its columns have to be three axes, right-handed"
             )
         quaternions = np.full((len(rotations), 4), np.nan)
         quaternions[good] = from_matrices(rotations[good])
-    scaled = bool(np.any(np.abs(scales[good] - 1.0) > RIGID))
+    scaled = bool(np.any(np.abs(scales[good] - 1.0) > MAX_RIGID_SCALE_RATIO))
     return positions, quaternions, np.where(good, scales, np.nan) if scaled else None
 
 

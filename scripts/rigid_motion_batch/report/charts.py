@@ -16,7 +16,7 @@ from markupsafe import Markup
 from rigid_motion_batch.analysis.choices import Tolerance, Uniform
 from rigid_motion_batch.analysis.needed import KeysNeeded, overall
 
-from .numbers import ERROR, Numbers
+from .numbers import ERROR_AT, Numbers
 
 Specification = dict[str, Any]
 
@@ -48,7 +48,7 @@ def error_over_rate(numbers: Numbers, clip: int | None = None) -> Specification 
     places = [place for place, choice in enumerate(numbers.choices) if not isinstance(choice, Tolerance)]
     if len(places) < 2:
         return None
-    values = numbers.mean(clip)[ERROR]
+    values = numbers.mean(clip)[ERROR_AT]
     rows: list[Specification] = [
         {
             "rate": numbers.choices[place].size,

@@ -26,8 +26,8 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import conjugate, multiply
-from rigid_motion_batch.analysis.metrics import NOTHING
-from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult, Motion
+from rigid_motion_batch.analysis.metrics import MAX_ROUNDING_M
+from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult, MotionResult
 from rigid_motion_batch.palette import full_colour
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.rest_bodies import carrying, short_names
@@ -41,7 +41,7 @@ FEWEST_SEEN = 300
 MOST_CHARTED = 50_000
 """Samples of an error over time; of longer ones the largest of every few are kept."""
 
-FACTORS = (1000, 500, 200, 100, 50, 30, 20, 10, 5, 3, 2, 1)
+MAGNIFICATION_FACTORS = (1000, 500, 200, 100, 50, 30, 20, 10, 5, 3, 2, 1)
 """By which deviations are magnified."""
 
 SEEN_AS = {True: 0.15, False: 0.34}
@@ -50,7 +50,7 @@ SEEN_AS = {True: 0.15, False: 0.34}
 Description = list[float]
 
 
-class Block:
+class PackedNumbers:
     """Numbers packed one array after the other."""
 
     def __init__(self) -> None:
@@ -78,7 +78,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
 
     `label` gives the name of a mode; the mesh is what a single rigid body moves.
     """
-    block, body = Block(), clip.parents is not None
+    block, body = PackedNumbers(), clip.parents is not None
     begin = float(clip.times[0])
     seen = _seen(clip)
     truth = _joints(clip.truth)[:, seen]
@@ -122,7 +122,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
 def _choice_data(
     clip: ClipResult, result: ChoiceResult, seen: np.ndarray, label: Callable[[str], str], size: float
 ) -> dict[str, Any]:
-    block, first = Block(), result.first
+    block, first = PackedNumbers(), result.first
     count = result.motions[0].errors.shape[1]
     every = -(-count // MOST_CHARTED)
     within = seen[(seen >= first) & (seen < first + count)]
@@ -162,7 +162,7 @@ def _choice_data(
 
 
 def _deviations(
-    block: Block, clip: ClipResult, motion: Motion, within: np.ndarray, first: int
+    block: PackedNumbers, clip: ClipResult, motion: MotionResult, within: np.ndarray, first: int
 ) -> dict[str, Description]:
     """How far a mode is from the recording at these samples of the clip."""
     at = within - first
@@ -183,7 +183,7 @@ def _deviations(
 @lru_cache(maxsize=4)
 def mesh_data(mesh: Mesh) -> dict[str, Any]:
     """Return a mesh as the viewer draws it."""
-    block = Block()
+    block = PackedNumbers()
     edges = mesh.edges()
     none = np.zeros((1, edges.shape[1]))
     return {
@@ -233,7 +233,11 @@ def _drawn_from(parents: np.ndarray, carries: np.ndarray) -> list[int]:
 
 def _factor(largest: float, seen_as: float) -> int:
     """By how much to magnify so that the largest deviation is seen, and looks no larger than this."""
-    return next(factor for factor in FACTORS if factor * largest <= seen_as or factor == 1) if largest > NOTHING else 1
+    return (
+        next(factor for factor in MAGNIFICATION_FACTORS if factor * largest <= seen_as or factor == 1)
+        if largest > MAX_ROUNDING_M
+        else 1
+    )
 
 
 def nice(length: float) -> float:
@@ -266,7 +270,7 @@ def _about(result: ChoiceResult, keyed: bool, every: int, *, thinned: bool) -> s
     return f"{keys} in {row.duration_s:.2f} s{sent}, {row.samples} samples{fewer}{peaks}"
 
 
-CREASE = np.cos(np.radians(35.0))
+CREASE_COSINE = np.cos(np.radians(35.0))
 """Faces that meet at a sharper angle keep an edge between them, in the shading and in the wireframe."""
 
 MOST_TRIANGLES = 6000
@@ -317,7 +321,7 @@ class Mesh:
             around = order[first:last]
             own = faces[around // 3]
             unit = own / np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1e-30)
-            normals[around] = (unit @ unit.T > CREASE) @ own
+            normals[around] = (unit @ unit.T > CREASE_COSINE) @ own
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
         tints = np.ones(len(faces)) if self.tints is None else np.asarray(self.tints, dtype=float)
         return np.concatenate((places.T, normals.T, np.repeat(tints, 3)[None]))
@@ -332,7 +336,7 @@ class Mesh:
         counts = np.bincount(kinds.ravel(), minlength=len(ordered))
         np.add.at(sums, kinds.ravel(), np.repeat(unit, 3, axis=0))
         # The sum of two unit vectors is as long as the angle between them is small.
-        flat = (counts == 2) & ((sums * sums).sum(axis=1) > 2.0 + 2.0 * CREASE)
+        flat = (counts == 2) & ((sums * sums).sum(axis=1) > 2.0 + 2.0 * CREASE_COSINE)
         _, firsts = np.unique(owners, return_index=True)
         ends = places[firsts][ordered[~flat]]
         return ends.reshape(-1, 6).T

@@ -14,7 +14,7 @@ from rigid_motion_batch.analysis.choices import Choice
 from rigid_motion_batch.analysis.held import PairSlips
 from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART
 
-from .numbers import STILL, Numbers, digits, listed
+from .numbers import STILL_AT, Numbers, digits, listed
 from .tables import Grid, grid_rows
 from .verdict import Verdict
 
@@ -95,7 +95,7 @@ def asked_first(said: Verdict, pairs: Sequence[PairSlips], numbers: Numbers) -> 
 def still_sentences(numbers: Numbers, spoken_of: Choice | None) -> list[str]:
     """Return the same of the first clips that have a point which stays, such as a pivot."""
     result: list[str] = []
-    for name, values in zip(numbers.clips, numbers.values[STILL], strict=True):
+    for name, values in zip(numbers.clips, numbers.values[STILL_AT], strict=True):
         known = np.isfinite(values).any(axis=1)
         if known.any() and len(result) < MOST_SAID:
             at = _shown(numbers, known, spoken_of)

@@ -12,7 +12,7 @@ from math import floor, isfinite, log10
 import numpy as np
 
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
-from rigid_motion_batch.analysis.metrics import NOTHING, Metrics, geometric_mean
+from rigid_motion_batch.analysis.metrics import MAX_ROUNDING_M, Metrics, geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE, STATE_OF_THE_ART, label_of
 from rigid_motion_batch.analysis.reconstructions import Groups, joint_groups
 from rigid_motion_batch.analysis.results import ChoiceNumbers
@@ -49,7 +49,7 @@ MEASURES = (
 )
 NONE, MINUS = "\u2013", "\u2212"
 
-ERROR, LARGEST, KEYS, STILL = 0, 2, 6, 9
+ERROR_AT, LARGEST_AT, KEYS_AT, STILL_AT = 0, 2, 6, 9
 """Places of measures. The RMS shell error decides, or the keys a second where a tolerance limits the error."""
 
 KINDS: tuple[type[Choice], ...] = (Uniform, Budget, Tolerance)
@@ -99,7 +99,7 @@ class Numbers:
 
     def deciding(self, choice: int) -> int:
         """Return the measure that decides under a choice."""
-        return KEYS if isinstance(self.choices[choice], Tolerance) else ERROR
+        return KEYS_AT if isinstance(self.choices[choice], Tolerance) else ERROR_AT
 
 
 RMS_IS = "RMS is a mean over time in which large errors count more."
@@ -162,7 +162,7 @@ def digits(value: float | None, places: int = 3) -> str:
     """Return a number with so many significant digits, as tables show it."""
     if value is None or not isfinite(value):
         return NONE
-    if abs(value) < NOTHING * 1e3:
+    if abs(value) < MAX_ROUNDING_M * 1e3:
         return "0"
     return f"{value:.{max(0, places - 1 - floor(log10(abs(value))))}f}"
 

@@ -32,9 +32,9 @@ from rigid_motion_batch.recordings.clips import ClipFacts
 from . import charts, tables
 from .data import Mesh, clip_data, drill, json_in_page, mesh_data
 from .held import MOST_SAID, asked_first, slip_grids, slip_sentences, still_sentences
-from .numbers import LARGEST, MEASURES, MINUS, RMS_IS, Gathering, Numbers, digits, error_is, percent, who_else
+from .numbers import LARGEST_AT, MEASURES, MINUS, RMS_IS, Gathering, Numbers, digits, error_is, percent, who_else
 from .rendering import SCRIPTS, address, script_of, shaders, style, write_page
-from .settings import Settings
+from .settings import PageSettings
 from .tables import Joints, joints_of
 from .verdict import verdict
 
@@ -56,7 +56,7 @@ Films = Mapping[tuple[str, str], Path | None]
 def write_report(
     path: Path,
     clips: Iterable[ClipResult],
-    settings: Settings,
+    settings: PageSettings,
     films: Films | None = None,
     *,
     folder: Path | None = None,
@@ -138,7 +138,7 @@ def write_report(
 def write_overview(
     path: Path,
     clips: Iterable[ClipResult],
-    settings: Settings,
+    settings: PageSettings,
     pages: Mapping[str, str | None],
     *,
     slips: Sequence[PairSlips] = (),
@@ -254,7 +254,7 @@ def _start(
     """Return what the page opens with: the choice of the verdict, and the clip with the largest error."""
     at = numbers.choices.index(spoken_of) if spoken_of else 0
     mode = numbers.modes.index(numbers.reference) if numbers.reference else 0
-    largest = numbers.values[LARGEST, :, at, mode]
+    largest = numbers.values[LARGEST_AT, :, at, mode]
     clip = int(np.nanargmax(largest)) if np.isfinite(largest).any() else 0
     choice = numbers.choices[at]
     return numbers.clips[clip], choice.name if choice in choices[clip][1] else choices[clip][1][0].name
@@ -269,7 +269,7 @@ def _overview_rows(
     groups = [group[0] for group in numbers.groups()]
     columns = [numbers.modes.index(mode) for mode in groups]
     beside = numbers.modes.index(numbers.reference or numbers.modes[0])
-    shown = numbers.values[LARGEST]
+    shown = numbers.values[LARGEST_AT]
     largest = shown.max(axis=(1, 2), initial=0.0, where=np.isfinite(shown))
     order = sorted(range(len(facts)), key=lambda place: (not facts[place].warnings, -largest[place]))
     for place in order:
@@ -277,13 +277,13 @@ def _overview_rows(
         for choice in range(len(numbers.choices)):
             own = numbers.values[numbers.deciding(choice), place, choice]
             if not np.isfinite(own[columns]).any():
-                cells.append(tables.Cell("too short", value=-1.0))
+                cells.append(tables.TableCell("too short", value=-1.0))
                 continue
             best = columns[int(np.nanargmin(own[columns]))]
             share = own[best] / own[beside] - 1.0 if own[beside] > 0.0 else 0.0
             name = numbers.label(numbers.modes[best])
             gain = f"{name} {MINUS}{percent(-share)}" if share < -0.005 else ""
-            cells.append(tables.Cell(digits(own[beside]), gain, value=float(np.nan_to_num(own[beside]))))
+            cells.append(tables.TableCell(digits(own[beside]), gain, value=float(np.nan_to_num(own[beside]))))
         page = pages.get(facts[place].name)
         yield {
             "facts": facts[place],
@@ -301,7 +301,7 @@ def _context(
     numbers: Numbers,
     facts: Sequence[ClipFacts],
     needed: Sequence[KeysNeeded],
-    settings: Settings,
+    settings: PageSettings,
     slips: Sequence[PairSlips],
 ) -> dict[str, Any]:
     said = verdict(numbers, needed)

@@ -18,7 +18,7 @@ import numpy as np
 from rigid_motion.motion.measures import rms
 from rigid_motion_batch.palette import ERROR_COLOURS, colours_on_pages, full_colour
 
-from .data import MOST_CHARTED, Block, Mesh, json_in_page, mesh_data, nice, peaks, size_as_text
+from .data import MOST_CHARTED, Mesh, PackedNumbers, json_in_page, mesh_data, nice, peaks, size_as_text
 from .rendering import SCRIPTS, address, script_of, shaders, style, write_page
 
 BEFORE, AFTER = "lerp_slerp", "dq_sclerp"
@@ -26,7 +26,7 @@ BEFORE, AFTER = "lerp_slerp", "dq_sclerp"
 
 CHOICE = "reduced"
 
-FINEST = 1e-4
+DRAWN_STEP_RATIO = 1e-4
 """Of the size of a body: how finely its joints are drawn."""
 
 MOST_TABS = 8
@@ -35,7 +35,7 @@ MOST_TABS = 8
 IN_THE_PAGE = 40_000_000
 """Bytes of all clips that can be played; of more files, those play that had most bytes."""
 
-CLEARLY = 1.02
+MIN_BETWEEN_FRAMES_RATIO = 1.02
 """By how much an error between frames is larger than those that were proven, where it is worth a word."""
 
 UNMOVED = Mesh(np.eye(3), np.arange(3)[None])
@@ -43,7 +43,7 @@ UNMOVED = Mesh(np.eye(3), np.arange(3)[None])
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ShownClip:
     """A clip before and after, in metres with z up."""
 
     name: str
@@ -75,9 +75,9 @@ class Shown:
     bytes: tuple[int, int]
 
 
-def clip_data(shown: Shown) -> dict[str, Any]:
+def clip_data(shown: ShownClip) -> dict[str, Any]:
     """Return what the viewer has of a clip: see `data.clip_data`."""
-    block, recorded, times = Block(), Block(), shown.times - shown.times[0]
+    block, recorded, times = PackedNumbers(), PackedNumbers(), shown.times - shown.times[0]
     low, high = shown.before.min(axis=(0, 1)), shown.before.max(axis=(0, 1))
     truth = shown.before - (low + high) / 2.0
     size = float(np.median(np.linalg.norm(np.ptp(truth, axis=0), axis=1))) or 1.0
@@ -94,7 +94,7 @@ def clip_data(shown: Shown) -> dict[str, Any]:
             "rms": [1e3 * scale * rms(shown.errors)],
             "errors": [block.put(row) for row in peaks(scale * errors, every)],
             "keys": block.put(keys, 4, 1.0),
-            "away": block.put(_rows(scale * away), step=FINEST * size),
+            "away": block.put(_rows(scale * away), step=DRAWN_STEP_RATIO * size),
             "by_joint": block.put(scale * heat, 1),
         }
 
@@ -112,7 +112,7 @@ def clip_data(shown: Shown) -> dict[str, Any]:
         "recording": {
             "times": recorded.put(times, 4, 1e-6),
             "seen": recorded.put(shown.moments, 4, 1.0),
-            "places": recorded.put(_rows(truth), step=FINEST * size),
+            "places": recorded.put(_rows(truth), step=DRAWN_STEP_RATIO * size),
             "block": recorded.text(),
         },
         "choices": [
@@ -212,7 +212,7 @@ def write_reduced(
     context = {
         "rows": rows,
         "sum": total,
-        "between": between if total.error is not None and between > CLEARLY * total.error else None,
+        "between": between if total.error is not None and between > MIN_BETWEEN_FRAMES_RATIO * total.error else None,
         "states": _counted(row.state for row in rows),
         "clips": places,
         "left_out": sum(len(views) for _, views in done) - len(places),

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rigid_motion_batch.analysis.choices import JOINT
+from rigid_motion_batch.analysis.choices import JOINT_RADIUS_M
 from rigid_motion_batch.analysis.modes import REFERENCE
 
 
 @dataclass(frozen=True)
-class Settings:
+class PageSettings:
     """What a page says of a run, but for its date."""
 
     radius: float
@@ -28,7 +28,7 @@ class Settings:
     slip_asked: bool = False
     """True if it was asked how far one body slips in another, which is answered first."""
 
-    joint_radius: float = JOINT
+    joint_radius: float = JOINT_RADIUS_M
     """Of the shell of a joint, in metres."""
 
     details: Mapping[str, str] = field(default_factory=dict)

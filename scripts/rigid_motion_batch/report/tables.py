@@ -25,7 +25,7 @@ SPACINGS = dict(zip(DECIMATIONS, ("evenly spaced", "where needed", "where needed
 
 
 @dataclass(frozen=True)
-class Cell:
+class TableCell:
     text: str
     small: str = ""
     best: bool = False
@@ -38,7 +38,7 @@ class Row:
     modes: tuple[str, ...]
     """Those that are one motion."""
 
-    cells: tuple[Cell, ...]
+    cells: tuple[TableCell, ...]
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def grid_rows(values: np.ndarray, groups: Groups, numbers: Numbers) -> tuple[Row
         Row(
             group,
             tuple(
-                Cell(
+                TableCell(
                     texts[choice][column],
                     _change(own[choice, column], reference, values[choice], group, numbers),
                     texts[choice][column] == least[choice],
@@ -122,7 +122,7 @@ def _change(value: float, reference: int | None, row: np.ndarray, group: Sequenc
     return "same" if shown == "0.0" else f"{'+' if change > 0 else MINUS}{shown}\u00a0%"
 
 
-def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tuple[str, ...], str, list[Cell]]]]:
+def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tuple[str, ...], str, list[TableCell]]]]:
     """Heads, and for each motion and way to space keys the keys that are as good as the reference's at each rate."""
     together = overall(needed)
     asked = [at for at in range(len(together.rates)) if together.asked[at]]
@@ -135,7 +135,7 @@ def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tup
             for at in asked:
                 share, reached = together.shares[group, way, at], int(together.clips[group, way, at])
                 if not reached:
-                    cells.append(Cell("not reached", value=1e9))
+                    cells.append(TableCell("not reached", value=1e9))
                     continue
                 number = (
                     f"{single.keys[group, way, at]:.0f}"
@@ -144,15 +144,15 @@ def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tup
                 )
                 partly = f" on {reached} of {together.asked[at]} clips" if reached < together.asked[at] else ""
                 best = bool(share <= finite[..., at].min() + 5e-3)
-                cells.append(Cell(number, percent(share) + partly, best, float(share)))
+                cells.append(TableCell(number, percent(share) + partly, best, float(share)))
             rows.append((modes, SPACINGS[DECIMATIONS[way]], cells))
     return [f"{together.rates[at]}/s" for at in asked], rows
 
 
-COLUMNS = 240
+PICTURE_COLUMNS = 240
 """Stretches of time that a picture has."""
 
-SHADES = 24
+SHADE_COUNT = 24
 
 
 @dataclass(frozen=True)
@@ -209,10 +209,10 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
 def heat_map(errors: np.ndarray, top: float) -> str:
     """Return the errors (joints, n) as the address of a picture, a row for each joint, the colours ending at `top`."""
     count = errors.shape[1]
-    begins = np.unique(np.arange(min(COLUMNS, count)) * count // min(COLUMNS, count))
+    begins = np.unique(np.arange(min(PICTURE_COLUMNS, count)) * count // min(PICTURE_COLUMNS, count))
     largest = np.maximum.reduceat(errors, begins, axis=1)
-    shades = np.clip(largest / top * SHADES, 0, SHADES - 1).astype(np.uint8)
-    palette = bytes.fromhex("".join(error_hex(shade / (SHADES - 1))[1:] for shade in range(SHADES)))
+    shades = np.clip(largest / top * SHADE_COUNT, 0, SHADE_COUNT - 1).astype(np.uint8)
+    palette = bytes.fromhex("".join(error_hex(shade / (SHADE_COUNT - 1))[1:] for shade in range(SHADE_COUNT)))
     return f"data:image/png;base64,{base64.b64encode(png(shades, palette)).decode('ascii')}"
 
 

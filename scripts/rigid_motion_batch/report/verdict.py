@@ -16,18 +16,18 @@ import numpy as np
 
 from rigid_motion.motion import MODES
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
-from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
+from rigid_motion_batch.analysis.metrics import MAX_ROUNDING_M, geometric_mean
 from rigid_motion_batch.analysis.needed import KeysNeeded, overall
 
 from .numbers import KINDS, Numbers, digits, listed, percent
 
-TIE = 0.005
+MAX_TIE_RATIO = 0.005
 """Ratios closer to 1 than this are no difference: they would be shown as 0 %."""
 
-ASKED = ("20", "15", "12", "30")
+ASKED_RATES = ("20", "15", "12", "30")
 """The rate of the reference that the sentence on keys needed is about: the first that was possible."""
 
-SPACED = "evenly spaced", "where the motion needs them", "where needed, and fitted"
+SPACING_TEXTS = "evenly spaced", "where the motion needs them", "where needed, and fitted"
 """How keys are placed, by `needed.DECIMATIONS`."""
 
 SAMPLE_IS_KEY = "No mode is off by more than rounding: every sample is a key, or nothing moves."
@@ -79,7 +79,7 @@ class _Contest:
     @property
     def distinguishable(self) -> np.ndarray:
         """Where all groups have a value and at least one of them has an error, shape (clips, choices)."""
-        least = NOTHING * 1e3 if self.kind is not Tolerance else 0.0
+        least = MAX_ROUNDING_M * 1e3 if self.kind is not Tolerance else 0.0
         return np.isfinite(self.values).all(axis=2) & (self.values.max(axis=2) > least)
 
     @property
@@ -154,7 +154,7 @@ def _best(contest: _Contest) -> tuple[int, int, np.ndarray] | None:
     ranked = np.argsort(scores, kind="stable")
     best = int(ranked[0])
     rival = contest.reference if contest.reference is not None else int(ranked[1])
-    if np.exp(scores[best] - scores[rival]) > 1.0 - TIE:
+    if np.exp(scores[best] - scores[rival]) > 1.0 - MAX_TIE_RATIO:
         return None
     return best, rival, means[:, best] / means[:, rival]
 
@@ -165,7 +165,7 @@ def _best(contest: _Contest) -> tuple[int, int, np.ndarray] | None:
 def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Verdict | None:
     """How few keys are as good as those of the reference at a rate, of those that were looked for."""
     together, reference = overall(needed), needed[0].reference
-    rate = next((rate for rate in ASKED if together.asked[together.rates.index(rate)]), None)
+    rate = next((rate for rate in ASKED_RATES if together.asked[together.rates.index(rate)]), None)
     if rate is None:
         return None
     at = together.rates.index(rate)
@@ -173,7 +173,7 @@ def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Verdict | No
     shares = np.where(whole, together.shares[..., at], np.inf)
     group, way = (int(place) for place in np.unravel_index(np.argmin(shares), shares.shape))
     label, theirs = numbers.label(reference), together.reference_keys_per_s[at]
-    wins = shares[group, way] <= 1.0 - TIE
+    wins = shares[group, way] <= 1.0 - MAX_TIE_RATIO
     spaced = [choice for choice in numbers.choices if isinstance(choice, Uniform) == (not wins or way == 0)]
     keys = float(together.keys_per_s[group, way, at]) if wins else theirs
     shown = nearest(spaced or numbers.choices, keys)
@@ -183,7 +183,7 @@ def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Verdict | No
     def amount(group: int) -> str:
         return f"{together.keys_per_s[group, way, at]:.3g} a second of {numbers.label(together.groups[group][0])}"
 
-    said = f"As good as {theirs:.3g} evenly spaced keys a second of {label} are {amount(group)}, {SPACED[way]}"
+    said = f"As good as {theirs:.3g} evenly spaced keys a second of {label} are {amount(group)}, {SPACING_TEXTS[way]}"
     beside = next((place for place, group in enumerate(together.groups) if reference in group), group)
     # Where keys are chosen better that is no merit of the mode: its rival has as good ones.
     if beside != group and np.isfinite(shares[beside, way]):
@@ -218,7 +218,7 @@ def _fewer_keys(contest: _Contest) -> Verdict | None:
     rate = float(np.exp(np.interp(-theirs[highest], -own, np.log(rates))))
     at_most = theirs[highest] > own[0]
     share = 1.0 - rate / rates[highest]
-    if share < TIE:
+    if share < MAX_TIE_RATIO:
         return None
     most, least = ("At most ", "at least ") if at_most else ("", "")
     placed = " on average" if contest.kind is Budget else ""
@@ -258,7 +258,7 @@ def _no_winner(contest: _Contest) -> Verdict:
     choice = contest.choices[at]
     best = contest.reference if contest.reference is not None else int(np.argmin(means[at]))
     over = _over(contest.distinguishable[:, at].sum())
-    better = means[known].min(axis=1) < (1.0 - TIE) * means[known, best]
+    better = means[known].min(axis=1) < (1.0 - MAX_TIE_RATIO) * means[known, best]
     if better.any():
         winners: dict[int, list[str]] = {}
         for place, is_better in zip(known.tolist(), better.tolist(), strict=True):
@@ -274,7 +274,7 @@ def _no_winner(contest: _Contest) -> Verdict:
     following = next(int(group) for group in np.argsort(means[at], kind="stable") if group != best)
     ratio = means[at, following] / means[at, best] - 1.0
     name = contest.name(following)
-    beside = f"{name} is as good" if ratio < TIE else f"{name} is next, with {percent(ratio)} more"
+    beside = f"{name} is as good" if ratio < MAX_TIE_RATIO else f"{name} is next, with {percent(ratio)} more"
     closer = "needs fewer keys" if within else "comes closer"
     return Verdict(f"Nothing {closer} than {said}; {beside}{over}.", choice)
 
@@ -285,5 +285,5 @@ def _wins(contest: _Contest) -> str:
     if not result or contest.distinguishable.sum() < 2:
         return ""
     values = contest.values[contest.distinguishable]
-    won = np.count_nonzero(values[:, result[0]] * (1.0 - TIE) <= values.min(axis=1))
+    won = np.count_nonzero(values[:, result[0]] * (1.0 - MAX_TIE_RATIO) <= values.min(axis=1))
     return f"{'Fewest keys' if contest.kind is Tolerance else 'Closest'} in {won} of {len(values)} cases"

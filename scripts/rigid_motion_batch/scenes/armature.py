@@ -25,14 +25,14 @@ from rigid_motion_batch.recordings.rest_bodies import LOOKED_AT, carrying
 LEAST_BONE = 0.02
 """A bone is no shorter than so much of the figure: Blender removes bones of no length."""
 
-STEADY = 1e-5
+MAX_STEADY_CHANGE = 1e-5
 """Metres and parts of a quaternion: a channel that varies less is set, and not keyed."""
 
-STILL = (1.0, 0.0, 0.0, 0.0)
+REST_QUATERNION = (1.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
+class RestFigure:
     """A figure at rest, in Blender's axes and metres, parents before their children."""
 
     parents: np.ndarray
@@ -51,11 +51,11 @@ class Rest:
     """The origin of that space in the figure's world: below it, on the ground. Shape (3,)."""
 
     @classmethod
-    def of(cls, clip: Clip) -> Rest:
+    def of(cls, clip: Clip) -> RestFigure:
         """Return the figure of a clip, which may be in any unit and axes, and at rest anywhere."""
         rest_body = clip.whole_body
         joints = clip.in_blender(rest_body.rest)
-        turned = np.tile(STILL, (len(rest_body.tails), 1))
+        turned = np.tile(REST_QUATERNION, (len(rest_body.tails), 1))
         arms = clip.in_blender(Poses(rest_body.tails, turned)).positions
         lengths = np.linalg.norm(arms, axis=1)
         least = LEAST_BONE * max(float(np.ptp(joints.positions, axis=0).max(initial=0.0)), float(lengths.max()), 1e-3)
@@ -88,7 +88,7 @@ class Rig:
     def __init__(
         self,
         name: str,
-        rest: Rest,
+        rest: RestFigure,
         names: Iterable[str],
         collection: bpy.types.Collection,
         like: Rig | None = None,
@@ -106,9 +106,9 @@ class Rig:
         above = np.where(rest.parents >= 0, rest.parents, 0)
         roots = (rest.parents < 0)[:, None]
         # A bone's channels are before * joint in its parent's space * after.
-        to_parents = Poses(none, np.where(roots, STILL, conjugate(turns[above])))
+        to_parents = Poses(none, np.where(roots, REST_QUATERNION, conjugate(turns[above])))
         parents_rest = Poses(
-            np.where(roots, 0.0, there.positions[above]), np.where(roots, STILL, there.quaternions[above])
+            np.where(roots, 0.0, there.positions[above]), np.where(roots, REST_QUATERNION, there.quaternions[above])
         )
         from_rest = placed(inverse(there), parents_rest)
         self._before, self._after = placed(from_rest, to_parents), Poses(none, turns)
@@ -132,7 +132,7 @@ class Rig:
         pose_bone = pose_bones(self.obj)[self.bones[bone]]
         quaternions = align_signs(channels.quaternions)
         for name, values in (("location", channels.positions), ("rotation_quaternion", quaternions)):
-            if len(values) > 1 and np.ptp(values, axis=0).max() > STEADY:
+            if len(values) > 1 and np.ptp(values, axis=0).max() > MAX_STEADY_CHANGE:
                 path = pose_bone.path_from_id(name)
                 animation.write_channel(self.obj, path, frames, values, group=pose_bone.name)
             else:
@@ -147,7 +147,7 @@ class Rig:
             animation.set_mode(keyed, mode)
 
 
-def _with_bones(obj: bpy.types.Object, rest: Rest, names: Iterable[str]) -> tuple[str, ...]:
+def _with_bones(obj: bpy.types.Object, rest: RestFigure, names: Iterable[str]) -> tuple[str, ...]:
     """Make the bones of an armature, and return what they are called."""
     view_layer().objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")

@@ -19,12 +19,12 @@ from rigid_motion_batch.palette import error_hex
 from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 from . import layout, physique, trails
-from .armature import Rest, Rig
+from .armature import RestFigure, Rig
 from .lanes import Cast, Lane
 from .materials import ghost, ink, surface
 from .nodes import Group, Socket, add_attribute, apply_group, node_of
 
-SHADES = 16
+SHADE_COUNT = 16
 """The number of shades of the bones."""
 
 ERROR, FLASH, WORST = "error", "flash", "worst"
@@ -33,7 +33,7 @@ ERROR, FLASH, WORST = "error", "flash", "worst"
 IN_FRONT = 0.45
 """The distance of what marks joints towards the camera, in units of the frame's height."""
 
-RINGED = 0.02
+MIN_RING_ERROR_RATIO = 0.02
 """The part of the error that colours reach up to: with less, the worst joint has no ring."""
 
 # In units of the frame's height.
@@ -42,10 +42,10 @@ RING_RADIUS = 0.024
 RING_THICKNESS = 0.0021
 GRID_RADIUS = 0.0013
 
-CELLS = 0.5
-"""Metres between the lines of the ground; a figure of another size has others, as its size is to `TALL`."""
+GROUND_CELL_M = 0.5
+"""Metres between the lines of the ground; a figure of another size has others, as its size is to `TYPICAL_HEIGHT_M`."""
 
-TALL = 1.7
+TYPICAL_HEIGHT_M = 1.7
 GRID_STEPS = 4
 """Points of a line of the ground from one crossing to the next, at which it may end."""
 
@@ -54,11 +54,11 @@ MOST_CELLS = 120
 
 
 @dataclass(frozen=True, eq=False)
-class BodyMotion:
+class StageMotion:
     """What moves on the stage, in metres and Blender's axes, around the middle of the recording: n frames."""
 
     rest_body: RestBody
-    rest: Rest
+    rest: RestFigure
     recording: Poses
     """The joints in their parents' space at each frame, shape (joints, n)."""
 
@@ -95,21 +95,21 @@ class BodyMotion:
 class Bodies:
     """Figures for the lanes, out of materials, groups and meshes that they share."""
 
-    def __init__(self, cast: Cast, motion: BodyMotion, shape: physique.Physique, full: float) -> None:
+    def __init__(self, cast: Cast, motion: StageMotion, shape: physique.Physique, full: float) -> None:
         self.cast, self.motion = cast, motion
         self.names = motion.rest_body.joints
         self.size = physique.body_size(motion.rest)
         self.rig: Rig | None = None
         self.ghost_action: bpy.types.Action | None = None
-        self.rest_body = physique.Carried.rest_body("Figure", shape)
+        self.rest_body = physique.CarriedMesh.rest_body("Figure", shape)
         self.ghost = ghost(cast.theme)
-        for shade in range(SHADES):
-            name = f"Error {1e3 * full * shade / (SHADES - 1):.3g} mm"
-            self.rest_body.mesh.materials.append(surface(name, error_hex(shade / (SHADES - 1)), roughness=0.55))
-        self.joints = physique.Carried.joints("Joints", motion.rest)
+        for shade in range(SHADE_COUNT):
+            name = f"Error {1e3 * full * shade / (SHADE_COUNT - 1):.3g} mm"
+            self.rest_body.mesh.materials.append(surface(name, error_hex(shade / (SHADE_COUNT - 1)), roughness=0.55))
+        self.joints = physique.CarriedMesh.joints("Joints", motion.rest)
         self.full = full
         self.colours, self.flashes, self.rings = _colours_group(), _flashes_group(), _rings_group()
-        self.grid = ground_grid(motion, CELLS * 2.0 ** round(np.log2(self.size / TALL)))
+        self.grid = ground_grid(motion, GROUND_CELL_M * 2.0 ** round(np.log2(self.size / TYPICAL_HEIGHT_M)))
         self.trail_group = trails.trail_group()
         self.track = ink("Ground", cast.theme.track)
 
@@ -162,7 +162,7 @@ class Bodies:
         rest_body.material_slots[0].material = self.ghost
 
     @staticmethod
-    def _carried(name: str, carried: physique.Carried, rig: Rig, lane: Lane) -> bpy.types.Object:
+    def _carried(name: str, carried: physique.CarriedMesh, rig: Rig, lane: Lane) -> bpy.types.Object:
         obj = lane.child(name, carried.mesh)
         carried.hang_on(rig, obj)
         return obj
@@ -172,15 +172,15 @@ class Bodies:
         errors = self._errors(lane)
         rest_body = self._carried(f"{mode} figure", self.rest_body, rig, lane)
         bones = float(len(self.names))
-        apply_group(rest_body, self.colours, Errors=errors, Bones=bones, Shades=SHADES / self.full)
+        apply_group(rest_body, self.colours, Errors=errors, Bones=bones, Shades=SHADE_COUNT / self.full)
         # Square to the camera, and in front of the figure: of the lane's turn there is nothing else.
         turn = -self.cast.framing.yaw
-        towards = rotate(layout.yaw_quaternion(turn), -layout.AWAY * IN_FRONT * metres).tolist()
+        towards = rotate(layout.yaw_quaternion(turn), -layout.AWAY_AXIS * IN_FRONT * metres).tolist()
         shared = {"Errors": errors, "Bones": bones, "Towards": towards, "Material": self.cast.ink}
         joints = self._carried(f"{mode} keys", self.joints, rig, lane)
         apply_group(joints, self.flashes, Radius=FLASH_RADIUS * metres, **shared)
         ring = self._carried(f"{mode} worst joint", self.joints, rig, lane)
-        facing = (np.pi / 2.0 - layout.ELEVATION, 0.0, turn)
+        facing = (np.pi / 2.0 - layout.ELEVATION_RAD, 0.0, turn)
         apply_group(
             ring, self.rings, Radius=RING_RADIUS * metres, Thickness=RING_THICKNESS * metres, Facing=facing, **shared
         )
@@ -191,7 +191,7 @@ class Bodies:
         errors = self.motion.errors[mode]
         mesh = bpy.data.meshes.new(f"{mode} errors")
         mesh.vertices.add(errors.size)
-        worst = (errors == errors.max(axis=0)) & (errors > RINGED * self.full)
+        worst = (errors == errors.max(axis=0)) & (errors > MIN_RING_ERROR_RATIO * self.full)
         for name, values in ((ERROR, errors), (FLASH, self.motion.flashes[mode]), (WORST, worst)):
             add_attribute(mesh, name, values.T.astype(np.float32).ravel())
         obj = lane.child(f"{mode} errors", mesh)
@@ -212,7 +212,7 @@ class Bodies:
         )
 
 
-def ground_grid(motion: BodyMotion, spacing: float) -> bpy.types.Mesh:
+def ground_grid(motion: StageMotion, spacing: float) -> bpy.types.Mesh:
     """Return lines on the ground around the way of a body, so many metres apart, as a mesh of edges."""
     reach = 2.5 * physique.body_size(motion.rest)
     way = motion.places(motion.recording).mean(axis=1)[:, :2]
@@ -272,7 +272,7 @@ def _colours_group() -> bpy.types.NodeTree:
     """Return the material of each face by the error of its bone: one of `Shades` for each metre."""
     group = Group("Colours of errors", Errors="Object", Bones="Float", Shades="Float")
     shade = group.math("MULTIPLY", _looked_up(group, ERROR), group.inputs["Shades"])
-    shade = group.math("MINIMUM", group.math("MAXIMUM", shade, 0.0), SHADES - 0.5)
+    shade = group.math("MINIMUM", group.math("MAXIMUM", shade, 0.0), SHADE_COUNT - 0.5)
     geometry = node_of(group.add("GeometryNodeSetMaterialIndex", group.inputs["Geometry"]))
     group.tree.links.new(shade, geometry.inputs["Material Index"])
     return group.finish(geometry.outputs[0])

@@ -22,29 +22,29 @@ from rigid_motion_batch.palette import error_hex, full_colour
 from rigid_motion_batch.recordings.rest_bodies import short_names
 
 from . import captions, layout
-from .armature import Rest
-from .bodies import SHADES, Bodies, BodyMotion, flashes
+from .armature import RestFigure
+from .bodies import SHADE_COUNT, Bodies, StageMotion, flashes
 from .findings import Finding
-from .framing import SMOOTHING, Framing, Jointed
+from .framing import MAX_SMOOTHING_S, Framing, Jointed
 from .lanes import Cast
 from .materials import ink
 from .physique import Physique, body_size, seen_bones
-from .scene import LEGEND, assemble_scene, begin
+from .scene import LEGEND_SIZE, assemble_scene, begin
 from .settings import SceneSettings
 from .timeline import Timeline
 
-FADE, FADE_SHARE = 5.0, 0.6
+FADE_FRAMES, FADE_SHARE = 5.0, 0.6
 """Frames in which a flash fades; where keys are near to one another, so much of what lies between them."""
 
-BAR, BAR_GAP = 0.24, 0.012
+BAR_WIDTH_RATIO, BAR_GAP_RATIO = 0.24, 0.012
 """The width of the bar of colours, and what is left free beside it, in units of the frame's height."""
 
-LEAST = "shell error 0"
+LEAST_TEXT = "shell error 0"
 
-MARGIN = 0.04
+MARGIN_RATIO = 0.04
 """The room around all joints, in units of the figure: its flesh."""
 
-GROUND = 0.05
+GROUND_RATIO = 0.05
 """The part of the ground that is seen below the feet, in units of the figure."""
 
 
@@ -63,7 +63,7 @@ def build_body_scene(
     """
     timeline = begin(made, settings)
     lanes_of = identical_modes(made) if settings.distinct else tuple((mode,) for mode in made.keys)
-    rest = Rest.of(made.clip)
+    rest = RestFigure.of(made.clip)
     motion, centre = shown_motion(made, [group[0] for group in lanes_of], timeline, rest)
 
     shape = Physique.of(made.clip, rest)
@@ -72,10 +72,12 @@ def build_body_scene(
         Jointed(motion.places(some), motion.carried(some, shape.foremost[ends], shape.vertices[ends]))
         for some in (motion.recording, *motion.modes.values())
     )
-    framing = Framing.of(recording, SMOOTHING * settings.fps)
+    framing = Framing.of(recording, MAX_SMOOTHING_S * settings.fps)
     extent, size = framing.extent(recording, others), body_size(rest)
     extent = replace(
-        extent, low=extent.low - size * np.array((MARGIN, MARGIN + GROUND, MARGIN)), high=extent.high + MARGIN * size
+        extent,
+        low=extent.low - size * np.array((MARGIN_RATIO, MARGIN_RATIO + GROUND_RATIO, MARGIN_RATIO)),
+        high=extent.high + MARGIN_RATIO * size,
     )
     cast = Cast.arranged(
         made,
@@ -93,7 +95,9 @@ def build_body_scene(
     )
     full = full_colour(motion.errors.values())
     most = _most(1e3 * full, cast.largest_error)
-    reserved = LEGEND * (captions.width_of(LEAST) + captions.width_of(most)) + BAR + 4.0 * BAR_GAP
+    reserved = (
+        LEGEND_SIZE * (captions.width_of(LEAST_TEXT) + captions.width_of(most)) + BAR_WIDTH_RATIO + 4.0 * BAR_GAP_RATIO
+    )
     legend = (
         "grey: recording",
         "ring: the joint that is farthest off",
@@ -107,8 +111,8 @@ def build_body_scene(
 
 
 def shown_motion(
-    made: Reconstruction, modes: Sequence[str], timeline: Timeline, rest: Rest
-) -> tuple[BodyMotion, np.ndarray]:
+    made: Reconstruction, modes: Sequence[str], timeline: Timeline, rest: RestFigure
+) -> tuple[StageMotion, np.ndarray]:
     """Return what moves on the stage, and what became its origin: the middle of the recording,
     on the ground, shape (3,).
     """
@@ -143,8 +147,8 @@ def shown_motion(
     }
     moment = {mode: [own for own, _ in some] for mode, some in keys.items()}
     most = max(len(own) for some in moment.values() for own in some)
-    fade = float(np.clip(FADE_SHARE * timeline.frames_per_key(most), 1.0, FADE))
-    return BodyMotion(
+    fade = float(np.clip(FADE_SHARE * timeline.frames_per_key(most), 1.0, FADE_FRAMES))
+    return StageMotion(
         rest_body=clip.whole_body,
         rest=rest,
         recording=around(recording),
@@ -175,16 +179,20 @@ def _most(full: float, largest: float) -> str:
 def _put_bar(cast: Cast, most: str) -> None:
     """Add what the colours of bones mean, at the right below the lanes."""
     collection, frame = bpy.data.collections["Captions"], bpy.data.objects["Frame"]
-    foot, right = -0.5 + layout.MARGIN + 0.004, -cast.layout.cells[0].left
+    foot, right = -0.5 + layout.MARGIN_RATIO + 0.004, -cast.layout.cells[0].left
 
     put = partial(captions.put, frame, collection)
-    put(captions.words("Largest shade", most, LEGEND, cast.faint, "RIGHT"), right, foot)
-    left = right - captions.width_of(most) * LEGEND - BAR_GAP - BAR
-    for step in range(SHADES):
-        colour = ink(f"Shade {step}", error_hex(step / (SHADES - 1)))
-        part = captions.card(f"Shade {step}", BAR / SHADES, 0.7 * LEGEND, colour, corner=0.0)
-        put(bpy.data.objects.new(part.name, part), left + (step + 0.5) * BAR / SHADES, foot + 0.35 * LEGEND)
-    put(captions.words("Least shade", LEAST, LEGEND, cast.faint, "RIGHT"), left - BAR_GAP, foot)
+    put(captions.words("Largest shade", most, LEGEND_SIZE, cast.faint, "RIGHT"), right, foot)
+    left = right - captions.width_of(most) * LEGEND_SIZE - BAR_GAP_RATIO - BAR_WIDTH_RATIO
+    for step in range(SHADE_COUNT):
+        colour = ink(f"Shade {step}", error_hex(step / (SHADE_COUNT - 1)))
+        part = captions.card(f"Shade {step}", BAR_WIDTH_RATIO / SHADE_COUNT, 0.7 * LEGEND_SIZE, colour, corner=0.0)
+        put(
+            bpy.data.objects.new(part.name, part),
+            left + (step + 0.5) * BAR_WIDTH_RATIO / SHADE_COUNT,
+            foot + 0.35 * LEGEND_SIZE,
+        )
+    put(captions.words("Least shade", LEAST_TEXT, LEGEND_SIZE, cast.faint, "RIGHT"), left - BAR_GAP_RATIO, foot)
 
 
 @contextmanager

@@ -18,11 +18,11 @@ from rigid_motion.blender import action_of, scene, view_layer
 
 from .nodes import Group, Socket, apply_group, input_path, node_of
 
-CORNER = 0.012
+CORNER_RATIO = 0.012
 
 
 def card(
-    name: str, width: float, height: float, material: bpy.types.Material, corner: float = CORNER
+    name: str, width: float, height: float, material: bpy.types.Material, corner: float = CORNER_RATIO
 ) -> bpy.types.Mesh:
     """Return a rectangle with round corners around the origin."""
     corner = min(corner, width / 2.0, height / 2.0)

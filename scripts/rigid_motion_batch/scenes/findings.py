@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from rigid_motion_batch.analysis.held import Slip
 from rigid_motion_batch.analysis.metrics import Metrics
 
-MOST = 3
+MAX_FINDINGS = 3
 """Findings of a film at most."""
 
-LEAST = 5e-5
+MIN_SLIDE_M = 5e-5
 """Metres that feet slide at least: what never moves counts as standing."""
 
 
@@ -53,10 +53,10 @@ def findings_of(rows: Sequence[Metrics], slips: Iterable[Slip] = ()) -> list[Fin
     slide = {row.mode: row.foot_slide_m for row in rows if row.foot_slide_m is not None}
     if still:
         result.append(Finding("pivot up to {} off", "pivot: the point that stays in the recording", still))
-    if max(slide.values(), default=0.0) > LEAST:
+    if max(slide.values(), default=0.0) > MIN_SLIDE_M:
         result.append(
             Finding(
                 "feet slide up to {}", "feet slide: while they stand on the ground", slide, rows[0].recorded_slide_m
             )
         )
-    return result[:MOST]
+    return result[:MAX_FINDINGS]

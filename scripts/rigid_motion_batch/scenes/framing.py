@@ -20,22 +20,22 @@ from . import layout
 FOLLOW_GAIN = 1.2
 """A motion is followed where that shows it so many times larger."""
 
-LEVEL = 0.3
+MAX_LEVEL_RATIO = 0.3
 """A body whose middle rises and falls by less of its height is followed over the ground alone."""
 
-WALKED = 0.5
+MIN_WALKED_RATIO = 0.5
 """A body that gets so far, in units of its height, is seen from the side that it goes past."""
 
 THREE_QUARTER = np.radians(30.0)
 """By how much it comes nearer to the camera as it goes."""
 
-SMOOTHING = 0.12
+MAX_SMOOTHING_S = 0.12
 """Seconds of the film: the standard deviation of the bell by which the focus is smoothed, at most."""
 
-BESIDE = 0.5
+MAX_BESIDE_RATIO = 0.5
 """The part of the room that the recording needs: what is farther off from it is cut where it leaves the view."""
 
-LAG = 1.35
+MAX_LAG_RATIO = 1.35
 """The most times that what is followed may need the room which it needs with a focus that is not smoothed."""
 
 
@@ -80,7 +80,7 @@ class Jointed:
         """The mean of the joints, at one height as long as the body stays about there: a step is no reason to nod."""
         middle = self.places.mean(axis=1)
         tall = float(np.ptp(self.places[..., 2], axis=1).max())
-        if np.ptp(middle[:, 2]) < LEVEL * tall:
+        if np.ptp(middle[:, 2]) < MAX_LEVEL_RATIO * tall:
             middle[:, 2] = np.median(middle[:, 2])
         return middle
 
@@ -94,7 +94,7 @@ class Jointed:
         middle = self.middle
         gone = middle[-1, :2] - middle[0, :2]
         tall = float(np.ptp(self.places[..., 2], axis=1).max())
-        if np.linalg.norm(gone) < WALKED * tall:
+        if np.linalg.norm(gone) < MIN_WALKED_RATIO * tall:
             return layout.heading(self.around(focus))
         return float(-np.arctan2(gone[1], gone[0]) - THREE_QUARTER)
 
@@ -144,13 +144,13 @@ class Framing:
         seen = [layout.project(rotate(turn, moving.around(self.focus))) for moving in (recording, *shown)]
         lows, highs = (np.array([edge(points, axis=0) for points in seen]) for edge in (np.min, np.max))
         low, high = lows.min(axis=0), highs.max(axis=0)
-        beside = BESIDE * float((highs[0] - lows[0])[:2].max())
+        beside = MAX_BESIDE_RATIO * float((highs[0] - lows[0])[:2].max())
         least, most = np.append((lows[0] - beside)[:2], -np.inf), np.append((highs[0] + beside)[:2], np.inf)
         return Extent(np.maximum(low, least), np.minimum(high, most), bool((low < least).any() or (high > most).any()))
 
     @classmethod
     def of(cls, recording: Moving, smoothing: float) -> Framing:
-        """Return what shows a recording well. `smoothing` is `SMOOTHING` in moments of it,
+        """Return what shows a recording well. `smoothing` is `MAX_SMOOTHING_S` in moments of it,
         or less where that shows more.
         """
         still = cls._facing(recording, np.zeros_like(recording.middle), follows=False)
@@ -159,7 +159,7 @@ class Framing:
             return still
         for share in (1.0, 0.5, 0.25):
             following = cls._facing(recording, _smoothed(recording.middle, share * smoothing), follows=True)
-            if following._width(recording) <= LAG * closest:
+            if following._width(recording) <= MAX_LAG_RATIO * closest:
                 break
         return following
 

@@ -28,13 +28,18 @@ from .nodes import apply_group
 from .settings import SceneSettings
 from .timeline import Timeline, peaks
 
-TITLE, NAME, NUMBER, UNIT, SMALL, FOUND = 0.044, 0.026, 0.05, 0.032, 0.028, 0.036
-"""Sizes of letters on a card, in units of the frame's height, where there is room."""
+# Sizes of letters on a card, in units of the frame's height, where there is room.
+TITLE_SIZE = 0.044
+NAME_SIZE = 0.026
+NUMBER_SIZE = 0.05
+UNIT_SIZE = 0.032
+SMALL_SIZE = 0.028
+FINDING_SIZE = 0.036
 
-INSET, COLUMN = 0.016, 0.15
+INSET_RATIO, COLUMN_RATIO = 0.016, 0.15
 """The space left free at the edges of a card, and the width of the numbers beside the graph."""
 
-GRAPH, GRAPH_COLUMNS = 0.066, 300
+GRAPH_HEIGHT_RATIO, GRAPH_COLUMNS = 0.066, 300
 """The height of a graph, and how many columns keep their least and their largest sample."""
 
 
@@ -130,7 +135,7 @@ class Cast:
     @property
     def behind(self) -> np.ndarray:
         """The distance of the recording behind what moves, in the space of a lane, where it hides nothing."""
-        return rotate(layout.yaw_quaternion(-self.framing.yaw), self.extent.depth * layout.AWAY)
+        return rotate(layout.yaw_quaternion(-self.framing.yaw), self.extent.depth * layout.AWAY_AXIS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +153,7 @@ class Lane:
         """Return what can be seen of it, as inputs of `trails.WINDOW`; the picture's height spans so many metres."""
         width, height = self.cell.room * metres / 2.0
         middle = layout.unproject(np.append(self.cell.view * metres, 0.0))
-        return {"Middle": middle, "Right": layout.RIGHT / width, "Up": layout.UP / height}
+        return {"Middle": middle, "Right": layout.RIGHT_AXIS / width, "Up": layout.UP_AXIS / height}
 
     def child(self, name: str, data: bpy.types.ID | None) -> bpy.types.Object:
         """Return a new object that moves with the lane."""
@@ -201,13 +206,13 @@ class Lanes:
         cast, mode, unit = self.cast, modes[0], cell.unit
         card = captions.card(f"{mode} card", cell.width, cell.height, self.card)
         self._put(bpy.data.objects.new(card.name, card), cell.x, cell.y, 1)
-        left, right = cell.left + INSET * unit, cell.left + cell.width - INSET * unit
+        left, right = cell.left + INSET_RATIO * unit, cell.left + cell.width - INSET_RATIO * unit
         room = right - left
-        title = min(TITLE * unit, room / self.title_width)
-        line = cell.foot + cell.height - INSET * unit - 0.72 * TITLE * unit
+        title = min(TITLE_SIZE * unit, room / self.title_width)
+        line = cell.foot + cell.height - INSET_RATIO * unit - 0.72 * TITLE_SIZE * unit
         self._put(captions.words(f"{mode} title", _title(mode), title, cast.ink), left, line)
         if names := names_of(modes, cast.notes):
-            size = NAME * unit
+            size = NAME_SIZE * unit
             while (text := captions.wrapped(names, room / size)).count("\n") > 1 or captions.width_of(
                 text
             ) * size > room:
@@ -216,21 +221,32 @@ class Lanes:
 
         lines = [cast.found(finding, mode) for finding in cast.findings]
         for place, text in enumerate(filter(None, reversed(lines))):
-            size = min(FOUND * unit, room / captions.width_of(text))
-            line = cell.foot + (INSET + GRAPH + 0.5 * layout.FOUND + layout.FOUND * place) * unit
+            size = min(FINDING_SIZE * unit, room / captions.width_of(text))
+            line = (
+                cell.foot
+                + (
+                    INSET_RATIO
+                    + GRAPH_HEIGHT_RATIO
+                    + 0.5 * layout.CARD_FINDING_RATIO
+                    + layout.CARD_FINDING_RATIO * place
+                )
+                * unit
+            )
             self._put(captions.words(f"{mode} finding {place + 1}", text, size, cast.ink), left, line)
 
-        column, foot = right - COLUMN * unit, cell.foot + INSET * unit
-        self._add_graph(mode, left, foot, column - left - INSET * unit, GRAPH * unit)
-        number = foot + GRAPH * unit - 0.72 * NUMBER * unit
-        self._put(captions.words(f"{mode} unit", "mm", UNIT * unit, cast.faint, "RIGHT"), right, number)
-        error = captions.readout(f"{mode} error", self.readout, NUMBER * unit, cast.timeline.frames, cast.errors[mode])
-        self._put(error, right - 1.7 * UNIT * unit, number)
+        column, foot = right - COLUMN_RATIO * unit, cell.foot + INSET_RATIO * unit
+        self._add_graph(mode, left, foot, column - left - INSET_RATIO * unit, GRAPH_HEIGHT_RATIO * unit)
+        number = foot + GRAPH_HEIGHT_RATIO * unit - 0.72 * NUMBER_SIZE * unit
+        self._put(captions.words(f"{mode} unit", "mm", UNIT_SIZE * unit, cast.faint, "RIGHT"), right, number)
+        error = captions.readout(
+            f"{mode} error", self.readout, NUMBER_SIZE * unit, cast.timeline.frames, cast.errors[mode]
+        )
+        self._put(error, right - 1.7 * UNIT_SIZE * unit, number)
         if self.names is None:
             text = f"max {cast.sampled[mode].max():.{captions.decimals_for(cast.largest_error)}f}"
-            self._put(captions.words(f"{mode} max", text, SMALL * unit, cast.faint, "RIGHT"), right, foot)
+            self._put(captions.words(f"{mode} max", text, SMALL_SIZE * unit, cast.faint, "RIGHT"), right, foot)
         else:  # The joint that the number is of.
-            size = min(SMALL, COLUMN / max(map(captions.width_of, cast.joints))) * unit
+            size = min(SMALL_SIZE, COLUMN_RATIO / max(map(captions.width_of, cast.joints))) * unit
             changes = captions.changes(cast.timeline.frames, cast.worst[mode])
             joint = captions.readout(f"{mode} joint", self.names, size, *changes, interpolation="CONSTANT")
             self._put(joint, column, foot)

@@ -1,8 +1,8 @@
 """Layout: where the lanes stand and what the camera frames, in NumPy alone.
 
-Two spaces. The *stage* is Blender's world, in metres, z up; the camera looks along +y and down by `ELEVATION`, through
-parallel rays, so every lane is seen from the same side. The *frame* is what it sees: x right, y up, 0 in the middle,
-in units of the picture's height. `Layout.metres` leads from one to the other.
+Two spaces. The *stage* is Blender's world, in metres, z up; the camera looks along +y and down by `ELEVATION_RAD`,
+through parallel rays, so every lane is seen from the same side. The *frame* is what it sees: x right, y up, 0 in the
+middle, in units of the picture's height. `Layout.metres` leads from one to the other.
 
 Deviations are by how much what is shown is off from the recording, and are drawn larger where they are small.
 """
@@ -19,27 +19,29 @@ from rigid_motion.motion.twists import between, exponential
 
 from . import layout
 
-ELEVATION = np.radians(20.0)
-RIGHT = np.array((1.0, 0.0, 0.0))
-UP = np.array((0.0, np.sin(ELEVATION), np.cos(ELEVATION)))
-AWAY = np.array((0.0, np.cos(ELEVATION), -np.sin(ELEVATION)))
+ELEVATION_RAD = np.radians(20.0)
+RIGHT_AXIS = np.array((1.0, 0.0, 0.0))
+UP_AXIS = np.array((0.0, np.sin(ELEVATION_RAD), np.cos(ELEVATION_RAD)))
+AWAY_AXIS = np.array((0.0, np.cos(ELEVATION_RAD), -np.sin(ELEVATION_RAD)))
 
-MARGIN = 0.022
-HEADER = 0.066
-FOOTER = 0.045
-GAP = 0.014
-PADDING = 0.028
-CARD = (0.42, 0.3)
+MARGIN_RATIO = 0.022
+HEADER_RATIO = 0.066
+FOOTER_RATIO = 0.045
+GAP_RATIO = 0.014
+PADDING_RATIO = 0.028
+FULL_CARD_RATIOS = (0.42, 0.3)
 """The width and height of a card on which letters have their full size; on a smaller one all of them are smaller."""
 
-HEAD, NAMES, FOOT, FOUND = 0.062, 0.052, 0.094, 0.042
-"""The parts of a card's height that are taken by what is written on it: the title, names below it if there are any,
-the error, and each finding above that."""
+# The parts of a card's height that are taken by what is written on it:
+CARD_HEAD_RATIO = 0.062  # the title
+CARD_NAMES_RATIO = 0.052  # names below it, if there are any
+CARD_FOOT_RATIO = 0.094  # the error
+CARD_FINDING_RATIO = 0.042  # each finding above that
 
 WRAP_GAIN = 0.85
 """A layout of fewer rows is kept while it shows motion and letters so large relative to the best."""
 
-DIRECTIONS = 1024
+DIRECTION_COUNT = 1024
 """Spread over the sphere as on a sunflower (a spherical Fibonacci lattice)."""
 
 SHOWN_RATIO = 2.5
@@ -64,17 +66,17 @@ class Cell:
     @property
     def unit(self) -> float:
         """The size of its letters, 1 at most."""
-        return min(1.0, self.width / CARD[0], self.height / CARD[1])
+        return min(1.0, self.width / FULL_CARD_RATIOS[0], self.height / FULL_CARD_RATIOS[1])
 
     @property
     def head(self) -> float:
         """The height of what is written at the top."""
-        return self.unit * (HEAD + NAMES * self.named)
+        return self.unit * (CARD_HEAD_RATIO + CARD_NAMES_RATIO * self.named)
 
     @property
     def base(self) -> float:
         """The height of what is written at the foot."""
-        return self.unit * (FOOT + FOUND * self.found)
+        return self.unit * (CARD_FOOT_RATIO + CARD_FINDING_RATIO * self.found)
 
     @property
     def view(self) -> np.ndarray:
@@ -84,7 +86,7 @@ class Cell:
     @property
     def room(self) -> np.ndarray:
         """The width and height that the motion may fill."""
-        return np.array((self.width - self.unit * PADDING, self.height - self.head - self.base))
+        return np.array((self.width - self.unit * PADDING_RATIO, self.height - self.head - self.base))
 
     @property
     def left(self) -> float:
@@ -125,8 +127,8 @@ def outermost(points: np.ndarray) -> np.ndarray:
     They span what all points span, but for a thousandth of their size, and are few enough to be followed through
     every frame.
     """
-    steps = np.arange(DIRECTIONS) + 0.5
-    height, turn = 1.0 - 2.0 * steps / DIRECTIONS, np.pi * (1.0 + 5.0**0.5) * steps
+    steps = np.arange(DIRECTION_COUNT) + 0.5
+    height, turn = 1.0 - 2.0 * steps / DIRECTION_COUNT, np.pi * (1.0 + 5.0**0.5) * steps
     ring = np.sqrt(1.0 - height * height)
     spread = np.stack((ring * np.cos(turn), ring * np.sin(turn), height), axis=-1)
     return points[np.unique(np.concatenate([(points @ part.T).argmax(axis=0) for part in np.split(spread, 8)]))]
@@ -158,12 +160,12 @@ def display_scale(path: np.ndarray, size: float) -> float:
 
 def project(points: np.ndarray) -> np.ndarray:
     """Return metres right and up in the frame, and away from the camera, of points on the stage: shape (..., 3)."""
-    return points @ np.stack((RIGHT, UP, AWAY), axis=-1)
+    return points @ np.stack((RIGHT_AXIS, UP_AXIS, AWAY_AXIS), axis=-1)
 
 
 def unproject(seen: np.ndarray) -> np.ndarray:
     """Return the points on the stage that `project` takes to these."""
-    return seen @ np.stack((RIGHT, UP, AWAY))
+    return seen @ np.stack((RIGHT_AXIS, UP_AXIS, AWAY_AXIS))
 
 
 def arrange(lanes: int, extent: np.ndarray, aspect: float, *, named: bool = False, found: int = 0) -> Layout:
@@ -188,13 +190,13 @@ def arrange(lanes: int, extent: np.ndarray, aspect: float, *, named: bool = Fals
 
 def _arranged(lanes: int, rows: int, extent: np.ndarray, aspect: float, named: bool, found: int) -> Layout:
     columns = -(-lanes // rows)
-    width = (aspect - 2.0 * MARGIN - (columns - 1) * GAP) / columns
-    height = (1.0 - HEADER - FOOTER - 2.0 * MARGIN - (rows - 1) * GAP) / rows
-    left, top = -aspect / 2.0 + MARGIN, 0.5 - MARGIN - HEADER
+    width = (aspect - 2.0 * MARGIN_RATIO - (columns - 1) * GAP_RATIO) / columns
+    height = (1.0 - HEADER_RATIO - FOOTER_RATIO - 2.0 * MARGIN_RATIO - (rows - 1) * GAP_RATIO) / rows
+    left, top = -aspect / 2.0 + MARGIN_RATIO, 0.5 - MARGIN_RATIO - HEADER_RATIO
     cells = tuple(
         Cell(
-            left + width / 2.0 + (lane % columns) * (width + GAP),
-            top - height / 2.0 - (lane // columns) * (height + GAP),
+            left + width / 2.0 + (lane % columns) * (width + GAP_RATIO),
+            top - height / 2.0 - (lane // columns) * (height + GAP_RATIO),
             width,
             height,
             named,
@@ -205,10 +207,10 @@ def _arranged(lanes: int, rows: int, extent: np.ndarray, aspect: float, named: b
     return Layout(cells, float((extent / cells[0].room).max()), aspect)
 
 
-SHARE = 0.25
+MAX_MAGNIFIED_RATIO = 0.25
 """The most of the object's size that the largest deviation is shown at, where it is magnified."""
 
-STEPS = (1.0, 2.0, 5.0)
+MAGNIFICATION_STEPS = (1.0, 2.0, 5.0)
 """Magnifications are these, times a power of ten."""
 
 
@@ -224,9 +226,9 @@ def magnification(deviation: float, size: float) -> float:
 
     A round number.
     """
-    most = SHARE * size / deviation if deviation > 1e-6 * size else 1.0
+    most = MAX_MAGNIFIED_RATIO * size / deviation if deviation > 1e-6 * size else 1.0
     power = 10.0 ** np.floor(np.log10(max(most, 1.0)))
-    return float(max(step * power for step in STEPS if step * power <= max(most, 1.0)))
+    return float(max(step * power for step in MAGNIFICATION_STEPS if step * power <= max(most, 1.0)))
 
 
 def magnified(shown: Poses, recording: Poses, factor: float, middle: np.ndarray) -> Poses:

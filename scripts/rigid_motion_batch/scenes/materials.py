@@ -8,19 +8,19 @@ import bpy
 
 from rigid_motion_batch.palette import Theme, linear
 
-GLOSS, BOUNCE = 0.0142, 0.878
+GLOSS_FACTOR, BOUNCE_FACTOR = 0.0142, 0.878
 """The factors of what Workbench's light `paint.sl` shows of a rough colour c that faces the camera:
-GLOSS + BOUNCE c (measured)."""
+GLOSS_FACTOR + BOUNCE_FACTOR c (measured)."""
 
 
-GHOST = 0.5
+GHOST_CONTRAST = 0.5
 """The amount that a ghost stands out from its card."""
 
 
 def ghost(theme: Theme) -> bpy.types.Material:
     """Return what the recording is made of: between its colour and that of the card, as if it were translucent."""
     colours = zip(linear(theme.ghost), linear(theme.card), strict=True)
-    return _lit("Recording", tuple(GHOST * ghost + (1.0 - GHOST) * card for ghost, card in colours))
+    return _lit("Recording", tuple(GHOST_CONTRAST * ghost + (1.0 - GHOST_CONTRAST) * card for ghost, card in colours))
 
 
 def surface(name: str, colour: str, *, alpha: float = 1.0, roughness: float = 0.4) -> bpy.types.Material:
@@ -47,7 +47,7 @@ def ink(name: str, colour: str) -> bpy.types.Material:
     """Return a flat colour that no light changes, for what is read rather than seen."""
     material, nodes, output = _new(name)
     rgb = linear(colour)
-    material.diffuse_color = (*(max(0.0, (value - GLOSS) / BOUNCE) for value in rgb), 1.0)
+    material.diffuse_color = (*(max(0.0, (value - GLOSS_FACTOR) / BOUNCE_FACTOR) for value in rgb), 1.0)
     material.roughness, material.specular_intensity = 1.0, 0.0
     emission = nodes.new("ShaderNodeEmission")
     emission.inputs["Color"].default_value = (*rgb, 1.0)

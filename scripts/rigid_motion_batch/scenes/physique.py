@@ -16,30 +16,30 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings.clips import Clip
 
-from .armature import Rest, Rig
+from .armature import RestFigure, Rig
 from .nodes import add_attribute
 
 BONE = "bone"
 """The attribute of a face or point: the number of its bone."""
 
-SLENDER = 0.13
+RADIUS_PER_LENGTH = 0.13
 """The thickness of a solid, relative to its length: its radius."""
 
-THICKNESS = 0.008, 0.034
+THICKNESS_RANGE = 0.008, 0.034
 """The thinnest and the thickest, relative to the figure."""
 
-LINK = 0.5
+LINK_THICKNESS_RATIO = 0.5
 """The thickness of what joins a bone to a child beside its end, relative to a solid."""
 
 AT_END = 0.02
 """A bone that ends so near to a child, relative to the figure, leads to it."""
 
-STUB = 0.04
+STUB_LENGTH_RATIO = 0.04
 """The length of a solid at a joint without children, relative to the figure, where bones do not lead to children: then
 they are of some program's making, and where they end means nothing."""
 
-SIDES = 8
-WAIST = 0.22
+N_SIDES = 8
+WAIST_RATIO = 0.22
 """The place along a solid where it is thickest."""
 
 
@@ -77,7 +77,7 @@ class Physique:
         return np.unique(np.concatenate(ends))
 
     @classmethod
-    def of(cls, clip: Clip, rest: Rest) -> Physique:
+    def of(cls, clip: Clip, rest: RestFigure) -> Physique:
         """Return the skin, or else solids."""
         skin = clip.whole_body.skin
         if skin is None:
@@ -88,7 +88,7 @@ class Physique:
         return cls(vertices, faces, skin.joints, skin.weights, smooth=True)
 
     @classmethod
-    def _of_solids(cls, rest: Rest) -> Physique:
+    def _of_solids(cls, rest: RestFigure) -> Physique:
         size = body_size(rest)
         vertices: list[np.ndarray] = []
         faces: list[tuple[int, ...]] = []
@@ -102,7 +102,7 @@ class Physique:
         return cls(np.concatenate(vertices), faces, joints, np.ones(joints.shape), smooth=False)
 
 
-def _parts(rest: Rest, size: float) -> Iterator[tuple[int, np.ndarray, np.ndarray, float]]:
+def _parts(rest: RestFigure, size: float) -> Iterator[tuple[int, np.ndarray, np.ndarray, float]]:
     """Yield the bone of each solid, where it begins and ends, and how thick it is, relative to others."""
     heads, tails, seen = rest.joints.positions, rest.tails, seen_bones(rest)
     children = {joint: np.flatnonzero(rest.parents == joint) for joint in seen}
@@ -113,7 +113,12 @@ def _parts(rest: Rest, size: float) -> Iterator[tuple[int, np.ndarray, np.ndarra
         if not len(own):
             along = tails[joint] - heads[joint]
             length = float(np.linalg.norm(along))
-            yield joint, heads[joint], heads[joint] + along * min(1.0, 1.0 if lead else STUB * size / length), 1.0
+            yield (
+                joint,
+                heads[joint],
+                heads[joint] + along * min(1.0, 1.0 if lead else STUB_LENGTH_RATIO * size / length),
+                1.0,
+            )
             continue
         straight = lead and gaps[joint].min() < AT_END * size
         if lead and not straight:
@@ -122,10 +127,10 @@ def _parts(rest: Rest, size: float) -> Iterator[tuple[int, np.ndarray, np.ndarra
             is_next = straight and child == own[gaps[joint].argmin()]
             alone = not lead and len(own) == 1
             if np.linalg.norm(heads[child] - heads[joint]) > 1e-3 * size:
-                yield joint, heads[joint], heads[child], 1.0 if is_next or alone else LINK
+                yield joint, heads[joint], heads[child], 1.0 if is_next or alone else LINK_THICKNESS_RATIO
 
 
-def body_size(rest: Rest) -> float:
+def body_size(rest: RestFigure) -> float:
     """Return the largest extent of the joints of a figure at rest, without what only carries it about.
 
     Where bones end is often made up by importers, and counts for a single joint alone.
@@ -136,7 +141,7 @@ def body_size(rest: Rest) -> float:
     return max(extent or float(np.ptp(np.concatenate((heads, rest.tails[seen])), axis=0).max()), 1e-6)
 
 
-def seen_bones(rest: Rest) -> list[int]:
+def seen_bones(rest: RestFigure) -> list[int]:
     """Return the bones but for those that are aside: they may reach to wherever the body was left."""
     return np.flatnonzero(~rest.aside if not rest.aside.all() else rest.aside).tolist()
 
@@ -145,26 +150,26 @@ def _solid(head: np.ndarray, tail: np.ndarray, share: float, size: float) -> tup
     """Return a spindle from head to tail, thickest near its head: its corners and faces."""
     along = tail - head
     length = float(np.linalg.norm(along))
-    radius = share * float(np.clip(SLENDER * length, THICKNESS[0] * size, THICKNESS[1] * size))
+    radius = share * float(np.clip(RADIUS_PER_LENGTH * length, THICKNESS_RANGE[0] * size, THICKNESS_RANGE[1] * size))
     along = along / max(length, 1e-9)
     side = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     side /= np.linalg.norm(side)
     other = np.cross(along, side)
-    angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    angles = 2.0 * np.pi * np.arange(N_SIDES) / N_SIDES
     ring = np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other
-    rings = ((0.0, 0.45), (WAIST, 1.0), (1.0, 0.35))
+    rings = ((0.0, 0.45), (WAIST_RATIO, 1.0), (1.0, 0.35))
     corners = np.concatenate([head + place * length * along + radius * width * ring for place, width in rings])
-    steps = np.arange(SIDES)
+    steps = np.arange(N_SIDES)
     faces = [
-        (first + step, first + (step + 1) % SIDES, first + SIDES + (step + 1) % SIDES, first + SIDES + step)
-        for first in (0, SIDES)
+        (first + step, first + (step + 1) % N_SIDES, first + N_SIDES + (step + 1) % N_SIDES, first + N_SIDES + step)
+        for first in (0, N_SIDES)
         for step in steps.tolist()
     ]
-    return corners, [*faces, tuple(steps[::-1].tolist()), tuple((2 * SIDES + steps).tolist())]
+    return corners, [*faces, tuple(steps[::-1].tolist()), tuple((2 * N_SIDES + steps).tolist())]
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
+class CarriedMesh:
     """A mesh of the figure at rest, for as many objects as there are rigs to carry it."""
 
     mesh: bpy.types.Mesh
@@ -175,7 +180,7 @@ class Carried:
     """Shape (v, k)."""
 
     @classmethod
-    def rest_body(cls, name: str, physique: Physique) -> Carried:
+    def rest_body(cls, name: str, physique: Physique) -> CarriedMesh:
         """Return a physique. Its faces know their bones."""
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(physique.vertices.tolist(), [], physique.faces)
@@ -185,7 +190,7 @@ class Carried:
         return cls(mesh, physique.carriers, physique.weights)
 
     @classmethod
-    def joints(cls, name: str, rest: Rest) -> Carried:
+    def joints(cls, name: str, rest: RestFigure) -> CarriedMesh:
         """Return a vertex at each joint, which knows its bone."""
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(rest.joints.positions.tolist(), [], [])

@@ -20,10 +20,10 @@ from . import layout
 from .lanes import Cast, Lane
 from .materials import ink
 
-INNER = 0.6
+MODE_CROSS_RATIO = 0.6
 """The size of the cross of a mode, of that of the recording."""
 
-ARM, THICK = 0.017, 0.0022
+ARM_RATIO, HALF_THICKNESS_RATIO = 0.017, 0.0022
 """How far the arms of a cross reach, and half of how thick they are, in units of the frame's height."""
 
 
@@ -49,7 +49,7 @@ class Pivot:
 
     def enter(self, lane: Lane, shown: Poses) -> None:
         """Add the cross of the recording, and that of a mode by its poses (n,) at the frames."""
-        own = _cross(f"Pivot {lane.mode}", INNER * self._cast.layout.metres)
+        own = _cross(f"Pivot {lane.mode}", MODE_CROSS_RATIO * self._cast.layout.metres)
         own.materials.append(ink(f"Pivot {lane.mode}", colour_on(self._cast.theme, lane.mode)))
         for name, mesh, places, before in (
             (f"{lane.mode} recording pivot", self._recorded_mesh, self._recorded, 1.0),
@@ -63,7 +63,7 @@ class Pivot:
     @property
     def _upright(self) -> np.ndarray:
         """The rotation that turns a cross to the camera, in the space of a lane."""
-        half = (math.pi / 2.0 - layout.ELEVATION) / 2.0
+        half = (math.pi / 2.0 - layout.ELEVATION_RAD) / 2.0
         return multiply(
             layout.yaw_quaternion(-self._cast.framing.yaw), np.array((np.cos(half), np.sin(half), 0.0, 0.0))
         )
@@ -71,7 +71,7 @@ class Pivot:
 
 def _cross(name: str, metres: float) -> bpy.types.Mesh:
     """Return a cross around the origin, in a picture that is so many metres high."""
-    long, short = ARM * metres, THICK * metres
+    long, short = ARM_RATIO * metres, HALF_THICKNESS_RATIO * metres
     corners = [(x, y, 0.0) for w, h in ((long, short), (short, long)) for x, y in ((-w, -h), (w, -h), (w, h), (-w, h))]
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(corners, [], [[0, 1, 2, 3], [4, 5, 6, 7]])

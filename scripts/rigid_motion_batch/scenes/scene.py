@@ -26,7 +26,7 @@ from rigid_motion_batch.palette import DARK, linear
 
 from . import captions, layout
 from .findings import Finding
-from .framing import SMOOTHING, Framing, Solid
+from .framing import MAX_SMOOTHING_S, Framing, Solid
 from .lanes import Cast, Lane, Lanes, remark_on
 from .layout import largest_deviation, magnification, magnified
 from .pivots import Pivot
@@ -35,13 +35,13 @@ from .solids import Solids
 from .subject import load_subject, vertices_of
 from .timeline import ShownMotion, Timeline
 
-LEGEND = 0.032
+LEGEND_SIZE = 0.032
 """The size of the letters below the lanes, in units of the frame's height, where there is room."""
 
-CLOCK = 0.3
+CLOCK_RATIO = 0.3
 """The room for the time, in units of the frame's height."""
 
-SOFTENED = 0.8
+SOFTENED_PIXEL_RATIO = 0.8
 """The part of a pixel that is the mean of those around it, near ones more: edges are smooth,
 and small letters clear."""
 
@@ -68,7 +68,7 @@ def build_scene(
     lanes_of = identical_modes(reconstruction) if settings.distinct else tuple((mode,) for mode in motion.modes)
 
     mesh = load_subject(settings.subject)
-    smoothing = SMOOTHING * settings.fps * timeline.steps
+    smoothing = MAX_SMOOTHING_S * settings.fps * timeline.steps
     outline = layout.outermost(vertices_of(mesh))
     framing = Framing.of(Solid(motion.recording, outline), smoothing)
     enlarged = layout.display_scale(motion.recording.positions - framing.focus, float(np.ptp(outline, axis=0).max()))
@@ -173,7 +173,7 @@ def _legend(cast: Cast, deviation: float, enlarged: float, radius: float, *, cro
 def make_frame(metres: float) -> bpy.types.Object:
     """Return the plane of the picture, behind everything that moves."""
     frame = bpy.data.objects.new("Frame", None)
-    frame.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION
+    frame.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION_RAD
     frame.scale = (metres, metres, metres)
     frame.empty_display_size = 0.1
     return frame
@@ -184,7 +184,7 @@ def _make_header(made: Reconstruction, legend: str, cast: Cast, frame: bpy.types
     collection = bpy.data.collections.new("Captions")
     blender.scene().collection.children.link(collection)
     collection.objects.link(frame)
-    left, line = cast.layout.cells[0].left, 0.5 - layout.MARGIN - 0.042
+    left, line = cast.layout.cells[0].left, 0.5 - layout.MARGIN_RATIO - 0.042
     right = -left
 
     put = partial(captions.put, frame, collection)
@@ -197,7 +197,7 @@ def _make_header(made: Reconstruction, legend: str, cast: Cast, frame: bpy.types
     if cast.findings:
         remark = "   \u00b7   ".join(map(remark_on, cast.findings))
         begins += 0.034 * captions.width_of(made.choice.title) + 0.06
-        size = min(LEGEND, max(0.01, right - CLOCK - begins) / captions.width_of(remark))
+        size = min(LEGEND_SIZE, max(0.01, right - CLOCK_RATIO - begins) / captions.width_of(remark))
         put(captions.words("Findings", remark, size, cast.faint), begins, line)
     timeline = cast.timeline
     ends = timeline.frames[[0, -1]]
@@ -205,8 +205,8 @@ def _make_header(made: Reconstruction, legend: str, cast: Cast, frame: bpy.types
     put(captions.readout("Time", decimals, 0.046, ends, timeline.times_of(ends) - timeline.start), right - 0.03, line)
     put(captions.words("Seconds", "s", 0.034, cast.faint, "RIGHT"), right, line)
 
-    size = min(LEGEND, (right - left - reserved) / captions.width_of(legend))
-    put(captions.words("Legend", legend, size, cast.faint), left, -0.5 + layout.MARGIN + 0.004)
+    size = min(LEGEND_SIZE, (right - left - reserved) / captions.width_of(legend))
+    put(captions.words("Legend", legend, size, cast.faint), left, -0.5 + layout.MARGIN_RATIO + 0.004)
 
 
 def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
@@ -215,8 +215,8 @@ def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
     camera = bpy.data.objects.new("Camera", lens)
     scene.collection.objects.link(camera)
     scene.camera = camera
-    camera.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION
-    camera.location = (-layout.AWAY * (depth + metres)).tolist()
+    camera.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION_RAD
+    camera.location = (-layout.AWAY_AXIS * (depth + metres)).tolist()
     lens.type = "ORTHO"
     lens.sensor_fit = "VERTICAL"
     lens.ortho_scale = metres
@@ -278,7 +278,7 @@ def _smooth_edges(scene: Any) -> None:
         tree.nodes.clear()
         output = tree.nodes.new("CompositorNodeComposite")
     rendered, smooth = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("CompositorNodeFilter")
-    smooth.inputs["Factor" if "Factor" in smooth.inputs else "Fac"].default_value = SOFTENED
+    smooth.inputs["Factor" if "Factor" in smooth.inputs else "Fac"].default_value = SOFTENED_PIXEL_RATIO
     tree.links.new(rendered.outputs["Image"], smooth.inputs["Image"])
     tree.links.new(smooth.outputs[0], output.inputs[0])
     scene.render.compositor_device = "CPU"

@@ -139,7 +139,7 @@ def _discard_all_but(mesh: bpy.types.Mesh | None, before: set[bpy.types.ID]) -> 
 MOST_TRIANGLES = 4000
 """So many are some 100 kB in a page."""
 
-TRIES = 6
+MAX_TRIES = 6
 
 
 def simplified(requested: str, most: int = MOST_TRIANGLES) -> dict[str, np.ndarray]:
@@ -154,7 +154,7 @@ def simplified(requested: str, most: int = MOST_TRIANGLES) -> dict[str, np.ndarr
     scene().collection.objects.link(obj)
     modifier = cast(bpy.types.DecimateModifier, obj.modifiers.new("Fewer", "DECIMATE"))
     modifier.use_collapse_triangulate = True
-    for _ in range(TRIES):
+    for _ in range(MAX_TRIES):
         result = _surface(obj)
         if len(result["triangles"]) <= most:
             return result

@@ -39,7 +39,7 @@ WINDOW = {"Middle": "Vector", "Right": "Vector", "Up": "Vector"}
 """The window that trails are kept within: the middle of a window of the picture in the world, and one over its half
 width and half height, along the directions in which these are."""
 
-FADE = 0.15
+FADE_RATIO = 0.15
 """The part of the window's half, from its edge, where what is drawn begins to thin."""
 
 
@@ -128,7 +128,7 @@ def _within_picture(group: Group, points: Socket) -> tuple[Socket, Socket]:
     share = group.math("MAXIMUM", *shares)
     outside = group.math("GREATER_THAN", share, 1.0)
     kept = group.add("GeometryNodeDeleteGeometry", points, outside, settings={"domain": "POINT"})
-    return kept, group.math("DIVIDE", group.math("SUBTRACT", 1.0, share), FADE, clamp=True)
+    return kept, group.math("DIVIDE", group.math("SUBTRACT", 1.0, share), FADE_RATIO, clamp=True)
 
 
 def _within_window(group: Group) -> tuple[Socket, Socket]:

@@ -23,9 +23,9 @@ from rigid_motion.live.sockets import Address, Outlet, Port
 from rigid_motion.motion import Poses, rms, shell_error
 from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import normalise
-from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams import Receiver, Sender, StreamBody
 from rigid_motion.streams.bodies import Forest
-from rigid_motion.streams.paths import Path
+from rigid_motion.streams.paths import KnotPath
 from rigid_motion.streams.wire import Description, read
 from rigid_motion_batch.analysis.held import mean_pose, seen_from
 
@@ -33,10 +33,10 @@ from .sending import Hand, even_rate
 
 LOOPBACK = "127.0.0.1"
 
-HEADERS = 28
+HEADER_BYTES = 28
 """Bytes of UDP and IPv4 in front of every datagram."""
 
-PATIENCE = 30.0
+PATIENCE_S = 30.0
 """Seconds in which the other process has to answer."""
 
 ARRIVAL = Struct("<d")
@@ -44,7 +44,7 @@ ARRIVAL = Struct("<d")
 
 
 def measure(
-    bodies: Sequence[Body],
+    bodies: Sequence[StreamBody],
     times: np.ndarray,
     poses: Poses,
     tolerance: float,
@@ -52,7 +52,7 @@ def measure(
     loss: float = 0.0,
     seed: int = 1,
     held: Sequence[tuple[str, Hand]] = (),
-) -> tuple[dict[str, float], Path]:
+) -> tuple[dict[str, float], KnotPath]:
     """Send samples (n,) of poses (joints, n) of all bodies, and return what it costs and what is shown (joints,).
 
     Datagrams take no time, and a part of them never arrives, in both directions. `joining_bytes`, with headers, are
@@ -84,7 +84,7 @@ def measure(
                 if answer:
                     answers.append(answer)
                 if answer and random.random() >= loss:
-                    say(sender.hear(answer, now), now)
+                    say(sender.take_answer(answer, now), now)
 
         try:
             for sample, moment in enumerate(times.tolist()):
@@ -94,13 +94,13 @@ def measure(
             say(sender.finish(), float(times[-1]))
         finally:
             port.send(ARRIVAL.pack(np.inf), receiver)
-        frames = receiving.result(PATIENCE)
+        frames = receiving.result(PATIENCE_S)
     if not frames:
         raise RuntimeError("nothing was shown: no datagram came through")
     moments, first = np.unique([moment for moment, _ in frames], return_index=True)
     drawn = joined([frames[row][1][:, None] for row in first.tolist()], axis=1)
-    shown = Path(moments, Poses(drawn.positions, normalise(drawn.quaternions)))
-    off = Forest(bodies).errors(shown.poses, Path(times, poses).at(moments)).max(axis=0)
+    shown = KnotPath(moments, Poses(drawn.positions, normalise(drawn.quaternions)))
+    off = Forest(bodies).errors(shown.poses, KnotPath(times, poses).at(moments)).max(axis=0)
     seconds = float(times[-1] - times[0])
     joining = [datagram for datagram in sent if isinstance(read(datagram), Description)]
     joining_bytes, motions = sum(map(len, joining)), len(sent) - len(joining)
@@ -108,16 +108,16 @@ def measure(
         "seconds": seconds,
         "datagrams": len(sent),
         "lost": len(lost),
-        "joining_bytes": joining_bytes + HEADERS * len(joining),
-        "answers_a_second": (sum(map(len, answers)) + HEADERS * len(answers)) / seconds,
+        "joining_bytes": joining_bytes + HEADER_BYTES * len(joining),
+        "answers_a_second": (sum(map(len, answers)) + HEADER_BYTES * len(answers)) / seconds,
         "share_within_tolerance": float(np.mean(off <= tolerance)),
         "share_within_20_mm": float(np.mean(off <= 0.02)),
-        **cost((sum(map(len, sent)) - joining_bytes) / seconds, HEADERS * motions / seconds, off),
+        **cost((sum(map(len, sent)) - joining_bytes) / seconds, HEADER_BYTES * motions / seconds, off),
     }, shown
 
 
 def measure_held(
-    bodies: Sequence[Body],
+    bodies: Sequence[StreamBody],
     times: np.ndarray,
     poses: Poses,
     tolerance: float,
@@ -146,12 +146,14 @@ def measure_held(
     true = place(poses)
     mean = mean_pose(true)
 
-    def sent(which: Sequence[Body], seed: int = 1, held: Sequence[tuple[str, Hand]] = ()) -> tuple[float, Path]:
+    def sent(
+        which: Sequence[StreamBody], seed: int = 1, held: Sequence[tuple[str, Hand]] = ()
+    ) -> tuple[float, KnotPath]:
         own = joined([forest.parted(poses)[body.name] for body in which])
         numbers, shown = measure(which, times, own, tolerance, delay, loss, seed, held)
         return numbers["bytes_a_second_with_headers"], shown
 
-    def result(size: float, *shown: Path) -> dict[str, float]:
+    def result(size: float, *shown: KnotPath) -> dict[str, float]:
         seen = times[times >= max(path.moments[0] for path in shown)]
         off = shell_error(
             place(joined([path.at(seen) for path in shown])), mean[np.zeros(len(seen), dtype=int)], radius
@@ -182,9 +184,9 @@ def cost(size: float, headers: float, off: np.ndarray) -> dict[str, float]:
 
 
 def _received(port: Port) -> tuple[bytes, Address]:
-    if came := port.received(PATIENCE):
+    if came := port.received(PATIENCE_S):
         return came[0]
-    raise RuntimeError(f"the receiver's process did not answer within {PATIENCE:g} s")
+    raise RuntimeError(f"the receiver's process did not answer within {PATIENCE_S:g} s")
 
 
 def _receive(to: int, times: np.ndarray, delay: float, names: Sequence[str]) -> list[tuple[float, Poses]]:
@@ -195,7 +197,7 @@ def _receive(to: int, times: np.ndarray, delay: float, names: Sequence[str]) -> 
     with Outlet(LOOPBACK, to) as outlet:
         outlet.say(b"")
         while draws:
-            data, _ = outlet.received(PATIENCE)[0]
+            data, _ = outlet.received(PATIENCE_S)[0]
             (arrival,) = ARRIVAL.unpack_from(data)
             while draws and draws[0] <= arrival:
                 # Nothing where the motion of that moment was over when the first datagram came.

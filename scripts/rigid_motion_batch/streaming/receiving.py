@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from rigid_motion.live.sockets import Address, Outlet
 from rigid_motion.streams import Receiver, Shown
-from rigid_motion.streams.playing import SILENT
+from rigid_motion.streams.playing import MAX_SILENCE_S
 from rigid_motion.streams.receiver import MOST_STREAMS
 
 from .rooms import ANSWERS, Came, Room
@@ -17,7 +17,7 @@ from .rooms import ANSWERS, Came, Room
 ANSWERS_A_SECOND = 100.0
 """To all streams together."""
 
-LINGER = 0.3
+LINGER_S = 0.3
 """Seconds without a sender, once all that came has been shown, that are the end: another sender may follow."""
 
 
@@ -45,11 +45,11 @@ class Receiving:
         """When something came last, and when the next answers are due."""
         room.listen(user)
 
-    def hear(self, until: float, stopped: Sequence[int]) -> None:
+    def listen_until(self, until: float, stopped: Sequence[int]) -> None:
         """Show what comes until a moment of `time.monotonic`, or until all who sent have gone."""
         began, frame = time.monotonic(), 0
         while not stopped and (now := time.monotonic()) < until:
-            if self._last > -math.inf and not self._heard and now - self._last > LINGER + self._margin:
+            if self._last > -math.inf and not self._heard and now - self._last > LINGER_S + self._margin:
                 break
             due = began + frame / self._fps
             for came in self._room.come(min(due, until) - now):
@@ -86,7 +86,7 @@ class Receiving:
         shown = list(self.receiver.show(now).values())
         for act in self.on_frame:
             act(shown)
-        for user in [user for user, heard in self._heard.items() if now - heard > SILENT]:
+        for user in [user for user, heard in self._heard.items() if now - heard > MAX_SILENCE_S]:
             self._leave(user)
 
     def _leave(self, user: str) -> None:

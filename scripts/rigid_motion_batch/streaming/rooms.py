@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from rigid_motion.live.sockets import is_loopback
-from rigid_motion.streams.wire import LONGEST
+from rigid_motion.streams.wire import MAX_BYTES
 from rigid_motion_batch.places import brings
 
 if TYPE_CHECKING:
     import zenoh
 
-HERE, EVERYWHERE, PORT = "127.0.0.1", "0.0.0.0", 7447
+LOOPBACK_ADDRESS, ANY_ADDRESS, ROUTER_PORT = "127.0.0.1", "0.0.0.0", 7447
 """The port is Zenoh's own."""
 
 MOTION, SKELETON, ANSWERS, LISTENING = "motion", "skeleton", "answers", "listening"
@@ -56,7 +56,7 @@ def locator(address: str) -> str:
     if "/" in address:
         return address
     has_port = re.fullmatch(r"(\[[^]]*\]|[^:]*):\d+", address)
-    return f"tcp/{address}" if has_port else f"tcp/{address}:{PORT}"
+    return f"tcp/{address}" if has_port else f"tcp/{address}:{ROUTER_PORT}"
 
 
 def is_local(address: str) -> bool:
@@ -69,8 +69,8 @@ def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
 
     On loopback whoever comes first keeps the port, and brings the others together. Elsewhere a router is expected.
     """
-    everywhere = EVERYWHERE if network else HERE
-    place = locator(at or (everywhere if role == "router" else HERE))
+    everywhere = ANY_ADDRESS if network else LOOPBACK_ADDRESS
+    place = locator(at or (everywhere if role == "router" else LOOPBACK_ADDRESS))
     result: dict[str, Any] = {"mode": role, "scouting/multicast/enabled": network, **LIMITS}
     if role == "router":
         return result | {"listen/endpoints": [place]}
@@ -111,7 +111,9 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
         way = "is its router running, as stream router --network on that machine?"
         if role == "router":
             way = "another program may have this port, or a file is missing"
-        raise ValueError(f"{at or config or HERE}: there is no way to it ({_first_line(error)}); {way}") from None
+        raise ValueError(
+            f"{at or config or LOOPBACK_ADDRESS}: there is no way to it ({_first_line(error)}); {way}"
+        ) from None
 
 
 def _first_line(error: Exception) -> str:
@@ -178,6 +180,6 @@ class Room:
         """Take what came: called by Zenoh, in a thread of its own."""
         user, stream, *_ = str(sample.key_expr).removeprefix(f"{self.name}/").split("/")
         datagram = None if str(sample.kind) == "SampleKind.DELETE" else sample.payload.to_bytes()
-        if datagram is None or len(datagram) <= LONGEST:
+        if datagram is None or len(datagram) <= MAX_BYTES:
             with suppress(queue.Full):
                 self._came.put_nowait(Came(user, stream, datagram))

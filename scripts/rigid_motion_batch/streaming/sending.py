@@ -11,24 +11,24 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion.motion.humanoid import beside
 from rigid_motion.motion.poses import joined
-from rigid_motion.streams import Body, Sender
-from rigid_motion.streams.bodies import RADIUS
-from rigid_motion.streams.paths import Path
+from rigid_motion.streams import Sender, StreamBody
+from rigid_motion.streams.bodies import DEFAULT_RADIUS_M
+from rigid_motion.streams.paths import KnotPath
 from rigid_motion.streams.wire import Description, read
 from rigid_motion_batch.analysis.held import find_held
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.rest_bodies import NOTHING, TYPICAL, size_of
+from rigid_motion_batch.recordings.rest_bodies import TYPICAL_HEIGHT_M, ZERO_SIZE, size_of
 
 from .rooms import ANSWERS, LISTENING, MOTION, SKELETON, Room
 
-SLIDES = 1e-4
+MIN_SLIDE_M = 1e-4
 """Metres by which a joint has to change its place in its parent's space to be sent with it."""
 
 Hand = tuple[str, str | None]
 """A body that holds another, and its joint that does; None where it has a single root."""
 
-LOOK, AGAIN, AFTER = 0.02, 0.03, 0.3
+LOOK_S, REPEAT_S, STAY_AFTER_S = 0.02, 0.03, 0.3
 """Seconds after which a loop looks up, whatever comes or does not; after which the description is sent again, for many
 may ask for it at once; and for which a sender stays behind the end, beside the delay: what was lost is asked for."""
 
@@ -42,7 +42,7 @@ def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
     times, poses = clip.times, poses if len(poses.shape) == 2 else poses[None]
     if clip.rate and len(times) != round((times[-1] - times[0]) * clip.rate) + 1:
         even = np.arange(times[0], times[-1] + 0.01 / clip.rate, 1.0 / clip.rate)
-        return even, Path(times, poses).at(even)
+        return even, KnotPath(times, poses).at(even)
     return times, poses
 
 
@@ -53,28 +53,28 @@ def radii_of(clip: Clip) -> np.ndarray:
     """
     figure, ends = clip.whole_body, clip.whole_body.ends
     size = size_of(figure.parents, figure.rest.positions)
-    ball = RADIUS / TYPICAL * size if size > NOTHING else RADIUS / clip.metres_per_unit
+    ball = DEFAULT_RADIUS_M / TYPICAL_HEIGHT_M * size if size > ZERO_SIZE else DEFAULT_RADIUS_M / clip.metres_per_unit
     return np.maximum(np.zeros(clip.joints) if ends is None else ends, ball) * clip.metres_per_unit
 
 
-def body_of(clip: Clip, poses: Poses, radius: float | None = None) -> Body:
+def body_of(clip: Clip, poses: Poses, radius: float | None = None) -> StreamBody:
     """Return what is streamed of a clip, with its own radii if none is given.
 
     A rigid body is at rest as in its first sample.
     """
     if clip.rest_body is None:
-        return Body.rigid(clip.name, poses[:, 0], radius or RADIUS)
+        return StreamBody.rigid(clip.name, poses[:, 0], radius or DEFAULT_RADIUS_M)
     radii = radii_of(clip) if radius is None else radius
     parents = clip.rest_body.parents
     turns = beside(to_blender(clip.rest_body.rest, clip.axes), parents).quaternions
-    sliding = np.ptp(poses.positions, axis=1).max(axis=1) > SLIDES
+    sliding = np.ptp(poses.positions, axis=1).max(axis=1) > MIN_SLIDE_M
     rest = Poses(poses.positions[:, 0], turns)
-    return Body(clip.name, clip.rest_body.joints, parents, rest, radii, sliding | (parents < 0))
+    return StreamBody(clip.name, clip.rest_body.joints, parents, rest, radii, sliding | (parents < 0))
 
 
 def together(
     clips: Sequence[Clip], rate: float | None = None, radius: float | None = None
-) -> tuple[list[Body], np.ndarray, Poses]:
+) -> tuple[list[StreamBody], np.ndarray, Poses]:
     """Return the bodies of clips that begin together, their moments (n,), and the poses (joints, n) of all.
 
     The moments are those of the first clip where all have the same or it is alone, or else even ones: so many a second,
@@ -87,7 +87,9 @@ def together(
         rate = rate or max(clip.samples_a_second for clip in clips)
         seconds = max(times[-1] - times[0] for times, _ in samples)
         moments = first[0] + np.arange(int(seconds * rate + 1e-6) + 1) / rate
-    shown = [Path(times, poses).at(np.minimum(moments - first[0] + times[0], times[-1])) for times, poses in samples]
+    shown = [
+        KnotPath(times, poses).at(np.minimum(moments - first[0] + times[0], times[-1])) for times, poses in samples
+    ]
     return bodies, moments, joined(shown)
 
 
@@ -100,7 +102,7 @@ def hand_of(text: str) -> Hand:
 def found_held(clips: Sequence[Clip]) -> list[tuple[str, Hand]]:
     """Return which rigid bodies of recordings are held by others all the time, as is found in them."""
     rigid = [clip for clip in clips if clip.rest_body is None]
-    return [(rigid[held].name, (rigid[holder].name, None)) for holder, held in find_held(rigid, RADIUS)]
+    return [(rigid[held].name, (rigid[holder].name, None)) for holder, held in find_held(rigid, DEFAULT_RADIUS_M)]
 
 
 def even_rate(times: np.ndarray) -> float | None:
@@ -109,7 +111,7 @@ def even_rate(times: np.ndarray) -> float | None:
     return float(round(rate)) if abs(rate - round(rate)) < 0.01 else None
 
 
-class Sending:
+class RoomSending:
     """A sender in a room, under the name of a user."""
 
     def __init__(self, room: Room, user: str, sender: Sender, ahead: float = 0.0) -> None:
@@ -140,15 +142,15 @@ class Sending:
                 self.joined += 1
                 said = self.sender.join()
             elif came.stream == ANSWERS and came.datagram:
-                said = self.sender.hear(came.datagram, self.now)
-            if said and self.now - self._described > AGAIN:
+                said = self.sender.take_answer(came.datagram, self.now)
+            if said and self.now - self._described > REPEAT_S:
                 self._described = self.now
                 self.say(said)
 
     def until(self, moment: float, stopped: Sequence[int]) -> None:
         """Wait for a moment of the motion, and meanwhile answer and say what is due without a sample."""
         while not stopped and (now := self.now) < moment:
-            self.answer(min(moment - now, max(self.sender.next - now, 0.0), LOOK))
+            self.answer(min(moment - now, max(self.sender.next - now, 0.0), LOOK_S))
             if self.sender.next <= (now := self.now) < moment:
                 self.say(self.sender.poll(now))
 
@@ -173,6 +175,6 @@ class Sending:
         seconds = self.now - first
         if not stopped:
             self.say(self.sender.finish())
-            self.until(last + delay + AFTER, stopped)
+            self.until(last + delay + STAY_AFTER_S, stopped)
         self.room.send(self.user, MOTION, None)
         return seconds

@@ -10,15 +10,15 @@ import numpy as np
 
 from rigid_motion.live.sockets import Address, Outlet, Port
 from rigid_motion.motion import Poses
-from rigid_motion.streams import Body, Keys, Receiver
+from rigid_motion.streams import ReceivedKeys, Receiver, StreamBody
 from rigid_motion.streams.vmc import Performer, write, write_trackers
 
-RATE = 90.0
+MAX_FRAMES_PER_S = 90.0
 """Frames a second at most: programs draw no faster."""
 
 
 @lru_cache(maxsize=16)
-def performer_of(body: Body) -> Performer | None:
+def performer_of(body: StreamBody) -> Performer | None:
     """Return what a skeleton is to VMC; None where it is no person."""
     performer = Performer(body.joints, body.in_root_space(body.rest))
     return performer if "Hips" in performer.bones else None
@@ -34,7 +34,7 @@ class ToVmc(Outlet):
         self.datagrams = 0
         self._began = time.monotonic()
 
-    def show(self, bodies: Iterable[tuple[Body, Poses]], moment: float | None = None) -> None:
+    def show(self, bodies: Iterable[tuple[StreamBody, Poses]], moment: float | None = None) -> None:
         """Show bodies at poses (joints,), each joint in its parent's space, at a moment, or else now."""
         trackers, datagrams = {}, list[bytes]()
         moment = time.monotonic() - self._began if moment is None else moment
@@ -49,7 +49,7 @@ class ToVmc(Outlet):
 
 
 def play(
-    body: Body,
+    body: StreamBody,
     moments: np.ndarray,
     poses: Poses,
     to: Address,
@@ -75,7 +75,7 @@ def play(
         return outlet.datagrams
 
 
-def performed(port: Port, receiver: Receiver) -> list[Keys]:
+def performed(port: Port, receiver: Receiver) -> list[ReceivedKeys]:
     """Return what another program performed to a port since the last call. Of several that is the first, until it has
     gone. Bodies are others as soon as bones or devices come that are new.
     """

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.poses import joined
-from rigid_motion.streams import Body, Keys, Shown
+from rigid_motion.streams import ReceivedKeys, Shown, StreamBody
 from rigid_motion_batch.analysis.metrics import lines_of_poses
 from rigid_motion_batch.axes import from_blender
 from rigid_motion_batch.files import replacing
@@ -19,36 +19,36 @@ from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 
-class Motion(NamedTuple):
+class ReceivedMotion(NamedTuple):
     """What was shown of a body: moments (n,), and poses (joints, n), each joint in its parent's space."""
 
     name: str
-    body: Body
+    body: StreamBody
     times: np.ndarray
     poses: Poses
 
-    def even(self, mode: str, fps: float) -> Motion:
+    def even(self, mode: str, fps: float) -> ReceivedMotion:
         """Return so many poses a second instead, with the in-betweens of a mode."""
         times = self.times[0] + np.arange(int((self.times[-1] - self.times[0]) * fps + 1e-6) + 1) / fps
         return self._replace(times=times, poses=interpolate(self.times, self.poses, times, mode))
 
 
-class Tracks(dict[tuple[str, Body], list[tuple[np.ndarray, Poses]]]):
+class Tracks(dict[tuple[str, StreamBody], list[tuple[np.ndarray, Poses]]]):
     """What was shown of all bodies of all users, or their keys, piece by piece."""
 
     def add_shown(self, shown: Iterable[Shown]) -> None:
         """Add a frame."""
         for what in shown:
             poses = {name: own[:, None] for name, own in what.poses.items()}
-            self.add_keys([Keys(what.stream, what.bodies, np.array([what.moment]), poses)])
+            self.add_keys([ReceivedKeys(what.stream, what.bodies, np.array([what.moment]), poses)])
 
-    def add_keys(self, came: Iterable[Keys]) -> None:
+    def add_keys(self, came: Iterable[ReceivedKeys]) -> None:
         """Add keys."""
         for keys in came:
             for body in keys.bodies:
                 self.setdefault((str(keys.stream.source), body), []).append((keys.moments, keys.poses[body.name]))
 
-    def motions(self) -> list[Motion]:
+    def motions(self) -> list[ReceivedMotion]:
         """Return those of which there is more than a pose, at moments that rise."""
         result = []
         for (user, body), pieces in self.items():
@@ -56,11 +56,11 @@ class Tracks(dict[tuple[str, Body], list[tuple[np.ndarray, Poses]]]):
             rising = np.flatnonzero(np.diff(np.maximum.accumulate(times), prepend=-np.inf) > 0.0)
             if len(rising) > 1:
                 poses = joined([poses for _, poses in pieces], axis=1)[:, rising]
-                result.append(Motion(f"{user}-{body.name}", body, times[rising], poses))
+                result.append(ReceivedMotion(f"{user}-{body.name}", body, times[rising], poses))
         return result
 
 
-def write_motions(path: Path, motions: Sequence[Motion], fps: float) -> list[Path]:
+def write_motions(path: Path, motions: Sequence[ReceivedMotion], fps: float) -> list[Path]:
     """Write a table of all, `.csv`, or a `.bvh` for each, and return what was written.
 
     In tables joints are where they are in the world. BVH is y up, as it is elsewhere.
@@ -80,7 +80,7 @@ def write_motions(path: Path, motions: Sequence[Motion], fps: float) -> list[Pat
     return paths
 
 
-def _write_table(file: TextIO, motions: Sequence[Motion]) -> None:
+def _write_table(file: TextIO, motions: Sequence[ReceivedMotion]) -> None:
     file.write("device,t,x,y,z,qw,qx,qy,qz\n")
     for motion in motions:
         poses = motion.body.skeleton.in_root_space(motion.poses)

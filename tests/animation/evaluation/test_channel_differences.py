@@ -13,13 +13,13 @@ from rigid_motion.animation.evaluation.components import (
     LOCATION,
     MODE_NUMBERS,
     PART_OF,
-    REST,
+    REST_COMPONENTS,
     ROTATION,
     ROWS,
     SCALE,
 )
 from rigid_motion.animation.evaluation.differences import channel_differences
-from rigid_motion.animation.evaluation.sources import Marks, Source
+from rigid_motion.animation.evaluation.sources import KeyedTransform, Marks
 from rigid_motion.animation.evaluation.spans import spans
 from rigid_motion.animation.fcurves.keys import CODE, INTERPOLATIONS, Cycles, Keys
 from rigid_motion.motion import Poses, interpolate
@@ -43,13 +43,16 @@ def keys_of(track: Track, interpolation: str = "LINEAR", **others: object) -> Ke
 
 def source_of(
     tracks: dict[int, Track], order: str | None = None, interpolation: str = "LINEAR", **others: object
-) -> Source:
+) -> KeyedTransform:
     """A source with a channel for each row, which goes on in a straight line, or round, if so given."""
     of_keys = {name: others.pop(name) for name in ("linear", "cycles") if name in others}
     channels = tuple(([row], keys_of(track, interpolation, **of_keys)) for row, track in tracks.items())
     keyed = frozenset(PART_OF[row] for row in tracks)
-    return Source(
-        order, keyed, channels, **{"rest": {}, "original": REST.copy(), "mode": MODE_NUMBERS["dq_sclerp"], **others}
+    return KeyedTransform(
+        order,
+        keyed,
+        channels,
+        **{"rest": {}, "original": REST_COMPONENTS.copy(), "mode": MODE_NUMBERS["dq_sclerp"], **others},
     )
 
 
@@ -80,13 +83,13 @@ def placed(poses: Poses) -> np.ndarray:
     return matrices(poses.positions, poses.quaternions, np.ones((len(poses), 3)))
 
 
-def inside(source: Source, count: int = 23) -> np.ndarray:
+def inside(source: KeyedTransform, count: int = 23) -> np.ndarray:
     """Frames inside of all spans."""
     steps = np.arange(1, count) / count
     return np.unique(np.concatenate([span.first + (span.last - span.first) * steps for span in spans(source)]))
 
 
-def channels(source: Source, frames: np.ndarray) -> np.ndarray:
+def channels(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
     """The values that channels are to have, (10, m)."""
     ((difference, native),) = channel_differences([source], [frames])
     unfilled = [row for row in range(10) if row not in source.filled_rows]
@@ -106,7 +109,9 @@ def rotations(order: str | None, count: int, seed: int = 0) -> np.ndarray:
     return random.uniform(-1.3, 1.3, (3, count))
 
 
-def moving(order: str | None = None, seed: int = 0, frames: tuple = FRAMES, **others: object) -> tuple[dict, Source]:
+def moving(
+    order: str | None = None, seed: int = 0, frames: tuple = FRAMES, **others: object
+) -> tuple[dict, KeyedTransform]:
     location = np.random.default_rng(seed + 99).normal(size=(3, len(frames)))
     tracks = tracks_of(LOCATION, frames, location)
     tracks |= tracks_of(ROTATION, frames, rotations(order, len(frames), seed))
@@ -114,7 +119,7 @@ def moving(order: str | None = None, seed: int = 0, frames: tuple = FRAMES, **ot
 
 
 def at_keys(tracks: dict[int, Track], frame: float) -> np.ndarray:
-    rows = REST.copy()
+    rows = REST_COMPONENTS.copy()
     for row, track in tracks.items():
         rows[row] = dict(track)[frame]
     return rows
@@ -127,7 +132,7 @@ def test_channels_move_the_body_as_the_screw_does(order, interpolation):
     own = np.array((0.4, -1.0, 2.0, 0.5, 0.5, -0.5, 0.5, 1.0, 1.0, 1.0))
     passed = np.arange(1.0, 23.0) / 23.0
     share = passed if interpolation == "LINEAR" else passed**2
-    for seed, original in enumerate((REST, own, REST)):
+    for seed, original in enumerate((REST_COMPONENTS, own, REST_COMPONENTS)):
         tracks, source = moving(order, seed, interpolation=interpolation, original=original)
         for span in spans(source):
             ends = np.stack((at_keys(tracks, span.first), at_keys(tracks, span.last)), axis=1)

@@ -12,7 +12,7 @@ from rigid_motion import animation
 from rigid_motion.animation.actions.reading import read
 from rigid_motion.animation.evaluation.components import PART_OF
 from rigid_motion.animation.evaluation.differences import seen_values
-from rigid_motion.animation.evaluation.sources import Run, Source
+from rigid_motion.animation.evaluation.sources import HoldRun, KeyedTransform
 from rigid_motion.animation.queries.keyed import active_binding
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.keyed import Carrier, rotation_path
@@ -99,18 +99,18 @@ def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) 
     return result, tolerances
 
 
-def _poses(prop: Carrier, run: Run | Source, frames: np.ndarray) -> np.ndarray:
+def _poses(prop: Carrier, run: HoldRun | KeyedTransform, frames: np.ndarray) -> np.ndarray:
     order = np.argsort(frames, kind="stable")
     rows = np.empty((10, len(frames)))
     # What is never passed on may also go on before and behind its keys.
     rows[:, order] = (
         seen_values(run, frames[order])
-        if isinstance(run, Source)
+        if isinstance(run, KeyedTransform)
         else (seen_values(run.source, run.moments(frames[order])))
     )
     # What has no keys is as it is.
     transform = transform_of(prop)
-    source = run if isinstance(run, Source) else run.source
+    source = run if isinstance(run, KeyedTransform) else run.source
     for row, one in enumerate(transform.components().tolist()):
         if PART_OF[row] not in source.keyed:
             rows[row] = one

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import Chebyshev
 
 from rigid_motion.animation.terms.apply import write
-from rigid_motion.animation.terms.carriers import MOST, Term, carry
+from rigid_motion.animation.terms.carriers import MAX_CHAIN_PRODUCTS, Term, carry
 from tests.animation.fcurves.examples import as_fcurve, keys_of
 from tests.thoroughness import tried
 
@@ -73,7 +73,7 @@ def test_any_polynomial_is_followed_at_any_frame_by_exact_factors(seed, degree, 
     series, last = smooth(seed, degree, size, zero_ends=zero_ends), float(np.float32(first + length))
     terms = carried(series, first, last)
     assert off(terms, series, first, last) <= max(TOLERANCE, 5e-6 * size)
-    assert len(terms) <= (max(degree + 1, MOST) if size > 1e-7 else 0)
+    assert len(terms) <= (max(degree + 1, MAX_CHAIN_PRODUCTS) if size > 1e-7 else 0)
     frames = frames_of(first, last)[:, None]
     for term in terms:
         coefficients = np.array(term.coefficients)
@@ -90,7 +90,7 @@ def test_two_terms_carry_any_degree_and_each_more_what_rounding_has_left():
     """On frames far away; Bernstein terms, one more than the degree, come last."""
     assert {len(carried(smooth(n, n, 0.1, zero_ends=False), 0.0, 16.0)) for n in range(3, 13)} == {2}
     counts = [len(carried(smooth(3, 12, 0.4), first, first + 20.0)) for first in (0.0, 500.0, 20_000.0, 500_000.0)]
-    assert counts == [2, 3, MOST, 11]
+    assert counts == [2, 3, MAX_CHAIN_PRODUCTS, 11]
 
 
 @pytest.mark.parametrize(("series", "count"), [((0.3,), 1), ((0.3, 0.3), 1), ((0.3, 0.1), 2), ((0.3, 0.0, -0.3), 1)])

@@ -126,7 +126,7 @@ def test_parts_are_split_at_breaks_each_on_its_own():
     terms = planned(span(1.0, 21.0, (7.28,), rows=rows), difference=difference)
     assert len(terms[LOCATION]) == 2
     for row, wanted in ((ROTATION, hump), (ROTATION + 1, bounce)):
-        assert off(terms[row], wanted) <= planning.TOLERANCE
+        assert off(terms[row], wanted) <= planning.ROTATION_SCALE_TOLERANCE
         assert sorted({round(term.first, 2) for term in terms[row]}) == [1.0, 7.28]
         assert len(terms[row]) <= 6
     assert ROTATION + 2 not in terms

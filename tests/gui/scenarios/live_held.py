@@ -9,7 +9,7 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import placed
-from rigid_motion.streams import Body, Sender
+from rigid_motion.streams import Sender, StreamBody
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.scenarios.live_bodies import RATE, Program, free_port, rig
@@ -29,7 +29,7 @@ class Holding(Program):
     """Another program, that sends a performer who takes a sword."""
 
     def __init__(self, port: int) -> None:
-        self._sender = Sender([BODY, Body.rigid("sword", radius=0.1)], rate=RATE)
+        self._sender = Sender([BODY, StreamBody.rigid("sword", radius=0.1)], rate=RATE)
         super().__init__(port)
 
     def datagrams(self, row: int) -> list[bytes]:

@@ -101,7 +101,7 @@ def test_errors_are_had_again_by_matrices(mode: str) -> None:
 def test_blocks_of_any_size_give_the_same_numbers(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
     made = evenly(swinging_body())
     whole, ground = measured(made), Ground.of(made)
-    monkeypatch.setattr(reconstructions, "BLOCK", block)
+    monkeypatch.setattr(reconstructions, "BLOCK_SAMPLES", block)
     pieces, of_pieces = measured(made), Ground.of(made)
     for name in ("shell", "position", "rotation", "velocity", "slide"):
         np.testing.assert_allclose(getattr(pieces, name), getattr(whole, name), rtol=1e-9, atol=1e-15)

@@ -7,7 +7,7 @@ import signal
 import time
 from pathlib import Path
 
-from rigid_motion_batch.pipeline.steps import Job, Step, TaskError
+from rigid_motion_batch.pipeline.steps import Step, StepJob, TaskError
 
 
 class Save(Step, blender=True):
@@ -17,7 +17,7 @@ class Save(Step, blender=True):
     frames: tuple[int, ...] = ()
     fate: str = ""
 
-    def make(self, job: Job) -> dict[str, int]:
+    def make(self, job: StepJob) -> dict[str, int]:
         import bpy
 
         print("Fra:1 Mem:1M")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
 from rigid_motion_batch.pipeline.running import Plan, Run, share_of
-from rigid_motion_batch.pipeline.steps import OWN, Step, Task
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER, Step, Task
 from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.progress import Progress, Stage
 from tests.scripts.pipeline.steps import FILE, Join, Write
@@ -90,10 +90,10 @@ def contents(output: Path) -> dict[str, str]:
     return {
         path.relative_to(output).as_posix(): path.read_text()
         for path in output.rglob("*")
-        if path.is_file() and OWN not in path.relative_to(output).parts
+        if path.is_file() and OWN_FOLDER not in path.relative_to(output).parts
     }
 
 
 def half_written(output: Path) -> list[Path]:
     """What is being made, or was when it was killed."""
-    return [*(output / OWN / "scratch").glob("*")]
+    return [*(output / OWN_FOLDER / "scratch").glob("*")]

@@ -8,7 +8,7 @@ import signal
 import time
 from pathlib import Path
 
-from rigid_motion_batch.pipeline.steps import Job, Step, TaskError
+from rigid_motion_batch.pipeline.steps import Step, StepJob, TaskError
 
 FILE = "out.txt"
 """The one file that every result has."""
@@ -23,7 +23,7 @@ class Write(Step, stage="write"):
     files: tuple[str, ...] = ()
     """More of them, with the same text."""
 
-    def make(self, job: Job) -> dict[str, int]:
+    def make(self, job: StepJob) -> dict[str, int]:
         _note(self.log, self.text)
         (job.folder / FILE).write_text("half")
         time.sleep(self.seconds)
@@ -39,7 +39,7 @@ class Join(Step, stage="join"):
 
     log: str = ""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         _note(self.log, "join")
         (job.folder / FILE).write_text("".join((folder / FILE).read_text() for folder in job.before if folder))
 
@@ -53,7 +53,7 @@ class Copy(Step):
 
     log: str = ""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         _note(self.log, "copy")
         source = Path(*job.task.inputs)
         try:
@@ -65,7 +65,7 @@ class Copy(Step):
 class Vanish(Copy):
     """Write what is in a file that is taken away meanwhile."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         super().make(job)
         Path(*job.task.inputs).unlink()
 
@@ -75,7 +75,7 @@ class Fail(Step):
 
     foreseen: bool = True
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         (job.folder / FILE).write_text("half")
         if self.foreseen:
             raise TaskError("it cannot be made; make another")
@@ -87,7 +87,7 @@ class Stumble(Step):
 
     file: str
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         (job.folder / self.file).mkdir(parents=True)
         (job.folder / self.file).write_text("never")
 
@@ -95,7 +95,7 @@ class Stumble(Step):
 class Forget(Step):
     """Make nothing."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         pass
 
 
@@ -106,7 +106,7 @@ class Die(Step):
     times: int
     words: str = ""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         (job.folder / FILE).write_text("half")
         with Path(self.marker).open("a") as stream:
             stream.write("x")
@@ -122,7 +122,7 @@ class ProcessId(Step):
     text: str
     seconds: float
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         time.sleep(self.seconds)
         (job.folder / FILE).write_text(str(os.getpid()))
 
@@ -130,14 +130,14 @@ class ProcessId(Step):
 class FillDisk(Step):
     """What writing on a full disk comes to."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(job.folder / FILE))
 
 
 class Chatter(Step):
     """Print on the standard output as Blender does, from Python and from below, and say how far it is."""
 
-    def make(self, job: Job) -> None:
+    def make(self, job: StepJob) -> None:
         print("Saved: 'x.png'", flush=True)
         os.write(1, b"Fra:1 Mem:1M\n")
         job.progress(1, 2)

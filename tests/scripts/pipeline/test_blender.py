@@ -14,7 +14,7 @@ import pytest
 from rigid_motion_batch.cli.compare import version_of
 from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
 from rigid_motion_batch.pipeline.running import Run
-from rigid_motion_batch.pipeline.steps import OWN, RunError, Task
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER, RunError, Task
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline.blender_steps import Save
 from tests.scripts.pipeline.plans import Listener, contents, half_written, run, states, task, writing
@@ -112,7 +112,7 @@ def test_a_blender_ends_with_what_started_it(blender: str, tmp_path: Path) -> No
 
     def kill() -> None:
         ends = time.monotonic() + 60.0
-        while not list(tmp_path.glob(f"{OWN}/scratch/*/*/*/begun")) and time.monotonic() < ends:
+        while not list(tmp_path.glob(f"{OWN_FOLDER}/scratch/*/*/*/begun")) and time.monotonic() < ends:
             time.sleep(0.05)
         pids.extend(blenders())
         os.kill(os.getpid(), signal.SIGINT)

@@ -13,11 +13,11 @@ from rigid_motion_batch.analysis.choices import Tolerance, Uniform
 from rigid_motion_batch.pipeline.comparison import ComparisonPlan
 from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
 from rigid_motion_batch.pipeline.running import DONE, UP_TO_DATE, Run
-from rigid_motion_batch.pipeline.steps import OWN, Task
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER, Task
 from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.pipeline.studies import Comparison
 from rigid_motion_batch.recordings.clip_reading import read_clips
-from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.report.settings import PageSettings
 from rigid_motion_batch.scenes.settings import SceneSettings
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.clips.recordings import compare_clip
@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 STAGE = SceneSettings(resolution=(64, 36), fps=10)
 
-ABOUT = Settings(0.1, "Rigid Motion", "compare toss.csv", details={"Videos": "small"})
+ABOUT = PageSettings(0.1, "Rigid Motion", "compare toss.csv", details={"Videos": "small"})
 
 
 def planned(*sources: Path, **fields: object) -> Comparison:
@@ -45,7 +45,7 @@ def compared(
     of_store = {name: options.pop(name) for name in ("alone", "overwrite") if name in options}
     with Watched(output, **of_store) as store, executor or Executor() as opened:
         plan = ComparisonPlan(comparison, store)
-        outcome, notes = run(plan.reading, store, opened, progress=listener, **options), plan.look_into()
+        outcome, notes = run(plan.reading, store, opened, progress=listener, **options), plan.inspect_clips()
         listener.notes += notes
         between = run(plan.measuring, store, opened, progress=listener, **options)
         plan.conclude()
@@ -107,13 +107,13 @@ def test_films_are_of_the_keys_that_the_verdict_speaks_of(output: Path, toss: Pa
         plan = ComparisonPlan(comparison, store)
         for step in (plan.reading, plan.measuring):
             run(step, store, Executor())
-            plan.look_into()
+            plan.inspect_clips()
         assert plan.filmed(plan.studies[0]) == [Uniform("5")]
         plan.conclude()
         assert plan.found.spoken_of == {"toss": Tolerance("2cm")}
         assert [task.name for task in plan.tasks() if task.name.startswith("encode")] == ["encode toss/tolerance-2cm"]
         every = ComparisonPlan(replace(comparison, every_film=True), store)
-        every.look_into()
+        every.inspect_clips()
         assert every.filmed(every.studies[0]) == [*choices]
 
 
@@ -126,7 +126,7 @@ def test_films_of_clips_with_a_page_each_are_of_what_that_page_speaks_of(
         plan = ComparisonPlan(planned(toss, short, stage=STAGE, choices=(Uniform("2"), Uniform("10"))), store)
         for step in (plan.reading, plan.measuring):
             run(step, store, Executor())
-            plan.look_into()
+            plan.inspect_clips()
         plan.conclude()
         assert {*plan.found.spoken_of} == {"toss", "short"}
         for study in plan.studies:
@@ -137,7 +137,7 @@ def test_a_film_knows_how_far_its_body_slips_in_the_one_that_holds_it(output: Pa
     with Store(output) as store:
         plan = ComparisonPlan(planned(Path(f"{ROOT / 'assets' / 'hold.csv'}:*"), stage=STAGE), store)
         run(plan.reading, store, Executor())
-        plan.look_into()
+        plan.inspect_clips()
         tasks = {task.name: task for task in plan.tasks()}
     slip = tasks["slip of hold-tool in hold-hand"].key
     assert slip in tasks["build hold-tool/5"].after
@@ -205,7 +205,7 @@ def test_a_damaged_part_is_made_again(output: Path, toss: Path, part: str) -> No
     comparison = planned(toss, choices=(Uniform("5"),), about=ABOUT)
     compared(output, comparison)
     metrics = (output / "metrics.csv").read_bytes()
-    (path,) = (output / OWN / "results").glob(f"*/{part}")
+    (path,) = (output / OWN_FOLDER / "results").glob(f"*/{part}")
     path.write_bytes(b"[" * path.stat().st_size)
     for name in ("metrics.csv", "report.html"):
         (output / name).unlink()
@@ -227,10 +227,10 @@ def test_a_clip_takes_two_kilobytes_at_most_between_two_plans(output: Path, toss
     compared(output, comparison)
     with Store(output) as store:
         plan = ComparisonPlan(comparison, store)
-        plan.look_into()
+        plan.inspect_clips()
         tracemalloc.start()
         before, _ = tracemalloc.get_traced_memory()
-        plan.look_into()
+        plan.inspect_clips()
         after, _ = tracemalloc.get_traced_memory()
         tracemalloc.stop()
     assert len(plan.studies) == 60

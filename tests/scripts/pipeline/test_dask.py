@@ -18,7 +18,7 @@ from distributed import Client
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.pipeline import dask
 from rigid_motion_batch.pipeline.dask import DaskExecutor
-from rigid_motion_batch.pipeline.steps import OWN, RunError
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER, RunError
 from tests.scripts.comparing import outputs, write_toss
 from tests.scripts.pipeline.plans import half_written
 from tests.scripts.stopping import descendants
@@ -132,7 +132,7 @@ def processor_time(processes: Iterable[int]) -> int:
 
 def at_work(output: Path) -> list[Path]:
     """What is printed by orders that are being done."""
-    return [*output.glob(f"{OWN}/scratch/*/*/log")]
+    return [*output.glob(f"{OWN_FOLDER}/scratch/*/*/log")]
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import pytest
 from rigid_motion_batch import places
 from rigid_motion_batch.pipeline.executors import Executor
 from rigid_motion_batch.pipeline.running import explain
-from rigid_motion_batch.pipeline.steps import OWN, Task, digest_of
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER, Task, digest_of
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import joining, run, run_in, task, writing
@@ -73,7 +73,7 @@ def test_files_that_are_missing_or_edited_are_named(output: Path) -> None:
 def test_a_damaged_result_is_named(output: Path) -> None:
     hidden = task("a", Write("1"), publish={})
     run_in(output, hidden)
-    (path,) = (output / OWN).glob("results/*/out.txt")
+    (path,) = (output / OWN_FOLDER).glob("results/*/out.txt")
     path.unlink()
     assert explained(output, hidden) == {"a": "its result is damaged"}
 

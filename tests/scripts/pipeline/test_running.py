@@ -14,7 +14,7 @@ import pytest
 
 from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor
 from rigid_motion_batch.pipeline.running import Run, share_of
-from rigid_motion_batch.pipeline.steps import OWN, Step, Task
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER, Step, Task
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import (
@@ -122,11 +122,11 @@ def test_a_failure_is_said_and_the_others_go_on(output: Path, executor: str) -> 
 def test_an_error_that_nobody_foresaw_names_its_task_and_a_file_says_where(output: Path) -> None:
     outcome = run_in(output, writing("a"), task("the bad one", Fail(foreseen=False)))
     assert outcome.failures["the bad one"] == "the bad one: KeyError: 'unforeseen'"
-    failures = json.loads((output / OWN / "failures.json").read_text())
+    failures = json.loads((output / OWN_FOLDER / "failures.json").read_text())
     assert "in make" in failures["the bad one"]["details"]
     run_in(output, writing("a"))
     run_in(output, writing("b"))
-    assert json.loads((output / OWN / "failures.json").read_text()) == {}
+    assert json.loads((output / OWN_FOLDER / "failures.json").read_text()) == {}
 
 
 def test_an_error_of_the_system_names_the_file_where_it_would_have_been(output: Path) -> None:
@@ -168,7 +168,7 @@ def test_what_was_published_of_something_else_does_not_pass_for_the_result_of_a_
     run_in(output, writing("a", "of yesterday", publish={FILE: "a/b.txt"}))
     outcome = run_in(output, task("a", Fail(), publish={FILE: "a/b.txt"}))
     assert states(outcome) == {"failed": 1}
-    assert os.listdir(output) == [OWN]
+    assert os.listdir(output) == [OWN_FOLDER]
 
 
 def test_tasks_that_are_the_same_are_done_once(output: Path, log: Log) -> None:
@@ -224,7 +224,7 @@ def film(output: Path, log: object, piece: str = "1", step: Step | None = None, 
 
 
 def kept(output: Path) -> int:
-    return len(os.listdir(output / OWN / "results"))
+    return len(os.listdir(output / OWN_FOLDER / "results"))
 
 
 def test_spent_results_go_when_what_wanted_them_is_done(output: Path, log: Log) -> None:

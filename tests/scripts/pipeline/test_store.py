@@ -12,7 +12,7 @@ from filelock import SoftFileLock
 
 from rigid_motion_batch.pipeline import steps as pipeline_steps
 from rigid_motion_batch.pipeline.executors import Executor
-from rigid_motion_batch.pipeline.steps import OWN, RunError, Task
+from rigid_motion_batch.pipeline.steps import OWN_FOLDER, RunError, Task
 from rigid_motion_batch.pipeline.store import Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import contents, joining, run, run_in, states, task, writing
@@ -106,7 +106,7 @@ def test_what_this_program_wrote_is_no_input_of_the_next_run(output: Path, tmp_p
     with pytest.raises(RunError, match="this input was written by a run into this folder"):
         copying(output, tmp_path / "linked", "d")
     with pytest.raises(RunError, match="this input was written by a run into this folder"):
-        copying(output, next((output / OWN).glob("results/*/out.txt")), "d")
+        copying(output, next((output / OWN_FOLDER).glob("results/*/out.txt")), "d")
     assert copying(tmp_path / "other", output / "c.txt", "d") == {"done": 1}
 
 
@@ -188,7 +188,7 @@ needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has 
 def test_a_damaged_result_is_made_again(output: Path, damage: Callable[[Path], None], part: str) -> None:
     hidden = task("hidden", Write("1"), publish={})
     run_in(output, hidden)
-    (path,) = (output / OWN).glob(part)
+    (path,) = (output / OWN_FOLDER).glob(part)
     damage(path)
     assert states(run_in(output, hidden, joining("c", hidden))) == {"done": 2}
     assert contents(output) == {"c.txt": "1"}
@@ -203,7 +203,7 @@ def test_whatever_becomes_of_its_records_the_work_goes_on(
     source = tmp_path / "in.csv"
     source.write_text("1")
     copying(output, source)
-    (path,) = (output / OWN).glob(part)
+    (path,) = (output / OWN_FOLDER).glob(part)
     damage(path)
     assert copying(output, source) == {"up to date": 1}
 
@@ -219,11 +219,11 @@ def rewritten(path: Path, content: str) -> None:
 def test_old_results_that_nobody_asks_for_go(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run_in(output, *whole())
     run_in(output, writing("a", "other"))
-    assert len(os.listdir(output / OWN / "results")) == 4
+    assert len(os.listdir(output / OWN_FOLDER / "results")) == 4
     week = time.time() + 8 * 86400
     monkeypatch.setattr(time, "time", lambda: week)
     run_in(output, writing("a", "third"), *whole()[1:2])
-    assert len(os.listdir(output / OWN / "results")) == 2
+    assert len(os.listdir(output / OWN_FOLDER / "results")) == 2
 
 
 def test_two_runs_in_one_folder_are_refused(output: Path) -> None:

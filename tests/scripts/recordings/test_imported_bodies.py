@@ -16,8 +16,8 @@ from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.recordings import Trajectory, read_trajectories, sampling, scene_bodies
 from rigid_motion_batch.recordings.clip_reading import make_clip
-from rigid_motion_batch.recordings.fbx import FIRST, MAGIC
-from rigid_motion_batch.scenes.armature import Rest
+from rigid_motion_batch.recordings.fbx import FIRST_RECORD_BYTE, MAGIC
+from rigid_motion_batch.scenes.armature import RestFigure
 from rigid_motion_batch.scenes.physique import body_size
 from rigid_motion_batch.silencing import silenced
 from tests.blank import blank
@@ -128,7 +128,7 @@ def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end
     assert (result.metres_per_unit, recording.note, result.warnings) == (1.0, "", ())
     assert np.linalg.norm(result.rest_body.tails, axis=-1).max() < 1.0
     assert (result.rest_body.ends is None) == (ending == ".glb"), "an importer made up where bones end"
-    rest = Rest.of(make_clip(result, str(path), "soldier", "blender"))
+    rest = RestFigure.of(make_clip(result, str(path), "soldier", "blender"))
     assert body_size(rest) == pytest.approx(1.73, abs=0.01)
     assert rest.joints.positions[:, 2].min() < 0.3, "the ground is below its feet, and not below the ends of bones"
     far = replace(rest, tails=rest.joints.positions + np.array([0.0, 0.0, 40.0]))
@@ -241,14 +241,18 @@ def test_too_much_is_refused(exported, refusal, monkeypatch: pytest.MonkeyPatch)
 def test_an_fbx_that_claims_more_than_it_holds_is_refused_before_room_is_made_for_it(exported, refusal) -> None:
     path, _ = exported(".fbx")
     content = path.read_bytes()
-    end, _, length, name = struct.unpack_from("<IIIB", content, FIRST)
-    path.write_bytes(content[:FIRST] + struct.pack("<IIIB", end, 2**32 - 1, length, name) + content[FIRST + 13 :])
+    end, _, length, name = struct.unpack_from("<IIIB", content, FIRST_RECORD_BYTE)
+    path.write_bytes(
+        content[:FIRST_RECORD_BYTE]
+        + struct.pack("<IIIB", end, 2**32 - 1, length, name)
+        + content[FIRST_RECORD_BYTE + 13 :]
+    )
     assert refusal(str(path))[1].startswith("this FBX is damaged (a part of it is longer than the whole); ")
 
     def record(packed: bytes, expected: int) -> bytes:
         numbers = b"d" + struct.pack("<III", expected, 1, len(packed)) + packed
-        end = FIRST + 13 + 1 + len(numbers)
-        return content[:FIRST] + struct.pack("<IIIB", end, 1, len(numbers), 1) + b"N" + numbers + bytes(13)
+        end = FIRST_RECORD_BYTE + 13 + 1 + len(numbers)
+        return content[:FIRST_RECORD_BYTE] + struct.pack("<IIIB", end, 1, len(numbers), 1) + b"N" + numbers + bytes(13)
 
     for packed, expected in ((zlib.compress(bytes(1 << 26)), 8), (b"x" * 20, 1 << 20), (zlib.compress(b""), 2**32 - 1)):
         path.write_bytes(record(packed, expected))

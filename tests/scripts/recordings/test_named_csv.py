@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
-from rigid_motion_batch.recordings.sense import FEWEST
+from rigid_motion_batch.recordings.plausibility import MIN_MIXED_SAMPLES
 from tests.thoroughness import tried
 
 HEADER = "t,x,y,z,qx,qy,qz,qw"
@@ -125,7 +125,7 @@ def test_what_is_no_header_behind_other_lines_is_told(write, refusal, text: str,
 
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
-samples = st.lists(st.tuples(*[numbers] * 9), min_size=2, max_size=FEWEST - 1).map(np.array)
+samples = st.lists(st.tuples(*[numbers] * 9), min_size=2, max_size=MIN_MIXED_SAMPLES - 1).map(np.array)
 """Too few to be told from those of several devices."""
 
 

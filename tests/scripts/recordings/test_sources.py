@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
-from rigid_motion_batch.recordings.reading import ENDINGS, FORMATS, INSTEAD, files_of, split_source
+from rigid_motion_batch.recordings.reading import ENDINGS, FORMATS, OTHER_FORMATS, files_of, split_source
 from rigid_motion_batch.recordings.recordings import unique
 
 CSV = "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,1\n"
@@ -108,7 +108,7 @@ def test_an_unknown_extension_is_answered_with_the_known_ones(write, refusal) ->
     assert (
         refusal(write("take.USD", "PXR-USDC"))[1] == "unknown extension '.USD'; open it in Blender, and name the .blend"
     )
-    assert not {*" ".join(INSTEAD).split()} & {*ENDINGS}
+    assert not {*" ".join(OTHER_FORMATS).split()} & {*ENDINGS}
 
 
 def test_a_name_from_a_file_cannot_reach_the_terminal(write) -> None:

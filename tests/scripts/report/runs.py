@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rigid_motion_batch.analysis.choices import EVERYWHERE, RIGID, Choice, Uniform
+from rigid_motion_batch.analysis.choices import EVERYWHERE, RIGID_RADIUS_M, Choice, Uniform
 from rigid_motion_batch.analysis.modes import COMPARED
 from rigid_motion_batch.analysis.needed import Ways, keys_needed
 from rigid_motion_batch.analysis.results import ClipResult, clip_result
@@ -24,5 +24,5 @@ def result_of(
 ) -> ClipResult:
     """What the analysis finds of a clip under some choices of keys."""
     result = [compare_clip(clip, choice, modes, EVERYWHERE) for choice in choices]
-    counted = keys_needed(Ways(clip, RIGID), modes) if needed else None
+    counted = keys_needed(Ways(clip, RIGID_RADIUS_M), modes) if needed else None
     return clip_result(replace(clip, warnings=(*clip.warnings, *warnings)), [item for item in result if item], counted)

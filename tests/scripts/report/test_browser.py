@@ -13,7 +13,7 @@ from rigid_motion_batch.analysis.results import ChoiceResult
 from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import pages
 from rigid_motion_batch.report.pages import write_overview, write_report
-from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.report.settings import PageSettings
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.chromium import Browser, browser
@@ -23,7 +23,7 @@ from tests.thoroughness import combined, sample
 
 pytestmark = pytest.mark.once
 
-SETTINGS = Settings(0.1, "Rigid Motion 1.0", "compare a.csv b.csv")
+SETTINGS = PageSettings(0.1, "Rigid Motion 1.0", "compare a.csv b.csv")
 WARNING = ClipWarning("A gap of 183 ms.", "Record again.", 101.25, 101.5)
 PATIENCE = 30.0
 """Seconds."""

@@ -17,16 +17,16 @@ from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import pages
-from rigid_motion_batch.report.numbers import ERROR, KEYS, Gathering
+from rigid_motion_batch.report.numbers import ERROR_AT, KEYS_AT, Gathering
 from rigid_motion_batch.report.pages import write_overview, write_report
-from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.report.settings import PageSettings
 from rigid_motion_batch.report.tables import grids
 from rigid_motion_batch.report.verdict import verdict
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.runs import MODES, result_of
 
-SETTINGS = Settings(0.1, "Rigid Motion 1.0", "compare reach.csv")
+SETTINGS = PageSettings(0.1, "Rigid Motion 1.0", "compare reach.csv")
 TEN = (Uniform("10"),)
 
 
@@ -187,9 +187,13 @@ def test_the_lowest_number_is_underlined_with_all_its_ties_but_not_where_all_are
     numbers = Gathering()
     numbers.add("clip", [replace(result, motions=motions).numbers])
     by_measure = {grid.column: [row.cells[0] for row in grid.rows] for grid in grids(numbers.numbers(), 0)}
-    assert [(cell.text, cell.best) for cell in by_measure[ERROR]] == [("2.00", True), ("2.00", True), ("3.00", False)]
-    assert [cell.small for cell in by_measure[ERROR]] == ["reference", "same", "+50\u00a0%"]
-    assert not any(cell.best for cell in by_measure[KEYS])
+    assert [(cell.text, cell.best) for cell in by_measure[ERROR_AT]] == [
+        ("2.00", True),
+        ("2.00", True),
+        ("3.00", False),
+    ]
+    assert [cell.small for cell in by_measure[ERROR_AT]] == ["reference", "same", "+50\u00a0%"]
+    assert not any(cell.best for cell in by_measure[KEYS_AT])
 
 
 def test_a_picture_of_joints_has_a_row_for_each_and_the_worst_is_red() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.needed import RATES, KeysNeeded
-from rigid_motion_batch.report.numbers import ERROR, KEYS, MEASURES, Numbers
+from rigid_motion_batch.report.numbers import ERROR_AT, KEYS_AT, MEASURES, Numbers
 from rigid_motion_batch.report.verdict import verdict
 
 FIVE, TEN, TWENTY = map(Uniform, ("5", "10", "20"))
@@ -22,7 +22,7 @@ def numbers(
     for place, clip in enumerate(clips):
         for column, mode in enumerate(modes):
             for row, choice in enumerate(choices):
-                values[KEYS if isinstance(choice, Tolerance) else ERROR, place, row, column] = clip[mode][row]
+                values[KEYS_AT if isinstance(choice, Tolerance) else ERROR_AT, place, row, column] = clip[mode][row]
     together = [mode for group in same for mode in group]
     groups = (*same, *((mode,) for mode in modes if mode not in together))
     names = tuple(f"clip{number}" for number in range(1, len(clips) + 1))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from research import live_costs
-from research.live_streams.engines import ENGINES, FPS, Way, by_engine, seen, truth_of
+from research.live_streams.engines import ENGINES, PICTURES_PER_S, Way, by_engine, seen, truth_of
 from rigid_motion.motion import Poses
 from rigid_motion_batch.places import ASSETS
 from tests.scripts.bvh_bodies import TIMES, write_body
@@ -15,7 +15,7 @@ from tests.scripts.research.keeping import written
 def test_a_steady_hand_is_shown_steadily(engine: str) -> None:
     times = np.arange(900) / 90.0
     hand = Poses(times[:, None] * (0.5, 0.0, 0.0), np.tile((1.0, 0.0, 0.0, 0.0), (900, 1)))
-    truth, frames = truth_of(times, hand), np.arange(0.5, 9.9, 1.0 / FPS)
+    truth, frames = truth_of(times, hand), np.arange(0.5, 9.9, 1.0 / PICTURES_PER_S)
     result = seen(by_engine(engine, truth, Way(0.02, 0.02, 0.0), frames), truth, frames)
     # By half an update at most: an engine without a buffer holds each until the next.
     assert result["largest_mm"] < 1e3 * 0.5 / 30.0 + 3.0

@@ -3,7 +3,7 @@
 import pytest
 
 from research import reduction
-from research.decimating import PARTS, bend, decimate
+from research.decimating import PARTS_PER_FRAME, bend, decimate
 from rigid_motion import animation
 from rigid_motion.motion import interpolate, reduce_keys, shell_error
 from rigid_motion_batch.analysis.needed import part_of
@@ -26,7 +26,7 @@ def live():
 def clip() -> Clip:
     """The first two seconds of a clip."""
     whole = reduction.read(reduction.ASSETS / "reach.csv", 30.0)
-    return part_of(whole, 0, 59 * PARTS)
+    return part_of(whole, 0, 59 * PARTS_PER_FRAME)
 
 
 @pytest.mark.parametrize("rotation_mode", reduction.ROTATION_MODES)
@@ -61,7 +61,7 @@ def test_curves_are_measured_as_the_scene_shows_them(live, clip, rotation_mode, 
 
 
 def test_fewest_keys_of_blenders_curves_are_those_of_the_search(live, clip):
-    frames, poses = reduction.frames_of(clip)[::PARTS], clip.poses[::PARTS]
+    frames, poses = reduction.frames_of(clip)[::PARTS_PER_FRAME], clip.poses[::PARTS_PER_FRAME]
     keys = reduce_keys(frames, poses, "bezier", TOLERANCE, RADIUS)
     left, within = reduction.blenders_curves(clip, clip.poses, "QUATERNION", TOLERANCE, RADIUS, 2.0 * TOLERANCE)
     assert left == within

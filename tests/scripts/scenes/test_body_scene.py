@@ -16,8 +16,8 @@ from rigid_motion_batch.analysis.reconstructions import Reconstruction, reconstr
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings import read_clips
 from rigid_motion_batch.scenes import layout
-from rigid_motion_batch.scenes.armature import Rest
-from rigid_motion_batch.scenes.bodies import SHADES
+from rigid_motion_batch.scenes.armature import RestFigure
+from rigid_motion_batch.scenes.bodies import SHADE_COUNT
 from rigid_motion_batch.scenes.body_scene import build_body_scene, shown_motion
 from rigid_motion_batch.scenes.film import save_blend
 from rigid_motion_batch.scenes.physique import BONE
@@ -43,7 +43,7 @@ def made_of(clip, modes=TWO, rate="5") -> Reconstruction:
 def test_a_body_is_in_the_middle_of_the_film_wherever_its_root_stands() -> None:
     (clip,), _ = read_clips([str(BODIES / "static_root.bvh")])
     made = made_of(clip)
-    motion, centre = shown_motion(made, TWO[:1], timeline_of(made), Rest.of(clip))
+    motion, centre = shown_motion(made, TWO[:1], timeline_of(made), RestFigure.of(clip))
     hips = clip.in_blender(made.skeleton.in_root_space(clip.poses))[1].positions
     assert abs(centre[1] - np.ptp(hips[:, 1]) / 2.0 - hips[:, 1].min()) < 0.5, "and not half-way to the root"
     places = motion.places(motion.recording)
@@ -67,7 +67,7 @@ def seen(rig: bpy.types.Object, turns: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return matrices[:, :3, 3], quaternions.as_quat(scalar_first=True)
 
 
-def turns_of(rig: bpy.types.Object, rest: Rest) -> np.ndarray:
+def turns_of(rig: bpy.types.Object, rest: RestFigure) -> np.ndarray:
     """How bones are turned from their joints."""
     bones = np.array([rig.data.bones[bone].matrix_local for bone in bones_of_joints()])[:, :3, :3]
     joints = Rotation.from_quat(rest.joints.quaternions, scalar_first=True)
@@ -79,7 +79,7 @@ def assert_played(made: Reconstruction, scene: bpy.types.Scene, modes: tuple[str
     times = timeline.times_of(timeline.frames)
     centre = np.array(scene["recording_centre_m"])
     clip = made.clip
-    rest = Rest.of(clip)
+    rest = RestFigure.of(clip)
     expected = {mode: to_blender(made.shown(mode, times), clip.axes) for mode in modes}
     turns = {mode: turns_of(bpy.data.objects[mode], rest) for mode in modes}
     columns = [np.interp(times, clip.times, column) for column in clip.poses.positions[0].T]
@@ -96,7 +96,7 @@ def assert_played(made: Reconstruction, scene: bpy.types.Scene, modes: tuple[str
         rig, rest_body = bpy.data.objects[f"{mode} recording"], bpy.data.objects[f"{mode} recording figure"]
         assert (rig.matrix_world.translation - rest_body.matrix_world.translation).length < 1e-6
         assert (rig.matrix_world.translation - bpy.data.objects[mode].matrix_world.translation) @ Vector(
-            layout.AWAY
+            layout.AWAY_AXIS
         ) > 0.1
 
 
@@ -160,16 +160,16 @@ def test_the_colour_of_each_face_is_that_of_its_joints_error(skin):
     made = made_of(dancing_clip(rate=48.0, skin=skin))
     scene = build_body_scene(made, SETTINGS)
     materials = bpy.data.objects["lerp_slerp figure"].data.materials
-    full = float(materials[SHADES - 1].name.split()[1]) * 1e-3
+    full = float(materials[SHADE_COUNT - 1].name.split()[1]) * 1e-3
     for mode in TWO:
         for frame in (1, 4, 9, 15):
             scene.frame_set(frame)
-            expected = errors_at(made, mode, frame) / full * SHADES
+            expected = errors_at(made, mode, frame) / full * SHADE_COUNT
             rest_body = bpy.data.objects[f"{mode} figure"].evaluated_get(bpy.context.evaluated_depsgraph_get())
             bones = [face.value for face in rest_body.data.attributes[BONE].data]
             assert set(bones) == set(range(len(JOINTS)))
             for bone, face in zip(bones, rest_body.data.polygons, strict=True):
-                assert face.material_index == pytest.approx(min(max(expected[bone] - 0.5, 0), SHADES - 1), abs=0.6)
+                assert face.material_index == pytest.approx(min(max(expected[bone] - 0.5, 0), SHADE_COUNT - 1), abs=0.6)
 
 
 def instances_of(name: str) -> list[np.ndarray]:

@@ -21,11 +21,11 @@ def test_the_motion_fits_its_cell_and_cells_keep_to_themselves(lanes, shape, asp
         assert np.all(half <= cell.room / 2.0 + 1e-12)
         assert abs(cell.view[0] - cell.x) + half[0] < cell.width / 2.0
         assert cell.view[1] + half[1] < cell.foot + cell.height - cell.head + 1e-12
-        assert cell.view[1] - half[1] > cell.foot + cell.unit * layout.FOOT - 1e-12
+        assert cell.view[1] - half[1] > cell.foot + cell.unit * layout.CARD_FOOT_RATIO - 1e-12
         assert abs(cell.x) + cell.width / 2.0 < ASPECTS[aspect] / 2.0
         assert abs(cell.y) + cell.height / 2.0 < 0.5
     for one, other in combinations(plan.cells, 2):
-        assert max(abs(one.x - other.x) - one.width, abs(one.y - other.y) - one.height) > layout.GAP - 1e-12
+        assert max(abs(one.x - other.x) - one.width, abs(one.y - other.y) - one.height) > layout.GAP_RATIO - 1e-12
 
 
 def test_the_broad_side_of_the_motion_faces_the_camera():

@@ -81,7 +81,7 @@ def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
     for mode in KEYFRAME_MODES:
         turn = np.array(bpy.data.objects[f"Lane {mode}"].matrix_world.to_quaternion())
         behind = np.array(bpy.data.objects[f"{mode} recording"].delta_location)
-        assert rotate(turn, behind) @ layout.AWAY == pytest.approx(np.linalg.norm(behind))
+        assert rotate(turn, behind) @ layout.AWAY_AXIS == pytest.approx(np.linalg.norm(behind))
         places = results_of[f"Lane {mode}"].positions
         kept = reconstruction.keys[mode][0]
         shown = {
@@ -223,7 +223,7 @@ def test_a_pivot_has_a_cross_where_it_was_and_one_where_the_mode_has_it_as_far_o
         assert 0.4 * row.still_point_m < np.linalg.norm(off, axis=1).max() < 1.01 * row.still_point_m
         assert np.ptp(layout.project(recorded)[:, :2], axis=0).max() < 0.02
         facing = rotate(places[f"{row.mode} pivot"].quaternions, np.array((0.0, 0.0, 1.0)))
-        assert facing @ layout.AWAY == pytest.approx(-1.0)
+        assert facing @ layout.AWAY_AXIS == pytest.approx(-1.0)
     build_scene(reconstruct(swinging_clip(seconds=0.6), "5", TWO), SETTINGS, findings_of(rows))
     assert "crosses" not in bpy.data.curves["Legend"].body
 
@@ -271,7 +271,7 @@ def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_muc
         poses = [read_poses(obj, frames) for obj in (true, shown, truth)]
         middle = np.mean([vertices_of(true.data).min(axis=0), vertices_of(true.data).max(axis=0)], axis=0)
         places = [layout.swept_points(some, middle[None]) for some in poses]
-        places[2] -= layout.AWAY * truth.delta_location.length
+        places[2] -= layout.AWAY_AXIS * truth.delta_location.length
         assert np.allclose(places[1] - places[2], 20.0 * (places[0] - places[2]), atol=1e-5)
 
 

@@ -22,14 +22,14 @@ import zenoh  # noqa: F401 - without it these tests are skipped
 from rigid_motion.motion.measures import shell_error
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion.streams import Receiver
-from rigid_motion.streams.paths import Path as Knots
+from rigid_motion.streams.paths import KnotPath as Knots
 from rigid_motion_batch.analysis.held import distances, seen_from
 from rigid_motion_batch.cli.stream import main
 from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.rest_bodies import RestBody
 from rigid_motion_batch.streaming.receiving import Receiving
-from rigid_motion_batch.streaming.rooms import HERE, Room, is_local, locator, opened, settings
+from rigid_motion_batch.streaming.rooms import LOOPBACK_ADDRESS, Room, is_local, locator, opened, settings
 from rigid_motion_batch.streaming.sending import samples_of
 from tests.streams.links import body, dance
 
@@ -47,14 +47,14 @@ MARGIN = ("--margin", "3")
 
 def free_port() -> int:
     with socket.socket() as tried:
-        tried.bind((HERE, 0))
+        tried.bind((LOOPBACK_ADDRESS, 0))
         return tried.getsockname()[1]
 
 
 @pytest.fixture
 def at() -> str:
     """A place that is nobody else's."""
-    return f"{HERE}:{free_port()}"
+    return f"{LOOPBACK_ADDRESS}:{free_port()}"
 
 
 @pytest.fixture(scope="module")
@@ -236,7 +236,7 @@ def test_whoever_joins_late_sees_a_body_at_rest_within_a_third_of_a_second(tmp_p
                 receiving = Receiving(room, "bob", 60.0, 0.0)
                 receiving.on_frame.append(shown.extend)
                 while not shown and time.monotonic() < joined + PATIENCE:
-                    receiving.hear(time.monotonic() + 0.02, ())
+                    receiving.listen_until(time.monotonic() + 0.02, ())
                 taken.append(time.monotonic() - joined)
     # A busy machine may take longer now and then.
     assert min(taken) < 0.3
@@ -259,7 +259,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
         subprocess.run(line, cwd=folder, check=True, capture_output=True)
     (folder / "users.txt").write_text("ada:one\nbob:two\neve:three\n")
     router, ada = ((ROOT / "docs" / "rooms" / f"{name}.json5").read_text() for name in ("router", "ada"))
-    (folder / "router.json5").write_text(router.replace("0.0.0.0:7447", f"{HERE}:{port}"))
+    (folder / "router.json5").write_text(router.replace("0.0.0.0:7447", f"{LOOPBACK_ADDRESS}:{port}"))
     ada = ada.replace("studio.example.org:7447", f"localhost:{port}")
     for user, password in (("ada", "one"), ("bob", "two"), ("eve", "three"), ("mallory", "four")):
         (folder / f"{user}.json5").write_text(ada.replace('"ada"', f'"{user}"').replace("change me", password))
@@ -293,9 +293,9 @@ def test_a_stranger_without_rights_neither_hears_nor_speaks(house, hand):
 
 def test_blender_gets_the_datagrams_as_they_are_and_its_answers_get_to_the_sender(at, endless):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as panel:
-        panel.bind((HERE, 0))
+        panel.bind((LOOPBACK_ADDRESS, 0))
         panel.settimeout(PATIENCE)
-        place = f"{HERE}:{panel.getsockname()[1]}"
+        place = f"{LOOPBACK_ADDRESS}:{panel.getsockname()[1]}"
         with (
             running("receive", "--room", "r", "--at", at, "--to-blender", place),
             running("send", endless, "--room", "r", "--user", "ada", "--at", at),
@@ -342,7 +342,7 @@ def test_addresses(address, written, loopback):
 @pytest.mark.slow
 def test_a_router_that_is_not_there_is_one_line_with_the_way_out(tmp_path, hand):
     config = tmp_path / "router.json5"
-    config.write_text(json.dumps({"connect": {"endpoints": [f"tcp/{HERE}:{free_port()}"]}}))
+    config.write_text(json.dumps({"connect": {"endpoints": [f"tcp/{LOOPBACK_ADDRESS}:{free_port()}"]}}))
     said = run("send", hand, "--room", "r", "--config", config, code=2)
     assert len(said.splitlines()) == 1
     assert "there is no way to it" in said
@@ -354,9 +354,9 @@ def test_a_router_that_is_not_there_is_one_line_with_the_way_out(tmp_path, hand)
 
 def test_a_port_that_is_taken_is_said(hand):
     with socket.socket() as taken:
-        taken.bind((HERE, 0))
+        taken.bind((LOOPBACK_ADDRESS, 0))
         taken.listen()
-        said = run("router", "--at", f"{HERE}:{taken.getsockname()[1]}", code=2)
+        said = run("router", "--at", f"{LOOPBACK_ADDRESS}:{taken.getsockname()[1]}", code=2)
     assert "another program may have this port" in said
 
 

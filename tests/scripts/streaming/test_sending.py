@@ -10,8 +10,8 @@ import pytest
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
-from rigid_motion.streams import Body, Receiver, Sender
-from rigid_motion.streams.paths import Path as Motion
+from rigid_motion.streams import Receiver, Sender, StreamBody
+from rigid_motion.streams.paths import KnotPath as Motion
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.bvh import _read_hierarchy
 from rigid_motion_batch.recordings.clip_reading import read_clips
@@ -20,7 +20,9 @@ from tests.recordings import RECORDINGS
 from tests.scripts.bvh_bodies import TIMES, write_body
 
 
-def ends_off(body: Body, times: np.ndarray, poses: Poses, ends: np.ndarray, tolerance: float, delay: float) -> float:
+def ends_off(
+    body: StreamBody, times: np.ndarray, poses: Poses, ends: np.ndarray, tolerance: float, delay: float
+) -> float:
     """How far the ends of bones (joints, 3), in their joints' axes, are shown off at most, at the samples."""
     sender, receiver, off = Sender([body], tolerance, delay), Receiver(), [0.0]
     truth = Motion(times, poses)
@@ -36,7 +38,7 @@ def ends_off(body: Body, times: np.ndarray, poses: Poses, ends: np.ndarray, tole
         for datagram in sender.add(time, poses[:, row]):
             receiver.take(datagram, time)
         for _, answer in receiver.answers():
-            sender.hear(answer, time)
+            sender.take_answer(answer, time)
         for shown in receiver.show(time).values():
             if shown.moment >= times[0]:
                 away = at(shown.poses[body.name]) - at(truth.pose(shown.moment))

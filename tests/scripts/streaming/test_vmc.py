@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
-from rigid_motion.streams import Body, Receiver, Sender
+from rigid_motion.streams import Receiver, Sender, StreamBody
 from rigid_motion_batch.cli import stream
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.streaming.vmc import ToVmc
 from tests.live.performing import BODY, TIMES_OF_A_SECOND, dance, frames_of_vmc, in_world
 from tests.scripts.bvh_bodies import TIMES, hips_at, write_body
-from tests.scripts.streaming.test_rooms import HERE, PATIENCE, free_port, running
+from tests.scripts.streaming.test_rooms import LOOPBACK_ADDRESS, PATIENCE, free_port, running
 
 pytestmark = [pytest.mark.blender, pytest.mark.network]
 
 
 def free_udp_port() -> int:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as tried:
-        tried.bind((HERE, 0))
+        tried.bind((LOOPBACK_ADDRESS, 0))
         return tried.getsockname()[1]
 
 
@@ -92,7 +92,7 @@ def test_a_body_without_hips_is_refused(walk, listener, capsys):
 
 
 def test_what_a_receiver_shows_goes_to_another_program(listener):
-    ball = Body.rigid("ball")
+    ball = StreamBody.rigid("ball")
     sender, receiver, poses = Sender([ball, BODY], rate=60.0), Receiver(), dance(TIMES_OF_A_SECOND)
     to_vmc = ToVmc(listener.getsockname())
     for datagram in sender.describe():
@@ -132,7 +132,7 @@ def test_what_does_not_go_together_is_said(arguments, said, capsys):
 
 
 def test_a_performer_goes_through_a_room_to_another_program(listener):
-    room, vmc = ("--room", "studio", "--at", f"{HERE}:{free_port()}"), free_udp_port()
+    room, vmc = ("--room", "studio", "--at", f"{LOOPBACK_ADDRESS}:{free_port()}"), free_udp_port()
     to = f"127.0.0.1:{listener.getsockname()[1]}"
     with (
         running("send", "--from-vmc", vmc, *room, "--user", "ada"),

@@ -8,7 +8,7 @@ import pytest
 
 from rigid_motion.animation import set_mode
 from rigid_motion.ui.overlay import cache
-from rigid_motion.ui.overlay.cache import SPARE, keep_only, notice_selection, path_of
+from rigid_motion.ui.overlay.cache import MAX_SPARE_PATHS, keep_only, notice_selection, path_of
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import key, new_object
 
@@ -86,11 +86,11 @@ def test_keys_selected_without_a_word_from_blender_are_noticed_when_asked_for(sc
 
 
 def test_paths_that_were_not_drawn_for_long_are_dropped(scene):
-    objects = [new_object(f"Tool {number}") for number in range(SPARE + 20)]
+    objects = [new_object(f"Tool {number}") for number in range(MAX_SPARE_PATHS + 20)]
     for obj in objects:
         path_of(obj, scene)
     path_of(objects[0], scene)
     keep_only(drawn=1)
-    assert len(cache._entries) == SPARE + 1
+    assert len(cache._entries) == MAX_SPARE_PATHS + 1
     assert (objects[0].session_uid, "") in cache._entries
     assert (objects[1].session_uid, "") not in cache._entries

@@ -8,7 +8,7 @@ import pytest
 
 from rigid_motion.animation import hold_in, set_mode
 from rigid_motion.ui.overlay.cache import path_of
-from rigid_motion.ui.overlay.points import PASSING
+from rigid_motion.ui.overlay.points import PASSING_HOLDER
 from tests.animation.keyed import curves_of
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object
@@ -68,7 +68,7 @@ def test_an_object_in_hands_that_move_by_keys(scene, hands, parented):
         prop.parent = key(new_object("Floor"), FRAMES, seed=7)
     passed_around(prop, hands)
     path = assert_where_it_is_seen(prop, scene)
-    assert [piece.holder for piece in path.pieces] == [0, 1, PASSING, 2, PASSING, 1, PASSING]
+    assert [piece.holder for piece in path.pieces] == [0, 1, PASSING_HOLDER, 2, PASSING_HOLDER, 1, PASSING_HOLDER]
     assert [piece.last for piece in path.pieces[:-1]] == [piece.first for piece in path.pieces[1:]]
 
 

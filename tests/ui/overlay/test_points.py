@@ -14,13 +14,13 @@ from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion.ui.overlay.cache import path_of
 from rigid_motion.ui.overlay.points import (
-    AXES,
-    FINENESS,
-    FINEST,
-    MOST,
-    SMOOTH,
-    TICKS,
-    Path,
+    MAX_AXES,
+    MAX_PATH_SAMPLES,
+    MAX_SAMPLES_PER_FRAME,
+    MAX_TICKS,
+    MIN_PATH_SAMPLES,
+    SMOOTH_EXTENT_WIDTHS,
+    DrawnPath,
     axis_frames,
     sample_frames,
     space_of_object,
@@ -42,7 +42,7 @@ def in_world(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
     return points @ space[:3, :3].T + space[:3, 3]
 
 
-def on(path: Path, line: np.ndarray, frames: np.ndarray) -> np.ndarray:
+def on(path: DrawnPath, line: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """The points of a line of a path that are on these frames."""
     assert np.isin(frames, path.frames).all()
     return line[np.searchsorted(path.frames, frames)]
@@ -136,7 +136,7 @@ def test_axes_point_where_the_object_is_turned(scene, mode):
         set_mode(obj, mode)
     frames = axis_frames(tick_frames(int(FRAMES[0]), int(FRAMES[-1])))
     shown = shown_worlds([obj], frames)[0]
-    assert 3 < len(frames) == len(path.axes) <= AXES + 1
+    assert 3 < len(frames) == len(path.axes) <= MAX_AXES + 1
     for axis in range(3):
         assert path.axes[:, axis, 0] == pytest.approx(shown[:, :3, 3], abs=1e-5)
         assert path.axes[:, axis, 1] - path.axes[:, axis, 0] == pytest.approx(1.5 * shown[:, :3, axis], abs=2e-5)
@@ -156,7 +156,7 @@ def test_ticks_are_on_the_same_frames_in_all_paths(scene):
 )
 def test_as_many_ticks_as_can_be_read(length, step):
     ticks = tick_frames(3, 3 + length)
-    assert len(ticks) <= TICKS + 1
+    assert len(ticks) <= MAX_TICKS + 1
     assert (np.diff(ticks) == step).all()
     assert (ticks % step == 0).all()
 
@@ -166,10 +166,12 @@ def test_samples_run_evenly_from_end_to_end_over_whole_frames_as_many_as_a_round
     frames = sample_frames(-7, -7 + length)
     assert (frames[0], frames[-1]) == (-7, -7 + length)
     assert (np.diff(frames) > 0).all()
-    assert len(frames) <= 2 * MOST
-    if length <= MOST:
+    assert len(frames) <= 2 * MAX_PATH_SAMPLES
+    if length <= MAX_PATH_SAMPLES:
         assert np.isin(np.arange(-7, -7 + length + 1), frames).all()
-        assert min(SMOOTH, length * FINEST) < len(frames) <= max(2 * SMOOTH, length + 1)
+        assert (
+            min(MIN_PATH_SAMPLES, length * MAX_SAMPLES_PER_FRAME) < len(frames) <= max(2 * MIN_PATH_SAMPLES, length + 1)
+        )
 
 
 def test_without_a_second_key_there_is_no_path(scene):
@@ -204,4 +206,4 @@ def test_a_thinned_line_looks_the_same():
     offset = line[:, None] - start
     share = np.clip((offset * chord).sum(axis=2) / (chord * chord).sum(axis=1), 0, 1)
     away = np.linalg.norm(offset - share[..., None] * chord, axis=2).min(axis=1)
-    assert away.max() < 2 * 2.0 / FINENESS
+    assert away.max() < 2 * 2.0 / SMOOTH_EXTENT_WIDTHS

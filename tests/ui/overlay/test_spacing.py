@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_motion.ui.overlay.points import CLEAR, TICK_GAP, Path, on_screen, readable
+from rigid_motion.ui.overlay.points import MIN_TICK_DISTANCE_PX, TICK_GAP, DrawnPath, on_screen, readable
 
 SIZE = (1000.0, 500.0)
 
 
-def straight(frames: int, places: np.ndarray | None = None, *, mode: bool = False, keys: tuple = (0, -1)) -> Path:
+def straight(frames: int, places: np.ndarray | None = None, *, mode: bool = False, keys: tuple = (0, -1)) -> DrawnPath:
     """A path along x with a tick on each of its frames, by one unit in all, or with these places."""
     at = np.arange(1.0, frames + 1.0)
     line = np.zeros((frames, 3))
     line[:, 0] = np.linspace(0.0, 1.0, frames) if places is None else places
-    return Path(
+    return DrawnPath(
         frames=at,
         native=line,
         desired=line if mode else None,
@@ -34,7 +34,7 @@ def view(width: float) -> np.ndarray:
     return np.diag((2.0 * width / SIZE[0], 2.0 * width / SIZE[1], 0.0, 1.0))
 
 
-def ticks(path: Path, width: float, **options: object) -> np.ndarray:
+def ticks(path: DrawnPath, width: float, **options: object) -> np.ndarray:
     """The frames of the ticks that are drawn."""
     return path.tick_frames[readable(path, view(width), SIZE, **options).native_ticks]
 
@@ -66,9 +66,9 @@ def test_no_tick_touches_another_or_a_key_where_the_object_slows_down():
     path = straight(61, eased)
     chosen = readable(path, view(900.0), SIZE).native_ticks
     drawn = 900.0 * eased[chosen]
-    assert (np.diff(drawn) >= CLEAR).all()
-    assert drawn.min() >= CLEAR
-    assert drawn.max() <= 900.0 - CLEAR
+    assert (np.diff(drawn) >= MIN_TICK_DISTANCE_PX).all()
+    assert drawn.min() >= MIN_TICK_DISTANCE_PX
+    assert drawn.max() <= 900.0 - MIN_TICK_DISTANCE_PX
     # In the middle, where it is fast, there is one on every frame.
     assert chosen[20:40].all()
 

@@ -15,7 +15,18 @@ import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ...blender import channelbag_in, enum_value, existing
-from ..fcurves.keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
+from ..fcurves.keys import (
+    AUTO_EASING,
+    BEZIER,
+    CODE,
+    CONSTANT,
+    EASINGS,
+    INTERPOLATIONS,
+    LINEAR,
+    MAX_NUMBER,
+    Cycles,
+    Keys,
+)
 from .marks import holds_of, is_any_flagged, marks_of
 from .modifiers import copy_modifier, is_term, read_cycles, set_settings, settings_of
 
@@ -32,10 +43,10 @@ KEY_FIELDS = {
 KeyFields = dict[str, np.ndarray]
 """All there is to n keys, each field of shape (n, width)."""
 
-BREAKDOWN = enum_value(bpy.types.Keyframe, "type", "BREAKDOWN")
+BREAKDOWN_KEY = enum_value(bpy.types.Keyframe, "type", "BREAKDOWN")
 """The code of this type of keys."""
 
-AUTOMATIC = [enum_value(bpy.types.Keyframe, "handle_left_type", name) for name in ("AUTO", "AUTO_CLAMPED")]
+AUTOMATIC_HANDLES = [enum_value(bpy.types.Keyframe, "handle_left_type", name) for name in ("AUTO", "AUTO_CLAMPED")]
 """The codes of the types of handles that Blender sets by the keys around."""
 
 
@@ -206,7 +217,7 @@ def code_of(name: str, value: str) -> int:
     return enum_value(bpy.types.Keyframe, name, value)
 
 
-class Read(NamedTuple):
+class ReadChannels(NamedTuple):
     """Channels of one owner that are keyed together."""
 
     numbers: list[int]
@@ -221,7 +232,7 @@ class Read(NamedTuple):
     """What the keys of each channel are held in, shape (c, n): see `marks.hold`; -1 where they do not say."""
 
 
-def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[Read]:
+def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[ReadChannels]:
     """Return the keys of F-curves that have some, those together that are keyed together, and the Cycles modifier that
     each begins with; none of their other modifiers.
     """
@@ -229,14 +240,14 @@ def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[Read]:
     for number, fcurve in enumerate(fcurves):
         # A channel that no mode fills says nothing of the types of others.
         (types,) = _read_property("type", [fcurve.keyframe_points], CODE)
-        times, is_breakdown = points[number][:, 0], types == BREAKDOWN
+        times, is_breakdown = points[number][:, 0], types == BREAKDOWN_KEY
         key = times.tobytes(), fcurve.extrapolation, read_cycles(fcurve), is_breakdown.tobytes()
         together.setdefault(key, []).append(number)
     result = []
     for (_, extrapolation, cycles, mask), numbers in together.items():
         channels, breakdowns = [fcurves[number].keyframe_points for number in numbers], np.frombuffer(mask, bool)
         stacked, is_linear = np.stack([points[number] for number in numbers]), extrapolation == "LINEAR"
-        result.append(Read(numbers, *_read_together(channels, stacked, is_linear, cycles, breakdowns)))
+        result.append(ReadChannels(numbers, *_read_together(channels, stacked, is_linear, cycles, breakdowns)))
     return result
 
 
@@ -257,18 +268,18 @@ def _read_together(
         left, right = (_read_property(name, channels, np.float32, 2) for name in ("handle_left", "handle_right"))
     if is_eased:
         easing = _read_property("easing", channels, CODE)
-        _replace_unknown(easing, EASINGS, AUTO)
+        _replace_unknown(easing, EASINGS, AUTO_EASING)
         settings = np.stack((back, amplitude, _read_property("period", channels, np.float32)))
     numbers = (np.abs(part).max(initial=0.0) for part in (points, left, right, settings) if part is not None)
     # What is no number is not smaller, either.
-    is_sound = all(number < LARGEST for number in numbers) and bool(np.all(np.diff(points[0, :, 0]) >= 0.0))
+    is_sound = all(number < MAX_NUMBER for number in numbers) and bool(np.all(np.diff(points[0, :, 0]) >= 0.0))
     marked = breakdowns if breakdowns.any() else None
     holds, automatic = np.full(points.shape[:2], -1), None
     if is_any_flagged(back):
         holds = holds_of(back, amplitude, _read_property("period", channels, np.float32))
     if (holds >= 0).any():
         types = [_read_property(f"handle_{side}_type", channels, CODE) for side in ("left", "right")]
-        automatic = np.isin(np.stack(types, axis=-1), AUTOMATIC)
+        automatic = np.isin(np.stack(types, axis=-1), AUTOMATIC_HANDLES)
     keys = Keys(points, interpolation, left, right, easing, settings, linear, cycles, marked, automatic, is_sound)
     return keys, marks_of(back, amplitude), holds
 

@@ -16,39 +16,39 @@ import numpy as np
 
 from ..evaluation.runs import MOST_FRAMES
 
-LOW = 63
+MARK_BITS = 63
 """The bits of either setting that have a mark."""
 
-SIGNATURE = 42
+AMPLITUDE_SIGNATURE_BITS = 42
 """What `amplitude` has in these bits where there is a mark: neither Blender's default nor a round number."""
 
-CHECK = 16
+BACK_CHECK_BIT = 16
 """What `back` has in these bits beside a mark, which is less."""
 
-HELD = 32
+BACK_HELD_BIT = 32
 """What `back` has in these bits, too, where `period` says what a key is held in."""
 
-MOST = 15
+MAX_MARK = 15
 """The largest mark, and the most holders that keys can tell apart."""
 
-HOLD_BITS = (MOST + 1) * (MOST_FRAMES + 1) - 1
+HOLD_BITS = (MAX_MARK + 1) * (MOST_FRAMES + 1) - 1
 """The bits of `period` that have a hold: the number of the holder, and the frames."""
 
 CHECK_BITS = 15 * (HOLD_BITS + 1)
 """Those above, which say whether it is one."""
 
-MULTIPLIER, ADDED = 4181, 3863
+MARK_MULTIPLIER, MARK_ADDEND = 4181, 3863
 """What they are made by: so no whole number up to 500 says a hold, nor any hundredths up to 20."""
 
-PERIOD = 4.1
+DEFAULT_PERIOD_FRAMES = 4.1
 """Blender's own, where there is none yet to have a hold in its bits."""
 
 
 def marks_of(backs: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
     """Return the marks in settings `back` and `amplitude` of keys (float32, any shape), 0 where there is none."""
-    low = backs.view(np.int32) & LOW
-    is_marked = ((amplitudes.view(np.int32) & LOW) == SIGNATURE) & ((low & CHECK) != 0)
-    return np.where(is_marked, low & MOST, 0)
+    low = backs.view(np.int32) & MARK_BITS
+    is_marked = ((amplitudes.view(np.int32) & MARK_BITS) == AMPLITUDE_SIGNATURE_BITS) & ((low & BACK_CHECK_BIT) != 0)
+    return np.where(is_marked, low & MAX_MARK, 0)
 
 
 def are_held(backs: np.ndarray, amplitudes: np.ndarray, periods: np.ndarray) -> np.ndarray:
@@ -67,7 +67,7 @@ def is_any_flagged(backs: np.ndarray) -> bool:
 
 
 def _are_flagged(backs: np.ndarray) -> np.ndarray:
-    return (backs.view(np.int32) & (CHECK | HELD)) == CHECK | HELD
+    return (backs.view(np.int32) & (BACK_CHECK_BIT | BACK_HELD_BIT)) == BACK_CHECK_BIT | BACK_HELD_BIT
 
 
 def _are_checked(periods: np.ndarray) -> np.ndarray:
@@ -77,7 +77,7 @@ def _are_checked(periods: np.ndarray) -> np.ndarray:
 
 def _checked(holds: np.ndarray) -> np.ndarray:
     """Return holds with the bits that say that they are some."""
-    return holds | (holds * MULTIPLIER + ADDED) & CHECK_BITS
+    return holds | (holds * MARK_MULTIPLIER + MARK_ADDEND) & CHECK_BITS
 
 
 def hold(number: int, frames: int = 0) -> int:
@@ -101,10 +101,10 @@ def mend_marks(fcurve: bpy.types.FCurve) -> np.ndarray:
     Returns which of them do not say any more what it was, shape (n,).
     """
     (backs, amplitudes), is_checked = _settings(fcurve), _are_checked(_setting(fcurve, "period"))
-    is_flagged, is_signed = _are_flagged(backs), (amplitudes.view(np.int32) & LOW) == SIGNATURE
+    is_flagged, is_signed = _are_flagged(backs), (amplitudes.view(np.int32) & MARK_BITS) == AMPLITUDE_SIGNATURE_BITS
     typed = is_flagged.astype(int) + is_signed + is_checked == 2
     if typed.any():
-        marks = np.where(typed & is_flagged, backs.view(np.int32) & MOST, marks_of(backs, amplitudes))
+        marks = np.where(typed & is_flagged, backs.view(np.int32) & MAX_MARK, marks_of(backs, amplitudes))
         write_marks(fcurve, np.where(typed & (marks == 0), np.maximum(carried_on(marks), 1), marks))
     return typed & ~(is_flagged & is_checked)
 
@@ -118,12 +118,12 @@ def write_marks(fcurve: bpy.types.FCurve, marks: np.ndarray) -> None:
     """Give the keys of an F-curve marks (n,). Nothing that Blender evaluates changes, so nothing is tagged."""
     backs, amplitudes = settings = _settings(fcurve)
     # What a key is held in stays.
-    is_held = (amplitudes.view(np.int32) & LOW) == SIGNATURE
+    is_held = (amplitudes.view(np.int32) & MARK_BITS) == AMPLITUDE_SIGNATURE_BITS
     is_held |= _are_checked(_setting(fcurve, "period"))
-    held = np.where(is_held & _are_flagged(backs), HELD, 0)
-    for values, bits in ((backs, CHECK | marks | held), (amplitudes, SIGNATURE)):
+    held = np.where(is_held & _are_flagged(backs), BACK_HELD_BIT, 0)
+    for values, bits in ((backs, BACK_CHECK_BIT | marks | held), (amplitudes, AMPLITUDE_SIGNATURE_BITS)):
         raw = values.view(np.int32)
-        raw[:] = np.where(marks > 0, raw & ~LOW | bits, raw)
+        raw[:] = np.where(marks > 0, raw & ~MARK_BITS | bits, raw)
     # Without one the signature is off by a bit, so that nothing else is read from it.
     amplitudes.view(np.int32)[(marks == 0) & (marks_of(backs, amplitudes) > 0)] ^= 1
     for name, values in zip(("back", "amplitude"), settings, strict=True):
@@ -134,9 +134,9 @@ def write_holds(fcurve: bpy.types.FCurve, holds: np.ndarray) -> None:
     """Give the keys of an F-curve, all of which have marks, holds (n,): see `hold`. Those of -1 have none."""
     backs, _ = _settings(fcurve)
     periods = _setting(fcurve, "period")
-    periods[(holds >= 0) & ~(np.abs(periods) > 1e-3)] = PERIOD
+    periods[(holds >= 0) & ~(np.abs(periods) > 1e-3)] = DEFAULT_PERIOD_FRAMES
     raw, bits = backs.view(np.int32), periods.view(np.int32)
-    raw[:] = np.where(holds >= 0, raw | HELD, raw & ~HELD)
+    raw[:] = np.where(holds >= 0, raw | BACK_HELD_BIT, raw & ~BACK_HELD_BIT)
     bits[:] = np.where(holds >= 0, bits & ~(CHECK_BITS | HOLD_BITS) | _checked(holds), bits)
     # Without one the check is off by a bit, so that none is read from it.
     bits[(holds < 0) & _are_checked(periods)] ^= HOLD_BITS + 1

@@ -11,21 +11,21 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..evaluation.components import MODE_NAMES, PART_OF, ROTATION, ROWS, UNKNOWN, rows_left_to
+from ..evaluation.components import MODE_NAMES, PART_OF, ROTATION, ROWS, UNKNOWN_MODE, rows_left_to
 from ..evaluation.differences import seen_values
-from ..evaluation.sources import REACH, SAME_FRAME, TURN_AXES, Marks, Source
+from ..evaluation.sources import OUTSIDE_REACH_FRAMES, SAME_FRAME, TURN_AXES, KeyedTransform, Marks
 from ..transforms import Channel, Refused, Transform
-from .channels import Read, read_keys
+from .channels import ReadChannels, read_keys
 from .marks import carried_on, has_marks, hold
 from .modifiers import is_term, longest_step, on_top
 from .refusals import refuse_drivers, refuse_envelope, refuse_linked, refuse_moving_deltas, refuse_numbers
 from .slots import Binding
 
-FRACTIONS = 2**24
+DIGEST_COUNT = 2**24
 """The number of digests that a term can keep as its influence, which is in single precision."""
 
 
-def read(binding: Binding) -> Source:
+def read(binding: Binding) -> KeyedTransform:
     """Return what is keyed of a transform in a slot. `Refused` where there can be no in-betweens of it."""
     (source,) = keyed_in([binding])
     if isinstance(source, Refused):
@@ -34,7 +34,7 @@ def read(binding: Binding) -> Source:
     return source
 
 
-def keyed_in(bindings: Sequence[Binding]) -> list[Source | Refused]:
+def keyed_in(bindings: Sequence[Binding]) -> list[KeyedTransform | Refused]:
     """Return what is keyed in each of several bindings, or why there can be no in-betweens of it.
 
     Where several users of a slot differ in what in-betweens depend on, it is what the leading one of them has.
@@ -44,9 +44,9 @@ def keyed_in(bindings: Sequence[Binding]) -> list[Source | Refused]:
     return list(map(leading, sources_of_users(bindings)))
 
 
-def leading(users: list[Source | Refused]) -> Source | Refused:
+def leading(users: list[KeyedTransform | Refused]) -> KeyedTransform | Refused:
     """Return the source of the user that most parts of a slot move, or the first of these."""
-    return max(users, key=lambda source: len(source.keyed) if isinstance(source, Source) else -1)
+    return max(users, key=lambda source: len(source.keyed) if isinstance(source, KeyedTransform) else -1)
 
 
 def planned_from(binding: Binding) -> int | None:
@@ -62,19 +62,19 @@ def planned_from(binding: Binding) -> int | None:
         influences = np.empty(len(fcurve.modifiers), np.float32)
         fcurve.modifiers.foreach_get("influence", influences)
         count += int(np.count_nonzero(influences == np.float32(kept)))
-    return (round(kept * FRACTIONS) - count) % FRACTIONS
+    return (round(kept * DIGEST_COUNT) - count) % DIGEST_COUNT
 
 
-def influence_for(source: Source, count: int) -> float:
+def influence_for(source: KeyedTransform, count: int) -> float:
     """Return what terms have for an influence, which is not in use: the digest of their source, and their number."""
-    return (source.digest24 + count) % FRACTIONS / FRACTIONS
+    return (source.digest24 + count) % DIGEST_COUNT / DIGEST_COUNT
 
 
-def sources_of_users(bindings: Sequence[Binding]) -> list[list[Source | Refused]]:
+def sources_of_users(bindings: Sequence[Binding]) -> list[list[KeyedTransform | Refused]]:
     """Return what is keyed in each of the bindings as each of its users has it."""
     drivers: dict[bpy.types.ID, set[Channel]] = {}
 
-    def source_of(user: Transform, binding: Binding) -> Source | Refused:
+    def source_of(user: Transform, binding: Binding) -> KeyedTransform | Refused:
         if user.animated not in drivers:
             data = user.animated.animation_data
             driving = () if data is None else data.drivers
@@ -87,7 +87,7 @@ def sources_of_users(bindings: Sequence[Binding]) -> list[list[Source | Refused]
     return [[source_of(user, binding) for user in binding.users] for binding in bindings]
 
 
-def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> Source:
+def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> KeyedTransform:
     """Return what is keyed in a slot as one of its users has it. `Refused` where there can be no in-betweens of it."""
     refuse_linked(user, binding)
     refuse_moving_deltas(user, binding, drivers)
@@ -115,13 +115,13 @@ def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> 
     reads, of_turns = read_keys(list(keyed.values())), read_keys(turns)
     rows, goes_on = list(keyed), any(read.keys.linear or read.keys.cycles is not None for read in reads)
     axes = _said_by(of_turns)
-    return Source(
+    return KeyedTransform(
         channels=tuple(([rows[number] for number in read.numbers], read.keys) for read in reads),
         mode=_modes_in(reads),
         turns=of_turns[0].keys if of_turns else None,
         turns_axis=TURN_AXES[0] if axes is None else replace(axes, numbers=axes.numbers % len(TURN_AXES)),
         seen=binding.slot.seen if goes_on else None,
-        reach=max([REACH, *map(longest_step, keyed.values())]) if goes_on else REACH,
+        reach=max([OUTSIDE_REACH_FRAMES, *map(longest_step, keyed.values())]) if goes_on else OUTSIDE_REACH_FRAMES,
         order=user.order,
         keyed=names,
         rest=rest,
@@ -132,27 +132,29 @@ def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> 
     )
 
 
-def _modes_in(channels: list[Read]) -> int | Marks:
-    """Return the modes that keys say, those that this version does not know as `UNKNOWN`; 0 where none says any."""
+def _modes_in(channels: list[ReadChannels]) -> int | Marks:
+    """Return the modes that keys say, those that this version does not know as `UNKNOWN_MODE`; 0 where none says
+    any.
+    """
     said = _said_by(channels)
     if said is None:
         return 0
-    numbers = np.where(np.isin(said.numbers, list(MODE_NAMES)), said.numbers, UNKNOWN)
+    numbers = np.where(np.isin(said.numbers, list(MODE_NAMES)), said.numbers, UNKNOWN_MODE)
     return int(numbers[0]) if np.all(numbers == numbers[0]) else Marks(said.frames, numbers)
 
 
-def _said_by(reads: list[Read]) -> Marks | None:
+def _said_by(reads: list[ReadChannels]) -> Marks | None:
     """Return what the marks of keys say from which frame on, as numbers from 0; None where there are none."""
     return _on_frames(reads, [read.marks for read in reads])
 
 
-def _held_in(reads: list[Read]) -> Marks | None:
+def _held_in(reads: list[ReadChannels]) -> Marks | None:
     """Return what keys are held in from which frame on, see `marks.hold`; None where all are held in nothing."""
     holds = _on_frames(reads, [read.holds + 1 for read in reads])
     return None if holds is None or not (holds.numbers >= hold(1)).any() else holds
 
 
-def _on_frames(reads: list[Read], of_keys: list[np.ndarray]) -> Marks | None:
+def _on_frames(reads: list[ReadChannels], of_keys: list[np.ndarray]) -> Marks | None:
     """Return the numbers of keys, (c, n) for each read, 0 where they say none, from which frame on, as numbers from 0.
 
     On one frame most channels have it, or else the first of them: whoever types a setting of a key takes its mark off.
@@ -184,12 +186,12 @@ def is_marked(binding: Binding) -> bool:
 
 
 def modes_said(binding: Binding) -> int | Marks:
-    """Return the modes that the keys of a slot say, as a `Source` has them."""
+    """Return the modes that the keys of a slot say, as a `KeyedTransform` has them."""
     keyed = [fcurve for fcurve in binding.moving.values() if fcurve.keyframe_points and not fcurve.mute]
     return _modes_in(read_keys(keyed))
 
 
-def added_values(binding: Binding, user: Transform, source: Source, frames: np.ndarray) -> np.ndarray:
+def added_values(binding: Binding, user: Transform, source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
     """Return what modifiers of the animator's add to the channels of a slot on these frames (m,), shape (10, m)."""
     added = np.zeros((10, len(frames)))
     curves = {row: binding.curves.get(channel) for row, channel in user.channels.items()}

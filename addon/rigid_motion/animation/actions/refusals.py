@@ -10,10 +10,10 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 
 from ...blender import enum_value
-from ..evaluation.components import UNKNOWN
-from ..evaluation.sources import Source
-from ..fcurves.keys import LARGEST, Keys
-from ..transforms import LINKED, WIDTHS, Channel, Refused, Transform
+from ..evaluation.components import UNKNOWN_MODE
+from ..evaluation.sources import KeyedTransform
+from ..fcurves.keys import MAX_NUMBER, Keys
+from ..transforms import LINKED_REFUSAL, WIDTHS, Channel, Refused, Transform
 from ..transforms.transform import channels_under, rotation_by
 from .modifiers import on_top
 from .slots import Binding
@@ -24,10 +24,10 @@ MOST_FRAMES = 250_000
 MOST_TURNS = 1000
 """Whole turns from one key to the next."""
 
-ENVELOPE = enum_value(bpy.types.FModifier, "type", "ENVELOPE")
+ENVELOPE_MODIFIER = enum_value(bpy.types.FModifier, "type", "ENVELOPE")
 """The code of this type of modifiers."""
 
-ENVELOPED = n_(
+ENVELOPED_CHANNEL = n_(
     "{name}: {channel} has an Envelope, which in-betweens cannot be put in front of: "
     "mute or remove it, or bake the channel (Graph Editor, Channel)"
 )
@@ -45,8 +45,8 @@ CHANGED_BY_MODIFIERS = n_(
 MOVING_DELTA = n_(
     "{name}: {channel} is animated, on top of the rotation that in-betweens are of: move that animation to a parent"
 )
-DRIVEN = n_("{name}: {channel} is driven: remove the driver, or bake it to keys")
-SILENT = n_(
+DRIVEN_CHANNEL = n_("{name}: {channel} is driven: remove the driver, or bake it to keys")
+SILENT_CHANNEL = n_(
     "{name}: {channel} is muted, or has samples in place of keys: unmute it, "
     "turn them into keys (Graph Editor, Channel > Samples to Keys), or delete it first"
 )
@@ -74,15 +74,15 @@ def refuse_drivers(user: Transform, binding: Binding, driven: Collection[int]) -
     for channel in (user.channels[row] for row in sorted(driven)):
         fcurve = binding.curves.get(channel)
         is_silent = fcurve is not None and (fcurve.mute or len(fcurve.sampled_points))
-        raise Refused(SILENT if is_silent else DRIVEN, name=user.name, channel=_label(*channel))
+        raise Refused(SILENT_CHANNEL if is_silent else DRIVEN_CHANNEL, name=user.name, channel=_label(*channel))
 
 
 def refuse_linked(user: Transform, binding: Binding | None = None) -> None:
     """Raise `Refused` where what is moved, or the Action that moves it, belongs to another file."""
     if not user.animated.is_editable:
-        raise Refused(LINKED, name=user.animated.name)
+        raise Refused(LINKED_REFUSAL, name=user.animated.name)
     if binding is not None and not binding.slot.is_editable:
-        raise Refused(LINKED, name=binding.slot.action.name)
+        raise Refused(LINKED_REFUSAL, name=binding.slot.action.name)
 
 
 def refuse_moving_deltas(user: Transform, binding: Binding, drivers: Collection[Channel]) -> None:
@@ -99,8 +99,8 @@ def refuse_envelope(name: str, fcurve: bpy.types.FCurve) -> None:
     types = np.empty(len(fcurve.modifiers), np.int32)
     # A look at each of them takes longer than all else.
     fcurve.modifiers.foreach_get("type", types)
-    if any(not fcurve.modifiers[number].mute for number in np.flatnonzero(types == ENVELOPE).tolist()):
-        raise Refused(ENVELOPED, name=name, channel=_label(fcurve.data_path, fcurve.array_index))
+    if any(not fcurve.modifiers[number].mute for number in np.flatnonzero(types == ENVELOPE_MODIFIER).tolist()):
+        raise Refused(ENVELOPED_CHANNEL, name=name, channel=_label(fcurve.data_path, fcurve.array_index))
 
 
 def refuse_modified(name: str, binding: Binding) -> None:
@@ -109,9 +109,9 @@ def refuse_modified(name: str, binding: Binding) -> None:
         raise Refused(CHANGED_BY_MODIFIERS, name=name)
 
 
-def refuse_numbers(name: str, source: Source) -> None:
+def refuse_numbers(name: str, source: KeyedTransform) -> None:
     """Raise `Refused` where the numbers of a source make no motion, or too long a one."""
-    if np.any(source.modes_at(source.keyed_frames) == UNKNOWN) if source.channels else source.mode == UNKNOWN:
+    if np.any(source.modes_at(source.keyed_frames) == UNKNOWN_MODE) if source.channels else source.mode == UNKNOWN_MODE:
         raise Refused(NO_SUCH_MODE, name=name)
     if (turns := source.turns) is not None:
         usable = (np.abs(turns.values[0]) <= MOST_TURNS) & np.isfinite(turns.times)
@@ -137,7 +137,7 @@ def _explain_damage(name: str, order: str | None, rows: list[int], keys: Keys) -
     settings = None if keys.easing_settings is None else np.moveaxis(keys.easing_settings, 0, -1)
     parts = [part for part in (keys.points, keys.left, keys.right, settings) if part is not None]
     # What is no number is not smaller, either.
-    damaged = ~(np.abs(np.concatenate(parts, axis=-1)) < LARGEST).all(axis=-1)
+    damaged = ~(np.abs(np.concatenate(parts, axis=-1)) < MAX_NUMBER).all(axis=-1)
     damaged[:, 1:] |= np.diff(keys.times) < 0.0
     channel, key = np.argwhere(damaged)[0].tolist()
     label = _label(*channels_under("", rotation_by(order))[rows[channel]])

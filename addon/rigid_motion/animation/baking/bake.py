@@ -24,7 +24,7 @@ from ..edits.mode_keys import set_mode_in
 from ..evaluation.channel_values import rotation_values
 from ..evaluation.components import PART_OF, SCALE
 from ..evaluation.runs import Switch
-from ..evaluation.sources import SAME_FRAME, Source, distinct
+from ..evaluation.sources import SAME_FRAME, KeyedTransform, distinct
 from ..fcurves.keys import Cycles
 from ..holds.holders import holders_of
 from ..holds.placing import poses_of, rows_of
@@ -35,15 +35,15 @@ from .worlds import alone_in, arrivals, say_holds, seen_range, worlds_of
 
 NOT_HELD = n_("{name} is held in nothing: Bake without To World has keys for its in-betweens")
 
-STAYS = 1e-5
+MAX_SCALE_ROUNDING = 1e-5
 """Scales that differ by less are the same."""
 
-Planned = tuple[Binding, Source, np.ndarray, np.ndarray, list[Switch]]
+Planned = tuple[Binding, KeyedTransform, np.ndarray, np.ndarray, list[Switch]]
 """What is baked: a binding, what is keyed in it, the frames (m,) of the keys, what channels have there (10, m), and the
 passes that become keys.
 """
 
-POINTS = ("co", "handle_left", "handle_right")
+POINT_ATTRIBUTES = ("co", "handle_left", "handle_right")
 """What a key has of frame and value."""
 
 
@@ -142,7 +142,7 @@ def bake_to_world(
         own = ~np.isin(frames, without(frames, distinct(source.keyed_frames)))
         types = np.where(own, code_of("type", "KEYFRAME"), code_of("type", "GENERATED"))
         for row, channel in transform.channels.items():
-            if PART_OF[row] != SCALE or channel in binding.curves or np.ptp(rows[row]) > STAYS:
+            if PART_OF[row] != SCALE or channel in binding.curves or np.ptp(rows[row]) > MAX_SCALE_ROUNDING:
                 fcurve = binding.ensure_curve(channel)
                 replace_keys(fcurve, frames, rows[row], interpolation=interpolation, key_type=types)
                 for modifier in list(fcurve.modifiers):
@@ -190,7 +190,7 @@ def is_baked(target: Target) -> bool:
     return last_change(transform_of(target)) == BAKED
 
 
-def _range(transform: Transform, binding: Binding, source: Source) -> tuple[float, float]:
+def _range(transform: Transform, binding: Binding, source: KeyedTransform) -> tuple[float, float]:
     """Return the first and the last frame to bake: of the keys, or of all that is seen where anything goes on."""
     modifiers = _modifiers(transform, binding, source)
     if source.cyclic is not None and not modifiers:
@@ -203,20 +203,20 @@ def _range(transform: Transform, binding: Binding, source: Source) -> tuple[floa
     return begin, end
 
 
-def _modifiers(transform: Transform, binding: Binding, source: Source) -> list[bpy.types.FModifier]:
+def _modifiers(transform: Transform, binding: Binding, source: KeyedTransform) -> list[bpy.types.FModifier]:
     """Return the modifiers of the animator's that are baked along with keys."""
     curves = map(binding.curves.get, _channels(transform, source).values())
     return [modifier for fcurve in curves if fcurve is not None for modifier in on_top(fcurve)]
 
 
-def _channels(transform: Transform, source: Source) -> dict[int, Channel]:
+def _channels(transform: Transform, source: KeyedTransform) -> dict[int, Channel]:
     """Return the channels that are baked, by their rows: what is muted or driven stays, and what no mode changes."""
     parts = source.keyed - (frozenset() if source.uniform_scale else {SCALE})
     channels = transform.channels.items()
     return {row: channel for row, channel in channels if PART_OF[row] in parts and row not in source.driven}
 
 
-def _frames(source: Source, begin: float, end: float, step: float, passes: Iterable[Switch] = ()) -> np.ndarray:
+def _frames(source: KeyedTransform, begin: float, end: float, step: float, passes: Iterable[Switch] = ()) -> np.ndarray:
     """Return every step from begin to end, and the keys in between; and all frames of passes that become keys."""
     keys = distinct(source.keyed_frames)
     passing = (np.arange(np.floor(switch.begin) + 1.0, switch.frame) for switch in passes)
@@ -226,7 +226,7 @@ def _frames(source: Source, begin: float, end: float, step: float, passes: Itera
 
 
 def _values(
-    transform: Transform, binding: Binding, source: Source, frames: np.ndarray, passes: Iterable[Switch]
+    transform: Transform, binding: Binding, source: KeyedTransform, frames: np.ndarray, passes: Iterable[Switch]
 ) -> np.ndarray:
     """Return what channels are to have on frames (m,), shape (10, m)."""
     values = continuous_values(source, frames, added_values(binding, transform, source, frames))
@@ -238,7 +238,7 @@ def _values(
     return values
 
 
-def _cycles(transform: Transform, binding: Binding, source: Source) -> Cycles | None:
+def _cycles(transform: Transform, binding: Binding, source: KeyedTransform) -> Cycles | None:
     """Return the cycles that go on behind baked keys; None where all rounds are baked."""
     return None if source.cyclic is None or _modifiers(transform, binding, source) else source.cyclic.cycles
 
@@ -246,7 +246,7 @@ def _cycles(transform: Transform, binding: Binding, source: Source) -> Cycles | 
 def _bake_place(
     transform: Transform,
     binding: Binding,
-    source: Source,
+    source: KeyedTransform,
     frames: np.ndarray,
     values: np.ndarray,
     passes: Iterable[Switch],
@@ -285,7 +285,7 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     added = without(frames, at)
     new = empty_key_fields(len(added))
     new["type"][:] = code_of("type", "GENERATED")
-    for name in POINTS:
+    for name in POINT_ATTRIBUTES:
         new[name][:, 0] = added
     order = np.argsort(np.append(at, added), kind="stable")
     fields = {name: np.concatenate((numbers, new[name]))[order] for name, numbers in old.items()}
@@ -293,6 +293,6 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     fields["interpolation"][:] = code
     # Handles keep their distance from the key.
     moved = np.interp(times, frames, values) - fields["co"][:, 1]
-    for name in POINTS:
+    for name in POINT_ATTRIBUTES:
         fields[name][:, 1] += moved
     set_key_fields(fcurve, fields)

@@ -16,7 +16,7 @@ from bpy.app.translations import pgettext_n as n_
 
 from ...motion import Poses, Skeleton, clean
 from ...motion.quaternions import conjugate, multiply, rotate, turned, turns_between
-from ...motion.trembling import ORDERS, trembling
+from ...motion.trembling import DIFFERENCE_ORDERS, trembling
 from ..actions.channels import key_fields, set_key_fields
 from ..actions.refusals import refuse_drivers, refuse_linked, refuse_modified
 from ..actions.slots import Binding
@@ -24,28 +24,28 @@ from ..edits.apply import Readings, Targets, apply_edit, readable
 from ..evaluation.bodies import turn_into_quaternions
 from ..evaluation.channel_values import rotation_values
 from ..evaluation.components import LOCATION, PART_OF, ROTATION, ROWS, SCALE
-from ..evaluation.sources import SAME_FRAME, Source
+from ..evaluation.sources import SAME_FRAME, KeyedTransform
 from ..holds.placing import channel_space
 from ..queries.keyed import frames_in
 from ..transforms import Refused, Transform, transform_of
-from .bake import POINTS
+from .bake import POINT_ATTRIBUTES
 from .fewer_keys import count_of, united
 from .motions import BodyMotion, continuous_values
 from .originals import CLEANED, Originals
 
-STRENGTH = 3.0
+MAX_MOVE_PER_NOISE = 3.0
 """By how many times of its trembling something may be moved: hardly any noise is more."""
 
-LEAST, DENSE = ORDERS[-1] + 2, 2.0
+MIN_NOISE_KEYS, MAX_KEY_SPACING_FRAMES = DIFFERENCE_ORDERS[-1] + 2, 2.0
 """The fewest keys that say how much something trembles, and the most frames from one to the next."""
 
-JOIN = 8
+TRANSITION_KEYS = 8
 """Keys over which what is cleaned goes over into what is not."""
 
-ROUNDS = 12
+MAX_DRAW_BACK_ROUNDS = 12
 """In which the keys on a frame are drawn back together where something is moved too far."""
 
-WITHIN = 0.999
+USED_TOLERANCE_RATIO = 0.999
 """The part of the tolerance that is used: keys are rounded."""
 
 TOO_FEW = n_("{name} has {count} keys of location and rotation: to tell trembling from motion takes {least}")
@@ -80,7 +80,7 @@ class Cleaning(NamedTuple):
     """Which of these were spikes or repeats, shape (t, m)."""
 
 
-Planned = tuple[Binding, Source, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+Planned = tuple[Binding, KeyedTransform, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """What the keys of a slot are to be: those of a source, on frames (m,), which are to be at others (m,); components
 (10, m), and which of them were bridged (m,).
 """
@@ -88,7 +88,7 @@ Planned = tuple[Binding, Source, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 def clean_motion(
     targets: Targets,
-    strength: float = STRENGTH,
+    strength: float = MAX_MOVE_PER_NOISE,
     radius: float | None = None,
     *,
     nearest: float | None = None,
@@ -130,7 +130,7 @@ def clean_motion(
     originals = Originals(CLEANED)
 
     def survey(readings: Mapping[Transform, Readings]) -> None:
-        together: dict[tuple, dict[Transform, tuple[Binding, Source]]] = {}
+        together: dict[tuple, dict[Transform, tuple[Binding, KeyedTransform]]] = {}
         for transform, reading in readings.items():
             plans[transform] = []
             try:
@@ -155,7 +155,7 @@ def clean_motion(
         if isinstance(result := plans[transform], Refused):
             raise result
         if not result:
-            raise Refused(TOO_FEW, name=transform.name, count=0, least=LEAST)
+            raise Refused(TOO_FEW, name=transform.name, count=0, least=MIN_NOISE_KEYS)
         return result
 
     def act(transform: Transform, planned: list[Planned]) -> None:
@@ -189,7 +189,7 @@ def pixels_of(camera: Any, nearest: float) -> float:
     return float(pixels * depth / nearest * (1.0 + (corners[:, :2] ** 2).sum(axis=1).max() / depth**2))
 
 
-def _check(transform: Transform, binding: Binding, source: Source) -> None:
+def _check(transform: Transform, binding: Binding, source: KeyedTransform) -> None:
     """Raise `Refused` where there is nothing dense to clean, or keys do not say where something is."""
     if source.held is not None:
         raise Refused(n_("{name} is held: Bake to World first, and clean that"), name=transform.name)
@@ -197,16 +197,16 @@ def _check(transform: Transform, binding: Binding, source: Source) -> None:
     refuse_modified(transform.name, binding)
     refuse_drivers(transform, binding, source.driven)
     count = count_of(source)
-    if count < LEAST:
-        raise Refused(TOO_FEW, name=transform.name, count=count, least=LEAST)
-    if (step := float(np.median(np.diff(source.keyed_frames)))) > DENSE:
+    if count < MIN_NOISE_KEYS:
+        raise Refused(TOO_FEW, name=transform.name, count=count, least=MIN_NOISE_KEYS)
+    if (step := float(np.median(np.diff(source.keyed_frames)))) > MAX_KEY_SPACING_FRAMES:
         text = n_("{name} has keys {step:g} frames apart: only recordings can be cleaned, with keys on every frame")
         raise Refused(text, name=transform.name, step=step)
 
 
 def _cleaned(
     obj: bpy.types.Object,
-    members: Mapping[Transform, tuple[Binding, Source]],
+    members: Mapping[Transform, tuple[Binding, KeyedTransform]],
     strength: float,
     radius: float | None,
     *,
@@ -233,7 +233,7 @@ def _cleaned(
     if floor * motion.unit <= motion.rounding:
         floor = 0.0
     tolerance = strength * floor * motion.unit
-    result = clean(frames, chain, WITHIN**2 * tolerance / motion.unit or None, radii, skeleton)
+    result = clean(frames, chain, USED_TOLERANCE_RATIO**2 * tolerance / motion.unit or None, radii, skeleton)
     out = result.spikes | result.repeats
     bridged = np.zeros((len(joints), len(frames)), dtype=bool)
     bridged[taking] = out & (inside > 0.0)
@@ -251,8 +251,8 @@ def _cleaned(
     hangs = bridged.copy()
     for own in Skeleton(motion.parents).levels[1:]:
         hangs[own] |= hangs[motion.parents[own]]
-    allowed, share = WITHIN * tolerance, inside
-    for left in range(ROUNDS, -1, -1):
+    allowed, share = USED_TOLERANCE_RATIO * tolerance, inside
+    for left in range(MAX_DRAW_BACK_ROUNDS, -1, -1):
         shares = {number: np.where(bridged[number], 1.0, share)[:, None] for number in sources}
         rows = {
             number: _corrected(joints[number], sources[number], start[number], shares[number], *corrections[number])
@@ -263,7 +263,7 @@ def _cleaned(
         over = off.max(axis=0) / allowed if allowed else np.zeros(len(frames))
         if (over <= 1.0).all():
             break
-        share = np.where(over > 1.0, share * WITHIN / over if left > 1 else 0.0, share)
+        share = np.where(over > 1.0, share * USED_TOLERANCE_RATIO / over if left > 1 else 0.0, share)
     numbers = list(sources)
     world = np.array(channel_space(joints[0], bpy.context.evaluated_depsgraph_get()).translation)
     # What only turns is seen where a bone ends, and where a camera looks.
@@ -301,7 +301,7 @@ def _inside(obj: bpy.types.Object, frames: np.ndarray, bindings: Sequence[Bindin
     if not len(selected):
         raise Refused(NO_KEY_SELECTED, name=obj.name)
     first, last = np.searchsorted(frames, selected[[0, -1]] - SAME_FRAME)
-    rows, width = np.arange(len(frames)), min(JOIN, (last - first) / 2.0 + 1e-9)
+    rows, width = np.arange(len(frames)), min(TRANSITION_KEYS, (last - first) / 2.0 + 1e-9)
     begins = (rows - first) / width if first else np.ones(len(frames))
     ends = (last - rows) / width if last < len(frames) - 1 else np.ones(len(frames))
     part = np.clip(np.minimum(begins, ends), 0.0, 1.0)
@@ -319,7 +319,7 @@ def _floor(frames: np.ndarray, poses: Poses, reaches: np.ndarray, skeleton: Skel
     return math.sqrt(squares.max())
 
 
-def _values(transform: Transform, source: Source, frames: np.ndarray) -> np.ndarray:
+def _values(transform: Transform, source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
     """Return the components (10, m) of something on frames (m,): those without keys as they are now."""
     rows, rest = continuous_values(source, frames), transform.components()
     for part in ROWS.keys() - source.keyed:
@@ -328,7 +328,12 @@ def _values(transform: Transform, source: Source, frames: np.ndarray) -> np.ndar
 
 
 def _corrected(
-    transform: Transform, source: Source, start: np.ndarray, share: np.ndarray, slides: np.ndarray, turns: np.ndarray
+    transform: Transform,
+    source: KeyedTransform,
+    start: np.ndarray,
+    share: np.ndarray,
+    slides: np.ndarray,
+    turns: np.ndarray,
 ) -> np.ndarray:
     """Return components (10, m) with a share (m, 1) of corrections made: slides and rotation vectors (m, 3) in the axes
     of what is moved.
@@ -346,7 +351,7 @@ def _corrected(
 def _write(
     transform: Transform,
     binding: Binding,
-    source: Source,
+    source: KeyedTransform,
     frames: np.ndarray,
     moved: np.ndarray,
     values: np.ndarray,
@@ -360,7 +365,7 @@ def _write(
         fields = key_fields(fcurve.keyframe_points)
         at = np.searchsorted(frames, fields["co"][:, 0] - SAME_FRAME)
         by = np.stack((moved[at] - frames[at], values[row, at] - fields["co"][:, 1]), axis=1)
-        for name in POINTS:
+        for name in POINT_ATTRIBUTES:
             fields[name] += by.astype(np.float32)
         for name in ("select_control_point", "select_left_handle", "select_right_handle") if select else ():
             fields[name][:, 0] = bridged[at]

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...gltf.errors import PARTS
+from ...gltf.errors import PARTS_PER_GAP
 from ..actions.slots import Binding
 from ..evaluation.components import MODE_NUMBERS, PART_OF, ROWS, SCALE
-from ..evaluation.sources import SAME_FRAME, Source, distinct
+from ..evaluation.sources import SAME_FRAME, KeyedTransform, distinct
 from ..fcurves.keys import CODE, CONSTANT, LINEAR, Keys
 from ..transforms import Refused, Transform
-from .motions import SMALLEST, continuous_values, without
+from .motions import SINGLE_PRECISION_RATIO, continuous_values, without
 
 
 class NeedsItsKeys(Refused):
@@ -44,8 +44,8 @@ class FewerKeys(NamedTuple):
     """The keys that one slot is to have, and those that it has."""
 
     binding: Binding
-    source: Source
-    fewer: Source
+    source: KeyedTransform
+    fewer: KeyedTransform
     largest_error: float
     """In the scene's units; of a rig that of all its bones, with and without keys, but for those not promised."""
 
@@ -61,7 +61,7 @@ class FewerKeys(NamedTuple):
         return count_of(self.fewer)
 
 
-def count_of(source: Source) -> int:
+def count_of(source: KeyedTransform) -> int:
     """Return on how many frames a source has keys."""
     return len(distinct(source.keyed_frames))
 
@@ -71,32 +71,32 @@ def united(frames: Iterable[np.ndarray]) -> np.ndarray:
     return distinct(np.unique(np.concatenate(list(frames))))
 
 
-def samples_of(source: Source) -> np.ndarray:
+def samples_of(source: KeyedTransform) -> np.ndarray:
     """Return the frames that keys may be on: those of the source's, and whole ones between these."""
     keys = distinct(source.keyed_frames)
     whole = np.arange(np.ceil(keys[0]), np.floor(keys[-1]) + 1.0)
     return np.union1d(keys, without(whole, keys))
 
 
-def seen_frames(frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
+def seen_frames(frames: np.ndarray, sources: Sequence[KeyedTransform]) -> np.ndarray:
     """Return these frames and all whole ones that are seen: between them, and outside of keys that go on."""
     first, last = min(source.seen_range[0] for source in sources), max(source.seen_range[1] for source in sources)
     return np.union1d(frames, np.arange(np.floor(first), np.ceil(last) + 1.0))
 
 
-def moments(frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
+def moments(frames: np.ndarray, sources: Sequence[KeyedTransform]) -> np.ndarray:
     """Return these frames and the moments between them that are looked at: eighths, and those just before jumps."""
     jumps = [
         keys.times[1:][(keys.interpolation[:, :-1] == CONSTANT).any(axis=0)] - 2.0 * SAME_FRAME
         for source in sources
         for keys in source.curves
     ]
-    eighths = np.arange(np.floor(frames[0]) * PARTS, np.ceil(frames[-1]) * PARTS + 1.0) / PARTS
+    eighths = np.arange(np.floor(frames[0]) * PARTS_PER_GAP, np.ceil(frames[-1]) * PARTS_PER_GAP + 1.0) / PARTS_PER_GAP
     more = np.concatenate((eighths, *jumps))
     return np.union1d(frames, without(more[(more > frames[0]) & (more < frames[-1])], frames))
 
 
-def values_on(transform: Transform, source: Source, frames: np.ndarray) -> dict[int, np.ndarray]:
+def values_on(transform: Transform, source: KeyedTransform, frames: np.ndarray) -> dict[int, np.ndarray]:
     """Return what the channels that get other keys have on rising frames, each (n,), by the rows of components."""
     values, keyed = continuous_values(source, frames), {row for rows, _ in source.channels for row in rows}
     rows = [row for row in transform.channels if PART_OF[row] in source.keyed]
@@ -105,7 +105,7 @@ def values_on(transform: Transform, source: Source, frames: np.ndarray) -> dict[
     return {row: values[row] for row in rows if row in keyed or not is_constant(values[row])}
 
 
-def has_uneven_scale(source: Source) -> bool:
+def has_uneven_scale(source: KeyedTransform) -> bool:
     """Return whether a scale is keyed that differs from axis to axis as it changes."""
     if SCALE not in source.keyed or source.uniform_scale:
         return False
@@ -114,10 +114,10 @@ def has_uneven_scale(source: Source) -> bool:
 
 def is_constant(columns: np.ndarray) -> np.ndarray:
     """Return whether values (n, ...) stay the same, shape (...)."""
-    return np.ptp(columns, axis=0) <= SMALLEST * np.maximum(np.abs(columns).max(axis=0), 1.0)
+    return np.ptp(columns, axis=0) <= SINGLE_PRECISION_RATIO * np.maximum(np.abs(columns).max(axis=0), 1.0)
 
 
-def with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray], mode: str) -> Source:
+def with_keys(source: KeyedTransform, frames: np.ndarray, values: dict[int, np.ndarray], mode: str) -> KeyedTransform:
     """Return the source with these keys alone in the channels that have values: straight lines between them, and holds
     where all channels held.
     """
@@ -139,7 +139,7 @@ def with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray],
     return replace(source, channels=tuple(channels), rest=rest, mode=MODE_NUMBERS[mode], turns=None)
 
 
-def _interpolations(source: Source, frames: np.ndarray) -> np.ndarray:
+def _interpolations(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
     """Return the codes of keys on these frames: whether all channels of the source hold until the next, shape (k,)."""
     codes = np.full(len(frames), LINEAR, CODE)
     keys, moving = source.key_frames, np.append(0, np.cumsum(~source.holds))

@@ -20,7 +20,7 @@ from ..actions.marks import write_marks
 from ..actions.slots import Binding
 from ..evaluation.components import MODE_NUMBERS, PART_OF, SCALE
 from ..evaluation.marks import turns_at
-from ..evaluation.sources import SAME_FRAME, Run, Source
+from ..evaluation.sources import SAME_FRAME, HoldRun, KeyedTransform
 from ..fcurves.keys import LINEAR
 from ..holds.holders import holders_of
 from ..holds.placing import channel_space
@@ -29,15 +29,15 @@ from ..transforms.sizes import radius_of, reaches_of, scale_in_scene
 from .fewer_keys import WholeRig, count_of, has_uneven_scale
 from .native_curves import handles_of
 from .search import fewer_keys
-from .worlds import RESTS, say_holds
+from .worlds import MAX_CHANNEL_ROUNDING, say_holds
 
 
 class FewerRuns(NamedTuple):
     """The runs of something held that are to have fewer keys, and what it has now."""
 
     binding: Binding
-    source: Source
-    runs: Sequence[tuple[Run, Source]]
+    source: KeyedTransform
+    runs: Sequence[tuple[HoldRun, KeyedTransform]]
     """Those that get fewer keys, and these."""
 
     largest_error: float
@@ -53,7 +53,7 @@ class FewerRuns(NamedTuple):
 
 
 def fewer_runs(
-    transform: Transform, binding: Binding, source: Source, mode: str, tolerance: float, radius: float | None
+    transform: Transform, binding: Binding, source: KeyedTransform, mode: str, tolerance: float, radius: float | None
 ) -> FewerRuns | None:
     """Return the runs of something held that can have fewer keys, None where none can. For the rest `fewer_keys`."""
     radius, depsgraph = _reach(transform, radius), bpy.context.evaluated_depsgraph_get()
@@ -92,7 +92,7 @@ def _reach(transform: Transform, radius: float | None) -> float:
     return max(away) * size
 
 
-def _turns(source: Source, run: Run) -> bool:
+def _turns(source: KeyedTransform, run: HoldRun) -> bool:
     """Return whether a run makes whole turns more, which fewer keys do not."""
     if source.turns is None:
         return False
@@ -100,9 +100,9 @@ def _turns(source: Source, run: Run) -> bool:
     return bool(turns_at(source.turns, np.append(run.stretch.first + SAME_FRAME, inside)).any())
 
 
-def _begun(source: Source, first: float) -> Source:
+def _begun(source: KeyedTransform, first: float) -> KeyedTransform:
     """Return a source with a single key on the frame on which its run begins, where it rests from there on."""
-    if any(np.ptp(keys.values, axis=1).max() > RESTS for keys in source.curves):
+    if any(np.ptp(keys.values, axis=1).max() > MAX_CHANNEL_ROUNDING for keys in source.curves):
         return source
     rests = [(rows, keys.at(np.arange(len(keys.times)) == 0)) for rows, keys in source.channels]
     for _, keys in rests:
@@ -145,7 +145,7 @@ def write_runs(transform: Transform, fewer: FewerRuns, mode: str) -> None:
     say_holds(binding, source.held)
 
 
-def _keys_of(source: Source | None, row: int) -> KeyFields | None:
+def _keys_of(source: KeyedTransform | None, row: int) -> KeyFields | None:
     """Return the keys of a component of a source, None where it has none."""
     for rows, keys in () if source is None else source.channels:
         if row in rows:

@@ -31,7 +31,7 @@ from ..edits.apply import Readings, Target, apply_edit, readable
 from ..edits.holding import DEFAULT_MODE
 from ..evaluation.components import LOCATION, MODE_NUMBERS, PART_OF, ROTATION, ROWS, SCALE
 from ..evaluation.differences import seen_values
-from ..evaluation.sources import SAME_FRAME, Source, distinct
+from ..evaluation.sources import SAME_FRAME, KeyedTransform, distinct
 from ..fcurves.keys import CONSTANT, LINEAR
 from ..holds.dependencies import Node, follows, node_of
 from ..holds.holders import add_holder, holders_of
@@ -43,19 +43,19 @@ from ..transforms.sizes import radius_of
 from .fewer_keys import count_of, samples_of
 from .originals import REDUCED, Originals
 from .reducing import Reduction, channel_keys
-from .resting import Body, Rest, relative
+from .resting import BodyPoses, RestStretch, relative
 from .worlds import alone_in, worlds_of
 
-LEAST = 5
+DEFAULT_MIN_HOLD_FRAMES = 5
 """The fewest frames on which something is held, where nothing else is said."""
 
-HAND = 0.005
+DEFAULT_HAND_TOLERANCE = 0.005
 """The tolerance where nothing else is said: recorded hands give way."""
 
-CLEARLY = 4.0
+MIN_MOVE_PER_TOLERANCE = 4.0
 """What is held moves in the world by more than so many tolerances, and by more than so many of its errors."""
 
-GROWN = 1e-3
+MAX_GROWTH_RATIO = 1e-3
 """The part of its size by which something may grow, and counts as rigid."""
 
 NOTHING_HELD = n_(
@@ -63,13 +63,13 @@ NOTHING_HELD = n_(
     "tolerance, or select what holds it"
 )
 NO_HANDS = n_("There is nothing that could hold {name}: select objects or rigs, too")
-SPARSE = n_(
+SPARSE_REFUSAL = n_(
     "{name} has keys far apart around frame {frame:g}, whose in-betweens would change: bake them first (Bake to Keys)"
 )
 NO_KEYS = n_("{name} has no keys of location or rotation to be reduced: bake its motion first (Object > Animation)")
-GROWS = n_("{name} grows or shrinks, and what is held is of one size: remove the keys of its scale first")
+SCALE_REFUSAL = n_("{name} grows or shrinks, and what is held is of one size: remove the keys of its scale first")
 
-Offer = tuple[Node, Rest, float]
+Offer = tuple[Node, RestStretch, float]
 """What may hold something, when, and how far away it is."""
 
 Holders = Iterable[bpy.types.Object | bpy.types.PoseBone]
@@ -104,10 +104,10 @@ class HeldSegment:
 def held_segments(
     prop: Target,
     holders: Holders | None = None,
-    tolerance: float = HAND,
+    tolerance: float = DEFAULT_HAND_TOLERANCE,
     radius: float | None = None,
     *,
-    least: int = LEAST,
+    least: int = DEFAULT_MIN_HOLD_FRAMES,
 ) -> list[HeldSegment]:
     """Return when something was held in what, as far as its keys tell: the longest and tightest first.
 
@@ -143,10 +143,10 @@ def held_segments(
 def reduce_into_holds(
     prop: Target,
     holders: Holders | None = None,
-    tolerance: float = HAND,
+    tolerance: float = DEFAULT_HAND_TOLERANCE,
     radius: float | None = None,
     *,
-    least: int = LEAST,
+    least: int = DEFAULT_MIN_HOLD_FRAMES,
     segments: Sequence[HeldSegment] | None = None,
 ) -> list[HeldSegment]:
     """Hold something where its keys say that it was held, with a key for each time, and return these.
@@ -156,7 +156,7 @@ def reduce_into_holds(
     """
     originals = Originals(REDUCED)
 
-    def plan(transform: Transform, readings: Readings) -> tuple[Binding, Source, list[HeldSegment]]:
+    def plan(transform: Transform, readings: Readings) -> tuple[Binding, KeyedTransform, list[HeldSegment]]:
         found = segments
         if found is None:
             found = _found(transform, readings, holders, tolerance, radius, least)
@@ -169,7 +169,7 @@ def reduce_into_holds(
         _refuse_sparse(transform, source, chosen)
         return binding, source, chosen
 
-    def act(transform: Transform, planned: tuple[Binding, Source, list[HeldSegment]]) -> list[HeldSegment]:
+    def act(transform: Transform, planned: tuple[Binding, KeyedTransform, list[HeldSegment]]) -> list[HeldSegment]:
         _hold(transform, *planned, originals)
         return planned[2]
 
@@ -177,7 +177,7 @@ def reduce_into_holds(
     return done
 
 
-def _keyed(transform: Transform, readings: Readings) -> tuple[Binding, Source]:
+def _keyed(transform: Transform, readings: Readings) -> tuple[Binding, KeyedTransform]:
     """Return what moves something, and what is keyed of it. `Refused` where it cannot be held as that says."""
     keyed = [(binding, source) for binding, source in readable(transform, readings) if source.channels]
     if not any({LOCATION, ROTATION} & source.keyed for _, source in keyed):
@@ -225,10 +225,10 @@ def _found(
     frames, radius = samples_of(source), radius or radius_of(transform.carrier)
     worlds = worlds_of(transform, nodes, frames)
     prop, sizes = poses_of(worlds.prop)
-    if np.ptp(sizes, axis=0).max() > GROWN * np.abs(sizes).max():
-        raise Refused(GROWS, name=transform.name)
+    if np.ptp(sizes, axis=0).max() > MAX_GROWTH_RATIO * np.abs(sizes).max():
+        raise Refused(SCALE_REFUSAL, name=transform.name)
     # The space of the channels is where the prop would be with nothing on them.
-    own = Body(relative(poses_of(worlds.prop @ np.linalg.inv(worlds.local))[0], prop), radius)
+    own = BodyPoses(relative(poses_of(worlds.prop @ np.linalg.inv(worlds.local))[0], prop), radius)
     free = _free(source, frames)
     # Where more is to be seen before and behind its keys it rests there.
     free[[0, -1]] &= binding.slot.seen[0] >= frames[0], binding.slot.seen[1] <= frames[-1]
@@ -238,12 +238,12 @@ def _found(
     for node, places in zip(nodes, worlds.nodes, strict=True):
         holder, growth = poses_of(places)
         # What is held by something that grows would grow with it.
-        if np.ptp(growth, axis=0).max() > GROWN * np.abs(growth).max():
+        if np.ptp(growth, axis=0).max() > MAX_GROWTH_RATIO * np.abs(growth).max():
             continue
-        there = Body(relative(holder, prop), radius)
+        there = BodyPoses(relative(holder, prop), radius)
         for whole in there.rests(tolerance, free, least, anyway):
             rest = _without(whole, lies)
-            distance = max(tolerance, rest.largest) * CLEARLY
+            distance = max(tolerance, rest.largest) * MIN_MOVE_PER_TOLERANCE
             if rest.frames >= least and own.moves(rest, distance):
                 offers.append((node, rest, float(np.linalg.norm(rest.pose.positions))))
                 scales[node] = growth[0]
@@ -253,7 +253,7 @@ def _found(
     ]
 
 
-def _free(source: Source, frames: np.ndarray) -> np.ndarray:
+def _free(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
     """Return on which frames (m,) nothing holds something, nor is it passed on."""
     free = np.ones(len(frames), dtype=bool)
     for run in source.runs:
@@ -264,7 +264,7 @@ def _free(source: Source, frames: np.ndarray) -> np.ndarray:
     return free
 
 
-def _without(rest: Rest, others: Iterable[Rest]) -> Rest:
+def _without(rest: RestStretch, others: Iterable[RestStretch]) -> RestStretch:
     """Return what is left of a rest without the ends that are in others."""
     first, last = rest.first, rest.last
     for other in sorted(others):
@@ -276,7 +276,7 @@ def _without(rest: Rest, others: Iterable[Rest]) -> Rest:
     return rest._replace(first=first, last=last)
 
 
-def _best(offers: list[Offer], tolerance: float, least: int) -> Iterator[tuple[Node, Rest]]:
+def _best(offers: list[Offer], tolerance: float, least: int) -> Iterator[tuple[Node, RestStretch]]:
     """Yield the best of what is offered, none of them overlapping: nodes, rests, and how far away nodes are.
 
     The longest and tightest one is the best: no error at all is worth twice the length. Of those that are equally good,
@@ -294,7 +294,7 @@ def _best(offers: list[Offer], tolerance: float, least: int) -> Iterator[tuple[N
         offers = [offer for offer in cut if offer[1].frames >= least]
 
 
-def _apart(rest: Rest, taken: Rest) -> Rest:
+def _apart(rest: RestStretch, taken: RestStretch) -> RestStretch:
     """Return the longer part of a rest that is outside of another one."""
     before = rest._replace(last=min(rest.last, taken.first - 1))
     after = rest._replace(first=max(rest.first, taken.last + 1))
@@ -302,7 +302,7 @@ def _apart(rest: Rest, taken: Rest) -> Rest:
 
 
 def _segment(
-    node: Node, rest: Rest, frames: np.ndarray, keys: np.ndarray, scales: tuple[np.ndarray, np.ndarray]
+    node: Node, rest: RestStretch, frames: np.ndarray, keys: np.ndarray, scales: tuple[np.ndarray, np.ndarray]
 ) -> HeldSegment:
     """Return the segment of a rest. Scales (3,) are the prop's and the holder's in the world."""
     first, last = frames[[rest.first, rest.last]].tolist()
@@ -313,7 +313,7 @@ def _segment(
     return HeldSegment(*node, first, last, rest.largest, inside, grip)
 
 
-def _refuse_sparse(transform: Transform, source: Source, segments: Iterable[HeldSegment]) -> None:
+def _refuse_sparse(transform: Transform, source: KeyedTransform, segments: Iterable[HeldSegment]) -> None:
     """Raise `Refused` where in-betweens that are not straight lines depend on keys that are to go."""
     keys, frames = source.key_frames, samples_of(source)
     shaped = (source.modes != 0) | np.array([_is_shaped(source, frame) for frame in keys[:-1].tolist()], dtype=bool)
@@ -324,10 +324,10 @@ def _refuse_sparse(transform: Transform, source: Source, segments: Iterable[Held
         # That in which it is no longer, and the one beside it, whose tangent is another one then.
         for place in (first - 2, first - 1, until - 1, until):
             if 0 <= place < len(shaped) and shaped[place]:
-                raise Refused(SPARSE, name=transform.name, frame=keys[place])
+                raise Refused(SPARSE_REFUSAL, name=transform.name, frame=keys[place])
 
 
-def _is_shaped(source: Source, frame: float) -> bool:
+def _is_shaped(source: KeyedTransform, frame: float) -> bool:
     """Return whether anything but straight lines and holds goes on from a key."""
     return any(
         not np.isin(keys.interpolation[:, place], (LINEAR, CONSTANT)).all()
@@ -339,7 +339,7 @@ def _is_shaped(source: Source, frame: float) -> bool:
 class _Switches:
     """When something is held in which of its new holders, k times one behind the other."""
 
-    def __init__(self, source: Source, segments: Sequence[HeldSegment], numbers: Sequence[int]) -> None:
+    def __init__(self, source: KeyedTransform, segments: Sequence[HeldSegment], numbers: Sequence[int]) -> None:
         frames = samples_of(source)
         self.source, self.holds = source, np.array([hold(number) for number in numbers])
         self.begins = np.array([segment.first for segment in segments])
@@ -368,7 +368,7 @@ class _Switches:
 
 
 def _hold(
-    transform: Transform, binding: Binding, source: Source, segments: list[HeldSegment], originals: Originals
+    transform: Transform, binding: Binding, source: KeyedTransform, segments: list[HeldSegment], originals: Originals
 ) -> None:
     """Have something be held in these segments, in their order: a key where each begins, and one behind it."""
     notes, before = originals.keep(binding), channel_keys(binding)

@@ -23,16 +23,16 @@ from ..evaluation.bodies import turn_into_quaternions
 from ..evaluation.channel_values import rotation_values
 from ..evaluation.components import LOCATION, ROTATION, ROWS, SCALE
 from ..evaluation.differences import channel_differences, seen_values
-from ..evaluation.sources import SAME_FRAME, Source
-from ..fcurves.keys import LARGEST
+from ..evaluation.sources import SAME_FRAME, KeyedTransform
+from ..fcurves.keys import MAX_NUMBER
 from ..transforms import WIDTHS, Channel, Transform
 from ..transforms.posing import Hierarchy
 from ..transforms.sizes import into_scene, radius_of, reaches_of, scale_in_scene
 
-MOVING = {*WIDTHS, "rotation_mode"}
+MOVING_CHANNELS = {*WIDTHS, "rotation_mode"}
 """Properties of bones that a driver moves them by."""
 
-SMALLEST = 1e-6
+SINGLE_PRECISION_RATIO = 1e-6
 """Errors of single precision, relative to how far something gets."""
 
 LEAST_SCALE = 1e-6
@@ -52,7 +52,7 @@ def not_promised(rig: bpy.types.Object) -> tuple[str, ...]:
     animated |= {driver.data_path for driver in drivers}
     bones, followers = pose_bones(rig), set()
     for bone in bones:
-        if not driven.isdisjoint(f"{bone.path_from_id()}.{name}" for name in MOVING):
+        if not driven.isdisjoint(f"{bone.path_from_id()}.{name}" for name in MOVING_CHANNELS):
             followers.add(bone.name)
         for constraint in bone.constraints:
             switches = {f"{constraint.path_from_id()}.{name}" for name in ("influence", "mute", "enabled")}
@@ -71,7 +71,7 @@ def without(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     return frames[np.searchsorted(others, frames - SAME_FRAME) == np.searchsorted(others, frames + SAME_FRAME)]
 
 
-def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Poses, AffineMaps]:
+def shown(transform: Transform, source: KeyedTransform, frames: np.ndarray) -> tuple[Poses, AffineMaps]:
     """Return how a source is seen on these frames (n,), with the object's own delta transforms, and what is not keyed.
 
     Returns
@@ -86,7 +86,7 @@ def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Pos
 
 
 def shown_together(
-    transforms: Sequence[Transform], sources: Sequence[Source], frames: np.ndarray
+    transforms: Sequence[Transform], sources: Sequence[KeyedTransform], frames: np.ndarray
 ) -> Iterator[tuple[Poses, AffineMaps]]:
     """Yield what `shown` returns for each of several transforms."""
     step = max(1, AT_ONCE // len(frames))
@@ -112,7 +112,7 @@ def evaluated(
         fcurve = curves.get(channel)
         if fcurve is not None and not fcurve.mute and not fcurve.is_empty:
             rows[row] = [fcurve.evaluate(frame) for frame in frames.tolist()]
-    rows = np.where(np.abs(rows) < LARGEST, rows, rest[:, None])
+    rows = np.where(np.abs(rows) < MAX_NUMBER, rows, rest[:, None])
     return _placed(transform, rows, transform.original())
 
 
@@ -127,7 +127,7 @@ def _placed(transform: Transform, rows: np.ndarray, delta: np.ndarray) -> tuple[
     return Poses(positions if along is None else positions @ along.T, quaternions, mean), maps
 
 
-def continuous_values(source: Source, frames: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
+def continuous_values(source: KeyedTransform, frames: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
     """Return what the channels of a source have on rising frames (m,), without jumps of rotation, shape (10, m).
 
     `added` (10, m) is what is on top of that.
@@ -165,7 +165,7 @@ class BodyMotion:
         self,
         joints: Sequence[Transform],
         slot: Slot,
-        sources: Mapping[int, Source],
+        sources: Mapping[int, KeyedTransform],
         frames: np.ndarray,
         radius: float | None,
         space: np.ndarray | None = None,
@@ -192,12 +192,12 @@ class BodyMotion:
         self.extent = float(away.max()) / self.unit
         """The distance that any ball gets from the object's origin, in that unit."""
         moved = float(np.abs(self.truth.origins[0]).max()) if 0 in sources else 0.0
-        self.rounding = SMALLEST * (moved + float(away.max()))
+        self.rounding = SINGLE_PRECISION_RATIO * (moved + float(away.max()))
 
     def _look_at(self, frames: np.ndarray) -> list[Poses]:
         """Have all joints be as they were recorded on these frames, and return the poses of their channels."""
         self.frames = frames
-        self._shown: dict[int, Source | None] = {}
+        self._shown: dict[int, KeyedTransform | None] = {}
         keyed = shown_together([self.joints[number] for number in self._sources], [*self._sources.values()], frames)
         known = dict(zip(self._sources, keyed, strict=True))
         result = [known.get(n) or evaluated(joint, self._curves, frames) for n, joint in enumerate(self.joints)]
@@ -225,7 +225,7 @@ class BodyMotion:
         own_scales, *bone_scales = (cast(np.ndarray, poses.scales) for poses in self.poses)
         size = float(own_scales[0]) or 1.0
         local = [Poses(own.positions / size, own.quaternions, own_scales / size)]
-        grows = any(np.abs(scales - 1.0).max() > SMALLEST for scales in bone_scales)
+        grows = any(np.abs(scales - 1.0).max() > SINGLE_PRECISION_RATIO for scales in bone_scales)
         parents = self.parents.copy()
         for number, poses in enumerate(of_bones, 1):
             bone: Any = self.joints[number].carrier
@@ -240,7 +240,7 @@ class BodyMotion:
             local.append(placed(Poses(np.array(position), np.array(turn)), poses))
         scales = np.maximum([poses.scales for poses in local], LEAST_SCALE)
         positions, quaternions = (np.stack([getattr(p, name) for p in local]) for name in ("positions", "quaternions"))
-        grows = np.abs(scales - 1.0).max() > SMALLEST
+        grows = np.abs(scales - 1.0).max() > SINGLE_PRECISION_RATIO
         heads = parents != self.parents
         chains = 1 + max(np.count_nonzero(heads[[*self.above(number)]]) for number in range(len(heads)))
         return parents, Poses(positions, align_signs(quaternions), scales if grows else None), chains**-0.5
@@ -251,7 +251,7 @@ class BodyMotion:
             self._posed[0] = self._parent @ self._channels[0]
         self.hierarchy.pose([number - 1 for number in numbers if number], self._channels[1:], self._posed[1:])
 
-    def show(self, sources: Mapping[int, Source | None]) -> None:
+    def show(self, sources: Mapping[int, KeyedTransform | None]) -> None:
         """Let joints be moved by other keys, or as they were where it is None."""
         changed = {number: source for number, source in sources.items() if source is not self._shown.get(number)}
         now = {number: source for number, source in changed.items() if source is not None}

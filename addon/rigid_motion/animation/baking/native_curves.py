@@ -15,10 +15,19 @@ import bpy
 import numpy as np
 
 from ...blender import channelbag_in
-from ...motion.cubic_keys import CONSTANT, CUBIC, THIRD, CubicKeys, Samples, errors_between, fitted_together, keyed_at
+from ...motion.cubic_keys import (
+    CONSTANT_KIND,
+    CUBIC_KIND,
+    THIRD_RATIO,
+    CubicKeys,
+    Samples,
+    errors_between,
+    fitted_together,
+    keyed_at,
+)
 from ..actions.channels import KeyFields, code_of, key_points, replace_keys
 from ..evaluation.components import LOCATION, PART_OF, ROTATION, ROWS
-from ..evaluation.sources import Source
+from ..evaluation.sources import KeyedTransform
 from ..fcurves.evaluation import evaluate
 from ..fcurves.keys import BEZIER, CODE, Keys
 from ..transforms import Transform
@@ -27,26 +36,26 @@ from .fewer_keys import is_constant, values_on
 NATIVE = "NATIVE_CURVES"
 """What is asked for in place of a mode."""
 
-UNSMOOTHED = 1.0 / 2.5614
+UNSMOOTHED_RATIO = 1.0 / 2.5614
 """The length of automatic handles where Auto Handle Smoothing of F-curves is None, as in files of old."""
 
-WORTH, NEARER = 0.9, 0.25
+MAX_KEYS_RATIO, MAX_ERROR_RATIO = 0.9, 0.25
 """Handles are so long where that leaves no more than this share of the keys, or as many with a quarter of the error."""
 
-LENGTHS = 1e-4
+QUATERNION_LENGTH_WEIGHT = 1e-4
 """The weight of a quaternion's length: handles are to look as if set by hand, and what is between frames stays near."""
 
-ASKED = 5
+FIRST_TRIAL_CURVES = 5
 """So many are tried first, to see whether any gains by that."""
 
-TRIES = 8
+MAX_AUTOMATIC_TRIES = 8
 """So often automatic handles are tried on fewer keys than before."""
 
-COLLINEAR = 1e-4
+MAX_COLLINEAR_SLOPE_RATIO = 1e-4
 """Handles are in one line whose slopes differ by less, relative to the larger of them."""
 
-ROUNDING = 3e-3
-"""That of single precision, relative to the value, over `COLLINEAR`."""
+SLOPE_ROUNDING_RATIO = 3e-3
+"""That of single precision, relative to the value, over `MAX_COLLINEAR_SLOPE_RATIO`."""
 
 
 class JointCurves:
@@ -66,7 +75,7 @@ class JointCurves:
     """
 
     def __init__(
-        self, transform: Transform, source: Source, frames: np.ndarray, reach: float, allowed: np.ndarray
+        self, transform: Transform, source: KeyedTransform, frames: np.ndarray, reach: float, allowed: np.ndarray
     ) -> None:
         self.source, self.frames = source, frames
         self.values = values_on(transform, source, frames)
@@ -83,7 +92,7 @@ class JointCurves:
                 if turns:
                     # Half of their angle counts.
                     values, by = values / np.linalg.norm(values, axis=1, keepdims=True), 2.0 * reach
-                self.parts.append((rows, Samples(values, allowed / by, turns, lengths=LENGTHS)))
+                self.parts.append((rows, Samples(values, allowed / by, turns, lengths=QUATERNION_LENGTH_WEIGHT)))
 
     def scaled(self, scale: float) -> list[Samples]:
         """Return the samples of all parts, which may be so many times as far off."""
@@ -101,7 +110,7 @@ class JointCurves:
         errors = np.max([errors_between(self.frames, samples, at) for _, samples in self.parts], axis=0)
         return len(keys), float(np.median(errors))
 
-    def keyed(self, keys: np.ndarray, scale: float) -> Source:
+    def keyed(self, keys: np.ndarray, scale: float) -> KeyedTransform:
         """Return the source with keys on these frames (k,) alone; what does not move has a single one."""
         at = np.searchsorted(self.frames, keys)
         channels = []
@@ -127,8 +136,8 @@ class JointCurves:
         arriving[0], leaving[-1] = leaving[0], arriving[-1]
         times, kinds = curves.times[:, None], curves.kinds.copy()
         # What is held is a curve as well, and no jump where its end is moved later.
-        kinds[:-1][(kinds[:-1] == CONSTANT) & (values[1:] == values[:-1]).all(axis=1)] = CUBIC
-        kinds[-1] = CUBIC
+        kinds[:-1][(kinds[:-1] == CONSTANT_KIND) & (values[1:] == values[:-1]).all(axis=1)] = CUBIC_KIND
+        kinds[-1] = CUBIC_KIND
         points, left, right = (
             np.stack((np.broadcast_to(x, y.shape), y), axis=-1).swapaxes(0, 1).astype(np.float32)
             for x, y in (
@@ -147,7 +156,7 @@ class JointCurves:
             cycles=None if old is None else old.cycles,
         )
 
-    def automatic(self, fewer: Source, scale: float, scratch: bpy.types.FCurve) -> Source:
+    def automatic(self, fewer: KeyedTransform, scale: float, scratch: bpy.types.FCurve) -> KeyedTransform:
         """Return the source with the handles that Blender sets where the curves stay within so much with them.
 
         A scratch F-curve is needed for that.
@@ -161,7 +170,7 @@ class JointCurves:
     def _with_automatic(self, keys: Keys, samples: Samples, scratch: bpy.types.FCurve) -> Keys:
         begins = np.searchsorted(self.frames, keys.times)
         flags = np.ones(len(begins), dtype=bool)
-        for _ in range(TRIES):
+        for _ in range(MAX_AUTOMATIC_TRIES):
             tried = _shaped(
                 replace(keys, automatic=np.broadcast_to(flags[:, None], (*keys.points.shape[:2], 2))), scratch
             )
@@ -194,13 +203,13 @@ def choose_handles(curves: Mapping[int, JointCurves]) -> None:
     """Have joints have handles of the length with which they need the fewest keys."""
     count = len(curves)
     moving = [number for number, joint in curves.items() if joint.parts]
-    first = moving[:: max(1, count // ASKED)]
+    first = moving[:: max(1, count // FIRST_TRIAL_CURVES)]
     for some in (first, [number for number in moving if number not in first]):
         gained = False
         for joint in map(curves.__getitem__, some):
-            (keys, error), (others, less) = joint.fit(THIRD), joint.fit(UNSMOOTHED)
-            gains = others <= WORTH * keys or (others <= keys and less <= NEARER * error)
-            joint.with_handles(UNSMOOTHED if gains else THIRD)
+            (keys, error), (others, less) = joint.fit(THIRD_RATIO), joint.fit(UNSMOOTHED_RATIO)
+            gains = others <= MAX_KEYS_RATIO * keys or (others <= keys and less <= MAX_ERROR_RATIO * error)
+            joint.with_handles(UNSMOOTHED_RATIO if gains else THIRD_RATIO)
             gained |= gains
         if not gained:
             break
@@ -233,7 +242,7 @@ def write_keys(fcurve: bpy.types.FCurve, keys: Keys, channel: int) -> None:
     points = keys.points[channel]
     if keys.automatic is not None and keys.right is not None:
         longest = (keys.right[channel, :-1, 0] - points[:-1, 0]) / np.diff(points[:, 0])
-        fcurve.auto_smoothing = "NONE" if np.any(longest > (THIRD + UNSMOOTHED) / 2.0) else "CONT_ACCEL"
+        fcurve.auto_smoothing = "NONE" if np.any(longest > (THIRD_RATIO + UNSMOOTHED_RATIO) / 2.0) else "CONT_ACCEL"
     replace_keys(
         fcurve, keys.times, points[:, 1], interpolation=keys.interpolation[channel], handle_type="AUTO_CLAMPED"
     )
@@ -248,8 +257,8 @@ def handles_of(keys: Keys, channel: int) -> KeyFields:
         return {}
     points, left, right = keys.points[channel], keys.left[channel], keys.right[channel]
     (before, rise), (behind, rest) = (points - left).T.astype(float), (right - points).T.astype(float)
-    size = np.maximum(np.abs(rise), np.abs(rest)) + ROUNDING * np.abs(points[:, 1])
-    straight = np.abs(rise * behind - rest * before) <= COLLINEAR * size * (before + behind)
+    size = np.maximum(np.abs(rise), np.abs(rest)) + SLOPE_ROUNDING_RATIO * np.abs(points[:, 1])
+    straight = np.abs(rise * behind - rest * before) <= MAX_COLLINEAR_SLOPE_RATIO * size * (before + behind)
     aligned, free, automatic = (code_of("handle_left_type", name) for name in ("ALIGNED", "FREE", "AUTO_CLAMPED"))
     types = np.where(straight, aligned, free).astype(np.int32)
     if keys.automatic is not None:

@@ -22,7 +22,7 @@ from ..actions.slots import Binding
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
 from ..edits.mode_keys import set_mode_in
 from ..evaluation.components import PART_OF, SCALE
-from ..evaluation.sources import Source
+from ..evaluation.sources import KeyedTransform
 from ..transforms import Note, Refused, Transform, transform_of
 from .bake import go_back
 from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, count_of, has_uneven_scale
@@ -31,13 +31,13 @@ from .native_curves import NATIVE, write_keys
 from .originals import CLEANED, REDUCED, Originals, discard_originals, last_change, notes_of
 from .search import NO_FEWER, NOT_SO_MANY, NotFewer, fewer_keys
 
-HELD = n_("{name} is held, and is reduced for each time that it is so: by a tolerance, not to a number of keys")
+HELD_REFUSAL = n_("{name} is held, and is reduced for each time that it is so: by a tolerance, not to a number of keys")
 
-SMOOTH = "motor_spline"
+SMOOTH_MODE = "motor_spline"
 """The mode that mostly needs the fewest keys."""
 
 FEWEST = "FEWEST"
-"""Asks for `NATIVE` or `SMOOTH`, whichever needs fewer keys, or a mode that needs fewer than both."""
+"""Asks for `NATIVE` or `SMOOTH_MODE`, whichever needs fewer keys, or a mode that needs fewer than both."""
 
 Plans = dict[Transform, "list[FewerKeys | FewerRuns] | Refused"]
 """The keys that targets are to have in each slot that moves them; or why they cannot."""
@@ -75,7 +75,7 @@ class Reduction:
 
 def reduce_keys_of(
     targets: Targets,
-    mode: str = SMOOTH,
+    mode: str = SMOOTH_MODE,
     tolerance: float = 0.001,
     radius: float | None = None,
     *,
@@ -119,7 +119,7 @@ def reduce_keys_of(
     """
     modes: tuple[str, ...] = (mode,)
     if mode == FEWEST:  # So many keys are so many with each.
-        modes = (NATIVE, SMOOTH) if count else tuple(dict.fromkeys((NATIVE, SMOOTH, *KEYFRAME_MODES)))
+        modes = (NATIVE, SMOOTH_MODE) if count else tuple(dict.fromkeys((NATIVE, SMOOTH_MODE, *KEYFRAME_MODES)))
     if mode not in (NATIVE, FEWEST) and mode not in KEYFRAME_MODES:
         raise Refused(no_such_mode(mode, KEYFRAME_MODES))
     if not 0.0 < tolerance < math.inf:
@@ -179,7 +179,7 @@ def _plans(
     What is held moves with its holder, and so by itself. `NotFewer` where so many keys are left, or more.
     """
     plans: Plans = {}
-    together: dict[tuple, dict[Transform, tuple[Binding, Source]]] = {}
+    together: dict[tuple, dict[Transform, tuple[Binding, KeyedTransform]]] = {}
     for transform, reading in readings.items():
         try:
             keyed = [(binding, source) for binding, source in readable(transform, reading) if source.channels]
@@ -195,7 +195,7 @@ def _plans(
             if source.held is None:
                 together.setdefault((transform.animated, *binding.slot.key), {})[transform] = binding, source
             elif count is not None:
-                plans[transform] = Refused(HELD, name=transform.name)
+                plans[transform] = Refused(HELD_REFUSAL, name=transform.name)
             elif (runs := fewer_runs(transform, binding, source, mode, tolerance, radius)) is not None:
                 of_runs.append(runs)
     for (obj, *_), members in together.items():
@@ -220,7 +220,9 @@ def _keys_left(plans: Plans, readings: Mapping[Transform, Readings]) -> int:
     count = 0
     for transform, plan in plans.items():
         fewer = {id(one.binding): one.after for one in plan} if isinstance(plan, list) else {}
-        sources = ((id(binding), source) for binding, source in readings[transform] if isinstance(source, Source))
+        sources = (
+            (id(binding), source) for binding, source in readings[transform] if isinstance(source, KeyedTransform)
+        )
         count += sum(fewer.get(binding, count_of(source)) for binding, source in sources if source.channels)
     return count
 
@@ -310,7 +312,7 @@ def channel_keys(binding: Binding) -> int:
     return sum(len(fcurve.keyframe_points) for fcurve in binding.curves.values())
 
 
-def _no_fewer(transform: Transform, keyed: Sequence[tuple[Binding, Source]], count: int | None) -> Refused:
+def _no_fewer(transform: Transform, keyed: Sequence[tuple[Binding, KeyedTransform]], count: int | None) -> Refused:
     before = sum(count_of(source) for _, source in keyed if source.channels)
     if before <= 2:
         text = n_(

@@ -13,20 +13,20 @@ from ...motion import Poses, shell_error
 from ...motion.poses import inverse, placed
 from ...motion.quaternions import from_matrices, matrices
 
-STEPS = 48
+MINIMAX_STEPS = 48
 """Steps towards the pose with the smallest largest error, which is then a few hundredths from the best one."""
 
-ROUNDS = 6
+MAX_EXTENSION_ROUNDS = 6
 """So often a stretch is made as long as the pose allows that is the best one of it."""
 
-TIGHTER = 0.5
+TIGHTER_ERROR_RATIO = 0.5
 """The share of an error that is worth a few frames at the ends of a stretch."""
 
-WORTH = 0.1
+MAX_FRAMES_LOST_RATIO = 0.1
 """The share of the frames that may be given up for that, and at least two."""
 
 
-class Rest(NamedTuple):
+class RestStretch(NamedTuple):
     """A stretch on which something is at rest."""
 
     first: int
@@ -43,7 +43,7 @@ class Rest(NamedTuple):
         return self.last - self.first + 1
 
 
-class Body:
+class BodyPoses:
     """A body with poses (m,) in something.
 
     Each pose is also a point: its origin, and its axes as long as the radius over the root of two. The distance of two
@@ -69,7 +69,7 @@ class Body:
         points = self.points[first : last + 1]
         center = (points.min(axis=0) + points.max(axis=0)) / 2.0
         best, smallest = center, np.inf
-        for step in range(STEPS):
+        for step in range(MINIMAX_STEPS):
             apart = points - center
             squared = np.einsum("ij,ij->i", apart, apart)
             worst = int(np.argmax(squared))
@@ -80,7 +80,9 @@ class Body:
         turn = left @ np.diag((1.0, 1.0, np.linalg.det(left @ right))) @ right
         return Poses(best[:3], from_matrices(turn))
 
-    def rests(self, tolerance: float, free: np.ndarray, least: int, anyway: np.ndarray | None = None) -> list[Rest]:
+    def rests(
+        self, tolerance: float, free: np.ndarray, least: int, anyway: np.ndarray | None = None
+    ) -> list[RestStretch]:
         """Return the stretches of at least so many free frames (m,) on which it is at rest, the longest first.
 
         None of them overlap. Each is as tight as it may be for a few frames less. None is within those from each frame
@@ -89,7 +91,7 @@ class Body:
         last = self.reached(tolerance, free)
         starts = np.arange(len(last))
         counts = np.where(free if anyway is None else free & (last > anyway), last - starts + 1, 0)
-        result: list[Rest] = []
+        result: list[RestStretch] = []
         while len(counts) and counts[first := int(np.argmax(counts))] >= least:
             rest = self._rest_within(first, int(last[first]), tolerance, least)
             if rest is None:
@@ -124,23 +126,23 @@ class Body:
             low, high = np.where(fits[:, None], lower, low), np.where(fits[:, None], higher, high)
         return at
 
-    def _rest_within(self, first: int, last: int, tolerance: float, least: int) -> Rest | None:
+    def _rest_within(self, first: int, last: int, tolerance: float, least: int) -> RestStretch | None:
         """Return a long stretch of these places on which it is at rest; None where none is long enough."""
         rest = self._longest(first, last, tolerance)
         if rest.frames < least:
             return None
         while rest.largest > 0.0:
-            tighter = self._longest(rest.first, rest.last, TIGHTER * rest.largest)
-            if tighter.frames < max(least, rest.frames - max(2, int(WORTH * rest.frames))):
+            tighter = self._longest(rest.first, rest.last, TIGHTER_ERROR_RATIO * rest.largest)
+            if tighter.frames < max(least, rest.frames - max(2, int(MAX_FRAMES_LOST_RATIO * rest.frames))):
                 break
             rest = tighter
         return rest
 
-    def _longest(self, first: int, last: int, tolerance: float) -> Rest:
+    def _longest(self, first: int, last: int, tolerance: float) -> RestStretch:
         """Return the longest stretch of these places that is found to be at rest, which may be a single frame."""
         begin, end = first, last
-        found = Rest(first, first, self.poses[first], 0.0)
-        for _ in range(ROUNDS):
+        found = RestStretch(first, first, self.poses[first], 0.0)
+        for _ in range(MAX_EXTENSION_ROUNDS):
             pose = self.best_pose(begin, end)
             errors = self.errors(first, last, pose)
             edges = np.flatnonzero(np.diff(np.concatenate(([False], errors <= tolerance, [False]))))
@@ -151,14 +153,14 @@ class Body:
             begins, ends = edges[::2], edges[1::2] - 1
             longest = int(np.argmax(ends - begins))
             near = slice(begins[longest], ends[longest] + 1)
-            rest = Rest(first + int(near.start), first + int(near.stop) - 1, pose, float(errors[near].max()))
+            rest = RestStretch(first + int(near.start), first + int(near.stop) - 1, pose, float(errors[near].max()))
             found = max(found, rest, key=lambda rest: (rest.frames, -rest.largest))
             if (rest.first, rest.last) == (begin, end):
                 break
             begin, end = rest.first, rest.last
         return found
 
-    def moves(self, rest: Rest, distance: float) -> bool:
+    def moves(self, rest: RestStretch, distance: float) -> bool:
         """Return whether it moves by more than a distance here while it is at rest in something else."""
         pose = self.best_pose(rest.first, rest.last)
         return bool(self.errors(rest.first, rest.last, pose).max() > distance)

@@ -19,7 +19,7 @@ from ...blender import pose_bones, scene
 from ...motion import reduce_keys, reduce_skeleton_keys
 from ...motion.contacts import slide, standing
 from ..actions.slots import Binding
-from ..evaluation.sources import SAME_FRAME, Source, distinct
+from ..evaluation.sources import SAME_FRAME, KeyedTransform, distinct
 from ..transforms import Refused, Transform, transform_of
 from .fewer_keys import (
     FewerKeys,
@@ -39,26 +39,26 @@ from .native_curves import NATIVE, JointCurves, choose_handles, needed, scratch_
 NO_FEWER = n_("{name} needs its {count} keys to stay within the tolerance: allow a larger one")
 NOT_SO_MANY = n_("{name} has {count} keys: ask for fewer")
 
-HOLD = 4.0
+CONTACT_WEIGHT = 4.0
 """The weight of the error of what stands on the ground."""
 
-APART = 4
+MIN_MEND_SPACING_FRAMES = 4
 """Frames between places that are mended at once."""
 
 AT_ONCE = 2**18
 """Joints times moments that are looked at in one go."""
 
-TRIES, TIGHTER, MOST = 3, 0.8, 3.0
+MAX_CURVE_TRIES, TIGHTENING_POWER, MAX_TIGHTENING = 3, 0.8, 3.0
 """So often curves are searched for, each time within less of the tolerance by this power of what they were over it, and
 by no more than this."""
 
-HALVINGS = 24
+MAX_BUDGET_HALVINGS = 24
 """The most steps towards the tolerance with which there are so many keys."""
 
-Members = Mapping[Transform, tuple[Binding, Source]]
+Members = Mapping[Transform, tuple[Binding, KeyedTransform]]
 """What one slot moves of an object and its bones, and is to have fewer keys: by what it moves, and what is keyed."""
 
-Keyed = Callable[[int, np.ndarray], Source]
+Keyed = Callable[[int, np.ndarray], KeyedTransform]
 """Returns the source of a joint, by its number, with keys on frames (k,) alone."""
 
 Over = list[tuple[float, int, int]]
@@ -88,7 +88,7 @@ def fewer_keys(
     `reduce_keys_of`. `Refused` where none of several can have fewer. With a `space`, see `BodyMotion`, the only member
     is looked at by itself. `NotFewer` where a mode needs so many keys, `below`, even before they are proven.
     """
-    body = _Body(obj, members, math.inf if count is not None else tolerance, radius, hold=hold, space=space)
+    body = _SearchedBody(obj, members, math.inf if count is not None else tolerance, radius, hold=hold, space=space)
     shared |= count is not None
     if mode == NATIVE:
         fewer = body.curved(count, shared=shared)
@@ -103,7 +103,7 @@ def fewer_keys(
     return body.plans(fewer)
 
 
-class _Body:
+class _SearchedBody:
     """An object and its bones as one slot moves them: those that are to have fewer keys, and all others as they are."""
 
     def __init__(
@@ -133,7 +133,7 @@ class _Body:
             render = scene().render
             seconds = self.frames * render.fps_base / render.fps
             self.stands[1:] = standing(seconds, self.motion.truth.origins[1:])
-        self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
+        self.weights = np.where(self.stands, CONTACT_WEIGHT, 1.0) if hold else np.ones(self.stands.shape)
         self.errors: np.ndarray = np.zeros(len(joints))
         """The largest displacement of any point in each joint's ball, as was proven last, shape (joints,)."""
         self.between: np.ndarray = np.zeros(len(joints))
@@ -163,7 +163,7 @@ class _Body:
             number: self._within_its_keys(times[rows], number) for number, rows in enumerate(keys) if not fixed[number]
         }
 
-    def curved(self, count: int | None, *, shared: bool) -> dict[int, Source]:
+    def curved(self, count: int | None, *, shared: bool) -> dict[int, KeyedTransform]:
         """Return the joints that get fewer keys, and these, with curves of Blender's own: see `proven`.
 
         They keep to the tolerance on frames. `between` becomes how far off joints are at all moments.
@@ -192,11 +192,13 @@ class _Body:
             result[number] = JointCurves(motion.joints[number], source, frames, motion.reach(number), allowed)
         return result
 
-    def _fewest(self, curves: dict[int, JointCurves], *, shared: bool) -> tuple[dict[int, Source], dict[int, float]]:
+    def _fewest(
+        self, curves: dict[int, JointCurves], *, shared: bool
+    ) -> tuple[dict[int, KeyedTransform], dict[int, float]]:
         """Return the fewest keys that are found for all joints, and by how much of what is allowed each is off."""
         choose_handles(curves)
-        scales, best, fewest = dict.fromkeys(curves, 1.0), (dict[int, Source](), dict[int, float]()), math.inf
-        for _ in range(TRIES):
+        scales, best, fewest = dict.fromkeys(curves, 1.0), (dict[int, KeyedTransform](), dict[int, float]()), math.inf
+        for _ in range(MAX_CURVE_TRIES):
             chosen, keyed = needed(curves, scales, shared=shared), _keyed(curves, scales)
             self.motion.show({number: keyed(number, keys) for number, keys in chosen.items()})
             # Errors of what hangs on one another add up.
@@ -208,14 +210,19 @@ class _Body:
                 best, fewest = (fewer, scales), count
             if max(excess.values()) == 1.0:
                 break
-            scales = {number: scale / min(excess[number], MOST) ** TIGHTER for number, scale in scales.items()}
+            scales = {
+                number: scale / min(excess[number], MAX_TIGHTENING) ** TIGHTENING_POWER
+                for number, scale in scales.items()
+            }
         return best
 
-    def _so_many(self, curves: dict[int, JointCurves], count: int) -> tuple[dict[int, Source], dict[int, float]]:
+    def _so_many(
+        self, curves: dict[int, JointCurves], count: int
+    ) -> tuple[dict[int, KeyedTransform], dict[int, float]]:
         """Return so many keys on the same frames for all joints, and by how much of what is allowed each is off."""
         low, high, keys = 0.0, 1.0, self.frames[self.sampled][[0, -1]]
-        for _ in range(HALVINGS):
-            scale = math.sqrt(low * high) or high / MOST**2
+        for _ in range(MAX_BUDGET_HALVINGS):
+            scale = math.sqrt(low * high) or high / MAX_TIGHTENING**2
             found = united(needed(curves, dict.fromkeys(curves, scale), shared=True).values())
             low, high, keys = (scale, high, keys) if len(found) > count else (low, scale, found)
             if len(keys) == count or low > high / 1.01:
@@ -233,8 +240,8 @@ class _Body:
             keys = np.union1d(keys, next((frame for frame in off if frame in left), left[0]))
 
     def _automatic(
-        self, curves: dict[int, JointCurves], fewer: dict[int, Source], scales: dict[int, float]
-    ) -> dict[int, Source]:
+        self, curves: dict[int, JointCurves], fewer: dict[int, KeyedTransform], scales: dict[int, float]
+    ) -> dict[int, KeyedTransform]:
         """Return the joints with the handles that Blender sets wherever all stays within the tolerance with them."""
         result = dict(fewer)
         with scratch_curve() as scratch:
@@ -250,7 +257,7 @@ class _Body:
         self._keep_to(self.allowed, result, mend)
         return result
 
-    def plans(self, fewer: Mapping[int, Source]) -> dict[Transform, FewerKeys]:
+    def plans(self, fewer: Mapping[int, KeyedTransform]) -> dict[Transform, FewerKeys]:
         """Return the plans for joints that have fewer keys by now."""
         joints, motion, whole = self.motion.joints, self.motion, None
         counted = np.ones(len(joints), dtype=bool)
@@ -282,7 +289,7 @@ class _Body:
     def with_mode(self, mode: str) -> Keyed:
         """Return what gives a joint keys on frames alone, with a mode."""
 
-        def keyed(number: int, keys: np.ndarray) -> Source:
+        def keyed(number: int, keys: np.ndarray) -> KeyedTransform:
             source, every = self.sources[number], np.union1d(self.frames, keys)
             at = np.searchsorted(every, keys)
             values = values_on(self.motion.joints[number], source, every)
@@ -290,13 +297,13 @@ class _Body:
 
         return keyed
 
-    def proven(self, chosen: dict[int, np.ndarray], keyed: Keyed, *, shared: bool) -> dict[int, Source]:
+    def proven(self, chosen: dict[int, np.ndarray], keyed: Keyed, *, shared: bool) -> dict[int, KeyedTransform]:
         """Return the joints that get fewer keys, and these, so that all of the body keeps to the tolerance.
 
         Keys are put back in `chosen`, the frames of each joint's, where the motion of the channels is off after all.
         What would not have fewer keys than before stays as it is.
         """
-        fewer: dict[int, Source] = {}
+        fewer: dict[int, KeyedTransform] = {}
 
         def have(numbers: Iterable[int]) -> None:
             for number in numbers:
@@ -314,7 +321,7 @@ class _Body:
         return fewer
 
     def _keep_to(
-        self, allowed: float, fewer: dict[int, Source], mend: Callable[[Over, BodyMotion], bool] | None = None
+        self, allowed: float, fewer: dict[int, KeyedTransform], mend: Callable[[Over, BodyMotion], bool] | None = None
     ) -> None:
         """Have `fewer` mended, of which all is shown, until nothing is over what is allowed at any moment.
 
@@ -394,7 +401,7 @@ def _apart(over: Over, motion: BodyMotion) -> Iterator[tuple[float, int, int]]:
     taken: set[tuple[int, int]] = set()
     for error, number, moment in over:
         # Once what it hangs on is put right, it may be, too.
-        chain, span = [*motion.above(number)], int(motion.frames[moment] // APART)
+        chain, span = [*motion.above(number)], int(motion.frames[moment] // MIN_MEND_SPACING_FRAMES)
         if taken.isdisjoint((item, near) for item in chain for near in (span - 1, span, span + 1)):
             taken.update((item, span) for item in chain)
             yield error, number, moment

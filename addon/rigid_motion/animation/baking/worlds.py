@@ -19,23 +19,23 @@ from ..actions.slots import Binding
 from ..evaluation.components import MODE_NUMBERS
 from ..evaluation.differences import seen_values
 from ..evaluation.runs import MOST_FRAMES, Switch
-from ..evaluation.sources import SAME_FRAME, Marks, Source
+from ..evaluation.sources import SAME_FRAME, KeyedTransform, Marks
 from ..following import follower
 from ..holds.dependencies import Node
 from ..holds.holders import is_ours
 from ..holds.placing import converted, world_matrix
 from ..transforms import Refused, Transform
 
-SEVERAL = n_(
+SEVERAL_REFUSAL = n_(
     "{name} moves by an Action that others have, too, and is elsewhere than they are: "
     "give it one of its own (Object > Relations > Make Single User)"
 )
 IN_STRIPS = n_("{name} moves by NLA strips: enter the only one that it has (NLA Editor, Tab), or bake the strips first")
 
-RESTS = 1e-6
+MAX_CHANNEL_ROUNDING = 1e-6
 """Values of channels that differ by less stand still."""
 
-MOMENTS = 9
+STILLNESS_SAMPLES = 9
 """So many moments tell whether something stands still."""
 
 
@@ -57,7 +57,7 @@ def alone_in(transform: Transform, bindings: Sequence[Binding]) -> Binding:
     if len(bindings) != 1 or not bindings[0].slot.plays_in(transform.animated):
         raise Refused(IN_STRIPS, name=transform.name)
     if len(bindings[0].users) > 1:
-        raise Refused(SEVERAL, name=transform.name)
+        raise Refused(SEVERAL_REFUSAL, name=transform.name)
     return bindings[0]
 
 
@@ -103,7 +103,7 @@ def _as_keyed(transform: Transform) -> Iterator[None]:
     frame, subframe = scene.frame_current, scene.frame_subframe
     others = [item for item in transform.carrier.constraints if not is_ours(item) and not item.mute]
     with ExitStack() as stack:
-        stack.enter_context(follower.follower.turn())
+        stack.enter_context(follower.follower.own_edits())
         stack.callback(scene.frame_set, frame, subframe=subframe)
         for constraint in others:
             stack.callback(setattr, constraint, "mute", False)
@@ -111,7 +111,7 @@ def _as_keyed(transform: Transform) -> Iterator[None]:
         yield
 
 
-def seen_range(source: Source, seen: tuple[int, int]) -> tuple[float, float]:
+def seen_range(source: KeyedTransform, seen: tuple[int, int]) -> tuple[float, float]:
     """Return the first and last frame on which keys or what holds something move it; `seen` is all there is to see."""
     begin, end = source.keyed_range
     if source.goes_on or source.hold_at(begin)[0]:
@@ -121,13 +121,13 @@ def seen_range(source: Source, seen: tuple[int, int]) -> tuple[float, float]:
     return begin, end
 
 
-def arrivals(source: Source, step: float) -> list[Switch]:
+def arrivals(source: KeyedTransform, step: float) -> list[Switch]:
     """Return the passes, longer than a step and a frame, to what something moves in as it arrives there."""
     result = []
     for switch, run in zip(source.switches, source.runs[1:], strict=True):
         if switch.frame - switch.begin > min(step, 1.0) + SAME_FRAME:
-            coming = seen_values(run.source, run.moments(np.linspace(switch.begin, switch.frame, MOMENTS)))
-            if np.ptp(coming, axis=1).max() > RESTS:
+            coming = seen_values(run.source, run.moments(np.linspace(switch.begin, switch.frame, STILLNESS_SAMPLES)))
+            if np.ptp(coming, axis=1).max() > MAX_CHANNEL_ROUNDING:
                 result.append(switch)
     return result
 

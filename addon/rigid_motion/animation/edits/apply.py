@@ -15,7 +15,7 @@ from bpy.app.translations import pgettext_n as n_
 from ..actions.reading import sources_of_users
 from ..actions.refusals import refuse_linked, refuse_numbers
 from ..actions.slots import Binding, bindings_of
-from ..evaluation.sources import Source
+from ..evaluation.sources import KeyedTransform
 from ..following import follower
 from ..queries.keyed import active_binding
 from ..transforms import Refused, Transform, transform_of
@@ -26,7 +26,7 @@ Target = bpy.types.Object | bpy.types.PoseBone | Transform
 Targets = Target | Iterable[Target]
 """One or several."""
 
-Readings = list[tuple[Binding, Source | Refused]]
+Readings = list[tuple[Binding, KeyedTransform | Refused]]
 """The bindings that move a target, and what is keyed in each of them as it has it; or why that cannot be filled in."""
 
 Plan = TypeVar("Plan")
@@ -68,13 +68,13 @@ def apply_edit(
         raise refusals[0] if len(refusals) == 1 else Refused("\n".join(map(str, refusals)))
     if refused is not None:
         refused.extend(refusals)
-    with follower.follower.turn():
+    with follower.follower.own_edits():
         results = {transform: act(transform, planned) for transform, planned in plans}
     follower.refresh(transform for transform, _ in plans)
     return results
 
 
-def readable(transform: Transform, readings: Readings) -> list[tuple[Binding, Source]]:
+def readable(transform: Transform, readings: Readings) -> list[tuple[Binding, KeyedTransform]]:
     """Return what is keyed of a transform in all of its bindings. `Refused` where one of them cannot be filled in."""
     result = []
     for binding, source in readings:

@@ -22,7 +22,7 @@ from ..evaluation.bodies import body_poses
 from ..evaluation.channel_values import channel_values
 from ..evaluation.components import AXIS_ANGLE, DEPENDS_ON_KEYS, MODE_NAMES, MODE_NUMBERS, ROWS, SCALE
 from ..evaluation.differences import in_betweens
-from ..evaluation.sources import SAME_FRAME, Source
+from ..evaluation.sources import SAME_FRAME, KeyedTransform
 from ..evaluation.turning import needs_turning
 from ..following import follower
 from ..following.inserted import set_key
@@ -175,7 +175,7 @@ class Breakdowns:
     @contextmanager
     def _edit(self) -> Iterator[None]:
         """Give all their keys back, edit them, and refresh."""
-        with follower.follower.turn():
+        with follower.follower.own_edits():
             for between in self._between:
                 between.put_back()
             yield
@@ -184,7 +184,7 @@ class Breakdowns:
             between.binding.slot.action.update_tag()
 
 
-def _without(source: Source, frame: float) -> Source:
+def _without(source: KeyedTransform, frame: float) -> KeyedTransform:
     """Return what is keyed but for this frame. A channel with no other key keeps its value."""
     channels, rest = [], dict(source.rest)
     for rows, keys in source.channels:
@@ -196,7 +196,7 @@ def _without(source: Source, frame: float) -> Source:
     return replace(source, channels=tuple(channels), rest=rest)
 
 
-def _components_near(source: Source, pose: Poses, near: np.ndarray) -> np.ndarray:
+def _components_near(source: KeyedTransform, pose: Poses, near: np.ndarray) -> np.ndarray:
     """Return the components that show one pose (1,) with the own delta transforms, shape (10,).
 
     The rotation is in the sign and the turn that `near` (10,) has, and so is the scale that the modes leave to Blender.

@@ -21,11 +21,11 @@ from ..actions.slots import Binding, bindings_of
 from ..evaluation.components import MODE_NUMBERS, PART_OF, ROWS, SCALE
 from ..evaluation.differences import seen_values
 from ..evaluation.runs import MOST_FRAMES
-from ..evaluation.sources import SAME_FRAME, Marks, Source
+from ..evaluation.sources import SAME_FRAME, KeyedTransform, Marks
 from ..following import follower
 from ..holds.holders import Holder, add_holder, basis_in, holders_of, world_in
 from ..holds.placing import matrices_of, poses_of, rows_of, world_matrix
-from ..holds.problems import STAYS, refuse_holder, refuse_motion, refuse_space
+from ..holds.problems import MAX_VALUE_ROUNDING, refuse_holder, refuse_motion, refuse_space
 from ..queries.keyed import active_binding, modes_in, source_of
 from ..queries.segments import frame_in_action
 from ..transforms import WIDTHS, Refused, Transform, transform_of
@@ -42,7 +42,7 @@ NOT_SHOWN = n_("{name} is hidden or excluded, and Blender does not know where it
 NO_SUCH_BONE = n_("{holder} has no bone {bone}: give the name of one of its pose bones")
 NOT_HELD = n_("{name} is held in nothing, so there is no grip to match: hold it first (Hold In)")
 NO_GRIP = n_("{name} was not held in {holder} before frame {frame:g}, so there is no grip to match")
-FRAMES = n_("{frames} is no number of frames to pass over: give a whole number from 0 to {most}")
+FRAMES_REFUSAL = n_("{frames} is no number of frames to pass over: give a whole number from 0 to {most}")
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def hold_in(
     """
     target, name = _target(holder, bone)
 
-    def plan(transform: Transform, readings: Readings) -> Source | None:
+    def plan(transform: Transform, readings: Readings) -> KeyedTransform | None:
         if frames is not None:
             _refuse_frames(frames)
         binding = active_binding(transform, [one for one, _ in readings])
@@ -118,7 +118,7 @@ def hold_in(
             raise Refused(NOT_SHOWN, name=transform.name)
         return source if source and source.channels else None
 
-    def act(transform: Transform, source: Source | None) -> None:
+    def act(transform: Transform, source: KeyedTransform | None) -> None:
         _hold(transform, source, target, name, frames)
 
     apply_edit(prop, plan, act, None)
@@ -240,10 +240,10 @@ def _target(holder: object, bone: str | None) -> tuple[bpy.types.Object | None, 
 
 def _refuse_frames(frames: int) -> None:
     if isinstance(frames, bool) or not isinstance(frames, int) or not 0 <= frames <= MOST_FRAMES:
-        raise Refused(FRAMES, frames=frames, most=MOST_FRAMES)
+        raise Refused(FRAMES_REFUSAL, frames=frames, most=MOST_FRAMES)
 
 
-def _source_in(binding: Binding, readings: Readings) -> Source:
+def _source_in(binding: Binding, readings: Readings) -> KeyedTransform:
     source = next(source for one, source in readings if one is binding)
     if isinstance(source, Refused):
         raise source
@@ -256,7 +256,7 @@ def _frame(transform: Transform) -> float:
 
 
 def _hold(
-    transform: Transform, source: Source | None, target: bpy.types.Object | None, bone: str, frames: int | None
+    transform: Transform, source: KeyedTransform | None, target: bpy.types.Object | None, bone: str, frames: int | None
 ) -> None:
     """Key a transform, which is keyed so, in the space of a holder on the frame that is shown."""
     seen, posed, frame = world_matrix(transform), transform.components(), _frame(transform)
@@ -299,17 +299,17 @@ def _key_seen(transform: Transform, number: int, seen: Matrix, frame: float) -> 
     _key(transform, rows, paths, frame)
 
 
-def _needs_key_before(source: Source | None, frame: float) -> bool:
+def _needs_key_before(source: KeyedTransform | None, frame: float) -> bool:
     """Return whether something has no key before a frame, or is not at rest since the last one."""
     keys = np.empty(0) if source is None else source.keyed_frames
     keys = keys[keys < frame - SAME_FRAME]
     if source is None or not len(keys):
         return True
     first, last = seen_values(source, np.array([keys[-1], max(frame - 1.0, keys[-1])])).T
-    return bool(np.abs(last - first).max() > STAYS)
+    return bool(np.abs(last - first).max() > MAX_VALUE_ROUNDING)
 
 
-def _rows_of(transform: Transform, source: Source | None, frame: float) -> np.ndarray:
+def _rows_of(transform: Transform, source: KeyedTransform | None, frame: float) -> np.ndarray:
     """Return the components (10,) that a transform has on a frame by a source. What has no keys there is as it is."""
     rows = transform.components()
     if source is not None:
@@ -318,7 +318,7 @@ def _rows_of(transform: Transform, source: Source | None, frame: float) -> np.nd
     return rows
 
 
-def _carried(transform: Transform, source: Source, holder: Holder | None, frame: float) -> Matrix | None:
+def _carried(transform: Transform, source: KeyedTransform, holder: Holder | None, frame: float) -> Matrix | None:
     """Return where a holder carries something on the frame that is shown, which is that of a switch."""
     run = next((run for run in source.runs if run.stretch.until > frame - SAME_FRAME), None)
     if run is None:

@@ -20,7 +20,7 @@ from ..actions.modifiers import add_cycles
 from ..actions.refusals import MOST_TURNS, refuse_linked, refuse_numbers
 from ..actions.slots import Binding
 from ..evaluation.components import MODE_NUMBERS
-from ..evaluation.sources import TURN_AXES, Source
+from ..evaluation.sources import TURN_AXES, KeyedTransform
 from ..fcurves.keys import Cycles
 from ..following.refreshing import mark_all
 from ..following.shared_turns import is_among, set_turns_in
@@ -161,7 +161,7 @@ def repeat(targets: Targets, mode: str = "REPEAT", *, refused: list[Refused] | N
         # Where it is refused for its Cycles as they are, this is the way out.
         binding = editable_binding(transform, [binding for binding, _ in readings])
         source = next(source for one, source in readings if one is binding)
-        if isinstance(source, Source):
+        if isinstance(source, KeyedTransform):
             channels = tuple((rows, replace(keys, cycles=cycles)) for rows, keys in source.channels)
             refuse_numbers(transform.name, replace(source, channels=channels))
         return binding

@@ -15,10 +15,10 @@ import numpy as np
 from ...motion import Poses, twists
 from ...motion.eulers import quaternions_from_extrinsic_eulers
 from ...motion.quaternions import multiply
-from ...motion.segments import STILL
+from ...motion.segments import MAX_SAME_POSE_CHANGE
 from ..fcurves.evaluation import evaluate
 from .components import AXIS_ANGLE, LOCATION, ROTATION, ROWS, SCALE
-from .sources import Source, sampled
+from .sources import KeyedTransform, sampled
 
 LEAST_SCALE = 1e-3
 """The least scale whose growth is measured."""
@@ -27,13 +27,13 @@ NO_AXIS = 1e-35
 """The square of the length up to which an axis is none, and turns by nothing: Blender's."""
 
 
-def channels_at_ends(segments: list[tuple[Source, slice]]) -> tuple[np.ndarray, np.ndarray]:
+def channels_at_ends(segments: list[tuple[KeyedTransform, slice]]) -> tuple[np.ndarray, np.ndarray]:
     """Return the channels' own values where each segment starts and where it ends, (10, S) each."""
     starts, ends = zip(*(source.bounds for source, _ in segments), strict=True)
     return sampled(segments, starts), sampled(segments, ends)
 
 
-def progress_weights(start: np.ndarray, end: np.ndarray, like: Source) -> tuple[np.ndarray, np.ndarray]:
+def progress_weights(start: np.ndarray, end: np.ndarray, like: KeyedTransform) -> tuple[np.ndarray, np.ndarray]:
     """Return what the progress in S segments is made of: weights of channels (10, S), and what to take off, (S,).
 
     A scale has a say only if the modes change it.
@@ -45,11 +45,11 @@ def progress_weights(start: np.ndarray, end: np.ndarray, like: Source) -> tuple[
         # A unit quaternion moves by half of the angle that the object turns.
         weights[ROWS[ROTATION]] *= 4.0
     total = np.einsum("rs,rs->s", weights, chord)
-    weights /= np.where(total > STILL**2, total, np.inf)
+    weights /= np.where(total > MAX_SAME_POSE_CHANGE**2, total, np.inf)
     return weights, np.einsum("rs,rs->s", weights, start)
 
 
-def idle_progress(source: Source, frames: np.ndarray) -> np.ndarray:
+def idle_progress(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
     """Return how far segments have come on rising frames (m,) where no channel changes: as their keys are interpolated.
 
     It is that of a value with the keys of the first channel that modes change, or else of all, which goes up by one
@@ -93,7 +93,7 @@ def turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:
     turns /= lengths
 
 
-def body_poses(rows: np.ndarray, original: np.ndarray, axes: np.ndarray | None, source: Source) -> Poses:
+def body_poses(rows: np.ndarray, original: np.ndarray, axes: np.ndarray | None, source: KeyedTransform) -> Poses:
     """Return the poses (S, k) of S segments that channels (10, S, k) give.
 
     With the objects' own delta transforms (10, S, 1), and along the axes (S, 3, 3) that location has.
@@ -120,7 +120,7 @@ def between(first: Poses, second: Poses, *, shortest: bool = True) -> np.ndarray
     return rows
 
 
-def location_axes(sources: Sequence[Source], owners: np.ndarray) -> np.ndarray | None:
+def location_axes(sources: Sequence[KeyedTransform], owners: np.ndarray) -> np.ndarray | None:
     """Return the axes that the location of each segment runs along, (S, 3, 3), None where all have their own."""
     if all(source.location_axes is None for source in sources):
         return None

@@ -19,13 +19,13 @@ from ...motion import Poses, twists
 from ...motion.quaternions import multiply, rotate
 from .bodies import between
 
-GRID = np.linspace(-0.25, 1.25, 49)
+COARSE_PROGRESS = np.linspace(-0.25, 1.25, 49)
 """Progress at which a path is first compared with a key: an easing may pass both ends."""
 
-FINER = np.linspace(-1.0, 1.0, 9)
+FINE_OFFSETS = np.linspace(-1.0, 1.0, 9)
 """Around the best of these it is compared on nine more, in the distance of two of them, over and over."""
 
-ROUNDS = 14
+REFINEMENT_ROUNDS = 14
 """How often: to more digits than single precision has."""
 
 PosesAt = Callable[[np.ndarray, np.ndarray], Poses]
@@ -105,10 +105,10 @@ def _nearest(keys: Poses, counts: np.ndarray, poses_at: PosesAt) -> tuple[np.nda
         misses = off(tried)
         return np.take_along_axis(tried, np.einsum("rke,rke->ke", misses, misses).argmin(axis=1)[:, None], axis=1)
 
-    best, step = nearest(np.tile(GRID, (len(many), 1))), GRID[1] - GRID[0]
+    best, step = nearest(np.tile(COARSE_PROGRESS, (len(many), 1))), COARSE_PROGRESS[1] - COARSE_PROGRESS[0]
     low, high = best - step, best + step
-    for number in range(ROUNDS):
-        best = nearest(np.clip(best + 0.25**number * step * FINER, low, high))
+    for number in range(REFINEMENT_ROUNDS):
+        best = nearest(np.clip(best + 0.25**number * step * FINE_OFFSETS, low, high))
     return best[:, 0], off(best)[..., 0]
 
 

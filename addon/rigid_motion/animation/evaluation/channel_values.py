@@ -13,10 +13,10 @@ import numpy as np
 from ...motion import Poses
 from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.quaternions import align_signs, conjugate, multiply
-from .components import AXIS_ANGLE, LOCATION, REST, ROTATION, ROWS, SCALE
+from .components import AXIS_ANGLE, LOCATION, REST_COMPONENTS, ROTATION, ROWS, SCALE
 from .marks import FULL_TURN
 
-STEPS = 12
+TURN_STEPS = 12
 """Steps in which a rotation is followed from key to key, and once more for each turn that it makes."""
 
 MOST_STEPS = 4096
@@ -25,7 +25,7 @@ MOST_STEPS = 4096
 NO_TURN = 1e-9
 """The sine of half an angle below which a rotation has no axis."""
 
-SHORTEST = 0.5
+MIN_LENGTH_RATIO = 0.5
 """Beyond keys lengths that differ get no shorter than this part of the shorter one."""
 
 
@@ -41,7 +41,7 @@ def steps_of(
         # What the modes make of quaternions is continuous.
         return used.astype(int), np.zeros(np.count_nonzero(used))
     starts = np.concatenate(((0,), np.cumsum(counts[used])[:-1]))
-    density = STEPS * (1.0 + np.abs(turns[used]))
+    density = TURN_STEPS * (1.0 + np.abs(turns[used]))
     low, high = np.minimum.reduceat(progress, starts), np.maximum.reduceat(progress, starts)
     before = np.minimum(np.ceil(density * np.maximum(-low, 0.0)), MOST_STEPS)
     behind = np.minimum(np.ceil(density * np.maximum(high, 1.0)), MOST_STEPS)
@@ -157,7 +157,7 @@ def _lengths(first: np.ndarray, last: np.ndarray, many: np.ndarray, progress: np
     """Return lengths (m,) that run evenly between those of vectors (., s), where these have any."""
     begin, end = (np.sqrt(np.einsum("ks,ks->s", key, key)) for key in (first, last))
     begin, end = (np.where(length > 0.0, length, 1.0) for length in (begin, end))
-    least = (SHORTEST * np.minimum(begin, end)).repeat(many)
+    least = (MIN_LENGTH_RATIO * np.minimum(begin, end)).repeat(many)
     return np.maximum(begin.repeat(many) + progress * (end - begin).repeat(many), least)
 
 
@@ -206,6 +206,6 @@ def rotation_values(quaternions: np.ndarray, first: np.ndarray, order: str | Non
     if order is None:
         return align_signs(quaternions).T
     count = len(quaternions)
-    ends = np.concatenate((REST[:3], first, REST[7:]))[None, :, None].repeat(2, axis=0)
+    ends = np.concatenate((REST_COMPONENTS[:3], first, REST_COMPONENTS[7:]))[None, :, None].repeat(2, axis=0)
     poses, progress = Poses(np.zeros((count, 3)), align_signs(quaternions)), np.arange(count) / count
-    return channel_values(poses, np.array([count]), progress, ends, REST[:, None], order)[ROWS[ROTATION]]
+    return channel_values(poses, np.array([count]), progress, ends, REST_COMPONENTS[:, None], order)[ROWS[ROTATION]]

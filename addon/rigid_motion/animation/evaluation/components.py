@@ -21,7 +21,7 @@ AXIS_ANGLE = "AXIS_ANGLE"
 PART_OF = tuple(name for name, rows in ROWS.items() for _ in range(rows.start, rows.stop))
 """The one of them that each row is a component of."""
 
-REST = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)
+REST_COMPONENTS = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)
 """The components of something that is not moved. Rotations are quaternions where they are not channels."""
 
 MODE_NUMBERS = {"BLENDER": 0, **{name: mode.number for name, mode in KEYFRAME_MODES.items()}}
@@ -36,10 +36,10 @@ MODE_NAMES = {number: name for name, number in MODE_NUMBERS.items()}
 DEPENDS_ON_KEYS = [MODE_NUMBERS[name] for name in ("pga_lerp", "cga_lerp", "motor_spline")]
 """The modes whose path would be another one with a key more on it."""
 
-SMOOTH = [mode.number for mode in KEYFRAME_MODES.values() if mode.is_smooth]
+SMOOTH_MODES = [mode.number for mode in KEYFRAME_MODES.values() if mode.is_smooth]
 """The modes for which the keys around a segment count."""
 
-UNKNOWN = -1
+UNKNOWN_MODE = -1
 """The mode of something from a file that is damaged, or of a later version."""
 
 

@@ -23,9 +23,9 @@ from ...motion.piecewise import combine
 from .bodies import body_poses, channels_at_ends, idle_progress, location_axes, progress_weights
 from .breakdowns import Passages, moved_by
 from .channel_values import channel_values, steps_of
-from .components import MODE_NAMES, MODE_NUMBERS, ROWS, SCALE, SMOOTH
-from .ends import MEASURED, Ends, corrected, packed
-from .sources import Source, each, sampled, values_of
+from .components import MODE_NAMES, MODE_NUMBERS, ROWS, SCALE, SMOOTH_MODES
+from .ends import SLOPE_MOMENTS, Ends, corrected, packed
+from .sources import KeyedTransform, each, sampled, values_of
 
 
 class InBetweens(NamedTuple):
@@ -42,7 +42,7 @@ class InBetweens(NamedTuple):
 
 
 def in_betweens(
-    source: Source, frames: np.ndarray, mode: str | None = None, progress: np.ndarray | None = None
+    source: KeyedTransform, frames: np.ndarray, mode: str | None = None, progress: np.ndarray | None = None
 ) -> InBetweens:
     """Return the motion of a source at any rising frames, sub-frames included.
 
@@ -69,12 +69,14 @@ def in_betweens(
     return InBetweens(moved(native), moved(native + difference))
 
 
-def seen_values(source: Source, frames: np.ndarray) -> np.ndarray:
+def seen_values(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
     """Return the values that channels are to have on any rising frames (m,), shape (10, m)."""
     return np.add(*_both(source, np.asarray(frames, dtype=np.float64)))
 
 
-def _both(source: Source, frames: np.ndarray, progress: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+def _both(
+    source: KeyedTransform, frames: np.ndarray, progress: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the channels' own values and what is to be added, (10, m) each, also outside of spans."""
     (native,) = values_of([source], [frames])
     folded, order = frames, np.arange(len(frames))
@@ -87,7 +89,7 @@ def _both(source: Source, frames: np.ndarray, progress: np.ndarray | None = None
     return native, difference
 
 
-def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
+def progress_at(sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Return how far along its segment of the path, 0 to 1, each source is on rising frames of its own, (m,)."""
     result: dict[int, np.ndarray] = {}
     for numbers in _alike(sources):
@@ -101,7 +103,7 @@ def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list
 
 
 def channel_differences(
-    sources: Sequence[Source], frames: Sequence[np.ndarray], given: np.ndarray | None = None
+    sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray], given: np.ndarray | None = None
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return what is to be added to the channels of each source, and the values that they have by themselves.
 
@@ -140,7 +142,7 @@ def channel_differences(
 
 
 def _differences_of_runs(
-    sources: Sequence[Source], frames: Sequence[np.ndarray], given: np.ndarray | None
+    sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray], given: np.ndarray | None
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return `channel_differences` of sources, some of which pass from one holder to another: each run by itself."""
     runs = [(number, run) for number, source in enumerate(sources) for run in source.runs]
@@ -168,7 +170,7 @@ def _differences_of_runs(
     return list(zip(differences, natives, strict=True))
 
 
-def _alike(sources: Sequence[Source]) -> list[list[int]]:
+def _alike(sources: Sequence[KeyedTransform]) -> list[list[int]]:
     """Return the numbers of the sources that are worked on together: those that turn and scale alike,
     and have keys that are passed or not.
     """
@@ -182,7 +184,7 @@ def _alike(sources: Sequence[Source]) -> list[list[int]]:
 class _Motion:
     """The motion of alike sources in S segments from key to key, on P segments of paths: those that pass keys."""
 
-    sources: list[Source]
+    sources: list[KeyedTransform]
     modes: np.ndarray
     """Of the segments, shape (S,)."""
 
@@ -207,14 +209,14 @@ class _Motion:
     passages: Passages | None
 
     @classmethod
-    def of(cls, sources: Sequence[Source]) -> _Motion:
+    def of(cls, sources: Sequence[KeyedTransform]) -> _Motion:
         """Prepare for the motion of sources that turn and scale alike."""
         sources = [source.looped for source in sources]
         paths = [source.path for source in sources]
         segments = _segments(paths)
         bounds = channels_at_ends(segments)
         modes = np.concatenate([source.modes for source in paths])
-        smooth = np.isin(modes, SMOOTH)
+        smooth = np.isin(modes, SMOOTH_MODES)
         ends, lacks = Ends.of(*bounds, segments, smooth), None
         weights, offsets = progress_weights(*bounds, sources[0])
         idle = np.zeros(len(modes), dtype=bool)
@@ -222,9 +224,9 @@ class _Motion:
             idle = (ends.turning.spins.turns != 0.0) & ~weights.any(axis=0)
         has_handles = smooth & np.concatenate([source.has_handles for source in paths]) if smooth.any() else smooth
         if has_handles.any():
-            at = (ends.times[:, :1] + np.diff(ends.times) * MEASURED).ravel()
-            of_each = [at[span.start * len(MEASURED) : span.stop * len(MEASURED)] for _, span in segments]
-            measured = sampled(each(paths, map(len, of_each)), of_each).reshape(10, -1, len(MEASURED))
+            at = (ends.times[:, :1] + np.diff(ends.times) * SLOPE_MOMENTS).ravel()
+            of_each = [at[span.start * len(SLOPE_MOMENTS) : span.stop * len(SLOPE_MOMENTS)] for _, span in segments]
+            measured = sampled(each(paths, map(len, of_each)), of_each).reshape(10, -1, len(SLOPE_MOMENTS))
             progress = np.einsum("rs,rsk->sk", weights, measured) - offsets[:, None]
             if idle.any():
                 uniform = np.concatenate([idle_progress(*one) for one in zip(paths, of_each, strict=True)])
@@ -237,14 +239,16 @@ class _Motion:
         return cls._passing(sources, modes, ends, lacks)
 
     @classmethod
-    def _passing(cls, sources: list[Source], modes: np.ndarray, ends: Ends, lacks: np.ndarray | None) -> _Motion:
+    def _passing(
+        cls, sources: list[KeyedTransform], modes: np.ndarray, ends: Ends, lacks: np.ndarray | None
+    ) -> _Motion:
         """Return the motion of sources with keys that their paths, whose segments have these modes and ends, pass."""
         segments = _segments(sources)
         bounds = channels_at_ends(segments)
         passed = np.concatenate([source.passed[:-1] for source in sources])
         keys = Ends.of(*bounds, segments, np.zeros(len(passed), dtype=bool)).keys
         many = np.diff(np.append(np.flatnonzero(~passed), len(passed)))
-        passages = Passages.of(passed, keys, lambda *at: _poses(ends, modes, *at), np.isin(modes, SMOOTH))
+        passages = Passages.of(passed, keys, lambda *at: _poses(ends, modes, *at), np.isin(modes, SMOOTH_MODES))
         if lacks is not None:
             lacks = np.where(many > 1, 0.0, lacks).repeat(many, axis=1)
         idle = np.zeros(len(passed), dtype=bool)
@@ -339,11 +343,11 @@ def _poses(ends: Ends, modes: np.ndarray, counts: np.ndarray, progress: np.ndarr
     return Poses(rows[:, :3], rows[:, 3:7], None if ends.keys.scales is None else rows[:, 7])
 
 
-def _segments(sources: Sequence[Source]) -> list[tuple[Source, slice]]:
+def _segments(sources: Sequence[KeyedTransform]) -> list[tuple[KeyedTransform, slice]]:
     return each(sources, (len(source.key_frames) - 1 for source in sources))
 
 
-def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def _counts(sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Return how many samples segments have, (segments,), and which are inside of them, or where channels go on, (m,).
 
     What is outside of the keys belongs to the outermost ones.

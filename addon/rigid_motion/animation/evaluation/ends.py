@@ -28,29 +28,29 @@ from ...motion.curves import twist_shares
 from ...motion.poses import beyond
 from ...motion.segments import prepare_within
 from .bodies import between, body_poses, location_axes
-from .sources import Source
+from .sources import KeyedTransform
 from .turning import Turning, needs_turning, turning_of, without_spins
 
-STEP = 1.0 / 8.0
+SLOPE_STEP_RATIO = 1.0 / 8.0
 """The part of a segment that slopes are measured over: exact for cubics in time, and finite for vertical handles."""
 
-SLOPES = np.array((18.0, -9.0, 2.0)) / (6.0 * STEP)
-"""The slope at 0 of the cubic through 0 and three values that are `STEP` apart."""
+SLOPE_WEIGHTS = np.array((18.0, -9.0, 2.0)) / (6.0 * SLOPE_STEP_RATIO)
+"""The slope at 0 of the cubic through 0 and three values that are `SLOPE_STEP_RATIO` apart."""
 
-MEASURED = np.concatenate((np.arange(1, 4) * STEP, 1.0 - np.arange(3, 0, -1) * STEP))
+SLOPE_MOMENTS = np.concatenate((np.arange(1, 4) * SLOPE_STEP_RATIO, 1.0 - np.arange(3, 0, -1) * SLOPE_STEP_RATIO))
 """The moments in the time of a segment where it is measured: next to its first key, and next to its second."""
 
 AT_REST = 1e-9
 """What moves and turns by less from key to key rests, but for rounding."""
 
-FASTEST = 3.0
+MAX_SLOPE = 3.0
 """The largest slope of progress that is corrected: up to here a cubic between two keys does not turn back.
 Source: Fritsch and Carlson, "Monotone piecewise cubic interpolation", 1980."""
 
-SHORTEST = 0.1
+MIN_TANGENT_LENGTH = 0.1
 """The length of a tangent from which on progress is not corrected any further to make up for it."""
 
-SMALL = 0.01
+MIN_MEAN_SPEED_RATIO = 0.01
 """The least part that the mean has of the squared speeds that it is made of: where the motion turns back on itself
 there is no direction to measure along."""
 
@@ -118,14 +118,14 @@ def packed(poses: Poses) -> np.ndarray:
 def native_twists(keys: Poses, measured: Poses) -> np.ndarray:
     """Return Blender's own twists at both ends, and the growth of log scale, shape (2, 7, S), in unit time.
 
-    From the poses at both keys (S, 2) and those of Blender's own in-betweens at the moments `MEASURED` (S, 6).
+    From the poses at both keys (S, 2) and those of Blender's own in-betweens at the moments `SLOPE_MOMENTS` (S, 6).
     """
     count = len(keys.positions)
     ends = keys[np.arange(count).repeat(6), np.tile((0, 0, 0, 1, 1, 1), count)]
     scales = None if measured.scales is None else measured.scales.ravel()
     flat = Poses(measured.positions.reshape(-1, 3), measured.quaternions.reshape(-1, 4), scales)
     result = between(ends, flat).reshape(7, -1, 6)
-    return np.stack((result[..., :3] @ SLOPES, -(result[..., :2:-1] @ SLOPES)))
+    return np.stack((result[..., :3] @ SLOPE_WEIGHTS, -(result[..., :2:-1] @ SLOPE_WEIGHTS)))
 
 
 def tangents_and_lacks(
@@ -152,13 +152,13 @@ def tangents_and_lacks(
     share = twist_shares(durations[before], durations[after])
     parts = share * of_before, (1.0 - share) * of_after
     mean = parts[0] + parts[1]
-    squared = np.maximum(_dot(mean, mean), SMALL * sum(_dot(part, part) for part in parts))
+    squared = np.maximum(_dot(mean, mean), MIN_MEAN_SPEED_RATIO * sum(_dot(part, part) for part in parts))
     for side, segments, of_side, alone in ((1, before, of_before, share == 1.0), (0, after, of_after, share == 0.0)):
         length = _ratio(_dot(of_side, mean), squared)
         speed = _ratio(_dot(counting * native[side][:, segments], mean), durations[segments] * squared)
-        slope = speed / np.copysign(np.maximum(np.abs(length), SHORTEST), length)
+        slope = speed / np.copysign(np.maximum(np.abs(length), MIN_TANGENT_LENGTH), length)
         tangents[side, segments] = length
-        lack = np.clip(slope, -FASTEST, FASTEST) - np.clip(slopes[side, segments], -FASTEST, FASTEST)
+        lack = np.clip(slope, -MAX_SLOPE, MAX_SLOPE) - np.clip(slopes[side, segments], -MAX_SLOPE, MAX_SLOPE)
         lacks[side, segments] = np.where(alone, 0.0, lack)
     return tangents, lacks
 
@@ -220,7 +220,9 @@ class Ends:
     """The poses that each mode makes of all segments, once it has been asked for."""
 
     @classmethod
-    def of(cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray) -> Ends:
+    def of(
+        cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[KeyedTransform, slice]], smooth: np.ndarray
+    ) -> Ends:
         """Return the ends of the channels (10, S) at both ends, and which of the segments have a smooth mode."""
         sources = [source for source, _ in segments]
         owners = np.repeat(np.arange(len(sources)), [span.stop - span.start for _, span in segments])
@@ -253,9 +255,13 @@ class Ends:
             screws[:, :3] += np.moveaxis(self.whole.twists, 1, 0)
         return screws
 
-    def at_keys(self, progress: np.ndarray, measured: np.ndarray, source: Source) -> tuple[np.ndarray, np.ndarray]:
-        """Return `tangents_and_lacks`, from progress (S, 6) and the channels (., S, 6) at the moments `MEASURED`."""
-        slopes = np.stack((progress[:, :3] @ SLOPES, (1.0 - progress[:, :2:-1]) @ SLOPES))
+    def at_keys(
+        self, progress: np.ndarray, measured: np.ndarray, source: KeyedTransform
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return `tangents_and_lacks`, from progress (S, 6) and the channels (., S, 6) at the moments
+        `SLOPE_MOMENTS`.
+        """
+        slopes = np.stack((progress[:, :3] @ SLOPE_WEIGHTS, (1.0 - progress[:, :2:-1]) @ SLOPE_WEIGHTS))
         poses = body_poses(measured, self.original[..., None], self.axes, source)
         if self.whole is not None:
             # Angles turn by spins, too. These are known, and what is left is less than half a turn.

@@ -16,7 +16,7 @@ HALF_TURN = np.pi - 1e-4
 WHOLE_TURN = 1e-5
 """Turns of the channel that differ by less from whole ones do so for rounding."""
 
-PARALLEL = 1e-6
+MAX_PARALLEL_COSINE_GAP = 1e-6
 """Axes are parallel whose cosine is nearer to one: by less than a tenth of a degree."""
 
 SCREW_AXIS = "SCREW"
@@ -68,7 +68,7 @@ def sweeps(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Return by how much angles change (S,) of angles and axes (4, S) to others; 0 where the axes are not parallel."""
     lengths = np.sqrt(np.einsum("ks,ks->s", start[1:], start[1:]) * np.einsum("ks,ks->s", end[1:], end[1:]))
     dot = np.einsum("ks,ks->s", start[1:], end[1:])
-    is_parallel = (lengths > 0.0) & (np.abs(dot) >= (1.0 - PARALLEL) * lengths)
+    is_parallel = (lengths > 0.0) & (np.abs(dot) >= (1.0 - MAX_PARALLEL_COSINE_GAP) * lengths)
     return np.where(is_parallel, np.sign(dot) * end[0] - start[0], 0.0)
 
 

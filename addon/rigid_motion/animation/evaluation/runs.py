@@ -23,7 +23,7 @@ MOST_FRAMES = 63
 """The most frames over which something passes from one holder to the next."""
 
 
-SOON = 1.0 / 64.0
+PASS_LEAD_FRAMES = 1.0 / 64.0
 """By how many frames what passes over is there before its key. Blender takes keys for one that are nearer than 0.01."""
 
 
@@ -40,7 +40,7 @@ class Switch(NamedTuple):
     @property
     def there(self) -> float:
         """The frame at which it has passed over, just before its key: on the key nothing hides what is posed."""
-        return self.frame - min(SOON, (self.frame - self.begin) / 2)
+        return self.frame - min(PASS_LEAD_FRAMES, (self.frame - self.begin) / 2)
 
     @property
     def is_at_once(self) -> bool:

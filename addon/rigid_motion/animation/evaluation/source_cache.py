@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections import OrderedDict
 
-from .sources import Source
+from .sources import KeyedTransform
 
 MOST_KEYS = 2**20
 """Of all that are kept: some 32 MB, hundreds of undo steps of an ordinary file."""
 
 
-class _Sources(OrderedDict[int, Source]):
+class _Sources(OrderedDict[int, KeyedTransform]):
     """Those used last come last; what is too much in keys is dropped."""
 
     size = 0
@@ -26,7 +26,7 @@ class _Sources(OrderedDict[int, Source]):
 known = _Sources()
 
 
-def cache_source(source: Source) -> None:
+def cache_source(source: KeyedTransform) -> None:
     """Keep a source; those that were not used for longest go where there is no room."""
     known.drop(source.digest24)
     known[source.digest24] = source
@@ -35,7 +35,7 @@ def cache_source(source: Source) -> None:
         known.drop(next(iter(known)))
 
 
-def cached_source(digest: int | None) -> Source | None:
+def cached_source(digest: int | None) -> KeyedTransform | None:
     """Return the source with this digest, of 24 bits; None where it is not known any more."""
     return None if digest is None else known.get(digest)
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..fcurves.evaluation import evaluate
 from ..fcurves.keys import BEZIER, CONSTANT, LINEAR, Keys, cycled
-from .components import AXIS_ANGLE, DEPENDS_ON_KEYS, PART_OF, REST, ROTATION, ROWS, SCALE, SMOOTH
+from .components import AXIS_ANGLE, DEPENDS_ON_KEYS, PART_OF, REST_COMPONENTS, ROTATION, ROWS, SCALE, SMOOTH_MODES
 from .marks import (
     FULL_TURN,
     HALF_TURN,
@@ -35,14 +35,14 @@ from .marks import (
 )
 from .runs import MOST_FRAMES, Stretch, Switch, keys_in, resting_in, stretches_of, switches_of
 
-__all__ = ["SAME_FRAME", "SCREW_AXIS", "TURN_AXES", "WHOLE_TURN", "Marks", "Source", "distinct"]
+__all__ = ["SAME_FRAME", "SCREW_AXIS", "TURN_AXES", "WHOLE_TURN", "KeyedTransform", "Marks", "distinct"]
 
-REACH = 12.0
+OUTSIDE_REACH_FRAMES = 12.0
 """Frames that are looked at outside of the seen ones. A Stepped modifier of no more changes nothing, when it comes."""
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class KeyedTransform:
     """The keys of one slot, the values that what it does not key rests at, and the segments between keys."""
 
     order: str | None
@@ -75,7 +75,7 @@ class Source:
     seen: tuple[int, int] | None = None
     """First and last frame that are seen of it, in scenes and strips."""
 
-    reach: float = REACH
+    reach: float = OUTSIDE_REACH_FRAMES
     """How many frames before and behind the seen ones motion blur and Stepped modifiers look at, at most."""
 
     driven: frozenset[int] = frozenset()
@@ -159,7 +159,7 @@ class Source:
     @cached_property
     def is_smooth(self) -> bool:
         """Return whether a mode in it looks at the keys around a segment."""
-        return bool(np.isin(self.mode.numbers if isinstance(self.mode, Marks) else self.mode, SMOOTH).any())
+        return bool(np.isin(self.mode.numbers if isinstance(self.mode, Marks) else self.mode, SMOOTH_MODES).any())
 
     @cached_property
     def cyclic(self) -> Keys | None:
@@ -189,7 +189,7 @@ class Source:
         return self.cyclic is None or repeat(self.channels, self.cyclic, self.order)
 
     @cached_property
-    def looped(self) -> Source:
+    def looped(self) -> KeyedTransform:
         """Source with a segment more on either side, where a mode looks over the seam of endless rounds."""
         if self.cyclic is None or self.cyclic.cycles is None or not self.is_smooth or len(self.key_frames) < 2:
             return self
@@ -292,7 +292,7 @@ class Source:
         return passed
 
     @cached_property
-    def path(self) -> Source:
+    def path(self) -> KeyedTransform:
         """Source without the keys that are `passed`, but otherwise the same."""
         if not self.passed.any():
             return self
@@ -312,10 +312,10 @@ class Source:
         return switches_of(self.keyed_frames, self.held)
 
     @cached_property
-    def runs(self) -> list[Run]:
+    def runs(self) -> list[HoldRun]:
         """The stretches of keys that are held in the same, one behind the other; one alone where nothing is passed."""
         stretches = stretches_of(self.keyed_frames, self.switches, is_linear=self.is_linear)
-        return [Run(stretch, self._in(stretch)) for stretch in stretches]
+        return [HoldRun(stretch, self._in(stretch)) for stretch in stretches]
 
     def hold_at(self, frame: float) -> tuple[int, int]:
         """Return the number of the holder that a key on a frame is in, 0 for none, and the frames of its passing."""
@@ -324,11 +324,11 @@ class Source:
         number, frames = divmod(int(self.held.at(np.array([frame + 0.5 * SAME_FRAME]))[0]), MOST_FRAMES + 1)
         return number, frames
 
-    def run_at(self, frame: float) -> Run:
+    def run_at(self, frame: float) -> HoldRun:
         """Return the run whose motion is shown on a frame."""
         return next((run for run in self.runs if frame < run.stretch.until), self.runs[-1])
 
-    def _in(self, stretch: Stretch) -> Source:
+    def _in(self, stretch: Stretch) -> KeyedTransform:
         """Return the source with the keys of a stretch alone; what has none there rests."""
         channels, rest = [], dict(self.rest)
         for rows, keys in self.channels:
@@ -397,11 +397,11 @@ class Source:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class HoldRun:
     """A stretch of keys that are held in the same."""
 
     stretch: Stretch
-    source: Source
+    source: KeyedTransform
     """With these keys alone."""
 
     def moments(self, frames: np.ndarray) -> np.ndarray:
@@ -434,18 +434,18 @@ def repeat(channels: tuple[tuple[list[int], Keys], ...], cyclic: Keys, order: st
     return bool(np.abs(change[3:]).max() < 1e-6)
 
 
-def each(sources: Sequence[Source], counts: Iterable[int]) -> list[tuple[Source, slice]]:
+def each(sources: Sequence[KeyedTransform], counts: Iterable[int]) -> list[tuple[KeyedTransform, slice]]:
     """Return each source with the span of what it has this many of."""
     bounds = [0, *itertools.accumulate(counts)]
     return [(source, slice(*span)) for source, span in zip(sources, itertools.pairwise(bounds), strict=True)]
 
 
-def sampled(samples: list[tuple[Source, slice]], frames: Sequence[np.ndarray]) -> np.ndarray:
+def sampled(samples: list[tuple[KeyedTransform, slice]], frames: Sequence[np.ndarray]) -> np.ndarray:
     """Return the channels' own values at the frames of each source, m in all, (10, m). What it does not key rests."""
     rows = np.empty((10, samples[-1][1].stop if samples else 0))
     curves, times, out, apart = [], [], [], []
     for (source, span), at in zip(samples, frames, strict=True):
-        rows[:, span] = REST[:, None]
+        rows[:, span] = REST_COMPONENTS[:, None]
         if source.order is not None:
             rows[3, span] = 0.0
         for row, value in source.rest.items():
@@ -464,7 +464,7 @@ def sampled(samples: list[tuple[Source, slice]], frames: Sequence[np.ndarray]) -
     return rows
 
 
-def values_of(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
+def values_of(sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Return what the channels of each source alone have on frames of its own, shape (10, m)."""
     samples = each(sources, map(len, frames))
     rows = sampled(samples, frames)

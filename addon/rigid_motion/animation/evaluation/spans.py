@@ -9,15 +9,15 @@ import numpy as np
 
 from ..fcurves.keys import BEZIER, EASINGS, ELASTIC, INTERPOLATIONS, KEY_TOLERANCE, Keys
 from .components import PART_OF, ROWS
-from .sources import SAME_FRAME, Source, distinct
+from .sources import SAME_FRAME, KeyedTransform, distinct
 
-BOUNCE = {name: code for code, name in INTERPOLATIONS.items()}["BOUNCE"]
-IN, IN_OUT = (code for code, name in EASINGS.items() if name in ("EASE_IN", "EASE_IN_OUT"))
+BOUNCE_CODE = {name: code for code, name in INTERPOLATIONS.items()}["BOUNCE"]
+EASE_IN_CODE, EASE_IN_OUT_CODE = (code for code, name in EASINGS.items() if name in ("EASE_IN", "EASE_IN_OUT"))
 
-LANDINGS = np.array((1.0 / 2.75, 2.0 / 2.75, 2.5 / 2.75))
+BOUNCE_LANDING_TIMES = np.array((1.0 / 2.75, 2.0 / 2.75, 2.5 / 2.75))
 """When a ball lands that bounces out, 0 to 1."""
 
-SWINGS = 0.3, 0.45
+ELASTIC_PERIOD_RATIOS = 0.3, 0.45
 """ELASTIC's own period, in durations of a segment: and where it eases in and out."""
 
 
@@ -37,7 +37,7 @@ class Span:
     """Frames inside of it at which the timing has a kink."""
 
 
-def spans(source: Source) -> list[Span]:
+def spans(source: KeyedTransform) -> list[Span]:
     """Return the stretches in which the modes act, in order of time.
 
     Of cycles those between the first key and the last: what is added repeats with the channels.
@@ -63,7 +63,7 @@ def spans(source: Source) -> list[Span]:
     ]
 
 
-def _spans_of_runs(source: Source) -> list[Span]:
+def _spans_of_runs(source: KeyedTransform) -> list[Span]:
     """Return the stretches of time from key to key of something that passes from one holder to another.
 
     What its channels have between the last key in one and the first in the next is the same for none of the modes.
@@ -107,13 +107,15 @@ def _breaks(keys: Keys) -> np.ndarray:
     codes, easings, periods = (rows[:, :-1] for rows in (keys.interpolation, keys.easing, keys.easing_settings[2]))
     starts, durations = keys.times[:-1], np.diff(keys.times)
     with np.errstate(divide="ignore", invalid="ignore"):
-        periods = np.where(periods == 0.0, np.where(easings == IN_OUT, *SWINGS[::-1]), periods / durations)
+        periods = np.where(
+            periods == 0.0, np.where(easings == EASE_IN_OUT_CODE, *ELASTIC_PERIOD_RATIOS[::-1]), periods / durations
+        )
     # By how much of the segment a kink is away from its steep end.
-    away = np.full((len(LANDINGS), *codes.shape), np.nan)
-    away[:, codes == BOUNCE] = LANDINGS[:, None]
+    away = np.full((len(BOUNCE_LANDING_TIMES), *codes.shape), np.nan)
+    away[:, codes == BOUNCE_CODE] = BOUNCE_LANDING_TIMES[:, None]
     away[:, codes == ELASTIC] = 0.25 * periods[codes == ELASTIC]
-    moments = np.where(easings == IN, 1.0 - away, away)
-    both = (easings == IN_OUT) & (codes > BEZIER)
+    moments = np.where(easings == EASE_IN_CODE, 1.0 - away, away)
+    both = (easings == EASE_IN_OUT_CODE) & (codes > BEZIER)
     halves = np.concatenate((0.5 - 0.5 * away, 0.5 + 0.5 * away, np.full((1, *codes.shape), 0.5)))[:, both]
     at = np.broadcast_to(starts, codes.shape)[both] + halves * np.broadcast_to(durations, codes.shape)[both]
     frames = np.concatenate((at.ravel(), (starts + moments * durations)[:, ~both].ravel()))

@@ -22,7 +22,7 @@ from ...motion.spins import FULL_TURN, Spins
 from .bodies import body_poses
 from .components import AXIS_ANGLE, ROTATION, ROWS
 from .marks import HALF_TURN, SAME_VALUE, SCREW_AXIS, sweeps
-from .sources import Source
+from .sources import KeyedTransform
 
 NO_TURN = 1e-4
 """Radians: what turns by less has no axis."""
@@ -68,7 +68,7 @@ class Turning:
         return replace(self.spins, turns=np.ones(len(self.first))).twists(self.first, self.second)[:, 0] / FULL_TURN
 
 
-def needs_turning(source: Source) -> bool:
+def needs_turning(source: KeyedTransform) -> bool:
     """Return whether any segment may turn otherwise than by the shortest way."""
     return source.has_half_turns or source.turns is not None
 
@@ -102,7 +102,7 @@ def turning(
 
 
 def turning_of(
-    sources: Sequence[Source], start: np.ndarray, end: np.ndarray, keys: Poses, original: np.ndarray
+    sources: Sequence[KeyedTransform], start: np.ndarray, end: np.ndarray, keys: Poses, original: np.ndarray
 ) -> tuple[Turning, Turning]:
     """Return how S segments of alike sources turn, and the same in whole turns alone.
 
@@ -122,7 +122,7 @@ def turning_of(
     return result, replace(by_angles, spins=replace(spins, turns=whole))
 
 
-def turning_in(source: Source, segment: int, turns: float | None = None) -> Turning:
+def turning_in(source: KeyedTransform, segment: int, turns: float | None = None) -> Turning:
     """Return how one of the segments of a source turns, with other turns than those of its channel if so given."""
     rows, original, one = values_at_ends(source, segment), source.original[:, None], slice(segment, segment + 1)
     poses = body_poses(rows[:, None], original[..., None], None, source)
@@ -132,7 +132,7 @@ def turning_in(source: Source, segment: int, turns: float | None = None) -> Turn
     return turning(rows[:, :1], rows[:, 1:], poses, own, source.order, channel, axes, backwards)
 
 
-def values_at_ends(source: Source, segment: int) -> np.ndarray:
+def values_at_ends(source: KeyedTransform, segment: int) -> np.ndarray:
     """Return what the channels have at both ends of a segment, (10, 2)."""
     return source.values_at(source.key_frames[segment : segment + 2])
 

@@ -31,7 +31,7 @@ def ease(interpolation: str, easing: str, u: np.ndarray, back: np.ndarray | floa
     array, shape (n,)
         0 at the start and 1 at the end; BACK leaves that range in between.
     """
-    easing = _AUTO.get(interpolation, "EASE_IN") if easing == "AUTO" else easing
+    easing = _AUTO_EASINGS.get(interpolation, "EASE_IN") if easing == "AUTO" else easing
     if interpolation == "BACK" and easing == "EASE_IN_OUT":
         back = 1.525 * back
     ease_in = EASE_IN[interpolation]
@@ -124,4 +124,4 @@ EASE_IN: dict[str, Callable[[np.ndarray, np.ndarray | float], np.ndarray]] = {
 }
 """From time and BACK's overshoot to value, easing in. ELASTIC is not here: it depends on the size of the change."""
 
-_AUTO = {"BACK": "EASE_OUT", "BOUNCE": "EASE_OUT"}
+_AUTO_EASINGS = {"BACK": "EASE_OUT", "BOUNCE": "EASE_OUT"}

@@ -24,7 +24,7 @@ ELASTIC = 3 + _EASED.index("ELASTIC")
 EASINGS = dict(enumerate(("AUTO", "EASE_IN", "EASE_OUT", "EASE_IN_OUT")))
 """From the code of `bpy.types.Keyframe.easing` to its name."""
 
-AUTO = 0
+AUTO_EASING = 0
 
 CODE = np.uint8
 """The type that Blender keeps codes in: any other takes longer to read."""
@@ -32,7 +32,7 @@ CODE = np.uint8
 KEY_TOLERANCE = float(np.float32(1e-4))
 """Frames from a key within which Blender takes its value."""
 
-LARGEST = 1e30
+MAX_NUMBER = 1e30
 """Frames and values from here on are damage. An infinite one that is typed, or set by a script, becomes 3.4e38."""
 
 
@@ -91,7 +91,7 @@ class Keys:
     where that is asked for."""
 
     is_sound: bool = True
-    """True if all numbers that were read are smaller than `LARGEST`, and the keys in the order of their frames."""
+    """True if all numbers that were read are smaller than `MAX_NUMBER`, and the keys in the order of their frames."""
 
     @cached_property
     def times(self) -> np.ndarray:

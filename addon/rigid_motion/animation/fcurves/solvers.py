@@ -16,7 +16,7 @@ BRACKETED_STEPS = 100
 IN_TIME = (1.0 / 3.0, 2.0 / 3.0)
 """The times of handles with which a segment is a cubic in time."""
 
-GOOD = 1e-6
+MAX_ROOT_ERROR = 1e-6
 """The largest error with which nothing better is looked for: a few times the rounding of single precision."""
 
 LEAST_PULL = 1e-6
@@ -131,7 +131,7 @@ def fit_together(times: np.ndarray, values: np.ndarray, shares: np.ndarray, nati
     mixed = native.copy()
     mixed[np.argsort(-shares)[1::2]] = IN_TIME
     (best, least), (others, error) = (_nearest(x, times, values, shares) for x in (native, mixed))
-    return others if error < 0.5 * least and least > GOOD else best
+    return others if error < 0.5 * least and least > MAX_ROOT_ERROR else best
 
 
 def _nearest(x: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, float]:

@@ -24,7 +24,7 @@ from ..queries.segments import frame_in_action
 from ..transforms import WIDTHS, Transform
 from .changes import graphs_of
 
-ROUNDING = 1e-4
+MAX_MATRIX_ROUNDING = 1e-4
 """What channels lose of a matrix, relative to it and absolute below 1. Where they lose more it was not for them."""
 
 
@@ -59,7 +59,7 @@ def _assigned(obj: bpy.types.Object, graphs: Iterable[bpy.types.Depsgraph]) -> A
     if not known or any(one.matrix_world == obj.matrix_world for one in known) or _holder_of(transform) is None:
         return None
     taken = world_in(transform, None, obj.matrix_basis, view_layer().depsgraph)
-    if not np.allclose(np.array(taken), np.array(obj.matrix_world), rtol=ROUNDING, atol=ROUNDING):
+    if not np.allclose(np.array(taken), np.array(obj.matrix_world), rtol=MAX_MATRIX_ROUNDING, atol=MAX_MATRIX_ROUNDING):
         return None
     return Assigned(transform, obj.matrix_world.copy(), transform.components(), np.array(known[0].scale))
 
@@ -80,7 +80,7 @@ def settled(items: Iterable[Assigned]) -> list[Settled]:
         if holder is not None and holder.target is not None:
             basis = np.array(basis_in(transform, holder, item.world, depsgraph))
             values = rows_of(*poses_of(basis[None]), transform, item.values)[:, 0].astype(np.float32)
-            if np.allclose(values[ROWS[SCALE]], item.scale, rtol=ROUNDING):
+            if np.allclose(values[ROWS[SCALE]], item.scale, rtol=MAX_MATRIX_ROUNDING):
                 values[ROWS[SCALE]] = item.scale
             result.append(Settled(transform, item.values, values))
     return result

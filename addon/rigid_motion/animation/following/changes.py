@@ -26,10 +26,10 @@ OF_OBJECTS = (
 )
 """The properties of objects that in-betweens depend on."""
 
-OFTEN = ("co", "handle_left", "handle_right")
+OFTEN_CHANGED = ("co", "handle_left", "handle_right")
 """What of keys is dragged: it is looked at first."""
 
-SELDOM = ("interpolation", "easing", "back", "amplitude", "period", "type")
+SELDOM_CHANGED = ("interpolation", "easing", "back", "amplitude", "period", "type")
 """What else in-betweens depend on of keys."""
 
 
@@ -121,14 +121,16 @@ def _matters(path: str) -> bool:
 
 
 def _often_in(curves: Mapping[Channel, bpy.types.FCurve]) -> dict[Channel, tuple[bool, str, bytes]]:
-    """Return whether F-curves are muted, how they go on, and `OFTEN` of their keys."""
-    return {channel: (one.mute, one.extrapolation, _keys_of(one, OFTEN)) for channel, one in curves.items()}
+    """Return whether F-curves are muted, how they go on, and `OFTEN_CHANGED` of their keys."""
+    return {channel: (one.mute, one.extrapolation, _keys_of(one, OFTEN_CHANGED)) for channel, one in curves.items()}
 
 
 def _seldom_in(curves: Mapping[Channel, bpy.types.FCurve]) -> dict[Channel, tuple]:
-    """Return the number of modifiers of F-curves, what matters of the animator's, and `SELDOM` of their keys."""
+    """Return the number of modifiers of F-curves, what matters of the animator's, and `SELDOM_CHANGED` of their
+    keys.
+    """
     return {
-        channel: (len(one.modifiers), *settings_of_others(one), _keys_of(one, SELDOM))
+        channel: (len(one.modifiers), *settings_of_others(one), _keys_of(one, SELDOM_CHANGED))
         for channel, one in curves.items()
     }
 

@@ -36,7 +36,7 @@ from ..transforms import WIDTHS, Channel, Transform, let_override_be_read, split
 from .assigned import Assigned, Settled, assigned, set_keys, set_values, settled
 from .changes import Snapshot, add_action, bones_in, edited_actions, edited_objects, graphs_of, settings_of
 from .refreshing import is_keying_safe, refresh_bindings
-from .unkeyed import Poses
+from .unkeyed import UnkeyedPoses
 
 log = logging.getLogger(__package__)
 
@@ -72,7 +72,7 @@ class Follower:
         """The Actions, by session id, that were followed before Blender evaluated them."""
         self.added: set[tuple[int, int]] = set()
         """The objects and Actions, by session id, that were added to dependency graphs."""
-        self.unkeyed: list[Poses] = []
+        self.unkeyed: list[UnkeyedPoses] = []
         """Poses without keys that are to be set again."""
         self.undoes = False
         """True while objects are those of an undo step, whose matrices are of nothing evaluated yet."""
@@ -98,7 +98,7 @@ class Follower:
             # A render that is watched changes frames on a thread of its own, where nothing may be written.
             if self.enabled and not self.busy and threading.current_thread() is threading.main_thread():
                 try:
-                    with self.turn():
+                    with self.own_edits():
                         method(*arguments)
                 except Exception:
                     log.exception("In-betweens could not be brought up to date")
@@ -106,7 +106,7 @@ class Follower:
         return follow
 
     @contextmanager
-    def turn(self) -> Iterator[None]:
+    def own_edits(self) -> Iterator[None]:
         """Have the edits that Blender tells of meanwhile be the extension's."""
         before, self.busy = self.busy, True
         try:
@@ -124,7 +124,7 @@ class Follower:
         else:
             slots = slots_of(obj for obj in bpy.data.objects if obj.animation_data is not None)
             bindings = [binding for slot in slots if not self._is_plain(slot) for binding in bindings_in_slot(slot)]
-        with self.turn():
+        with self.own_edits():
             count = refresh_bindings(bindings, may_key=is_keying_safe())
         self._remember(bindings)
         return count
@@ -173,7 +173,9 @@ class Follower:
                 written.setdefault(binding.slot, {}).update(binding.curves)
                 follows |= channels_of(binding)
             for slot, curves in written.items():
-                self.unkeyed.append(Poses(slot, {*(curves if edited is None else edited), *follows}, curves, frame))
+                self.unkeyed.append(
+                    UnkeyedPoses(slot, {*(curves if edited is None else edited), *follows}, curves, frame)
+                )
 
         if bindings:
             refresh_bindings(bindings, before_writing=keep_poses, **options)
@@ -200,7 +202,7 @@ class Follower:
         bindings = (*bindings_in(left & set(bpy.data.actions)), *bindings_of(edited))
         self._refresh([*{(item.slot.key, item.prefix): item for item in bindings}.values()], (), frame)
 
-    def look_through(self) -> None:
+    def refresh_file(self) -> None:
         """Refresh all there is in the file."""
         self.ranges = _ranges()
         self.refresh()
@@ -227,7 +229,7 @@ class Follower:
 
     def after_update(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         if self.ranges is None or (depsgraph.id_type_updated("SCENE") and self.ranges != _ranges()):
-            self.look_through()
+            self.refresh_file()
         actions = {action for action in edited_actions(depsgraph) if action.session_uid not in self.followed}
         self.followed = set()
         self.follow(actions, scene.frame_current_final)
@@ -245,7 +247,7 @@ class Follower:
 
     def before_frame(self, scene: bpy.types.Scene, *_: object) -> None:
         if self.ranges is None:
-            self.look_through()
+            self.refresh_file()
         graphs = graphs_of(scene)
         items = [] if self.undoes else settled(assigned(edited_objects(*graphs)))
         for item in items:
@@ -270,10 +272,10 @@ class Follower:
     def after_load(self, *_: object) -> None:
         source_cache.clear()
         self.begin_file()
-        self.look_through()
+        self.refresh_file()
 
     def before_saving(self, *_: object) -> None:
-        self.look_through()
+        self.refresh_file()
         for obj in bpy.data.objects:
             if obj.override_library is not None and obj.pose is not None:
                 let_override_be_read(obj)
@@ -313,7 +315,7 @@ def is_enabled() -> bool:
 
 def first_look() -> None:
     """Look through the file as soon as Blender is idle."""
-    follower.look_through()
+    follower.refresh_file()
 
 
 def register() -> None:

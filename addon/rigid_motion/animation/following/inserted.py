@@ -18,13 +18,13 @@ from ..actions.slots import Binding
 from ..evaluation.components import DEPENDS_ON_KEYS
 from ..evaluation.differences import seen_values
 from ..evaluation.marks import SAME_VALUE
-from ..evaluation.sources import SAME_FRAME, Source
+from ..evaluation.sources import SAME_FRAME, KeyedTransform
 from ..evaluation.turning import needs_turning
 from .kept_runs import keep_run
 from .kept_timing import Insertion, nearest_key
 
 
-def key_fellows(binding: Binding, new: Source, old: Source) -> bool:
+def key_fellows(binding: Binding, new: KeyedTransform, old: KeyedTransform) -> bool:
     """Key all that modes fill on frames where any of it was keyed on an in-between of a mode, and on the keys around.
 
     `old` is what was keyed before. Returns whether any was keyed.
@@ -54,7 +54,7 @@ def key_fellows(binding: Binding, new: Source, old: Source) -> bool:
     return result
 
 
-def divided(binding: Binding, new: Source, old: Source) -> Insertion | None:
+def divided(binding: Binding, new: KeyedTransform, old: KeyedTransform) -> Insertion | None:
     """Return the insertion of a single key of all channels that has the pose of the motion as it was, if it is one."""
     added = _without(new.key_frames, old.key_frames)
     if len(added) != 1 or len(new.key_frames) != len(old.key_frames) + 1 or old.order != new.order:
@@ -96,11 +96,11 @@ Times = dict[int, np.ndarray]
 """Frames of keys by the rows of their components."""
 
 
-def _times_of(source: Source) -> Times:
+def _times_of(source: KeyedTransform) -> Times:
     return {row: keys.times for rows, keys in source.channels for row in rows}
 
 
-def _is_in_between(source: Source, frame: float) -> bool:
+def _is_in_between(source: KeyedTransform, frame: float) -> bool:
     """Return whether a mode acts on a frame: between two keys, and outside where the motion goes on."""
     first, last = source.key_frames[[0, -1]]
     return (first < frame < last or source.goes_on) and source.mode_at(frame) != 0

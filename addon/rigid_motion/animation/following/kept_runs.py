@@ -16,8 +16,8 @@ import numpy as np
 
 from ..actions.channels import key_points
 from ..evaluation.differences import progress_at
-from ..evaluation.ends import MEASURED, SLOPES
-from ..evaluation.sources import SAME_FRAME, Source
+from ..evaluation.ends import SLOPE_MOMENTS, SLOPE_WEIGHTS
+from ..evaluation.sources import SAME_FRAME, KeyedTransform
 from ..fcurves.keys import BEZIER, LINEAR, Keys
 from ..fcurves.solvers import bezier_cubics, solve_cubics
 
@@ -28,7 +28,7 @@ Curves = Mapping[int, bpy.types.FCurve]
 """F-curves by the rows of their components."""
 
 
-def keep_run(curves: Curves, old: Source, new: Source, frame: float, *, may_free: bool) -> None:
+def keep_run(curves: Curves, old: KeyedTransform, new: KeyedTransform, frame: float, *, may_free: bool) -> None:
     """Have keys of one holder move something as those that were there before a key more on this frame.
 
     `may_free` is true where the handles around that key are set afterwards.
@@ -78,17 +78,17 @@ def _divided(was: Keys | None, keys: Keys, frame: float) -> Keys:
     return replace(keys, interpolation=codes, **dict(zip(("left", "right"), handles, strict=True)))
 
 
-def _at_speed(old: Source, new: Source) -> list[tuple[list[int], Keys]]:
+def _at_speed(old: KeyedTransform, new: KeyedTransform) -> list[tuple[list[int], Keys]]:
     """Return the channels with which a motion passes the key that was its last one, to a new one, as fast as it did.
 
     A smooth mode, which now looks at both, has it pass in proportion to the slopes of the channels there.
     """
     before, last, frame = new.key_frames[-3:].tolist()
-    near = np.concatenate((before + (last - before) * MEASURED[3:], last + (frame - last) * MEASURED[:3]))
-    desired = np.concatenate((progress_at([old], [near[:3]])[0], MEASURED[:3]))
+    near = np.concatenate((before + (last - before) * SLOPE_MOMENTS[3:], last + (frame - last) * SLOPE_MOMENTS[:3]))
+    desired = np.concatenate((progress_at([old], [near[:3]])[0], SLOPE_MOMENTS[:3]))
     for _ in range(3):
         now = progress_at([new], [near])[0]
-        slopes = np.array([((1.0 - one[2::-1]) @ SLOPES, one[3:] @ SLOPES) for one in (desired, now)])
+        slopes = np.array([((1.0 - one[2::-1]) @ SLOPE_WEIGHTS, one[3:] @ SLOPE_WEIGHTS) for one in (desired, now)])
         factors = np.divide(slopes[0], slopes[1], out=np.ones(2), where=np.abs(slopes[1]) > 0.1)
         channels = []
         for rows, keys in new.channels:

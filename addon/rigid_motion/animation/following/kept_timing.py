@@ -17,17 +17,17 @@ import numpy as np
 from ..actions.channels import key_points
 from ..evaluation.components import PART_OF, ROTATION
 from ..evaluation.differences import progress_at
-from ..evaluation.sources import SAME_FRAME, Source
+from ..evaluation.sources import SAME_FRAME, KeyedTransform
 from ..fcurves.keys import Keys
 from ..fcurves.solvers import fit_together, solve_cubics
 
-MOMENTS = np.linspace(0.0, 1.0, 41)
+TIMING_MOMENTS = np.linspace(0.0, 1.0, 41)
 """Moments of either side, at which the timing is looked at."""
 
 IN_TIME = np.array((1.0, 2.0)) / 3.0
 """The times of handles with which a segment is a cubic in time."""
 
-STILL = 1e-6
+MIN_PROGRESS = 1e-6
 """Progress along a path that is none."""
 
 
@@ -44,7 +44,7 @@ class Insertion:
     curves: Mapping[int, bpy.types.FCurve]
     """The channels by the rows of their components."""
 
-    old: Source
+    old: KeyedTransform
     """As it was without the key."""
 
     frame: float
@@ -68,15 +68,15 @@ class Insertion:
 
     @property
     def moments(self) -> np.ndarray:
-        """`MOMENTS` before the key and then behind it, as frames."""
+        """`TIMING_MOMENTS` before the key and then behind it, as frames."""
         first, frame, last = self.frames.tolist()
-        moments = np.concatenate((first + (frame - first) * MOMENTS, frame + (last - frame) * MOMENTS))
+        moments = np.concatenate((first + (frame - first) * TIMING_MOMENTS, frame + (last - frame) * TIMING_MOMENTS))
         # On the last frame the next segment begins.
         moments[-1] = np.nextafter(last, first)
         return moments
 
     def keep(self, progress: np.ndarray) -> None:
-        """Set the handles with which the progress at `MOMENTS` on either side is this again, (2, m)."""
+        """Set the handles with which the progress at `TIMING_MOMENTS` on either side is this again, (2, m)."""
         filled, curved, linear = set(self.old.filled_rows), [], np.zeros(2)
         for rows, keys in self.old.channels:
             for number, row in enumerate(rows):
@@ -95,9 +95,11 @@ class Insertion:
         for side, total in enumerate(np.sum(shares, axis=0).tolist()):
             begun = progress[side] - progress[side, 0]
             handles = np.tile(IN_TIME[:, None], (len(curved), 1, 2))
-            if abs(begun[-1]) >= STILL and total > 0.0:
-                desired = (begun / begun[-1] * (total + linear[side]) - linear[side] * MOMENTS) / total
-                handles = fit_together(MOMENTS, desired, np.array(shares)[:, side] / total, np.array(times)[:, side])
+            if abs(begun[-1]) >= MIN_PROGRESS and total > 0.0:
+                desired = (begun / begun[-1] * (total + linear[side]) - linear[side] * TIMING_MOMENTS) / total
+                handles = fit_together(
+                    TIMING_MOMENTS, desired, np.array(shares)[:, side] / total, np.array(times)[:, side]
+                )
                 self._go_on(side, of_all, begun[-1], linear[side] / total)
             for three, of_one in zip(of_all, handles, strict=True):
                 _set_handles(three[side], three[side + 1], of_one)

@@ -19,7 +19,7 @@ from ..actions.refusals import refuse_numbers
 from ..actions.slots import Binding
 from ..evaluation.components import MODE_NUMBERS
 from ..evaluation.source_cache import cache_source, cached_source
-from ..evaluation.sources import SAME_FRAME, Source
+from ..evaluation.sources import SAME_FRAME, KeyedTransform
 from ..holds.apply import apply_holds, has_holders, restore_holds
 from ..terms.apply import apply, remove_terms
 from ..terms.planning import plan
@@ -28,7 +28,7 @@ from .inserted import divided, key_fellows
 from .kept_timing import keep_timing
 from .shared_turns import share_out_turns
 
-Reading = tuple[Binding, Source]
+Reading = tuple[Binding, KeyedTransform]
 
 
 def refresh_bindings(
@@ -64,12 +64,12 @@ def refresh_bindings(
         restore_holds(binding)
     marked = [binding for binding in bindings if is_marked(binding) or has_holders(binding)]
     stale: list[Reading] = []
-    current: dict[Binding, Source] = {}
-    plain: dict[Binding, Source] = {}
+    current: dict[Binding, KeyedTransform] = {}
+    plain: dict[Binding, KeyedTransform] = {}
     for binding, source in zip(marked, keyed_in(marked), strict=True):
-        if isinstance(source, Source) and not _is_desired(binding, source):
+        if isinstance(source, KeyedTransform) and not _is_desired(binding, source):
             plain[binding] = source
-        elif isinstance(source, Source):
+        elif isinstance(source, KeyedTransform):
             current[binding] = source
             if is_doubtful or source.digest24 != planned_from(binding):
                 stale.append((binding, current.pop(binding)))
@@ -121,7 +121,7 @@ def mark_all(binding: Binding, number: int) -> None:
             write_marks(fcurve, np.where(read_holds(fcurve) >= 0, number + 1, number + 1 if number else 0))
 
 
-def _is_desired(binding: Binding, source: Source | Refused) -> bool:
+def _is_desired(binding: Binding, source: KeyedTransform | Refused) -> bool:
     """Return whether there is more to a source than Blender's own in-betweens, and it can be had."""
     if isinstance(source, Refused):
         return False
@@ -137,7 +137,7 @@ def _completed(stale: Sequence[Reading]) -> list[Reading]:
     olds = [cached_source(planned_from(binding)) for binding, _ in stale]
     result = list(stale)
 
-    def known() -> Iterator[tuple[Binding, Source, Source]]:
+    def known() -> Iterator[tuple[Binding, KeyedTransform, KeyedTransform]]:
         return ((*reading, old) for reading, old in zip(result, olds, strict=True) if old is not None)
 
     result = _read_anew(result, {binding for binding, now, old in known() if key_fellows(binding, now, old)})
@@ -151,7 +151,10 @@ def _read_anew(readings: Sequence[Reading], changed: Collection[Binding]) -> lis
     """Return readings with what is keyed by now in those of them that were changed."""
     old = [binding for binding, _ in readings if binding in changed]
     fresh = dict(zip(old, keyed_in(old), strict=True))
-    return [(binding, now if isinstance(now := fresh.get(binding), Source) else source) for binding, source in readings]
+    return [
+        (binding, now if isinstance(now := fresh.get(binding), KeyedTransform) else source)
+        for binding, source in readings
+    ]
 
 
 def _apply(stale: Sequence[Reading]) -> list[bool]:
@@ -171,7 +174,7 @@ def _apply(stale: Sequence[Reading]) -> list[bool]:
     return result
 
 
-def _carry_marks(binding: Binding, source: Source) -> None:
+def _carry_marks(binding: Binding, source: KeyedTransform) -> None:
     """Mark the keys that go on with what others say, or differ from them, so that they say it without these."""
     voting = {row for rows, _ in source.channels for row in rows}
     for row, channel in binding.users[0].channels.items():

@@ -15,10 +15,10 @@ from ..actions.slots import Binding
 from ..evaluation.components import LOCATION, MODE_NAMES, ROWS
 from ..evaluation.differences import in_betweens
 from ..evaluation.marks import WHOLE_TURN
-from ..evaluation.sources import SAME_FRAME, TURN_AXES, Source
+from ..evaluation.sources import SAME_FRAME, TURN_AXES, KeyedTransform
 from ..evaluation.turning import Turning, needs_turning, shortest_turns, turning_in
 from ..queries.keyed import frames_in, turns_in
-from ..transforms import GROUP, bone_name
+from ..transforms import GROUP_NAME, bone_name
 
 
 def set_turns_in(
@@ -38,7 +38,7 @@ def set_turns_in(
         return
     fcurve = binding.ensure_curve(channel)
     if fcurve.group is None:
-        fcurve.group = ensure_group(binding.channelbag, bone_name(binding.prefix) or GROUP)
+        fcurve.group = ensure_group(binding.channelbag, bone_name(binding.prefix) or GROUP_NAME)
     mark = max(read_marks(fcurve)[:1], default=0) if axis is None else TURN_AXES.index(axis) + 1
     # Muted it has no say. Now it has, and all other segments keep the turns that they had without.
     old, selected = (
@@ -58,17 +58,19 @@ def is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
     return np.searchsorted(chosen, frames + SAME_FRAME) > np.searchsorted(chosen, frames - SAME_FRAME, side="right")
 
 
-STRAIGHT = ("lerp_slerp",)
+STRAIGHT_MODES = ("lerp_slerp",)
 """Modes by which the path of the origin does not depend on how the body turns."""
 
 ONE_AXIS = 1e-5
 """Radians off an axis, for rounding."""
 
-SAMPLES = 16
+SAMPLES_PER_TURN = 16
 """Samples of each part of a segment, and of each turn in it, to see how far a motion turns."""
 
 
-def share_out_turns(binding: Binding, source: Source, old: Source, progress: float | None = None) -> bool:
+def share_out_turns(
+    binding: Binding, source: KeyedTransform, old: KeyedTransform, progress: float | None = None
+) -> bool:
     """Share the turns of segments out among the parts that keys divide them into, so that the motion stays as it is.
 
     Where keys go between such parts, these have whole turns together again. Returns whether anything was changed.
@@ -95,7 +97,7 @@ def share_out_turns(binding: Binding, source: Source, old: Source, progress: flo
     return True
 
 
-def _divided(old: Source, source: Source, progress: float | None) -> dict[float, float]:
+def _divided(old: KeyedTransform, source: KeyedTransform, progress: float | None) -> dict[float, float]:
     """Return the turns of the parts that keys divide segments into, by the frames that these begin on."""
     shared: dict[float, float] = {}
     for segment in np.flatnonzero(old.modes).tolist():
@@ -112,7 +114,7 @@ def _divided(old: Source, source: Source, progress: float | None) -> dict[float,
     return shared
 
 
-def _joined(old: Source, source: Source) -> dict[float, float]:
+def _joined(old: KeyedTransform, source: KeyedTransform) -> dict[float, float]:
     """Return the whole turns of segments in place of which there were several, not all of them in whole turns."""
     shared: dict[float, float] = {}
     for segment in np.flatnonzero(source.segment_turns != np.rint(source.segment_turns)).tolist():
@@ -130,25 +132,25 @@ def _within(frames: np.ndarray, first: float, last: float) -> np.ndarray:
     return np.flatnonzero((frames[:-1] > first - SAME_FRAME) & (frames[:-1] < last - SAME_FRAME))
 
 
-def _is_enough_in_whole_turns(source: Source, segment: int, turned: Turning) -> bool:
+def _is_enough_in_whole_turns(source: KeyedTransform, segment: int, turned: Turning) -> bool:
     """Return whether it makes no difference for the motion what part of a turn is spin.
 
     So it is where all of it is about one axis, and the path of the origin does not depend on it.
     """
     ends = source.values_at(source.key_frames[segment : segment + 2])[ROWS[LOCATION]]
-    is_straight = MODE_NAMES[source.modes[segment]] in STRAIGHT or not np.ptp(ends, axis=1).any()
+    is_straight = MODE_NAMES[source.modes[segment]] in STRAIGHT_MODES or not np.ptp(ends, axis=1).any()
     return is_straight and float(np.abs(np.cross(turned.turn[:, 0], turned.axes_in_body[:, 0])).max()) < ONE_AXIS
 
 
 def _shares(
-    source: Source, turned: Turning, frames: np.ndarray, along: Sequence[float] | None = None
+    source: KeyedTransform, turned: Turning, frames: np.ndarray, along: Sequence[float] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return what part of the turn of a segment is made from each of the frames (p + 1,) in it to the next, (p,); and
     the axis of its spins as it lies in the body on each of them, (p, 3). `along` is the progress (p + 1,) on the
     frames, if it is not that of the motion.
     """
     most = max(abs(float(turned.spins.turns[0])), float(np.abs(source.segment_turns).sum()))
-    steps = SAMPLES * (1 + int(most))
+    steps = SAMPLES_PER_TURN * (1 + int(most))
 
     def sampled(ends: Sequence[float] | np.ndarray) -> np.ndarray:
         inner = [np.linspace(*pair, steps, endpoint=False) for pair in itertools.pairwise(ends)]
@@ -163,7 +165,9 @@ def _shares(
     return angles.reshape(-1, steps).sum(axis=1) / turned.about[0], axes[:-1:steps]
 
 
-def _turns_of(source: Source, segment: int, of: Turning, share: float, axis: np.ndarray, *, whole: bool) -> float:
+def _turns_of(
+    source: KeyedTransform, segment: int, of: Turning, share: float, axis: np.ndarray, *, whole: bool
+) -> float:
     """Return the turns that a segment needs to have this share of a turning,
     whose axis (3,) is as it lies in the body there.
 

@@ -22,7 +22,7 @@ SAME_VALUE = 1e-6
 """Values that differ by less, relative or absolute below 1, are the same in single precision."""
 
 
-class Poses:
+class UnkeyedPoses:
     """What the channels of a slot move of its users, as it is before something is written.
 
     Parameters

@@ -15,12 +15,12 @@ from ..actions.channels import ensure_group, key_points, replace_keys
 from ..actions.marks import hold, mend_marks, read_holds, write_holds
 from ..actions.slots import Binding
 from ..evaluation.components import PART_OF
-from ..evaluation.sources import Source
+from ..evaluation.sources import KeyedTransform
 from ..fcurves.keys import BEZIER, CONSTANT, LINEAR
-from ..transforms import GROUP, Channel, Transform
+from ..transforms import GROUP_NAME, Channel, Transform
 from .dependencies import follows, node_of
 from .holders import (
-    KINDS,
+    HOLD_KINDS,
     Constraint,
     Holder,
     add_constraint,
@@ -38,7 +38,7 @@ from .holders import (
 from .keying import InfluenceKeys, Passing, holding_keys, passing, passing_keys
 from .placing import hang_of, matrices_of, poses_of, rows_of
 
-NEAR = 1e-4
+MAX_SAME_FRAMES = 1e-4
 """Frames of handles that differ by less are the same."""
 
 
@@ -61,9 +61,9 @@ def restore_holds(binding: Binding) -> None:
     )
 
     def held_on(frame: float) -> int:
-        number = next((number for number, one in holding.items() if one.evaluate(frame + NEAR) > 0.5), 0)
+        number = next((number for number, one in holding.items() if one.evaluate(frame + MAX_SAME_FRAMES) > 0.5), 0)
         ends = key_points(passings[number])[:, 0] if number in passings else np.empty(0)
-        begins = ends[:-2][np.abs(ends[2:] - frame) < NEAR]
+        begins = ends[:-2][np.abs(ends[2:] - frame) < MAX_SAME_FRAMES]
         return hold(number, round(frame - float(begins[0])) if len(begins) else 0)
 
     for fcurve, places in lost:
@@ -72,7 +72,7 @@ def restore_holds(binding: Binding) -> None:
         write_holds(fcurve, holds)
 
 
-def apply_holds(binding: Binding, source: Source, *, may_key: bool = True) -> bool:
+def apply_holds(binding: Binding, source: KeyedTransform, *, may_key: bool = True) -> bool:
     """Have the constraints of a transform hold it as its keys say. Returns whether anything was changed.
 
     Unless `may_key`, keys are only moved, for Blender remembers where in memory they are: what else there is to do is
@@ -134,12 +134,12 @@ def _release(binding: Binding) -> bool:
     return bool(there)
 
 
-def _is_complete(user: Transform, source: Source, binding: Binding) -> bool:
+def _is_complete(user: Transform, source: KeyedTransform, binding: Binding) -> bool:
     held, passed = spoken_of(source)
     return held.keys() <= constraints_to(user).keys() and passed <= _passings(user, binding).keys()
 
 
-def _complete(binding: Binding, source: Source) -> bool:
+def _complete(binding: Binding, source: KeyedTransform) -> bool:
     """Have all users have the constraints that keys speak of, as far as holders are known, each in its own space."""
     (held, passed), changed = spoken_of(source), False
     for user in binding.users:
@@ -155,7 +155,7 @@ def _complete(binding: Binding, source: Source) -> bool:
         holders = {0: Holder(0, None, ""), **{holder.number: holder for holder in holders_of(user)}}
         for number in sorted((passed & holders.keys()) - _passings(user, binding).keys()):
             fellow = _of_all(binding, partial(_passings, binding=binding)).get(number)
-            label = f"{KINDS['ACTION']} {holders[number].name or 'World'}" if fellow is None else fellow.name
+            label = f"{HOLD_KINDS['ACTION']} {holders[number].name or 'World'}" if fellow is None else fellow.name
             add_passing(user, holders[number], label)
             changed = True
         ours = _passings(user, binding)
@@ -172,7 +172,7 @@ def _key(binding: Binding, channel: Channel, keys: InfluenceKeys, may_key: bool 
         return False
     fcurve, user = binding.ensure_curve(channel), binding.users[0]
     if fcurve.group is None and may_key:
-        fcurve.group = ensure_group(binding.channelbag, user.carrier.name if user.is_part else GROUP)
+        fcurve.group = ensure_group(binding.channelbag, user.carrier.name if user.is_part else GROUP_NAME)
     points = fcurve.keyframe_points
     desired = np.column_stack((keys.frames, keys.values)).astype(np.float32)
     eases = np.flatnonzero(keys.interpolations == BEZIER)
@@ -185,7 +185,7 @@ def _key(binding: Binding, channel: Channel, keys: InfluenceKeys, may_key: bool 
         np.array_equal(codes, keys.interpolations)
         and np.array_equal(key_points(fcurve), desired)
         and all(
-            np.abs(key_points(fcurve, f"handle_{side}")[at] - desired[at] - off).max(initial=0) < NEAR
+            np.abs(key_points(fcurve, f"handle_{side}")[at] - desired[at] - off).max(initial=0) < MAX_SAME_FRAMES
             for side, at, off in handles
         )
     ):
@@ -204,7 +204,7 @@ def _key(binding: Binding, channel: Channel, keys: InfluenceKeys, may_key: bool 
     return True
 
 
-def _arrive(binding: Binding, source: Source, poses: Passing) -> bool:
+def _arrive(binding: Binding, source: KeyedTransform, poses: Passing) -> bool:
     """Have the constraints that pass show the poses in which something arrives."""
     slot, changed, last = _slot_of(binding), False, int(np.ceil(poses.frames[-1]))
     bag = channelbag_in(binding.slot.action.layers[0].strips[0], slot)

@@ -16,24 +16,24 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from mathutils import Matrix
 
-from ..actions.marks import MOST, hold
+from ..actions.marks import MAX_MARK, hold
 from ..actions.slots import Binding, slots_alone
-from ..evaluation.sources import Source
+from ..evaluation.sources import KeyedTransform
 from ..transforms import Channel, Refused, Transform, transform_of
 from .placing import channel_space, converted, hang_of, hangs_on_bone, world_of
 
 Constraint = Any
 """A *Child Of* or *Action* constraint, which have different properties."""
 
-KINDS = {"CHILD_OF": "Held In", "ACTION": "Pass To"}
+HOLD_KINDS = {"CHILD_OF": "Held In", "ACTION": "Pass To"}
 """The types of our constraints, and how their names begin."""
 
-_NUMBER = re.compile(r"rigid_motion (\d+)")
+_HOLDER_NAME = re.compile(r"rigid_motion (\d+)")
 
-_ONE = 2.0**-100
+_INVERSE_MARK = 2.0**-100
 """What stands for 1 in the last row of an inverse: nothing, in any product that Blender makes with it."""
 
-ROUNDING = 1e-5
+MAX_SCALE_ROUNDING = 1e-5
 """Scales that differ from one by less do so for rounding."""
 
 TOO_MANY = n_("{name} has had {most} holders, and keys cannot tell more apart: remove constraints that hold nothing")
@@ -87,9 +87,9 @@ def basis_in(
 def number_of(constraint: Constraint) -> int | None:
     """Return the number of the holder that a constraint of ours is to; None where it is none of ours."""
     if constraint.type == "CHILD_OF":
-        number = constraint.inverse_matrix[3][0] / _ONE
-        return int(number) if 1.0 <= number <= MOST else None
-    found = _NUMBER.fullmatch(constraint.subtarget) if constraint.type == "ACTION" else None
+        number = constraint.inverse_matrix[3][0] / _INVERSE_MARK
+        return int(number) if 1.0 <= number <= MAX_MARK else None
+    found = _HOLDER_NAME.fullmatch(constraint.subtarget) if constraint.type == "ACTION" else None
     return int(found[1]) if found else None
 
 
@@ -146,11 +146,11 @@ def add_holder(binding: Binding, target: bpy.types.Object, bone: str) -> int:
             return holder.number
     known = [holder.number for holder in _all_holders() if (holder.target, holder.bone) == (target, bone)]
     elsewhere = {holder.number for holder in _all_holders()}
-    choices = [*known, *(n for n in range(1, MOST) if n not in elsewhere), *range(1, MOST)]
+    choices = [*known, *(n for n in range(1, MAX_MARK) if n not in elsewhere), *range(1, MAX_MARK)]
     number = next((number for number in choices if number not in taken), None)
     if number is None:
-        raise Refused(TOO_MANY, name=binding.name, most=MOST - 1)
-    label = f"{KINDS['CHILD_OF']} {bone or target.name}"
+        raise Refused(TOO_MANY, name=binding.name, most=MAX_MARK - 1)
+    label = f"{HOLD_KINDS['CHILD_OF']} {bone or target.name}"
     while any(label in user.carrier.constraints for user in binding.users):
         label += "'"
     added = [(user, add_constraint(user, Holder(number, target, bone), label)) for user in binding.users]
@@ -185,7 +185,7 @@ def known_holder(binding: Binding, number: int) -> tuple[Holder, str] | None:
     if len(known) != 1:
         return None
     (holder,) = known.values()
-    return holder, f"{KINDS['CHILD_OF']} {holder.name}"
+    return holder, f"{HOLD_KINDS['CHILD_OF']} {holder.name}"
 
 
 def _all_holders() -> Iterator[Holder]:
@@ -239,14 +239,14 @@ def set_offset(constraint: Constraint, user: Transform, number: int) -> None:
 
 
 def _set_inverse(constraint: Constraint, inverse: Matrix, number: int) -> None:
-    inverse[3][0] = number * _ONE
+    inverse[3][0] = number * _INVERSE_MARK
     constraint.inverse_matrix = inverse
 
 
 def _without_noise(matrix: Matrix) -> Matrix:
     """Return a matrix without a location, and the identity for what is one but for rounding."""
     matrix.translation = 0.0, 0.0, 0.0
-    return Matrix() if np.abs(np.array(matrix) - np.eye(4)).max() < ROUNDING else matrix
+    return Matrix() if np.abs(np.array(matrix) - np.eye(4)).max() < MAX_SCALE_ROUNDING else matrix
 
 
 def add_passing(user: Transform, holder: Holder, label: str) -> Constraint:
@@ -283,7 +283,7 @@ def _let_go(user: Transform, influence: Channel) -> None:
             bag.fcurves.new(path, index=index).keyframe_points.insert(first, 0.0)
 
 
-def spoken_of(source: Source) -> tuple[dict[int, float], set[int]]:
+def spoken_of(source: KeyedTransform) -> tuple[dict[int, float], set[int]]:
     """Return the numbers of the holders that keys are in, from which frame on, and of those that are passed to."""
     if source.held is None:
         return {}, set()

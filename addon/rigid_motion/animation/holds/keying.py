@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..evaluation.differences import seen_values
-from ..evaluation.runs import SOON
-from ..evaluation.sources import Source
+from ..evaluation.runs import PASS_LEAD_FRAMES
+from ..evaluation.sources import KeyedTransform
 from ..fcurves.keys import BEZIER, CONSTANT
 
-SAMPLES = 8
+SUBFRAME_POSES = 8
 """How many poses a frame has of those in which something arrives that moves: renderers blur motion by such parts."""
 
 
@@ -40,7 +40,7 @@ class Passing(NamedTuple):
     """For each of these holders what the clock has at frames: both ends of each passing, shape (2 p, 2)."""
 
 
-def holding_keys(source: Source, number: int) -> InfluenceKeys:
+def holding_keys(source: KeyedTransform, number: int) -> InfluenceKeys:
     """Return the keys of how far something is held in the holder of this number: not at all, or all of it."""
     switches = source.switches
     first = source.keyed_range[0] if source.channels else 0.0
@@ -51,7 +51,7 @@ def holding_keys(source: Source, number: int) -> InfluenceKeys:
     return InfluenceKeys(np.array(frames)[changes], values[changes], np.full(len(changes), CONSTANT))
 
 
-def passing_keys(source: Source, number: int) -> InfluenceKeys:
+def passing_keys(source: KeyedTransform, number: int) -> InfluenceKeys:
     """Return the keys of how far something has passed over to the holder of this number."""
     first = source.keyed_range[0] if source.channels else 0.0
     keys = [(first, 0.0, CONSTANT)]
@@ -63,14 +63,14 @@ def passing_keys(source: Source, number: int) -> InfluenceKeys:
     return InfluenceKeys(np.array(frames), np.array(values), np.array(codes))
 
 
-def passing(source: Source) -> Passing | None:
+def passing(source: KeyedTransform) -> Passing | None:
     """Return the poses in which something arrives at all holders that it passes over to; None where it does nowhere."""
     frames, rows, numbers, clocks, clock = [], [], [], dict[int, list[tuple[float, float]]](), 0.0
     for switch, run in zip(source.switches, source.runs[1:], strict=True):
         if switch.is_at_once:
             continue
-        last = switch.frame + SOON
-        inside = np.arange(np.ceil(switch.begin * SAMPLES), last * SAMPLES) / SAMPLES
+        last = switch.frame + PASS_LEAD_FRAMES
+        inside = np.arange(np.ceil(switch.begin * SUBFRAME_POSES), last * SUBFRAME_POSES) / SUBFRAME_POSES
         at = np.unique(np.concatenate(((switch.begin,), inside, (switch.frame, last))))
         values = seen_values(run.source, run.moments(at))
         if np.ptp(values, axis=1).max() == 0.0:

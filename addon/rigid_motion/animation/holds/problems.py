@@ -9,22 +9,24 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
 from ..actions.slots import Binding
-from ..evaluation.components import REST
-from ..evaluation.sources import Source
+from ..evaluation.components import REST_COMPONENTS
+from ..evaluation.sources import KeyedTransform
 from ..transforms import Refused, Transform
 from .dependencies import follows, node_of
 from .holders import channel_of, constraints_to, passings_in, spoken_of
 
-STAYS = 1e-5
+MAX_VALUE_ROUNDING = 1e-5
 """Values that differ by less stand still."""
 
 ITSELF = n_("{name} cannot be held in itself: choose what holds it last, so that it is active")
 CYCLE = n_("{name} cannot be held in {holder}, which follows it: {holder} would wait for itself")
 REPEATS = n_("{name} repeats by Cycles, and cannot be held: bake the rounds to keys, or remove Cycles")
 DELTAS = n_("{name} has delta transforms: apply them first (Object > Apply > All Deltas)")
-HANGS = n_("{name} hangs on vertices or the path of its parent: parent it to the object or a bone instead (Ctrl P)")
+ON_VERTICES = n_(
+    "{name} hangs on vertices or the path of its parent: parent it to the object or a bone instead (Ctrl P)"
+)
 CONNECTED = n_("{name} is connected to its parent, which it cannot leave: disconnect it first (Alt P in Edit Mode)")
-LACKING = n_(
+LACKS_HOLDER = n_(
     "The keys of {name} say that it is held from frame {frame:g} on, but not in what: "
     "hold it there anew (Hold In), or undo what removed its constraint"
 )
@@ -40,7 +42,7 @@ def refuse_holder(transform: Transform, target: bpy.types.Object, bone: str) -> 
         raise Refused(CYCLE, name=transform.name, holder=bone or target.name)
 
 
-def refuse_motion(transform: Transform, source: Source | None) -> None:
+def refuse_motion(transform: Transform, source: KeyedTransform | None) -> None:
     """Raise `Refused` where a transform that is keyed so cannot be held in anything."""
     if source is not None and any(keys.cycles is not None for keys in source.curves):
         raise Refused(REPEATS, name=transform.name)
@@ -49,7 +51,7 @@ def refuse_motion(transform: Transform, source: Source | None) -> None:
 
 def refuse_space(transform: Transform) -> None:
     """Raise `Refused` where no constraint knows the space of the channels of a transform, or moves it there."""
-    if not np.allclose(transform.original(), REST, atol=STAYS):
+    if not np.allclose(transform.original(), REST_COMPONENTS, atol=MAX_VALUE_ROUNDING):
         raise Refused(DELTAS, name=transform.name)
     carrier, parent = transform.carrier, transform.animated.parent
     if isinstance(carrier, bpy.types.PoseBone):
@@ -58,10 +60,10 @@ def refuse_space(transform: Transform) -> None:
     elif parent is not None:
         goes_along_path = parent.type == "CURVE" and cast(bpy.types.Curve, parent.data).use_path
         if carrier.parent_type.startswith("VERTEX") or (carrier.parent_type != "BONE" and goes_along_path):
-            raise Refused(HANGS, name=transform.name)
+            raise Refused(ON_VERTICES, name=transform.name)
 
 
-def refuse_holds(transform: Transform, binding: Binding, source: Source) -> None:
+def refuse_holds(transform: Transform, binding: Binding, source: KeyedTransform) -> None:
     """Raise `Refused` where a transform is not held as its keys in a slot say."""
     held, passed = spoken_of(source)
     if not held:
@@ -71,7 +73,7 @@ def refuse_holds(transform: Transform, binding: Binding, source: Source) -> None
     for number, frame in held.items():
         constraint = holding.get(number)
         if constraint is None:
-            raise Refused(LACKING, name=transform.name, frame=frame)
+            raise Refused(LACKS_HOLDER, name=transform.name, frame=frame)
         target, bone = constraint.target, constraint.subtarget
         if target is None or (bone and (target.pose is None or bone not in target.pose.bones)):
             raise Refused(GONE, name=transform.name, constraint=constraint.name)

@@ -12,8 +12,8 @@ from ..actions.channels import key_points, selected_keys
 from ..actions.reading import keyed_in, modes_said, read
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import Binding, bindings_for, bindings_of
-from ..evaluation.components import MODE_NAMES, UNKNOWN
-from ..evaluation.sources import SAME_FRAME, Marks, Source, distinct
+from ..evaluation.components import MODE_NAMES, UNKNOWN_MODE
+from ..evaluation.sources import SAME_FRAME, KeyedTransform, Marks, distinct
 from ..transforms import Refused, Transform, transform_of
 
 
@@ -37,19 +37,19 @@ def active_bindings(transforms: Sequence[Transform]) -> dict[Transform, Binding]
     return result
 
 
-def source_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> Source | None:
+def source_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> KeyedTransform | None:
     """Return what is keyed in the Action, None where nothing is. `Refused` where rigid motion cannot act on it."""
     binding = active_binding(transform_of(carrier))
     source = None if binding is None else read(binding)
     return source if source and source.channels else None
 
 
-def sources_of(bindings: Sequence[Binding]) -> list[Source | None]:
+def sources_of(bindings: Sequence[Binding]) -> list[KeyedTransform | None]:
     """Return what is keyed in each of these, None where nothing is, it is refused, or a driver moves a part of it."""
-    result: list[Source | None] = []
+    result: list[KeyedTransform | None] = []
     for binding, source in zip(bindings, keyed_in(bindings), strict=True):
         result.append(None)
-        if isinstance(source, Source) and source.channels and not source.driven:
+        if isinstance(source, KeyedTransform) and source.channels and not source.driven:
             with suppress(Refused):
                 refuse_numbers(binding.name, source)
                 result[-1] = source
@@ -106,7 +106,7 @@ def modes_in(binding: Binding, frames: np.ndarray) -> np.ndarray:
     """Return the numbers of the modes at these frames, shape (n,); Blender's own where there is what is no mode."""
     modes = modes_said(binding)
     numbers = modes.at(frames + 0.5 * SAME_FRAME) if isinstance(modes, Marks) else np.full(len(frames), modes)
-    return np.where(numbers == UNKNOWN, 0, numbers)
+    return np.where(numbers == UNKNOWN_MODE, 0, numbers)
 
 
 def turns_in(binding: Binding, frames: np.ndarray) -> np.ndarray:

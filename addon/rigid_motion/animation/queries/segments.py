@@ -16,7 +16,7 @@ from ..actions.reading import is_marked, leading, planned_from, sources_of_users
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import bindings_of
 from ..evaluation.components import MODE_NAMES
-from ..evaluation.sources import SAME_FRAME, Source
+from ..evaluation.sources import SAME_FRAME, KeyedTransform
 from ..evaluation.spans import spans
 from ..evaluation.turning import turning_in, values_at_ends
 from ..fcurves.keys import cycled
@@ -30,10 +30,10 @@ HALF_TURN = np.pi + 1e-3
 NEAR_HALF_TURN = np.radians(170.0)
 """From here on a small change of a key may send a body that turns the shortest way round the other way."""
 
-NEAR = 1e-6
+MAX_SAME_VALUE_GAP = 1e-6
 """Values that differ by less are the same."""
 
-DIFFERING = n_(
+DIFFERING_REFUSAL = n_(
     "{name} moves by the same Action slot as {leader}, but has another rotation mode, driver, delta transform or "
     "Local Location; the in-betweens are those of {leader}: "
     "give it an Action of its own (Object > Relations > Make Single User)"
@@ -78,7 +78,7 @@ def frame_in_action(obj: bpy.types.Object, frame: float) -> float:
     return frame if data is None else data.nla_tweak_strip_time_to_scene(frame, invert=True)
 
 
-def segment_at(source: Source, frame: float) -> SegmentFacts | None:
+def segment_at(source: KeyedTransform, frame: float) -> SegmentFacts | None:
     """Return the segment that a frame is in, None before the first key and after the last where no cycle repeats them.
 
     A key is in the segment that it starts; the last one in the segment that it ends.
@@ -103,14 +103,14 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
         turn=float(turned.totals[0]),
         turns=float(turned.spins.turns[0]),
         distance=float(np.linalg.norm(location[:, 1] - location[:, 0])),
-        long_way=source.order is None and -1.0 + NEAR < alike < -NEAR,
+        long_way=source.order is None and -1.0 + MAX_SAME_VALUE_GAP < alike < -MAX_SAME_VALUE_GAP,
         is_sure=source.order is not None and bool(np.any(swept > NEAR_HALF_TURN)),
         two_axes=source.order is not None and int(np.count_nonzero(swept > HALF_TURN)) > 1,
-        scales_unevenly=not source.uniform_scale and bool(np.any(np.abs(np.diff(scale)) > NEAR)),
+        scales_unevenly=not source.uniform_scale and bool(np.any(np.abs(np.diff(scale)) > MAX_SAME_VALUE_GAP)),
     )
 
 
-def is_up_to_date(target: bpy.types.Object | bpy.types.PoseBone | Transform, source: Source) -> bool:
+def is_up_to_date(target: bpy.types.Object | bpy.types.PoseBone | Transform, source: KeyedTransform) -> bool:
     """Return whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
     binding = active_binding(transform_of(target))
     planned = None if binding is None else planned_from(binding)
@@ -133,9 +133,9 @@ def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str
             if source.is_live:
                 spans(source)
                 leader = leading(sources)
-                if isinstance(leader, Source) and leader.digest != source.digest:
+                if isinstance(leader, KeyedTransform) and leader.digest != source.digest:
                     name = binding.users[sources.index(leader)].name
-                    raise Refused(DIFFERING, name=transform.name, leader=name)
+                    raise Refused(DIFFERING_REFUSAL, name=transform.name, leader=name)
     except Refused as problem:
         return str(problem)
     except ValueError as problem:

@@ -18,7 +18,7 @@ from ..actions.modifiers import is_term, misplaced, put_behind, terms_in
 from ..actions.reading import influence_for
 from ..actions.slots import Binding
 from ..evaluation.components import MODE_NAMES
-from ..evaluation.sources import Source
+from ..evaluation.sources import KeyedTransform
 from ..transforms import WIDTHS
 from .carriers import Term
 
@@ -34,7 +34,7 @@ SETTINGS = (
 """What all terms have alike."""
 
 
-def apply(binding: Binding, source: Source, planned: Mapping[int, Sequence[Term]]) -> bool:
+def apply(binding: Binding, source: KeyedTransform, planned: Mapping[int, Sequence[Term]]) -> bool:
     """Have the channels of a slot have these terms, by the rows of their components, and no others.
 
     A channel that has none of its own yet, of a part that others have keys of, is made with one key.
@@ -63,7 +63,7 @@ def remove_terms(binding: Binding) -> bool:
     return bool(removed)
 
 
-def _named(planned: Mapping[int, Sequence[Term]], source: Source) -> dict[int, dict[str, Term]]:
+def _named(planned: Mapping[int, Sequence[Term]], source: KeyedTransform) -> dict[int, dict[str, Term]]:
     """Return terms by what they are called: by the modes and the frames that they are for, and numbered."""
     ranges = list({term[:2] for terms in planned.values() for term in terms})
     modes = source.modes_at(np.array(ranges).reshape(-1, 2).mean(axis=1)).tolist()

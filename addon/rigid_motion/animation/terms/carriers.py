@@ -32,29 +32,29 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
-PAIR, MOST = 2, 4
+MIN_CHAIN_PRODUCTS, MAX_CHAIN_PRODUCTS = 2, 4
 """The fewest and the most products of a chain."""
 
-MARGIN = 0.05
+ROOT_MARGIN_RATIO = 0.05
 """K is larger than it has to be, by this share of d, so that roots of d + K T are apart from each other."""
 
-LEFT = 4.0
+ROUNDING_LEFT_FACTOR = 4.0
 """How many times what rounding has left is left to the next product of a chain, so that this has all its roots."""
 
 SMALL_STEP = 1e-5
 """After a step of Newton's that is no larger the root is exact to far more than single precision."""
 
-GUARD = 0.85
+CARRIER_TOLERANCE_RATIO = 0.85
 """The share of its tolerance that a carrier may use up on the frames where it is tried, as others are a bit worse."""
 
-DROPPED = 0.25
+DROPPED_TOLERANCE_RATIO = 0.25
 """The share of its tolerance below which a Bernstein coefficient needs no term. Errors do not add up: the sum of all
 Bernstein polynomials is 1."""
 
 MOST_STEPS = 40
 """The most steps to a root; most take six."""
 
-CHUNK = 512
+CHUNK_PIECES = 512
 """How many pieces, of like degree, are worked on at once: arrays then fit the cache."""
 
 MOST_KNOWN = 16384
@@ -215,7 +215,7 @@ class _Pieces(NamedTuple):
         low, roots, high = (np.cos(turns * (numbers + part)) for part in (1.0, 0.5, 0.0))
         spare = sides * np.cos(degrees * np.arccos(fit_of(len(extremes))[0]))
         result = cls((first + last) / 2, halves, slopes, low, roots, high, sides * (-1.0) ** numbers, spare)
-        return result, (needed.min(0) + MARGIN * abs(at_extremes).max(1))[:, None]
+        return result, (needed.min(0) + ROOT_MARGIN_RATIO * abs(at_extremes).max(1))[:, None]
 
     def some(self, rows: np.ndarray) -> _Pieces:
         return _Pieces(*(values[rows] for values in self))
@@ -276,8 +276,8 @@ def carry(
     pending = np.array([row for row, one in enumerate(asked) if one not in _known], int)
     degrees = np.where(series[pending] != 0, np.arange(series.shape[1]), 0).max(1, initial=0)
     order = np.argsort(degrees, kind="stable")
-    for start in range(0, len(order), CHUNK):
-        some = order[start : start + CHUNK]
+    for start in range(0, len(order), CHUNK_PIECES):
+        some = order[start : start + CHUNK_PIECES]
         rows = pending[some]
         trimmed = series[rows, : degrees[some[-1]] + 1]
         coefficients = _carried(trimmed, degrees[some], first[rows], last[rows], tolerances[rows])
@@ -293,7 +293,7 @@ def _carried(
     middles, halves = (first + last) / 2, (last - first) / 2
     frames = _single(middles + halves * np.cos(np.linspace(np.pi, 0, 2 * series.shape[1] + 15))).astype(float)
     wanted = _values_of(series, (frames - middles) / halves)
-    allowed = GUARD * tolerances
+    allowed = CARRIER_TOLERANCE_RATIO * tolerances
     result: list[list[tuple[float, ...]]] = [[] for _ in degrees]
     errors = abs(wanted).max(1)
 
@@ -310,11 +310,11 @@ def _carried(
     def try_bernstein(highest: float, most: float) -> None:
         for degree in np.unique(degrees[(errors > allowed) & (degrees <= highest)]).tolist():
             rows = np.flatnonzero((errors > allowed) & (degrees == degree))
-            dropped = DROPPED * tolerances[rows, None]
+            dropped = DROPPED_TOLERANCE_RATIO * tolerances[rows, None]
             try_out(rows, _bernstein(series[rows, : degree + 1], first[rows], last[rows], dropped), most)
 
     # At keys, where polynomials are 0, there are terms for one degree less than they have.
-    try_bernstein(PAIR + 1, PAIR)
+    try_bernstein(MIN_CHAIN_PRODUCTS + 1, MIN_CHAIN_PRODUCTS)
     rows = np.flatnonzero((errors > allowed) & (degrees > 1))
     if len(rows):
         pieces, size = _Pieces.of(series[rows], degrees[rows, None], first[rows], last[rows])
@@ -324,10 +324,10 @@ def _carried(
         product, left = pieces.product_of(values)
         try_out(rows, [*chain, product])
         missed = errors[rows] > allowed[rows]
-        if len(chain) == MOST - 1 or not missed.any():
+        if len(chain) == MAX_CHAIN_PRODUCTS - 1 or not missed.any():
             break
         rows, pieces, values, left = rows[missed], pieces.some(missed), values[missed], left[missed]
-        spare = LEFT * abs(left).max(1, keepdims=True) * pieces.spare
+        spare = ROUNDING_LEFT_FACTOR * abs(left).max(1, keepdims=True) * pieces.spare
         product, left = pieces.product_of(values - spare)
         values, chain = left + spare, [*(each.some(missed) for each in chain), product]
     try_bernstein(np.inf, np.inf)

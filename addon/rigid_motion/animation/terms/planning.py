@@ -19,40 +19,40 @@ import numpy as np
 
 from ..evaluation.components import LOCATION, ROTATION, ROWS
 from ..evaluation.differences import channel_differences
-from ..evaluation.sources import Source
+from ..evaluation.sources import KeyedTransform
 from ..evaluation.spans import Span, spans
-from .carriers import GUARD, Term, carry, fit_of
+from .carriers import CARRIER_TOLERANCE_RATIO, Term, carry, fit_of
 
-NODES = 24
+NODES_PER_PIECE = 24
 """How many moments a piece is tried on."""
 
-MOST_DEGREE = NODES - 5
+MOST_DEGREE = NODES_PER_PIECE - 5
 """The highest degree of a polynomial. What is behind it tells whether all has been seen."""
 
-UNSEEN = 10.0
+UNSEEN_COEFFICIENT_FACTOR = 10.0
 """How many times the last coefficients the unseen ones may add up to. Those of a kink fall as slowly as 1 / k^2, which
 makes five times; and each of them is missed twice, as nodes take it for one of the seen ones."""
 
 LOCATION_TOLERANCE = 4e-6
 """How far off location may be, in units: what single precision leaves of 64 units anyway, and no one sees."""
 
-TOLERANCE = 2e-6
+ROTATION_SCALE_TOLERANCE = 2e-6
 """How far off rotation and scale may be: 2 micrometres at an arm's length."""
 
-BASE = np.full(10, TOLERANCE)
-BASE[ROWS[LOCATION]] = LOCATION_TOLERANCE
+COMPONENT_TOLERANCES = np.full(10, ROTATION_SCALE_TOLERANCE)
+COMPONENT_TOLERANCES[ROWS[LOCATION]] = LOCATION_TOLERANCE
 """The tolerances of rows, where values are not large."""
 
 SINGLE_PRECISION = 1e-7
 """Nothing is closer than this share of the values that differences are added to: a step is 1.2e-7 of them at most."""
 
-EDGE = 1e-8
+SPAN_EDGE_RATIO = 1e-8
 """The share of a span that moments keep away from its ends, where there is no difference but next to which there is."""
 
-FITTING = 0.5
+POLYNOMIAL_TOLERANCE_RATIO = 0.5
 """The share of the tolerance that polynomials may use up; carriers have the rest."""
 
-FRACTIONS = 1, 2, 4, 8
+PARTS_PER_FRAME = 1, 2, 4, 8
 """Into how many parts of a frame spans may be split: renderers blur motion by samples on such."""
 
 LAST_FRAME = 1048574
@@ -82,7 +82,7 @@ class _Polynomials(NamedTuple):
     first: np.ndarray
     last: np.ndarray
     series: np.ndarray
-    """Shape (., NODES)."""
+    """Shape (., NODES_PER_PIECE)."""
 
     tolerances: np.ndarray
     """What carriers may use up."""
@@ -94,7 +94,7 @@ class _Polynomials(NamedTuple):
 class _Spans:
     """The spans of all sources, and their differences on any frames: where planning meets evaluation."""
 
-    def __init__(self, sources: Sequence[Source]) -> None:
+    def __init__(self, sources: Sequence[KeyedTransform]) -> None:
         self.sources = sources
         found = [(number, span) for number, source in enumerate(sources) for span in spans(source)]
         self.all: list[Span] = [span for _, span in found]
@@ -105,7 +105,7 @@ class _Spans:
 
     def pieces(self) -> _Pieces:
         """Return all spans as pieces, but for those with no frame of single precision inside."""
-        rows = np.zeros((len(self.all), len(BASE)), bool)
+        rows = np.zeros((len(self.all), len(COMPONENT_TOLERANCES)), bool)
         for number, span in enumerate(self.all):
             rows[number, list(span.rows)] = True
         every = np.flatnonzero(_after(self.first) < self.last)
@@ -114,17 +114,17 @@ class _Spans:
     def differences(self, numbers: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (difference, native) of spans with these rising numbers (P,), on frames (P, M); each (P, 10, M)."""
         first, last = self.first[numbers, None], self.last[numbers, None]
-        frames = np.clip(frames, first + EDGE * (last - first), last - EDGE * (last - first))
+        frames = np.clip(frames, first + SPAN_EDGE_RATIO * (last - first), last - SPAN_EDGE_RATIO * (last - first))
         owners, starts = np.unique(self.owners[numbers], return_index=True)
         asked = [np.unique(of_source, return_inverse=True) for of_source in np.split(frames, starts[1:])]
         values = channel_differences([self.sources[owner] for owner in owners], [rising for rising, _ in asked])
-        shape = (len(BASE), -1, frames.shape[1])
+        shape = (len(COMPONENT_TOLERANCES), -1, frames.shape[1])
         both = [np.stack(pair)[:, :, places.ravel()] for pair, (_, places) in zip(values, asked, strict=True)]
         difference, native = np.concatenate(both, axis=2).reshape(2, *shape).transpose(0, 2, 1, 3)
         return difference, native
 
 
-def plan(sources: Sequence[Source]) -> list[dict[int, list[Term]]]:
+def plan(sources: Sequence[KeyedTransform]) -> list[dict[int, list[Term]]]:
     """Return, for each source, the terms that its channels should have, by rows; in order of time.
 
     Rows without terms are left out.
@@ -178,23 +178,23 @@ def _tried(every: _Spans, pieces: _Pieces) -> tuple[_Polynomials, _Pieces]:
     A polynomial ends where the difference does, so that what is 0 at keys stays so. Where there is no eighth of a frame
     inside of a piece it runs straight.
     """
-    nodes, to_series = fit_of(NODES)
+    nodes, to_series = fit_of(NODES_PER_PIECE)
     middles, halves = (pieces.first + pieces.last) / 2, (pieces.last - pieces.first) / 2
     moments = middles[:, None] + halves[:, None] * np.concatenate([[-1.0], nodes, [1.0]])
     difference, native = every.differences(pieces.spans, moments)
-    tolerances = np.maximum(BASE, SINGLE_PRECISION * np.abs(native).max(axis=2))
-    series = (difference[..., 1:-1].reshape(-1, NODES) @ to_series).reshape(difference[..., 1:-1].shape)
+    tolerances = np.maximum(COMPONENT_TOLERANCES, SINGLE_PRECISION * np.abs(native).max(axis=2))
+    series = (difference[..., 1:-1].reshape(-1, NODES_PER_PIECE) @ to_series).reshape(difference[..., 1:-1].shape)
     # What each degree leaves: at most, and at both ends, where a slope may be infinite and no node sees it.
     size = np.abs(series)
     behind = np.cumsum(size[..., ::-1], axis=2)[..., ::-1] - size
-    at_first = difference[..., :1] - np.cumsum(series * (-1.0) ** np.arange(NODES), axis=2)
+    at_first = difference[..., :1] - np.cumsum(series * (-1.0) ** np.arange(NODES_PER_PIECE), axis=2)
     at_last = difference[..., -1:] - np.cumsum(series, axis=2)
-    unseen = UNSEEN * behind[..., MOST_DEGREE]
+    unseen = UNSEEN_COEFFICIENT_FACTOR * behind[..., MOST_DEGREE]
     missed = behind + np.maximum(np.abs(at_first), np.abs(at_last)) + unseen[..., None]
-    is_close = missed[..., : MOST_DEGREE + 1] <= FITTING * tolerances[..., None]
+    is_close = missed[..., : MOST_DEGREE + 1] <= POLYNOMIAL_TOLERANCE_RATIO * tolerances[..., None]
     is_close[..., 0] = False
-    is_short = np.floor(FRACTIONS[-1] * pieces.first) + 1 >= FRACTIONS[-1] * pieces.last
-    matters = pieces.rows & (size.sum(axis=2) + unseen > GUARD * tolerances)
+    is_short = np.floor(PARTS_PER_FRAME[-1] * pieces.first) + 1 >= PARTS_PER_FRAME[-1] * pieces.last
+    matters = pieces.rows & (size.sum(axis=2) + unseen > CARRIER_TOLERANCE_RATIO * tolerances)
     followed = is_close.any(axis=2) | is_short[:, None]
     # Near gimbal lock several values of all angles turn alike, and which it is hangs on the frames that are asked for.
     turning = ROWS[ROTATION]
@@ -202,10 +202,10 @@ def _tried(every: _Spans, pieces: _Pieces) -> tuple[_Polynomials, _Pieces]:
     followed[is_torn, turning], matters[is_torn, turning] = False, pieces.rows[is_torn, turning]
     number, row = np.nonzero(matters & followed)
     degree = np.maximum(is_close.argmax(axis=2), 1)[number, row]
-    chosen = np.where(np.arange(NODES) <= degree[:, None], series[number, row], 0.0)
+    chosen = np.where(np.arange(NODES_PER_PIECE) <= degree[:, None], series[number, row], 0.0)
     first, last = at_first[number, row, degree], at_last[number, row, degree]
     chosen[:, :2] += np.stack([first + last, last - first], 1) / 2
-    allowed = (1.0 - FITTING) * tolerances[number, row]
+    allowed = (1.0 - POLYNOMIAL_TOLERANCE_RATIO) * tolerances[number, row]
     polynomials = _Polynomials(pieces.spans[number], row, pieces.first[number], pieces.last[number], chosen, allowed)
     rows = matters & ~followed
     is_open = rows.any(axis=1)
@@ -223,7 +223,7 @@ def _split(every: _Spans, pieces: _Pieces) -> _Pieces:
     for number, (span, first, last) in enumerate(ends):
         breaks = np.float32(every.all[span].breaks).astype(float)
         between = np.unique(breaks[(first < breaks) & (breaks < last)]).tolist()
-        middles = (float(np.floor(parts_of * (first + last) / 2 + 0.5)) / parts_of for parts_of in FRACTIONS)
+        middles = (float(np.floor(parts_of * (first + last) / 2 + 0.5)) / parts_of for parts_of in PARTS_PER_FRAME)
         between = between or [middle for middle in middles if first < middle < last][:1]
         parts.extend((number, *both) for both in pairwise([first, *between, last]))
     numbers, first, last = np.array(parts).reshape(-1, 3).T

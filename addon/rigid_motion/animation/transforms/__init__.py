@@ -12,9 +12,9 @@ Each module imports only those above it.
 from __future__ import annotations
 
 from .transform import (
-    GROUP,
-    LINKED,
-    MOTION,
+    GROUP_NAME,
+    LINKED_REFUSAL,
+    MOTION_PROPERTY,
     OWN_WORDS,
     TURNS_PROPERTY,
     WIDTHS,
@@ -31,9 +31,9 @@ from .transform import (
 )
 
 __all__ = [
-    "GROUP",
-    "LINKED",
-    "MOTION",
+    "GROUP_NAME",
+    "LINKED_REFUSAL",
+    "MOTION_PROPERTY",
     "OWN_WORDS",
     "TURNS_PROPERTY",
     "WIDTHS",

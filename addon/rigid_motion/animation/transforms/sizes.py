@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...blender import pose_bones, scene
-from ...gltf.sizes import OF_A_BODY, OF_KEY_POSES, SHELL
+from ...gltf.sizes import MIN_BALL_RADIUS_RATIO, OF_A_BODY, OF_KEY_POSES
 from .transform import Transform, transform_of
 
 SOME_SIZE = 0.1
@@ -31,7 +31,7 @@ def reaches_of(rig: bpy.types.Object) -> dict[str, float]:
     bones = {bone.name: bone for bone in cast(bpy.types.Pose, rig.pose).bones}
     heads = {name: np.array(bone.bone.head_local) for name, bone in bones.items()}
     reaches = {name: _length(bone.bone) or _some_size() for name, bone in bones.items()}
-    least = SHELL * _extent(rig)
+    least = MIN_BALL_RADIUS_RATIO * _extent(rig)
     for obj in cast(bpy.types.Scene, bpy.context.scene).objects:
         if obj.parent == rig and obj.parent_type == "BONE" and obj.parent_bone in bones:
             at_bone = np.array((rig.matrix_world @ bones[obj.parent_bone].matrix).inverted_safe())

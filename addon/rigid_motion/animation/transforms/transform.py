@@ -13,24 +13,24 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...blender import existing
 from ...motion.eulers import ORDERS, quaternions_from_extrinsic_eulers
-from ..evaluation.components import LOCATION, REST, ROTATION, ROWS, SCALE
+from ..evaluation.components import LOCATION, REST_COMPONENTS, ROTATION, ROWS, SCALE
 
 OWN_WORDS = "Rigid Motion"
 """The context of words that Blender has another translation for, or one that is too long where they are shown."""
 
-LINKED = n_(
+LINKED_REFUSAL = n_(
     "{name} is linked from another file: make it local first (Object > Relations > Make Local), "
     "or override it (Object > Library Override > Make)"
 )
 """The reason why a data-block cannot be edited, and the way out."""
 
-MOTION = "rigid_motion"
+MOTION_PROPERTY = "rigid_motion"
 """The name of the properties of this extension on objects and pose bones."""
 
-TURNS_PROPERTY = f"{MOTION}.turns"
+TURNS_PROPERTY = f"{MOTION_PROPERTY}.turns"
 """The property by whose keys segments make whole turns more."""
 
-GROUP = "Rigid Motion"
+GROUP_NAME = "Rigid Motion"
 """The group of F-curves that the channel of turns of an object is in."""
 
 WIDTHS = {LOCATION: 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, SCALE: 3}
@@ -130,7 +130,7 @@ class Transform:
     @property
     def motion(self) -> ObjectMotion:
         """The properties that this extension keeps on it."""
-        return getattr(self.carrier, MOTION)
+        return getattr(self.carrier, MOTION_PROPERTY)
 
     @property
     def rotation(self) -> str:
@@ -159,7 +159,7 @@ class Transform:
 
     def components(self) -> np.ndarray:
         """Return its properties as they are now, as the ten components of a source."""
-        result = REST.copy()
+        result = REST_COMPONENTS.copy()
         for part, prop in self.properties.items():
             result[ROWS[part].start :][: WIDTHS[prop]] = getattr(self.carrier, prop)
         return result
@@ -169,7 +169,7 @@ class Transform:
 
         The rotation is a unit quaternion.
         """
-        obj, result = self.animated, REST.copy()
+        obj, result = self.animated, REST_COMPONENTS.copy()
         if self.is_part:
             return result
         result[ROWS[LOCATION]], result[ROWS[SCALE]] = obj.delta_location, obj.delta_scale
@@ -241,4 +241,4 @@ def let_override_be_read(rig: bpy.types.Object) -> None:
     """
     reference = existing(rig.override_library).reference
     for bone in reference.pose.bones if isinstance(reference, bpy.types.Object) and reference.pose is not None else ():
-        getattr(bone, MOTION)
+        getattr(bone, MOTION_PROPERTY)

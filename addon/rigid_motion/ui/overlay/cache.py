@@ -18,25 +18,25 @@ import numpy as np
 
 from ...animation.actions.channels import selected_keys
 from ...animation.actions.slots import Binding
-from ...animation.evaluation.sources import Source
+from ...animation.evaluation.sources import KeyedTransform
 from ...animation.queries.keyed import active_bindings, frames_in
 from ...animation.transforms import Transform, transform_of
 from ...blender import existing, original_uid, persistent
 from ...handlers import append_handlers, remove_handlers
 from . import records
 from .ghosts import ghosts_of
-from .held import Held, is_held
+from .held import HolderMotion, is_held
 from .kinds import axis_length_of, followed
-from .parents import Carried, Parents
-from .points import Path, trace
+from .parents import CarriedTargets, Parents
+from .points import DrawnPath, trace
 
-SPARE = 64
+MAX_SPARE_PATHS = 64
 """The number of paths kept that are not drawn any more."""
 
 
 @dataclass
 class _Entry:
-    path: Path | None
+    path: DrawnPath | None
     digest: tuple
     """The digest of all that the path depends on."""
 
@@ -52,7 +52,7 @@ class _Entry:
     above: frozenset[int] = frozenset()
     """Session ids of what its parents move by, where it follows them."""
 
-    records: tuple[tuple[records.Record, int], ...] = ()
+    records: tuple[tuple[records.PlaceRecord, int], ...] = ()
     """What it depends on that is known as it was seen alone, and how often that had changed."""
 
     stale: bool = False
@@ -70,7 +70,7 @@ _entries: OrderedDict[tuple[int, str], _Entry] = OrderedDict()
 """By the identity of what is moved; those drawn last come last."""
 
 
-def path_of(target: bpy.types.Object | bpy.types.PoseBone | Transform, scene: bpy.types.Scene) -> Path | None:
+def path_of(target: bpy.types.Object | bpy.types.PoseBone | Transform, scene: bpy.types.Scene) -> DrawnPath | None:
     """Return the path of a target, as the overlay of the scene is set.
 
     None where it has none: without keys in its Action, with a single one, and where rigid motion is refused.
@@ -80,7 +80,7 @@ def path_of(target: bpy.types.Object | bpy.types.PoseBone | Transform, scene: bp
 
 def paths_of(
     targets: Sequence[Transform], scene: bpy.types.Scene, turned: Mapping[Transform, np.ndarray | None] | None = None
-) -> list[Path | None]:
+) -> list[DrawnPath | None]:
     """Return the paths of several targets. `turned` is what stands between the rotation of a bone and its location."""
     overlay: Any = getattr(scene, OVERLAY)
     settings = (
@@ -99,7 +99,7 @@ def paths_of(
         ):
             stale[target] = turn
     if stale:
-        carried = Carried()
+        carried = CarriedTargets()
         for target, (binding, source) in carried.read(stale).items():
             before = _entries.get(target.identity)
             entry = _read(target, binding, source, settings, stale[target], before, carried)
@@ -115,7 +115,7 @@ def _bytes(turn: np.ndarray | None) -> bytes:
 
 def keep_only(drawn: int) -> None:
     """Drop paths that were not drawn for long, where this many were drawn just now."""
-    while len(_entries) > drawn + SPARE:
+    while len(_entries) > drawn + MAX_SPARE_PATHS:
         _entries.popitem(last=False)
 
 
@@ -148,11 +148,11 @@ def _selection(binding: Binding | None) -> bytes:
 def _read(
     target: Transform,
     binding: Binding | None,
-    source: Source | None,
+    source: KeyedTransform | None,
     settings: tuple,
     turn: np.ndarray | None,
     before: _Entry | None,
-    carried: Carried,
+    carried: CarriedTargets,
 ) -> _Entry:
     data = target.animated.animation_data
     action = data.action if data else None
@@ -194,17 +194,17 @@ def _read(
 def _read_held(
     target: Transform,
     binding: Binding,
-    source: Source,
+    source: KeyedTransform,
     entry: _Entry,
     settings: tuple,
     before: _Entry | None,
-    carried: Carried,
+    carried: CarriedTargets,
 ) -> _Entry:
     """Fill the entry of something that is held. In a strip that is tweaked it has no path."""
     entry.settings = (*settings, b"")
     if existing(target.animated.animation_data).use_tweak_mode:
         return entry
-    held = Held(target, source, carried)
+    held = HolderMotion(target, source, carried)
     mode, tick_step, axes_size, ghost_step, *_ = settings
     selected, size = frames_in(binding, selected=True), axes_size * axis_length_of(target, source)
     entry.above, entry.records, entry.selected = held.ids, held.records, _selection(binding)

@@ -14,7 +14,7 @@ import numpy as np
 from ...animation import Cleaning
 from ...blender import persistent
 from ...handlers import append_handlers, remove_handlers
-from .drawing import TICK, Pen, batch_of
+from .drawing import TICK_DIAMETER_PX, Pen, batch_of
 
 OPERATOR = "RIGID_MOTION_OT_clean_motion"
 
@@ -44,7 +44,7 @@ def draw() -> None:
         for lines, color in ((before, pen.look.native_color), (after, pen.look.mode_color)):
             for line in lines:
                 pen.line(batch_of("LINE_STRIP", line), color, 0.6 * pen.look.line_width)
-        pen.dot(batch_of("POINTS", before[bridged]), pen.look.key_color, TICK)
+        pen.dot(batch_of("POINTS", before[bridged]), pen.look.key_color, TICK_DIAMETER_PX)
     gpu.state.program_point_size_set(False)
     gpu.state.blend_set("NONE")
 

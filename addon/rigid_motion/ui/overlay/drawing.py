@@ -31,32 +31,32 @@ from ..targets import selected_in_view
 from . import cache
 from .ghosts import Ghosts, shape_of
 from .kinds import space_of
-from .points import PASSING, TICKS, Path, Readable, readable, thinned
+from .points import MAX_TICKS, PASSING_HOLDER, DrawnPath, Readable, readable, thinned
 from .settings import RigidMotionOverlay, is_shown, overlay_settings
 
 log = logging.getLogger(__package__)
 
-OUTLINE: Color = (0.0, 0.0, 0.0, 1.0)
+OUTLINE_COLOUR: Color = (0.0, 0.0, 0.0, 1.0)
 """Around lines and dots, so that they stand out from any background."""
 
-WHITE: Color = (1.0, 1.0, 1.0, 1.0)
+KEY_COLOUR: Color = (1.0, 1.0, 1.0, 1.0)
 """Keys that are not selected, as in the Dope Sheet."""
 
-TICK, KEY, NOW = 6.0, 10.0, 12.0
+TICK_DIAMETER_PX, KEY_DIAMETER_PX, NOW_DIAMETER_PX = 6.0, 10.0, 12.0
 """Diameters of dots, outline included: ticks, keys, and where the object is on the current frame."""
 
 AXIS_OPACITY = 0.8
 
-SOLID, EDGES = 0.15, 0.55
+SOLID_OPACITY, EDGE_OPACITY = 0.15, 0.55
 """Opacity of the triangles and of the edges of a ghost."""
 
-DARKEST = 0.2
+MIN_BRIGHTNESS = 0.2
 """A colour of the theme that is darker is meant to be dark."""
 
 EDGE_WIDTH = 1.0
 """The width of edges, in pixels at a resolution scale of 1."""
 
-NEAR = 0.5
+MIN_GHOST_DISTANCE_FRAMES = 0.5
 """Frames from the current one within which there is no ghost, since the thing itself is there."""
 
 MOST_VIEWS = 24
@@ -105,7 +105,7 @@ def _dot_shader() -> gpu.types.GPUShader:
 
 def brightened(color: Sequence[float]) -> Color:
     """Return a colour of the theme as bright as lines have to be beside those of modes."""
-    red, green, blue = (part / max(*color, DARKEST) for part in color)
+    red, green, blue = (part / max(*color, MIN_BRIGHTNESS) for part in color)
     return red, green, blue, 1.0
 
 
@@ -117,7 +117,7 @@ Batch = gpu.types.GPUBatch | None
 class _Batches:
     """A path on the graphics card."""
 
-    path: Path
+    path: DrawnPath
     native: Batch
     desired: Batch
     keys: Batch
@@ -133,7 +133,7 @@ class _Batches:
     """Ticks and axes: their name, and which of them can be told apart in a view."""
 
     @classmethod
-    def of(cls, path: Path) -> _Batches:
+    def of(cls, path: DrawnPath) -> _Batches:
         return cls(
             path,
             native=batch_of("LINE_STRIP", thinned(path.native)),
@@ -173,7 +173,7 @@ class _Batches:
 Primitive = Literal["POINTS", "LINES", "LINE_STRIP", "TRIS"]
 
 _own_space: Callable[[], AbstractContextManager[None]] = cast(Any, gpu.matrix.push_pop)
-_batches: WeakKeyDictionary[Path, _Batches] = WeakKeyDictionary()
+_batches: WeakKeyDictionary[DrawnPath, _Batches] = WeakKeyDictionary()
 
 
 def batch_of(kind: Primitive, points: np.ndarray | list) -> Batch:
@@ -203,7 +203,7 @@ class Pen:
         """Return the colour of what something is held in, from that of the world."""
         if holder == 0:
             return free
-        return self.look.tick_color if holder == PASSING else self.hues[hue_of(holder) - 1]
+        return self.look.tick_color if holder == PASSING_HOLDER else self.hues[hue_of(holder) - 1]
 
     def line(self, batch: Batch, color: Color, width: float) -> None:
         if batch:
@@ -213,7 +213,7 @@ class Pen:
             batch.draw(self.lines)
 
     def outlined_line(self, batch: Batch, color: Color, width: float) -> None:
-        self.line(batch, OUTLINE, width + 2.0)
+        self.line(batch, OUTLINE_COLOUR, width + 2.0)
         self.line(batch, color, width)
 
     def dot(
@@ -221,7 +221,7 @@ class Pen:
         batch: Batch,
         color: Color,
         diameter: float,
-        outline: Color = OUTLINE,
+        outline: Color = OUTLINE_COLOUR,
         border: float = 1.0,
     ) -> None:
         if batch:
@@ -249,15 +249,15 @@ def _draw_ghosts(pen: Pen, transform: Transform, ghosts: Ghosts, frame: float, c
     try:
         holders = np.zeros(len(ghosts.frames), int) if ghosts.holders is None else ghosts.holders
         for at, matrix, holder in zip(ghosts.frames.tolist(), ghosts.matrices, holders.tolist(), strict=True):
-            if abs(at - frame) < NEAR:
+            if abs(at - frame) < MIN_GHOST_DISTANCE_FRAMES:
                 continue
             red, green, blue, opacity = pen.held_color(holder, color)
             with _own_space():
                 gpu.matrix.multiply_matrix(Matrix(matrix))
                 if triangles:
-                    shader.uniform_float("color", (red, green, blue, SOLID * opacity))
+                    shader.uniform_float("color", (red, green, blue, SOLID_OPACITY * opacity))
                     triangles.draw(shader)
-                pen.line(lines, (red, green, blue, EDGES * opacity), EDGE_WIDTH)
+                pen.line(lines, (red, green, blue, EDGE_OPACITY * opacity), EDGE_WIDTH)
     finally:
         gpu.state.face_culling_set("NONE")
         gpu.state.depth_test_set("NONE")
@@ -327,14 +327,14 @@ def _draw(context: Any) -> None:
                 native_now.append(space @ Vector(native.tolist()))
             if desired is not None:
                 desired_now.append(space @ Vector(desired.tolist()))
-        pen.dot(batch_of("POINTS", native_now), pen.look.native_color, NOW)
-        pen.dot(batch_of("POINTS", desired_now), pen.look.mode_color, NOW)
+        pen.dot(batch_of("POINTS", native_now), pen.look.native_color, NOW_DIAMETER_PX)
+        pen.dot(batch_of("POINTS", desired_now), pen.look.mode_color, NOW_DIAMETER_PX)
     finally:
         gpu.state.program_point_size_set(False)
         gpu.state.blend_set("NONE")
 
 
-def _draw_path(pen: Pen, path: Path, settings: RigidMotionOverlay) -> None:
+def _draw_path(pen: Pen, path: DrawnPath, settings: RigidMotionOverlay) -> None:
     batches = _batches.get(path)
     if batches is None:
         batches = _batches[path] = _Batches.of(path)
@@ -346,15 +346,15 @@ def _draw_path(pen: Pen, path: Path, settings: RigidMotionOverlay) -> None:
     if settings.show_native or batches.desired is None:
         pen.outlined_line(batches.native, look.native_color, 0.6 * look.line_width)
         (ticks,) = batches.some("native_ticks", chosen.native_ticks)
-        pen.dot(ticks, OUTLINE, TICK, look.native_color, 1.25)
+        pen.dot(ticks, OUTLINE_COLOUR, TICK_DIAMETER_PX, look.native_color, 1.25)
     if batches.desired is not None:
-        pen.line(batches.desired, OUTLINE, look.line_width + 2.0)
+        pen.line(batches.desired, OUTLINE_COLOUR, look.line_width + 2.0)
         for holder, piece in batches.pieces or ((0, batches.desired),):
             pen.line(piece, pen.held_color(holder, look.mode_color), look.line_width)
         (ticks,) = batches.some("desired_ticks", existing(chosen.desired_ticks))
-        pen.dot(ticks, look.tick_color, TICK)
-    diameter = KEY if len(path.keys) <= TICKS else TICK
-    pen.dot(batches.keys, WHITE, diameter)
+        pen.dot(ticks, look.tick_color, TICK_DIAMETER_PX)
+    diameter = KEY_DIAMETER_PX if len(path.keys) <= MAX_TICKS else TICK_DIAMETER_PX
+    pen.dot(batches.keys, KEY_COLOUR, diameter)
     pen.dot(batches.selected, look.key_color, diameter)
 
 
@@ -378,7 +378,7 @@ HANDLERS: dict[str, Callable] = {
     "load_post": _on_file,
 }
 
-PLACES = (
+DRAWN_SPACES = (
     (bpy.types.SpaceView3D, draw_paths, "POST_VIEW"),
     (bpy.types.SpaceDopeSheetEditor, follow_selection, "POST_PIXEL"),
     (bpy.types.SpaceGraphEditor, follow_selection, "POST_PIXEL"),
@@ -395,7 +395,7 @@ _complaint = ""
 def register() -> None:
     append_handlers(HANDLERS)
     if not bpy.app.background:
-        for space, draw, moment in PLACES:
+        for space, draw, moment in DRAWN_SPACES:
             _handles.append((space, space.draw_handler_add(draw, (), "WINDOW", moment)))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...animation.baking.motions import shown
 from ...animation.evaluation.components import MODE_NUMBERS
-from ...animation.evaluation.sources import Source
+from ...animation.evaluation.sources import KeyedTransform
 from ...animation.transforms import Transform
 from ...animation.transforms.sizes import drawn_size
 from ...blender import existing
@@ -32,10 +32,10 @@ MOST_TRIANGLES = 200000
 GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that have triangles."""
 
-RING = 0.1
+WIDEST_BONE_RATIO = 0.1
 """The place along a bone where its octahedron is widest, and its width there, as parts of its length."""
 
-BOX = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+BOX_EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
 """The edges of a bounding box, by Blender's order of its corners."""
 
 
@@ -71,7 +71,12 @@ def ghost_frames(first: int, last: int, step: int) -> np.ndarray:
 
 
 def ghosts_of(
-    transform: Transform, source: Source, mode: str | None, step: int, turn: np.ndarray | None, parents: Parents | None
+    transform: Transform,
+    source: KeyedTransform,
+    mode: str | None,
+    step: int,
+    turn: np.ndarray | None,
+    parents: Parents | None,
 ) -> Ghosts:
     """Return where something is every few frames of a mode.
 
@@ -116,7 +121,7 @@ def shape_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> Shape:
 
 def octahedron(length: float) -> Shape:
     """Return a bone of a length along y, as Blender draws it."""
-    wide = RING * length
+    wide = WIDEST_BONE_RATIO * length
     head, tail = np.zeros(3), np.array((0.0, length, 0.0))
     ring = [np.array((x, wide, z)) for x, z in ((wide, wide), (-wide, wide), (-wide, -wide), (wide, -wide))]
     edges, faces = [], []
@@ -152,7 +157,7 @@ def _plain(obj: bpy.types.Object) -> Shape:
     """Return the bounding box of an object, or a cross of its axes where it has no size."""
     corners = np.array(obj.bound_box)
     if np.ptp(corners) > 0.0:
-        return Shape(corners[np.ravel(BOX)], np.empty((0, 3)))
+        return Shape(corners[np.ravel(BOX_EDGES)], np.empty((0, 3)))
     size = drawn_size(obj) or 1.0
     ends = size * np.concatenate((np.eye(3), -np.eye(3)))
     return Shape(ends[[0, 3, 1, 4, 2, 5]], np.empty((0, 3)))

@@ -14,19 +14,19 @@ import numpy as np
 
 from ...animation.baking.motions import shown
 from ...animation.evaluation.components import MODE_NUMBERS
-from ...animation.evaluation.sources import Run, Source
+from ...animation.evaluation.sources import HoldRun, KeyedTransform
 from ...animation.holds.holders import Holder, holders_of
 from ...animation.transforms import Transform, transform_of
 from ...motion.affine import AffineMaps
 from .blends import blended, smoothstep
 from .ghosts import Ghosts, ghost_frames, in_space_of_path, matrices_of
 from .kinds import space_of
-from .parents import Carried, Parents, identity, maps_of
-from .points import PASSING, Path, Piece, axis_frames, sample_frames, tick_frames
-from .records import Record, record_of
+from .parents import CarriedTargets, Parents, identity, maps_of
+from .points import PASSING_HOLDER, DrawnPath, Piece, axis_frames, sample_frames, tick_frames
+from .records import PlaceRecord, record_of
 
 
-class Held:
+class HolderMotion:
     """What holds something, and where that carries it.
 
     Parameters
@@ -37,7 +37,7 @@ class Held:
         That of all targets that are looked at together.
     """
 
-    def __init__(self, target: Transform, source: Source, carried: Carried) -> None:
+    def __init__(self, target: Transform, source: KeyedTransform, carried: CarriedTargets) -> None:
         self.target, self.source = target, source
         context: Any = bpy.context
         self._scene, self._depsgraph = context.scene, context.view_layer.depsgraph
@@ -54,7 +54,7 @@ class Held:
         self.ids = frozenset(ids)
         """Session ids of the data-blocks that decide on it."""
 
-    def _read(self, holder: Holder, carried: Carried) -> Parents | Record:
+    def _read(self, holder: Holder, carried: CarriedTargets) -> Parents | PlaceRecord:
         target: Any = holder.target
         transform = transform_of((target.pose.bones.get(holder.bone) if holder.bone else None) or target)
         parents = Parents(transform, carried, itself=True)
@@ -63,9 +63,9 @@ class Held:
         return record_of(transform, self._scene.frame_current_final, self._depsgraph)
 
     @property
-    def records(self) -> tuple[tuple[Record, int], ...]:
+    def records(self) -> tuple[tuple[PlaceRecord, int], ...]:
         """What is known as it was seen alone, and how often that has changed."""
-        return tuple((one, one.version) for one, _ in self._holders.values() if isinstance(one, Record))
+        return tuple((one, one.version) for one, _ in self._holders.values() if isinstance(one, PlaceRecord))
 
     @property
     def range(self) -> tuple[int, int]:
@@ -107,7 +107,9 @@ class Held:
                 result[passing] = blended(result[passing], there[passing], smoothstep(np.minimum(over, 1.0)))
         return result
 
-    def _place(self, result: AffineMaps, run: Run, frames: np.ndarray, chosen: np.ndarray, mode: str | None) -> None:
+    def _place(
+        self, result: AffineMaps, run: HoldRun, frames: np.ndarray, chosen: np.ndarray, mode: str | None
+    ) -> None:
         """Put where a run has it on the chosen ones of frames (n,) into a result (n,)."""
         if not chosen.any():
             return
@@ -133,10 +135,10 @@ class Held:
             at = frames >= run.stretch.first if run is not self.source.runs[0] else np.ones(len(frames), dtype=bool)
             numbers[at] = self.source.hold_at(run.stretch.first)[0]
         for switch in self.source.switches:
-            numbers[(frames >= switch.begin) & (frames < switch.frame)] = PASSING
+            numbers[(frames >= switch.begin) & (frames < switch.frame)] = PASSING_HOLDER
         return numbers
 
-    def trace(self, mode: str | None, tick_step: int, axis_length: float, selected: np.ndarray) -> Path | None:
+    def trace(self, mode: str | None, tick_step: int, axis_length: float, selected: np.ndarray) -> DrawnPath | None:
         """Return its path in the world, see `points.trace`; None where it is one point."""
         keys = self.source.keyed_frames
         first, last = self.range
@@ -153,7 +155,7 @@ class Held:
         with_axes = axis_frames(ticks)
         axes = desired[np.searchsorted(frames, with_axes)]
         ends = axes.origins[:, None] + axis_length * np.moveaxis(axes.axes, -1, 1)
-        return Path(
+        return DrawnPath(
             frames=samples,
             native=native.origins[on_samples],
             desired=None if mode == "BLENDER" else desired.origins[on_samples],
@@ -174,7 +176,7 @@ class Held:
         return Ghosts(frames, matrices_of(self.maps(frames, mode)), self.holders_at(frames))
 
 
-def is_held(source: Source) -> bool:
+def is_held(source: KeyedTransform) -> bool:
     """Return whether anything holds what has these keys at any time."""
     return source.held is not None and any(source.hold_at(run.stretch.first)[0] for run in source.runs)
 

@@ -13,7 +13,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...animation.evaluation.components import LOCATION
-from ...animation.evaluation.sources import Source
+from ...animation.evaluation.sources import KeyedTransform
 from ...animation.transforms import Transform, transform_of
 from ...blender import pose_bones
 from .parents import unless_same
@@ -52,7 +52,7 @@ def space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> t
     return rig.matrix_world @ space, unless_same(np.array(turned))
 
 
-def followed(bone: bpy.types.PoseBone, source: Source, turned: np.ndarray | None) -> Followed:
+def followed(bone: bpy.types.PoseBone, source: KeyedTransform, turned: np.ndarray | None) -> Followed:
     """Return the point of a bone that its path is of."""
     moves = LOCATION in source.keyed and not bone.bone.use_connect
     stays = np.zeros(3) if moves or bone.bone.use_connect else np.array(bone.location)
@@ -61,7 +61,7 @@ def followed(bone: bpy.types.PoseBone, source: Source, turned: np.ndarray | None
     return Followed(moves, stays, tip * scale, turned)
 
 
-def axis_length_of_bone(bone: bpy.types.PoseBone, source: Source) -> float:
+def axis_length_of_bone(bone: bpy.types.PoseBone, source: KeyedTransform) -> float:
     """Return how long to draw its local axes: half as long as it is. At scale 1, where the source has a scale."""
     size = 0.5 * bone.bone.length
     return float(size if source.uniform_scale else size * np.abs(np.array(bone.scale)).max()) or 1.0
@@ -76,7 +76,7 @@ def space_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> tuple[Matr
     return space_of_object(transform.animated, depsgraph), None
 
 
-def axis_length_of(transform: Transform, source: Source) -> float:
+def axis_length_of(transform: Transform, source: KeyedTransform) -> float:
     """Return how long its local axes are."""
     if transform.is_part:
         return axis_length_of_bone(transform.pose_bone, source)

@@ -14,32 +14,32 @@ import numpy as np
 from mathutils import Matrix
 
 from ...animation.actions.slots import Binding
-from ...animation.baking.motions import MOVING, not_promised, shown
-from ...animation.evaluation.sources import Source
+from ...animation.baking.motions import MOVING_CHANNELS, not_promised, shown
+from ...animation.evaluation.sources import KeyedTransform
 from ...animation.queries.keyed import active_bindings, sources_of
 from ...animation.transforms import Transform, transform_of
 from ...animation.transforms.posing import Hierarchy
 from ...blender import pose_bones
 from ...motion.affine import AffineMaps
 
-SAME = 1e-5
+MAX_DIRECTION_ROUNDING = 1e-5
 """Components of directions that differ by less are the same in single precision."""
 
 WHOLE_OBJECTS = ("OBJECT", "ARMATURE")
 """Types of parents that carry an object by their own transform."""
 
 
-class Carried:
+class CarriedTargets:
     """Several targets and what they hang on: read once, and worked out once for all looked at on the same frames."""
 
     def __init__(self) -> None:
         self._not_promised = functools.cache(not_promised)
         self.hierarchy = functools.cache(_hierarchy)
-        self._read: dict[Transform, tuple[Binding | None, Source | None]] = {}
+        self._read: dict[Transform, tuple[Binding | None, KeyedTransform | None]] = {}
         self._channels: dict[tuple[Transform, bytes], AffineMaps] = {}
         self._posed: dict[tuple[Transform, bytes], AffineMaps] = {}
 
-    def read(self, transforms: Iterable[Transform]) -> dict[Transform, tuple[Binding | None, Source | None]]:
+    def read(self, transforms: Iterable[Transform]) -> dict[Transform, tuple[Binding | None, KeyedTransform | None]]:
         """Return the binding that each moves by, and what is keyed there; None where there is none."""
         transforms = list(transforms)
         if missing := [transform for transform in transforms if transform not in self._read]:
@@ -91,7 +91,7 @@ class Parents:
         Read the target, too, for where it is itself.
     """
 
-    def __init__(self, target: Transform, carried: Carried, *, itself: bool = False) -> None:
+    def __init__(self, target: Transform, carried: CarriedTargets, *, itself: bool = False) -> None:
         self.target, self._carried = target, carried
         self._read = carried.read((target, *_above(target)) if itself else _above(target))
         self.known = all(
@@ -164,7 +164,7 @@ class Parents:
 
 def unless_same(turned: np.ndarray) -> np.ndarray | None:
     """Return turns (..., 3, 3), or None where all of them are by nothing."""
-    return None if np.abs(turned - np.eye(3)).max() < SAME else turned
+    return None if np.abs(turned - np.eye(3)).max() < MAX_DIRECTION_ROUNDING else turned
 
 
 def _above(target: Transform) -> Iterator[Transform]:
@@ -180,14 +180,16 @@ def _above(target: Transform) -> Iterator[Transform]:
         obj = parent
 
 
-def _moves_by_keys(transform: Transform, carried: Carried) -> bool:
+def _moves_by_keys(transform: Transform, carried: CarriedTargets) -> bool:
     """Return whether nothing but keys of its Action has a part in where something is."""
     obj = transform.animated
     if transform.is_part:
         return not carried.follows(transform)
     data, body = obj.animation_data, obj.rigid_body
     in_strips = data is not None and (data.use_tweak_mode or any(track.strips for track in data.nla_tracks))
-    driven = data is not None and any(driver.data_path.removeprefix("delta_") in MOVING for driver in data.drivers)
+    driven = data is not None and any(
+        driver.data_path.removeprefix("delta_") in MOVING_CHANNELS for driver in data.drivers
+    )
     constrained = any(not constraint.mute and constraint.influence > 0.0 for constraint in obj.constraints)
     return not (in_strips or driven or constrained or body is not None) and _hangs_on_a_whole(obj)
 

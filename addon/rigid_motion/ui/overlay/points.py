@@ -19,7 +19,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...animation.evaluation.differences import in_betweens
-from ...animation.evaluation.sources import Source
+from ...animation.evaluation.sources import KeyedTransform
 from ...animation.transforms.sizes import drawn_size
 from ...motion import Poses
 from ...motion.affine import AffineMaps, turned
@@ -27,20 +27,20 @@ from ...motion.quaternions import rotate
 from .ghosts import Ghosts
 from .parents import Parents
 
-SMOOTH = 256
+MIN_PATH_SAMPLES = 256
 """A path gets this many samples, or one on every frame where those are more: bends look round then."""
 
-FINEST = 16
+MAX_SAMPLES_PER_FRAME = 16
 """The most samples in a frame."""
 
-MOST = 8192
+MAX_PATH_SAMPLES = 8192
 """About the most samples, and the most ticks, of one path. Where it has more frames, samples are further apart."""
 
-TICKS, AXES = 60, 20
+MAX_TICKS, MAX_AXES = 60, 20
 """About the most ticks of a path where no more were requested, and the most of them with axes."""
 
 
-FINENESS = 5000
+SMOOTH_EXTENT_WIDTHS = 5000
 """The extent of a path, in widths of its line, up to which no corners show on the screen."""
 
 TICK_GAP = 14.0
@@ -49,16 +49,16 @@ TICK_GAP = 14.0
 AXES_GAP = 36.0
 """The gap from axes to axes."""
 
-CLEAR = 9.0
+MIN_TICK_DISTANCE_PX = 9.0
 """From a tick to its neighbour, at least, and to a key."""
 
 AT_REST = 1.0
 """The least distance from tick to tick that says something of the usual speed."""
 
-STEPS = [digit * 10**power for power in range(7) for digit in (1, 2, 5)]
+TICK_STEPS_FRAMES = [digit * 10**power for power in range(7) for digit in (1, 2, 5)]
 
 
-PASSING = -1
+PASSING_HOLDER = -1
 """Where there is no single holder: what passes from one to another."""
 
 
@@ -69,7 +69,7 @@ class Piece(NamedTuple):
     last: int
 
     holder: int
-    """The number of what holds it there, 0 for the world, or PASSING."""
+    """The number of what holds it there, 0 for the world, or PASSING_HOLDER."""
 
 
 class Followed(NamedTuple):
@@ -104,7 +104,7 @@ class Followed(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class DrawnPath:
     """The path of an object's origin or of a point of a bone: as Blender's in-betweens have it, and as a mode does."""
 
     frames: np.ndarray
@@ -156,14 +156,14 @@ class Path:
 
 
 def trace(
-    source: Source,
+    source: KeyedTransform,
     mode: str | None = None,
     tick_step: int = 0,
     axis_length: float = 1.0,
     selected: np.ndarray | None = None,
     followed: Followed | None = None,
     parents: Parents | None = None,
-) -> Path | None:
+) -> DrawnPath | None:
     """Return the path of a source, None where it has fewer than two keys.
 
     Parameters
@@ -206,7 +206,7 @@ def trace(
         spaces, turns = parents.spaces(frames)
         followed = None if followed is None else followed._replace(turned=turns)
     native, desired = (_points(poses, followed, spaces) for poses in (motion.native, motion.desired))
-    return Path(
+    return DrawnPath(
         frames=samples,
         native=native[on_samples],
         desired=None if is_native else desired[on_samples],
@@ -236,10 +236,10 @@ def _points(poses: Poses, followed: Followed | None, spaces: AffineMaps | None) 
 def sample_frames(first: int, last: int) -> np.ndarray:
     """Return evenly spaced frames from the first to the last whole one: close enough for a path to look round."""
     length = last - first
-    if length > MOST:
-        return np.append(np.arange(first, last, -(-length // MOST)), last).astype(np.float64)
+    if length > MAX_PATH_SAMPLES:
+        return np.append(np.arange(first, last, -(-length // MAX_PATH_SAMPLES)), last).astype(np.float64)
     # Powers of two, so that whole frames are hit exactly.
-    finer = min(2 ** int(np.ceil(np.log2(max(SMOOTH / length, 1.0)))), FINEST)
+    finer = min(2 ** int(np.ceil(np.log2(max(MIN_PATH_SAMPLES / length, 1.0)))), MAX_SAMPLES_PER_FRAME)
     return first + np.arange(length * finer + 1) / finer
 
 
@@ -248,7 +248,7 @@ def tick_frames(first: int, last: int, step: int = 0) -> np.ndarray:
     0 chooses 1, 2, 5, 10...
     """
     length = last - first
-    step = max(step, -(-length // MOST)) if step else _round_step(length, TICKS)
+    step = max(step, -(-length // MAX_PATH_SAMPLES)) if step else _round_step(length, MAX_TICKS)
     return np.arange(-(-first // step), last // step + 1.0) * step
 
 
@@ -257,12 +257,12 @@ def axis_frames(ticks: np.ndarray) -> np.ndarray:
     if len(ticks) < 2:
         return ticks
     step = ticks[1] - ticks[0]
-    return ticks[ticks % (step * _round_step(len(ticks), AXES)) == 0.0]
+    return ticks[ticks % (step * _round_step(len(ticks), MAX_AXES)) == 0.0]
 
 
 def _round_step(length: int, most: int) -> int:
     """Return the least of 1, 2, 5, 10, 20... that a length has at most this many of."""
-    return next(step for step in STEPS if length <= most * step)
+    return next(step for step in TICK_STEPS_FRAMES if length <= most * step)
 
 
 def _axes(
@@ -283,11 +283,12 @@ def _axes(
 def thinned(line: np.ndarray) -> np.ndarray:
     """Return the points of a line without those that make no visible difference, shape (fewer, 3).
 
-    Every other point goes where the line stays within 1/`FINENESS` of its extent, and so on until all have to stay.
+    Every other point goes where the line stays within 1/`SMOOTH_EXTENT_WIDTHS` of its extent, and so on until all have
+    to stay.
     """
     if len(line) < 3:
         return line
-    tolerance = float(np.ptp(line, axis=0).max()) / FINENESS
+    tolerance = float(np.ptp(line, axis=0).max()) / SMOOTH_EXTENT_WIDTHS
     while True:
         start, middle, end = line[:-2:2], line[1:-1:2], line[2::2]
         chord, offset = end - start, middle - start
@@ -301,7 +302,7 @@ def thinned(line: np.ndarray) -> np.ndarray:
         line = line[stays]
 
 
-def axis_length_of_object(obj: bpy.types.Object, source: Source) -> float:
+def axis_length_of_object(obj: bpy.types.Object, source: KeyedTransform) -> float:
     """Return how long to draw an object's local axes: half as long as it is. At scale 1,
     where the source has a scale.
     """
@@ -341,7 +342,7 @@ class Readable:
 
 
 def readable(
-    path: Path, projection: np.ndarray, size: tuple[float, float], scale: float = 1.0, *, every_tick: bool = False
+    path: DrawnPath, projection: np.ndarray, size: tuple[float, float], scale: float = 1.0, *, every_tick: bool = False
 ) -> Readable:
     """Return what of a path can be told apart in a view.
 
@@ -371,8 +372,8 @@ def readable(
     # The same frames on both, so that they can be compared.
     step = _step(native if desired is None else desired, TICK_GAP)
     return Readable(
-        _spaced(native, step, keys, CLEAR, path.tick_frames),
-        None if desired is None else _spaced(desired, step, keys, CLEAR, path.tick_frames),
+        _spaced(native, step, keys, MIN_TICK_DISTANCE_PX, path.tick_frames),
+        None if desired is None else _spaced(desired, step, keys, MIN_TICK_DISTANCE_PX, path.tick_frames),
         some_axes,
     )
 
@@ -388,7 +389,7 @@ def _step(pixels: np.ndarray, gap: float) -> int:
     """Return the first of 1, 2, 5, 10... points (n, 2) after which a path has usually gone as far as
     the gap, 0 for none.
     """
-    for step in STEPS:
+    for step in TICK_STEPS_FRAMES:
         across, up = (pixels[step::step] - pixels[:-step:step]).T
         moved = np.sort(np.hypot(across, up))
         moved = moved[moved > AT_REST]

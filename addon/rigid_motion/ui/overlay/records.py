@@ -15,11 +15,11 @@ from ...animation.transforms import Transform
 from ...motion.affine import AffineMaps
 from .blends import blended
 
-SAME = 1e-6
+MAX_MATRIX_ROUNDING = 1e-6
 """Matrices whose parts differ by less are the same."""
 
 
-class Record:
+class PlaceRecord:
     """The places of an object or a bone in the world."""
 
     def __init__(self, transform: Transform) -> None:
@@ -38,7 +38,7 @@ class Record:
         if self.transform.is_part:
             place = place @ np.array(evaluated.pose.bones[self.transform.carrier.name].matrix)
         before = self.places.get(frame)
-        if before is None or np.abs(before - place).max() > SAME:
+        if before is None or np.abs(before - place).max() > MAX_MATRIX_ROUNDING:
             self.places[frame] = place
             self.version += 1
 
@@ -53,13 +53,13 @@ class Record:
         return blended(seen[first], seen[second], (at - known[first]) / np.maximum(known[second] - known[first], 1e-9))
 
 
-_records: dict[tuple[int, str], Record] = {}
+_records: dict[tuple[int, str], PlaceRecord] = {}
 """By the identity of what is seen."""
 
 
-def record_of(transform: Transform, frame: float, depsgraph: bpy.types.Depsgraph) -> Record:
+def record_of(transform: Transform, frame: float, depsgraph: bpy.types.Depsgraph) -> PlaceRecord:
     """Return the record of something, from now on kept up to date by `note`."""
-    record = _records.setdefault(transform.identity, Record(transform))
+    record = _records.setdefault(transform.identity, PlaceRecord(transform))
     record.transform = transform
     record.note(frame, depsgraph)
     return record

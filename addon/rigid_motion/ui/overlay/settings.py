@@ -26,7 +26,7 @@ from . import cache
 
 MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MODE_ITEMS[1:]]
 
-HIDDEN = n_("Hidden by Viewport Overlays")
+HIDDEN_LABEL = n_("Hidden by Viewport Overlays")
 
 
 @with_properties
@@ -113,7 +113,7 @@ def draw_settings(layout: bpy.types.UILayout, context: Any) -> None:
     """Draw the settings of the overlay, for a panel."""
     settings = overlay_settings(context.scene)
     if (settings.show_paths or settings.show_ghosts) and not is_shown(context):
-        draw_text(context, layout, HIDDEN, "INFO")
+        draw_text(context, layout, HIDDEN_LABEL, "INFO")
     if cache.know_from_seeing(map(transform_of, selected_in_view(context))):
         layout.operator(RIGID_MOTION_OT_update_path.bl_idname)
     row = labelled(layout, iface_("Mode", OWN_WORDS))

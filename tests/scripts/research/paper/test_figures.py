@@ -2,7 +2,7 @@
 
 import pytest
 
-from research.drawing import DOTS_PER_INCH, WIDTH, Model
+from research.drawing import DOTS_PER_INCH, WIDTH_PX, Model
 from research.paper import catching, strips, triangle
 from tests.scripts.research.paper.clips import thrown
 
@@ -18,11 +18,11 @@ def test_the_tip_rests_under_screws_and_leaves_its_place_under_the_state_of_the_
 
 @pytest.mark.parametrize("figure", ["triangle", "strips", "catching"])
 def test_all_words_are_inside_of_the_picture_and_large_enough_to_read(figure: str, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(catching, "RATES", (5, 20))
+    monkeypatch.setattr(catching, "UPDATES_PER_S", (5, 20))
     monkeypatch.setattr(Model, "draw", lambda *_, **__: None)  # it takes seconds, and no words are in it
     drawn = {"triangle": triangle.draw, "strips": strips.draw, "catching": lambda: catching.pictures(thrown())[1](90)}
     axes = drawn[figure]()
-    assert (axes.figure.bbox.width, axes.figure.dpi) == (WIDTH, DOTS_PER_INCH)
+    assert (axes.figure.bbox.width, axes.figure.dpi) == (WIDTH_PX, DOTS_PER_INCH)
     axes.figure.draw_without_rendering()
     legend = axes.get_legend()
     words = [*axes.texts, *(legend.get_texts() if legend else ())]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from research.paper import holding
-from research.paper.holding import KINDS, MODES, RATES
+from research.paper.holding import KINDS, MODES, UPDATES_PER_S
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion_batch.recordings.clips import Clip
 from tests.scripts.research.paper.clips import clip
@@ -44,7 +44,7 @@ def test_a_tool_is_one_body_with_the_hand_that_has_it_and_goes_over_without_a_ju
 @pytest.mark.parametrize("mode", MODES)
 def test_a_tool_in_the_space_of_the_hand_does_not_slip_and_separate_streams_do(kind: str, mode: str):
     ways = measured()[kind][mode]
-    for rate in RATES:
+    for rate in UPDATES_PER_S:
         assert ways["held"][rate]["held"] < 1e-9
         assert ways["held"][rate]["change"] < 1e-9
         assert ways["separate"][rate]["held"] > 1e-4
@@ -53,7 +53,7 @@ def test_a_tool_in_the_space_of_the_hand_does_not_slip_and_separate_streams_do(k
 def test_a_screw_in_one_stream_holds_it_but_where_hands_change_between_updates():
     for kind in KINDS:
         ways = measured()[kind]["dq_sclerp"]
-        for rate in RATES:
+        for rate in UPDATES_PER_S:
             assert ways["together"][rate]["held"] < 1e-9
             assert ways["together"][rate]["change"] > 1e-3
             assert ways["marked"][rate]["change"] < 1e-9

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from research.paper.motions import REST, read_motion
+from research.paper.motions import MAX_REST_RMS, read_motion
 from rigid_motion_batch.recordings import TrajectoryError
 
 
@@ -19,6 +19,6 @@ def swinging(amplitude: float) -> np.ndarray:
 
 
 def test_a_body_that_stays_within_a_centimetre_of_its_mean_is_at_rest(tmp_path: Path):
-    write(tmp_path / "rests.csv", swinging(REST))
+    write(tmp_path / "rests.csv", swinging(MAX_REST_RMS))
     with pytest.raises(TrajectoryError, match="at rest"):
         read_motion(tmp_path / "rests.csv")

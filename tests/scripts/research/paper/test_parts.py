@@ -8,7 +8,7 @@ import pytest
 
 from research.paper import parts, sending
 from research.paper.table import UPDATES
-from rigid_motion_batch.streaming.measuring import HEADERS
+from rigid_motion_batch.streaming.measuring import HEADER_BYTES
 from tests.scripts.research.paper.clips import circling
 
 pytestmark = pytest.mark.blender
@@ -37,14 +37,14 @@ def test_a_part_writes_its_figures(tmp_path: Path) -> None:
 
 @pytest.mark.network
 def test_a_stream_costs_less_the_more_it_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sending, "DELAYS", (0.1,))
-    monkeypatch.setattr(sending, "TOLERANCES", (1.0, 5.0, 3))
+    monkeypatch.setattr(sending, "DELAYS_S", (0.1,))
+    monkeypatch.setattr(sending, "TOLERANCE_RANGE", (1.0, 5.0, 3))
     result = sending.costs([CLIP])
     own = result["needed"]["100"]
     assert own["bytes"].tolist() == sorted(own["bytes"], reverse=True)
     for datagrams, size in zip(own["datagrams"], own["bytes"], strict=True):
-        assert size > HEADERS * datagrams > 0.0
-    assert result["even"]["7 doubles"][0] == 30 * (56 + HEADERS + sending.STAMP)
+        assert size > HEADER_BYTES * datagrams > 0.0
+    assert result["even"]["7 doubles"][0] == 30 * (56 + HEADER_BYTES + sending.STAMP_BYTES)
     assert own["saved_bytes"]["7 doubles"][0] == pytest.approx(1.0 - own["bytes"][0] / result["even"]["7 doubles"][0])
 
 

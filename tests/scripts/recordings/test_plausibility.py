@@ -9,7 +9,7 @@ import pytest
 from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings import ReadingOptions, Trajectory, TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.clip_reading import make_clip
-from rigid_motion_batch.recordings.sense import breaks, doubts, require_one_body
+from rigid_motion_batch.recordings.plausibility import breaks, implausibilities, require_one_body
 from rigid_motion_batch.recordings.times import typical_interval
 
 COUNT = 90
@@ -66,7 +66,7 @@ def test_one_device_is_not_refused(scale: float, rate: float, rounded_to: float)
     ],
 )
 def test_what_nobody_records_is_said(trajectory: Trajectory, told: str) -> None:
-    assert str(doubts(trajectory)[0]).startswith(told)
+    assert str(implausibilities(trajectory)[0]).startswith(told)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_what_stays_far_from_its_origin_may_be_in_another_unit(shift: float, sca
     """A calm head in centimetres or inches is no faster than a quick hand in metres, but as high as a house."""
     one = hand(rate=10.0)
     calm = one.poses.positions * scale / 10.0 + np.array((0.0, shift, 0.0))
-    result = doubts(replace(one, poses=Poses(calm, one.poses.quaternions)))
+    result = implausibilities(replace(one, poses=Poses(calm, one.poses.quaternions)))
     assert len(result) == said
     assert all("--scale 0.01, if inches, --scale 0.0254" in item.way_out for item in result)
 
@@ -125,7 +125,7 @@ def test_one_wild_time_stamp_is_no_reason_for_doubts(row: int, time: float) -> N
     one = hand()
     times = 1.7e9 + one.times
     times[row] = time
-    assert doubts(replace(one, times=times)) == ()
+    assert implausibilities(replace(one, times=times)) == ()
     assert typical_interval(times) == pytest.approx(1.0 / 90.0, rel=1e-4)
 
 

@@ -17,38 +17,38 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.motion.repair import LARGEST, Repair
+from rigid_motion.motion.repair import MAX_MEASURE, Repair
 
 from .clips import ClipWarning
 from .recordings import Trajectory, TrajectoryError, shown
 from .rest_bodies import RestBody, size_of
-from .times import FASTEST, SLOWEST, typical_interval
+from .times import MAX_SAMPLES_PER_S, MIN_SAMPLES_PER_S, typical_interval
 
 HIGHEST_SPEED = 20.0
 """Metres a second, which 95 % of the speeds are below: nearly three times what a fast game has. A hand at rest in
 centimetres passes for one in metres; one that moves does not."""
 
-WIDEST = 100.0
+MAX_ROOM_WIDTH_M = 100.0
 """Metres: wider than rooms and halls where people are tracked."""
 
 LOOK_BACK = 8
 """Samples among which those of one device come again, where a few take turns."""
 
-NEARER = 10.0
+MIN_NEARER_RATIO = 10.0
 """Times nearer to an earlier sample than to the last one that a sample has to be, not to follow the last. Along
 any motion that is sampled well the last one is the nearest."""
 
 SAME_TIME = 0.01
 """Metres between samples of one time that one device does not have."""
 
-MIXED = 0.25
+MIN_MIXED_RATIO = 0.25
 """The share of samples that do not follow the last one, from which on there are several devices. Of two that take turns
 it is all; of two in any order, half."""
 
-FURTHEST = 20.0
+MAX_ORIGIN_DISTANCE_M = 20.0
 """Metres from the origin of a recording, which lies in the room where it was made. A headset is 170 cm above it."""
 
-FEWEST = 16
+MIN_MIXED_SAMPLES = 16
 """Samples that are enough to see that."""
 
 
@@ -62,7 +62,7 @@ def require_one_body(trajectory: Trajectory, path: Path | str, way_out: str, lin
     """
     times, positions = _usable(trajectory)
     interval = typical_interval(times)
-    if len(times) < FEWEST or not interval > 0.0:
+    if len(times) < MIN_MIXED_SAMPLES or not interval > 0.0:
         return
     jumps = np.linalg.norm(positions[LOOK_BACK:] - positions[LOOK_BACK - 1 : -1], axis=-1)
     nearest = np.full(len(jumps), np.inf)
@@ -73,9 +73,9 @@ def require_one_body(trajectory: Trajectory, path: Path | str, way_out: str, lin
     with np.errstate(over="ignore"):
         speeds = jumps / np.where(steps > 0.0, steps, interval)
     impossible = (speeds > HIGHEST_SPEED) | ((steps == 0.0) & (jumps > SAME_TIME))
-    mixed = impossible & (jumps > NEARER * nearest)
+    mixed = impossible & (jumps > MIN_NEARER_RATIO * nearest)
     count = np.count_nonzero(mixed)
-    if count > MIXED * len(mixed):
+    if count > MIN_MIXED_RATIO * len(mixed):
         problem = (
             f"{count} of {len(times)} samples jump from one place to another and back, at "
             f"{np.median(speeds[mixed]):.3g} m/s: these are several devices"
@@ -83,7 +83,7 @@ def require_one_body(trajectory: Trajectory, path: Path | str, way_out: str, lin
         raise TrajectoryError(path, problem, way_out, line)
 
 
-def doubts(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[ClipWarning, ...]:
+def implausibilities(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[ClipWarning, ...]:
     """Return what of a recording is hard to believe.
 
     Parameters
@@ -100,10 +100,10 @@ def doubts(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[ClipWarn
 
 def _usable(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     """Return times and positions, in seconds and metres, of samples with no damage in both; of a body its root's."""
-    rows = np.abs(trajectory.times) < LARGEST
+    rows = np.abs(trajectory.times) < MAX_MEASURE
     poses = trajectory.poses if trajectory.rest_body is None else trajectory.poses[0]
     positions = poses.positions
-    rows &= (np.abs(positions) < LARGEST).all(axis=-1)
+    rows &= (np.abs(positions) < MAX_MEASURE).all(axis=-1)
     return trajectory.times[rows], positions[rows] * trajectory.metres_per_unit
 
 
@@ -112,18 +112,18 @@ def _of_times(times: np.ndarray, time_unit: bool) -> Iterator[ClipWarning]:
     if not interval > 0.0:
         return
     way_out = "if its times are no seconds, --time-unit ms, us or ns" if time_unit else ""
-    if interval > 1.0 / SLOWEST:
+    if interval > 1.0 / MIN_SAMPLES_PER_S:
         counted = time_unit and bool(np.all(np.rint(times) == times))
         yield ClipWarning(
             f"only {1.0 / interval:.2g} samples a second, fewer than any motion needs",
             "if it counts frames, --frame-rate 90, or how many there were a second; " * counted + way_out,
         )
-    if interval < 1.0 / FASTEST:
+    if interval < 1.0 / MAX_SAMPLES_PER_S:
         yield ClipWarning(f"{1.0 / interval:.3g} samples a second, more than any device has", way_out)
 
 
 def _of_lengths(times: np.ndarray, positions: np.ndarray) -> Iterator[ClipWarning]:
-    if len(times) < FEWEST:
+    if len(times) < MIN_MIXED_SAMPLES:
         return
     steps = np.diff(times)
     forward = steps > 0.0
@@ -132,47 +132,47 @@ def _of_lengths(times: np.ndarray, positions: np.ndarray) -> Iterator[ClipWarnin
     low, high = np.percentile(positions, (1.0, 99.0), axis=0)
     extent, away = float(np.linalg.norm(high - low)), float(np.linalg.norm(low + high)) / 2.0
     units = "if its lengths are centimetres, --scale 0.01, if inches, --scale 0.0254, if millimetres, --scale 0.001"
-    if fast > HIGHEST_SPEED or extent > WIDEST:
+    if fast > HIGHEST_SPEED or extent > MAX_ROOM_WIDTH_M:
         text = f"a twentieth of its speeds are above {fast:.3g} m/s, and it goes {extent:.3g} m far, as no hand does"
         yield ClipWarning(text, units)
-    elif away > FURTHEST and away > extent:
+    elif away > MAX_ORIGIN_DISTANCE_M and away > extent:
         yield ClipWarning(f"it stays {away:.3g} m away from its origin, and moves within {extent:.2g} m", units)
 
 
-IDENTICAL = 5
+MAX_T_POSE_SAMPLES = 5
 """Samples in front that may hold the same T-pose."""
 
-SAME = 1e-3
+MAX_HELD_POSE_RATIO = 1e-3
 """Part of its size by which a body may move and still hold a pose."""
 
-JUMPS = 0.1
+MIN_T_POSE_JUMP_RATIO = 0.1
 """Part of its size that a joint moves, at least, from a T-pose to the motion."""
 
-FASTER = 5.0
+MIN_T_POSE_JUMP_FACTOR = 5.0
 """Factor by which that is farther than any joint moves in any sample afterwards."""
 
-STARTLED = 10.0
+MIN_FIRST_JUMP_FACTOR = 10.0
 """Such a factor where the first pose is neither a T-pose nor that at rest, and more than `HIGHEST_SPEED`."""
 
-SOON = 60
+FIRST_JUMP_SAMPLES = 60
 """Samples that are looked at for that."""
 
 AT_REST = 0.02
 """Part of its size by which any joint may be away from where it is at rest."""
 
-BROAD, FLAT = 0.75, 0.4
+MIN_T_POSE_SPAN_RATIO, MAX_T_POSE_DEPTH_RATIO = 0.75, 0.4
 """The least that the arms of a T-pose reach, and the most that it is deep, as parts of its largest extent."""
 
-GAP = 0.2
+MIN_GAP_S = 0.2
 """Seconds: the longest time between keys of a comparison at 5 keys a second. In a longer gap there is no key at all."""
 
-LOST = 0.25
+MIN_LOST_RATIO = 0.25
 """The share of rows from which on it is no repair to leave them out."""
 
-ISOLATED = 10.0
+MIN_ISOLATED_JUMP_FACTOR = 10.0
 """Factor by which a jump goes farther than the samples around it."""
 
-AROUND = 8
+JUMP_REACH_SAMPLES = 8
 """Samples before and after a jump that it is compared with."""
 
 MOST_JUMPS = 0.01
@@ -181,7 +181,7 @@ MOST_JUMPS = 0.01
 MOST_NAMED = 5
 """Gaps or jumps that are named, the largest ones."""
 
-BLOCK = 4096
+BLOCK_SAMPLES = 4096
 """Samples of a body that are looked at at once."""
 
 LEAVE_OUT = "take a part without it: --start and --end"
@@ -199,12 +199,12 @@ def calibration_pose(
     warning : ClipWarning or None
         What to say of these; also of another pose that it jumps from.
     """
-    if len(times) < FEWEST:
+    if len(times) < MIN_MIXED_SAMPLES:
         return 0, None
-    places = rest_body.skeleton.in_root_space(poses[:, : IDENTICAL + SOON]).positions
+    places = rest_body.skeleton.in_root_space(poses[:, : MAX_T_POSE_SAMPLES + FIRST_JUMP_SAMPLES]).positions
     size = max(size_of(rest_body.parents, places[:, 0]), size_of(rest_body.parents, rest_body.rest.positions))
     steps = np.linalg.norm(np.diff(places, axis=1), axis=-1)
-    held = int(np.argmax(steps.max(axis=0) > SAME * size)) + 1
+    held = int(np.argmax(steps.max(axis=0) > MAX_HELD_POSE_RATIO * size)) + 1
     joint = int(np.argmax(steps[:, held - 1]))
     jump, others = steps[joint, held - 1], np.max(steps[:, held:], initial=0.0)
     speed = jump * metres / (times[held] - times[held - 1])
@@ -214,10 +214,14 @@ def calibration_pose(
     )
     where = float(times[0]), float(times[held])
     kind = _kind(places[:, 0], rest_body, size)
-    if kind and held <= IDENTICAL and jump > max(JUMPS * size, FASTER * others):
+    if (
+        kind
+        and held <= MAX_T_POSE_SAMPLES
+        and jump > max(MIN_T_POSE_JUMP_RATIO * size, MIN_T_POSE_JUMP_FACTOR * others)
+    ):
         frames = "its first frame is" if held == 1 else f"its first {held} frames are"
         return held, ClipWarning(f"{frames} {kind} and left out: {described}", "--start 0 keeps it", *where)
-    if held == 1 and speed > HIGHEST_SPEED and jump > STARTLED * others:
+    if held == 1 and speed > HIGHEST_SPEED and jump > MIN_FIRST_JUMP_FACTOR * others:
         text = f"its first sample is a pose of its own, perhaps the T-pose before a recording: {described}; "
         way_out = f"leave it out: --start {times[1] - times[0]:.3g}"
         return 0, ClipWarning(text + "errors around it say nothing of the motion", way_out, *where)
@@ -227,7 +231,7 @@ def calibration_pose(
 def _kind(places: np.ndarray, rest_body: RestBody, size: float) -> str:
     """Return what pose these places (joints, 3) are: a T-pose in any axes, or that at rest; empty for any other."""
     smallest, middle, largest = np.sort(np.ptp(places, axis=0))
-    if middle > BROAD * largest and smallest < FLAT * largest:
+    if middle > MIN_T_POSE_SPAN_RATIO * largest and smallest < MAX_T_POSE_DEPTH_RATIO * largest:
         return "a T-pose"
     away = places - rest_body.rest.positions
     return "the pose at rest" if np.abs(away - away[0]).max() < AT_REST * size else ""
@@ -235,7 +239,11 @@ def _kind(places: np.ndarray, rest_body: RestBody, size: float) -> str:
 
 def losses(repairs: Sequence[Repair], count: int) -> tuple[list[ClipWarning], list[Repair]]:
     """Return warnings of repairs that cost a good part of so many rows of a recording, and the other repairs."""
-    costly = [repair for repair in repairs if repair.fault.startswith("dropped") and len(repair.rows) >= LOST * count]
+    costly = [
+        repair
+        for repair in repairs
+        if repair.fault.startswith("dropped") and len(repair.rows) >= MIN_LOST_RATIO * count
+    ]
     warnings = []
     for repair in costly:
         way_out = "if tracking was lost there, take a part without it: --start and --end"
@@ -259,13 +267,13 @@ def breaks(
     """
     steps = np.diff(times)
     result = [*_gaps(times, steps, begin)]
-    if len(times) >= FEWEST:
+    if len(times) >= MIN_MIXED_SAMPLES:
         result += _jumps(times, steps, np.concatenate(list(_lengths(poses, rest_body))) * metres, begin)
     return sorted(result, key=lambda warning: warning.start_s or 0.0)
 
 
 def _gaps(times: np.ndarray, steps: np.ndarray, begin: float) -> Iterator[ClipWarning]:
-    gaps = np.flatnonzero((steps > GAP) & (steps > ISOLATED * np.median(steps)))
+    gaps = np.flatnonzero((steps > MIN_GAP_S) & (steps > MIN_ISOLATED_JUMP_FACTOR * np.median(steps)))
     for row in _largest(steps, gaps):
         first, last = times[row : row + 2].tolist()
         text = f"no samples from {first - begin:.2f} s to {last - begin:.2f} s{_of(gaps, 'gaps')}"
@@ -277,9 +285,9 @@ def _jumps(times: np.ndarray, steps: np.ndarray, lengths: np.ndarray, begin: flo
     fast = np.flatnonzero(lengths > HIGHEST_SPEED * steps)
     if len(fast) > MOST_JUMPS * len(steps):
         return
-    around = [lengths[max(0, row - AROUND) : row + AROUND + 1] for row in fast]
+    around = [lengths[max(0, row - JUMP_REACH_SAMPLES) : row + JUMP_REACH_SAMPLES + 1] for row in fast]
     usual = np.array([np.median(lengths) for lengths in around])
-    jumps = fast[lengths[fast] > ISOLATED * usual]
+    jumps = fast[lengths[fast] > MIN_ISOLATED_JUMP_FACTOR * usual]
     for row in _largest(lengths, jumps):
         first, last = times[row : row + 2].tolist()
         text = f"a jump at {first - begin:.2f} s{_of(jumps, 'jumps')}: {lengths[row]:.2g} m in one sample, at "
@@ -295,8 +303,8 @@ def _lasting(steps: np.ndarray) -> np.ndarray:
 def _lengths(poses: Poses, rest_body: RestBody | None) -> Iterator[np.ndarray]:
     """Yield how far a body, or any joint of it, gets from each sample to the next, block by block."""
     count = poses.shape[-1]
-    for first in range(0, count - 1, BLOCK):
-        part = poses[..., first : first + BLOCK + 1]
+    for first in range(0, count - 1, BLOCK_SAMPLES):
+        part = poses[..., first : first + BLOCK_SAMPLES + 1]
         places = part.positions[None] if rest_body is None else rest_body.skeleton.in_root_space(part).positions
         yield np.linalg.norm(np.diff(places, axis=1), axis=-1).max(axis=0)
 
