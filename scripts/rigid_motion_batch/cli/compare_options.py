@@ -234,7 +234,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video.add_argument(
         "--antialiasing",
         choices=ANTIALIASING,
-        help="for workbench: OFF, FXAA or a number of samples; 8 for a talk (softened by the compositor)",
+        help="for workbench: OFF, FXAA or a number of samples (8 on a graphics card, otherwise edges are smoothed)",
     )
     video.add_argument(
         "--samples",
