@@ -83,10 +83,13 @@ class Path:
     def nearest(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How far along the path the poses are that are nearest to keys (2,), and how far these are off it, (2, 7).
 
-        A radian is as far as a unit of length.
+        A radian is as far as a unit of length. Keys that shape the path are at its ends, where it may rest as well.
         """
         keys, places = self.body.key_poses(frames), []
-        for number in range(2):
+        for number, frame in enumerate(frames):
+            if frame in (self.first, self.last):
+                places.append(float(frame == self.last))
+                continue
             low, high = -0.25, 1.25
             for _ in range(7):
                 grid, step = np.linspace(low, high, 49, retstep=True)
