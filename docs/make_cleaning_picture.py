@@ -2,14 +2,18 @@
 
 python docs/make_cleaning_picture.py
 
-writes cleaning.svg beside this file. The motions are those of assets/ and of the dancer among the examples, with noise.
+writes cleaning.svg beside this file, and cleaning-film.svg, which moves by itself in every browser. The motions are
+those of assets/ and of the dancer among the examples, with noise.
 """
 
 from __future__ import annotations
 
 import sys
 import tempfile
+import textwrap
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -20,14 +24,20 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")
 
 from docs.drawing import drawing, element, polyline
 from examples.dancer import dance
+from rigid_motion.blender import existing
 from rigid_motion.motion import Poses
 from rigid_motion.motion.differences import turned_in_world
+from rigid_motion.motion.quaternions import matrices
 from rigid_motion_batch.files import write_text
 from rigid_motion_batch.recordings import read_clips
 from rigid_motion_batch.recordings.cleaning import cleaned_clip, described
 from rigid_motion_batch.recordings.clips import Clip
 
-WIDTH, HEIGHT, TOP, LEFT = 860, 190, 44, 12
+WIDTH, HEIGHT, TOP, LEFT = 860, 200, 54, 12
+FILM_PX = 260
+"""The height of the film."""
+
+FILM_S, FILM_RATE_HZ = 4.0, 24
 STYLE = "text{font:14px sans-serif;fill:#2b3440}.small{font-size:12px;fill:#5b6675}path{fill:none}"
 RECORDED, CLEANED, TRUTH = "#e08a3c", "#3b73d1", "#2b3440"
 
@@ -58,12 +68,11 @@ def dancer() -> Clip:
         path = Path(folder) / "dancer.bvh"
         bpy.ops.export_anim.bvh(filepath=str(path), frame_start=1, frame_end=int(dance.FRAMES[-1]))
         (clip,), _ = read_clips([str(path)])
-    return clip
+    return replace(clip, axes="blender")
 
 
-def panel(row: int, title: str, truth: Clip, shaky: Clip, tolerance: float, part: slice, **joint: str) -> str:
+def panel(row: int, title: str, truth: Clip, shaky: Clip, cleaned: Clip, said: str, part: slice, **joint: str) -> str:
     """Return the graph of a height, or of an angle about the axis up of what is no body, in a part of a clip."""
-    cleaned, found = cleaned_clip(shaky, tolerance)
     lines, seconds = [], truth.times[part] - truth.times[part][0]
     for clip in (shaky, truth, cleaned):
         if clip.rest_body:
@@ -90,8 +99,69 @@ def panel(row: int, title: str, truth: Clip, shaky: Clip, tolerance: float, part
             strict=True,
         )
     ]
-    said = element("text", "; ".join(described(shaky, found)), x=LEFT, y=top - 8, class_="small")
-    return element("text", title, x=LEFT, y=top - 24) + said + "".join(paths)
+    texts = [
+        element("text", text, x=LEFT, y=top - 34 + 16 * line, class_="small" if line else "")
+        for line, text in enumerate((title, *textwrap.wrap(said, 130)))
+    ]
+    return "".join((*texts, *paths))
+
+
+def strokes_of_body(clip: Clip) -> np.ndarray:
+    """Return lines from the joints to their parents, from the front, in metres, shape (t, n, 2, 2)."""
+    skeleton = existing(clip.rest_body).skeleton
+    places = np.stack([clip.in_blender(pose).positions for pose in skeleton.in_root_space(clip.poses)], axis=1)
+    child = np.flatnonzero(np.asarray(skeleton.parents) >= 0)
+    return np.stack((places[:, child], places[:, np.asarray(skeleton.parents)[child]]), axis=2)[..., [0, 2]]
+
+
+def strokes_of_hand(clip: Clip) -> np.ndarray:
+    """Return its axes, seen from a corner, in metres, shape (t, 3, 2, 2)."""
+    poses = clip.in_blender(clip.poses)
+    tips = poses.positions[:, None] + 0.25 * np.moveaxis(matrices(poses.quaternions), -1, 0).swapaxes(1, 2)
+    ends = np.stack((np.repeat(poses.positions[:, None], 3, axis=1), tips), axis=2)
+    return ends @ np.array(((0.8, -0.6, 0.0), (0.3, 0.4, 0.85))).T
+
+
+def strokes_of_camera(clip: Clip, placed: Poses) -> np.ndarray:
+    """Return the edges of a cube that stands in front of the placed camera, as the camera sees them, (t, 12, 2, 2)."""
+    corners = np.array(list(np.ndindex(2, 2, 2)), dtype=float) - 0.5
+    edges = [
+        (one, other) for one in range(8) for other in range(one) if np.abs(corners[one] - corners[other]).sum() == 1.0
+    ]
+    turned, turns = (np.moveaxis(matrices(poses.quaternions), -1, 0) for poses in (placed, clip.poses))
+    cube = placed.positions + (0.6 * corners + (0.0, 0.0, -1.6)) @ turned[0].T
+    seen = np.einsum("tji,tkj->tki", turns, cube - clip.poses.positions[:, None])
+    return (seen[..., :2] / -seen[..., 2:])[:, edges]
+
+
+def film(row: int, title: str, clips: tuple[Clip, Clip], strokes_of: Callable[[Clip], np.ndarray], part: slice) -> str:
+    """Return both clips as they play in a part, side by side, in loops of as many seconds."""
+    times = clips[0].times[part] - clips[0].times[part][0]
+    shown = np.searchsorted(times, np.arange(0.0, min(times[-1], FILM_S), 1.0 / FILM_RATE_HZ))
+    drawn = [strokes_of(clip)[part][shown] for clip in clips]
+    points = np.concatenate(drawn).reshape(-1, 2)
+    low, high = np.quantile(points, 0.002, axis=0), np.quantile(points, 0.998, axis=0)
+    width, height = WIDTH / 6 - 2 * LEFT, FILM_PX - TOP - 30
+    size = min(width / (high - low)[0], height / (high - low)[1])
+    result = [element("text", title, x=row * WIDTH / 3 + LEFT, y=20)]
+    for half, (lines, colour) in enumerate(zip(drawn, (RECORDED, CLEANED), strict=True)):
+        middle = np.array(((row + 0.25 + 0.5 * half) * WIDTH / 3, TOP + height / 2))
+        pixels = middle + size * (lines - (low + high) / 2) * (1.0, -1.0)
+        pictures = [
+            "".join(f"M{a[0]:.1f} {a[1]:.1f}L{b[0]:.1f} {b[1]:.1f}" for a, b in picture) for picture in pixels.tolist()
+        ]
+        moving = element(
+            "animate",
+            attributeName="d",
+            dur=f"{len(pictures) / FILM_RATE_HZ:.3f}s",
+            repeatCount="indefinite",
+            calcMode="discrete",
+            values=";".join(pictures),
+        )
+        result.append(element("path", moving, d=pictures[0], stroke=colour, stroke_width=3, stroke_linecap="round"))
+        name = ("as recorded", "cleaned")[half]
+        result.append(element("text", name, x=middle[0], y=FILM_PX - 8, text_anchor="middle", class_="small"))
+    return "".join(result)
 
 
 def main() -> None:
@@ -101,29 +171,36 @@ def main() -> None:
     for first, off in ((60, 0.2), (180, -0.15)):
         shaky.positions[first : first + 2] += off
     foot = next(name for name in body.whole_body.joints if "foot" in name.lower() or "toe" in name.lower())
-    panels = (
-        panel(0, "A hand: its height", hand, replace(hand, poses=shaky), 0.03, slice(20, 220)),
-        panel(
-            1,
+    shown = (
+        ("A hand: its height", hand, replace(hand, poses=shaky), 0.03, slice(20, 220), {}),
+        (
             "A camera: how far it is turned",
             camera,
             replace(camera, poses=shaken(camera.poses, 0.004, 1.0, 2)),
             0.02,
             slice(0, 100),
-            joint="",
+            {"joint": ""},
         ),
-        panel(
-            2,
+        (
             f"A body: the height of {foot}",
             body,
             replace(body, poses=shaken(body.poses, 0.002, 0.4, 3)),
             0.03,
             slice(0, 120),
-            joint=foot,
+            {"joint": foot},
         ),
     )
+    strokes = (strokes_of_hand, partial(strokes_of_camera, placed=camera.poses[50:51]), strokes_of_body)
+    panels, films = [], []
+    for row, (title, truth, recorded, tolerance, part, joint) in enumerate(shown):
+        cleaned, found = cleaned_clip(recorded, tolerance)
+        said = "; ".join(described(recorded, found))
+        panels.append(panel(row, title, truth, recorded, cleaned, said, part, **joint))
+        films.append(film(row, title.partition(":")[0], (recorded, cleaned), strokes[row], part))
     about = "As recorded (orange), cleaned (blue), and as it was before noise was put in (grey)"
     write_text(DOCS / "cleaning.svg", drawing(about, STYLE, WIDTH, 3 * HEIGHT + 4, *panels))
+    about = "A hand, what a camera sees, and a body: as recorded (orange) and cleaned (blue)"
+    write_text(DOCS / "cleaning-film.svg", drawing(about, STYLE, WIDTH, FILM_PX, *films))
 
 
 if __name__ == "__main__":

@@ -20,16 +20,19 @@ from rigid_motion.animation import (
     unbake,
     write_channel,
 )
+from rigid_motion.animation.baking import cleaning as cleaning_of_keys
 from rigid_motion.animation.baking.cleaning import focus_of, pixels_of
 from rigid_motion.animation.transforms.sizes import reaches_of
-from rigid_motion.motion import Poses, shell_error
+from rigid_motion.motion import Poses, shell_error, standing
+from rigid_motion.motion.contacts import slide, slide_ratios, spans
 from rigid_motion.motion.quaternions import turned
-from rigid_motion_batch.recordings.world_poses import read_poses
 from tests.animation.bones.poses import shown_poses
+from tests.animation.bones.rigs import Rest, new_rig
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.scenes import key, new_object
 from tests.balls import largest_displacements
 from tests.rigs.recorded import FRAMES, recorded_rig
+from tests.world_poses import read_poses
 
 COUNT, RADIUS, SIZE, TURN = 300, 0.1, 1e-3, 5e-3
 SPIKE = 120
@@ -173,6 +176,62 @@ def test_no_bone_is_moved_by_more_whatever_it_hangs_on(live_file, rotation_mode,
         jerks = [np.abs(np.diff(poses[name][:, :3, 1], n=4, axis=0)).mean() for poses in (before, after)]
         # An arm in between that is not cleaned goes on trembling.
         assert jerks[1] < (0.9 if chosen == ("Spine", "Hand.L") else 0.7) * jerks[0]
+
+
+LEG = (
+    Rest("Hip", (0.0, 0.0, 1.0), (0.0, 0.001, 0.9)),
+    Rest("Thigh", (0.0, 0.0, 0.9), (0.0, 0.001, 0.5), "Hip"),
+    Rest("Foot", (0.0, 0.0, 0.1), (0.0, 0.001, 0.05), "Thigh"),
+)
+
+
+def shaky_leg(seed: int) -> bpy.types.Object:
+    """A hip that goes on and trembles, above a foot that stands, as by inverse kinematics, and steps forwards in
+    five frames out of thirty.
+    """
+    rig, random = new_rig("Leg", LEG), np.random.default_rng(seed)
+    hip, steps = 0.005 * FRAMES + 0.002 * random.normal(size=len(FRAMES)), FRAMES / 30.0
+    foot = 0.15 * (np.floor(steps) + np.clip(6.0 * np.mod(steps, 1.0) - 5.0, 0.0, 1.0))
+    along = rig.data.bones["Hip"].x_axis.x
+    write_channel(rig, 'pose.bones["Hip"].location', FRAMES, np.outer(hip / along, (1.0, 0.0, 0.0)))
+    leans = np.outer(np.arcsin((hip - foot - 0.075) / along / 0.8), (0.0, 0.0, 1.0))
+    turns = turned(np.tile((1.0, 0.0, 0.0, 0.0), (len(FRAMES), 1)), leans)
+    write_channel(rig, 'pose.bones["Thigh"].rotation_quaternion', FRAMES, turns)
+    return rig
+
+
+def origins(rig: bpy.types.Object) -> np.ndarray:
+    """Where the bones begin in the world, as the scene evaluates them, shape (bones, n, 3)."""
+    (shown,) = shown_poses([rig], FRAMES)
+    return np.stack([(np.array(rig.matrix_world) @ poses)[:, :3, 3] for poses in shown.values()])
+
+
+@pytest.mark.parametrize("upright", [True, False])
+def test_a_foot_that_stands_slides_no_further_than_it_did(live_file, monkeypatch, upright):
+    ratios: dict[bool, list[float]] = {True: [], False: []}
+    for seed in range(3):
+        rig = shaky_leg(seed)
+        if not upright:
+            # The axes of the channels are others than the world's.
+            rig.parent = new_object("Parent")
+            rig.parent.rotation_euler, rig.rotation_euler = (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)
+            bpy.context.view_layer.update()
+        before, targets = origins(rig), [*rig.pose.bones][:2]
+        stands = standing(FRAMES / bpy.context.scene.render.fps, before, shaky=True)
+        assert stands.any(axis=1).tolist() == [False, False, True]
+        for hold, most in ratios.items():
+            with monkeypatch.context() as patch:
+                if not hold:
+                    patch.setattr(cleaning_of_keys, "standing", lambda *_, **__: False)
+                (cleaning,) = clean_motion(targets)
+            after = origins(rig)
+            most.append(slide_ratios(after, before, stands).max())
+            slides = slide(after, stands), slide(before, stands)
+            assert cleaning.contacts == (pytest.approx((len(spans(stands)), *slides), abs=1e-6) if hold else (0, 0, 0))
+            assert 0.0 < cleaning.moved <= 3.0 * cleaning.trembling
+            restore_keys(targets)
+    assert max(ratios[True]) < 1.0 + 1e-4
+    assert max(ratios[False]) > 1.1
 
 
 def test_cameras_are_cleaned_in_pixels_of_their_pictures(live_file):

@@ -7,11 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_motion.motion import Poses, Skeleton, clean, shell_error
+from rigid_motion.motion import Poses, Skeleton, clean, shell_error, standing
 from rigid_motion.motion.banded import Banded
+from rigid_motion.motion.contacts import slide, slide_ratios
 from rigid_motion.motion.differences import coefficients, turned_in_world
 from rigid_motion.motion.quaternions import align_signs, multiply, normalise, rotate
 from rigid_motion.motion.trembling import trembling
+from tests.motion.bodies import random_parents
 
 NOISE, TURNS = 1e-3, np.radians(0.3)
 
@@ -73,6 +75,19 @@ def test_white_noise_is_measured_and_most_of_it_goes(seed):
     assert not cleaned.repeats.any()
 
 
+@pytest.mark.parametrize("count", [60, 100, 200, 600, 4000])
+def test_white_noise_is_measured_as_it_is_however_short_the_recording(count):
+    found = []
+    for seed in range(200 if count < 600 else 20):
+        times, truth = hand(seed, count)
+        found += trembling(times, shaken(truth, seed))[:2]
+    parts = np.reshape(found, (-1, 2)) / (NOISE, TURNS)
+    # Not too little for want of samples, and no more scattered than so many numbers are.
+    assert parts.mean() == pytest.approx(1.0, abs=0.02)
+    assert parts.std() < 1.0 / np.sqrt(count)
+    assert np.mean(np.abs(parts - 1.0) < 0.15) > (0.8 if count < 100 else 0.9)
+
+
 def test_motion_without_noise_is_left_alone():
     times, truth = hand(1)
     cleaned = clean(times, truth)
@@ -129,6 +144,28 @@ def test_a_drum_stroke_keeps_its_hit():
     assert not cleaned.spikes.any()
 
 
+@pytest.mark.parametrize("late", [0.0, 0.33, 0.5], ids="{} samples".format)
+@pytest.mark.parametrize("shape", ["drum", "throw", "step"])
+def test_a_hit_is_no_further_off_than_it_was_recorded_be_it_on_a_sample_or_between_two(shape, late):
+    times = (np.arange(900) + late) / 90.0
+    phase = np.mod(times, 1.0) - 0.5
+    height = {
+        "drum": 0.8 * np.abs(phase),
+        "throw": 2.45 * (0.25 - phase**2),
+        "step": 0.3 * np.floor(times) + 0.3 * np.clip(5.0 * np.mod(times, 1.0), 0.0, 1.0),
+    }[shape]
+    tilts = turned_in_world(np.tile([1.0, 0, 0, 0], (900, 1)), height[:, None] * (0.0, 1.0, 0.0))
+    truth = Poses(np.stack([0.2 * np.sin(times), 0.1 * times, height], axis=1), tilts)
+    hits, ratios = np.argsort(-np.abs(np.diff(height, 2)))[:12] + 1, []
+    for seed in range(40, 45):
+        shaky = shaken(truth, seed)
+        cleaned = clean(times, shaky).poses
+        assert rms(cleaned, truth) < 0.5 * rms(shaky, truth)
+        ratios.append(rms(cleaned[hits], truth[hits]) / rms(shaky[hits], truth[hits]))
+    assert np.median(ratios) < 1.01
+    assert max(ratios) < 1.2
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6), st.floats(1e-5, 0.05), st.floats(0.01, 1.0), st.integers(8, 150))
 def test_nothing_is_moved_by_more_than_the_tolerance(seed, tolerance, radius, count):
@@ -147,6 +184,24 @@ def test_nothing_is_moved_by_more_than_the_tolerance(seed, tolerance, radius, co
     assert np.isfinite(cleaned.poses.positions).all()
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_what_has_been_cleaned_is_not_moved_again(seed):
+    random = np.random.default_rng(seed)
+    count, size, turn = int(random.integers(60, 900)), 10 ** random.uniform(-4, -2), 10 ** random.uniform(-4, -2)
+    times, truth = hand(seed, count, float(random.choice([30, 60, 90, 120])))
+    noise = random.normal(size=(2, count, 3))
+    noise[:, 1:] += random.choice([0.0, 0.5]) * noise[:, :-1]
+    positions = truth.positions + size * noise[0]
+    for row in random.integers(9, count - 9, count // 200):
+        positions[row : row + 2] += random.uniform(0.05, 0.3)
+    shaky = Poses(positions, align_signs(turned_in_world(truth.quaternions, turn * noise[1])))
+    # Less takes out no more than a part of the trembling each time.
+    tolerance = 3.0 * (size * 3.0**0.5 + 0.1 * turn * 2.0**0.5)
+    for allowed in (None, tolerance):
+        cleaned = clean(times, shaky, allowed)
+        assert clean(cleaned.times, cleaned.poses, allowed).moved.max() < 1e-6 * tolerance
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_the_world_the_clock_and_the_direction_of_time_do_not_matter(seed):
     times, truth = hand(seed)
@@ -161,8 +216,6 @@ def test_the_world_the_clock_and_the_direction_of_time_do_not_matter(seed):
         (clean(times, moved(shaky), tolerance).poses, moved(cleaned.poses)),
         (clean(3.0 * times + 5.0, shaky, tolerance).poses, cleaned.poses),
         (clean(-times[::-1], shaky[::-1], tolerance).poses[::-1], cleaned.poses),
-        # Again it has nothing to do.
-        (clean(times, cleaned.poses, tolerance).poses, cleaned.poses),
     ):
         assert shell_error(other, expected).max() < 1e-4 * tolerance
 
@@ -209,3 +262,49 @@ def test_a_body_is_cleaned_joint_by_joint_and_bounded_in_the_world(tolerance):
     assert shell_error(world, before, 0.05).max() <= tolerance * (1.0 + 1e-9)
     if tolerance > 0.005:
         assert rms(world, real) < 0.7 * rms(before, real)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.none() | st.floats(1e-4, 0.1), st.integers(8, 200), st.integers(1, 6))
+def test_what_stands_slides_no_further_than_it_did_and_nothing_is_moved_by_more(seed, tolerance, count, joints):
+    random = np.random.default_rng(seed)
+    times = np.cumsum(random.uniform(0.001, 0.1, count))
+    walk = np.cumsum(random.normal(size=(joints, count, 7)) * random.choice([0, 1e-3, 0.1], (joints, count, 1)), axis=1)
+    walk += random.choice([0, 1e-3, 1e-2]) * random.normal(size=walk.shape) + random.normal(size=(joints, 1, 7))
+    poses = Poses(walk[..., :3], np.stack([align_signs(normalise(rows)) for rows in walk[..., 3:]]))
+    stands = np.repeat(random.random((joints, count // 8 + 1)) < 0.5, 8, axis=1)[:, :count]
+    skeleton = Skeleton(random_parents(random, joints))
+    cleaned = clean(times, poses, tolerance, 0.1, skeleton, stands=stands)
+    out = cleaned.spikes | cleaned.repeats
+    for own in skeleton.levels[1:]:
+        out[own] |= out[skeleton.parents[own]]
+    assert np.array_equal(cleaned.stands, stands & ~out)
+    after, before = (skeleton.in_root_space(each).positions for each in (cleaned.poses, poses))
+    assert slide_ratios(after, before, cleaned.stands, 0.25 * (tolerance or 0.0)).max() <= 1.0 + 1e-9
+    assert tolerance is None or cleaned.moved[~out].max(initial=0.0) <= tolerance * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_foot_that_stood_still_stays_so_and_moves_nothing_else_further_than_it_was_to_be(seed):
+    """A hip that trembles above a foot that steps, with a leg between them that is as long as it has to be."""
+    times, still = np.arange(400) / 60.0, np.tile([1.0, 0, 0, 0], (400, 1))
+    steps = np.floor(times) + np.clip(5.0 * np.mod(times, 1.0) - 4.0, 0.0, 1.0)
+    foot = np.outer(0.2 * steps + 0.1, (1.0, 0, 0))
+    truth = np.stack([0.2 * times, 0.02 * np.sin(6.0 * times), 0.9 + 0.02 * np.cos(12.0 * times)], axis=1)
+    hip = truth + 0.002 * np.random.default_rng(seed).normal(size=(400, 3))
+    leg = foot - hip
+    lengths = np.linalg.norm(leg, axis=1)
+    turns = align_signs(normalise(np.column_stack([lengths - leg[:, 2], np.cross((0.0, 0.0, -1.0), leg)])))
+    poses = Poses(np.stack([hip, 0.0 * hip, np.outer(lengths, (0, 0, -1.0))]), np.stack([still, turns, still]))
+    skeleton = Skeleton([-1, 0, 1])
+    before = skeleton.in_root_space(poses).positions
+    np.testing.assert_allclose(before[2], foot, atol=1e-12)
+    stands = standing(times, before, shaky=True)
+    assert stands.sum(axis=1)[:2].tolist() == [0, 0]
+    free, held = (clean(times, poses, None, 0.03, skeleton, stands=each) for each in (None, stands))
+    after = skeleton.in_root_space(held.poses).positions
+    assert slide(before, stands) < 1e-12
+    assert slide(skeleton.in_root_space(free.poses).positions, stands) > 0.003
+    assert slide(after, stands) < 1e-8
+    assert (held.moved.max(axis=1) <= free.moved.max(axis=1) * (1.0 + 1e-9)).all()
+    assert np.linalg.norm(after[0] - truth) < 1.05 * np.linalg.norm(hip - truth)

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion.motion import Poses, shell_error
+from rigid_motion.motion import Poses, shell_error, standing
+from rigid_motion.motion.contacts import slide_ratios
 from rigid_motion_batch.cli import clean, reduce
 from rigid_motion_batch.recordings import ReadingOptions, read_clips, read_trajectories
 from tests.motion.test_cleaning import hand, rms, shaken
@@ -41,6 +42,11 @@ def poses_of(path: Path) -> Poses:
     return clip.in_metres(clip.poses)
 
 
+def poses_in_world(path: Path) -> Poses:
+    (clip,), _ = read_clips([str(path)])
+    return clip.in_metres(clip.whole_body.skeleton.in_root_space(clip.poses))
+
+
 def test_a_table_comes_back_in_its_columns_and_nearer_to_the_truth(shaky, tmp_path, capsys):
     before = shaky.read_text().splitlines()
     assert run(shaky, "--tolerance", "4mm") == 0
@@ -48,7 +54,7 @@ def test_a_table_comes_back_in_its_columns_and_nearer_to_the_truth(shaky, tmp_pa
     done = capsys.readouterr()
     assert done.out.splitlines() == [str(made)]
     said = next(line for line in done.err.splitlines() if "trembles" in line)
-    assert "trembles by 0.97 mm and 0.29 degrees; moved at most " in said
+    assert "trembles by 0.99 mm and 0.28 degrees; moved at most " in said
     assert "; 3 rows were spikes: 80, 81, 200" in said
     after = made.read_text().splitlines()
     assert after[:2] == before[:2]
@@ -83,14 +89,34 @@ def test_a_body_comes_back_with_its_hierarchy_and_is_bounded_in_the_world(tmp_pa
     numbers += random.normal(size=numbers.shape) * ([0.001] * 3 + [0.3] * (numbers.shape[1] - 3))
     source.write_text("\n".join([f"{head}Frame Time: {rate}", *(" ".join(map(str, row)) for row in numbers), ""]))
     assert run(source, "--tolerance", "1cm", "--output", tmp_path / "made.bvh") == 0
-    assert "where it does most" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "where it does most" in said
+    assert "no foot surely stands: none is held" in said
     assert (tmp_path / "made.bvh").read_text().startswith(head)
-    world = []
-    for path in (source, tmp_path / "made.bvh"):
-        (clip,), _ = read_clips([str(path)])
-        world.append(clip.in_metres(clip.whole_body.skeleton.in_root_space(clip.poses)))
-    off = shell_error(*world, 0.03)
+    off = shell_error(poses_in_world(source), poses_in_world(tmp_path / "made.bvh"), 0.03)
     assert 0.001 < off.max() <= 0.01 + 1e-6
+
+
+def test_feet_that_stand_are_held_and_it_says_how_often_they_do(tmp_path, capsys):
+    random, steps = np.random.default_rng(2), np.arange(300) / 60.0
+    # A hip that trembles above a foot that stands, as by inverse kinematics, and steps.
+    hip = 20.0 * steps + 0.2 * random.normal(size=300)
+    foot = 20.0 * (np.floor(steps) + np.clip(5.0 * np.mod(steps, 1.0) - 4.0, 0.0, 1.0)) + 10.0
+    lean = np.degrees(np.arcsin((foot - hip) / 80.0))
+    parts = "ROOT Hips", "OFFSET 0 0 0", "CHANNELS 3 Xposition Yposition Zposition"
+    parts += "JOINT Thigh", "OFFSET 0 0 0", "CHANNELS 3 Zrotation Xrotation Yrotation"
+    parts += "JOINT Foot", "OFFSET 0 -80 0", "CHANNELS 0", "End Site", "OFFSET 0 -5 0"
+    lines = [line for part in parts for line in ([part] if part[0] in "OC" else [part, "{"])]
+    source, made = tmp_path / "walk.bvh", tmp_path / "walk-cleaned.bvh"
+    rows = [f"{x} 90 0 {turn} 0 0" for x, turn in zip(hip, lean, strict=True)]
+    times = "MOTION", "Frames: 300", "Frame Time: 0.0166667"
+    source.write_text("\n".join(["HIERARCHY", *lines, *"}}}}", *times, *rows, ""]))
+    assert run(source) == 0
+    assert "; 5 contacts held: feet that stand slide by 16 mm, and did by 16 mm" in capsys.readouterr().err
+    after, before = (poses_in_world(path).positions for path in (made, source))
+    stands = standing(np.arange(300) / 60.0, before[..., [0, 2, 1]], shaky=True)
+    assert (after != before).any()
+    assert 0.9 < slide_ratios(after, before, stands).max() <= 1.0 + 1e-5
 
 
 def test_a_pixel_is_as_large_as_the_nearest_thing_has_it(shaky, tmp_path):
@@ -152,7 +178,7 @@ def test_keys_are_few_of_what_was_cleaned_and_both_promises_are_said(shaky, tmp_
         keys.append(len((made / "hand-keys.csv").read_text().splitlines()) - 1)
     assert keys[1] < 0.5 * keys[0]
     said = capsys.readouterr().err
-    assert "cleaned first: trembles by 0.97 mm" in said
+    assert "cleaned first: trembles by 0.99 mm" in said
     assert "keys and errors are to what was cleaned" in said
     (clip,), _ = read_clips([str(shaky)], None, ReadingOptions(clean=0.004))
     assert rms(clip.in_metres(clip.poses), TRUTH) < 0.6 * rms(shaken(TRUTH, 3), TRUTH)

@@ -6,12 +6,16 @@ there, so that hits stay hits and what is calm gets smooth. Nothing is to be set
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
+from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_poses, check_radii
+from .contacts import slide_ratios
 from .corrections import MIN_MOTION_PER_NOISE, Corrections
 from .measures import shell_error
 from .modes import interpolate
@@ -21,10 +25,21 @@ from .skeletons import Skeleton
 from .trembling import DIFFERENCE_ORDERS, Trembling, trembling
 
 CAP_ROUNDS = 12
-"""In which samples that are too far off are drawn back together with the motion around them, and as many alone."""
+"""In which samples that are too far off are drawn back with the motion around, in as many alone, in as many fully."""
+
+SLIDE_RATIO = 0.25
+"""Of the tolerance: how far a joint that stands may get from where it stood at first, unless it got further."""
+
+LOOK_AGAIN_ROUNDS, GIVEN_BACK_SAMPLES = 4, 24
+"""What would be a spike if it were cleaned again, as what is at the bound beside what is smooth, gets so many samples
+back on either side as they were: where these tremble, too, it is none. Looked for so many times."""
 
 MIN_NOISE_RATIO = 1e-3
 """Of the tolerance, or else of the radius: what trembles less is still."""
+
+MIN_MOVED_PER_NOISE = 0.3
+"""Mean squares of what samples are moved by, in those of the noise that was found: where they are less that is none, as
+most of it would go, but what motion leaves. So what has been cleaned is not cleaned again."""
 
 MAX_STEADY_NOISE_RATIO = 0.97
 """Of the noise by stamped times has to be left by steady ones for these to be right."""
@@ -69,6 +84,9 @@ class Cleaned:
     noise: np.ndarray
     """What was found to be noise, of places and of rotations in radians, along an axis: (2,), or (2, joints)."""
 
+    stands: np.ndarray
+    """Which joints were held as they stood: those that were said to, where they hang on nothing that was left out."""
+
 
 def clean(
     times: ArrayLike,
@@ -76,6 +94,8 @@ def clean(
     tolerance: float | None = None,
     radius: ArrayLike = 0.1,
     skeleton: Skeleton | None = None,
+    looks: Looks | None = None,
+    stands: ArrayLike | None = None,
 ) -> Cleaned:
     """Take the trembling and the spikes out of a recording.
 
@@ -92,6 +112,11 @@ def clean(
         Of the balls around the origins.
     skeleton : Skeleton, optional
         Which joint hangs on which. Without, none does.
+    looks : Looks, optional
+        What was found when this was cleaned within another tolerance, most of which is found once.
+    stands : array-like of bool, shape of the poses, optional
+        Which joints stand, and when, as `standing` finds them where a recording is shaky. There none gets further from
+        where it stood at first than it did, or than a quarter of the tolerance. Without, feet may slide.
 
     Returns
     -------
@@ -108,10 +133,7 @@ def clean(
     --------
     repair : Unit quaternions and rising times.
     reduce_keys : Few keys of what was cleaned.
-
-    Notes
-    -----
-    Feet that stand are not held: where they tremble they may slide by as much as they are allowed to be moved.
+    standing : Which joints of a body stand.
 
     Examples
     --------
@@ -136,26 +158,46 @@ def clean(
     skeleton = skeleton or Skeleton(np.full(len(joints.positions), -1))
     if len(skeleton) != joints.shape[0]:
         raise ValueError(f"a skeleton of {len(skeleton)} joints does not fit poses of {joints.shape[0]}")
+    standing = np.broadcast_to(np.asarray(stands is not None and stands, dtype=bool), poses.shape)
     radii = np.broadcast_to(radii, len(skeleton))
+    look = looks or Looks()
     times, trembles = _steadied(times, [joints[joint] for joint in range(len(skeleton))])
-    least = [MIN_NOISE_RATIO * (tolerance or own) for own in radii.tolist()]
-    found = [_Joint(times, joints[own], trembles[own], least[own], radii[own]) for own in range(len(skeleton))]
-    cleaned = _within(found, skeleton, radii, tolerance)
+    # The same for all tolerances that are much the same.
+    least = [MIN_NOISE_RATIO * 10.0 ** np.floor(np.log10(tolerance or own)) for own in radii.tolist()]
+    found = [look(times, joints[own], trembles[own], least[own], radii[own]) for own in range(len(skeleton))]
+    cleaned, held = _within(found, skeleton, radii, tolerance, standing)
+    # Whatever would be found of these would be no noise.
+    still = [_some(each, (False, False)) for each in trembles]
+    for _ in range(LOOK_AGAIN_ROUNDS):
+        parts = [cleaned[own] for own in range(len(found))]
+        again = [look(times, *own) for own in zip(parts, still, least, radii, strict=True)]
+        if not any(each.out.any() for each in again):
+            break
+        for each, other in zip(found, again, strict=True):
+            each.give_back(other.out)
+        cleaned, held = _within(found, skeleton, radii, tolerance, standing)
     moved = shell_error(skeleton.in_root_space(cleaned), skeleton.in_root_space(joints), radii[:, None])
     spikes, repeats, alone = (
         np.array([getattr(each, name) for each in found]) for name in ("spikes", "repeats", "alone")
     )
     noise = np.array([(each.noise.position, each.noise.rotation) for each in found]).T
     if len(poses.shape) == 2:
-        return Cleaned(times, cleaned, moved, spikes, repeats, alone, noise)
-    return Cleaned(times, cleaned[0], moved[0], spikes[0], repeats[0], alone[0], noise[:, 0])
+        return Cleaned(times, cleaned, moved, spikes, repeats, alone, noise, held)
+    return Cleaned(times, cleaned[0], moved[0], spikes[0], repeats[0], alone[0], noise[:, 0], held[0])
 
 
 class _Joint:
     """What is found of one joint: its noise, the samples that are left out, and its corrections."""
 
     def __init__(self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float) -> None:
+        left: Trembling | None = noise
+        while left is not None:
+            left = self._find(times, poses, left, least, radius)
+
+    def _find(self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float) -> Trembling | None:
+        """Find all that for such noise, or return what is left of the noise: the rest was none."""
         self.start, self.noise = poses, _much(noise, least, radius)
+        self.share = np.ones(len(times))
         self.spikes, self.repeats = outliers(times, poses, self.noise)
         self.out = self.spikes | self.repeats
         rows = np.flatnonzero(~self.out)
@@ -163,51 +205,102 @@ class _Joint:
         self.corrections: Corrections | None = None
         if len(rows) <= DIFFERENCE_ORDERS[-1] + 1:
             self.spikes, self.repeats, self.out = np.zeros((3, len(times)), dtype=bool)
-            return
+            return None
+        taken = np.array(self.noise[:2]) > 0.0
         if self.out.any():
             # What trembles is found again without them.
-            self.noise = _much(trembling(times[rows], poses[rows]), least, radius)
-            here = np.array([np.interp(times, times[rows], each) for each in self.noise.here])
-            self.noise = self.noise._replace(here=here)
+            again = trembling(times[rows], poses[rows])
+            here = np.array([np.interp(times, times[rows], each) for each in again.here])
+            self.noise = _much(_some(again, taken)._replace(here=here), least, radius)
             self.start = _bridged(times, poses, rows)
+        self.corrections = Corrections(times, self.start, self.noise, self.out)
+        is_noise = self.corrections.moved > MIN_MOVED_PER_NOISE
+        if (is_noise != taken).any():
+            # Spikes have to be told by that, too.
+            return _some(noise, is_noise)
         sizes = np.array([[self.noise.position], [self.noise.rotation]])
         self.alone = ~self.out & ((self.noise.here > MIN_MOTION_PER_NOISE * sizes) & (sizes > 0.0)).any(axis=0)
-        self.corrections = Corrections(times, self.start, self.noise, self.out)
+        return None
+
+    def copied(self) -> _Joint:
+        """Return the same, to be drawn back and given back."""
+        result = copy(self)
+        result.corrections = self.corrections and self.corrections.copied()
+        return result
+
+    def give_back(self, rows: np.ndarray) -> None:
+        """Leave what is around rows (n,) of a mask as it was."""
+        if not rows.any():
+            return
+        apart = np.abs(np.arange(len(rows))[:, None] - np.flatnonzero(rows)).min(axis=1)
+        self.share = np.minimum(self.share, np.clip(apart / GIVEN_BACK_SAMPLES - 1.0, 0.0, 1.0))
+        self.alone |= ~self.out & (self.share < 1.0)
 
 
-def _within(found: list[_Joint], skeleton: Skeleton, radii: np.ndarray, tolerance: float | None) -> Poses:
-    """Return corrected poses (joints, n), of which all are within the tolerance that hang on nothing left out."""
-    count = len(found[0].out)
-    share = np.ones((len(found), count))
+class Looks:
+    """What was found of joints, for when the same are cleaned within another tolerance: of this time and the last."""
+
+    def __init__(self) -> None:
+        self._found: dict[bytes, _Joint] = {}
+        self._before: dict[bytes, _Joint] = {}
+
+    def turn_over(self) -> None:
+        """Forget what has not been looked for since this was called before."""
+        self._found, self._before = {}, self._found
+
+    def __call__(self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float) -> _Joint:
+        arrays = times, poses.positions, poses.quaternions, np.array([least, radius, *noise[:2]])
+        key = blake2b(b"".join(each.tobytes() for each in arrays)).digest()
+        found = self._found.get(key) or self._before.get(key) or _Joint(times, poses, noise, least, radius)
+        self._found[key] = found
+        return found.copied()
+
+
+def _within(
+    found: list[_Joint], skeleton: Skeleton, radii: np.ndarray, tolerance: float | None, standing: np.ndarray
+) -> tuple[Poses, np.ndarray]:
+    """Return corrected poses (joints, n), of which all are within the tolerance that hang on nothing left out, and
+    which of them are held, as they stand besides: these slide no further than they did or may.
+    """
+    share = np.array([each.share for each in found])
     bounded = ~np.array([each.out for each in found])
     for joints in skeleton.levels[1:]:
         bounded[joints] &= bounded[skeleton.parents[joints]]
+    held = standing.reshape(bounded.shape) & bounded
+    limits: ArrayLike | None = tolerance
     there = skeleton.in_root_space(joined([each.start[None] for each in found]))
-    for attempt in range(2 * CAP_ROUNDS + 1):
+    for attempt in range(3 * CAP_ROUNDS + 1):
         pairs = zip(found, share, strict=True)
         made = [each.corrections.made(own) if each.corrections else each.start for each, own in pairs]
         cleaned = joined([poses[None] for poses in made])
-        if tolerance is None:
-            return cleaned
-        off = shell_error(skeleton.in_root_space(cleaned), there, radii[:, None])
-        over = skeleton.most_below(np.where(bounded, off / tolerance, 0.0))
+        shown = skeleton.in_root_space(cleaned)
+        off = np.where(bounded, shell_error(shown, there, radii[:, None]), 0.0)
+        # What is held back moves nothing around it further than it was to be moved.
+        limits = off.max(axis=1, keepdims=True) + 1e-99 if limits is None else limits
+        slid = slide_ratios(shown.positions, there.positions, held, SLIDE_RATIO * (tolerance or 0.0))
+        over = skeleton.most_below(np.maximum(off / limits, slid))
         if (over <= 1.0).all():
-            return cleaned
+            return cleaned, held
         if attempt < CAP_ROUNDS:
             # As long as that helps, the motion around gives way, too.
             for each, own in zip(found, over, strict=True):
                 if each.corrections and own.max() > 1.0:
                     each.corrections.draw_back(own)
         else:
-            last = attempt == 2 * CAP_ROUNDS - 1
+            last = attempt >= 2 * CAP_ROUNDS
             share = np.where(over > 1.0, 0.0 if last else share * (1.0 - 1e-9) / np.maximum(over, 1.0), share)
-    return cleaned
+    return cleaned, held
 
 
 def _much(noise: Trembling, least: float, radius: float) -> Trembling:
     """Return noise without what is too little to be worth moving anything."""
     position, rotation = (size if size * arm > least else 0.0 for size, arm in ((noise[0], 1.0), (noise[1], radius)))
     return noise._replace(position=position, rotation=rotation)
+
+
+def _some(noise: Trembling, taken: Sequence[bool] | np.ndarray) -> Trembling:
+    """Return the noise of places, rotations, both or none."""
+    return noise._replace(position=noise.position * taken[0], rotation=noise.rotation * taken[1])
 
 
 def _bridged(times: np.ndarray, poses: Poses, rows: np.ndarray) -> Poses:

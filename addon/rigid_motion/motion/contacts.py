@@ -20,7 +20,7 @@ MIN_STANDING_S = 0.1
 """Seconds that something stands at least: what only turns back is not standing."""
 
 
-def standing(times: ArrayLike, positions: ArrayLike) -> np.ndarray:
+def standing(times: ArrayLike, positions: ArrayLike, *, shaky: bool = False) -> np.ndarray:
     """Which joints stand on the ground, and when.
 
     Parameters
@@ -29,6 +29,8 @@ def standing(times: ArrayLike, positions: ArrayLike) -> np.ndarray:
         Seconds, strictly rising.
     positions : array-like, shape (joints, n, 3)
         In the world, the third axis upwards, in any unit: what is low and slow is measured by the body's height.
+    shaky : bool
+        Look at means over twice as long as anything stands at least, for the positions tremble.
 
     Returns
     -------
@@ -43,6 +45,7 @@ def standing(times: ArrayLike, positions: ArrayLike) -> np.ndarray:
     See Also
     --------
     reduce_skeleton_keys : Takes it for weights: feet that stand count for more.
+    clean : Lets feet that stand slide no further than they did.
 
     Examples
     --------
@@ -61,6 +64,11 @@ def standing(times: ArrayLike, positions: ArrayLike) -> np.ndarray:
         raise ValueError(f"positions of shape {positions.shape} need the shape (joints, {times.size}, 3)")
     if len(times) < 2:
         return np.zeros(positions.shape[:2], dtype=bool)
+    for _ in range(2 * shaky):
+        reach, at = round(MIN_STANDING_S / 2.0 / float(np.median(np.diff(times)))), np.arange(len(times))
+        first, last = np.maximum(at - reach, 0), np.minimum(at + reach + 1, len(at))
+        sums = np.cumsum(np.pad(positions, ((0, 0), (1, 0), (0, 0))), axis=1)
+        positions = (sums[:, last] - sums[:, first]) / (last - first)[:, None]
     heights = positions[..., 2]
     height = float(np.median(np.ptp(heights, axis=0)))
     ways = np.linalg.norm(np.diff(positions, axis=1), axis=-1)
@@ -75,6 +83,19 @@ def contacts(times: np.ndarray, low: np.ndarray, slow: np.ndarray) -> np.ndarray
         if times[last] - times[first] < MIN_STANDING_S:
             stands[joint, first : last + 1] = False
     return stands
+
+
+def slide_ratios(positions: np.ndarray, before: np.ndarray, stands: np.ndarray, allowed: float = 0.0) -> np.ndarray:
+    """Return how many times as far as before at most (joints, n, 3), or as is allowed, joints are from where they stood
+    at first, while they stand (joints, n): at first that which is most, and 0 where none stands. Rounding is none.
+    """
+    ratios, least = np.zeros(stands.shape), 1e-9 * float(np.abs(before).max(initial=0.0)) + 1e-99
+    for joint, first, last in spans(stands):
+        rows = slice(first, last + 1)
+        now, own = (np.linalg.norm(each[joint, rows] - each[joint, first], axis=-1) for each in (positions, before))
+        ratios[joint, rows] = now / (max(np.max(own), allowed) + least)
+        ratios[joint, first] = np.max(ratios[joint, rows])
+    return ratios
 
 
 def slide(positions: np.ndarray, stands: np.ndarray) -> float:

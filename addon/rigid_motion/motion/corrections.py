@@ -1,13 +1,15 @@
 """Corrections of a recording: how far each sample is moved, so that the jerk is as large as it is around there.
 
 Of corrections d and third derivatives s the sum of d^2 / noise^2 and h s^2 / J^2 is made least, for places and for
-rotation vectors in world axes; J^2, the density of the jerk around a sample, is found by MacKay's fixed point. Source:
+rotation vectors in world axes; J^2, the density of the jerk around a sample, is found by MacKay's fixed point. Where it
+stands out of the noise, in places or rotations, there is a hit, and nothing is expected of the jerk of either. Source:
 D. MacKay, *Bayesian interpolation*, Neural Computation 4, 1992.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -28,6 +30,10 @@ JERK_REACH_SAMPLES = 1
 
 MIN_JERK_RATIO = 1e-9
 """Of the jerk that noise makes is always allowed: more would be lost in rounding."""
+
+MIN_HIT_RATIO, HIT_POWER = 0.1, 2
+"""Where the density of the jerk is more than such a part of that of the noise, it counts by this power as many times as
+large: the edges of a hit, which is in one axis and shorter than what is averaged over, were cut by what is expected."""
 
 MIN_MOTION_PER_NOISE, STIFFNESS_POWER, MAX_STIFFNESS = 1.25, 6, 100.0
 """Where a recording trembles by more than so many times its noise, that may be motion, and this power of what is above
@@ -52,20 +58,30 @@ class Channel:
 
     corrections: np.ndarray = field(init=False)
     densities: np.ndarray = field(init=False)
+    of_noise: np.ndarray = field(init=False)
+    """The densities that the noise alone would have."""
 
     def __post_init__(self) -> None:
         self.corrections = np.zeros((len(self.precisions), 3))
+        self.of_noise = self.noise**2 * self.steps * np.einsum("nk,nk->n", self.coefficients, self.coefficients)
         self.densities = self._density(1.0)
 
     def _density(self, determined: np.ndarray | float) -> np.ndarray:
         """Return how large the jerk is around each sample, where it determines so much of what is found."""
         found = self.differences(self.corrections)
         squares = np.einsum("nc,nc->n", found, found) / 3.0
-        least = MIN_JERK_RATIO * self.noise**2 * np.einsum("nk,nk->n", self.coefficients, self.coefficients)
-        return np.maximum(mean_around(self.steps * squares, JERK_REACH_SAMPLES) / determined, self.steps * least)
+        around = mean_around(self.steps * squares, JERK_REACH_SAMPLES) / determined
+        return np.maximum(around, MIN_JERK_RATIO * self.of_noise)
+
+    @property
+    def moved(self) -> float:
+        """Mean square of what samples are moved by, in squares of the noise."""
+        return float(np.einsum("n,nc->", self.precisions, self.corrections**2)) / (
+            3.0 * np.count_nonzero(self.precisions)
+        )
 
     def settle(self) -> None:
-        """Find how large the jerk is, and the corrections for it."""
+        """Find how large the jerk is."""
         c = self.coefficients
         for _ in range(JERK_ROUNDS):
             inverse = self.improve().inverse_diagonals()
@@ -77,7 +93,6 @@ class Channel:
                     spread += twice * c[:, first] * c[:, second] * covariances
             determined = mean_around(np.maximum(1.0 - spread * self.steps / self.densities, 0.0), JERK_REACH_SAMPLES)
             self.densities = self._density(np.maximum(determined, 1e-9))
-        self.improve()
 
     def improve(self) -> Banded:
         """Make one step of Newton's towards the best corrections, and return the matrix of that."""
@@ -115,10 +130,22 @@ class Corrections:
         self.turns = channel(of_rotations, noise.rotation, noise.here[1])
         for each in self._all:
             each.settle()
+        self.moved = np.array([each.moved if each else 0.0 for each in (self.places, self.turns)])
+        """Mean squares of what samples are moved by, in those of the noise, of places and of rotations."""
+        hits = [each.densities / (MIN_HIT_RATIO * each.of_noise) for each in self._all]
+        for each in self._all:
+            each.densities = each.densities * np.maximum(1.0, np.max(hits, axis=0)) ** HIT_POWER
+            each.improve()
 
     @property
     def _all(self) -> list[Channel]:
         return [each for each in (self.places, self.turns) if each]
+
+    def copied(self) -> Corrections:
+        """Return the same, to be drawn back."""
+        result = copy(self)
+        result.places, result.turns = copy(self.places), copy(self.turns)
+        return result
 
     def draw_back(self, over: np.ndarray) -> None:
         """Draw samples back that are too far off by so many times (n,), as the motion around them allows."""

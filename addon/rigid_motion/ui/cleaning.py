@@ -99,6 +99,7 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
     def _summary(self, context: bpy.types.Context, cleanings: list[Cleaning]) -> str:
         """Return what became of all that was cleaned: lengths, or pixels where it is cameras."""
         cameras: list[Any] = [one.transforms[0].carrier for one in cleanings]
+        spoken = partial(length, cast(bpy.types.Scene, context.scene), precision=3)
         spans = [(one.trembling, one.moved) for one in cleanings]
         if all(isinstance(camera, bpy.types.Object) and camera.type == "CAMERA" for camera in cameras):
             by = [pixels_of(camera, self.nearest or focus_of(camera)) for camera in cameras]
@@ -107,10 +108,7 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
             ]
             trembling, moved = (iface_("{count:.2g} pixels").format(count=pixels) for pixels in most)
         else:
-            trembling, moved = (
-                length(cast(bpy.types.Scene, context.scene), max(ends), precision=3)
-                for ends in zip(*spans, strict=True)
-            )
+            trembling, moved = (spoken(max(ends)) for ends in zip(*spans, strict=True))
         parts = [
             rpt_("trembles by {length}").format(length=trembling),
             rpt_("moved at most {length}").format(length=moved),
@@ -121,6 +119,12 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
             parts.append(rpt_(text).format(count=spikes))
         if repeats:
             parts.append(rpt_("repeated keys: {count}").format(count=repeats))
+        if rigs := [one.contacts for one in cleanings if one.contacts]:
+            counts, *slides = zip(*rigs, strict=True)
+            now, before = (spoken(max(ends)) for ends in slides)
+            text = n_("contacts held: {count}, feet slide by {now} there, and did by {before}")
+            text = text if any(counts) else n_("no foot surely stands: none is held")
+            parts.append(rpt_(text).format(count=sum(counts), now=now, before=before))
         if (alone := max(one.alone for one in cleanings)) > MIN_UNTOUCHED_RATIO:
             text = rpt_("{percent:.0f} % of the keys stay nearly as they are: motion cannot be told from noise there")
             parts.append(text.format(percent=100.0 * alone))

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigid_motion.motion import Cleaned, clean, repair, standing
-from rigid_motion.motion.contacts import slide
+from rigid_motion.motion import Cleaned, Poses, clean, repair, standing
+from rigid_motion.motion.contacts import slide, spans
 from rigid_motion_batch.command_line import listed
 
 from .clips import Clip
@@ -28,9 +28,9 @@ def cleaned_clip(clip: Clip, tolerance: float | None = None, radius: float | Non
     """Return a clip without its trembling, and what was found; lengths are in metres."""
     metres, body = clip.metres_per_unit, clip.rest_body
     radius = radius or (JOINT_RADIUS_M if body else RIGID_RADIUS_M)
-    found = clean(
-        clip.times, clip.poses, tolerance and tolerance / metres, radius / metres, body.skeleton if body else None
-    )
+    stands = standing(clip.times, _places(clip, clip.poses), shaky=True) if body else None
+    tolerance, skeleton = tolerance and tolerance / metres, body.skeleton if body else None
+    found = clean(clip.times, clip.poses, tolerance, radius / metres, skeleton, stands=stands)
     return replace(clip, times=found.times, poses=found.poses), found
 
 
@@ -65,12 +65,14 @@ def described(clip: Clip, found: Cleaned, rows: np.ndarray | None = None) -> Ite
     if (share := float(np.mean(found.alone))) > MIN_UNTOUCHED_RATIO:
         yield f"{share:.0%} is left nearly as it is, as motion cannot be told from noise there"
     if body:
-        before, after = (clip.in_blender(body.skeleton.in_root_space(poses)) for poses in (clip.poses, found.poses))
-        stands = standing(found.times, after.positions)
-        slides = [length(slide(poses.positions, stands)) for poses in (before, after)]
-        yield (
-            f"feet that stand slide by {slides[1]}, and did by {slides[0]}" if stands.any() else "no foot surely stands"
-        )
+        now, before = (length(slide(_places(clip, poses), found.stands)) for poses in (found.poses, clip.poses))
+        contacts = f"{len(spans(found.stands))} contacts held: feet that stand slide by {now}, and did by {before}"
+        yield contacts if found.stands.any() else "no foot surely stands: none is held"
+
+
+def _places(clip: Clip, poses: Poses) -> np.ndarray:
+    """Return where the joints of a body are that has these poses, in metres and Blender's axes."""
+    return clip.in_blender(clip.whole_body.skeleton.in_root_space(poses)).positions
 
 
 def _below(clip: Clip, marked: np.ndarray) -> np.ndarray:

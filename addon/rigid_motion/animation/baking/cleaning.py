@@ -14,7 +14,10 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
-from ...motion import Poses, Skeleton, clean
+from ...blender import scene
+from ...motion import Poses, Skeleton, clean, standing
+from ...motion.cleaning import SLIDE_RATIO, Looks
+from ...motion.contacts import slide, slide_ratios, spans
 from ...motion.quaternions import conjugate, multiply, rotate, turned, turns_between
 from ...motion.trembling import DIFFERENCE_ORDERS, trembling
 from ..actions.channels import key_fields, set_key_fields
@@ -42,11 +45,14 @@ MIN_NOISE_KEYS, MAX_KEY_SPACING_FRAMES = DIFFERENCE_ORDERS[-1] + 2, 2.0
 TRANSITION_KEYS = 8
 """Keys over which what is cleaned goes over into what is not."""
 
-MAX_DRAW_BACK_ROUNDS = 12
-"""In which the keys on a frame are drawn back together where something is moved too far."""
+MAX_DRAW_BACK_ROUNDS = 24
+"""In which the keys on a frame are drawn back together where something is moved too far: half of them to none."""
 
 USED_TOLERANCE_RATIO = 0.999
 """The part of the tolerance that is used: keys are rounded."""
+
+_LOOKS = Looks()
+"""What was found, while a slider is drawn."""
 
 TOO_FEW = n_("{name} has {count} keys of location and rotation: to tell trembling from motion takes {least}")
 NO_KEY_SELECTED = n_("{name}: no key of location, rotation or scale is selected")
@@ -70,6 +76,9 @@ class Cleaning(NamedTuple):
 
     alone: float
     """The part of the keys that were left as they are, as motion cannot be told from noise there."""
+
+    contacts: tuple[int, float, float] | None
+    """How many times bones stand, and how far they slide there now and did, at most; None of what is no rig."""
 
     before: np.ndarray
     """Where each of the transforms was in the world on each key, shape (t, m, 3): bones where they end, and cameras
@@ -107,7 +116,7 @@ def clean_motion(
         See `edits.apply`.
     strength : float
         By how many times of its trembling any point within the radius may be moved, but by spikes. Of bones that is so
-        in the rig's space, for all that hangs on them, too.
+        in the rig's space, for all that hangs on them, too. Bones that stand slide no further, or by a quarter of that.
     radius : float, optional
         In the scene's units. As far as each target reaches, otherwise.
     nearest : float, optional
@@ -126,6 +135,7 @@ def clean_motion(
         text = n_("the keys may be moved by more than 0 times their trembling, not {strength:g}")
         raise Refused(text, strength=strength)
     plans: dict[Transform, list[Planned] | Refused] = {}
+    _LOOKS.turn_over()
     found: list[Cleaning] = []
     originals = Originals(CLEANED)
 
@@ -220,8 +230,12 @@ def _cleaned(
     inside = _inside(obj, frames, [binding for binding, _ in members.values()]) if selected else np.ones(len(frames))
     motion = BodyMotion(joints, next(iter(members.values()))[0].slot, sources, frames, radius)
     parents, poses, _ = motion.as_chains()
-    # The object, and all that the targets hang on; what is no target is at rest.
-    taking = np.array(sorted({0, *(above for number in sources for above in motion.above(number))}))
+    stands, render = np.zeros((len(joints), len(frames)), dtype=bool), scene().render
+    if bones:
+        stands[1:] = standing(frames * render.fps_base / render.fps, motion.truth.origins[1:], shaky=True)
+    # The object, targets and what stands, and all that these hang on; what is no target is at rest.
+    wanted = *sources, *np.flatnonzero(stands.any(axis=1)).tolist()
+    taking = np.array(sorted({0, *(above for number in wanted for above in motion.above(number))}))
     chain, resting = poses[taking], np.array([number not in sources for number in taking.tolist()])
     positions, quaternions = chain.positions.copy(), chain.quaternions.copy()
     positions[resting], quaternions[resting] = positions[resting, :1], quaternions[resting, :1]
@@ -233,7 +247,8 @@ def _cleaned(
     if floor * motion.unit <= motion.rounding:
         floor = 0.0
     tolerance = strength * floor * motion.unit
-    result = clean(frames, chain, USED_TOLERANCE_RATIO**2 * tolerance / motion.unit or None, radii, skeleton)
+    within = USED_TOLERANCE_RATIO**2 * tolerance / motion.unit or None
+    result = clean(frames, chain, within, radii, skeleton, _LOOKS, stands[taking])
     out = result.spikes | result.repeats
     bridged = np.zeros((len(joints), len(frames)), dtype=bool)
     bridged[taking] = out & (inside > 0.0)
@@ -248,9 +263,11 @@ def _cleaned(
             slides = size * rotate(axes, result.poses.positions[at] - chain.positions[at])
             corrections[number] = slides, turns_between(chain.quaternions[at], result.poses.quaternions[at])
     start = {number: _values(joints[number], source, frames) for number, source in sources.items()}
-    hangs = bridged.copy()
+    hangs, moving = bridged.copy(), np.isin(np.arange(len(joints)), list(sources))
     for own in Skeleton(motion.parents).levels[1:]:
         hangs[own] |= hangs[motion.parents[own]]
+        moving[own] |= moving[motion.parents[own]]
+    stands &= ~hangs & moving[:, None]
     allowed, share = USED_TOLERANCE_RATIO * tolerance, inside
     for left in range(MAX_DRAW_BACK_ROUNDS, -1, -1):
         shares = {number: np.where(bridged[number], 1.0, share)[:, None] for number in sources}
@@ -260,10 +277,12 @@ def _cleaned(
         }
         motion.show_values(rows)
         off = np.where(hangs, 0.0, motion.displacements())
-        over = off.max(axis=0) / allowed if allowed else np.zeros(len(frames))
+        slid = slide_ratios(motion.now().origins, motion.truth.origins, stands, SLIDE_RATIO * allowed)
+        over = np.maximum(slid.max(axis=0), off.max(axis=0) / (allowed or math.inf))
         if (over <= 1.0).all():
             break
-        share = np.where(over > 1.0, share * USED_TOLERANCE_RATIO / over if left > 1 else 0.0, share)
+        drawn = share * USED_TOLERANCE_RATIO / np.maximum(over, 1.0) * (left > MAX_DRAW_BACK_ROUNDS // 2)
+        share = np.where(over > 1.0, drawn, share)
     numbers = list(sources)
     world = np.array(channel_space(joints[0], bpy.context.evaluated_depsgraph_get()).translation)
     # What only turns is seen where a bone ends, and where a camera looks.
@@ -271,6 +290,7 @@ def _cleaned(
     ends = np.array([_end(joints[number], turns_alone * float(motion.radii[number])) for number in numbers])
     before, after = (maps[numbers].at(ends[:, None]) + world for maps in (motion.truth, motion.now()))
     at_targets, of_targets = ~resting, inside > 0.0
+    now, then = (slide(maps.origins, stands) for maps in (motion.now(), motion.truth))
     cleaning = Cleaning(
         [joints[number] for number in numbers],
         floor * motion.unit,
@@ -278,6 +298,7 @@ def _cleaned(
         int((result.spikes[at_targets] & of_targets).sum()),
         int((result.repeats[at_targets] & of_targets).sum()),
         float(result.alone[at_targets].mean()),
+        (len(spans(stands & of_targets)), now, then) if bones else None,
         before,
         after,
         bridged[numbers],
