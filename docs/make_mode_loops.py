@@ -28,12 +28,12 @@ from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs, rotate
 from rigid_motion_batch import palette
-from rigid_motion_batch.recordings.world_poses import read_poses
 from rigid_motion_batch.scenes import captions
 from rigid_motion_batch.scenes.film import render_film
 from rigid_motion_batch.scenes.materials import ink, surface
 from rigid_motion_batch.scenes.scene import make_lights, set_up_render
 from rigid_motion_batch.scenes.settings import SceneSettings
+from tests.world_poses import read_poses
 
 SETTINGS = SceneSettings(resolution=(960, 540), antialiasing="5", fps=24)
 THEME = palette.DARK

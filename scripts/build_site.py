@@ -56,18 +56,9 @@ def build(folder: Path) -> Path:
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as beside:
         built, kept = Path(beside) / "site", Path(beside) / "before"
         pages = stage(Path(beside) / "checkout")
-        options = [
-            "-q",
-            "-W",
-            "--keep-going",
-            "-b",
-            "html",
-            "-c",
-            str(ROOT / "docs"),
-            "-d",
-            str(Path(beside) / "known"),
-        ]
-        subprocess.run([sys.executable, "-m", "sphinx", *options, str(pages), str(built)], check=True)
+        known = Path(beside) / "known"
+        options = ["-q", "-W", "--keep-going", "-b", "html", "-c", ROOT / "docs", "-d", known]
+        subprocess.run([sys.executable, "-m", "sphinx", *options, pages, built], check=True)
         if folder.exists():
             folder.rename(kept)
         built.rename(folder)

@@ -9,12 +9,11 @@ into `node_modules/.bin`; without it they are left out, and so is what they deco
 
 from __future__ import annotations
 
-import json
 import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stdout
 from functools import cache, partial
 from io import StringIO
 from pathlib import Path
@@ -25,7 +24,6 @@ import numpy as np
 
 from research.glb_bodies import HEIGHT_M, RADIUS_M, export
 from research.glb_playing import animation_bytes, errors_of, opened, size_of
-from research.pages import FIGURES
 from research.studies import publish, report, study_parser
 from rigid_motion_batch.analysis.metrics import geometric_mean
 from rigid_motion_batch.cli import reduce
@@ -52,16 +50,6 @@ ROTATION_BITS, TRANSLATION_BITS = range(4, 17), range(6, 25)
 """What its `-ar` and `-at` may be."""
 
 
-def knows(way: str) -> bool:
-    """Return whether reduce has these options."""
-    try:
-        with redirect_stderr(StringIO()):
-            reduce.parse(["walk.glb", *way.split()])
-    except SystemExit:
-        return False
-    return True
-
-
 class Measured:
     """A body, and what each program makes of it."""
 
@@ -81,7 +69,7 @@ class Measured:
         yield EXPORTED, partial(self._row, self.exported)
         for tolerance in TOLERANCES_M:
             within = f"within {1e3 * tolerance:g} mm"
-            for way in filter(knows, WAYS):
+            for way in WAYS:
                 if self.tools or NEEDS_TOOLS not in way:
                     yield f"reduce{way}, {within}", partial(self._reduced, way, tolerance)
             for flag, name in RATE_KEPT.items() if self.tools else ():
@@ -199,17 +187,6 @@ def beside(clips: list[dict[str, Any]]) -> dict[str, dict[str, dict[str, float]]
     return result
 
 
-def _known(root: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
-    """Return the rows of the figures as they are, by group, clip and tool."""
-    groups = json.loads((root / FIGURES / "benchmark_glb.json").read_text(encoding="utf-8"))["groups"]
-    return {
-        (title, clip["name"], row["tool"]): row
-        for title, group in groups.items()
-        for clip in group["clips"]
-        for row in clip["tools"]
-    }
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Measure, and write the figures."""
     parser = study_parser("glb_sizes", __doc__)
@@ -217,20 +194,19 @@ def main(arguments: list[str] | None = None) -> int:
         option = f"--{group.replace('_', '-')}"
         parser.add_argument(option, type=Path, nargs="+", default=[], metavar="PATH", help=f"{title}: FBX, BVH, GLB")
     parser.add_argument("--tools", type=Path, metavar="FOLDER", help="where gltfpack and gltf-transform are")
-    parser.add_argument("--keep", action="store_true", help="measure only what the figures do not have yet")
     options = parser.parse_args(arguments)
     versions = {"Blender": bpy.app.version_string}
     if options.tools:
         said = subprocess.run([options.tools / "gltfpack", "-v"], capture_output=True, text=True).stdout
         versions["gltfpack"] = said.split()[-1]
-    groups, known = {}, _known(options.root) if options.keep else {}
+    groups = {}
     for group, title in GROUPS.items():
         clips: list[dict[str, Any]] = []
         for path in getattr(options, group):
             report(f"{title}: {path.name}")
             with tempfile.TemporaryDirectory() as folder:
                 ways = Measured(path, group, options.tools, Path(folder)).ways()
-                rows = [{"tool": tool} | (known.get((title, path.stem, tool)) or make()) for tool, make in ways]
+                rows = [{"tool": tool, **make()} for tool, make in ways]
             clips.append({"name": path.stem, "tools": rows})
             groups[title] = {"clips": clips, "means": means(clips), "beside": beside(clips)}
             publish("benchmark_glb", {"groups": groups}, options, "...", **versions)

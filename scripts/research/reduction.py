@@ -11,6 +11,7 @@ trials. All errors are those of what Blender shows, at eighths of frames.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,12 @@ from typing import Any
 import bpy
 import numpy as np
 
-from research import body_reduction
 from research.decimating import (
     MIN_ERROR_RATIO,
+    MIN_VARIATION,
     NUMBERS_PER_FREE_KEY,
     PARTS_PER_FRAME,
+    DecimatedBody,
     Left,
     bend,
     between,
@@ -36,8 +38,12 @@ from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, reduce_keys, shell_error
 from rigid_motion.motion.eulers import quaternions_from_extrinsic_eulers
 from rigid_motion.motion.quaternions import normalise
-from rigid_motion_batch.analysis.metrics import geometric_mean
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.metrics import geometric_mean, key_samples
 from rigid_motion_batch.analysis.modes import REFERENCE, STATE_OF_THE_ART
+from rigid_motion_batch.analysis.needed import part_of
+from rigid_motion_batch.analysis.reconstructions import Reconstruction, moving, reconstruct
+from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
@@ -48,6 +54,15 @@ ROTATION_MODES = ("QUATERNION", "XYZ")
 RIVALS = "curves", "curves_between", "decimate"
 MAX_TRIALS = 14  # error margins and tolerances tried until a rival is as good as the reduced poses
 ROUNDING_RATIO = 1e-4  # the share by which single precision may miss a tolerance
+
+TOLERANCE, RADIUS_M, HEIGHT_M = Tolerance("10mm"), 0.03, 1.7
+"""The errors that are allowed, of the ball at every joint, and what every body's largest extent is made; metres."""
+
+MODE = "motor_spline"
+WAYS = {"keys of each joint": False, "key poses": True}
+BODY_RIVALS = "Blender's curves", "Decimate"
+
+MOST_FRAMES = 1200  # longer recordings are cut off
 
 
 def read(path: Path, rate: float) -> Clip:
@@ -176,6 +191,90 @@ def means(rows: list[dict[str, Any]], rival: str) -> dict[str, float]:
     return {"recordings": len(pairs), **{name: geometric_mean(np.array(own)) for name, own in ratios.items()}}
 
 
+# -- whole bodies ----------------------------------------------------------------------------------------------------
+
+
+def of_bodies(paths: Sequence[Path]) -> dict[str, Any]:
+    """Return all that is measured of the bodies in files."""
+    clips = [replace(read_clips([str(path)])[0][0], name=path.stem) for path in paths]
+    bodies = [of_height(part_of(clip, 0, min(len(clip.times), MOST_FRAMES) - 1)) for clip in clips]
+    pairs = {way: [beside(body, way) for body in bodies] for way in WAYS}
+    return {
+        "bodies": [about(body) for body in bodies],
+        "beside": [row for of_way in pairs.values() for rows in of_way for row in rows],
+        "beside_means": {
+            way: {
+                rival: {
+                    name: geometric_mean(np.array([rows[place][name] / rows[0][name] for rows in of_way]))
+                    for name in ("frames", "key_count", "numbers")
+                }
+                for place, rival in enumerate(BODY_RIVALS, 1)
+            }
+            for way, of_way in pairs.items()
+            if of_way
+        },
+    }
+
+
+def about(body: Clip) -> dict[str, Any]:
+    """Return what a body is."""
+    joints, frames = body.poses.shape
+    extent = HEIGHT_M / body.metres_per_unit
+    return {"name": body.name, "joints": joints, "frames": frames, "rate": body.samples_a_second, "extent": extent}
+
+
+def of_height(clip: Clip) -> Clip:
+    """Return the same body, larger or smaller: in the first frame its joints span `HEIGHT_M` along one of the axes."""
+    places = clip.rest_body.skeleton.in_root_space(clip.poses[:, :1]).positions
+    return replace(clip, metres_per_unit=HEIGHT_M / float(np.ptp(places, axis=(0, 1)).max()))
+
+
+def beside(body: Clip, way: str) -> list[dict[str, Any]]:
+    """Return what is left by keys of each joint or by key poses, by the same with Blender's curves between them, and by
+    Decimate within the error that the first have.
+    """
+    report(f"{body.name}, {way}")
+    made = {mode: reconstruct(body, TOLERANCE, [mode], RADIUS_M, shared=WAYS[way]) for mode in (MODE, REFERENCE)}
+    own, curves = (left_by(one) for one in made.values())
+    left = DecimatedBody(made[MODE]).within(1e-3 * own["error_mm"])
+    rows = own, curves, left.figures()
+    return [{"body": body.name, "how": how, **row} for how, row in zip((way, *BODY_RIVALS), rows, strict=True)]
+
+
+def left_by(made: Reconstruction) -> dict[str, Any]:
+    """Return what the keys of its one mode are, their largest error between frames as well, and how far feet slide."""
+    (row,) = measured(made).rows
+    slides = {"slide_mm": row.foot_slide_m, "recorded_slide_mm": row.recorded_slide_m}
+    return {
+        "frames": row.key_frames,
+        "key_count": row.keys,
+        "numbers": numbers_of(made),
+        "on_frames_mm": 1e3 * row.max_shell_m,
+        "error_mm": 1e3 * largest_error(made),
+        **{name: None if metres is None else 1e3 * metres for name, metres in slides.items()},
+    }
+
+
+def largest_error(made: Reconstruction) -> float:
+    """Return the largest error of any joint at any part of a frame, in metres: the recording is straight between its
+    samples.
+    """
+    (mode,) = made.keys
+    every = np.arange(made.samples.start, made.samples.stop)
+    times, straight = between(made.times), replace(made, keys={STATE_OF_THE_ART: (every,) * len(made.radii)})
+    truth = straight.shown(STATE_OF_THE_ART, times)
+    return float(shell_error(made.shown(mode, times), truth, made.radii[:, None]).max())
+
+
+def numbers_of(made: Reconstruction) -> int:
+    """Return how many numbers the keys take: for each its time, and the place and the turn where these vary."""
+    (keys,), clip = made.keys.values(), made.clip
+    places = np.ptp(clip.poses.positions, axis=1).max(axis=1) * clip.metres_per_unit > MIN_VARIATION
+    counts, channels, moves = np.array([*map(len, keys)]), 4 + 3 * places, moving(clip)
+    times = len(key_samples(keys)) if made.shared else counts[moves].sum()
+    return int(times + (counts * channels)[moves].sum())
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Measure, and write the figures."""
     parser = study_parser("reduction", __doc__)
@@ -205,7 +304,7 @@ def main(arguments: list[str] | None = None) -> int:
                 rotation: {rival: means(of_rotation, rival) for rival in RIVALS}
                 for rotation, of_rotation in rows.items()
             },
-            **body_reduction.figures(bodies),
+            **of_bodies(bodies),
         }
     given = f"--tolerance {options.tolerance:g} --radius {options.radius:g} --fps {options.fps:g}"
     more = [f"--{name} ..." for name in ("recordings", "bodies") if getattr(options, name)]

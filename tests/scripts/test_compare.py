@@ -20,7 +20,7 @@ from rigid_motion_batch.scenes import film
 from tests.balls import largest_displacements
 from tests.scripts.comparing import COLUMNS, ROOT, SMALL, outputs, poses_of, rows_of, run, table, tasks_of, write_toss
 
-pytestmark = pytest.mark.blender
+pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 ADAPTIVE = ("--no-video", "--decimate", "adaptive", "--tolerance", "5mm, 0.02", "--rates", "10")
 

@@ -14,6 +14,8 @@ from tests.balls import largest_displacements
 from tests.scripts.bvh_bodies import PLACES, angles_at, hips_at, write_body
 from tests.scripts.comparing import ROOT, SMALL, poses_of, rows_of, run, table, write_toss
 
+pytestmark = pytest.mark.any_blender
+
 FAST = ("--no-video", "--rates", "10")
 
 POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")

@@ -13,7 +13,7 @@ from tests.gltf.making import Making, walk
 from tests.scripts.reducing import hand_made, listed, object_file, run, write_csv
 from tests.scripts.stopping import ROOT, start
 
-pytestmark = pytest.mark.blender
+pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 KILL = "os.kill(os.getpid(), signal.SIGKILL)"
 

@@ -20,7 +20,7 @@ from tests.gltf.making import Making, walk
 from tests.gltf.player import File, off
 from tests.scripts.reducing import listed
 
-pytestmark = pytest.mark.blender
+pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 WITHOUT_BLENDER = """
 import sys

@@ -19,7 +19,7 @@ from tests.scripts.reducing import listed, run, write_csv
 from tests.scripts.report.chromium import browser
 from tests.scripts.report.javascript import require, value_of
 
-pytestmark = pytest.mark.blender
+pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 HOSTILE = "a</script><img src=x onerror='broken = 1'>{{ 7 * 7 }}"
 HOSTILE_FILE = HOSTILE.replace("/", "\N{DIVISION SLASH}")

@@ -13,7 +13,11 @@ from tests.scripts.reducing import listed, write_csv
 
 ROOT = Path(__file__).resolve().parents[2]
 
-pytestmark = [pytest.mark.blender, pytest.mark.skipif(sys.platform == "win32", reason="shells, and devices of Unix")]
+pytestmark = [
+    pytest.mark.blender,
+    pytest.mark.skipif(sys.platform == "win32", reason="shells, and devices of Unix"),
+    pytest.mark.any_blender,
+]
 
 ODD = "a\nb\t\x1b[2J \u00fc\u624b.csv"
 """What a file may be called."""

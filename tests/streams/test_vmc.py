@@ -29,7 +29,7 @@ from tests.live.performing import PARENTS, PLACES
 from tests.motion.cases import random_quaternions
 from tests.thoroughness import sample
 
-pytestmark = pytest.mark.blender
+pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 
 def world(body: StreamBody, poses: Poses) -> Poses:

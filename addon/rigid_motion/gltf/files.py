@@ -7,7 +7,6 @@ import secrets
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,7 @@ from .errors import World
 from .meshopt import are_clear, decompressed, packed, shortened, unpacked
 from .nodes import Nodes, by_target, steadied
 from .references import References
-from .rewriting import StoredTrack, amount_before, made_smaller, shown
+from .rewriting import StoredTrack, amount_before, shown, with_tracks
 from .seen import Seen
 from .sizes import OF_A_BODY, OF_KEY_POSES, joints_of, shells_of, size_of
 from .tracks import NUMBERS_PER_KEY, PATHS, WEIGHTS, Clip, Target, read_clips
@@ -120,11 +119,11 @@ def reduced(document: Document, options: Options) -> Report:
     with damage_refused():
         within = tolerance if options.count is None else max((clip.error for clip in result), default=0.0)
         noted = _with_note(document, within + (earlier or 0.0)) if tracks else document
-        pack = partial(packed, streams=streams) if options.meshopt else None
-        changed, chosen = made_smaller(noted, references, tracks, pack)
+        changed, chosen = with_tracks(noted, references, tracks)
+        changed = packed(changed, streams=streams) if options.meshopt else changed
         larger = tracks.keys() - chosen
         result = [kept(it.number, it.name, it.before, LARGER_REASON) if it.number in larger else it for it in result]
-        if not (pack or chosen) or changed.size >= before:
+        if not (options.meshopt or chosen) or changed.size >= before:
             return left_alone("no clip would become smaller", size, result)
         _require_proven(changed, nodes, seen, clips, {number: tracks[number] for number in chosen})
     return Report(size, tolerance, tuple(result), changed, before, changed.size, "", earlier)

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import copy
 from bisect import bisect_left
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import accumulate
 from typing import Any
 
@@ -60,31 +59,18 @@ class StoredTrack:
         return self.times[:, None], self.values
 
 
-def made_smaller(
-    document: Document,
-    references: References,
-    tracks: Mapping[int, Sequence[StoredTrack]],
-    pack: Callable[[Document], Document] | None = None,
+def with_tracks(
+    document: Document, references: References, tracks: Mapping[int, Sequence[StoredTrack]]
 ) -> tuple[Document, frozenset[int]]:
-    """Return the document with those of the tracks that make it smaller, and the numbers of their animations.
+    """Return the document with these tracks in its animations, by their numbers, and those that have theirs.
 
-    Where it is packed, with all of them: what each of them is worth then, nobody knows.
-    Channels of these that are not among the tracks go, but for those that move no node or that extensions define.
-    What several animations share goes with the last of them that uses it. So an animation is worth the most together
-    with all others, and one that is worth nothing then is worth nothing at all.
+    Animations with extensions that are not known stay as they are. Channels of the others that are not among the tracks
+    go, but for those that move no node or that extensions define. What several animations share goes with the last of
+    them that uses it.
     """
     animations = objects(document.json, "animations")
     chosen = {number: new for number, new in tracks.items() if not any(unknown(animations[number]))}
-    if pack:
-        return pack(_Rewriting(document, references, chosen).done()), frozenset(chosen)
-    while chosen:
-        rewriting = _Rewriting(document, references, chosen)
-        smaller = {number: new for number, new in chosen.items() if rewriting.saved(number) > 0}
-        if len(smaller) == len(chosen):
-            result = rewriting.done()
-            return (result, frozenset(chosen)) if result.size < document.size else (document, frozenset())
-        chosen = smaller
-    return document, frozenset()
+    return (_Rewriting(document, references, chosen).done() if chosen else document), frozenset(chosen)
 
 
 class _Rewriting:
@@ -102,38 +88,10 @@ class _Rewriting:
             self.view_users[container[key]].append(owners.get(id(container), NO_ANIMATION))
         for number, animation_tracks in tracks.items():
             self._put(objects(self.json, "animations")[number], animation_tracks)
-        self.used_after = Counter(container[key] for container, key in sampler_slots(self.json))
+        used_after = {container[key] for container, key in sampler_slots(self.json)}
         self.unused = {
-            number
-            for number, users in references.users.items()
-            if users <= set(tracks) and number not in self.used_after
+            number for number, users in references.users.items() if users <= set(tracks) and number not in used_after
         }
-
-    def saved(self, number: int) -> int:
-        """Return how many bytes fewer the file has for an animation, given that all others are as they are."""
-        before, after = (objects(json, "animations")[number] for json in (self.before.json, self.json))
-        used = Counter(sampler[key] for sampler in after["samplers"] for key in ("input", "output"))
-        comes = [
-            accessor
-            for accessor, count in used.items()
-            if accessor >= self.first_new and count == self.used_after[accessor]
-        ]
-        return len(as_text(before)) - len(as_text(after)) + self._goes[number] - sum(map(self._cost, comes))
-
-    @cached_property
-    def _goes(self) -> Counter[int]:
-        """By the number of an animation: the bytes that would stay if it stayed as it was."""
-        result: Counter[int] = Counter()
-        for accessor in self.unused:
-            result.update(dict.fromkeys(self.references.users[accessor], self._cost(accessor)))
-        return result
-
-    def _cost(self, number: int) -> int:
-        """Return about how many bytes a file has for an accessor, with the views that are its alone."""
-        accessor = self.accessors[number]
-        views = {container[key] for container, key in view_slots(accessor)}
-        own = [self.views[view] for view in views if set(self.view_users.get(view, ())) == {number}]
-        return stored_size(self.json, number) + sum(len(as_text(part)) + 1 for part in (accessor, *own))
 
     def done(self) -> Document:
         removed = self._views_that_go()

@@ -42,16 +42,13 @@ what is written:
   the file; nothing where there is nothing to do. A file that was edited since, or that is not the program's own, is
   replaced only with --overwrite. With --in-place the program replaces the file itself, and keeps the one before as
   NAME.blend1. The paths of the results are printed on standard output, one a line; everything else goes to standard
-  error. A relative output path of the render, and disk caches of simulations, depend on the place and the name of the
-  file, as after Save As. A folder stands for the .blend files in it and below, but for results of this program. The
-  same command again does what is new or has changed: the folder .rigid-motion beside the results has the record of
-  them.
+  error. Relative paths of renders and caches depend on the place of the file, as after Save As. A folder stands for the
+  .blend files in it and below, but for results of this program. The same command again does what is new or has changed.
 
 what is run:
-  Nothing in the files: scripts and Python expressions stay in them, switched off. If a farm should run them, let it
-  render with `blender --enable-autoexec`. Of missing libraries it is said what is missing; an object counts as not done
-  if it is missing, overrides a missing one or moves by a missing Action, and so does a file that lacks a collection or
-  a scene, unless --objects says which ones you mean.
+  Nothing in the files: scripts and Python expressions stay in them, switched off. An object counts as not done if it
+  is missing from a library, overrides a missing one or moves by a missing Action, and so does a file that lacks a
+  collection or a scene, unless --objects says which ones you mean.
 """
 
 

@@ -51,21 +51,18 @@ SCRIPT = "compare.py"
 
 EPILOG = """
 inputs:
-  tables with named columns (t,x,y,z,qx,qy,qz,qw or timestamp_ms,pos_x,...,rot_w and the like, in any order), TUM,
-  KITTI, Motive, Vicon, Qualisys, COLMAP, JSON and more (docs/csv.md), BVH, FBX, glTF, .blend; a folder stands for the
-  recordings in it. FILE:BODY takes one body of several, FILE:* all of them. A BVH, FBX or glTF is a whole body,
-  FILE:JOINT one joint of it; without a skeleton, an FBX or glTF is the objects that move in it. In a .blend, a body is
-  an object (FILE.blend:OBJECT), a bone of a rig (FILE.blend:OBJECT/BONE) or a whole rig (FILE.blend:RIG), moving as
-  Blender shows it in the world.
+  tables with named columns (t,x,y,z,qx,qy,qz,qw and the like, in any order), TUM, KITTI, Motive, Vicon, Qualisys,
+  COLMAP, JSON and more (docs/csv.md), BVH, FBX, glTF, .blend; a folder stands for the recordings in it. FILE:BODY takes
+  one body of several, FILE:* all of them. A BVH, FBX or glTF is a whole body, FILE:JOINT one joint of it; without a
+  skeleton, an FBX or glTF is the objects that move in it. In a .blend, a body is an object (FILE.blend:OBJECT), a bone
+  of a rig (FILE.blend:OBJECT/BONE) or a whole rig (FILE.blend:RIG).
 
 examples:
   python scripts/compare.py
   python scripts/compare.py hand_left.csv hand_right.csv --axes unity --output renders/hands
   python scripts/compare.py log.csv:left --columns t=when,device=who --time-unit ms --scale 0.01
-  python scripts/compare.py unity.csv --axes unity --euler YXZ --degrees
   python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
   python scripts/compare.py dance.bvh walk.fbx fox.glb shot.blend:Rig
-  python scripts/compare.py dance.bvh:LeftHand --object controller
   python scripts/compare.py dances/ --tolerance 1cm --shared --no-video
   python scripts/compare.py take.csv --budget 5,10 --rates 10 --modes all,best_of
   python scripts/compare.py take.csv --against mine.csv
@@ -73,17 +70,15 @@ examples:
   blender --background --python scripts/compare.py -- hand_left.csv --axes unity
 
 keys:
-  Without more, --rates keys a second are kept, evenly spaced in time and the same for every mode. With --tolerance each
-  mode keeps the fewest samples with which its shell error is within that length, with --budget so many on average,
-  where its RMS error is small. Both also count the keys that each mode needs to be as good as Blender's own curves,
-  which takes up to two seconds for every 100 samples. --rates beside them adds evenly spaced keys for comparison.
+  Without more, --rates keys a second are kept, evenly spaced in time and the same for every mode. --tolerance and
+  --budget also count the keys that each mode needs to be as good as Blender's own curves, which takes up to two seconds
+  for every 100 samples; --rates beside them adds evenly spaced keys for comparison.
 
 output:
   A table of errors, one sentence, and as the last line the path of OUTPUT/report.html; everything else goes to standard
-  error. OUTPUT/metrics.csv has all numbers, and every clip and choice of keys has a folder (OUTPUT/CLIP/10, /budget-10,
-  /tolerance-5mm) with its keys and motions. What an earlier run of the same recordings wrote is replaced, and what is
-  done already is not done again. docs/comparing.md says what each file has, how errors are measured, and what many
-  clips, whole bodies and a Blender of yours need.
+  error. OUTPUT/metrics.csv has all numbers, and every clip and choice of keys has a folder with its keys and motions.
+  What an earlier run of the same recordings wrote is replaced, and what is done already is not done again.
+  docs/comparing.md says what each file has, and how errors are measured.
 
 Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could be done, or a wrong option, 130
 stopped by Ctrl-C, and 143 by SIGTERM.

@@ -63,39 +63,33 @@ examples:
   blender --background --python scripts/reduce.py -- shot.blend
 
 .blend files:
-  The program reduces every object, and all bones of a rig together, with more than two keys of location or rotation. It
-  keeps the keys that the mode needs, and sets the mode on them. The dense keys stay in the file, so that Restore Keys
-  brings them back; with --discard they do not. Bones that follow constraints or drivers, and what hangs on them, are
-  not promised: they are named. What needs all of its keys stays as it is, and so does an object whose scale has keys
-  everywhere that differ from axis to axis. With --curves what is left are Bezier keys, with handles and without a mode,
-  which play in any Blender. They keep to the tolerance on frames; how far they are off between these is said.
+  The program reduces every object, and all bones of a rig together, with more than two keys of location or rotation,
+  and sets the mode on the keys that are left. The dense keys stay in the file for Restore Keys. Bones that follow
+  constraints or drivers, and what hangs on them, are not promised: they are named. What needs all of its keys stays as
+  it is, and so does an object whose scale has keys everywhere that differ from axis to axis.
 
 glTF files:
   walk.glb becomes walk-reduced.glb, and so with .vrm and .vrma; walk.gltf becomes walk-reduced.gltf with its .bin
   beside it. There are fewer keys in every clip, and nothing else is changed. Blender is not needed. No vertex, and no
   point within --radius of any node, is off by more than the tolerance in the world, neither at keys nor at eighths
   between them: what is written is played again. What moves no node, or would become larger, is left alone. With --glb,
-  .blend and FBX files and recordings become such files: Blender exports them, sampled on every frame as they are shown,
-  for glTF knows lines and even turns alone. With --curves, channels that need fewer keys as cubic splines become such.
-  These keep to the tolerance at the keys of the input; how far off they are between, from its lines, is said. With
-  --meshopt all of it is compressed, for viewers that read EXT_meshopt_compression; what comes compressed goes out so.
+  Blender exports .blend and FBX files and recordings, sampled on every frame as they are shown. What comes compressed
+  by meshopt goes out so.
 
 recordings:
   The program reads what compare.py reads; FILE:BODY takes one body of several, FILE:* all. A rigid motion becomes
-  NAME-keys.csv, t,x,y,z,qw,qx,qy,qz in the axes and units of the recording, and with --blend also NAME-keys.blend with
-  an empty; a whole body becomes NAME-keys.blend with a rig, with the mode or with curves, whichever needs fewer keys:
-  --mode or --curves decides. With --curves a rigid motion becomes NAME-keys.blend alone. These are in metres and
-  Blender's axes, and play in any Blender, with or without the extension. The first sample is on frame 1.
+  NAME-keys.csv, t,x,y,z,qw,qx,qy,qz in the axes and units of the recording, or with --curves NAME-keys.blend with an
+  empty; a whole body becomes NAME-keys.blend with a rig, with the mode or with curves, whichever needs fewer keys.
+  .blend files are in metres and Blender's axes, and play without the extension. The first sample is on frame 1.
 
 what is written:
   New files beside the inputs or in --output, which for a single input may be the name of the file. A file that was
-  edited since, or that is not the program's own, is replaced only with --overwrite. With --in-place the program
-  replaces a .blend file itself, and keeps the one before as NAME.blend1. Nothing is written of what is left alone, not
-  even under the name that --output gives. The paths of the results are printed on standard output, one a line, or with
-  --json what became of each input; everything else goes to standard error, with a sentence on all of it as the last
-  line. Scripts and Python expressions in files do not run. A folder stands for the .blend, glTF, VRM, FBX, BVH, CSV
-  (.csv, .tsv) and .tum files in it and below, but for results of this program. The same command again does what is new
-  or has changed: the folder .rigid-motion beside the results has the record of them.
+  edited since, or that is not the program's own, is replaced only with --overwrite. With --in-place the file before is
+  kept as NAME.blend1. The paths of the results are printed on standard output, one a line; everything else goes to
+  standard error, with a sentence on all of it as the last line. Scripts and Python expressions in files do not run. A
+  folder stands for the .blend, glTF, VRM, FBX, BVH, CSV (.csv, .tsv) and .tum files in it and below, but for results of
+  this program. The same command again does what is new or has changed: the folder .rigid-motion beside the results has
+  the record of them.
 """
 
 

@@ -21,7 +21,8 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.command_line import listed
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, moments_of
-from .objects import LAST_FRAME, probe
+from .matrices import filled, growing
+from .objects import LAST_FRAME, matrix_of, poses_on, probe
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import ALL, Selection, Trajectory, TrajectoryError, shown
 from .rigs import armature_of, in_blender, whole_body
@@ -35,9 +36,6 @@ OF_BONES = "pose.bones["
 
 MAX_LISTED_BONES = 5
 """Bones of a rig that are listed where one has to be named."""
-
-MAX_STEADY_SCALE_RATIO = 1e-4
-"""Share by which a scale may differ that is one and the same: single precision, through a chain of bones."""
 
 
 @dataclass(frozen=True)
@@ -142,18 +140,18 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
 
 
 def _sample(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
-    from .world_poses import read_poses
-
     moments, metres = _moments(path, body, scenes)
     with probe() as obj:
         follow = cast("bpy.types.CopyTransformsConstraint", obj.constraints.new("COPY_TRANSFORMS"))
-        follow.target = body.obj
-        if body.bone is not None:
-            follow.subtarget = body.bone
-        seen = sampled(
-            moments, lambda frames: read_poses(obj, frames)[None], np.array([-1]), OF_OBJECTS, scale or metres
-        )
-    poses = seen.poses[0]
+        follow.target, follow.subtarget = body.obj, body.bone or ""
+
+        def look(frames: np.ndarray) -> Poses:
+            return poses_on(path, body.name, 1, frames, lambda seen: matrix_of(obj.evaluated_get(seen))[None])
+
+        seen = sampled(moments, look, np.array([-1]), OF_OBJECTS, scale or metres)
+    poses = filled(seen.poses)[0]
+    if np.allclose(poses.scales, 1.0, atol=1e-6):
+        poses = Poses(poses.positions, poses.quaternions)
     trajectory = Trajectory(body.name, moments.times(seen.frames), poses, metres, _remark(body, poses))
     return seen.described(trajectory, moments, scale or metres)
 
@@ -187,9 +185,7 @@ def _moments(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], name: s
 
 def _remark(body: BlendBody, poses: Poses) -> str:
     """Return what the size of its rig does to a bone."""
-    if body.bone is None or poses.scales is None:
-        return ""
-    if not np.allclose(poses.scales, poses.scales[0], rtol=MAX_STEADY_SCALE_RATIO, atol=0.0):
+    if body.bone is None or poses.scales is None or growing(poses).scales is not None:
         return ""
     size = f"{poses.scales[0]:.4g} times its own size"
     return f"{body.name} is {size} all along, and so are the shell of its errors (--radius) and what a video shows"

@@ -28,7 +28,7 @@ from .recordings import Cells, Selection, Trajectory, TrajectoryError, shown, un
 from .rest_bodies import LOOKED_AT, RestBody
 from .rewriting import eulers_near, write_text
 from .sizing import sized
-from .tables import HeaderLine, is_number, lines_of, parse_rows
+from .tables import HeaderLine, lines_of, parse_rows
 
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
 
@@ -339,8 +339,7 @@ def _read_motion(
     line : int
         The last one before the frames.
     """
-    cut: list[tuple[int, str]] = []
-    rows = _finished(lines_of(path, after=motion), cut)
+    rows = ((number, text) for number, line in lines_of(path, after=motion) if (text := line.strip()))
     settings = list(islice(rows, 2))
     count = _read_setting(path, settings[:1], "Frames:", motion)
     frame_time = _read_setting(path, settings[1:], "Frame Time:", motion)
@@ -349,38 +348,12 @@ def _read_motion(
         raise TrajectoryError(path, "no joint has CHANNELS", "export the BVH again", motion)
     columns = {label: index for index, label in enumerate(labels)}
     values = parse_rows(path, rows, None, columns, len(columns))
-    warnings = []
-    if cut:
-        lost = _is_cut_off(cut[0][1], len(columns))
-        if not lost:
-            last = parse_rows(path, cut, None, columns, len(columns))
-            # Where more were to come, its last number may lack digits.
-            lost = len(values) + 1 < count
-            values = values if lost else np.concatenate((values, last))
-        if lost:
-            warnings.append(ClipWarning(f"{path.name}:{cut[0][0]}: the file is cut off in this row, which is left out"))
+    warnings: tuple[ClipWarning, ...] = ()
     if count != len(values):
         text = f"Frames: says {count:g} and {len(values)} whole rows follow, which are read"
         way_out = "export the BVH again if that is not all"
-        warnings.append(ClipWarning(f"{path.name}:{settings[0][0]}: {text}", way_out))
-    return values, frame_time, tuple(warnings), settings[1][0]
-
-
-def _finished(lines: Iterable[tuple[int, str]], unfinished: list[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-    """Yield numbered lines, without blank ones and blanks around them; a last one without an end goes to a list."""
-    before = None
-    for number, line in lines:
-        if before:
-            yield before
-        before = (number, text) if (text := line.strip()) else None
-    if before:
-        unfinished.append(before)
-
-
-def _is_cut_off(row: str, width: int) -> bool:
-    """Return whether a row lacks numbers at its end, or a part of the last one, and is sound as far as it goes."""
-    *cells, last = row.split()
-    return all(map(is_number, cells)) and len(cells) < width and (len(cells) < width - 1 or not is_number(last))
+        warnings = (ClipWarning(f"{path.name}:{settings[0][0]}: {text}", way_out),)
+    return values, frame_time, warnings, settings[1][0]
 
 
 def _read_setting(path: Path, row: list[tuple[int, str]], name: str, motion: int) -> float:

@@ -25,10 +25,10 @@ import numpy as np
 
 from rigid_motion_batch.axes import NERF
 
-from .cameras import in_order, number_in
 from .column_names import column_name
 from .columns import RowLayout, known_in, layout_of
 from .options import ReadingOptions
+from .plain import in_order, number_in
 from .recordings import Selection, Trajectory, TrajectoryError, shown
 from .rewriting import WRITTEN_DECIMALS
 from .tables import HeaderLine, is_number, read_text

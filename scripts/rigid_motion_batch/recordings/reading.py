@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rigid_motion_batch.command_line import did_you_mean
 
-from . import blend, bvh, cameras, fbx, gltf, headless, json_logs, named_csv, optical
+from . import blend, bvh, fbx, gltf, json_logs, optical, plain
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .plausibility import implausibilities
 from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
@@ -65,10 +65,10 @@ FORMATS = (
     Format("Motive CSV", TEXT, optical.read_motive, optical.recognises_motive),
     Format("Vicon CSV", TEXT, optical.read_vicon, optical.recognises_vicon, VALUE_OPTIONS),
     Format("Qualisys TSV", TEXT, optical.read_qualisys, optical.recognises_qualisys, VALUE_OPTIONS),
-    Format("COLMAP images", TEXT, cameras.read_images, cameras.recognises_images, VALUE_OPTIONS, says_unit=False),
-    Format("g2o graph", TEXT, cameras.read_graph, cameras.recognises_graph, VALUE_OPTIONS, says_unit=False),
-    Format("rows of numbers (TUM, KITTI)", TEXT, headless.read, headless.recognises, TABLE, says_unit=False),
-    Format("CSV with named columns", TEXT, named_csv.read, honours=TABLE, says_unit=False),
+    Format("COLMAP images", TEXT, plain.read_images, plain.recognises_images, VALUE_OPTIONS, says_unit=False),
+    Format("g2o graph", TEXT, plain.read_graph, plain.recognises_graph, VALUE_OPTIONS, says_unit=False),
+    Format("rows of numbers (TUM, KITTI)", TEXT, plain.read_rows, plain.recognises_rows, TABLE, says_unit=False),
+    Format("CSV with named columns", TEXT, plain.read_named, honours=TABLE, says_unit=False),
     Format("JSON", JSON, json_logs.read, honours=TABLE, says_unit=False),
     Format("BVH", (".bvh",), bvh.read, axes=bvh.AXES, in_metres=False),
     Format("FBX", (".fbx",), fbx.read, honours=("scale",), measured=False),

@@ -37,12 +37,8 @@ def eulers_near(quaternions: np.ndarray, order: str, near: np.ndarray) -> np.nda
 
 def write_text(header: HeaderLine, target: Path, numbers: np.ndarray) -> None:
     """Write the file of a header to a path, with other numbers (rows, columns) in it but for those that are NaN."""
-    width = len(header.cells) // header.height
-    places: dict[int, tuple[int, int]] = {}
     changed = np.isfinite(numbers).any(axis=1)
-    for row, (line, _) in enumerate(Table(header, {}).rows()):
-        if changed[row]:
-            places |= {line + below: (row, width * below + header.shift) for below in range(header.height)}
+    rows = {line: numbers[row] for row, (line, _) in enumerate(Table(header, {}).rows()) if changed[row]}
     with header.path.open("rb") as head:
         encoding = ENCODINGS.get(head.read(2), "utf-8")
     separator = None if header.shift else header.separator
@@ -51,13 +47,12 @@ def write_text(header: HeaderLine, target: Path, numbers: np.ndarray) -> None:
         target.open("w", encoding=encoding, newline="") as written,
     ):
         for number, text in enumerate(file, 1):
-            if number not in places:
+            if number not in rows:
                 written.write(text)
                 continue
-            row, first = places[number]
             pieces, done = [], 0
-            for place, (begin, end) in enumerate(_spans(text.rstrip("\r\n"), separator, header.vectors)):
-                value = numbers[row, place + first] if place + first < numbers.shape[1] else np.nan
+            spans = _spans(text.rstrip("\r\n"), separator, header.vectors)
+            for value, (begin, end) in zip(rows[number][header.shift :], spans, strict=False):
                 if np.isfinite(value):
                     pieces += [text[done:begin], _text(value, text[begin:end], separator)]
                     done = end

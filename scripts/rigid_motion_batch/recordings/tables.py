@@ -209,9 +209,6 @@ class HeaderLine:
     shift: int = 0
     """Cells of a row that the line has not, at its beginning."""
 
-    height: int = 1
-    """Lines of a row."""
-
     write: Callable[[Path, np.ndarray], None] | None = None
     """A function that writes the file with other numbers, where lines are no rows."""
 

@@ -6,8 +6,9 @@ angles need their order from the user. A matrix may be transposed, and a positio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import takewhile
 
 import numpy as np
@@ -25,6 +26,8 @@ from .plausibility import require_one_body
 from .recordings import Cells, Selection, Trajectory, unique
 from .rewriting import eulers_near, write_text
 from .tables import HeaderLine, Table
+
+WXYZ = ("qw", *QUATERNION[:3])
 
 MOST_LABELS = 0.5
 """The share of the rows up to which different texts in a column can be names of devices. Running numbers are not."""
@@ -49,6 +52,9 @@ MAX_RIGID_SCALE_RATIO = 1e-3
 class _TrackedBody:
     """One body of the file: its columns, and its rows."""
 
+    header: HeaderLine
+    layout: RowLayout
+    options: ReadingOptions
     name: str
     prefix: str
     """The prefix of its columns."""
@@ -60,11 +66,87 @@ class _TrackedBody:
         """Return what errors call a column."""
         return f"{self.prefix} {meaning}".strip()
 
+    @property
+    def metres(self) -> list[float]:
+        """The metres of a unit along x, y and z."""
+        return metres_of(self.header, self.layout, self.columns, self.options)
+
+    def trajectory(self, times: np.ndarray, held: Mapping[str, np.ndarray]) -> Trajectory:
+        """Return what its columns hold, by their meanings."""
+        header, options, metres = self.header, self.options, self.metres
+        positions = np.column_stack([held[axis] for axis in POSITION])
+        warnings: tuple[ClipWarning, ...] = header.warnings
+        scales = held["scale"] if np.any(held.get("scale", 1.0) != 1.0) else None
+        if "qw" in held:
+            quaternions = np.column_stack([held[item] for item in WXYZ])
+        elif "m00" in held:
+            positions, quaternions, scales = _of_matrices(header, positions, held)
+        else:
+            angles, more = self._radians(np.column_stack([held[item] for item in self._angles]))
+            quaternions, warnings = quaternions_from_intrinsic_eulers(angles, options.intrinsic_order), warnings + more
+        if len(set(metres)) > 1:
+            positions, metres = positions * metres, [1.0]
+        times, poses, remark = _together(times, Poses(positions, quaternions, scales))
+        if header.inverted:
+            with np.errstate(invalid="ignore", over="ignore"):
+                poses = inverse(poses)
+        return Trajectory(self.name, times, poses, metres[0], remark, warnings, axes=header.axes)
+
+    def numbers(self, held: Mapping[str, np.ndarray], poses: Poses) -> dict[int, np.ndarray]:
+        """Return what holds poses, by columns, where these were held: what `trajectory` does, the other way round."""
+        poses = inverse(poses) if self.header.inverted else poses
+        places = poses.positions / (self.metres if len(set(self.metres)) > 1 else 1.0)
+        made = dict(zip(POSITION, places.T, strict=True))
+        if "qw" in held:
+            before = np.column_stack([held[item] for item in WXYZ])
+            signs = np.where(np.einsum("nk,nk->n", before, poses.quaternions) < 0.0, -1.0, 1.0)
+            made |= zip(WXYZ, (signs[:, None] * poses.quaternions).T, strict=True)
+        elif "m00" in held:
+            axes = matrices(poses.quaternions).transpose(2, 0, 1)
+            axes = axes if poses.scales is None else axes * poses.scales[:, None, None]
+            if _is_transposed(held):
+                axes, made = axes.transpose(0, 2, 1), dict(zip(BOTTOM, places.T, strict=True))
+            made |= zip(MATRIX, axes.reshape(-1, 9).T, strict=True)
+        else:
+            unit = np.pi / 180.0 if self._in_degrees else 1.0
+            before = np.column_stack([held[item] for item in self._angles]) * unit
+            angles = eulers_near(poses.quaternions, self.options.intrinsic_order, before) / unit
+            made |= zip(self._angles, angles.T, strict=True)
+        return {self.columns[item]: column for item, column in made.items()}
+
+    @property
+    def _angles(self) -> list[str]:
+        """The meanings of the angles, in the order of the turns."""
+        return [f"r{axis.lower()}" for axis in self.options.intrinsic_order]
+
+    @property
+    def _units(self) -> list[str]:
+        return [self.layout.units.get(self.columns[item], "") for item in EULER]
+
+    @property
+    def _in_degrees(self) -> bool:
+        return self.options.degrees or "deg" in self._units
+
+    def _radians(self, angles: np.ndarray) -> tuple[np.ndarray, tuple[ClipWarning, ...]]:
+        """Return angles of shape (n, 3) as radians, and what is hard to believe of them."""
+        largest = float(np.nanmax(np.abs(angles), initial=0.0, where=np.isfinite(angles)))
+        warnings: tuple[ClipWarning, ...] = ()
+        if self.options.degrees and len(angles) and 0.0 < largest <= SMALLEST_DEGREES:
+            text = f"its angles are all within {largest:.3g} degrees"
+            warnings = (ClipWarning(text, "radians need no --degrees"),)
+        if self._in_degrees:
+            return np.radians(angles), warnings
+        if "rad" not in self._units and largest > LARGEST_RADIANS:
+            way_out = "say so: --degrees; or name the columns of radians rx_rad, ry_rad, rz_rad"
+            raise self.header.error(f"angles go up to {largest:.4g}, which are no radians", way_out)
+        return angles, ()
+
 
 def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine, way_out: str) -> list[Trajectory]:
     """Read the requested bodies of the rows below a header; `way_out` is what to do with devices that are mixed."""
     layout = layout_of(header, options)
-    bodies = _bodies(header, layout, "device" in dict(options.columns))
+    write = header.write or (lambda target, numbers: write_text(header, target, numbers))
+    bodies = _bodies(header, layout, options)
     taken = set(selection.of([body.name for body in bodies]))
     requested = [body for body in bodies if body.name in taken]
     columns = {body.label(one): index for body in requested for one, index in body.columns.items() if one != "t"}
@@ -83,11 +165,11 @@ def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine
             there = ~np.isnan([*held.values()]).all(axis=0)
             seconds, held = seconds[there], {one: column[there] for one, column in held.items()}
             rows = rows[there]
-        trajectory = _trajectory(header, body, seconds, held, layout, options)
+        trajectory = body.trajectory(seconds, held)
         if len(trajectory.times) == len(rows):
             own_clock = len(times) == 1 and (len(layout.bodies) == 1 or "t" in body.columns)
-            cells = _cells(header, body, held, layout, options, rows, count)
-            cells = replace(cells, times=_times_written(clock, times[0], rows) if own_clock else None)
+            written = _times_written(clock, times[0], rows) if own_clock else None
+            cells = Cells(rows, (count, len(header.cells)), partial(body.numbers, held), write, written)
             trajectory = replace(trajectory, cells=cells)
         remarks = (trajectory.remark, header.remark, layout.remark, clock.remark)
         trajectory = replace(trajectory, remark="; ".join(filter(None, remarks)), dated=clock.dated)
@@ -96,10 +178,10 @@ def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine
     return trajectories
 
 
-def _bodies(header: HeaderLine, layout: RowLayout, named: bool) -> list[_TrackedBody]:
-    """Return all bodies in the order of columns and rows; `named` is whether the user named their column."""
+def _bodies(header: HeaderLine, layout: RowLayout, options: ReadingOptions) -> list[_TrackedBody]:
+    """Return all bodies in the order of columns and rows."""
     columns = {f"device {index}": index for index in layout.devices}
-    groups = _devices(Table(header, columns), named)
+    groups = _devices(Table(header, columns), "device" in dict(options.columns))
     bodies = [
         (f"{device} {prefix}".strip() or header.path.stem, prefix, columns, rows)
         for device, rows in groups.items()
@@ -107,7 +189,7 @@ def _bodies(header: HeaderLine, layout: RowLayout, named: bool) -> list[_Tracked
     ]
     names = unique([name for name, *_ in bodies])
     return [
-        _TrackedBody(name, prefix, columns, rows)
+        _TrackedBody(header, layout, options, name, prefix, columns, rows)
         for name, (_, prefix, columns, rows) in zip(names, bodies, strict=True)
     ]
 
@@ -137,77 +219,6 @@ def _codes(cells: Iterator[tuple[int, str]]) -> tuple[dict[str, int], np.ndarray
     return codes, np.fromiter((codes.setdefault(text, len(codes)) for _, text in rows), np.int64)
 
 
-def _trajectory(
-    header: HeaderLine,
-    body: _TrackedBody,
-    times: np.ndarray,
-    held: Mapping[str, np.ndarray],
-    layout: RowLayout,
-    options: ReadingOptions,
-) -> Trajectory:
-    metres = metres_of(header, layout, body.columns, options)
-    positions = np.column_stack([held[axis] for axis in POSITION])
-    warnings: tuple[ClipWarning, ...] = header.warnings
-    scales = held["scale"] if np.any(held.get("scale", 1.0) != 1.0) else None
-    if "qw" in held:
-        quaternions = np.column_stack([held[item] for item in ("qw", *QUATERNION[:3])])
-    elif "m00" in held:
-        positions, quaternions, scales = _of_matrices(header, positions, held)
-    else:
-        angles = np.column_stack([held[f"r{axis.lower()}"] for axis in options.intrinsic_order])
-        units = [layout.units.get(body.columns[item], "") for item in EULER]
-        angles, more = _radians(header, angles, units, options)
-        quaternions, warnings = quaternions_from_intrinsic_eulers(angles, options.intrinsic_order), warnings + more
-    if len(set(metres)) > 1:
-        positions, metres = positions * metres, [1.0]
-    times, poses, remark = _together(times, Poses(positions, quaternions, scales))
-    if header.inverted:
-        with np.errstate(invalid="ignore", over="ignore"):
-            poses = inverse(poses)
-    return Trajectory(body.name, times, poses, metres[0], remark, warnings, axes=header.axes)
-
-
-def _cells(
-    header: HeaderLine,
-    body: _TrackedBody,
-    held: Mapping[str, np.ndarray],
-    layout: RowLayout,
-    options: ReadingOptions,
-    rows: np.ndarray,
-    count: int,
-) -> Cells:
-    """Return where a body's numbers are, which are held like this: what `_trajectory` does, the other way round."""
-    metres = metres_of(header, layout, body.columns, options)
-    scale = 1.0 / np.array(metres if len(set(metres)) > 1 else [1.0])
-
-    def numbers(poses: Poses) -> dict[int, np.ndarray]:
-        poses = inverse(poses) if header.inverted else poses
-        places = poses.positions * scale
-        made = dict(zip(POSITION, places.T, strict=True))
-        if "qw" in held:
-            before = np.column_stack([held[item] for item in ("qw", *QUATERNION[:3])])
-            signs = np.where(np.einsum("nk,nk->n", before, poses.quaternions) < 0.0, -1.0, 1.0)
-            made |= zip(("qw", *QUATERNION[:3]), (signs[:, None] * poses.quaternions).T, strict=True)
-        elif "m00" in held:
-            axes = matrices(poses.quaternions).transpose(2, 0, 1)
-            axes = axes if poses.scales is None else axes * poses.scales[:, None, None]
-            bottom = np.column_stack([held.get(item, np.zeros(len(rows))) for item in BOTTOM])
-            if np.any(np.nan_to_num(bottom)) and not np.any(np.nan_to_num([held[axis] for axis in POSITION])):
-                axes, made = axes.transpose(0, 2, 1), dict(zip(BOTTOM, places.T, strict=True))
-            made |= zip(MATRIX, axes.reshape(-1, 9).T, strict=True)
-        else:
-            order = options.intrinsic_order
-            before = np.column_stack([held[f"r{axis.lower()}"] for axis in order])
-            units = [layout.units.get(body.columns[item], "") for item in EULER]
-            unit = np.pi / 180.0 if options.degrees or "deg" in units else 1.0
-            angles = eulers_near(poses.quaternions, order, before * unit) / unit
-            made |= zip((f"r{axis.lower()}" for axis in order), angles.T, strict=True)
-        return {body.columns[item]: column for item, column in made.items()}
-
-    write = header.write or (lambda target, numbers: write_text(header, target, numbers))
-    return Cells(rows, (count, len(header.cells)), numbers, write)
-
-
 def _times_written(clock: Clock, column: int, rows: np.ndarray) -> Callable[[np.ndarray], dict[int, np.ndarray]] | None:
     """Return a function of times (n,) that returns what stands for them in their column; None where no number does."""
     if not clock.per_second:
@@ -221,14 +232,20 @@ def _times_written(clock: Clock, column: int, rows: np.ndarray) -> Callable[[np.
     return written
 
 
+def _is_transposed(held: Mapping[str, np.ndarray]) -> bool:
+    """Return whether the translation of matrices is in their last row."""
+    below, beside = ([held[item] for item in where if item in held] for where in (BOTTOM, POSITION))
+    return bool(np.any(np.nan_to_num(below)) and not np.any(np.nan_to_num(beside)))
+
+
 def _of_matrices(
     header: HeaderLine, positions: np.ndarray, held: Mapping[str, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """Return positions (n, 3), quaternions and scales of matrices, whichever way round; NaN where one is no pose."""
     rotations = np.stack([held[item] for item in MATRIX], axis=-1).reshape(-1, 3, 3)
-    bottom = np.column_stack([held.get(item, np.zeros(len(positions))) for item in BOTTOM])
-    if np.any(np.nan_to_num(bottom)) and not np.any(np.nan_to_num(positions)):
-        rotations, positions = rotations.transpose(0, 2, 1), bottom
+    if _is_transposed(held):
+        rotations = rotations.transpose(0, 2, 1)
+        positions = np.column_stack([held.get(item, np.zeros(len(positions))) for item in BOTTOM])
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         scales = np.cbrt(np.linalg.det(rotations))
         rotations = rotations / scales[:, None, None]
@@ -266,20 +283,3 @@ def _together(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, str]:
     places, turns = (interpolate(own, known, at, "lerp_slerp") for own, known in parts)
     remark = "positions and rotations stand in different rows: each is filled in between its own"
     return at, Poses(places.positions, turns.quaternions), remark
-
-
-def _radians(
-    header: HeaderLine, angles: np.ndarray, units: Sequence[str], options: ReadingOptions
-) -> tuple[np.ndarray, tuple[ClipWarning, ...]]:
-    """Return angles of shape (n, 3) as radians, and what is hard to believe of them."""
-    largest = float(np.nanmax(np.abs(angles), initial=0.0, where=np.isfinite(angles)))
-    warnings: tuple[ClipWarning, ...] = ()
-    if options.degrees and len(angles) and 0.0 < largest <= SMALLEST_DEGREES:
-        text = f"its angles are all within {largest:.3g} degrees"
-        warnings = (ClipWarning(text, "radians need no --degrees"),)
-    if options.degrees or "deg" in units:
-        return np.radians(angles), warnings
-    if "rad" not in units and largest > LARGEST_RADIANS:
-        way_out = "say so: --degrees; or name the columns of radians rx_rad, ry_rad, rz_rad"
-        raise header.error(f"angles go up to {largest:.4g}, which are no radians", way_out)
-    return angles, ()

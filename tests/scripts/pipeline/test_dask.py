@@ -163,6 +163,7 @@ def clips(tmp_path: Path) -> list[Path]:
 
 
 @pytest.mark.blender
+@pytest.mark.any_blender
 @pytest.mark.slow
 def test_the_workers_make_what_one_machine_makes_and_say_what_fails(
     cluster: Cluster, clips: list[Path], tmp_path: Path, capfd: pytest.CaptureFixture
@@ -183,6 +184,7 @@ def test_the_workers_make_what_one_machine_makes_and_say_what_fails(
 
 
 @pytest.mark.blender
+@pytest.mark.any_blender
 @pytest.mark.slow
 def test_ctrl_c_leaves_no_process_at_work(cluster: Cluster, tmp_path: Path) -> None:
     clips = [write_toss(tmp_path / f"{name}.csv", samples=300) for name in ("one", "two")]
@@ -248,6 +250,7 @@ def test_a_wrong_address_is_said_to_be_one(tmp_path: Path, address: str, complai
 
 
 @pytest.mark.blender
+@pytest.mark.any_blender
 @pytest.mark.slow
 def test_workers_may_come_and_die_and_the_scheduler_too_and_nothing_is_lost(clips: list[Path], tmp_path: Path) -> None:
     (tmp_path / "dask").mkdir()

@@ -123,8 +123,6 @@ RAW: dict[str, Layout] = {
         "# timestamp(s) q1 q2 q3 q4 px py pz vx vy vz\n" + rows(SECONDS, quaternions(), *[LEFT.positions] * 2),
     ),
     "poses without times": Layout("take.csv", rows(*POSE), COUNTED),
-    "matrices in lines of their own": Layout("take.txt", rows(matrices().reshape(-1, 4)), COUNTED),
-    "Redwood": Layout("take.txt", "".join(f"0 0 1\n{rows(matrix)}\n" for matrix in matrices(height=4)), COUNTED),
     "numbers with decimal commas": Layout("take.csv", rows(SECONDS, *POSE, separator=";").replace(".", ",")),
     "Nuke": Layout(
         "take.chan",

@@ -117,12 +117,14 @@ def fuzz(
     return readable
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("ending", SEEDS)
 def test_damaged_text_is_refused_in_one_line_or_can_be_filled_in(tmp_path: Path, ending: str) -> None:
     readable = fuzz(tmp_path, ending, tuple(seed.encode() for seed in SEEDS[ending]), CASES)
     assert 0 < readable < CASES or CASES < 100, "damage that is always or never noticed tells little"
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("name", sample([*LAYOUTS, *OPTICAL]))
 def test_damage_to_any_layout_is_refused_in_one_line_or_can_be_filled_in(tmp_path: Path, name: str) -> None:
     layout = (LAYOUTS | OPTICAL)[name]

@@ -14,6 +14,7 @@ from rigid_motion_batch.recordings.inspecting import inspect
 from tests.scripts.recordings.layouts import LAYOUTS, LEFT, RIGHT
 from tests.scripts.recordings.optical_layouts import OPTICAL
 from tests.scripts.recordings.written_layouts import WRITTEN
+from tests.thoroughness import sample
 
 EVERY = LAYOUTS | OPTICAL | WRITTEN
 
@@ -88,7 +89,7 @@ def test_a_body_of_qualisys_is_turned_by_roll_then_pitch_then_yaw(write, by_rows
     assert body.warnings == ()
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", sample([*EVERY]))
 def test_what_is_compared_can_be_looked_into_and_reduced(write, tmp_path, name: str, capsys) -> None:
     layout = EVERY[name]
     said = [f"--{option.replace('_', '-')}={as_typed(value)}" for option, value in layout.said.items()]

@@ -5,7 +5,7 @@ import pytest
 from research import benchmark_live
 from tests.scripts.research.keeping import written
 
-pytestmark = pytest.mark.blender
+pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 
 def test_the_study_writes_what_the_page_reads(tmp_path, empty_file, capsys):

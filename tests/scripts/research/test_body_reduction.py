@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
-from research import body_reduction, reduction
+from research import reduction
 from research.decimating import DecimatedBody, decimate
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.reconstructions import reconstruct
@@ -15,7 +15,7 @@ from tests.scripts.bvh_bodies import write_body
 from tests.scripts.research.keeping import written
 
 # Blender's BVH importer leaves closing the file to Python.
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+pytestmark = [pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"), pytest.mark.any_blender]
 
 TIMES = np.arange(24) / 30.0
 
@@ -23,7 +23,7 @@ TIMES = np.arange(24) / 30.0
 @pytest.fixture
 def body(tmp_path) -> Clip:
     clip, *_ = read_clips([str(write_body(tmp_path / "body.bvh", TIMES))])[0]
-    return body_reduction.of_height(clip)
+    return reduction.of_height(clip)
 
 
 def shown(body: DecimatedBody) -> np.ndarray:
@@ -48,15 +48,8 @@ def test_errors_of_decimated_curves_are_those_of_what_blender_shows(body):
     assert decimated.left().largest > 1e-3
 
 
-def test_greedy_insertion_leaves_no_key_that_can_go(body):
-    keys = body_reduction.greedy(body)
-    assert body_reduction.errors_of(body, keys, body_reduction.MODE).max() <= 0.01
-    for key in keys[1:-1]:
-        assert body_reduction.errors_of(body, keys[keys != key], body_reduction.MODE).max() > 0.01
-
-
 def test_rivals_are_as_good(body):
-    rows = {way: body_reduction.beside(body, way) for way in body_reduction.WAYS}
+    rows = {way: reduction.beside(body, way) for way in reduction.WAYS}
     for own, curves, decimated in rows.values():
         for row in (own, curves):
             assert row["on_frames_mm"] <= 10.0 + 1e-6

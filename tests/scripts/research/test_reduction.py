@@ -8,9 +8,9 @@ from rigid_motion import animation
 from rigid_motion.motion import interpolate, reduce_keys, shell_error
 from rigid_motion_batch.analysis.needed import part_of
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.world_poses import read_poses
+from tests.world_poses import read_poses
 
-pytestmark = pytest.mark.blender
+pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 TOLERANCE, RADIUS = 0.005, 0.1
 

@@ -18,7 +18,6 @@ from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.world_poses import read_poses
 from rigid_motion_batch.scenes import layout
 from rigid_motion_batch.scenes.findings import findings_of
 from rigid_motion_batch.scenes.nodes import input_path
@@ -28,6 +27,7 @@ from rigid_motion_batch.scenes.subject import vertices_of
 from rigid_motion_batch.scenes.timeline import Timeline
 from tests.scripts.clips.recordings import reconstruct, swinging_clip
 from tests.thoroughness import sample
+from tests.world_poses import read_poses
 
 SETTINGS = SceneSettings(resolution=(160, 90), fps=12)
 TWO = ("lerp_slerp", "dq_sclerp")

@@ -19,7 +19,7 @@ from tests.live.performing import BODY, TIMES_OF_A_SECOND, dance, frames_of_vmc,
 from tests.scripts.bvh_bodies import TIMES, hips_at, write_body
 from tests.scripts.streaming.test_rooms import LOOPBACK_ADDRESS, PATIENCE, free_port, running
 
-pytestmark = [pytest.mark.blender, pytest.mark.network]
+pytestmark = [pytest.mark.blender, pytest.mark.network, pytest.mark.any_blender]
 
 
 def free_udp_port() -> int:

@@ -10,7 +10,7 @@ from research.paper.catching import CATCH, GRIP_M, HELD, RELEASE, UPDATES_PER_S
 from rigid_motion.motion.quaternions import angle_between, rotate
 from tests.scripts.research.paper.clips import thrown
 
-pytestmark = pytest.mark.blender
+pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 
 @cache

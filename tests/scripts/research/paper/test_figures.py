@@ -6,7 +6,7 @@ from research.drawing import DOTS_PER_INCH, WIDTH_PX, Model
 from research.paper import catching, strips, triangle
 from tests.scripts.research.paper.clips import thrown
 
-pytestmark = pytest.mark.blender
+pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 
 def test_the_tip_rests_under_screws_and_leaves_its_place_under_the_state_of_the_art():

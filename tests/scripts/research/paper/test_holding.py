@@ -12,6 +12,8 @@ from rigid_motion.motion.poses import inverse, placed
 from rigid_motion_batch.recordings.clips import Clip
 from tests.scripts.research.paper.clips import clip
 
+pytestmark = pytest.mark.once
+
 
 def waving(side: str, often: float) -> Clip:
     """A hand that swings to and fro about z, so many times a second."""

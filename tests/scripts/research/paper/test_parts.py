@@ -11,7 +11,7 @@ from research.paper.table import UPDATES
 from rigid_motion_batch.streaming.measuring import HEADER_BYTES
 from tests.scripts.research.paper.clips import circling
 
-pytestmark = pytest.mark.blender
+pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 CLIP = circling(turns=0.7, rate=90.0, seconds=3.0)
 

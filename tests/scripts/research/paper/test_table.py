@@ -8,6 +8,8 @@ from research.paper.table import UPDATES
 from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.research.paper.clips import circling
 
+pytestmark = pytest.mark.once
+
 
 @pytest.mark.slow
 def test_on_a_pivot_a_screw_needs_no_more_updates_than_tell_which_way_it_turns():

@@ -1,30 +1,45 @@
-"""Rows of numbers without names: TUM, KITTI, pose matrices, the rows of EuRoC, VINS and OpenVINS, Nuke's .chan.
+"""Tables whose lines are rows: with named columns, without any names, and the cameras of COLMAP and g2o.
 
+Columns have names in any order, as loggers write them: `t,x,y,z,qx,qy,qz,qw`, `timestamp_ms,pos_x,...,rot_w`.
+`column_names` says which are known, and `columns` how they become bodies: several in a row, or one of several that
+another column names. The quaternion's order is that of the names; other columns are ignored. Separated by commas,
+semicolons or tabs; with the latter two, numbers may have a decimal comma. The program's own files
+(`t,x,y,z,qw,qx,qy,qz`) are such CSVs.
+
+Rows of numbers without names are those of TUM, KITTI, pose matrices, EuRoC, VINS and OpenVINS, and Nuke's .chan.
 Where a comment names the columns (`# timestamp tx ty tz qx qy qz qw`), the names are used. Otherwise what is where is
 seen by the numbers: a matrix has right angles, a quaternion the length 1. Columns may be named by their place,
 `--columns t=1,x=2`. At which end of a quaternion w is no number says: at the last, as in TUM, unless the first rotation
 is 1 0 0 0; in rows with commas, as of EuRoC and VINS, at the one that is larger in the first row. A guess is a warning.
 Nuke's axes are right-handed, y up, and its cameras look along -z.
+
+COLMAP's images.txt and g2o's graphs have no times: they are numbers of images or vertices, and need a rate. COLMAP has
+two lines for each image, in any order, and the world as the camera sees it: its pose is the inverse of that. Cameras
+look along z, with x to the right and y down; the axes of the world may be any, and mostly are those of a camera, too.
+Its unit of length is any.
 Sources: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats,
-https://www.cvlibs.net/datasets/kitti/eval_odometry.php.
+https://www.cvlibs.net/datasets/kitti/eval_odometry.php, https://colmap.github.io/format.html#images-txt,
+https://github.com/RainerKuemmerle/g2o/wiki/File-Format-SLAM-3D.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
-from itertools import islice
+from itertools import chain, islice
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
 
 from .clips import ClipWarning
 from .column_names import ColumnName
-from .columns import layout_of
+from .columns import columns_found, known_in, layout_of
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError
-from .tables import HeaderLine, Table, header_lines, is_number, lines_of
+from .tables import HeaderLine, Table, header_lines, is_number, lines_of, lines_of_words
 from .tracks import read_below
 
 MIN_ROW_NUMBERS = 3
@@ -51,9 +66,6 @@ MAX_UNTURNED_W_ERROR = 1e-6
 POSITIONS_ONLY = 4
 """Numbers in a row of a time and a position."""
 
-REDWOOD = ("source", "target", "frame")
-"""What stands in front of each matrix in files of Redwood and Open3D."""
-
 MIN_AXIS_LENGTH = 1e-12
 """Length that axes have at least."""
 
@@ -65,15 +77,61 @@ TIME = [ColumnName("time")]
 MATRIX = [ColumnName("matrix", f"{row}{column}") for row in range(4) for column in range(4)]
 CHAN = [ColumnName("frame"), *POSITION, *(ColumnName("euler", axis, "deg") for axis in "xyz")]
 
+COLMAP = ["frame", "device", "qw", "qx", "qy", "qz", "x", "y", "z"]
 
-def recognises(head: list[str]) -> bool:
+VERTEX = "VERTEX_SE3:QUAT"
+
+G2O = ["", "frame", "x", "y", "z", "qx", "qy", "qz", "qw"]
+
+
+# -- named columns -----------------------------------------------------------------------------------------------------
+
+
+def read_named(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
+    """Read the requested bodies. One without a name of its own has the file's."""
+    header = _find_header(path, options)
+    way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
+    return read_below(selection, options, header, f"{way_out}, or split the file")
+
+
+def _find_header(path: Path, options: ReadingOptions) -> HeaderLine:
+    """Find the line that names all that is needed: one of the first, or the only one further down.
+
+    Where none does, TrajectoryError says what the nearest lacks.
+    """
+    first = [line.of_rows() for line in header_lines(path)]
+    result: list[HeaderLine] = []
+    problems: list[tuple[int, TrajectoryError]] = []
+    for line in chain(first, lines_of_words(path, first[-1].number)):
+        try:
+            layout_of(line, options)
+        except TrajectoryError as error:
+            problems.append((known_in(line), error))
+            continue
+        if line in first:
+            return line
+        result.append(line)
+    if len(result) == 1:
+        return result[0]
+    if result:
+        numbers = " and ".join(str(line.number) for line in result[:2])
+        problem = f"lines {numbers} both name columns, with others before them"
+        raise result[0].error(problem, "make a file of each table, without what is before it")
+    known, nearest = max(problems, key=itemgetter(0))
+    raise nearest if known else problems[len(first) - 1][1]
+
+
+# -- rows of numbers ---------------------------------------------------------------------------------------------------
+
+
+def recognises_rows(head: list[str]) -> bool:
     """Return whether the first row, comments aside, consists of numbers."""
     row = next((line for line in head if line.strip() and not line.lstrip().startswith("#")), "")
     cells = _cells(row)
     return len(cells) >= MIN_ROW_NUMBERS and all(map(is_number, cells))
 
 
-def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
+def read_rows(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """Read the one body of the file, which has the file's name."""
     return read_below(selection, options, _header(path, options), "write a file for each")
 
@@ -88,10 +146,6 @@ def _header(path: Path, options: ReadingOptions) -> HeaderLine:
     text = next(lines_of(path, after=row.number - 1))[1]
     cells = [str(place) for place, _ in enumerate(_cells(text), 1)]
     header = HeaderLine(path, row.number - 1, _separator(text), cells)
-    if len(cells) in (len(REDWOOD), POSITIONS_ONLY):
-        blocks = replace(header, cells=[str(place) for place in range(1, len(MATRIX) + 1)], rows=_blocks, height=4)
-        header = blocks if _names(blocks)[0] else header
-        cells = header.cells
     names, warnings = _names(header)
     warnings = () if "qw" in dict(options.columns) else warnings
     if not names and not options.columns:
@@ -114,13 +168,6 @@ def _cells(row: str) -> list[str]:
     """Return the cells of a row, of which empty ones at the end do not count."""
     separator = _separator(row)
     return (row if separator == "," else row.replace(",", ".")).strip().rstrip(separator).split(separator)
-
-
-def _blocks(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-    """Yield matrices that have a line for each of their rows as a row, without the three numbers in front of some."""
-    rows = [(number, line) for number, line in lines if len(line.split()) not in (0, len(REDWOOD))]
-    for first in range(0, len(rows), 4):
-        yield rows[first][0], " ".join(line for _, line in rows[first : first + 4])
 
 
 def _names(header: HeaderLine) -> tuple[list[ColumnName], tuple[ClipWarning, ...]]:
@@ -189,3 +236,64 @@ def _order(header: HeaderLine, four: np.ndarray, place: int) -> tuple[list[Colum
         f"its columns have no names, and the {'first' if at_first else 'last'} of the four of a rotation is taken for w"
     )
     return _quaternion(taken), (ClipWarning(text, f"if it is the other way round: --columns {columns}"),)
+
+
+# -- cameras -----------------------------------------------------------------------------------------------------------
+
+
+def recognises_images(head: list[str]) -> bool:
+    """Return whether this is COLMAP's images.txt: by its comments, or by its first image and the points in it."""
+    rows = [line for line in head if not line.startswith("#")]
+    return any("POINTS2D[]" in line for line in head) or bool(rows and _image(rows[0]))
+
+
+def read_images(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
+    """Read the cameras of COLMAP's images.txt. Of images in folders, each folder is a body."""
+    remark = "poses of the world were turned into those of the camera; COLMAP's unit of length may be any (--scale)"
+    header = HeaderLine(path, 0, "\t", COLMAP, rows=_images, inverted=True, axes="opencv", remark=remark, shift=1)
+    return read_below(selection, options, header, "name the folder of each camera's images in front of their names")
+
+
+def _images(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    """Yield a row for each image in the order of their names: the last number in it, its folder, and the pose."""
+    images = [(number, cells) for number, line in lines if (cells := _image(line))]
+    for place, (number, cells) in enumerate(sorted(images, key=lambda image: in_order(image[1][-1]))):
+        yield number, "\t".join([number_in(cells[-1], place), cells[-1].rpartition("/")[0], *cells[1:8]])
+
+
+def _image(line: str) -> list[str] | None:
+    """Return the cells of the first line of an image: a number, a quaternion and a position, a camera, and a name.
+
+    None for any other, such as that of its points, which are numbers to its end.
+    """
+    cells = line.split(maxsplit=9)
+    numbers = len(cells) == 10 and cells[0].isdecimal() and cells[8].isdecimal() and all(map(is_number, cells[1:8]))
+    return cells if numbers and not is_number(cells[9].split()[-1]) else None
+
+
+def in_order(name: str) -> list[tuple[int, str]]:
+    """Return a key that sorts names as people do: 9 before 10."""
+    return [(int(part or 0), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d{1,18})", name)]
+
+
+def number_in(name: str, otherwise: int) -> str:
+    """Return the last number in the name of an image, or another."""
+    file = name.rpartition("/")[2]
+    numbers = re.findall(r"\d{1,15}", file.rpartition(".")[0] or file)
+    return numbers[-1] if numbers else str(otherwise)
+
+
+def recognises_graph(head: list[str]) -> bool:
+    """Return whether this is a graph of g2o, which has a word in front of every row."""
+    return any(line.startswith((VERTEX, "EDGE_SE3:QUAT")) for line in head)
+
+
+def read_graph(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
+    """Read the vertices of a graph, as they are numbered."""
+    header = HeaderLine(path, 0, None, G2O, rows=_vertices, advice="export the vertices, too")
+    return read_below(selection, options, header, "write a file for each")
+
+
+def _vertices(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    rows = [(number, line) for number, line in lines if line.startswith(VERTEX)]
+    return iter(sorted(rows, key=lambda row: in_order((*row[1].split(maxsplit=2), "", "")[1])))
