@@ -45,6 +45,9 @@ PATIENCE = 30.0
 PIE_RADIUS = 150
 """Pixels from the middle of a pie menu to one of its items."""
 
+FOLDED = 50
+"""Pixels: the redo panel is higher than this once it is unfolded."""
+
 COMPASS = {
     "W": (-1, 0),
     "E": (1, 0),
@@ -130,6 +133,15 @@ class Hand:
             self._event(key, "RELEASE")
         yield
 
+    def enter(self, text: str, place: Place | None = None) -> Steps[None]:
+        """Type a value into the field at a place, or under the mouse, in place of the one that it has."""
+        if place:
+            yield from self.hover(place)
+        yield from self.press("RET")
+        yield from self.press("A", ctrl=True)
+        yield from self.type(text)
+        yield from self.press("RET")
+
     def _event(self, kind: str, value: str, **details: object) -> None:
         x, y = self.place
         self.window.event_simulate(type=kind, value=value, x=x, y=y, **details)
@@ -183,6 +195,14 @@ class Hand:
             yield from self.picture(picture, box)
         self._event(key, "RELEASE", **modifiers)
         yield
+
+    def unfold_redo_panel(self, area: bpy.types.Area) -> Steps[bpy.types.Region]:
+        """Unfold what an area shows of the last operation, if it is not; and its region."""
+        redo = places.region(area, "HUD")
+        if redo.height < FOLDED:
+            yield from self.click(places.centre(redo))
+            yield from self.wait_until(lambda: redo.height > FOLDED, "the redo panel unfolds")
+        return redo
 
     def open_sidebar(self, area: bpy.types.Area, category: str) -> Steps[None]:
         """Open the sidebar of an area at the tab of this name."""

@@ -27,6 +27,11 @@ def key_the_cube() -> None:
     bpy.ops.ed.undo_push(message="Keys")
 
 
+def on_screen(name: str) -> np.ndarray:
+    """The world matrix of an object as it is on the screen, for which nothing is evaluated anew."""
+    return np.array(bpy.data.objects[name].evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+
+
 def rig() -> bpy.types.Object:
     return bpy.data.objects["Rig"]
 

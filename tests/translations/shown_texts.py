@@ -102,7 +102,7 @@ def marked_or_drawn(tree: ast.AST) -> Iterator[Message]:
     for node in ast.walk(tree):
         if not isinstance(node, ast.Call):
             continue
-        name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        name = name_of(node)
         if name in MARKS and (text := literal(node.args[0])) is not None:
             yield OWN_WORDS if len(node.args) > 1 else DEFAULT, text
         elif name in DRAWN:
@@ -118,13 +118,34 @@ def literal(node: ast.AST) -> str | None:
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
 
 
+OF_PROGRAMMERS = {"exception", "ValueError", "TypeError", "Ticking", "compile", "Shortcut"}
+"""Functions whose texts go into the log, to callers from Python, or into Blender's keymaps and patterns."""
+
+
 def sentences(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Every literal with words in it, also as a part of an f-string, but for docstrings: line and text."""
-    docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    """Every literal with words in it that may be shown, also as a part of an f-string: line and text.
+
+    Docstrings, annotations and the texts of hidden properties are none.
+    """
+    left_out: list[ast.AST] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr):
+            left_out.append(node.value)
+        elif isinstance(node, ast.AnnAssign):
+            left_out.append(node.annotation)
+        elif isinstance(node, ast.Call):
+            options = [ast.unparse(given.value) for given in node.keywords if given.arg == "options"]
+            if name_of(node) in OF_PROGRAMMERS or any("HIDDEN" in given for given in options):
+                left_out += ast.walk(node)
+    hidden = set(map(id, left_out))
     for node in ast.walk(tree):
         text = literal(node)
-        if text is not None and id(node) not in docstrings and has_words(text):
+        if text is not None and id(node) not in hidden and has_words(text):
             yield node.lineno, text
+
+
+def name_of(call: ast.Call) -> str:
+    return call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
 
 
 def has_words(text: str) -> bool:

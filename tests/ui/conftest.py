@@ -6,9 +6,8 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import write_channel
 from tests.animation.keyed import curves_of
-from tests.animation.scenes import new_object
+from tests.animation.scenes import turning
 
 FRAMES = np.array((1.0, 11.0, 21.0, 41.0))
 
@@ -21,14 +20,7 @@ def tool(extension) -> bpy.types.Object:
 
 def keyed(name: str, rotation_mode: str = "QUATERNION") -> bpy.types.Object:
     """A selected, active object, moved along x and turned a quarter about z from each key to the next."""
-    obj = new_object(name, rotation_mode)
-    angles = np.arange(len(FRAMES)) * np.pi / 2.0
-    write_channel(obj, "location", FRAMES, np.outer(np.arange(len(FRAMES)), (2.0, 0.0, 0.0)))
-    if rotation_mode == "QUATERNION":
-        half, zero = 0.5 * angles, np.zeros(len(FRAMES))
-        write_channel(obj, "rotation_quaternion", FRAMES, np.stack((np.cos(half), zero, zero, np.sin(half)), axis=1))
-    elif rotation_mode in ("XYZ", "ZYX"):
-        write_channel(obj, "rotation_euler", FRAMES, np.outer(angles, (0.0, 0.0, 1.0)))
+    obj = turning(name, 90.0 * np.arange(len(FRAMES)), FRAMES, rotation_mode)
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
     return obj

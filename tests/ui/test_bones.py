@@ -118,40 +118,26 @@ def body(extension) -> bpy.types.Object:
     return body
 
 
-def test_of_a_rig_that_is_selected_as_an_object_all_bones_are_reduced_and_restored(body, capfd):
-    assert operators.reduce_keys.poll()
-    assert not operators.restore_keys.poll()
-    assert operators.reduce_keys(shared=True, tolerance=0.02) == {"FINISHED"}
-    counts = {len(animation.key_frames(bone)) for bone in body.pose.bones}
-    assert len(counts) == 1
-    (count,) = counts
-    said = capfd.readouterr().out
-    assert f"7 bones: 630 keys became {7 * count}, largest error " in said
-    assert f", keys on {count} frames" in said
-    assert operators.restore_keys() == {"FINISHED"}
-    assert {len(animation.key_frames(bone)) for bone in body.pose.bones} == {len(RECORDED)}
-
-
 def test_the_tolerance_to_begin_with_is_one_of_the_rigs_size(body):
     body.scale = (100.0, 100.0, 100.0)
     bpy.context.view_layer.update()
-    operators.reduce_keys()
+    operators.reduce_keys(mode=SCREW)
     largest = animation.reduction_of(list(body.pose.bones)).largest_error
     assert 0.001 * max(body.dimensions) < largest < 0.0031 * max(body.dimensions)
 
 
 def test_key_poses_begin_with_a_larger_tolerance_for_as_long_as_nobody_sets_one(body):
-    operators.reduce_keys(shared=True)
+    operators.reduce_keys(mode="motor_spline", shared=True)
     few = len(animation.key_frames(body.pose.bones["Root"]))
     assert few < 0.3 * len(RECORDED)
     operators.restore_keys()
     offered = first_tolerance(bpy.context.scene, list(map(transform_of, body.pose.bones)), shared=True)
-    operators.reduce_keys(shared=True, tolerance=0.5 * offered)
+    operators.reduce_keys(mode="motor_spline", shared=True, tolerance=0.5 * offered)
     assert len(animation.key_frames(body.pose.bones["Root"])) > few
     operators.restore_keys()
     # The redo panel, after Key Poses was switched on: the tolerance stands that own keys were offered.
     own = first_tolerance(bpy.context.scene, list(map(transform_of, body.pose.bones)))
-    operators.reduce_keys(shared=True, tolerance=own, offered=own)
+    operators.reduce_keys(mode="motor_spline", shared=True, tolerance=own, offered=own)
     assert len(animation.key_frames(body.pose.bones["Root"])) == few
 
 

@@ -47,11 +47,14 @@ def test_what_holds_things_has_its_own_page(doc_id, anchor, extension):
     [RigidMotion, RigidMotionOverlay, RigidMotionPreferences],
     ids=lambda cls: cls.__name__,
 )
-def test_every_property_that_is_drawn_has_a_page(cls, extension):
+def test_every_property_that_is_drawn_says_what_it_is_for_and_has_a_page(cls, extension):
     own = {name for base in cls.__mro__ for name in vars(base).get("__annotations__", {})}
-    shown = [prop.identifier for prop in cls.bl_rna.properties if prop.identifier in own and not prop.is_hidden]
+    shown = [prop for prop in cls.bl_rna.properties if prop.identifier in own and not prop.is_hidden]
     assert shown
-    for name in shown:
+    for prop in shown:
+        name = prop.identifier
+        assert prop.name
+        assert prop.description or prop.type == "COLLECTION"
         # Before 5.0 Blender knows no preferences of extensions by their names, so the map is asked.
         url = WM_OT_doc_view_manual._lookup_rna_url(f"bpy.types.{cls.__name__}.{name}", verbose=False)
         assert url.startswith(manual.DOCS), name

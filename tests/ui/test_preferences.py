@@ -59,10 +59,3 @@ def test_without_live_update_edits_wait_until_it_is_on_again(chosen, again):
     preferences().live_update = True
     bpy.context.scene.frame_set(6)
     assert obj.location.y != pytest.approx(before)
-
-
-def test_every_preference_says_what_it_is_for(chosen):
-    for prop in chosen.bl_rna.properties:
-        if prop.identifier in type(chosen).__annotations__:
-            assert prop.name, prop.identifier
-            assert len(prop.description) > 15, prop.identifier

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import pytest
 
-from rigid_motion.animation import is_reduced, modes_of
+from rigid_motion.animation import is_reduced, key_frames, modes_of
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.ui.panels import facts_and_notes
 from rigid_motion.ui.targets import (
@@ -20,7 +20,7 @@ from rigid_motion.ui.targets import (
 from rigid_motion.ui.wording import KEYED_BONES
 from tests.animation.bones.rigs import select_bones
 from tests.animation.scenes import editor
-from tests.rigs.recorded import NAMES, recorded_rig
+from tests.rigs.recorded import recorded_rig
 from tests.ui.conftest import FRAMES, keyed, select_keys
 
 
@@ -51,21 +51,25 @@ def test_in_a_key_editor_modes_are_for_the_selected_keys_of_all_objects_shown(to
 
 
 @pytest.mark.parametrize("kind", ["VIEW_3D", *KEY_EDITORS])
-def test_a_rig_in_object_mode_is_reduced_and_restored_in_every_editor(extension, kind):
+def test_a_rig_in_object_mode_is_reduced_and_restored_in_every_editor(extension, kind, capfd):
     rig = recorded_rig()
     rig.select_set(True)
     select_bones(rig)
-    keys = bpy.ops.rigid_motion
+    keys, bones = bpy.ops.rigid_motion, rig.pose.bones
     with editor(kind) as space:
         if kind in KEY_EDITORS:
             space.dopesheet.show_only_selected = True
         assert [text for _, text in facts_and_notes(rig, 5.0)[1]] == [KEYED_BONES]
         assert keys.reduce_keys.poll()
         assert not keys.restore_keys.poll()
-        assert keys.reduce_keys(tolerance=0.05) == {"FINISHED"}
-        assert all(is_reduced(rig.pose.bones[name]) for name in NAMES)
+        assert keys.reduce_keys(mode="dq_sclerp", shared=True, tolerance=0.05) == {"FINISHED"}
+        assert all(map(is_reduced, bones))
+        (count,) = {len(key_frames(bone)) for bone in bones}
+        said = capfd.readouterr().out
+        assert f"7 bones: 630 keys became {7 * count}, largest error " in said
+        assert f", keys on {count} frames" in said
         assert keys.restore_keys() == {"FINISHED"}
-        assert not any(is_reduced(rig.pose.bones[name]) for name in NAMES)
+        assert not any(map(is_reduced, bones))
 
 
 def test_the_modes_meant_are_those_of_the_scope(tool):

@@ -34,6 +34,7 @@ from .baking.reducing import (
 from .edits.breakdowns import Breakdowns, breakdown
 from .edits.holding import HoldFacts, hold_facts, hold_in, hold_keys, match_grip, pass_frames
 from .edits.mode_keys import copy_modes, repeat, set_mode, set_turns
+from .edits.speed import EvenSpeed, equalise_speed
 from .evaluation.components import MODE_IDS
 from .following import follower
 from .following.follower import is_enabled, refresh, set_enabled
@@ -48,6 +49,7 @@ __all__ = [
     "NATIVE",
     "Breakdowns",
     "Cleaning",
+    "EvenSpeed",
     "HeldSegment",
     "HoldFacts",
     "NeedsItsKeys",
@@ -62,6 +64,7 @@ __all__ = [
     "clean_motion",
     "copy_modes",
     "discard_dense_keys",
+    "equalise_speed",
     "held_segments",
     "hold_facts",
     "hold_in",

@@ -6,12 +6,21 @@ chosen from Python and by a button.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import cast
 
 import bpy
 
-from ..blender import CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty, with_properties
+from ..blender import (
+    CollectionProperty,
+    EnumProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+    with_properties,
+)
 from ..motion import KEYFRAME_MODES
 from .actions.refusals import MOST_TURNS
 from .baking.originals import BAKED, CLEANED, REDUCED
@@ -119,6 +128,14 @@ class RigidMotion(bpy.types.PropertyGroup):
         options={"ANIMATABLE"},
         override={"LIBRARY_OVERRIDABLE"},
         update=_on_turns,
+    )
+    lead: Sequence[float] = FloatVectorProperty(
+        name="Point",
+        description="The point that its path in the viewport follows, on its own axes. At zero it is the origin",
+        subtype="TRANSLATION",
+        size=3,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
     )
     # The mode that was chosen before there was an Action to keep it.
     awaited: str = EnumProperty(items=MODE_ITEMS, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})

@@ -8,6 +8,8 @@ panels       the sidebar, with its notes                  overlay      paths in 
 wording      labels, texts and lines of a panel           preferences  of the extension
 gltf_export  glTF files with few keys                     live         bodies over a network
 manual       where the documentation is                   cleaning     keys that tremble less
+trail        paths edited in the viewport               speed        how fast things move, and evenly
+deviations   pops and kinks on paths
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import bpy
 from . import (
     breakdown,
     cleaning,
+    deviations,
     gltf_export,
     holding,
     keymap,
@@ -30,6 +33,8 @@ from . import (
     panels,
     preferences,
     reducing,
+    speed,
+    trail,
 )
 
 CLASSES: tuple[type[Any], ...] = (
@@ -39,7 +44,10 @@ CLASSES: tuple[type[Any], ...] = (
     *reducing.CLASSES,
     *cleaning.CLASSES,
     *holding.CLASSES,
+    *speed.CLASSES,
+    *deviations.CLASSES,
     *overlay.CLASSES,
+    *trail.CLASSES,
     *gltf_export.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
@@ -52,7 +60,10 @@ def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     holding.register()
+    speed.register()
+    deviations.register()
     live.register()
+    trail.register()
     menus.register()
     keymap.register()
     manual.register()
@@ -63,7 +74,10 @@ def unregister() -> None:
     manual.unregister()
     keymap.unregister()
     menus.unregister()
+    trail.unregister()
     live.unregister()
+    deviations.unregister()
+    speed.unregister()
     holding.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -37,6 +37,14 @@ LINE_COLOUR, HANDLE_COLOUR, TEXT_COLOUR = (0.8, 0.8, 0.8, 0.7), (0.28, 0.45, 0.7
 CONFIRM, CANCEL = {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}, {"RIGHTMOUSE", "ESC"}
 
 
+def typed_number(text: str) -> float:
+    """Return the number that is being typed."""
+    try:
+        return float(text)
+    except ValueError:  # so far it is a sign or a point alone
+        return 0.0
+
+
 class Slider:
     """A factor, and how mouse and keyboard change it.
 
@@ -63,10 +71,7 @@ class Slider:
     @property
     def factor(self) -> float:
         if self.typed:
-            try:
-                return float(self.typed) / 100.0
-            except ValueError:  # so far it is a sign or a point alone
-                return 0.0
+            return typed_number(self.typed) / 100.0
         factor = self._dragged if self.overshoots else min(max(self._dragged, 0.0), 1.0)
         return round(factor / CTRL_STEP) * CTRL_STEP if self._snaps else factor
 

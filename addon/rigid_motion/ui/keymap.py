@@ -1,4 +1,6 @@
-"""Shortcuts: Alt T for the pie menus, beside T, by which Blender chooses the interpolation of keys."""
+"""Shortcuts: Alt T for the pie menus, beside T, by which Blender chooses the interpolation of keys; and Shift Alt T for
+the tool that edits paths.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ from bpy.app.translations import contexts
 from ..blender import existing
 from .menus import RIGID_MOTION_MT_pie_keys, RIGID_MOTION_MT_pie_view
 
-PIE_OPERATOR = "wm.call_menu_pie"
+PIE_OPERATOR, TOOL_OPERATOR = "wm.call_menu_pie", "rigid_motion.edit_path"
 
 
 class Shortcut(NamedTuple):
@@ -19,12 +21,15 @@ class Shortcut(NamedTuple):
     space: Literal["EMPTY", "DOPESHEET_EDITOR", "GRAPH_EDITOR"]
     """The space of the keymap."""
 
-    menu: str
+    menu: str = ""
+    """The pie menu; "" for *Edit Path*."""
 
 
 SHORTCUTS = (
     Shortcut("Object Mode", "EMPTY", RIGID_MOTION_MT_pie_view.__name__),
     Shortcut("Pose", "EMPTY", RIGID_MOTION_MT_pie_view.__name__),
+    Shortcut("Object Mode", "EMPTY"),
+    Shortcut("Pose", "EMPTY"),
     Shortcut("Dopesheet", "DOPESHEET_EDITOR", RIGID_MOTION_MT_pie_keys.__name__),
     Shortcut("Graph Editor", "GRAPH_EDITOR", RIGID_MOTION_MT_pie_keys.__name__),
 )
@@ -38,8 +43,10 @@ def register() -> None:
         return
     for shortcut in SHORTCUTS:
         keymap = configuration.keymaps.new(name=shortcut.keymap, space_type=shortcut.space)
-        item = keymap.keymap_items.new(PIE_OPERATOR, "T", "PRESS", alt=True)
-        existing(item.properties).name = shortcut.menu
+        operator = PIE_OPERATOR if shortcut.menu else TOOL_OPERATOR
+        item = keymap.keymap_items.new(operator, "T", "PRESS", alt=True, shift=not shortcut.menu)
+        if shortcut.menu:
+            existing(item.properties).name = shortcut.menu
         _items.append((keymap, item))
 
 
@@ -55,7 +62,8 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     for shortcut in SHORTCUTS:
         keymap = configuration.keymaps.find(shortcut.keymap, space_type=shortcut.space)
         for item in keymap.keymap_items if keymap else ():
-            if item.idname == PIE_OPERATOR and existing(item.properties).name == shortcut.menu:
+            # The tool has no menu.
+            if item.idname in (PIE_OPERATOR, TOOL_OPERATOR) and getattr(item.properties, "name", "") == shortcut.menu:
                 row = layout.column()
                 row.context_pointer_set("keymap", keymap)
                 row.label(text=shortcut.keymap, text_ctxt=cast(Any, contexts).id_windowmanager)

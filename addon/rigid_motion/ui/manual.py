@@ -18,8 +18,10 @@ MODES = f"{ANIMATORS}#which-mode-is-good-for-what"
 EDIT = f"{ANIMATORS}#edit"
 BREAKDOWN = f"{ANIMATORS}#breakdown-push-and-relax"
 LIMITS = f"{ANIMATORS}#limits"
+EDIT_PATH = "on_the_path.md#edit-path"
 LIVE = "live.md"
 HOLDING = "holding.md"
+ON_THE_PATH = "on_the_path.md"
 
 PAGES = (
     ("bpy.ops.rigid_motion.set_mode", MODES),
@@ -38,7 +40,13 @@ PAGES = (
         )
     ),
     ("bpy.types.scene.rigid_motion_pass", f"{HOLDING}#pass"),
+    ("bpy.ops.rigid_motion.go_to_deviation", f"{ON_THE_PATH}#deviations"),
+    ("bpy.types.rigidmotionoverlay.*deviation*", f"{ON_THE_PATH}#deviations"),
+    ("bpy.ops.rigid_motion.equalise_speed", f"{ON_THE_PATH}#speed"),
+    *((f"bpy.types.rigidmotionoverlay.{name}", f"{ON_THE_PATH}#ghosts") for name in ("*ghost*", "show_bodies")),
+    ("bpy.types.rigidmotionoverlay.*speed*", f"{ON_THE_PATH}#speed"),
     ("bpy.ops.rigid_motion.update_path", f"{ANIMATORS}#see-the-motion"),
+    *((f"bpy.ops.rigid_motion.{name}", EDIT_PATH) for name in ("edit_path", "*_path_key*", "set_path_point")),
     ("bpy.ops.rigid_motion.*bake", f"{ANIMATORS}#bake"),
     ("bpy.ops.rigid_motion.reduce_keys", "reduction.md"),
     ("bpy.ops.rigid_motion.clean_motion", f"{ANIMATORS}#clean-motion"),
@@ -49,6 +57,7 @@ PAGES = (
     ("bpy.types.livesettings.*", LIVE),
     ("bpy.types.livebone.*", LIVE),
     ("bpy.types.rigidmotion.mode", MODES),
+    ("bpy.types.rigidmotion.lead", EDIT_PATH),
     ("bpy.types.rigidmotion.*", EDIT),
     ("bpy.types.rigidmotionoverlay.*", f"{ANIMATORS}#see-the-motion"),
     ("bpy.types.rigidmotionpreferences.*", f"{ANIMATORS}#install"),

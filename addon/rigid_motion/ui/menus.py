@@ -72,12 +72,14 @@ class _Menu(Menu):
         layout.operator("rigid_motion.set_turns", text="Set Turns...")
         layout.operator_menu_enum("rigid_motion.add_cycles", "mode")
         layout.operator("rigid_motion.copy_mode")
+        layout.operator("rigid_motion.equalise_speed")
         _draw_breakdowns(self, context)
         layout.separator()
         layout.menu(RIGID_MOTION_MT_other_keys.__name__)
         layout.operator("rigid_motion.clear")
         layout.operator("rigid_motion.refresh")
         layout.separator()
+        layout.operator("rigid_motion.edit_path")
         existing(layout.operator("wm.call_menu_pie", text="Pie Menu")).name = self.pie
 
 
@@ -194,6 +196,7 @@ def _draw_keys(self: Menu, _context: bpy.types.Context) -> None:
 def _draw_clean(self: Menu, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.operator("rigid_motion.clean_motion")
+    self.layout.operator("rigid_motion.equalise_speed")
 
 
 def _draw_export(self: Menu, _context: bpy.types.Context) -> None:

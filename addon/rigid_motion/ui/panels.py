@@ -17,7 +17,7 @@ from ..animation.queries.keyed import active_binding, source_of
 from ..animation.queries.segments import SegmentFacts, frame_in_action, is_up_to_date, segment_at
 from ..animation.transforms import OWN_WORDS, Transform, transform_of
 from ..blender import Panel, existing
-from . import held_in, overlay
+from . import deviations, held_in, overlay, speed
 from .holding import facts_or_none, name_of, shown_prop
 from .operators import axis_of_turns
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_key_editor, modes_meant, with_keyed_bones
@@ -199,6 +199,17 @@ class _Path(Folded):
 
     def draw(self, context: bpy.types.Context) -> None:
         overlay.draw_settings(self.layout, context)
+        deviations.draw_settings(context, self.layout)
+
+
+class _Speed(Folded):
+    bl_label = "Speed"
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(overlay.overlay_settings(context.scene), "show_speed", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        speed.draw_panel(context, self.layout)
 
 
 def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segment: SegmentFacts) -> None:
@@ -261,6 +272,7 @@ def _panels() -> Iterator[type[Panel]]:
         yield (main := _in_space(_Main, space))
         yield _in_space(_Path, space, main)
         yield _in_space(_HeldIn, space, main)
+        yield _in_space(_Speed, space, main)
 
 
 CLASSES = tuple(_panels())

@@ -32,6 +32,8 @@ class Look(NamedTuple):
     mode_color: Color = (0.20, 0.72, 1.0, 1.0)
     key_color: Color = (1.0, 0.75, 0.20, 1.0)
     tick_color: Color = (1.0, 1.0, 1.0, 1.0)
+    past_color: Color = (1.0, 0.42, 0.42, 1.0)
+    future_color: Color = (0.25, 0.85, 0.62, 1.0)
     line_width: float = 2.0
 
 
@@ -104,6 +106,8 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
     tick_color: Color = _color(
         "Ticks", "Color of the marks that are evenly timed along a path", DEFAULT_LOOK.tick_color
     )
+    past_color: Color = _color("Past", "Color of ghosts before the current frame", DEFAULT_LOOK.past_color)
+    future_color: Color = _color("Future", "Color of ghosts behind the current frame", DEFAULT_LOOK.future_color)
     line_width: float = FloatProperty(
         name="Line Width",
         description="Width of the paths",
@@ -123,7 +127,15 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
 
         layout.label(text="Path Overlay")
         column = layout.column()
-        for name in ("native_color", "mode_color", "key_color", "tick_color", "line_width"):
+        for name in (
+            "native_color",
+            "mode_color",
+            "key_color",
+            "tick_color",
+            "past_color",
+            "future_color",
+            "line_width",
+        ):
             column.prop(self, name)
 
         layout.label(text="Pie Menu")

@@ -12,7 +12,7 @@ from tests.animation.keyed import curves_of, key_frames, snapshot
 from tests.animation.oracle import assert_shown, expected_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.keyed import FRAMES, cube, key_the_cube
+from tests.gui.keyed import FRAMES, cube, key_the_cube, on_screen
 
 ALIKE = 2e-5
 """What poses may differ by that are the same, in metres and in parts of a rotation matrix."""
@@ -20,16 +20,10 @@ ALIKE = 2e-5
 CURSOR = (1.0, 2.0, 0.5)
 
 
-def place(name: str = "Cube") -> np.ndarray:
-    """Where something is on the screen."""
-    obj = bpy.data.objects[name]
-    return np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
-
-
 def assert_place_on_the_screw() -> None:
     """What is on the screen now is what the mode makes of the keys as they are now."""
     frame = bpy.context.scene.frame_current
-    np.testing.assert_allclose(place(), expected_worlds(cube(), [frame])[0], atol=ALIKE)
+    np.testing.assert_allclose(on_screen("Cube"), expected_worlds(cube(), [frame])[0], atol=ALIKE)
 
 
 def scenario(hand: Hand) -> Steps[None]:
@@ -56,7 +50,7 @@ def scenario(hand: Hand) -> Steps[None]:
 def dragged(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
     """Keys and handles follow the mouse, and the body with them; Esc lets all be as it was."""
     middle = places.centre(places.region(graph))
-    before, there = snapshot(cube()), place()
+    before, there = snapshot(cube()), on_screen("Cube")
     for key, confirm in (("G", False), ("S", True), ("G", True)):
         yield from hand.hover(middle)
         yield from hand.press("A")
@@ -74,7 +68,7 @@ def dragged(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
         assert_shown([cube()], range(1, 61))
         if not confirm:
             assert snapshot(cube()) == before
-            np.testing.assert_allclose(place(), there, atol=ALIKE)
+            np.testing.assert_allclose(on_screen("Cube"), there, atol=ALIKE)
     yield from hand.picture("dragged")
     for _ in range(2):
         yield from hand.press("Z", ctrl=True)
@@ -106,9 +100,9 @@ def cycled(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
     if bpy.app.version >= (5, 2):
         assert all(curve.modifiers[0].type == "CYCLES" for curve in curves_of(cube()).values())
         bpy.context.scene.frame_set(10)
-        first = place()
+        first = on_screen("Cube")
         bpy.context.scene.frame_set(49)
-        np.testing.assert_allclose(place(), first, atol=ALIKE)
+        np.testing.assert_allclose(on_screen("Cube"), first, atol=ALIKE)
         bpy.context.scene.frame_set(10)
     with bpy.context.temp_override(window=hand.window, area=graph, region=region):
         bpy.ops.graph.extrapolation_type(type="CLEAR_CYCLIC")
@@ -124,14 +118,18 @@ def commands(hand: Hand, view: bpy.types.Area) -> Steps[None]:
         for number, act in enumerate((snapped, turned_back, put_back, grabbed)):
             bpy.context.scene.frame_set(10)
             yield from hand.hover(places.centre(places.region(view)))
-            keys, before = snapshot(cube()), place()
+            keys, before = snapshot(cube()), on_screen("Cube")
             expected = yield from act(hand, before)
             yield
-            np.testing.assert_allclose(place(), expected, atol=ALIKE, err_msg=f"{act.__name__}, Auto Key {auto}")
+            np.testing.assert_allclose(
+                on_screen("Cube"), expected, atol=ALIKE, err_msg=f"{act.__name__}, Auto Key {auto}"
+            )
             yield from hand.picture(f"{act.__name__}{'-keyed' * auto}")
             bpy.context.scene.frame_set(12)
             bpy.context.scene.frame_set(10)
-            np.testing.assert_allclose(place(), expected if auto else before, atol=ALIKE, err_msg=act.__name__)
+            np.testing.assert_allclose(
+                on_screen("Cube"), expected if auto else before, atol=ALIKE, err_msg=act.__name__
+            )
             assert (snapshot(cube()) == keys) is not auto
             if auto:
                 yield from hand.press("Z", ctrl=True)
@@ -198,5 +196,5 @@ def copied(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[Non
     assert bpy.data.objects["Other"].rigid_motion.mode == "dq_sclerp"
     for frame in range(1, 41):
         bpy.context.scene.frame_set(frame)
-        np.testing.assert_allclose(place("Other"), place(), atol=ALIKE, err_msg=f"frame {frame}")
+        np.testing.assert_allclose(on_screen("Other"), on_screen("Cube"), atol=ALIKE, err_msg=f"frame {frame}")
     yield from hand.picture("copied")

@@ -1,4 +1,4 @@
-"""A screw that is edited by hand: keys moved and inserted, undone, played, put somewhere with Auto Key.
+"""A screw that is edited by hand: keys moved and inserted, undone, played, and values typed with Auto Key.
 
 What is on the screen is held against `tests.animation.oracle` on every frame, after every edit.
 """
@@ -12,11 +12,10 @@ from tests.animation.keyed import curves_of, key_frames, snapshot
 from tests.animation.oracle import assert_shown, expected_worlds, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.keyed import FRAMES, cube, key_the_cube
+from tests.gui.keyed import FRAMES, cube, key_the_cube, on_screen
 
 WHOLE = range(1, 61)
 SCREW = "dq_sclerp"
-CURSOR = (1.0, 2.0, 0.5)
 
 ALIKE = 1e-5
 """What poses may differ by that are the same, in metres and in parts of a rotation matrix."""
@@ -28,11 +27,6 @@ HALF_WAY = 0.3
 def shown() -> np.ndarray:
     """The cube's world matrices on all frames."""
     return shown_worlds([cube()], WHOLE)[0]
-
-
-def place() -> np.ndarray:
-    """Where the cube is on the screen."""
-    return np.array(cube().evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
 
 
 def assert_on_the_screw(*frames: float) -> None:
@@ -58,7 +52,6 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from inserted(hand, view, sheet)
     yield from played(hand, view)
     bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
-    yield from snapped(hand, view)
     yield from typed(hand, sheet)
 
 
@@ -111,28 +104,12 @@ def played(hand: Hand, view: bpy.types.Area) -> Steps[None]:
         np.testing.assert_allclose(matrix, expected[frame - 1], atol=ALIKE, err_msg=f"frame {frame}")
 
 
-def snapped(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Shift S, Selection to Cursor: the cube is keyed where the cursor is, and turned as it was on the screen."""
-    bpy.context.scene.cursor.location = CURSOR
-    bpy.context.scene.frame_set(10)
-    before = place()
-    yield from hand.hover(places.centre(places.region(view)))
-    yield from hand.pie("S", "N", shift=True)
-    yield from hand.wait_until(lambda: 10.0 in key_frames(cube()), "the snapped cube is keyed")
-    before[:3, 3] = CURSOR
-    np.testing.assert_allclose(place(), before, atol=ALIKE)
-    assert_on_the_screw(1, 10, 28, 40)
-
-
 def typed(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
     """After the playhead was dragged, a value that is typed into the Properties editor is the value of the key."""
     yield from hand.click(places.playhead(sheet, 35))
     field = yield from hand.find_button(hand.area("PROPERTIES"), "WINDOW", "location")
-    yield from hand.hover(field)
-    yield from hand.press("RET")
-    yield from hand.type("5")
-    yield from hand.press("RET")
+    yield from hand.enter("5", field)
     yield from hand.wait_until(lambda: 35.0 in key_frames(cube()), "the typed value is keyed")
     assert curves_of(cube())["location", 0].evaluate(35) == 5.0
-    assert abs(place()[0, 3] - 5.0) < ALIKE
+    assert abs(on_screen("Cube")[0, 3] - 5.0) < ALIKE
     yield from hand.picture("typed")

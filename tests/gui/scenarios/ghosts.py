@@ -1,11 +1,14 @@
-"""Ghosts of a sword that hangs on a moving arm, its path in the world, and ghosts of bones; switched on in the panel.
+"""Ghosts of a sword that hangs on a moving arm, of bones and of a skinned body; switched on in the panel.
 
 That they are drawn, and in their colour, is counted in the pixels of the screen.
 """
 
 from __future__ import annotations
 
+import bmesh
 import bpy
+import numpy as np
+from mathutils import Matrix
 
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
@@ -13,12 +16,12 @@ from tests.gui.keyed import cube, key_the_cube
 from tests.rigs.recorded import FRAMES, recorded_rig
 
 
-def bluish(hand: Hand, view: bpy.types.Area, name: str) -> Steps[int]:
-    """Keep a picture of the viewport, and count its pixels that are tinted blue."""
+def tinted(hand: Hand, view: bpy.types.Area, name: str) -> Steps[np.ndarray]:
+    """Keep a picture of the viewport, and count its pixels that are reddish as the past, and greenish as the future."""
     part = places.region(view)
     pixels = yield from hand.picture(name, places.box(part))
-    shown = pixels[:, : part.width * 2 // 3].astype(float) / 255
-    return int(((shown[..., 2] - shown[..., 0]) > 0.04).sum())
+    red, green, blue = (pixels[:, : part.width * 2 // 3].astype(float) / 255).transpose(2, 0, 1)
+    return np.array([(red - np.maximum(green, blue) > 0.03).sum(), (np.minimum(green, blue) - red > 0.03).sum()])
 
 
 def scenario(hand: Hand) -> Steps[None]:
@@ -27,24 +30,30 @@ def scenario(hand: Hand) -> Steps[None]:
     space.view_distance = 16.0
     settings = bpy.context.scene.rigid_motion_overlay
     sword_on_an_arm()
+    bpy.context.scene.frame_set(20)
     yield from hand.open_sidebar(view, "Animation")
-    without = yield from bluish(hand, view, "without")
+    without = yield from tinted(hand, view, "without")
     show = yield from hand.find_button(view, "UI", "show_paths", narrow=True)
-    yield from hand.click(show)
-    assert settings.show_paths
     yield from hand.click((show[0] + 60, show[1]))  # the header, to unfold the panel
-    path = yield from bluish(hand, view, "path-in-the-world")
-    assert path > without + 200, (path, without)
     ghosts = yield from hand.find_button(view, "UI", "show_ghosts", narrow=True)
     yield from hand.click(ghosts)
     assert settings.show_ghosts
-    both = yield from bluish(hand, view, "ghosts")
-    assert both > 2 * path, (both, path)
-    yield from hand.click(show)
-    alone = yield from bluish(hand, view, "ghosts-alone")
-    assert alone > path, (alone, path)
+    aside = (places.region(view).x + 150, places.region(view).y + 60)
+    yield from hand.hover(aside)
+    both = yield from tinted(hand, view, "ghosts")
+    assert (both > without + 1000).all(), (both, without)
+    settings.ghosts_before = 0
+    after = yield from tinted(hand, view, "future-alone")
+    assert after[0] < without[0] + 100, (after, without)
+    settings.ghosts_before, settings.ghosts_on = 5, "KEYS"
+    keys = yield from tinted(hand, view, "keys")
+    assert (keys > without + 300).all(), (keys, without)
+    assert (keys < both).all(), (keys, both)
+    settings.ghosts_on = "STEP"
+    yield from never_in_the_way(hand, view, without)
     yield from hand.click(ghosts)
-    assert (yield from bluish(hand, view, "nothing")) < without + 50
+    nothing = yield from tinted(hand, view, "nothing")
+    assert (nothing < without + 100).all(), (nothing, without)
 
     bpy.data.batch_remove(bpy.data.objects)
     rig = recorded_rig()
@@ -58,10 +67,59 @@ def scenario(hand: Hand) -> Steps[None]:
     for bone in rig.pose.bones:
         bone.select = bone.name in ("Hand.L", "Hand.R")
     rig.data.bones.active = rig.data.bones["Hand.L"]
-    without = yield from bluish(hand, view, "bones-without")
-    settings.show_ghosts, settings.show_paths, settings.ghost_step = True, True, 6
-    seen = yield from bluish(hand, view, "bones")
-    assert seen > without + 500, (seen, without)
+    bpy.context.scene.frame_set(60)
+    without = yield from tinted(hand, view, "bones-without")
+    settings.show_ghosts, settings.ghost_step = True, 6
+    seen = yield from tinted(hand, view, "bones")
+    assert (seen > without + 100).all(), (seen, without)
+    body = skin_of(rig)
+    yield
+    update = yield from hand.find_button(view, "UI", "rigid_motion.update_path")
+    yield from hand.click(update)
+    yield from hand.hover(aside)
+    bodies = yield from tinted(hand, view, "skinned")
+    assert (bodies > seen + 1000).all(), (bodies, seen)
+    body.data.vertices[0].co.x += 0.01
+    body.data.update()
+    forgotten = yield from tinted(hand, view, "forgotten")
+    assert (forgotten < seen + 500).all(), (forgotten, seen)
+
+
+def never_in_the_way(hand: Hand, view: bpy.types.Area, without: np.ndarray) -> Steps[None]:
+    """A large object, from near: what there is of ghosts leaves the view to be seen through."""
+    cube().scale = (4.0, 4.0, 4.0)
+    part = places.region(view)
+    settings = bpy.context.scene.rigid_motion_overlay
+    settings.show_ghosts = False
+    plain = yield from hand.picture("large-without", places.box(part))
+    settings.show_ghosts = True
+    seen = yield from hand.picture("large", places.box(part))
+    change = np.abs(seen.astype(float) - plain)[:, : part.width * 2 // 3].max(axis=2) / 255
+    assert 0.0 < change.mean() < 0.08, change.mean()
+    cube().scale = (0.15, 0.15, 1.0)
+
+
+def skin_of(rig: bpy.types.Object) -> bpy.types.Object:
+    """A body of a ball around each bone, which goes along with it."""
+    mesh = bmesh.new()
+    groups = mesh.verts.layers.deform.verify()
+    for number, bone in enumerate(rig.data.bones):
+        middle = 0.5 * (bone.head_local + bone.tail_local)
+        along = bone.matrix_local.to_3x3().to_4x4()
+        size = Matrix.Diagonal((0.05, 0.55 * bone.length, 0.05, 1.0))
+        ball = bmesh.ops.create_uvsphere(
+            mesh, u_segments=16, v_segments=10, radius=1.0, matrix=Matrix.Translation(middle) @ along @ size
+        )
+        for vertex in ball["verts"]:
+            vertex[groups][number] = 1.0
+    body = bpy.data.objects.new("Body", bpy.data.meshes.new("Body"))
+    mesh.to_mesh(body.data)
+    for bone in rig.data.bones:
+        body.vertex_groups.new(name=bone.name)
+    body.modifiers.new("Armature", "ARMATURE").object = rig
+    body.parent = rig
+    bpy.context.collection.objects.link(body)
+    return body
 
 
 def sword_on_an_arm() -> None:

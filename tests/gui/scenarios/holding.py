@@ -13,6 +13,7 @@ from mathutils import Matrix, Quaternion, Vector
 from rigid_motion.animation import hold_facts
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
+from tests.gui.keyed import on_screen
 from tests.rigs.human import human
 from tests.rigs.scenes import GRIP, HANDSHAKE, key, make_fist, turned
 
@@ -51,45 +52,25 @@ def make_the_stage() -> None:
             make_fist(rig, side)
     level, tilted = HANDSHAKE, turned(-25.0, "X").to_3x3() @ HANDSHAKE
     raised, inwards = turned(60.0, "X").to_3x3() @ HANDSHAKE, turned(-35.0, "Z").to_3x3() @ HANDSHAKE
-    alice, bob = obj("Alice").pose.bones, obj("Bob").pose.bones
-    for bone, side, poses in (
-        (
-            alice["hand_ik.R"],
-            "R",
-            {
-                1: ((-0.35, -0.25, 1.1), level),
-                TAKEN: (TABLE, level),
-                32: ((-0.18, -0.36, 1.25), tilted),
-                PASSED: ((0.0, -0.34, 1.2), inwards),
-                58: ((-0.3, -0.2, 1.0), level),
-            },
-        ),
-        (
-            alice["hand_ik.L"],
-            "L",
-            {
-                1: ((0.3, -0.2, 1.0), level),
-                30: ((0.3, -0.2, 1.0), level),
-                PASSED: ((0.03, -0.34, 1.2), level),
-                56: ((0.25, -0.12, 1.05), tilted),
-                THROWN: ((0.24, -0.52, 1.4), raised),
-                76: ((0.24, -0.4, 1.2), level),
-            },
-        ),
-        (
-            bob["hand_ik.R"],
-            "R",
-            {
-                1: ((-0.3, -0.2, 1.0), level),
-                60: ((-0.3, -0.2, 1.0), level),
-                CAUGHT: ((-0.15, -0.5, 1.35), tilted),
-                92: ((-0.2, -0.35, 1.1), level),
-                END: ((-0.25, -0.3, 1.25), inwards),
-            },
-        ),
+    for name, side, frame, fist, axes in (
+        ("Alice", "R", 1, (-0.35, -0.25, 1.1), level),
+        ("Alice", "R", TAKEN, TABLE, level),
+        ("Alice", "R", 32, (-0.18, -0.36, 1.25), tilted),
+        ("Alice", "R", PASSED, (0.0, -0.34, 1.2), inwards),
+        ("Alice", "R", 58, (-0.3, -0.2, 1.0), level),
+        ("Alice", "L", 1, (0.3, -0.2, 1.0), level),
+        ("Alice", "L", 30, (0.3, -0.2, 1.0), level),
+        ("Alice", "L", PASSED, (0.03, -0.34, 1.2), level),
+        ("Alice", "L", 56, (0.25, -0.12, 1.05), tilted),
+        ("Alice", "L", THROWN, (0.24, -0.52, 1.4), raised),
+        ("Alice", "L", 76, (0.24, -0.4, 1.2), level),
+        ("Bob", "R", 1, (-0.3, -0.2, 1.0), level),
+        ("Bob", "R", 60, (-0.3, -0.2, 1.0), level),
+        ("Bob", "R", CAUGHT, (-0.15, -0.5, 1.35), tilted),
+        ("Bob", "R", 92, (-0.2, -0.35, 1.1), level),
+        ("Bob", "R", END, (-0.25, -0.3, 1.25), inwards),
     ):
-        for frame, (fist, axes) in poses.items():
-            key(bone, frame, grasped(side, Vector(fist), axes))
+        key(obj(name).pose.bones[f"hand_ik.{side}"], frame, grasped(side, Vector(fist), axes))
     bpy.ops.mesh.primitive_cube_add(size=1.0, location=(-0.22, -0.5, 0.9))
     bpy.context.object.name, bpy.context.object.scale = "Table", (0.5, 0.4, 0.06)
     make_the_mug()
@@ -144,13 +125,13 @@ def picked_up(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """From the table, by the pie; undone and done again as one step."""
     yield from go_to(TAKEN)
     yield from select_hand(hand, view, "Alice", "hand_ik.R")
-    there = place_of("Mug")
+    there = on_screen("Mug")
     yield from hand.pie("T", "NE", alt=True, picture="pie")
     yield 0.3
     yield from hand.picture("hold-menu")
     yield from hand.choose("Hold In")
     yield from hand.wait_until(lambda: now() == "hand_ik.R", "the right hand holds the mug")
-    assert np.abs(place_of("Mug") - there).max() < SLIP
+    assert np.abs(on_screen("Mug") - there).max() < SLIP
     yield from hand.press("Z", ctrl=True)
     yield from hand.wait_until(lambda: now() == "" and not obj("Mug").animation_data, "one undo takes it all back")
     yield from hand.press("Z", ctrl=True, shift=True)
@@ -178,16 +159,9 @@ def handed_over(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Step
 
 def set_in_redo_panel(hand: Hand, area: bpy.types.Area, frames: int) -> Steps[None]:
     """Over how many frames it passes, in what is unfolded after an operator."""
-    redo = places.region(area, "HUD")
-    if redo.height < 50:
-        yield from hand.click(places.centre(redo))
-        yield from hand.wait_until(lambda: redo.height > 50, "the redo panel unfolds")
+    redo = yield from hand.unfold_redo_panel(area)
     yield from hand.picture(f"redo-{frames}")
-    yield from hand.hover(places.redo_row(redo, 0))
-    yield from hand.press("RET")
-    yield from hand.press("A", ctrl=True)
-    yield from hand.type(str(frames))
-    yield from hand.press("RET")
+    yield from hand.enter(str(frames), places.redo_row(redo, 0))
     yield from hand.wait_until(lambda: hold_facts(obj("Mug")).frames == frames, f"it passes over {frames} frames")
 
 
@@ -207,7 +181,7 @@ def thrown(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.picture("pass")
     yield from hand.press("RET")
     yield from set_in_redo_panel(hand, view, 3)
-    mug, start = obj("Mug"), Vector(place_of("Mug")[:3, 3])
+    mug, start = obj("Mug"), Vector(on_screen("Mug")[:3, 3])
     end = Vector(fist_of("Bob", "hand_ik.R", CAUGHT))
     for share in (0.5, 0.94):
         frame = round(THROWN + share * (CAUGHT - THROWN))
@@ -254,11 +228,7 @@ def seen_in_the_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
     yield 0.3
     yield from hand.picture("holders")
     yield from hand.press("ESC")
-    yield from hand.hover(number)
-    yield from hand.press("RET")
-    yield from hand.press("A", ctrl=True)
-    yield from hand.type("5")
-    yield from hand.press("RET")
+    yield from hand.enter("5", number)
     yield from hand.wait_until(lambda: hold_facts(obj("Mug")).frames == 5, "the number in the panel is at the key")
     yield from hand.press("Z", ctrl=True)
     yield from hand.wait_until(lambda: hold_facts(obj("Mug")).frames == 6, "undone")
@@ -302,12 +272,8 @@ def slip(rig: str, bone: str, first: int, last: int) -> float:
         bpy.context.scene.frame_set(quarter // 4, subframe=quarter % 4 / 4)
         posed = obj(rig).evaluated_get(bpy.context.evaluated_depsgraph_get())
         holder = np.array(posed.matrix_world, dtype=float) @ np.array(posed.pose.bones[bone].matrix, dtype=float)
-        grips.append(np.linalg.inv(holder) @ place_of("Mug"))
+        grips.append(np.linalg.inv(holder) @ on_screen("Mug"))
     return float(np.abs(np.array(grips) - grips[0]).max())
-
-
-def place_of(name: str) -> np.ndarray:
-    return np.array(obj(name).evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world, dtype=float)
 
 
 def fist_of(rig: str, bone: str, frame: int) -> Vector:
@@ -342,7 +308,7 @@ def select_hand(hand: Hand, view: bpy.types.Area, rig: str, bone: str) -> Steps[
         yield from hand.press("TAB", ctrl=True)
     if bpy.context.scene.frame_current == TAKEN:
         # Later a hand is around it, and that is what would be clicked on.
-        yield from hand.click(places.point(view, place_of("Mug")[:3, 3]))
+        yield from hand.click(places.point(view, on_screen("Mug")[:3, 3]))
         yield from hand.wait_until(lambda: obj("Mug").select_get(), "the mug is clicked on")
     for item in bpy.context.view_layer.objects:
         item.select_set(item.name in ("Mug", rig))

@@ -67,14 +67,8 @@ def scenario(hand: Hand) -> Steps[None]:
     assert reduction.needed["motor_spline"] > count()
     assert "AUTO_CLAMPED" in handle_types()
     yield from hand.find_button(view, "UI", "show_paths", narrow=True)
-    redo, before = places.region(view, "HUD"), count()
-    yield from hand.click(places.centre(redo))
-    yield from hand.wait_until(lambda: redo.height > 100, "the redo panel unfolds")
-    yield from hand.hover(places.redo_row(redo, 1))
-    yield from hand.press("RET")
-    yield from hand.press("A", ctrl=True)
-    yield from hand.type("0.002")
-    yield from hand.press("RET")
+    redo, before = (yield from hand.unfold_redo_panel(view)), count()
+    yield from hand.enter("0.002", places.redo_row(redo, 1))
     yield from hand.wait_until(lambda: count() != before, "another tolerance, the same curves")
     assert animation.reduction_of(rig().pose.bones).mode == animation.NATIVE
     assert count() < 1.5 * own

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import set_mode
-from rigid_motion.ui.overlay import cache
 from rigid_motion.ui.overlay.cache import MAX_SPARE_PATHS, keep_only, notice_selection, path_of
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import key, new_object
@@ -86,11 +85,12 @@ def test_keys_selected_without_a_word_from_blender_are_noticed_when_asked_for(sc
 
 
 def test_paths_that_were_not_drawn_for_long_are_dropped(scene):
-    objects = [new_object(f"Tool {number}") for number in range(MAX_SPARE_PATHS + 20)]
-    for obj in objects:
-        path_of(obj, scene)
+    objects = [key(new_object(f"Tool {number}")) for number in range(MAX_SPARE_PATHS + 20)]
+    updated()
+    paths = [path_of(obj, scene) for obj in objects]
     path_of(objects[0], scene)
     keep_only(drawn=1)
-    assert len(cache._entries) == MAX_SPARE_PATHS + 1
-    assert (objects[0].session_uid, "") in cache._entries
-    assert (objects[1].session_uid, "") not in cache._entries
+    assert path_of(objects[0], scene) is paths[0]
+    kept = [path_of(obj, scene) is path for obj, path in zip(objects[20:], paths[20:], strict=True)]
+    assert all(kept)
+    assert path_of(objects[1], scene) is not paths[1]

@@ -1,4 +1,4 @@
-"""Ghosts are where Blender shows the thing itself on their frames, and look like it."""
+"""Paths, ghosts and axes are where Blender shows the thing itself on their frames; ghosts look like it."""
 
 from __future__ import annotations
 
@@ -8,34 +8,29 @@ import pytest
 
 from rigid_motion.animation import set_mode
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion.ui.overlay.cache import path_of
-from rigid_motion.ui.overlay.ghosts import MOST_EDGES, MOST_GHOSTS, ghost_frames, octahedron, shape_of
-from rigid_motion.ui.overlay.points import space_of_object
-from tests.animation.bones.poses import shown_poses
-from tests.animation.oracle import shown_worlds
+from rigid_motion.ui.overlay.ghost_bodies import seen_bodies
+from rigid_motion.ui.overlay.ghost_drawing import box_of, covered_by, fades, thinned_out
+from rigid_motion.ui.overlay.ghosts import (
+    FEW_TRIANGLES,
+    MOST_EDGES,
+    MOST_GHOSTS,
+    fewer_triangles,
+    ghost_frames,
+    octahedron,
+    shape_of,
+)
+from tests.animation.bones.rigs import select_bones
 from tests.animation.scenes import key, new_object
-from tests.ui.overlay.test_parents import SETTINGS, WHOLE
-from tests.ui.rigs import FRAMES, key_bone, new_rig, path_and_space
+from tests.ui.rigs import FRAMES, key_bone, new_rig
 
-
-@pytest.fixture
-def ghostly(scene) -> bpy.types.Scene:
-    scene.rigid_motion_overlay.show_ghosts = True
-    scene.rigid_motion_overlay.ghost_step = 4
-    return scene
-
-
-def assert_as_shown(path, space, matrices):
-    """The ghosts are on their frames, as these matrices on all whole frames from the first on have it."""
-    assert path.ghosts.frames.tolist() == list(range(4, 41, 4))
-    placed = path.ghosts.matrices if path.in_world else np.array(space) @ path.ghosts.matrices
-    assert placed == pytest.approx(matrices[path.ghosts.frames.astype(int) - 1], abs=3e-5)
+KEYS = np.array((1.0, 7.5, 41.0))
+from tests.ui.overlay.seen import assert_where_it_is_seen
 
 
 @pytest.mark.parametrize("under", ["nothing", "a table that stands", "a table that moves"])
 @pytest.mark.parametrize("scale", [None, "even", "uneven"])
 @pytest.mark.parametrize("order", ["QUATERNION", "XZY"])
-def test_ghosts_of_an_object_are_where_it_is_shown(ghostly, under, scale, order):
+def test_an_object_is_where_it_is_shown(scene, under, scale, order):
     obj = key(new_object(rotation_mode=order), FRAMES, scale=scale)
     obj.delta_location = (0.3, 0.2, 0.1)
     if scale is None:
@@ -46,31 +41,35 @@ def test_ghosts_of_an_object_are_where_it_is_shown(ghostly, under, scale, order)
         if under.endswith("moves"):
             key(obj.parent, FRAMES, seed=3)
     set_mode(obj, "motor_spline")
-    bpy.context.view_layer.update()
-    path, space = path_of(obj, ghostly), space_of_object(obj, bpy.context.evaluated_depsgraph_get())
-    assert_as_shown(path, space, shown_worlds([obj], WHOLE)[0])
+    scene.rigid_motion_overlay.ghost_step = 4
+    path = assert_where_it_is_seen(obj, scene)
+    assert path.ghosts.frames.tolist() == list(range(4, 41, 4))
 
 
-@SETTINGS
+OTHERWISE = {"use_local_location": False, "use_inherit_rotation": False, "inherit_scale": "NONE", "use_connect": True}
+
+
+@pytest.mark.parametrize("setting", [{}, *({name: value} for name, value in OTHERWISE.items())], ids=str)
 @pytest.mark.parametrize("under", ["stands", "moves"])
 @pytest.mark.parametrize("moved", [False, True])
-def test_ghosts_of_a_bone_are_where_it_is_shown(ghostly, setting, under, moved):
+def test_a_bone_is_where_it_is_shown_by_its_tail_if_nothing_moves_it(scene, setting, under, moved):
     rig = new_rig(**setting)
     rig.pose.bones["Arm"].rotation_quaternion = (0.8, 0.0, 0.0, 0.6)
-    if under == "moves":
-        set_mode(key_bone(rig.pose.bones["Hip"]), "dq_sclerp")
+    for name in ("Hip", "Arm") if under == "moves" else ():
+        set_mode(key_bone(rig.pose.bones[name]), "dq_sclerp")
     hand = key_bone(rig.pose.bones["Hand"], location=moved)
     hand.location = hand.location if moved else (0.3, 0.2, 0.1)
     set_mode(hand, "motor_spline")
-    bpy.context.view_layer.update()
-    path, space = path_and_space(hand)
+    head = moved and not setting.get("use_connect")
+    path = assert_where_it_is_seen(hand, scene, (0.0, 0.0 if head else hand.bone.length, 0.0))
     assert path.in_world == (under == "moves")
-    assert_as_shown(path, space, np.array(rig.matrix_world) @ shown_poses([rig], WHOLE)[0]["Hand"])
+    assert np.linalg.norm(path.axes[:, :, 1] - path.axes[:, :, 0], axis=2) == pytest.approx(0.5 * hand.bone.length)
 
 
 def test_of_a_long_motion_there_are_no_more_than_can_be_drawn():
-    assert ghost_frames(1, 41, 5).tolist() == [5, 10, 15, 20, 25, 30, 35, 40]
-    assert len(ghost_frames(0, 100000, 1)) <= MOST_GHOSTS + 1
+    assert ghost_frames(1, 41, 5, KEYS).tolist() == [5, 10, 15, 20, 25, 30, 35, 40]
+    assert ghost_frames(1, 41, -1, KEYS).tolist() == KEYS.tolist()
+    assert len(ghost_frames(0, 100000, 1, KEYS)) <= MOST_GHOSTS + 1
 
 
 def test_an_object_looks_like_its_evaluated_geometry(scene):
@@ -84,7 +83,7 @@ def test_an_object_looks_like_its_evaluated_geometry(scene):
     obj.modifiers.new("Array", "ARRAY").count = 3000
     bpy.context.view_layer.update()
     shape = shape_of(transform_of(obj), bpy.context.evaluated_depsgraph_get())
-    assert shape.triangles.shape == (18000, 3)
+    assert 0 < len(shape.triangles) <= 3 * FEW_TRIANGLES
     assert len(shape.lines) == 0, f"more than {MOST_EDGES} edges hide one another"
 
 
@@ -106,3 +105,95 @@ def test_a_bone_is_an_octahedron_of_its_length():
     corners = shape.triangles.reshape(-1, 3, 3)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert (np.einsum("ij,ij->i", normals, corners.mean(axis=1) - middle) > 0.0).all(), "faces look outwards"
+
+
+def test_of_a_large_mesh_few_triangles_stay_near_it():
+    """A sphere of 100 000 triangles is one of a tenth of these, without a hole, and as large."""
+    rows, columns = 160, 320
+    across, up = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, columns), np.linspace(0.0, np.pi, rows))
+    sphere = np.stack((np.sin(up) * np.cos(across), np.sin(up) * np.sin(across), np.cos(up)), axis=-1).reshape(-1, 3)
+    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    triangles = np.concatenate(
+        (
+            np.stack((first, first + 1, first + columns), 1),
+            np.stack((first + 1, first + columns + 1, first + columns), 1),
+        )
+    )
+    kept, few = fewer_triangles(sphere, triangles)
+    assert 1000 < len(few) <= FEW_TRIANGLES
+    corners = sphere[kept][few]
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    assert area == pytest.approx(4.0 * np.pi, rel=0.1)
+
+
+def test_those_next_to_the_frame_are_shown_and_fade(scene):
+    settings = scene.rigid_motion_overlay
+    settings.ghosts_before, settings.ghosts_after = 2, 3
+    fade = fades(np.arange(0.0, 60.0, 5.0), 20.0, settings)
+    assert np.flatnonzero(fade).tolist() == [2, 3, 5, 6, 7]
+    assert fade[[3, 5]].tolist() == [1.0, 1.0]
+    assert (np.diff(fade[5:8]) < 0.0).all()
+    assert fade[2] < fade[3]
+    settings.ghosts_before = 0
+    assert np.flatnonzero(fades(np.arange(0.0, 60.0, 5.0), 20.0, settings)).tolist() == [5, 6, 7]
+
+
+def test_they_never_fill_the_view():
+    fade = np.linspace(0.2, 1.0, 12)
+    assert thinned_out(fade, np.full(12, 0.01)).tolist() == fade.tolist()
+    large = thinned_out(fade, np.full(12, 0.4))
+    assert np.count_nonzero(large) <= 4
+    assert (large * 0.4).sum() <= 0.4
+    assert (thinned_out(fade, np.ones(12)) * 1.0).sum() <= 0.4
+
+
+def test_what_a_box_covers_is_what_is_seen_of_it():
+    box = box_of(np.array(((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5))))
+    shifted = np.tile(np.eye(4), (3, 1, 1))
+    shifted[1, 0, 3], shifted[2, 3, 3] = 0.75, -1.0
+    assert covered_by(box, shifted).tolist() == pytest.approx([0.25, 0.1875, 1.0])  # whole, cut off, behind the viewer
+
+
+def test_meshes_of_an_armature_are_seen_and_forgotten_when_their_keys_change(scene):
+    rig, body = skinned()
+    settings = scene.rigid_motion_overlay
+    settings.show_ghosts, settings.ghost_step = True, 10
+    scene.frame_start, scene.frame_end = 1, 40
+    for frame in range(1, 41):
+        scene.frame_set(frame)
+    ((at, seen, frames),) = seen_bodies(bpy.context)
+    assert at == rig
+    assert frames.tolist() == [10.0, 20.0, 30.0, 40.0]
+    assert sorted(seen.places) == frames.tolist()
+    for frame, places in seen.places.items():
+        scene.frame_set(int(frame))
+        evaluated = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        expected = [evaluated.matrix_world @ vertex.co for vertex in evaluated.data.vertices]
+        assert places == pytest.approx(np.array(expected)[seen.kept], abs=1e-5)
+    # A pose without a key changes nothing.
+    rig.pose.bones["Hand"].rotation_quaternion = (0.5, 0.5, 0.5, 0.5)
+    bpy.context.view_layer.update()
+    assert len(list(seen_bodies(bpy.context))) == 1
+    rig.pose.bones["Hand"].keyframe_insert("rotation_quaternion", frame=15)
+    bpy.context.view_layer.update()
+    assert not list(seen_bodies(bpy.context))
+    scene.frame_set(20)
+    ((_, seen, _),) = seen_bodies(bpy.context)
+    assert list(seen.places) == [20.0]
+    body.data.vertices[0].co.x += 1.0
+    body.data.update()
+    bpy.context.view_layer.update()
+    assert not list(seen_bodies(bpy.context))
+
+
+def skinned() -> tuple[bpy.types.Object, bpy.types.Object]:
+    """A rig whose hand swings, and a mesh that goes along with it."""
+    rig = new_rig()
+    set_mode(key_bone(rig.pose.bones["Hand"]), "dq_sclerp")
+    mesh = bpy.data.meshes.new("Body")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [], [(0, 1, 2, 3)])
+    body = new_object("Body", data=mesh)
+    body.modifiers.new("Armature", "ARMATURE").object = rig
+    body.vertex_groups.new(name="Hand").add([0, 1, 2, 3], 1.0, "REPLACE")
+    select_bones(rig, "Hand")
+    return rig, body

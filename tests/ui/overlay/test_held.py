@@ -10,39 +10,9 @@ from rigid_motion.animation import hold_in, set_mode
 from rigid_motion.ui.overlay.cache import path_of
 from rigid_motion.ui.overlay.points import PASSING_HOLDER
 from tests.animation.keyed import curves_of
-from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object
+from tests.ui.overlay.seen import assert_where_it_is_seen
 from tests.ui.rigs import FRAMES, key_bone, new_rig
-
-WHOLE = np.arange(1.0, 42.0)
-NEAR = 3e-5
-
-
-def shown(carrier):
-    """Where Blender shows an object or a bone in the world, on all whole frames, (n, 4, 4)."""
-    if isinstance(carrier, bpy.types.Object):
-        return shown_worlds([carrier], WHOLE)[0]
-    result = []
-    for frame in WHOLE.astype(int).tolist():
-        bpy.context.scene.frame_set(frame)
-        rig = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        result.append(np.array(rig.matrix_world @ rig.pose.bones[carrier.name].matrix))
-    return np.array(result)
-
-
-def assert_where_it_is_seen(carrier, scene):
-    expected = shown(carrier)
-    path = path_of(carrier, scene)
-    assert path.in_world
-    first, last = path.frames[[0, -1]].astype(int)
-    whole = slice(first - 1, last)
-    assert path.desired[np.searchsorted(path.frames, WHOLE[whole])] == pytest.approx(expected[whole, :3, 3], abs=NEAR)
-    assert len(path.ghosts.frames) > 4
-    assert path.ghosts.matrices == pytest.approx(expected[(path.ghosts.frames - 1).astype(int)], abs=NEAR)
-    tips = path.axes[:, 0, 1] - path.axes[:, 0, 0]
-    along = expected[(path.axis_frames - 1).astype(int), :3, 0]
-    assert tips / np.linalg.norm(tips, axis=1, keepdims=True) == pytest.approx(along, abs=1e-3)
-    return path
 
 
 def passed_around(prop, holders):
@@ -54,7 +24,6 @@ def passed_around(prop, holders):
 
 @pytest.fixture
 def hands(scene):
-    scene.rigid_motion_overlay.show_ghosts = True
     left, right = (key(new_object(name), FRAMES, seed=seed) for seed, name in enumerate(("Left", "Right")))
     set_mode([left, right], "motor_spline")
     return left, right

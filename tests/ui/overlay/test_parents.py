@@ -3,32 +3,14 @@
 from __future__ import annotations
 
 import bpy
-import numpy as np
 import pytest
 
 from rigid_motion.animation import set_mode
 from rigid_motion.ui.overlay.cache import path_of
-from tests.animation.bones.poses import shown_poses
 from tests.animation.keyed import curves_of
-from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import give_own_deltas, key, new_object
-from tests.ui.rigs import FRAMES, key_bone, new_rig, path_and_space
-
-WHOLE = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
-
-
-def shown(carrier, point=(0.0, 0.0, 0.0)):
-    """Where Blender shows a point of an object or a bone in the world, on all whole frames."""
-    matrices = shown_worlds([carrier.id_data], WHOLE)[0]
-    if isinstance(carrier, bpy.types.PoseBone):
-        matrices = matrices @ shown_poses([carrier.id_data], WHOLE)[0][carrier.name]
-    return (matrices @ (*point, 1.0))[:, :3]
-
-
-def assert_in_world(path, expected):
-    assert path.in_world
-    on = np.searchsorted(path.frames, WHOLE)
-    assert path.desired[on] == pytest.approx(expected, abs=3e-5)
+from tests.ui.overlay.seen import assert_where_it_is_seen
+from tests.ui.rigs import FRAMES, key_bone, new_rig
 
 
 @pytest.fixture
@@ -51,26 +33,7 @@ def test_an_object_on_a_bone_that_moves(scene, table, connected):
     obj = key(new_object("Sword"), FRAMES)
     obj.parent, obj.parent_type, obj.parent_bone = rig, "BONE", "Hand"
     set_mode(obj, "motor_spline")
-    assert_in_world(path_of(obj, scene), shown(obj))
-
-
-SETTINGS = pytest.mark.parametrize(
-    "setting",
-    [{}, {"use_local_location": False}, {"use_inherit_rotation": False}, {"inherit_scale": "NONE"}],
-    ids=str,
-)
-
-
-@SETTINGS
-@pytest.mark.parametrize("moves", [False, True])
-def test_a_bone_under_bones_that_move(scene, setting, moves):
-    rig = new_rig(**setting)
-    for name in ("Hip", "Arm"):
-        set_mode(key_bone(rig.pose.bones[name]), "dq_sclerp")
-    hand = key_bone(rig.pose.bones["Hand"], location=moves)
-    set_mode(hand, "motor_spline")
-    point = (0.0, 0.0, 0.0) if moves else (0.0, hand.bone.length, 0.0)
-    assert_in_world(path_and_space(hand)[0], shown(hand, point))
+    assert assert_where_it_is_seen(obj, scene).in_world
 
 
 OTHERS = {
@@ -92,6 +55,25 @@ def test_parents_that_do_not_move_by_keys_alone_are_as_they_are_now(scene, table
     assert not path_of(obj, scene).in_world
 
 
+STANDING = {
+    "order": lambda floor: setattr(floor, "rotation_mode", "ZYX"),
+    "turn": lambda floor: setattr(floor, "rotation_euler", (0.2, 0.0, 0.1)),
+    "delta": lambda floor: setattr(floor, "delta_location", (1.0, 2.0, 3.0)),
+}
+
+
+@pytest.mark.parametrize("edit", STANDING)
+def test_a_path_follows_what_its_parents_stand_on(scene, edit):
+    table, floor, obj = key(new_object("Table"), FRAMES), new_object("Floor", "XYZ"), key(new_object(), FRAMES)
+    table.parent, obj.parent, floor.rotation_euler = floor, table, (0.5, 0.9, -0.4)
+    set_mode([table, obj], "dq_sclerp")
+    bpy.context.view_layer.update()
+    path_of(obj, scene)
+    STANDING[edit](floor)
+    bpy.context.view_layer.update()
+    assert assert_where_it_is_seen(obj, scene).in_world
+
+
 def test_a_path_follows_edits_of_its_parents(scene, table):
     obj = key(new_object(), FRAMES)
     obj.parent = table
@@ -104,4 +86,4 @@ def test_a_path_follows_edits_of_its_parents(scene, table):
     assert after is not before
     set_mode(obj, "dq_sclerp")
     bpy.context.view_layer.update()
-    assert_in_world(path_of(obj, scene), shown(obj))
+    assert assert_where_it_is_seen(obj, scene).in_world

@@ -19,6 +19,7 @@ def straight(frames: int, places: np.ndarray | None = None, *, mode: bool = Fals
         frames=at,
         native=line,
         desired=line if mode else None,
+        key_frames=at[list(keys)],
         keys=line[list(keys)],
         selected=np.zeros(len(keys), dtype=bool),
         tick_frames=at,

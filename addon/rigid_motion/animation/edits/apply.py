@@ -6,19 +6,23 @@ Every target says first whether it can be done. Where one cannot, `Refused` is r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, TypeVar
 
 import bpy
 from bpy.app.translations import pgettext_n as n_
 
+from ...blender import view_layer
+from ..actions.channels import KeyFields, key_fields, set_key_fields
 from ..actions.reading import sources_of_users
 from ..actions.refusals import refuse_linked, refuse_numbers
 from ..actions.slots import Binding, bindings_of
+from ..evaluation.components import ROWS
 from ..evaluation.sources import KeyedTransform
 from ..following import follower
 from ..queries.keyed import active_binding
-from ..transforms import Refused, Transform, transform_of
+from ..transforms import WIDTHS, Channel, Refused, Transform, transform_of
 
 Target = bpy.types.Object | bpy.types.PoseBone | Transform
 """Something to act on."""
@@ -93,3 +97,59 @@ def editable_binding(transform: Transform, bindings: Iterable[Binding]) -> Bindi
         raise Refused(text, name=transform.name)
     refuse_linked(transform, binding)
     return binding
+
+
+class TriedEdit:
+    """A transform whose keys are edited again and again, each time from those that it had."""
+
+    def __init__(self, transform: Transform, binding: Binding, channels: Iterable[Channel]) -> None:
+        self.transform, self.binding = transform, binding
+        self.posed = transform.components()
+        curves = {channel: binding.curves.get(channel) for channel in channels}
+        self.keys: dict[Channel, KeyFields | None] = {
+            channel: key_fields(curve.keyframe_points) if curve else None for channel, curve in curves.items()
+        }
+        """The keys of these channels as they were; None where there is no channel."""
+
+    def put_back(self) -> None:
+        """Give its channels the keys that they had."""
+        for channel, fields in self.keys.items():
+            if fields is not None:
+                set_key_fields(self.binding.ensure_curve(channel), fields)
+            elif channel in self.binding.curves:
+                self.binding.channelbag.fcurves.remove(self.binding.curves.pop(channel))
+
+
+class TriedEdits:
+    """Edits of several transforms of which some are tried until one is good.
+
+    It is not generic: `typing` keeps what a generic class was made for, and Blender 4.5 never ends while it does.
+    """
+
+    def __init__(self, tried: Iterable[Any]) -> None:
+        self.tried = list(tried)
+        """Each is a `TriedEdit`."""
+
+    def __len__(self) -> int:
+        return len(self.tried)
+
+    def cancel(self) -> None:
+        """Let all be as it was, with the poses that had no key yet."""
+        with self.edit():
+            pass
+        for one in self.tried:
+            for part, prop in one.transform.properties.items():
+                setattr(one.transform.carrier, prop, one.posed[ROWS[part]][: WIDTHS[prop]])
+
+    @contextmanager
+    def edit(self) -> Iterator[None]:
+        """Give all their keys back, edit them, and refresh."""
+        with follower.follower.own_edits():
+            for one in self.tried:
+                one.put_back()
+            yield
+            follower.refresh([one.transform for one in self.tried])
+            for one in self.tried:
+                one.binding.slot.action.update_tag()
+            # All is up to date: the follower need not look through all that these Actions have.
+            view_layer().update()

@@ -7,16 +7,13 @@ makes of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
-from ...blender import scene, view_layer
+from ...blender import scene
 from ...motion import Poses, interpolate
-from ..actions.channels import key_fields, set_key_fields
 from ..actions.reading import added_values, read
 from ..evaluation.bodies import body_poses
 from ..evaluation.channel_values import channel_values
@@ -24,13 +21,12 @@ from ..evaluation.components import AXIS_ANGLE, DEPENDS_ON_KEYS, MODE_NAMES, MOD
 from ..evaluation.differences import in_betweens
 from ..evaluation.sources import SAME_FRAME, KeyedTransform
 from ..evaluation.turning import needs_turning
-from ..following import follower
 from ..following.inserted import set_key
 from ..following.kept_timing import nearest_key
 from ..following.shared_turns import share_out_turns
 from ..queries.segments import frame_in_action
-from ..transforms import WIDTHS, Refused, Transform
-from .apply import Readings, Targets, apply_edit, editable_binding, readable
+from ..transforms import Refused, Transform
+from .apply import Readings, Targets, TriedEdit, TriedEdits, apply_edit, editable_binding, readable
 
 BREAKDOWN, PUSH, RELAX = KINDS = ("BREAKDOWN", "PUSH", "RELAX")
 """From the key before to the key after; away from the in-between of the mode; towards it."""
@@ -54,12 +50,11 @@ def breakdown(
     Breakdowns(targets, kind, refused=refused).apply(factor)
 
 
-class _Between:
+class _Between(TriedEdit):
     """A transform, and what it is between on a frame of the scene. `Refused` where it is between no keys."""
 
     def __init__(self, transform: Transform, readings: Readings, frame: float) -> None:
-        self.transform = transform
-        self.binding = binding = editable_binding(transform, [binding for binding, _ in readings])
+        binding = editable_binding(transform, [binding for binding, _ in readings])
         self.frame = frame = frame_in_action(transform.animated, frame)
         whole = next(source for one, source in readable(transform, readings) if one is binding)
         is_switch = any(abs(switch.frame - frame) < SAME_FRAME for switch in whole.switches)
@@ -75,16 +70,11 @@ class _Between:
         after = int(np.searchsorted(keys, frame))
         self.ends = float(keys[after - 1]), float(keys[after])
         """The frames of the keys before and after."""
-        self.posed = transform.components()
+        rows = (row for rows, _ in self.source.channels for row in rows)
+        channels = [transform.channels[row] for row in rows]
+        super().__init__(transform, binding, (*channels, transform.turns_channel))
         self.seen = self.posed - added_values(binding, transform, whole, np.array([frame]))[:, 0]
         """Its components as it is seen, shape (10,)."""
-        keyed = [
-            *(transform.channels[row] for rows, _ in self.source.channels for row in rows),
-            transform.turns_channel,
-        ]
-        curves = {channel: binding.curves.get(channel) for channel in keyed}
-        self.keys = {channel: key_fields(curve.keyframe_points) if curve else None for channel, curve in curves.items()}
-        """The keys of its channels as they were, and of that of turns; None where there is none."""
 
     @property
     def mode(self) -> str:
@@ -115,14 +105,6 @@ class _Between:
         passed = interpolate((0.0, 1.0), ways, np.array([share]), self.mode, extrapolate=True)
         return _components_near(self.source, passed, straight)
 
-    def put_back(self) -> None:
-        """Give its channels the keys that they had."""
-        for channel, fields in self.keys.items():
-            if fields is not None:
-                set_key_fields(self.binding.ensure_curve(channel), fields)
-            elif channel in self.binding.curves:
-                self.binding.channelbag.fcurves.remove(self.binding.curves.pop(channel))
-
     def key(self, kind: str, factor: float) -> None:
         """Set a key of the pose in all channels that have keys, and share out the turns of the segment.
 
@@ -142,7 +124,7 @@ class _Between:
             share_out_turns(self.binding, read(self.binding), self.source, factor if kind == BREAKDOWN else None)
 
 
-class Breakdowns:
+class Breakdowns(TriedEdits):
     """Targets with keys before and after the current frame, of which poses in between are tried until one is good."""
 
     def __init__(self, targets: Targets, kind: str = BREAKDOWN, *, refused: list[Refused] | None = None) -> None:
@@ -152,36 +134,13 @@ class Breakdowns:
         def plan(transform: Transform, readings: Readings) -> _Between:
             return _Between(transform, readings, frame)
 
-        self._between = list(apply_edit(targets, plan, lambda _, between: between, refused).values())
-
-    def __len__(self) -> int:
-        return len(self._between)
+        super().__init__(apply_edit(targets, plan, lambda _, between: between, refused).values())
 
     def apply(self, factor: float) -> None:
         """Key the poses of this factor, in place of those of the factor before."""
-        with self._edit():
-            for between in self._between:
+        with self.edit():
+            for between in self.tried:
                 between.key(self.kind, factor)
-
-    def cancel(self) -> None:
-        """Let all be as it was, with the poses that had no key yet."""
-        with self._edit():
-            pass
-        view_layer().update()
-        for between in self._between:
-            for part, prop in between.transform.properties.items():
-                setattr(between.transform.carrier, prop, between.posed[ROWS[part]][: WIDTHS[prop]])
-
-    @contextmanager
-    def _edit(self) -> Iterator[None]:
-        """Give all their keys back, edit them, and refresh."""
-        with follower.follower.own_edits():
-            for between in self._between:
-                between.put_back()
-            yield
-        follower.refresh([between.transform for between in self._between])
-        for between in self._between:
-            between.binding.slot.action.update_tag()
 
 
 def _without(source: KeyedTransform, frame: float) -> KeyedTransform:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from functools import cache, lru_cache
 from typing import Protocol, cast
 
@@ -59,6 +60,7 @@ class ObjectMotion(Protocol):
     """What this extension keeps on an object or a pose bone, see `properties`."""
 
     turns: int
+    lead: Sequence[float]
     awaited: str
     bakes: bpy.types.bpy_prop_collection_idprop[Note]
 

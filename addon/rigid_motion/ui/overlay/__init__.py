@@ -5,7 +5,10 @@ parents  where parents carry it         kinds    by what each kind is drawn
 ghosts   poses every few frames         blends   from one place to another
 records  where hands were seen          held     where what is held goes
 cache    what is worked out already     settings what to show
-drawing  lines, dots and ghosts on the screen
+drawing  lines and dots on the screen
+ghost_drawing  ghosts on the screen, around the current frame
+ghost_bodies   skinned meshes, as they were seen on other frames
+seen     where something is seen on any frames
 cleaned  what was cleaned, before and after
 """
 
@@ -14,7 +17,7 @@ from __future__ import annotations
 import bpy
 
 from ...blender import PointerProperty
-from . import cache, cleaned, drawing
+from . import cache, cleaned, drawing, ghost_bodies, ghost_drawing
 from .settings import RIGID_MOTION_OT_update_path, RigidMotionOverlay, draw_settings, draw_toggle, overlay_settings
 
 POPOVER = "VIEW3D_PT_overlay_object"
@@ -29,11 +32,15 @@ def register() -> None:
     getattr(bpy.types, POPOVER).append(draw_toggle)
     cache.register()
     drawing.register()
+    ghost_bodies.register()
+    ghost_drawing.register()
     cleaned.register()
 
 
 def unregister() -> None:
     cleaned.unregister()
+    ghost_drawing.unregister()
+    ghost_bodies.unregister()
     drawing.unregister()
     cache.unregister()
     getattr(bpy.types, POPOVER).remove(draw_toggle)

@@ -15,6 +15,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...animation.actions.channels import selected_keys
 from ...animation.actions.slots import Binding
@@ -23,10 +24,11 @@ from ...animation.queries.keyed import active_bindings, frames_in
 from ...animation.transforms import Transform, transform_of
 from ...blender import existing, original_uid, persistent
 from ...handlers import append_handlers, remove_handlers
+from ..targets import selected_in_view
 from . import records
 from .ghosts import ghosts_of
 from .held import HolderMotion, is_held
-from .kinds import axis_length_of, followed
+from .kinds import axis_length_of, followed, space_of
 from .parents import CarriedTargets, Parents
 from .points import DrawnPath, trace
 
@@ -84,7 +86,7 @@ def paths_of(
     """Return the paths of several targets. `turned` is what stands between the rotation of a bone and its location."""
     overlay: Any = getattr(scene, OVERLAY)
     settings = (
-        *(overlay.mode, overlay.tick_step, overlay.axes_size, overlay.ghost_step if overlay.show_ghosts else 0),
+        *(overlay.mode, overlay.tick_step, overlay.axes_size, _ghost_step(overlay)),
         *(scene.frame_start, scene.frame_end),
     )
     stale: dict[Transform, np.ndarray | None] = {}
@@ -107,6 +109,25 @@ def paths_of(
     for target in targets:
         _entries.move_to_end(target.identity)
     return [_entries[target.identity].path for target in targets]
+
+
+def shown_paths(context: Any) -> list[tuple[Transform, Matrix, DrawnPath]]:
+    """Return the selected objects or bones that have paths, each with the map from its path's space into the world."""
+    depsgraph, targets = context.view_layer.depsgraph, list(map(transform_of, selected_in_view(context)))
+    spaces = {target: space_of(target, depsgraph) for target in targets}
+    paths = paths_of(targets, context.scene, {target: turned for target, (_, turned) in spaces.items()})
+    keep_only(len(targets))
+    return [
+        (target, Matrix() if path.in_world else spaces[target][0], path)
+        for target, path in zip(targets, paths, strict=True)
+        if path is not None
+    ]
+
+
+def _ghost_step(overlay: Any) -> int:
+    """Return the frames from ghost to ghost, 0 without any, -1 for those of keys."""
+    step = overlay.ghost_step if overlay.ghosts_on == "STEP" else -1
+    return step if overlay.show_ghosts else 0
 
 
 def _bytes(turn: np.ndarray | None) -> bytes:
@@ -168,7 +189,7 @@ def _read(
     else:
         parents = None
     mode, tick_step, axes_size, ghost_step, *_ = settings
-    point = followed(target.pose_bone, source, turn) if target.is_part else None
+    point = followed(target, source, turn)
     size = axis_length_of(target, source)
     entry.selected = _selection(binding)
     # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.

@@ -1,8 +1,7 @@
-"""Drawing paths and ghosts in the 3D viewport: what was computed becomes batches on the graphics card, and stays there.
+"""Drawing paths in the 3D viewport: what was computed becomes batches on the graphics card, and stays there.
 
 Batches are in the space of the objects' channels; from there into the world it is a matrix at drawing, so a parent that
-moves costs nothing. What ghosts look like is there once, and placed by a matrix each. Colours are as on the screen,
-widths in pixels at a resolution scale of 1.
+moves costs nothing. Colours are as on the screen, widths in pixels at a resolution scale of 1.
 """
 
 from __future__ import annotations
@@ -19,18 +18,15 @@ import bpy
 import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
-from mathutils import Matrix, Vector
+from mathutils import Vector
 
 from ...animation.queries.segments import frame_in_action
-from ...animation.transforms import Transform, transform_of
-from ...blender import existing, original_uid, persistent, view_layer
-from ...handlers import append_handlers, remove_handlers
+from ...animation.transforms import Transform
+from ...blender import existing
 from ..holding import hue_of
 from ..preferences import DEFAULT_LOOK, Color, preferences
 from ..targets import selected_in_view
 from . import cache
-from .ghosts import Ghosts, shape_of
-from .kinds import space_of
 from .points import MAX_TICKS, PASSING_HOLDER, DrawnPath, Readable, readable, thinned
 from .settings import RigidMotionOverlay, is_shown, overlay_settings
 
@@ -47,17 +43,8 @@ TICK_DIAMETER_PX, KEY_DIAMETER_PX, NOW_DIAMETER_PX = 6.0, 10.0, 12.0
 
 AXIS_OPACITY = 0.8
 
-SOLID_OPACITY, EDGE_OPACITY = 0.15, 0.55
-"""Opacity of the triangles and of the edges of a ghost."""
-
 MIN_BRIGHTNESS = 0.2
 """A colour of the theme that is darker is meant to be dark."""
-
-EDGE_WIDTH = 1.0
-"""The width of edges, in pixels at a resolution scale of 1."""
-
-MIN_GHOST_DISTANCE_FRAMES = 0.5
-"""Frames from the current one within which there is no ghost, since the thing itself is there."""
 
 MOST_VIEWS = 24
 """Choices of ticks or axes that stay on the graphics card for each path, while it is looked at from here and there."""
@@ -172,7 +159,7 @@ class _Batches:
 
 Primitive = Literal["POINTS", "LINES", "LINE_STRIP", "TRIS"]
 
-_own_space: Callable[[], AbstractContextManager[None]] = cast(Any, gpu.matrix.push_pop)
+own_space: Callable[[], AbstractContextManager[None]] = cast(Any, gpu.matrix.push_pop)
 _batches: WeakKeyDictionary[DrawnPath, _Batches] = WeakKeyDictionary()
 
 
@@ -232,44 +219,17 @@ class Pen:
             batch.draw(self.dots)
 
 
-_shapes: dict[tuple[int, str], tuple[Batch, Batch]] = {}
-"""The triangles and the edges of ghosts, by the identity of what is moved."""
-
-
-def _draw_ghosts(pen: Pen, transform: Transform, ghosts: Ghosts, frame: float, color: Color) -> None:
-    """Draw all ghosts of something but that of this frame, as the keys have it, in the space of the matrix stack."""
-    identity = transform.identity
-    if identity not in _shapes:
-        shape = shape_of(transform, existing(view_layer().depsgraph))
-        _shapes[identity] = batch_of("TRIS", shape.triangles), batch_of("LINES", shape.lines)
-    triangles, lines = _shapes[identity]
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    gpu.state.depth_test_set("LESS_EQUAL")
-    gpu.state.face_culling_set("BACK")
-    try:
-        holders = np.zeros(len(ghosts.frames), int) if ghosts.holders is None else ghosts.holders
-        for at, matrix, holder in zip(ghosts.frames.tolist(), ghosts.matrices, holders.tolist(), strict=True):
-            if abs(at - frame) < MIN_GHOST_DISTANCE_FRAMES:
-                continue
-            red, green, blue, opacity = pen.held_color(holder, color)
-            with _own_space():
-                gpu.matrix.multiply_matrix(Matrix(matrix))
-                if triangles:
-                    shader.uniform_float("color", (red, green, blue, SOLID_OPACITY * opacity))
-                    triangles.draw(shader)
-                pen.line(lines, (red, green, blue, EDGE_OPACITY * opacity), EDGE_WIDTH)
-    finally:
-        gpu.state.face_culling_set("NONE")
-        gpu.state.depth_test_set("NONE")
+beside: list[Callable[[Pen, Transform, DrawnPath, float, RigidMotionOverlay], None]] = []
+"""What else is drawn of each path, below it and in its space, on a frame of its Action."""
 
 
 def draw_paths() -> None:
-    """Draw paths and ghosts of the selected objects or bones in the viewport that is being drawn. It never raises."""
+    """Draw paths of the selected objects or bones, and what is beside them, in a viewport. It never raises."""
     try:
         if is_shown(bpy.context):
             _draw(bpy.context)
     except Exception as problem:
-        _complain(problem)
+        complain(problem)
 
 
 def follow_selection() -> None:
@@ -280,15 +240,21 @@ def follow_selection() -> None:
         if not is_shown(context) or existing(context.screen).is_animation_playing:
             return
         if cache.notice_selection(selected_in_view(context)):
-            for window in existing(context.window_manager).windows:
-                for area in window.screen.areas:
-                    if area.type == "VIEW_3D":
-                        area.tag_redraw()
+            redraw(context, "VIEW_3D")
     except Exception as problem:
-        _complain(problem)
+        complain(problem)
 
 
-def _complain(problem: Exception) -> None:
+def redraw(context: bpy.types.Context, *kinds: str) -> None:
+    """Have all areas of these types be drawn anew."""
+    for window in existing(context.window_manager).windows:
+        for area in window.screen.areas:
+            if area.type in kinds:
+                area.tag_redraw()
+
+
+def complain(problem: Exception) -> None:
+    """Log a problem of drawing."""
     global _complaint
     # Once: the next redraw is a moment away.
     if repr(problem) != _complaint:
@@ -297,12 +263,7 @@ def _complain(problem: Exception) -> None:
 
 
 def _draw(context: Any) -> None:
-    scene, depsgraph = context.scene, context.view_layer.depsgraph
-    settings, targets = overlay_settings(scene), list(map(transform_of, selected_in_view(context)))
-    spaces = {target: space_of(target, depsgraph) for target in targets}
-    result = cache.paths_of(targets, scene, {target: turned for target, (_, turned) in spaces.items()})
-    paths = [(target, path) for target, path in zip(targets, result, strict=True) if path is not None]
-    cache.keep_only(len(targets))
+    scene, settings, paths = context.scene, overlay_settings(context.scene), cache.shown_paths(context)
     if not paths:
         return
     pen = Pen(context)
@@ -311,14 +272,12 @@ def _draw(context: Any) -> None:
     gpu.state.depth_test_set("NONE")
     gpu.state.program_point_size_set(True)
     try:
-        for target, path in paths:
-            space = Matrix() if path.in_world else spaces[target][0]
+        for target, space, path in paths:
             frame = frame_in_action(target.animated, scene.frame_current_final)
-            with _own_space():
+            with own_space():
                 gpu.matrix.multiply_matrix(space)
-                if path.ghosts is not None:
-                    color = pen.look.native_color if path.desired is None else pen.look.mode_color
-                    _draw_ghosts(pen, target, path.ghosts, frame, color)
+                for draw in beside:
+                    draw(pen, target, path, frame, settings)
                 if not settings.show_paths:
                     continue
                 _draw_path(pen, path, settings)
@@ -358,26 +317,6 @@ def _draw_path(pen: Pen, path: DrawnPath, settings: RigidMotionOverlay) -> None:
     pen.dot(batches.selected, look.key_color, diameter)
 
 
-@persistent
-def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if _shapes:
-        edited = {original_uid(update) for update in depsgraph.updates if update.is_updated_geometry}
-        for identity in [identity for identity in _shapes if identity[0] in edited]:
-            del _shapes[identity]
-
-
-@persistent
-def _on_file(*_: object) -> None:
-    _shapes.clear()
-
-
-HANDLERS: dict[str, Callable] = {
-    "depsgraph_update_post": _on_update,
-    "undo_post": _on_file,
-    "redo_post": _on_file,
-    "load_post": _on_file,
-}
-
 DRAWN_SPACES = (
     (bpy.types.SpaceView3D, draw_paths, "POST_VIEW"),
     (bpy.types.SpaceDopeSheetEditor, follow_selection, "POST_PIXEL"),
@@ -393,7 +332,6 @@ _complaint = ""
 
 
 def register() -> None:
-    append_handlers(HANDLERS)
     if not bpy.app.background:
         for space, draw, moment in DRAWN_SPACES:
             _handles.append((space, space.draw_handler_add(draw, (), "WINDOW", moment)))
@@ -403,7 +341,5 @@ def unregister() -> None:
     for space, handle in _handles:
         space.draw_handler_remove(handle, "WINDOW")
     _handles.clear()
-    remove_handlers(HANDLERS)
-    _shapes.clear()
     _batches.clear()
     _dot_shader.cache_clear()

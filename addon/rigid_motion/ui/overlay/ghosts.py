@@ -20,14 +20,20 @@ from ...blender import existing
 from ...motion.affine import AffineMaps
 from .parents import Parents
 
-MOST_GHOSTS = 120
+MOST_GHOSTS = 2000
 """About the most ghosts of one path: where it has more, they are further apart."""
 
 MOST_EDGES = 4000
 """The most edges of something that is shown with them: more would hide one another."""
 
-MOST_TRIANGLES = 200000
+MOST_TRIANGLES = 2000000
 """The most triangles of something that is not shown by its bounding box."""
+
+FEW_TRIANGLES = 6000
+"""So many are enough to see what a ghost is: it has no more."""
+
+MAX_CELLS = 96
+"""The cells of the finest grid along the longest side of something, see `fewer_triangles`."""
 
 GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that have triangles."""
@@ -64,8 +70,10 @@ class Ghosts:
     """The numbers of what holds it, see `points.Piece`, shape (g,). None for what nothing ever holds."""
 
 
-def ghost_frames(first: int, last: int, step: int) -> np.ndarray:
-    """Return the multiples of a step from the first frame to the last."""
+def ghost_frames(first: int, last: int, step: int, keys: np.ndarray) -> np.ndarray:
+    """Return the multiples of a step from the first frame to the last; for a negative step the frames of keys (k,)."""
+    if step < 0:
+        return keys
     step = max(step, -(-(last - first) // MOST_GHOSTS))
     return np.arange(-(-first // step), last // step + 1.0) * step
 
@@ -78,12 +86,12 @@ def ghosts_of(
     turn: np.ndarray | None,
     parents: Parents | None,
 ) -> Ghosts:
-    """Return where something is every few frames of a mode.
+    """Return where something is on `ghost_frames` in a mode.
 
     `turn` is what stands between the rotation of a bone and that space, where there are no `parents`. ValueError where
     its numbers make no motion.
     """
-    frames = ghost_frames(*source.seen_range, step)
+    frames = ghost_frames(*source.seen_range, step, source.keyed_frames)
     if mode is not None:
         source = replace(source, mode=MODE_NUMBERS[mode])
     maps = shown(transform, source, frames)[1]
@@ -142,9 +150,26 @@ def _geometry(obj: bpy.types.Object) -> Shape | None:
         vertices = _read(mesh.vertices, "co", np.float32, 3)
         corners = _read(mesh.loop_triangles, "vertices", np.int32, 3)
         edges = _read(mesh.edges, "vertices", np.int32, 2) if len(mesh.edges) <= MOST_EDGES else corners[:0]
-        return Shape(vertices[edges.ravel()], vertices[corners.ravel()])
+        kept, few = fewer_triangles(vertices, corners)
+        return Shape(vertices[edges.ravel()], vertices[kept[few.ravel()]])
     finally:
         obj.to_mesh_clear()
+
+
+def fewer_triangles(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of some of the vertices (v, 3), and triangles (t, 3) among these that look much the same.
+
+    Vertices in one cell of a grid become one.
+    """
+    kept, few, cells = np.arange(len(vertices)), triangles, MAX_CELLS
+    extent = max(float(np.ptp(vertices, axis=0).max()), 1e-9)
+    while len(few) > FEW_TRIANGLES:
+        grid = ((vertices - vertices.min(axis=0)) * (cells / extent)).astype(np.int64)
+        _, kept, cell = np.unique(grid @ (1, 4096, 4096**2), return_index=True, return_inverse=True)
+        few = cell.reshape(-1)[triangles]
+        apart = (few[:, 0] != few[:, 1]) & (few[:, 1] != few[:, 2]) & (few[:, 2] != few[:, 0])
+        few, cells = few[apart], 2 * cells // 3
+    return kept, few.astype(np.int32)
 
 
 def _read(items: bpy.types.bpy_prop_collection, name: str, kind: type, width: int) -> np.ndarray:

@@ -63,6 +63,12 @@ class HolderMotion:
         return record_of(transform, self._scene.frame_current_final, self._depsgraph)
 
     @property
+    def carriers(self) -> frozenset[Transform]:
+        """All that carries it at any time, as far as that moves by keys."""
+        holders = (holder.carriers for holder, _ in self._holders.values() if isinstance(holder, Parents))
+        return self._parents.carriers.union(*holders)
+
+    @property
     def records(self) -> tuple[tuple[PlaceRecord, int], ...]:
         """What is known as it was seen alone, and how often that has changed."""
         return tuple((one, one.version) for one, _ in self._holders.values() if isinstance(one, PlaceRecord))
@@ -84,6 +90,7 @@ class HolderMotion:
         return (
             self._parents.digest,
             space,
+            tuple(self.target.motion.lead),
             *(
                 (number, getattr(one, "digest", None), offset.axes.tobytes(), offset.origins.tobytes())
                 for number, (one, offset) in sorted(self._holders.items())
@@ -117,16 +124,30 @@ class HolderMotion:
         if mode is not None:
             source = replace(source, mode=MODE_NUMBERS[mode])
         maps = shown(self.target, source, run.moments(at))[1]
-        held = self._holders.get(self.source.hold_at(run.stretch.first)[0])
+        spaces, turn = self._space_of(self.source.hold_at(run.stretch.first)[0], at)
+        result[chosen] = spaces @ in_space_of_path(self.target, maps, turn)
+
+    def _space_of(self, number: int, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
+        """Return what `Parents.spaces` does for frames (n,) of keys in the holder of a number."""
+        held = self._holders.get(number)
         if held is not None:
             holder, offset = held
-            spaces = holder.places(at) if isinstance(holder, Parents) else holder.maps(at)
-            result[chosen] = spaces @ offset @ maps
-        elif self._parents.known:
-            spaces, turns = self._parents.spaces(at)
-            result[chosen] = spaces @ in_space_of_path(self.target, maps, turns)
-        else:
-            result[chosen] = maps_of(self._space) @ in_space_of_path(self.target, maps, self._turn)
+            return (holder.places(frames) if isinstance(holder, Parents) else holder.maps(frames)) @ offset, None
+        if self._parents.known:
+            return self._parents.spaces(frames)
+        return identity(len(frames)) @ maps_of(self._space), self._turn
+
+    def spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray]:
+        """Return the maps (n,) into the world, and the turns (n, 3, 3), of the spaces that keys on frames (n,) are in,
+        see `Parents.spaces`.
+        """
+        maps, numbers = identity(len(frames)), np.array([self.source.hold_at(frame)[0] for frame in frames.tolist()])
+        turns = maps.axes.copy()
+        for number in np.unique(numbers).tolist():
+            chosen = numbers == number
+            maps[chosen], turn = self._space_of(number, frames[chosen])
+            turns[chosen] = np.eye(3) if turn is None else turn
+        return maps, turns
 
     def holders_at(self, frames: np.ndarray) -> np.ndarray:
         """Return the numbers of what holds it on frames (n,), PASSING where it passes."""
@@ -152,6 +173,8 @@ class HolderMotion:
         on_samples, on_keys, on_ticks = (np.searchsorted(frames, some) for some in (samples, keys, ticks))
         native = self.maps(frames, "BLENDER")
         desired = native if mode == "BLENDER" else self.maps(frames, mode)
+        lead = np.array(self.target.motion.lead)
+        native, desired = (AffineMaps(maps.axes, maps.at(lead)) for maps in (native, desired))
         with_axes = axis_frames(ticks)
         axes = desired[np.searchsorted(frames, with_axes)]
         ends = axes.origins[:, None] + axis_length * np.moveaxis(axes.axes, -1, 1)
@@ -159,6 +182,7 @@ class HolderMotion:
             frames=samples,
             native=native.origins[on_samples],
             desired=None if mode == "BLENDER" else desired.origins[on_samples],
+            key_frames=keys,
             keys=desired.origins[on_keys],
             selected=np.isin(keys, selected),
             tick_frames=ticks,
@@ -172,7 +196,7 @@ class HolderMotion:
 
     def ghosts(self, step: int, mode: str | None) -> Ghosts:
         """Return where it is every few frames."""
-        frames = ghost_frames(*self.range, step)
+        frames = ghost_frames(*self.range, step, self.source.keyed_frames)
         return Ghosts(frames, matrices_of(self.maps(frames, mode)), self.holders_at(frames))
 
 

@@ -1,4 +1,4 @@
-"""What the paths of each kind of transform are drawn by, and which point of a bone is followed.
+"""What the paths of each kind of transform are drawn by, and which point of it is followed.
 
 The path of a bone is that of its head, in the space of its channels, placed by its parent as it is posed on the current
 frame. The head of a bone that only turns stays where it is: there it is the path of the tail.
@@ -52,12 +52,17 @@ def space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> t
     return rig.matrix_world @ space, unless_same(np.array(turned))
 
 
-def followed(bone: bpy.types.PoseBone, source: KeyedTransform, turned: np.ndarray | None) -> Followed:
-    """Return the point of a bone that its path is of."""
+def followed(transform: Transform, source: KeyedTransform, turned: np.ndarray | None) -> Followed | None:
+    """Return the point that a path is of: that which leads, or else one of a bone; None for the origin of an object."""
+    lead, obj = np.array(transform.motion.lead), transform.animated
+    if not transform.is_part:
+        scale = np.ones(3) if source.uniform_scale else np.array(obj.scale) * np.array(obj.delta_scale)
+        return Followed(True, np.zeros(3), lead * scale, None) if lead.any() else None
+    bone = transform.pose_bone
     moves = LOCATION in source.keyed and not bone.bone.use_connect
     stays = np.zeros(3) if moves or bone.bone.use_connect else np.array(bone.location)
-    tip = np.zeros(3) if moves else np.array((0.0, bone.bone.length, 0.0))
-    scale = np.ones(3) if moves or source.uniform_scale else np.array(bone.scale)
+    tip = lead if moves or lead.any() else np.array((0.0, bone.bone.length, 0.0))
+    scale = np.ones(3) if source.uniform_scale else np.array(bone.scale)
     return Followed(moves, stays, tip * scale, turned)
 
 

@@ -25,6 +25,12 @@ from ...motion.affine import AffineMaps
 MAX_DIRECTION_ROUNDING = 1e-5
 """Components of directions that differ by less are the same in single precision."""
 
+MOST_SPACES = 32
+"""The number of results of `Parents.spaces` that are kept: while something is dragged, what carries it is the same."""
+
+_spaces: dict[tuple, tuple[AffineMaps, np.ndarray | None]] = {}
+"""By all that they depend on."""
+
 WHOLE_OBJECTS = ("OBJECT", "ARMATURE")
 """Types of parents that carry an object by their own transform."""
 
@@ -101,6 +107,8 @@ class Parents:
         """True if nothing but keys moves them."""
         self.move_by_keys = self.known and any(source is not None for _, source in self._read.values())
         """True if they move, and by keys alone."""
+        self.carriers = frozenset(self._read)
+        """All that carries it, and where it is read, the target itself."""
         self.ids = {item.animated.session_uid for item in self._read}
         self.ids |= {binding.slot.action.session_uid for binding, _ in self._read.values() if binding is not None}
         """Session ids of the data-blocks that decide on it."""
@@ -113,7 +121,7 @@ class Parents:
             keyed = source.keyed if source is not None else ()
             stands = [getattr(one.carrier, prop)[:] for name, prop in one.properties.items() if name not in keyed]
             rest = None if source is None else (source.digest, tuple(source.rest.items()))
-            result.append((one.animated.session_uid, one.prefix, rest, tuple(stands), _hung(one)))
+            result.append((*one.identity, one.order, rest, tuple(stands), one.original().tobytes(), _hung(one)))
         return tuple(result)
 
     def spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
@@ -129,6 +137,14 @@ class Parents:
         turned : array, shape (n, 3, 3), or None
             What stands between the target's rotation and that space, see `space_of_bone`. None where nothing does.
         """
+        key = self.target.identity, self.digest, frames.tobytes()
+        if key not in _spaces:
+            if len(_spaces) >= MOST_SPACES:
+                _spaces.clear()
+            _spaces[key] = self._spaces(frames)
+        return _spaces[key]
+
+    def _spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
         if not self.target.is_part:
             return self._carrying(self.target.animated, frames), None
         bone, stands = self.target.pose_bone, identity(len(frames))

@@ -116,6 +116,9 @@ class DrawnPath:
     desired: np.ndarray | None
     """Places if the mode does, shape (m, 3). None where there is no other mode than Blender's."""
 
+    key_frames: np.ndarray
+    """Frames of the Action with keys, shape (k,)."""
+
     keys: np.ndarray
     """The keys, shape (k, 3). They are the same in all modes."""
 
@@ -210,6 +213,7 @@ def trace(
         frames=samples,
         native=native[on_samples],
         desired=None if is_native else desired[on_samples],
+        key_frames=keys,
         keys=native[on_keys],
         selected=np.isin(keys, () if selected is None else selected),
         tick_frames=ticks,

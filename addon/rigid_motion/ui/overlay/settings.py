@@ -75,7 +75,43 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
     show_ghosts: bool = BoolProperty(
         name="Ghosts",
-        description="Draw the selected objects or bones as they are every few frames, in the mode of the path",
+        description="Draw the selected objects or bones as they are on frames before the current one and behind it, in "
+        "the mode of the path",
+        options=set(),
+    )
+    ghosts_on: str = EnumProperty(
+        name="Ghosts on",
+        description="The frames that have ghosts",
+        items=[
+            ("STEP", "Frames", "On every so many frames"),
+            ("KEYS", "Keys", "On keys alone"),
+        ],
+        translation_context=OWN_WORDS,
+        options=set(),
+    )
+    ghosts_before: int = IntProperty(
+        name="Before",
+        description="The most ghosts before the current frame. Those that would cover the view are left out",
+        default=5,
+        min=0,
+        soft_max=20,
+        max=200,
+        options=set(),
+    )
+    ghosts_after: int = IntProperty(
+        name="After",
+        description="The most ghosts behind the current frame. Those that would cover the view are left out",
+        default=5,
+        min=0,
+        soft_max=20,
+        max=200,
+        options=set(),
+    )
+    show_bodies: bool = BoolProperty(
+        name="Skinned Meshes",
+        description="Of armatures and their bones show the meshes that they deform, on frames that were shown since "
+        "the last edit: play them, or press Update Ghosts",
+        default=True,
         options=set(),
     )
     ghost_step: int = IntProperty(
@@ -84,6 +120,28 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
         default=5,
         min=1,
         soft_max=50,
+        options=set(),
+    )
+    show_deviations: bool = BoolProperty(
+        name="Deviations",
+        description="Mark frames on the path where the motion has a pop or a kink: its velocity jumps there, many "
+        "times as much as it changes around them",
+        options=set(),
+    )
+    deviation_threshold: float = FloatProperty(
+        name="Threshold",
+        description="By how many times more than around it the velocity has to change to be marked",
+        default=8.0,
+        min=1.5,
+        soft_max=50.0,
+        step=50,
+        precision=1,
+        options=set(),
+    )
+    show_speed: bool = BoolProperty(
+        name="Speed in Graph Editor",
+        description="Draw how fast the active object or bone goes, and how fast it turns, below its F-curves, each "
+        "with a scale of its own: the largest value is at the right",
         options=set(),
     )
 
@@ -116,6 +174,9 @@ def draw_settings(layout: bpy.types.UILayout, context: Any) -> None:
         draw_text(context, layout, HIDDEN_LABEL, "INFO")
     if cache.know_from_seeing(map(transform_of, selected_in_view(context))):
         layout.operator(RIGID_MOTION_OT_update_path.bl_idname)
+    row = layout.row(align=True)
+    row.operator("rigid_motion.edit_path")
+    row.operator_menu_enum("rigid_motion.set_path_point", "point")
     row = labelled(layout, iface_("Mode", OWN_WORDS))
     row.active = settings.show_paths or settings.show_ghosts
     row.prop(settings, "mode", text="")
@@ -123,7 +184,9 @@ def draw_settings(layout: bpy.types.UILayout, context: Any) -> None:
     ghosts.prop(settings, "show_ghosts")
     step = ghosts.row()
     step.active = settings.show_ghosts
-    step.prop(settings, "ghost_step", text="")
+    step.prop(settings, "ghosts_on", text="")
+    if settings.show_ghosts:
+        _draw_ghost_settings(layout, settings)
     column = layout.column()
     column.active = settings.show_paths
     labelled(column, iface_("Step", OWN_WORDS)).prop(settings, "tick_step", text="")
@@ -133,6 +196,17 @@ def draw_settings(layout: bpy.types.UILayout, context: Any) -> None:
     size = axes.row()
     size.active = settings.show_axes
     size.prop(settings, "axes_size", text="")
+
+
+def _draw_ghost_settings(layout: bpy.types.UILayout, settings: RigidMotionOverlay) -> None:
+    if settings.ghosts_on == "STEP":
+        labelled(layout).prop(settings, "ghost_step")
+    row = labelled(layout).row(align=True)
+    row.prop(settings, "ghosts_before")
+    row.prop(settings, "ghosts_after")
+    labelled(layout).prop(settings, "show_bodies")
+    if settings.show_bodies:
+        labelled(layout).operator(RIGID_MOTION_OT_update_path.bl_idname, text="Update Ghosts")
 
 
 def draw_toggle(panel: Any, context: Any) -> None:

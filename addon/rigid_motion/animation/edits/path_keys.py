@@ -1,0 +1,231 @@
+"""Keys on paths: moved, turned, retimed, inserted, deleted and selected, each key of a body in all of its channels.
+
+Where keys go is said in the world, and comes to channels through the space that these are in on the frame of each key.
+What has no keys of location cannot go anywhere: it turns about its origin until its point has come as near as it can.
+For targets, and what is refused, see `apply`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from bpy.app.translations import pgettext_n as n_
+
+from ...motion import Poses
+from ...motion.affine import AffineMaps, turned
+from ...motion.quaternions import from_matrices, matrices, multiply, normalise
+from ..actions.channels import BREAKDOWN_KEY, code_of, key_fields, key_points, set_key_fields
+from ..actions.slots import Binding
+from ..evaluation.bodies import turn_into_quaternions
+from ..evaluation.channel_values import channel_values
+from ..evaluation.components import LOCATION, PART_OF, ROTATION, ROWS
+from ..evaluation.differences import seen_values
+from ..evaluation.sources import SAME_FRAME
+from ..following.inserted import set_key
+from ..queries.keyed import active_binding, frames_in
+from ..transforms import Channel, Refused, Transform
+from .apply import Readings, Target, TriedEdit, TriedEdits, apply_edit, editable_binding, readable
+
+MIN_KEY_DISTANCE_FRAMES = 1.0
+"""From a key that is retimed to its neighbours, at least, where these were not nearer before."""
+
+MAX_STILL_CHANGE = 1e-6
+"""Values that differ by less need no key, and turns that do are none."""
+
+POINT_FIELDS = ("co", "handle_left", "handle_right")
+SELECTION_FIELDS = ("select_control_point", "select_left_handle", "select_right_handle")
+
+NOT_KEYED = n_("{name} has no keys of location or rotation that could be moved: key it first")
+
+
+class KeySpaces(NamedTuple):
+    """Some keys of something, n of them, and what their channels are in."""
+
+    frames: np.ndarray
+    """Of the Action, rising, shape (n,)."""
+
+    maps: AffineMaps
+    """From the space of location channels into the world, shape (n,)."""
+
+    turns: np.ndarray | None
+    """What stands between rotation and that space, shape (n, 3, 3); None where nothing does."""
+
+    points: np.ndarray
+    """The points of the body that lead, in the world, shape (n, 3)."""
+
+
+class _Keys(TriedEdit):
+    """Keys of a transform that are edited."""
+
+    def __init__(self, transform: Transform, readings: Readings, spaces: KeySpaces) -> None:
+        binding = editable_binding(transform, [binding for binding, _ in readings])
+        self.source = source = next(source for one, source in readable(transform, readings) if one is binding)
+        self.spaces = spaces
+        super().__init__(transform, binding, (*binding.moving, transform.turns_channel))
+        is_tied = transform.is_part and transform.pose_bone.bone.use_connect and transform.pose_bone.parent is not None
+        parts = {ROTATION} if is_tied else {LOCATION, ROTATION}
+        self.rows = [
+            row
+            for row, channel in transform.channels.items()
+            if PART_OF[row] in parts and row not in source.driven and self.keys.get(channel) is not None
+        ]
+        """The components that can be moved."""
+        if not self.rows:
+            raise Refused(NOT_KEYED, name=transform.name)
+        self.before = source.values_at(spaces.frames)
+        for part in ROWS.keys() - source.keyed:
+            self.before[ROWS[part]] = self.posed[ROWS[part], None]
+        if is_tied:
+            self.before[ROWS[LOCATION]] = 0.0
+        others = frames_in(binding)
+        away = others[~near(others, spaces.frames)] - spaces.frames[:, None]
+        back, forth = (np.abs(away[side]).min(initial=np.inf) for side in (away < 0.0, away > 0.0))
+        self.room = -max(back - MIN_KEY_DISTANCE_FRAMES, 0.0), max(forth - MIN_KEY_DISTANCE_FRAMES, 0.0)
+        """How many frames its keys may go back and forth before they come to others."""
+
+    def moved(self, delta: AffineMaps) -> np.ndarray:
+        """Return the components (10, n) with which a map of the world has moved its keys."""
+        _, spaces, turns, points = self.spaces
+        rows, original = self.before.copy(), self.source.original[:, None].repeat(len(points), axis=1)
+        turn_into_quaternions(rows, self.source.order)
+        places = spaces.at((rows[ROWS[LOCATION]] + original[ROWS[LOCATION]]).T)
+        axes = np.broadcast_to(delta.axes, spaces.axes.shape)
+        if np.allclose(delta.axes, np.eye(3), atol=MAX_STILL_CHANGE) and self.rows[0] >= ROWS[ROTATION].start:
+            axes = swings(points - places, delta.at(points) - places)
+        along = spaces.axes if turns is None else spaces.axes @ turns
+        # Under uneven scale that is no rotation: this is the nearest.
+        first, _, last = np.linalg.svd(np.linalg.solve(along, axes @ along))
+        quaternions = multiply(original[ROWS[ROTATION]].T, rows[ROWS[ROTATION]].T)
+        poses = Poses(
+            turned(np.linalg.inv(spaces.axes), delta.at(places) - spaces.origins),
+            multiply(from_matrices(first @ last), quaternions),
+        )
+        each, ends = np.ones(len(points), dtype=int), np.stack((self.before, self.before))
+        return channel_values(poses, each, np.zeros(len(points)), ends, original, self.source.order)
+
+    def move(self, delta: AffineMaps) -> None:
+        """Have its keys be where a map of the world takes them. Breakdowns shape the path from now on."""
+        frames, values, source = self.spaces.frames, self.moved(delta), self.source
+        passed = source.key_frames[source.passed]
+        for row in self.rows:
+            channel = self.transform.channels[row]
+            kept, fcurve = self.keys[channel], self.binding.curves[channel]
+            assert kept is not None
+            fields = {name: numbers.copy() for name, numbers in kept.items()}
+            times = fields["co"][:, 0]
+            at = np.abs(times - frames[:, None]).argmin(axis=1)
+            there = np.abs(times[at] - frames) < SAME_FRAME
+            by = values[row] - np.where(there, fields["co"][at, 1], self.before[row])
+            if PART_OF[row] == ROTATION and not np.abs(by).max() > MAX_STILL_CHANGE:
+                continue
+            for name in POINT_FIELDS:
+                fields[name][at[there], 1] += by[there]
+            shapes = at[there & near(frames, passed)]
+            types = fields["type"][shapes]
+            fields["type"][shapes] = np.where(types == BREAKDOWN_KEY, code_of("type", "KEYFRAME"), types)
+            set_key_fields(fcurve, fields)
+            for number in np.flatnonzero(~there & (np.abs(by) > MAX_STILL_CHANGE)).tolist():
+                set_key(fcurve, float(frames[number]), float(values[row, number]))
+
+    def retime(self, by: float) -> None:
+        """Have its keys be so many frames later, handles along with them."""
+        for channel, kept in self.keys.items():
+            if kept is not None:
+                fields = {name: numbers.copy() for name, numbers in kept.items()}
+                chosen = near(kept["co"][:, 0], self.spaces.frames)
+                for name in POINT_FIELDS:
+                    fields[name][chosen, 0] += by
+                set_key_fields(self.binding.curves[channel], fields)
+
+
+class KeyEdits(TriedEdits):
+    """Keys of several transforms of which places or frames are tried until they are good."""
+
+    def __init__(self, keys: Mapping[Transform, KeySpaces], *, refused: list[Refused] | None = None) -> None:
+        def plan(transform: Transform, readings: Readings) -> _Keys:
+            return _Keys(transform, readings, keys[transform])
+
+        super().__init__(apply_edit(keys, plan, lambda _, one: one, refused).values())
+
+    def move(self, delta: np.ndarray) -> None:
+        """Have all keys be where a rigid map of the world (4, 4) takes them from where they were at first."""
+        with self.edit():
+            for one in self.tried:
+                one.move(AffineMaps(delta[:3, :3], delta[:3, 3]))
+
+    def retime(self, by: float) -> float:
+        """Have all keys be so many frames later than at first, as far as none comes to others; return how many."""
+        back, forth = (np.array([one.room[side] for one in self.tried]) for side in (0, 1))
+        by = float(np.clip(by, back.max(), forth.min()))
+        with self.edit():
+            for one in self.tried:
+                one.retime(by)
+        return by
+
+
+def insert_key(target: Target, frame: float) -> None:
+    """Key something in all channels with keys on a frame of its Action, as it is seen there: the motion stays."""
+
+    def plan(transform: Transform, readings: Readings) -> tuple[Binding, dict[Channel, float], bool]:
+        binding = editable_binding(transform, [binding for binding, _ in readings])
+        source = next(source for one, source in readable(transform, readings) if one is binding)
+        run = source.run_at(frame)
+        values, channels = seen_values(run.source, run.moments(np.array([frame])))[:, 0].tolist(), transform.channels
+        first, last = run.source.keyed_range
+        is_native = first < frame < last and not run.source.mode_at(frame)
+        return binding, {channels[row]: values[row] for rows, _ in source.channels for row in rows}, is_native
+
+    def act(_: Transform, planned: tuple[Binding, dict[Channel, float], bool]) -> None:
+        binding, values, is_native = planned
+        for channel, value in values.items():
+            fcurve = binding.curves[channel]
+            behind = int(np.searchsorted(key_points(fcurve)[:, 0], frame))
+            # Automatic handles beside the key would be set anew.
+            for key in fcurve.keyframe_points[max(behind - 1, 0) : behind + 1] if is_native else ():
+                key.handle_left_type = key.handle_right_type = "FREE"
+            set_key(fcurve, frame, value)
+
+    apply_edit(target, plan, act, None)
+
+
+def delete_keys(keys: Mapping[Transform, np.ndarray], *, refused: list[Refused] | None = None) -> None:
+    """Delete the keys on some frames (n,) of each of these. A channel without others goes with them."""
+
+    def plan(transform: Transform, readings: Readings) -> Binding:
+        return editable_binding(transform, [binding for binding, _ in readings])
+
+    def act(transform: Transform, binding: Binding) -> None:
+        for channel in (*binding.moving, transform.turns_channel):
+            if (fcurve := binding.curves.get(channel)) is not None:
+                stays = ~near(key_points(fcurve)[:, 0], keys[transform])
+                if stays.any():
+                    fields = key_fields(fcurve.keyframe_points)
+                    set_key_fields(fcurve, {name: numbers[stays] for name, numbers in fields.items()})
+                else:
+                    binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+
+    apply_edit(keys, plan, act, refused)
+
+
+def select_keys(target: Transform, frames: np.ndarray) -> None:
+    """Have the keys on these frames (n,) be selected, and no others of something."""
+    if (binding := active_binding(target)) is not None:
+        for fcurve in binding.curves.values():
+            chosen = near(key_points(fcurve)[:, 0], frames)
+            for name in SELECTION_FIELDS:
+                fcurve.keyframe_points.foreach_set(name, chosen)
+
+
+def near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return which frames (n,) are any of others (m,) to Blender, shape (n,)."""
+    return (np.abs(frames[:, None] - others) < SAME_FRAME).any(axis=1)
+
+
+def swings(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the shortest turns (n, 3, 3) that take the directions of vectors (n, 3) to those of others."""
+    lengths = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
+    cosines = lengths + np.einsum("ni,ni->n", first, second)
+    turns = np.column_stack((np.where(cosines > 0.0, cosines, 1.0), np.cross(first, second)))
+    return np.moveaxis(matrices(normalise(turns)), -1, 0)

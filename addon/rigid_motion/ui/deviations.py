@@ -1,0 +1,121 @@
+"""*Show Deviations*: frames on which a body bends off from how it moves around them, on its path, one after the other.
+
+A pop or a kink is a jump of its velocity, however it turns, many times as large as the jumps around it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ..animation.transforms import Transform
+from ..blender import IntProperty, Operator, Returned, existing, view_layer, with_properties
+from ..motion.speeds import jumps
+from .overlay import overlay_settings
+from .overlay.drawing import Pen, batch_of, beside
+from .overlay.points import DrawnPath
+from .overlay.seen import SeenMotion, seen_paths
+from .overlay.settings import RigidMotionOverlay
+from .targets import targets_of
+from .wording import labelled
+
+MARK_COLOR = (1.0, 0.15, 0.75, 1.0)
+"""Of a mark on the path, as of no other thing there."""
+
+MARK_DIAMETER_PX, MARK_BORDER_PX = 16.0, 3.0
+
+MAX_NAMED_FRAMES = 6
+"""The most frames that there is room for in a sidebar."""
+
+_known: WeakKeyDictionary[DrawnPath, tuple[float, np.ndarray]] = WeakKeyDictionary()
+"""By paths, which are others after every edit: the threshold, and the frames (d,) that deviate."""
+
+
+def deviations_on(path: DrawnPath, target: Transform, settings: RigidMotionOverlay) -> np.ndarray:
+    """Return the whole frames of the Action on which a target deviates, (d,), as its path shows it."""
+    threshold, mode = settings.deviation_threshold, settings.mode
+    if (known := _known.get(path)) is None or known[0] != threshold:
+        motion = SeenMotion.of(target, existing(view_layer().depsgraph))
+        frames = motion.frames()
+        measured = jumps(motion.maps(frames, None if mode == "CHOSEN" else mode), motion.size)
+        # Of jumps side by side, which one pop makes, the largest.
+        near = np.pad(measured, 2)
+        largest = np.max([near[:-4], near[1:-3], near[3:-1], near[4:]], axis=0)
+        _known[path] = threshold, frames[(measured > threshold) & (measured >= largest)]
+    return _known[path][1]
+
+
+def draw(pen: Pen, target: Transform, path: DrawnPath, _now: float, settings: RigidMotionOverlay) -> None:
+    """Draw rings around the deviations on a path, in its space."""
+    if settings.show_deviations and settings.show_paths:
+        frames, line = deviations_on(path, target, settings), path.native if path.desired is None else path.desired
+        places = np.stack([np.interp(frames, path.frames, column) for column in line.T], axis=1)
+        ring = (*MARK_COLOR[:3], 0.0)
+        pen.dot(batch_of("POINTS", places), ring, MARK_DIAMETER_PX, MARK_COLOR, MARK_BORDER_PX)
+
+
+def frames_of(context: Any) -> np.ndarray:
+    """Return the frames of the scene on which any of the targets deviates, (d,), rising."""
+    targets, settings = targets_of(context), overlay_settings(context.scene)
+    found = [np.empty(0)]
+    for target, path in zip(targets, seen_paths(targets, context), strict=True):
+        if path is not None:
+            to_scene = existing(target.animated.animation_data).nla_tweak_strip_time_to_scene
+            found.append(np.array([to_scene(frame) for frame in deviations_on(path, target, settings).tolist()]))
+    return np.unique(np.concatenate(found))
+
+
+def draw_settings(context: Any, layout: bpy.types.UILayout) -> None:
+    """Draw the settings, and buttons to go from one to the next, for a panel."""
+    settings = overlay_settings(context.scene)
+    row = labelled(layout)
+    row.active = settings.show_paths
+    row.prop(settings, "show_deviations")
+    if not settings.show_deviations:
+        return
+    labelled(layout).prop(settings, "deviation_threshold")
+    row = labelled(layout).row(align=True)
+    before: Any = row.operator(RIGID_MOTION_OT_go_to_deviation.bl_idname, text="", icon="TRIA_LEFT")
+    before.step = -1
+    row.operator(RIGID_MOTION_OT_go_to_deviation.bl_idname, text="", icon="TRIA_RIGHT")
+    frames = frames_of(context)
+    row.label(text=", ".join(f"{frame:g}" for frame in frames[:MAX_NAMED_FRAMES]) or "0", translate=False)
+
+
+@with_properties
+class RIGID_MOTION_OT_go_to_deviation(Operator):
+    bl_idname = "rigid_motion.go_to_deviation"
+    bl_label = "Go to Deviation"
+    bl_description = "Go to the next frame, or the one before, on which the selection has a pop or a kink"
+
+    step: int = IntProperty(
+        name="Step", description="1 for the next one, -1 for the one before", default=1, min=-1, max=1
+    )
+
+    def execute(self, context: bpy.types.Context) -> Returned:
+        scene = existing(context.scene)
+        ways = (frames_of(context) - scene.frame_current) * self.step
+        if not (ways > 0.5).any():
+            self.report({"INFO"}, rpt_(NO_MORE))
+            return {"CANCELLED"}
+        scene.frame_set(scene.frame_current + self.step * round(float(ways[ways > 0.5].min())))
+        return {"FINISHED"}
+
+
+NO_MORE = n_("No more deviations in this direction")
+
+CLASSES = (RIGID_MOTION_OT_go_to_deviation,)
+
+
+def register() -> None:
+    beside.append(draw)
+
+
+def unregister() -> None:
+    beside.remove(draw)
+    _known.clear()

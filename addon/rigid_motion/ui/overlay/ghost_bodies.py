@@ -1,0 +1,182 @@
+"""Meshes that armatures deform, as ghosts: as they were seen on frames that were shown, since nobody else knows them.
+
+What is seen is kept with few triangles, in the world. It is forgotten when keys of the armature or the mesh change; a
+pose that is not keyed changes nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import bpy
+import gpu
+import numpy as np
+
+from ...animation.actions.channels import key_points
+from ...animation.actions.slots import active_fcurves
+from ...animation.transforms import Transform, transform_of
+from ...blender import existing, original_uid, persistent
+from ...handlers import append_handlers, remove_handlers
+from ..targets import selected_in_view
+from .ghosts import fewer_triangles, ghost_frames
+from .settings import overlay_settings
+
+MAX_SEEN_BODIES = 16
+"""The number of meshes that are kept."""
+
+
+@dataclass(eq=False)
+class SeenBody:
+    """One mesh, in the world."""
+
+    mesh: int
+    """The session id of its data."""
+
+    keys: bytes
+    """All keys that it moves by."""
+
+    count: int
+    """The number of its vertices."""
+
+    kept: np.ndarray
+    """The numbers of the vertices that are kept, (v,)."""
+
+    triangles: np.ndarray
+    """The corners of triangles among these, (t, 3)."""
+
+    places: dict[float, np.ndarray] = field(default_factory=dict)
+    """Where they were in the world, (v, 3), by the frames of the scene."""
+
+    batches: dict[float, tuple[gpu.types.GPUBatch, np.ndarray]] = field(default_factory=dict)
+    """What is on the graphics card of that, and the corners of the boxes around it, (8, 4)."""
+
+
+_seen: dict[int, SeenBody] = {}
+"""By the session id of the object of the mesh; those noted last come last."""
+
+_known_keys: dict[int, tuple[bytes, np.ndarray]] = {}
+"""See `_keys`, by the session ids of armatures."""
+
+
+def bodies_of(transform: Transform) -> list[bpy.types.Object]:
+    """Return the objects whose meshes an armature deforms: that of a bone, or of one of these objects."""
+    obj = transform.animated
+    rig = obj if obj.type == "ARMATURE" else obj.find_armature()
+    if rig is None:
+        return []
+    # What hangs on a rig is its child, or lies beside it.
+    beside = [item for collection in rig.users_collection for item in collection.objects]
+    return [
+        item for item in dict.fromkeys((*rig.children, *beside)) if item.type == "MESH" and item.find_armature() == rig
+    ]
+
+
+def _rigs(context: Any) -> dict[bpy.types.Object, list[bpy.types.Object]]:
+    """Return the selected armatures with the objects that they deform."""
+    transforms = {one.animated: one for one in map(transform_of, selected_in_view(context))}
+    found = {bodies[0].find_armature(): bodies for one in transforms.values() if (bodies := bodies_of(one))}
+    return {rig: [body for body in bodies if body.visible_get()] for rig, bodies in found.items() if rig is not None}
+
+
+def _keys(rig: bpy.types.Object) -> tuple[bytes, np.ndarray]:
+    """Return a digest of the keys in an armature's Action, and their frames (k,); read anew after an edit alone."""
+    if rig.session_uid not in _known_keys:
+        summary, frames = hashlib.blake2b(digest_size=16), [np.empty(0)]
+        for fcurve in active_fcurves(rig):
+            frames.append(key_points(fcurve)[:, 0].round(2))
+            for name in ("co", "handle_left", "handle_right"):
+                summary.update(key_points(fcurve, name).tobytes())
+        _known_keys[rig.session_uid] = summary.digest(), np.unique(np.concatenate(frames))
+    return _known_keys[rig.session_uid]
+
+
+def _frames(rig: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
+    """Return the frames of the scene that have ghosts."""
+    settings = overlay_settings(scene)
+    step = settings.ghost_step if settings.ghosts_on == "STEP" else -1
+    return ghost_frames(scene.frame_start, scene.frame_end, step, _keys(rig)[1])
+
+
+def note(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Take down the meshes of the selected armatures on the frame that is shown, if ghosts are to be on it."""
+    settings, now = overlay_settings(scene), float(scene.frame_current_final)
+    if settings.show_ghosts and settings.show_bodies and depsgraph.mode == "VIEWPORT":
+        for rig, bodies in _rigs(bpy.context).items():
+            for body in bodies if np.any(np.abs(_frames(rig, scene) - now) < 1e-3) else ():
+                _note(body, now, _keys(rig)[0], depsgraph)
+
+
+def _note(body: bpy.types.Object, now: float, keys: bytes, depsgraph: bpy.types.Depsgraph) -> None:
+    evaluated: Any = body.evaluated_get(depsgraph)
+    mesh = evaluated.data
+    mesh.calc_loop_triangles()
+    if not len(mesh.loop_triangles):  # as while it is edited
+        return
+    places: np.ndarray = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", places)
+    places = places.reshape(-1, 3)
+    seen = _seen.pop(body.session_uid, None)
+    if seen is None or seen.keys != keys or seen.count != len(places):
+        corners: np.ndarray = np.empty(3 * len(mesh.loop_triangles), np.int32)
+        mesh.loop_triangles.foreach_get("vertices", corners)
+        seen = SeenBody(
+            existing(body.data).session_uid, keys, len(places), *fewer_triangles(places, corners.reshape(-1, 3))
+        )
+    matrix = np.array(evaluated.matrix_world, dtype=np.float32)
+    seen.places[now] = places[seen.kept] @ matrix[:3, :3].T + matrix[:3, 3]
+    seen.batches.pop(now, None)
+    _seen[body.session_uid] = seen
+    while len(_seen) > MAX_SEEN_BODIES:
+        del _seen[next(iter(_seen))]
+
+
+def seen_bodies(context: Any) -> Iterator[tuple[bpy.types.Object, SeenBody, np.ndarray]]:
+    """Yield the meshes of the selected armatures that were seen with the keys as they are: the armature, what was seen,
+    and the frames that have ghosts.
+    """
+    for rig, bodies in _rigs(context).items():
+        for body in bodies:
+            seen = _seen.get(body.session_uid)
+            if seen is not None and seen.keys == _keys(rig)[0]:
+                yield rig, seen, _frames(rig, context.scene)
+
+
+@persistent
+def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if any(isinstance(update.id, bpy.types.Action | bpy.types.Object) for update in depsgraph.updates):
+        _known_keys.clear()
+    meshes = {original_uid(update) for update in depsgraph.updates if isinstance(update.id, bpy.types.Mesh)}
+    for uid in [uid for uid, seen in _seen.items() if seen.mesh in meshes]:
+        del _seen[uid]
+
+
+@persistent
+def _on_undo(*_: object) -> None:
+    _known_keys.clear()
+
+
+@persistent
+def _on_file(*_: object) -> None:
+    _known_keys.clear()
+    _seen.clear()
+
+
+HANDLERS: dict[str, Callable] = {
+    "frame_change_post": persistent(note),
+    "depsgraph_update_post": _on_update,
+    "undo_post": _on_undo,
+    "redo_post": _on_undo,
+    "load_post": _on_file,
+}
+
+
+def register() -> None:
+    append_handlers(HANDLERS)
+
+
+def unregister() -> None:
+    remove_handlers(HANDLERS)
+    _on_file()

@@ -1,0 +1,225 @@
+"""Ghosts on the screen: those next to the current frame, before it and behind it, fainter the further they are away.
+
+Where they cover more of a view than it has, only every second, third, ... is left, and these are fainter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+from mathutils import Matrix
+
+from ...animation.transforms import Transform
+from ...blender import existing, original_uid, persistent, view_layer
+from ...handlers import append_handlers, remove_handlers
+from ..preferences import Color
+from .drawing import Batch, Pen, batch_of, beside, complain, own_space
+from .ghost_bodies import SeenBody, seen_bodies
+from .ghosts import shape_of
+from .points import DrawnPath
+from .settings import RigidMotionOverlay, is_shown, overlay_settings
+
+SOLID_OPACITY, EDGE_OPACITY = 0.22, 0.6
+"""Opacity of the triangles and of the edges of the ghost that is next to the current frame."""
+
+LEAST_FADE = 0.25
+"""The part of that which the furthest one has."""
+
+EDGE_WIDTH = 1.0
+"""The width of edges, in pixels at a resolution scale of 1."""
+
+MIN_GHOST_DISTANCE_FRAMES = 0.5
+"""Frames from the current one within which there is no ghost, since the thing itself is there."""
+
+MAX_COVERED_RATIO, FULL_CONTRAST_RATIO = 1.5, 0.4
+"""How many times ghosts may cover a view in all, and up to where they have their full contrast."""
+
+
+class _OnCard(NamedTuple):
+    """What a ghost looks like, on the graphics card."""
+
+    triangles: Batch
+    edges: Batch
+
+    corners: np.ndarray
+    """Of its bounding box, shape (8, 4)."""
+
+
+_shapes: dict[tuple[int, str], _OnCard] = {}
+"""By the identity of what is moved."""
+
+_with_bodies: set[int] = set()
+"""The session ids of armatures whose bones have no ghosts, since their meshes have."""
+
+
+@persistent
+def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if _shapes:
+        forget({original_uid(update) for update in depsgraph.updates if update.is_updated_geometry})
+
+
+@persistent
+def _on_file(*_: object) -> None:
+    forget()
+
+
+HANDLERS: dict[str, Callable] = {
+    "depsgraph_update_post": _on_update,
+    "undo_post": _on_file,
+    "redo_post": _on_file,
+    "load_post": _on_file,
+}
+
+
+_handle: object = None
+
+
+def register() -> None:
+    global _handle
+    append_handlers(HANDLERS)
+    beside.append(draw_ghosts)
+    if not bpy.app.background:
+        _handle = bpy.types.SpaceView3D.draw_handler_add(draw_bodies, (), "WINDOW", "POST_VIEW")
+
+
+def unregister() -> None:
+    if not bpy.app.background:
+        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
+    beside.remove(draw_ghosts)
+    remove_handlers(HANDLERS)
+    forget()
+
+
+def forget(uids: set[int] | None = None) -> None:
+    """Have shapes be looked at anew: of objects with these session ids, or all."""
+    for identity in [identity for identity in _shapes if uids is None or identity[0] in uids]:
+        del _shapes[identity]
+
+
+def fades(frames: np.ndarray, now: float, settings: RigidMotionOverlay) -> np.ndarray:
+    """Return how much of their contrast ghosts (g,) on rising frames have: 0 for those that are not shown."""
+    result = np.zeros(len(frames))
+    before = np.flatnonzero(frames < now - MIN_GHOST_DISTANCE_FRAMES)[::-1][: settings.ghosts_before]
+    behind = np.flatnonzero(frames > now + MIN_GHOST_DISTANCE_FRAMES)[: settings.ghosts_after]
+    for chosen in (before, behind):
+        result[chosen] = np.linspace(1.0, LEAST_FADE, len(chosen))
+    return result
+
+
+def thinned_out(fade: np.ndarray, covered: np.ndarray) -> np.ndarray:
+    """Return what is left of the contrast of ghosts (g,) that cover so much of a view each, in parts of it.
+
+    The same ones are left wherever the current frame is.
+    """
+    numbers, step = np.arange(len(fade)), 1
+    while step < len(fade) and covered[(fade > 0.0) & (numbers % step == 0)].sum() > MAX_COVERED_RATIO:
+        step += 1
+    left = np.where(numbers % step == 0, fade, 0.0)
+    total = float(covered[left > 0.0].sum())
+    return left * min(1.0, FULL_CONTRAST_RATIO / max(total, 1e-9))
+
+
+def covered_by(corners: np.ndarray, matrices: np.ndarray) -> np.ndarray:
+    """Return how much of a view boxes cover, (g,): corners (8, 4) or of each (g, 8, 4), and matrices (g, 4, 4) into
+    clip space.
+    """
+    clip = corners @ matrices.transpose(0, 2, 1)
+    is_near = (clip[..., 3] <= 0.0).any(axis=1)
+    places = clip[..., :2] / np.where(clip[..., 3:] > 0.0, clip[..., 3:], 1.0)
+    inside = np.clip(places, -1.0, 1.0)
+    return np.where(is_near, 1.0, 0.25 * np.ptp(inside, axis=1).prod(axis=1))
+
+
+def box_of(points: np.ndarray) -> np.ndarray:
+    """Return the corners (8, 4) of the box around points (n, 3)."""
+    ends = np.stack((points.min(axis=0), points.max(axis=0)))
+    return np.array([(ends[i, 0], ends[j, 1], ends[k, 2], 1.0) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+
+
+def tint(pen: Pen, frame: float, now: float, holder: int = 0) -> Color:
+    """Return the colour of a ghost: that of what holds it, or else of the past or the future."""
+    return pen.held_color(holder, pen.look.past_color if frame < now else pen.look.future_color)
+
+
+def draw_ghosts(pen: Pen, transform: Transform, path: DrawnPath, now: float, settings: RigidMotionOverlay) -> None:
+    """Draw the ghosts of something around a frame, as the keys have it, in the space of the matrix stack."""
+    identity, ghosts = transform.identity, path.ghosts
+    if ghosts is None or transform.animated.session_uid in _with_bodies:
+        return
+    if identity not in _shapes:
+        shape = shape_of(transform, existing(view_layer().depsgraph))
+        corners = box_of(np.concatenate((shape.triangles, shape.lines)))
+        _shapes[identity] = _OnCard(batch_of("TRIS", shape.triangles), batch_of("LINES", shape.lines), corners)
+    look = _shapes[identity]
+    fade = _left(fades(ghosts.frames, now, settings), ghosts.matrices, look.corners)
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    gpu.state.depth_test_set("LESS_EQUAL")
+    gpu.state.face_culling_set("BACK")
+    try:
+        # From afar, so that what is nearer in time lies over it.
+        for number in sorted(np.flatnonzero(fade).tolist(), key=lambda number: fade[number]):
+            holder = 0 if ghosts.holders is None else int(ghosts.holders[number])
+            *rgb, alpha = tint(pen, float(ghosts.frames[number]), now, holder)
+            red, green, blue = rgb
+            with own_space():
+                gpu.matrix.multiply_matrix(Matrix(ghosts.matrices[number]))
+                if look.triangles:
+                    shader.uniform_float("color", (red, green, blue, SOLID_OPACITY * alpha * fade[number]))
+                    look.triangles.draw(shader)
+                pen.line(look.edges, (red, green, blue, EDGE_OPACITY * alpha * fade[number]), EDGE_WIDTH)
+    finally:
+        gpu.state.face_culling_set("NONE")
+        gpu.state.depth_test_set("NONE")
+
+
+def _left(fade: np.ndarray, matrices: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return `thinned_out` in the view that is being drawn, for one box (8, 4), or one each, with these matrices."""
+    shown, covered = np.flatnonzero(fade), np.zeros(len(fade))
+    view = np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
+    covered[shown] = covered_by(corners if corners.ndim == 2 else corners[shown], view @ matrices[shown])
+    return thinned_out(fade, covered)
+
+
+def draw_bodies() -> None:
+    """Draw the meshes of the selected armatures in the viewport that is being drawn. It never raises."""
+    context: Any = bpy.context
+    _with_bodies.clear()
+    try:
+        settings = overlay_settings(context.scene)
+        if not (settings.show_ghosts and settings.show_bodies and is_shown(context)):
+            return
+        pen, now = Pen(context), float(context.scene.frame_current_final)
+        gpu.state.blend_set("ALPHA")
+        gpu.state.depth_test_set("LESS_EQUAL")
+        gpu.state.face_culling_set("BACK")
+        for rig, seen, frames in seen_bodies(context):
+            _with_bodies.add(rig.session_uid)
+            _draw_body(pen, seen, frames, now, settings)
+    except Exception as problem:
+        complain(problem)
+    finally:
+        gpu.state.face_culling_set("NONE")
+        gpu.state.depth_test_set("NONE")
+        gpu.state.blend_set("NONE")
+
+
+def _draw_body(pen: Pen, seen: SeenBody, frames: np.ndarray, now: float, settings: RigidMotionOverlay) -> None:
+    known = np.array(sorted(frame for frame in seen.places if np.abs(frames - frame).min(initial=np.inf) < 1e-3))
+    fade, boxes = fades(known, now, settings), np.zeros((len(known), 8, 4))
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    for number in np.flatnonzero(fade).tolist():
+        frame = float(known[number])
+        if frame not in seen.batches:
+            content: dict[str, Any] = {"content": {"pos": seen.places[frame]}, "indices": seen.triangles}
+            seen.batches[frame] = batch_for_shader(shader, "TRIS", **content), box_of(seen.places[frame])
+        boxes[number] = seen.batches[frame][1]
+    fade = _left(fade, np.tile(np.eye(4), (len(known), 1, 1)), boxes)
+    for number in sorted(np.flatnonzero(fade).tolist(), key=lambda number: fade[number]):
+        frame = float(known[number])
+        shader.uniform_float("color", (*tint(pen, frame, now)[:3], SOLID_OPACITY * fade[number]))
+        seen.batches[frame][0].draw(shader)

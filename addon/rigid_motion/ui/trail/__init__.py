@@ -1,0 +1,19 @@
+"""Editing paths in the viewport: the tool *Edit Path*, whose handles are the keys on the paths that the overlay draws.
+
+A key is selected here as it is in the Dope Sheet. Each operator is one step of undo.
+
+handles   keys on the screen, and what their channels are in
+tool      the tool, its keys, and the operator that takes it
+picking   operators that select, insert and delete keys
+dragging  operators that move, turn and retime keys
+"""
+
+from __future__ import annotations
+
+from . import dragging, picking, tool
+
+CLASSES = (*picking.CLASSES, *dragging.CLASSES, *tool.CLASSES)
+
+__all__ = ["CLASSES", "register", "unregister"]
+
+register, unregister = tool.register, tool.unregister

@@ -1,0 +1,274 @@
+"""Selected keys on paths are moved, turned and retimed by the mouse, as Blender's own transforms go.
+
+X, Y and Z lock an axis of the world, Ctrl goes in steps, Shift is fine, and a number is typed, along X if none is
+locked. A click or Enter confirms, a right click or Esc brings all back.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from bpy_extras.view3d_utils import (
+    location_3d_to_region_2d,
+    region_2d_to_location_3d,
+    region_2d_to_origin_3d,
+    region_2d_to_vector_3d,
+)
+from mathutils import Matrix, Vector
+from mathutils.geometry import intersect_line_line
+
+from ...animation import Refused
+from ...animation.edits.path_keys import KeyEdits
+from ...blender import FloatProperty, FloatVectorProperty, Returned, existing, with_properties
+from ..breakdown import CANCEL, CONFIRM, SHIFT_RATIO, typed_number
+from .handles import Handles, OnPath, handles_of, key_under, select, selected_spaces
+from .picking import RIGID_MOTION_OT_select_path_keys, mouse_of, pressed_at
+
+STEP_PX = 50.0
+"""Steps of Ctrl are the largest power of ten that is no more than so many pixels, at a resolution scale of 1."""
+
+STEP_DEG, FINE_STEP_DEG = 5.0, 1.0
+"""Steps of Ctrl, and with Shift, of turns."""
+
+FINE_STEP_RATIO = 0.1
+"""Steps of Ctrl with Shift are so much smaller."""
+
+AXES = "XYZ"
+
+
+class DragInput:
+    """What mouse and keyboard say while keys are dragged. `place` is where the mouse is, in pixels of the region."""
+
+    def __init__(self, place: np.ndarray) -> None:
+        self.first, self.place, self._mouse = place.copy(), place.copy(), place.copy()
+        self.axis: int | None = None
+        """The axis of the world that is locked, 0 to 2."""
+        self.is_stepped = self.is_fine = False
+        self.typed = ""
+
+    @property
+    def number(self) -> float | None:
+        """The number that was typed; None where the mouse has its say."""
+        return typed_number(self.typed) if self.typed else None
+
+    def handle(self, event: bpy.types.Event) -> bool:
+        """Take an event, and say whether it may have changed anything."""
+        self.is_stepped, self.is_fine = event.ctrl, event.shift
+        if event.type == "MOUSEMOVE":
+            mouse = mouse_of(event)
+            self.place += (mouse - self._mouse) * (SHIFT_RATIO if event.shift else 1.0)
+            self._mouse = mouse
+        elif event.type in ("LEFT_CTRL", "RIGHT_CTRL", "LEFT_SHIFT", "RIGHT_SHIFT"):
+            pass
+        elif event.value != "PRESS":
+            return False
+        elif event.type in AXES:
+            axis = AXES.index(event.type)
+            self.axis = None if self.axis == axis else axis
+        elif event.type == "BACK_SPACE":
+            self.typed = self.typed[:-1]
+        elif event.unicode and event.unicode in "0123456789.,-":
+            self.typed += event.unicode.replace(",", ".")
+        else:
+            return False
+        return True
+
+
+class _Dragging(OnPath):
+    """Operators that try edits of the selected keys while the mouse moves."""
+
+    bl_options = {"REGISTER", "UNDO", "BLOCKING"}  # noqa: RUF012 - Blender reads it
+    leaves_carried: ClassVar[bool] = True
+    """True if keys go along with those of what carries them."""
+    keys_text: ClassVar[str] = n_(
+        "LMB, Enter: Confirm | Esc, RMB: Cancel | X, Y, Z: Axis | Ctrl: Steps | Shift: Precision | 0-9: Number"
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Returned:
+        handles, self._is_drag = handles_of(context), event.value == "CLICK_DRAG"
+        place = pressed_at(event) if self._is_drag else mouse_of(event)
+        self._hit: tuple[Handles, float] | None
+        if self._is_drag:
+            self._hit = key_under(context, handles, place)
+            if self._hit is None:
+                return {"PASS_THROUGH", "CANCELLED"}
+            one, frame = self._hit
+            if frame not in one.selected:
+                select(context, handles, {one.target: np.array([frame])})
+                # What is adjusted after the drag (F9) is then what was dragged.
+                bpy.ops.ed.undo_push(message=RIGID_MOTION_OT_select_path_keys.bl_label)
+                handles = handles_of(context)
+        else:
+            self._hit = next(((one, float(one.selected[0])) for one in handles if len(one.selected)), None)
+        if not self._read(handles):
+            return self.without_keys(handles, self._refused)
+        self._input = DragInput(place)
+        self.begin(context)
+        existing(context.workspace).status_text_set(iface_(self.keys_text))
+        existing(context.window_manager).modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> Returned:
+        is_released = self._is_drag and event.type == "LEFTMOUSE" and event.value == "RELEASE"
+        if event.type in CANCEL and event.value == "PRESS":
+            self.cancel(context)
+            return {"CANCELLED"}
+        if is_released or (event.type in CONFIRM and event.value == "PRESS"):
+            self._hide(context)
+            return self.finish(self._refused)
+        if self._input.handle(event):
+            existing(context.area).header_text_set(self.drag(context))
+            self.finish(())
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Bring all back. Blender calls it, too, where it ends the operator by itself."""
+        self._edits.cancel()
+        self._hide(context)
+        self.finish(())
+
+    def execute(self, context: bpy.types.Context) -> Returned:
+        handles = handles_of(context)
+        if not self._read(handles):
+            return self.without_keys(handles, self._refused)
+        self.apply()
+        return self.finish(self._refused)
+
+    def _read(self, handles: list[Handles]) -> bool:
+        """Get ready to edit the selected keys, and return whether there are any that can be."""
+        spaces, self._refused = selected_spaces(handles, leave_carried=self.leaves_carried), list[Refused]()
+        self._edits = KeyEdits(spaces, refused=self._refused)
+        if spaces:
+            self._pivot = Vector(np.concatenate([one.points for one in spaces.values()]).mean(axis=0).tolist())
+        return len(self._edits) > 0
+
+    def begin(self, context: Any) -> None:
+        """Note how the viewport is when the drag begins."""
+
+    def drag(self, context: Any) -> str:
+        """Edit the keys as the input has it, and return what to show in the header."""
+        raise NotImplementedError
+
+    def apply(self) -> None:
+        """Edit the keys as the properties have it."""
+        raise NotImplementedError
+
+    def _hide(self, context: bpy.types.Context) -> None:
+        existing(context.area).header_text_set(None)
+        existing(context.workspace).status_text_set(None)
+
+
+def _direction(axis: int | None) -> Vector | None:
+    return None if axis is None else Vector([float(axis == row) for row in range(3)])
+
+
+@with_properties
+class RIGID_MOTION_OT_move_path_keys(_Dragging):
+    bl_idname = "rigid_motion.move_path_keys"
+    bl_label = "Move Keys on Path"
+    bl_description = "Move the selected keys on paths in the world, each with the whole body"
+
+    value: Any = FloatVectorProperty(name="Move", description="How far, in the world", subtype="TRANSLATION", size=3)
+
+    def drag(self, context: Any) -> str:
+        given, number = self._input, self._input.number
+        direction = _direction(given.axis)
+        first, last = (self._at(context, place, direction) for place in (given.first, given.place))
+        move = last - first
+        if number is not None:
+            move = number * (direction or Vector((1.0, 0.0, 0.0)))
+        elif given.is_stepped:
+            beside = given.first + np.array((STEP_PX * context.preferences.system.ui_scale, 0.0))
+            away = (self._at(context, beside, None) - self._at(context, given.first, None)).length
+            step = 10.0 ** math.floor(math.log10(max(away, 1e-9)))
+            step *= FINE_STEP_RATIO if given.is_fine else 1.0
+            move = Vector([round(part / step) * step for part in move[:]])
+        self.value = move
+        self.apply()
+        parts = [f"D{name.lower()} {part:.4g}" for name, part in zip(AXES, move[:], strict=True)]
+        return "   ".join((*parts, f"({move.length:.4g})"))
+
+    def apply(self) -> None:
+        self._edits.move(np.array(Matrix.Translation(self.value[:])))
+
+    def _at(self, context: Any, place: np.ndarray, direction: Vector | None) -> Vector:
+        """Return the point of the world at a place on the screen: as deep as the keys, or on the axis through them."""
+        where = context.region, context.region_data, place.tolist()
+        if direction is None:
+            return region_2d_to_location_3d(*where, self._pivot)
+        origin, ray = region_2d_to_origin_3d(*where), region_2d_to_vector_3d(*where)
+        both = intersect_line_line(self._pivot, self._pivot + direction, origin, origin + ray)
+        return self._pivot if both is None else both[0]
+
+
+@with_properties
+class RIGID_MOTION_OT_rotate_path_keys(_Dragging):
+    bl_idname = "rigid_motion.rotate_path_keys"
+    bl_label = "Rotate Keys on Path"
+    bl_description = "Rotate the selected keys on paths about the middle of their points, each with the whole body"
+
+    angle: float = FloatProperty(name="Angle", description="By how much, counterclockwise", subtype="ANGLE")
+    axis: Any = FloatVectorProperty(
+        name="Axis", description="About which axis of the world", subtype="DIRECTION", size=3, default=(0.0, 0.0, 1.0)
+    )
+
+    def begin(self, context: Any) -> None:
+        middle = location_3d_to_region_2d(context.region, context.region_data, self._pivot, default=Vector((0.0, 0.0)))
+        self._middle, self._turned, self._before = np.array(middle), 0.0, self._input.first.copy()
+
+    def drag(self, context: Any) -> str:
+        given, number = self._input, self._input.number
+        (x, y), (to_x, to_y) = self._before - self._middle, given.place - self._middle
+        self._turned += math.atan2(x * to_y - y * to_x, x * to_x + y * to_y)
+        self._before = given.place.copy()
+        toward = context.region_data.view_rotation @ Vector((0.0, 0.0, 1.0))
+        axis = _direction(given.axis) or toward
+        angle = math.degrees(self._turned if axis.dot(toward) >= 0.0 else -self._turned)
+        if number is not None:
+            angle = number
+        elif given.is_stepped:
+            step = FINE_STEP_DEG if given.is_fine else STEP_DEG
+            angle = round(angle / step) * step
+        self.angle, self.axis = math.radians(angle), axis
+        self.apply()
+        return f"{angle:.2f}°" + ("" if given.axis is None else f"   {AXES[given.axis]}")
+
+    def apply(self) -> None:
+        middle = Matrix.Translation(tuple(self._pivot[:]))
+        self._edits.move(np.array(middle @ Matrix.Rotation(self.angle, 4, self.axis[:]) @ middle.inverted()))
+
+
+@with_properties
+class RIGID_MOTION_OT_retime_path_keys(_Dragging):
+    bl_idname = "rigid_motion.retime_path_keys"
+    bl_label = "Retime Keys on Path"
+    bl_description = (
+        "Move the selected keys in time. They keep their poses, and the key that is dragged gets the frame on which "
+        "the path is nearest to the mouse"
+    )
+    leaves_carried = False
+    keys_text = n_("LMB, Enter: Confirm | Esc, RMB: Cancel | Shift: Fractions of Frames | 0-9: Number")
+
+    frames: float = FloatProperty(name="Frames", description="How much later, in frames")
+
+    def drag(self, context: Any) -> str:
+        (one, frame), number = existing(self._hit), self._input.number
+        if number is not None:
+            self.frames = number
+        else:
+            # As the path was at first: along that which is drawn now the key would run away from the mouse.
+            _, moment = one.nearest_moment(context, self._input.place)
+            self.frames = (moment if self._input.is_fine else round(moment)) - frame
+        self.apply()
+        return iface_("Frame {frame:g} ({by:+g})").format(frame=round(frame + self.frames, 3), by=round(self.frames, 3))
+
+    def apply(self) -> None:
+        self.frames = self._edits.retime(self.frames)
+
+
+CLASSES = (RIGID_MOTION_OT_move_path_keys, RIGID_MOTION_OT_rotate_path_keys, RIGID_MOTION_OT_retime_path_keys)

@@ -1,0 +1,239 @@
+"""*Equalise Speed*: bodies go evenly along the paths that they had, as Blender plays them between frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Euler
+
+from rigid_motion.animation import Refused, equalise_speed, key_frames, modes_of, set_mode, set_turns
+from rigid_motion.animation.edits.speed import on_whole_frames
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.oracle import shown_worlds
+from tests.animation.scenes import FRAMES as FEW_FRAMES
+from tests.animation.scenes import key, new_object, write
+
+FRAMES = (1.0, 9.0, 33.0, 41.0, 81.0)
+STEP = 1.0 / 16.0
+SHARES = {
+    "CONSTANT": lambda t: t,
+    "EASE_IN": lambda t: t * t * (3.0 - t) / 2.0,
+    "EASE_OUT": lambda t: 1.0 - (1.0 - t) ** 2 * (2.0 + t) / 2.0,
+    "EASE_IN_OUT": lambda t: t * t * (3.0 - 2.0 * t),
+}
+FOR_MODES = [name for name, mode in KEYFRAME_MODES.items() if not mode.is_smooth]
+BLENDS = ("pga_lerp", "cga_lerp")
+PLACES = np.array(((0, 0, 0), (3, 1, 0), (4, 2, 2), (1, 6, 3), (0, 7, 0)), float)
+ANGLES = np.radians(((0, 0, 0), (20, 50, 0), (40, 20, 60), (0, 80, 90), (10, 20, 60)))
+
+
+def tool(mode: str, interpolation: str = "BEZIER", angles: np.ndarray = ANGLES) -> bpy.types.Object:
+    obj = new_object()
+    write(obj, "location", np.array(FRAMES), PLACES, interpolation)
+    turns = np.array([Euler(one).to_quaternion() for one in angles])
+    write(obj, "rotation_quaternion", np.array(FRAMES), turns, interpolation)
+    set_mode(obj, mode)
+    return obj
+
+
+def played(obj: bpy.types.Object, first: float = FRAMES[0], last: float = FRAMES[-1]) -> tuple[np.ndarray, np.ndarray]:
+    """Moments and matrices."""
+    frames = np.arange(first, last + STEP / 2.0, STEP)
+    return frames, shown_worlds([obj], frames)[0]
+
+
+def ways(worlds: np.ndarray) -> np.ndarray:
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(worlds[:, :3, 3], axis=0), axis=1)))
+
+
+def path_of(worlds: Sequence[np.ndarray], mode: str) -> np.ndarray:
+    """Places on the path from key to key, by the interpolation of two poses alone."""
+    keys, shares = Poses.from_matrices(np.array(worlds)), np.linspace(0.0, 1.0, 4001)
+    parts = [interpolate((0.0, 1.0), keys[i : i + 2], shares, mode).positions for i in range(len(keys.positions) - 1)]
+    return np.concatenate(parts)
+
+
+def off_path(points: np.ndarray, line: np.ndarray) -> float:
+    """How far points are from a line at most: by the pieces around the nearest of its points."""
+    most = 0.0
+    for point in points:
+        near = int(np.square(line - point).sum(axis=1).argmin())
+        start, along = line[max(near - 1, 0) : near + 1], np.diff(line[max(near - 1, 0) : near + 2], axis=0)
+        start = start[: len(along)]
+        share = np.clip(((point - start) * along).sum(1) / np.maximum((along**2).sum(1), 1e-30), 0, 1)
+        most = max(most, float(np.linalg.norm(point - start - share[:, None] * along, axis=1).min()))
+    return most
+
+
+def unevenness(obj: bpy.types.Object, ease: str) -> float:
+    """The largest difference of Blender's speed from that which is meant, as a part of the mean."""
+    frames, worlds = played(obj)
+    keys, done = key_frames(obj), ways(worlds)
+    meant = np.diff(SHARES[ease]((frames - frames[0]) / (frames[-1] - frames[0]))) * done[-1]
+    # What is cut short round a corner says nothing.
+    whole = ~np.any((keys[:, None] > frames[:-1]) & (keys[:, None] < frames[1:]), axis=0)
+    return float(np.abs(np.diff(done) - meant)[whole].max() / meant.mean())
+
+
+@pytest.mark.parametrize("ease", SHARES)
+@pytest.mark.parametrize("mode", FOR_MODES)
+def test_the_speed_is_even_and_the_path_stays(live_file, mode, ease):
+    obj = tool(mode)
+    expected = path_of(shown_worlds([obj], FRAMES)[0], mode)
+    (result,) = equalise_speed(obj, ease, between_frames=True).values()
+    _, worlds = played(obj)
+    assert off_path(worlds[::4, :3, 3], expected) < 1e-5
+    assert result.bend < 1e-4
+    assert key_frames(obj)[[0, -1]].tolist() == [1.0, 81.0]
+    assert modes_of(obj, key_frames(obj)[:-1]) == [mode] * 4
+    uneven = unevenness(obj, ease)
+    # Two handles say the timing of what is faster half-way all but exactly, and here it turns by up to 110 degrees.
+    assert uneven < (0.08 if mode in BLENDS else 0.01)
+    assert result.unevenness == pytest.approx(uneven, abs=0.005)
+    assert result.speed == pytest.approx(ways(worlds)[-1] / 80.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("mode", FOR_MODES)
+def test_keys_stay_on_whole_frames_unless_asked_for(live_file, mode):
+    obj = tool(mode)
+    (result,) = equalise_speed(obj).values()
+    frames = key_frames(obj)
+    assert frames.tolist() == np.rint(frames).tolist()
+    # A key is off by half a frame at most on either side of a segment.
+    assert unevenness(obj, "CONSTANT") < 1.0 / np.diff(frames).min() + 0.01
+    assert result.unevenness == pytest.approx(unevenness(obj, "CONSTANT"), abs=0.01)
+
+
+@pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER", "SINE"])
+def test_blenders_own_in_betweens_keep_their_path(live_file, interpolation):
+    obj = tool("BLENDER", interpolation)
+    before = played(obj)[1][:, :3, 3]
+    was = unevenness(obj, "CONSTANT")
+    (result,) = equalise_speed(obj, between_frames=True).values()
+    after = played(obj)[1][:, :3, 3]
+    assert off_path(after, before) < (2e-3 if interpolation == "BEZIER" else 1e-5)  # by chords of what was sampled
+    # Where values stay, two handles have times alone to say it.
+    assert unevenness(obj, "CONSTANT") < (0.25 * was if interpolation == "BEZIER" else 0.01)
+    assert result.unevenness == pytest.approx(unevenness(obj, "CONSTANT"), abs=0.05)
+
+
+@pytest.mark.parametrize("mode", [name for name, mode in KEYFRAME_MODES.items() if mode.is_smooth])
+def test_a_smooth_mode_is_evened_and_how_far_it_bends_is_said(live_file, mode):
+    obj = tool(mode)
+    before = played(obj)[1][:, :3, 3]
+    was = unevenness(obj, "CONSTANT")
+    (result,) = equalise_speed(obj, between_frames=True).values()
+    assert unevenness(obj, "CONSTANT") < 0.2 < 0.05 * was
+    assert result.bend == pytest.approx(off_path(played(obj)[1][:, :3, 3], before), abs=0.02)
+
+
+def test_between_two_keys_what_is_before_and_behind_them_stays(live_file):
+    obj = tool("dq_sclerp")
+    frames, before = played(obj)
+    equalise_speed(obj, frames=(9.0, 33.0, 41.0))
+    _, after = played(obj)
+    outside = (frames <= 9.0) | (frames >= 41.0)
+    np.testing.assert_allclose(after[outside], before[outside], atol=1e-5)
+    assert key_frames(obj)[[0, 1, 3, 4]].tolist() == [1.0, 9.0, 41.0, 81.0]
+    assert key_frames(obj)[2] != 33.0
+
+
+def test_what_rests_rests_as_long_as_before(live_file):
+    obj = new_object()
+    frames, places = np.array((1.0, 11.0, 31.0, 41.0)), np.array(((0, 0, 0), (1, 0, 0), (1, 0, 0), (5, 0, 0)), float)
+    write(obj, "location", frames, places)
+    set_mode(obj, "dq_sclerp")
+    equalise_speed(obj)
+    assert key_frames(obj).tolist() == [1.0, 5.0, 25.0, 41.0]
+    (at,) = shown_worlds([obj], (3.0, 15.0, 33.0))
+    assert at[:, 0, 3] == pytest.approx((0.5, 1.0, 3.0), abs=1e-5)
+
+
+def test_what_only_turns_turns_evenly_and_its_turns_go_along(live_file):
+    obj = new_object()
+    turns = np.array([Euler((0.0, 0.0, angle)).to_quaternion() for angle in (0.0, 0.5, 1.5)])
+    write(obj, "rotation_quaternion", np.array((1.0, 21.0, 31.0)), turns, "BEZIER")
+    set_mode(obj, "dq_sclerp")
+    (result,) = equalise_speed(obj).values()
+    assert result.is_turning
+    assert result.speed == pytest.approx(0.05, rel=1e-3)
+    assert key_frames(obj).tolist() == [1.0, 11.0, 31.0]
+    (at,) = shown_worlds([obj], (6.0, 21.0))
+    assert np.arctan2(at[:, 1, 0], at[:, 0, 0]) == pytest.approx((0.25, 1.0), abs=1e-4)
+    set_turns(obj, 1, (11.0,))
+    equalise_speed(obj)
+    keys = curves_of(obj)["rigid_motion.turns", 0].keyframe_points
+    assert key_frames(obj).tolist() == [1.0, 3.0, 31.0]
+    assert keys[-1].co.x in (3.0, 31.0)
+
+
+def test_the_turning_is_evened_where_asked_for(live_file):
+    obj = tool("lerp_slerp")
+    equalise_speed(obj, turning=True, between_frames=True)
+    frames, worlds = played(obj)
+    turned = np.array(
+        [np.arccos(np.clip((np.trace(a[:3, :3].T @ b[:3, :3]) - 1) / 2, -1, 1)) for a, b in pairwise(worlds[::16])]
+    )
+    keys = key_frames(obj)
+    whole = ~np.any((keys[:, None] > frames[:-1:16]) & (keys[:, None] < frames[16::16]), axis=0)
+    assert np.ptp(turned[whole]) < 0.01 * turned.mean()
+
+
+def test_twice_is_once(live_file):
+    obj = tool("dq_sclerp")
+    equalise_speed(obj, "EASE_IN", between_frames=True)
+    once = snapshot(obj)
+    equalise_speed(obj, "EASE_IN", between_frames=True)
+    for name, (*_, keys) in snapshot(obj).items():
+        np.testing.assert_allclose([one[:2] for one in keys], [one[:2] for one in once[name][-1]], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (
+            lambda obj: curves_of(obj)["location", 0].keyframe_points.remove(
+                curves_of(obj)["location", 0].keyframe_points[2]
+            ),
+            "frame 24",
+        ),
+        (lambda obj: [fcurve.keyframe_points.clear() for fcurve in curves_of(obj).values()], "key"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_stays(live_file, edit, said):
+    obj = key(new_object(), FEW_FRAMES)
+    edit(obj)
+    before = snapshot(obj)
+    with pytest.raises(Refused, match=said):
+        equalise_speed(obj)
+    assert snapshot(obj) == before
+
+
+def test_a_body_that_stands_no_chosen_keys_and_an_unknown_easing_are_refused(live_file):
+    obj = new_object()
+    write(obj, "location", np.array((1.0, 9.0)), np.array(((1.0, 0, 0), (1.0, 0, 0))))
+    with pytest.raises(Refused, match="key"):
+        equalise_speed(obj)
+    with pytest.raises(Refused, match="FAST is no easing"):
+        equalise_speed(tool("dq_sclerp"), "FAST")
+    with pytest.raises(Refused, match="no two keys"):
+        equalise_speed(tool("dq_sclerp"), frames=())
+
+
+@pytest.mark.parametrize(
+    ("frames", "expected"),
+    [
+        ((1.0, 1.2, 1.4, 9.0), (1.0, 2.0, 3.0, 9.0)),
+        ((1.0, 8.6, 8.8, 9.0), (1.0, 7.0, 8.0, 9.0)),
+        ((0.5, 0.6, 4.4, 6.5), (0.5, 1.0, 4.0, 6.5)),
+        ((1.0, 1.2, 1.4, 3.0), (1.0, 1.2, 1.4, 3.0)),
+        ((1.0, 9.0), (1.0, 9.0)),
+    ],
+)
+def test_whole_frames_are_apart_as_long_as_there_is_room(frames, expected):
+    assert on_whole_frames(np.array(frames)).tolist() == list(expected)

@@ -1,0 +1,195 @@
+"""Keys on paths go where they are moved to in the world, as Blender shows them, and others stay where they are."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import key_frames, set_mode
+from rigid_motion.ui.trail.handles import handles_of
+from tests.animation.held import worlds
+from tests.animation.keyed import curves_of, snapshot
+from tests.animation.scenes import FRAMES, new_object
+from tests.ui.trail.conftest import CARRIERS, MIDDLE, MOVE, TURN, about, bone, choose, held_prop
+
+NEAR = 2e-5
+"""Metres that places after a round through the channels are off, of up to ten."""
+
+operators = bpy.ops.rigid_motion
+
+
+def moved() -> set[str]:
+    return operators.move_path_keys(value=MOVE.translation)
+
+
+def turned() -> set[str]:
+    return operators.rotate_path_keys(angle=TURN.angle, axis=TURN.axis)
+
+
+def expected(before: np.ndarray, edit, frames: int = 1) -> np.ndarray:
+    """Where keys (n, 4, 4) are to be after an edit of them."""
+    middle = before[:, :3, 3].mean(axis=0)
+    return (np.array(MOVE) if edit is moved else about(middle, TURN)) @ before
+
+
+@pytest.mark.parametrize("edit", [moved, turned])
+@pytest.mark.parametrize("kind", CARRIERS)
+@pytest.mark.parametrize("mode", ["BLENDER", "dq_sclerp", "motor_spline"])
+def test_a_key_goes_where_it_is_moved_to_and_the_others_stay(scene, kind, mode, edit):
+    carrier = choose(CARRIERS[kind](), MIDDLE)
+    set_mode(carrier, mode)
+    others = [frame for frame in FRAMES if frame != MIDDLE]
+    before, stay = worlds(carrier, [MIDDLE]), worlds(carrier, others)
+    assert edit() == {"FINISHED"}
+    assert worlds(carrier, [MIDDLE]) == pytest.approx(expected(before, edit), abs=NEAR)
+    assert worlds(carrier, others) == pytest.approx(stay, abs=NEAR)
+    assert key_frames(carrier).tolist() == list(FRAMES)
+
+
+@pytest.mark.parametrize("kind", ["XYZ", "parented", "bone"])
+def test_several_keys_turn_about_their_middle(scene, kind):
+    carrier = choose(CARRIERS[kind](), *FRAMES)
+    before = worlds(carrier, FRAMES)
+    turned()
+    assert worlds(carrier, FRAMES) == pytest.approx(expected(before, turned), abs=NEAR)
+
+
+@pytest.mark.parametrize("edit", [moved, turned])
+@pytest.mark.parametrize("frame", [9.0, 20.0, 28.0, 40.0, 60.0, 70.0])
+@pytest.mark.parametrize("kind", ["free", "parented", "bone"])
+def test_keys_of_what_is_held_go_where_they_are_moved_to(scene, kind, frame, edit):
+    prop = held_prop(kind, frame)
+    before = worlds(prop, [frame])
+    assert edit() == {"FINISHED"}
+    assert worlds(prop, [frame]) == pytest.approx(expected(before, edit), abs=5 * NEAR)
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "lerp_slerp"])
+@pytest.mark.parametrize("kind", ["QUATERNION", "XYZ", "bone"])
+def test_segments_that_do_not_touch_the_key_stay(scene, kind, mode):
+    carrier = choose(CARRIERS[kind](), FRAMES[0])
+    set_mode(carrier, mode)
+    # Blender's automatic handles of the next key would give the next segment another timing.
+    for fcurve in curves_of(carrier).values():
+        for point in fcurve.keyframe_points:
+            point.handle_left_type = point.handle_right_type = "FREE"
+    bpy.context.view_layer.update()
+    rest = np.arange(FRAMES[1], FRAMES[-1] + 1.0)
+    before = worlds(carrier, rest)
+    moved()
+    assert np.abs(worlds(carrier, rest) - before).max() <= 1e-6
+
+
+def test_a_parent_that_is_moved_too_carries_its_child(scene):
+    table, child = CARRIERS["QUATERNION"](), CARRIERS["XYZ"]()
+    child.parent = table
+    for carrier in (table, child):
+        choose(carrier, MIDDLE)
+        carrier.select_set(True)
+    table.select_set(True)
+    before = worlds(child, [MIDDLE])
+    moved()
+    assert worlds(child, [MIDDLE]) == pytest.approx(np.array(MOVE) @ before, abs=NEAR)
+
+
+@pytest.mark.parametrize("connected", [False, True])
+def test_a_bone_that_only_turns_points_where_its_tail_is_dragged(scene, connected):
+    hand = bone(use_connect=connected)()
+    for index in range(3):
+        curves_of(hand)  # read anew: removing one moves the others
+        fcurves = hand.id_data.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+        fcurves.remove(fcurves.find(hand.path_from_id("location"), index=index))
+    choose(hand, MIDDLE)
+    (before,) = worlds(hand, [MIDDLE])
+    assert moved() == {"FINISHED"}
+    (after,) = worlds(hand, [MIDDLE])
+    assert after[:3, 3] == pytest.approx(before[:3, 3], abs=NEAR)
+    tail = before @ (0.0, hand.bone.length, 0.0, 1.0)
+    goal = tail[:3] + MOVE.translation - before[:3, 3]
+    assert after[:3, 1] / np.linalg.norm(after[:3, 1]) == pytest.approx(goal / np.linalg.norm(goal), abs=NEAR)
+
+
+def test_a_breakdown_that_is_moved_shapes_the_path(scene):
+    carrier = choose(CARRIERS["QUATERNION"]())
+    set_mode(carrier, "motor_spline")
+    assert operators.insert_path_key(frame=17.0) == {"FINISHED"}
+    assert {point.type for c in curves_of(carrier).values() for point in c.keyframe_points if point.co.x == 17.0} == {
+        "BREAKDOWN"
+    }
+    before = worlds(carrier, [17.0])
+    moved()
+    assert worlds(carrier, [17.0]) == pytest.approx(np.array(MOVE) @ before, abs=NEAR)
+
+
+def test_nothing_is_done_without_selected_keys_or_paths(scene):
+    carrier = choose(CARRIERS["QUATERNION"]())
+    before = snapshot(carrier)
+    assert moved() == {"CANCELLED"}
+    scene.rigid_motion_overlay.show_paths = False
+    assert moved() == {"CANCELLED", "PASS_THROUGH"}, "then G is Blender's own"
+    assert snapshot(carrier) == before
+
+
+POINT = np.array((0.3, -0.2, 0.9, 1.0))
+
+
+@pytest.mark.parametrize("kind", ["QUATERNION", "with deltas", "scaled", "bone"])
+@pytest.mark.parametrize("mode", ["BLENDER", "motor_spline"])
+def test_the_path_is_that_of_the_point_that_leads_and_bodies_turn_about_it(scene, kind, mode):
+    carrier = choose(CARRIERS[kind](), MIDDLE)
+    set_mode(carrier, mode)
+    scene.frame_set(17)
+    (now,) = worlds(carrier, [17.0])
+    scene.cursor.location = (now @ POINT)[:3]
+    assert operators.set_path_point(point="CURSOR") == {"FINISHED"}
+    (one,) = handles_of(bpy.context)
+    line = one.in_world(one.path.native if one.path.desired is None else one.path.desired)
+    frames = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
+    expected_line = (worlds(carrier, frames) @ POINT)[:, :3]
+    assert line[np.searchsorted(one.path.frames, frames)] == pytest.approx(expected_line, abs=5e-5)
+    before = worlds(carrier, [MIDDLE])
+    turned()
+    assert worlds(carrier, [MIDDLE]) == pytest.approx(about((before[0] @ POINT)[:3], TURN) @ before, abs=5e-5)
+
+
+@pytest.mark.parametrize("frame", [9.0, 28.0, 40.0])
+def test_a_point_of_what_is_held_leads(scene, frame):
+    prop = held_prop("free", frame)
+    prop.rigid_motion.lead = POINT[:3]
+    bpy.context.view_layer.update()
+    before = worlds(prop, [frame])
+    turned()
+    assert worlds(prop, [frame]) == pytest.approx(about((before[0] @ POINT)[:3], TURN) @ before, abs=1e-4)
+
+
+def test_vertices_and_the_tail_lead(scene):
+    mesh = bpy.data.meshes.new("Sword")
+    mesh.from_pydata([(0, 0, 0), (0, 0, 2), (0.2, 0, 2)], [], [(0, 1, 2)])
+    for vertex, is_selected in zip(mesh.vertices, (False, True, True), strict=True):
+        vertex.select = is_selected
+    sword = choose(new_object("Sword", data=mesh))
+    operators.set_path_point(point="VERTICES")
+    assert sword.rigid_motion.lead[:] == pytest.approx((0.1, 0.0, 2.0))
+    operators.set_path_point(point="ORIGIN")
+    assert sword.rigid_motion.lead[:] == (0.0, 0.0, 0.0)
+    hand = choose(bone()())
+    operators.set_path_point(point="TAIL")
+    assert hand.rigid_motion.lead[:] == pytest.approx((0.0, hand.length, 0.0))
+
+
+@pytest.mark.parametrize("edit", [moved, turned])
+@pytest.mark.parametrize("mode", ["BLENDER", "dq_sclerp"])
+@pytest.mark.parametrize("part", ["location", "rotation_euler"])
+def test_what_has_no_key_of_its_own_there_goes_along(scene, part, mode, edit):
+    carrier = CARRIERS["XYZ"]()
+    for (path, _), fcurve in curves_of(carrier).items():
+        if path == part:
+            fcurve.keyframe_points.remove(fcurve.keyframe_points[1])
+    set_mode(carrier, mode)
+    choose(carrier, MIDDLE)
+    others = [frame for frame in FRAMES if frame != MIDDLE]
+    before, stay = worlds(carrier, [MIDDLE]), worlds(carrier, others)
+    assert edit() == {"FINISHED"}
+    assert worlds(carrier, [MIDDLE]) == pytest.approx(expected(before, edit), abs=NEAR)
+    assert worlds(carrier, others) == pytest.approx(stay, abs=NEAR)
