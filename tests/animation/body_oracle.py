@@ -86,7 +86,7 @@ class Body:
                 poses = path.beside(np.array((first, last)), share)
             else:
                 poses = path.poses(share, np.clip((frames[inside] - first) / (last - first), 0.0, 1.0))
-            location[inside], quaternion[inside] = poses.positions @ _axes(self.obj), poses.quaternions
+            location[inside], quaternion[inside] = poses.positions @ location_axes(self.obj), poses.quaternions
             if self.scaled:
                 scale[inside] = poses.scales[:, None] * self.own.scale
         # What is muted is not moved; without one of its components Blender's own is left of a rotation or a scale.
@@ -106,7 +106,7 @@ class Body:
     def key_poses(self, frames: np.ndarray) -> Poses:
         positions, quaternions, scales = self.native(frames)
         return Poses(
-            (positions + self.own.location) @ _axes(self.obj).T,
+            (positions + self.own.location) @ location_axes(self.obj).T,
             multiply(np.array(self.own.quaternion), quaternions),
             scales[:, 0] if self.scaled else None,
         )
@@ -188,7 +188,7 @@ def _has_turns(obj: Carrier) -> bool:
     return turns is not None and not turns.mute and any(key.co[1] for key in turns.keyframe_points)
 
 
-def _axes(obj: Carrier) -> np.ndarray:
+def location_axes(obj: Carrier) -> np.ndarray:
     """The axes that location runs along, as columns in those of the body: a bone may have its parent's."""
     if isinstance(obj, bpy.types.Object) or obj.bone.use_local_location:
         return np.eye(3)

@@ -234,8 +234,12 @@ class Machine(RuleBasedStateMachine):
         name = sorted(self.before_bake)[int(who * len(self.before_bake))]
         keyed = self.before_bake.pop(name)
         self._edit(lambda: animation.unbake(self._found(name)))
-        assert snapshot(self._found(name)) == keyed
+        assert self._originals(name) == keyed
         assert not animation.is_baked(self._found(name))
+
+    def _originals(self, name: Name) -> dict:
+        """What Un-Bake gives back."""
+        return snapshot(self._found(name))
 
     @rule()
     def save_and_reload(self):

@@ -30,14 +30,14 @@ from rigid_motion.animation import (
 from rigid_motion.animation.actions.marks import read_holds
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion_batch.recordings.world_poses import read_poses
 from tests.animation.bones.poses import shown_of
-from tests.animation.bones.rigs import PLAYED, key_all, new_rig, select_only
+from tests.animation.bones.rigs import PLAYED, in_turn, key_all, new_rig, select_only
 from tests.animation.bones.test_rig_edits import assert_nothing_stale
 from tests.animation.held import KINDS, handled, new_hands, new_prop, worlds
 from tests.animation.keyed import Carrier, curves_of, moving_curves, snapshot
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import FRAMES, editor, enabled, key, new_object, new_strip, push_down, tweak
+from tests.world_poses import read_poses
 
 OF_BOTH = pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
 
@@ -280,8 +280,7 @@ def turn_a_key(hand: Carrier) -> None:
     bpy.context.view_layer.update()
 
 
-@pytest.mark.parametrize("throw", [0, 1, 3])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("kind", "throw"), in_turn(KINDS, [0, 1, 3]))
 def test_what_is_held_is_baked_in_the_spaces_of_its_holders(live_file, kind, throw):
     prop, hands = new_prop(kind), new_hands()
     handled(prop, *hands, throw=throw)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import (
+    NATIVE,
     Refused,
     bake,
     bake_poses,
@@ -30,14 +31,14 @@ from rigid_motion.animation import (
 )
 from rigid_motion.motion import Poses, interpolate, repair, shell_error
 from rigid_motion_batch.recordings import read_trajectories
-from rigid_motion_batch.recordings.world_poses import read_poses
 from tests.animation.bones.poses import shown_poses
-from tests.animation.bones.rigs import ARM, key_all, new_rig
+from tests.animation.bones.rigs import ARM, in_turn, key_all, new_rig
 from tests.animation.held import KINDS, handled, new_hands, new_prop, worlds
 from tests.animation.keyed import Carrier, curves_of, rotation_path, snapshot
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, linked, new_object
 from tests.balls import largest_displacements
+from tests.world_poses import read_poses
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 RATE = 30.0
@@ -87,8 +88,8 @@ def test_so_many_keys_have_less_of_an_error_than_as_many_evenly_in_time(live_fil
     assert key_frames(obj).tolist() == frames.tolist()
 
 
-@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
-def test_all_that_was_there_comes_back_to_the_last_handle(live_file, rotation_mode):
+@pytest.mark.parametrize(("rotation_mode", "mode"), in_turn(["QUATERNION", "XZY"], ["motor_spline", NATIVE]))
+def test_all_that_was_there_comes_back_to_the_last_handle(live_file, rotation_mode, mode):
     obj = key(new_object(rotation_mode=rotation_mode), np.arange(1.0, 120.0, 3.0), scale="uneven")
     obj["weight"] = 1.0
     write_channel(obj, '["weight"]', np.arange(1.0, 60.0), np.arange(59.0), interpolation="BOUNCE")
@@ -97,7 +98,7 @@ def test_all_that_was_there_comes_back_to_the_last_handle(live_file, rotation_mo
     set_mode(obj, "pga_lerp", [11.0])
     action, before, frames = obj.animation_data.action, snapshot(obj), np.arange(-3.0, 130.0)
     truth = read_poses(obj, frames)
-    reduce_keys_of(obj, "motor_spline", 0.3, RADIUS)
+    reduce_keys_of(obj, mode, 0.3, RADIUS)
     assert snapshot(obj) != before
     restore_keys(obj)
     assert obj.animation_data.action == action
@@ -188,8 +189,8 @@ def test_what_was_done_last_is_taken_back_first_and_the_file_keeps_dense_keys_un
     before.append(state())
     with pytest.raises(Refused, match="Tool was baked since it was reduced: Un-Bake first"):
         restore_keys(obj)
-    for tolerance in (0.5 * TOLERANCE, TOLERANCE):
-        reduce_keys_of(obj, "dq_sclerp", tolerance, RADIUS)
+    for mode in ("dq_sclerp", NATIVE):
+        reduce_keys_of(obj, mode, TOLERANCE, RADIUS)
     with pytest.raises(Refused, match="Tool was reduced since it was baked: Restore Keys first"):
         unbake(obj)
     if let_go:
@@ -224,14 +225,14 @@ def switches(prop: Carrier) -> list[tuple]:
     return result
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_what_is_held_is_reduced_in_its_holders_and_passes_as_before(live_file, kind):
+@pytest.mark.parametrize(("kind", "mode"), in_turn(KINDS, ["motor_spline", NATIVE]))
+def test_what_is_held_is_reduced_in_its_holders_and_passes_as_before(live_file, kind, mode):
     prop, hands = new_prop(kind), new_hands()
     handled(prop, *hands, throw=0)
     bake(prop)
-    frames = np.arange(1.0, 90.25, 0.25)
+    frames = np.arange(1.0, 90.25, 1.0 if mode == NATIVE else 0.25)
     before, truth, keys = switches(prop), worlds(prop, frames), snapshot(prop)
-    reduction = reduce_keys_of(prop, "motor_spline", COARSE, RADIUS)
+    reduction = reduce_keys_of(prop, mode, COARSE, RADIUS)
     assert reduction.before == 80
     assert reduction.after == len(key_frames(prop)) < 40
     assert {20.0, 40.0, 60.0} <= set(key_frames(prop))

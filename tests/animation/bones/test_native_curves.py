@@ -11,9 +11,7 @@ import pytest
 from rigid_motion.animation import (
     FEWEST,
     NATIVE,
-    bake,
     bake_poses,
-    discard_dense_keys,
     reduce_keys_of,
     reduction_of,
     restore_keys,
@@ -22,8 +20,7 @@ from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.hand_made import AUTOMATIC, LAST, OF_OLD, THIRD, bake_each_frame, hand_made, keys_of
 from tests.animation.bones.poses import shown_of
 from tests.animation.bones.rigs import in_turn
-from tests.animation.held import handled, new_hands, new_prop, worlds
-from tests.animation.keyed import curves_of, key_frames, mode_at, snapshot
+from tests.animation.keyed import curves_of, key_frames, mode_at
 from tests.animation.scenes import new_object, write
 from tests.balls import largest_displacements
 
@@ -76,20 +73,6 @@ def test_a_hand_made_animation_comes_back_with_its_own_keys(live_file, case, rot
     assert handles == OF_OLD or kinds[common] > 0.7 * kinds.total()
 
 
-def test_all_of_it_comes_back_until_dense_keys_are_discarded(live_file):
-    rig = hand_made(AUTOMATIC)
-    bake_each_frame(rig)
-    before = [snapshot(bone) for bone in bones(rig)]
-    reduce_keys_of(bones(rig), NATIVE, TOLERANCE, RADIUS)
-    restore_keys(bones(rig))
-    assert [snapshot(bone) for bone in bones(rig)] == before
-    reduce_keys_of(bones(rig), NATIVE, TOLERANCE, RADIUS)
-    few = keys_of(rig)
-    discard_dense_keys(bones(rig))
-    assert list(bpy.data.actions) == [rig.animation_data.action]
-    assert all(np.array_equal(frames, few[name]) for name, frames in keys_of(rig).items())
-
-
 STEPS = np.where(FRAMES < 15, 0.0, np.where(FRAMES < 31, 0.5, -0.4))
 LINES = np.interp(FRAMES, (0, 20, 40, LAST), (0, 1, 1, 3))
 STOPS = np.where(FRAMES < 50, np.clip(FRAMES / 20.0, 0.0, 1.0) ** 2 * (3.0 - 2.0 * np.clip(FRAMES / 20.0, 0, 1)), 1.0)
@@ -115,27 +98,6 @@ def test_steps_lines_and_holds_are_what_they_were(live_file, path, values, expec
         assert fcurve.evaluate(30.5) == pytest.approx(columns[30, 0])
 
 
-@pytest.mark.parametrize("count", [2, 5, 12])
-def test_so_many_key_poses_are_on_the_same_frames(live_file, count):
-    rig = hand_made(THIRD)
-    bake_each_frame(rig)
-    baked = shown_of(rig, FRAMES)
-    reduction = reduce_keys_of(bones(rig), NATIVE, radius=RADIUS, count=count)
-    assert {tuple(frames) for frames in keys_of(rig).values()} == {tuple(keys_of(rig)["Hips"])}
-    assert len(keys_of(rig)["Hips"]) == count
-    assert apart(shown_of(rig, FRAMES), baked) == pytest.approx(reduction.largest_error, rel=1e-3)
-
-
-def test_key_poses_keep_to_a_tolerance(live_file):
-    rig = hand_made(THIRD)
-    bake_each_frame(rig)
-    baked = shown_of(rig, FRAMES)
-    reduce_keys_of(bones(rig), NATIVE, 0.02, RADIUS, shared=True)
-    assert len({tuple(frames) for frames in keys_of(rig).values()}) == 1
-    assert len(keys_of(rig)["Hips"]) < 0.5 * len(FRAMES)
-    assert apart(shown_of(rig, FRAMES), baked) <= 0.02 * ROUNDED
-
-
 ANGLES = 0.025 * FRAMES
 SCREW = Poses(
     np.column_stack((np.cos(2.0 * ANGLES), np.sin(2.0 * ANGLES), 0.1 * ANGLES)),
@@ -150,6 +112,7 @@ CORNERED = np.random.default_rng(3).normal(size=(3, 7))
 SCREWS = interpolate(CORNERS, Poses(0.3 * CORNERED[:, :3], CORNERED[:, 3:]), FRAMES, "dq_sclerp")
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize(("poses", "mode"), [(SCREW, "motor_spline"), (CURVE, NATIVE), (SCREWS, "dq_sclerp")])
 def test_what_needs_the_fewest_keys_of_all_is_taken_where_that_is_asked_for(live_file, poses, mode):
     obj = new_object()
@@ -162,17 +125,3 @@ def test_what_needs_the_fewest_keys_of_all_is_taken_where_that_is_asked_for(live
         restore_keys(obj, refused=[])
         reduce_keys_of(obj, other, TOLERANCE, RADIUS, refused=[])
         assert len(key_frames(obj)) >= reduction.after
-
-
-def test_what_is_held_gets_curves_in_its_hands(live_file):
-    prop, hands = new_prop("free"), new_hands()
-    handled(prop, *hands, throw=0)
-    bake(prop)
-    frames = np.arange(1.0, 91.0)
-    truth, keys = worlds(prop, frames), snapshot(prop)
-    reduction = reduce_keys_of(prop, NATIVE, 0.01, RADIUS)
-    assert reduction.after == len(key_frames(prop)) < 40
-    assert apart(worlds(prop, frames), truth) <= 0.01 * ROUNDED
-    assert "FREE" in {key.handle_left_type for key in curves_of(prop)["location", 0].keyframe_points}
-    restore_keys(prop)
-    assert snapshot(prop) == keys

@@ -5,12 +5,15 @@ It is not promised of what follows constraints and drivers, which is named.
 
 from __future__ import annotations
 
+import itertools
+
 import bpy
 import numpy as np
 import pytest
 from mathutils import Quaternion
 
 from rigid_motion.animation import (
+    NATIVE,
     Refused,
     bake,
     hold_facts,
@@ -61,29 +64,33 @@ def largest(shown: np.ndarray, truth: np.ndarray, radius: float = RADIUS) -> np.
     return largest_displacements((shown - truth)[:, :3, 3], radius * (shown - truth)[:, :3, :3])
 
 
-def errors(rig: bpy.types.Object, truth: dict[str, np.ndarray]) -> dict[str, float]:
-    return {name: float(largest(rows, truth[name]).max()) for name, rows in matrices(rig).items()}
+def errors(rig: bpy.types.Object, truth: dict[str, np.ndarray], frames: np.ndarray = MOMENTS) -> dict[str, float]:
+    return {name: float(largest(rows, truth[name]).max()) for name, rows in matrices(rig, frames).items()}
 
 
-@pytest.mark.parametrize(("count", "rotation_mode"), in_turn([4, 12, None], ["QUATERNION", "XZY"]))
+@pytest.mark.parametrize(
+    ("case", "rotation_mode"),
+    in_turn(itertools.product([4, 12, None], ["motor_spline", NATIVE]), ["QUATERNION", "XZY"]),
+)
 def test_a_rig_that_moves_itself_has_its_keys_on_the_key_poses_and_their_error_is_what_is_said(
-    live_file, monkeypatch, count, rotation_mode
+    live_file, monkeypatch, case, rotation_mode
 ):
-    """Also where not all of a recording is looked at at once."""
+    """Also where not all of a recording is looked at at once. Of Blender's own curves it is that on whole frames."""
+    (count, mode), moments = case, FRAMES if NATIVE in case else MOMENTS
     monkeypatch.setattr(search, "AT_ONCE", 60 * len(NAMES))
     rig = recorded_rig(rotation_mode)
     write_channel(rig, "location", FRAMES, np.stack((np.sin(0.11 * FRAMES), 0.02 * FRAMES, 0.0 * FRAMES), axis=1))
     rig.scale = (0.5, 0.5, 0.5)
     bpy.context.view_layer.update()
-    truth, (place,), every = matrices(rig), shown_worlds([rig], MOMENTS), [rig, *bones(rig)]
-    reduction = reduce_keys_of(every, "motor_spline", TOLERANCE, 0.5 * RADIUS, shared=count is None, count=count)
+    truth, (place,), every = matrices(rig, moments), shown_worlds([rig], moments), [rig, *bones(rig)]
+    reduction = reduce_keys_of(every, mode, TOLERANCE, 0.5 * RADIUS, shared=count is None, count=count)
     keys = [key_frames(item).tolist() for item in every]
     assert keys == keys[:1] * len(keys)
     for item, some in zip(every, keys, strict=True):
         assert (reduction_of(item).before, reduction_of(item).after) == (len(FRAMES), len(some))
-        assert set(modes_of(item, key_frames(item))) == {"motor_spline"}
+        assert set(modes_of(item, key_frames(item))) == {"BLENDER" if mode == NATIVE else mode}
     assert len(keys[0]) == reduction.rig.frames == (count or len(keys[0])) < 0.5 * len(FRAMES)
-    worst = max(*errors(rig, truth).values(), largest(shown_worlds([rig], MOMENTS)[0], place).max())
+    worst = max(*errors(rig, truth, moments).values(), largest(shown_worlds([rig], moments)[0], place).max())
     assert reduction.largest_error == pytest.approx(worst, abs=2e-6)
     assert count or worst <= TOLERANCE * (1.0 + 1e-4)
 

@@ -25,6 +25,8 @@ from rigid_motion.animation.fcurves.keys import CODE, INTERPOLATIONS, Cycles, Ke
 from rigid_motion.motion import Poses, interpolate
 from tests.animation.oracle import matrices
 
+pytestmark = pytest.mark.any_blender
+
 Track = Sequence[tuple[float, float]]
 
 CODES = {name: code for code, name in INTERPOLATIONS.items()}

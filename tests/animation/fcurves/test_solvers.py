@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rigid_motion.animation.fcurves.solvers import fit_together, solve_cubics
 from tests.animation.fcurves.examples import evaluate_one, keys_of
 from tests.thoroughness import tried
+
+pytestmark = pytest.mark.any_blender
 
 NEAR_LEVEL = 0.5 + np.array((-1e-3, -1e-6, -1e-9, 1e-9, 1e-6, 1e-3))
 T, TIMES = np.concatenate((np.linspace(0.0, 1.0, 1001), NEAR_LEVEL)), np.linspace(0.0, 1.0, 41)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -11,13 +12,13 @@ from hypothesis import strategies as st
 
 from rigid_motion import animation
 from tests.animation.editing import SAME_FRAME
-from tests.animation.holds.model import assert_held, poses_in_holders, world_of
+from tests.animation.holds.model import assert_held, poses_in_holders, shown, world_of
 from tests.animation.keyed import HOLD_BITS, Carrier, curves_of, key_frames, snapshot
 from tests.animation.machine import Name, goes_on, shares, while_on
-from tests.animation.tool_steps import WithTools
+from tests.animation.path_steps import WithPaths
 
 
-class WithHolds(WithTools):
+class WithHolds(WithPaths):
     """An animator who also has things be held."""
 
     @property
@@ -54,6 +55,25 @@ class WithHolds(WithTools):
                 if not channel[0].startswith("constraints")
             }
         return result
+
+    def _originals(self, name: Name) -> dict:
+        """To what the keys are held in, and without what follows from them."""
+        kept = super()._originals(name)
+        return {channel: keys for channel, keys in kept.items() if not channel[0].startswith("constraints")}
+
+    def _is_live(self, name: Name) -> bool:
+        """What is passed on goes nowhere else between the keys of two holders, also where Blender has it move."""
+        source = animation.queries.keyed.source_of(self._found(name))
+        return super()._is_live(name) or (source is not None and bool(source.switches))
+
+    def _baked(self, name: Name, frames: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Also where it is in the world; and how it passes may be baked in what it passes from."""
+        ((chosen, poses),) = super()._baked(name, frames)
+        if not self._is_held(name):
+            return [(chosen, poses)]
+        switches = animation.queries.keyed.source_of(self._found(name)).switches
+        passing = [(frames > switch.begin) & (frames < switch.frame) for switch in switches]
+        return [(chosen & ~np.any(passing, axis=0), poses), (chosen, *shown([self._found(name)], frames))]
 
     def _snaps(self, name: Name) -> bool:
         """Blender moves what passes by a part of it alone, and snaps what is held to where it would be in the world."""
@@ -99,6 +119,47 @@ class WithHolds(WithTools):
     @while_on(who=shares, over=st.integers(0, 9))
     def choose_over_how_many_frames_it_passes(self, who, over):
         self._if_possible(self._named(who), lambda prop: animation.pass_frames(prop, over))
+
+    def _brought(self, name: str, *, link: bool, is_local: bool) -> bpy.types.Object:
+        """An object from a copy of this file, which is there a second time with all that it needs, in the scene.
+
+        Linked it may be made local with its Action; what it needs otherwise stays linked.
+        """
+        library = str(Path(self.folder.name) / f"library {self.fresh}.blend")
+        self.fresh += 1
+        bpy.ops.wm.save_as_mainfile(filepath=library, compress=False, copy=True)
+        before = set(bpy.data.objects)
+        with bpy.data.libraries.load(library, link=link) as (_, wanted):
+            wanted.objects = [name]
+        (obj,) = wanted.objects
+        for brought in set(bpy.data.objects) - before:
+            bpy.context.scene.collection.objects.link(brought)
+        if link and is_local:
+            obj = obj.make_local()
+            if obj.animation_data is not None and obj.animation_data.action is not None:
+                obj.animation_data.action.make_local()
+        return obj
+
+    @while_on(who=shares, is_local=st.booleans())
+    def link_it_for_a_while(self, who, is_local):
+        """It moves as the one that is here, also when it is made local with its Action."""
+        name = self._named(who)
+        frames = self._frames_that_are_seen([name])
+
+        def change() -> None:
+            own, objects, libraries = self._found(name), set(bpy.data.objects), set(bpy.data.libraries)
+            linked = self._brought(own.id_data.name, link=True, is_local=is_local)
+            bpy.context.view_layer.update()
+            both = [own, linked if own == own.id_data else linked.pose.bones[own.name]]
+            here, there = shown(both, frames)
+            error = np.abs(here - there).max() / max(1.0, np.abs(here).max())
+            assert error < 1e-5, f"{name} is off by {error} where it is linked"
+            for obj in set(bpy.data.objects) - objects:
+                bpy.data.objects.remove(obj)
+            for library in set(bpy.data.libraries) - libraries:
+                bpy.data.libraries.remove(library)
+
+        self._edit(change)
 
     @while_on(who=shares)
     def match_grips(self, who):

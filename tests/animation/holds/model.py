@@ -80,7 +80,9 @@ def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) 
             spaces[number] = (
                 _spaces(prop, frames)
                 if holder is None
-                else _rigid(shown([holder.target.pose.bones[holder.bone] if holder.bone else holder.target], frames)[0])
+                # What holds it takes it along, also where it changes its size from what that was at first.
+                else shown([holder.target.pose.bones[holder.bone] if holder.bone else holder.target], frames)[0]
+                @ np.array(holder.offset)
             )
         return spaces[number][chosen] @ _poses(prop, run, frames[chosen])
 
@@ -134,11 +136,6 @@ def _spaces(prop: Carrier, frames: np.ndarray) -> np.ndarray:
     if prop.parent is None:
         return np.tile(np.eye(4), (len(frames), 1, 1))
     return shown([prop.parent], frames)[0] @ np.array(prop.matrix_parent_inverse)
-
-
-def _rigid(worlds: np.ndarray) -> np.ndarray:
-    worlds[:, :3, :3] /= np.linalg.norm(worlds[:, :3, :3], axis=1, keepdims=True)
-    return worlds
 
 
 def _between(one: Matrix, other: Matrix, share: float) -> tuple[np.ndarray, bool]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -30,8 +29,9 @@ class Holding(WithHolds):
         orders=st.lists(st.sampled_from(ORDERS), min_size=3, max_size=3),
         mode=st.sampled_from(MODE_IDS),
         seed=seeds,
+        held=st.lists(st.none() | st.sampled_from(HANDS), min_size=3, max_size=3),
     )
-    def begin(self, orders, mode, seed):
+    def begin(self, orders, mode, seed, held=()):
         bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, LAST
         rests = (
             Rest("Grip", (0.3, 0.0, 1.4), (0.6, 0.1, 1.3)),
@@ -46,7 +46,11 @@ class Holding(WithHolds):
             animation.set_mode(obj, mode)
         bpy.data.objects["Child"].parent = bpy.data.objects["Parent"]
         self.names = ["Tool", "Child", "Rig/Bone"]
-        bpy.context.view_layer.update()
+        bpy.context.scene.frame_set(20)
+        for name, by in zip(self.names, held, strict=False):
+            if by is not None:
+                animation.hold_in(self._found(name), self._found(by))
+        bpy.context.scene.frame_set(1)
         self._start_history()
 
     def _found(self, name: str) -> Carrier:
@@ -161,20 +165,18 @@ class Holding(WithHolds):
         self._edit(change)
 
     @precondition(lambda self: self.on and len(self.names) < 5)
-    @rule(who=shares)
-    def append(self, who):
-        """From a copy of this file, with its holders, which are those that are here by no more than their names."""
+    @rule(who=shares, link=st.booleans())
+    def append(self, who, link):
+        """From a copy of this file, with its holders, which are those that are here by no more than their names.
+
+        It may also be linked and made local, with holders that are not.
+        """
         name = self._named(who).split("/")[0]
-        library = str(Path(self.folder.name) / f"library {self.fresh}.blend")
-        self.fresh += 1
-        bpy.ops.wm.save_as_mainfile(filepath=library, compress=False, copy=True)
 
         def change() -> None:
-            with bpy.data.libraries.load(library) as (_, wanted):
-                wanted.objects = [name]
-            (obj,) = wanted.objects
-            bpy.context.scene.collection.objects.link(obj)
-            self.names += self._names_in(obj)
+            brought = self._brought(name, link=link, is_local=True)
+            self.names += self._names_in(brought)
+            self._may_be_unbaked(name, brought.name)
 
         self._edit(change)
 
@@ -207,9 +209,20 @@ class Holding(WithHolds):
             bpy.context.view_layer.objects.active = bpy.data.objects[name]
             before = set(bpy.data.objects)
             bpy.ops.object.duplicate()
-            self.names += [obj.name for obj in set(bpy.data.objects) - before if not obj.name.startswith("Hand")]
+            new = [obj.name for obj in set(bpy.data.objects) - before if not obj.name.startswith("Hand")]
+            self.names += new
+            self._may_be_unbaked(name, *new)
 
         self._edit(change)
+
+    def _may_be_unbaked(self, name: str, *new: str) -> None:
+        """What is made of an object with an Action of its own has the way back from its baked keys, too."""
+        self.before_bake |= {
+            one.replace(name, other, 1): kept
+            for one, kept in self.before_bake.items()
+            if one.split("/")[0] == name
+            for other in new
+        }
 
     @while_on(who=shares, start=st.integers(1, 30), scale=st.sampled_from((1.0, 2.0)), by=st.sampled_from(HANDS))
     def hold_in_a_strip(self, who, start, scale, by):

@@ -5,35 +5,24 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from mathutils import Quaternion
 
 from rigid_motion.animation import refresh, repeat, set_enabled, set_mode, set_turns, write_channel
 from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.animation.queries.segments import frame_in_action, is_up_to_date, segment_at
-from tests.animation.scenes import new_object, push_down, tweak
+from tests.animation.scenes import push_down, turning, tweak
 
 FRAMES = np.array((1.0, 11.0, 31.0))
 
 
-def turned(angles, rotation_mode="QUATERNION", frames=FRAMES, sign=1.0):
-    """An object turned about z by these degrees, and moved 2 along x, from key to key."""
-    obj = new_object("Tool", rotation_mode)
-    angles = np.radians(angles)
-    write_channel(obj, "location", frames, np.outer(np.arange(len(frames)), (2.0, 0.0, 0.0)))
-    if rotation_mode == "QUATERNION":
-        quaternions = np.array([Quaternion((0.0, 0.0, 1.0), angle) for angle in angles])
-        quaternions[1::2] *= sign
-        write_channel(obj, "rotation_quaternion", frames, quaternions)
-    else:
-        write_channel(obj, "rotation_euler", frames, np.outer(angles, (0.0, 0.0, 1.0)))
-    return obj
+def turned(degrees, frames=FRAMES, **how):
+    return turning("Tool", degrees, frames, **how)
 
 
 def at(obj, frame):
     return segment_at(source_of(obj), frame)
 
 
-LONG, EULERS = {"angles": (0, 90, 120), "sign": -1.0}, {"angles": (0, 350, 380), "rotation_mode": "XYZ"}
+LONG, EULERS = {"degrees": (0, 90, 120), "sign": -1.0}, {"degrees": (0, 350, 380), "rotation_mode": "XYZ"}
 
 FACTS = {
     **{
@@ -47,10 +36,10 @@ FACTS = {
     "as far as angles say": (EULERS, 5, {"turn": 350, "turns": 1, "is_sure": True, "long_way": False}),
     "a small angle": (EULERS, 20, {"turns": 0, "is_sure": False, "two_axes": False}),
     "the long way in Blender": (LONG, 5, {"long_way": True}),
-    "a full turn through nothing": ({"angles": (0, 0, 0), "sign": -1.0}, 5, {"long_way": False}),
+    "a full turn through nothing": ({"degrees": (0, 0, 0), "sign": -1.0}, 5, {"long_way": False}),
     "nothing before the keys": ({}, 0, None),
     "nothing behind them": ({}, 32, None),
-    "nothing with a single one": ({"angles": (0,), "frames": FRAMES[:1]}, 1, None),
+    "nothing with a single one": ({"degrees": (0,), "frames": FRAMES[:1]}, 1, None),
 }
 """How an object is turned, a frame, and what is told of the segment there if there is one, angles in degrees."""
 
@@ -58,7 +47,7 @@ FACTS = {
 @pytest.mark.parametrize("what", FACTS)
 def test_a_segment_is_told_in_numbers(live_file, what):
     settings, frame, facts = FACTS[what]
-    segment = at(turned(**{"angles": (0, 90, 120), **settings}), frame)
+    segment = at(turned(**{"degrees": (0, 90, 120), **settings}), frame)
     assert (segment is None) == (facts is None)
     told = {name: np.degrees(segment.turn) if name == "turn" else getattr(segment, name) for name in facts or ()}
     assert told == pytest.approx(facts or {}, abs=1e-3)

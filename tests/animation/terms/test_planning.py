@@ -16,6 +16,8 @@ from rigid_motion.animation.terms import planning
 from rigid_motion.animation.terms.carriers import Term
 from tests.animation.terms.test_carriers import error, evaluate
 
+pytestmark = pytest.mark.any_blender
+
 LOCATION, ROTATION = 0, 4
 
 
