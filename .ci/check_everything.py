@@ -5,8 +5,8 @@
     .ci/run site 5.2.3    the parts that are named, once what they need is set up
 
 What is marked `blender` runs on each Blender; all else runs without one, once for each Python and its NumPy, which
-shows that it needs none. What is marked `once` runs on the newest Blender alone, where tests that try many cases try
-all of them. Environments are set up, the site is built and the wheel is installed while tests run.
+shows that it needs none. What is marked `once` or `any_blender` runs on the newest Blender alone, where tests that try
+many cases try all of them. Environments are set up, the site is built and the wheel is installed while tests run.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def every_part(folder: Path) -> list[Part]:
             if blender == newest:
                 marks, several = "blender or once", thorough
             else:
-                marks, several = "blender and not once", {}
+                marks, several = "blender and not once and not any_blender", {}
             where = ("--blender", blender, "-m", marks, *NOT_IN_WINDOWS)
             parts.append(tests(f"Blender {blender}", python, *where, **several))
             if blender == newest:

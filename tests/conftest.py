@@ -135,8 +135,18 @@ def pytest_make_collect_report(collector: pytest.Collector):
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave files alone that need Blender where those are asked for that need none."""
-    return ("not blender" in config.option.markexpr and needs_blender(collection_path)) or None
+    """Leave files alone that need Blender where those are asked for that need none, and the other way round."""
+    expression = config.option.markexpr
+    if "not blender" in expression:
+        return needs_blender(collection_path) or None
+    is_file = collection_path.is_file() and collection_path.name.startswith("test_")
+    return (expression.startswith("blender and") and is_file and not may_need_blender(collection_path)) or None
+
+
+def may_need_blender(path: Path) -> bool:
+    """Return whether any test of a file may need Blender's module: all of it, or one by a mark or a fixture."""
+    asks = re.compile("|".join(("mark.blender", *IN_BLENDER)))
+    return needs_blender(path) or bool(asks.search(path.read_text(encoding="utf-8")))
 
 
 @functools.cache

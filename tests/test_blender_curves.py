@@ -98,6 +98,7 @@ def test_there_are_twenty_recordings():
     assert len({(path.stem, name) for path, name in tracks()}) == len(tracks())
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("rate", [2.0, 5.0, 15.0])
 @pytest.mark.parametrize(("path", "name"), tracks(), ids=lambda part: part.stem if isinstance(part, Path) else part)
 def test_recordings(path, name, rate):

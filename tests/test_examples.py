@@ -115,6 +115,7 @@ def test_a_sword_stays_in_the_hand_and_the_screw_keeps_the_arm_long(make: Callab
     assert seen[1, 1] < 1e-4
 
 
+@pytest.mark.any_blender
 def test_a_hand_is_measured_as_its_page_says_from_a_log_with_faults(make: Callable, tmp_path: Path) -> None:
     make("hand")
     (_, *modes), *rates = table("hand")
@@ -127,6 +128,7 @@ def test_a_hand_is_measured_as_its_page_says_from_a_log_with_faults(make: Callab
     assert all(word in repairs for word in ("runs backwards", "comes again", "sign flips", "gaps"))
 
 
+@pytest.mark.any_blender
 @pytest.mark.slow
 def test_a_dancer_keeps_within_the_tolerance_with_a_quarter_of_the_keys(make: Callable, tmp_path: Path) -> None:
     printed = make("dancer")
@@ -150,6 +152,7 @@ def test_a_dancer_keeps_within_the_tolerance_with_a_quarter_of_the_keys(make: Ca
     assert 4 * after < before
 
 
+@pytest.mark.any_blender
 def test_a_camera_keeps_within_the_tolerance_of_its_solution_with_few_keys(make: Callable, tmp_path: Path) -> None:
     printed = make("camera")
     assert all(line in printed for line in claims("camera"))
@@ -171,6 +174,7 @@ def test_a_camera_keeps_within_the_tolerance_of_its_solution_with_few_keys(make:
     assert keys_of("Solved") == len(clip.times)
 
 
+@pytest.mark.any_blender
 @pytest.mark.slow
 def test_a_job_for_a_farm_makes_the_same_as_one_machine(make: Callable, tmp_path: Path) -> None:
     make("farm")

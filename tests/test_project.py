@@ -8,6 +8,8 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections import defaultdict
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import bpy
@@ -131,6 +133,21 @@ def test_the_extension_imports_downwards_and_nothing_else(floor):
             inside = 1 <= dots <= depth
             lower = (dots == depth + 1 and name.lstrip(".") in below) or (name == ".." and floor == "ui")
             assert known or inside or lower, f"{path.relative_to(ROOT)} imports {name}"
+
+
+ROOMS_OF_NUMBERS = {"fcurves", "evaluation"}
+"""Those of `animation` that need no Blender, as `motion` does not."""
+
+
+@pytest.mark.once
+def test_rooms_import_one_another_in_no_ring_and_those_of_numbers_need_no_blender():
+    rooms = defaultdict(set)
+    for path in (PACKAGE / "animation").glob("*/*.py"):
+        others = {name for name in imported(path) if not re.fullmatch(r"\.\w*", name)} - sys.stdlib_module_names
+        rooms[path.parent.name] |= {name[2:] for name in others if re.fullmatch(r"\.\.\w+", name)}
+        if path.parent.name in ROOMS_OF_NUMBERS:
+            assert others <= {"numpy", "...motion", *(f"..{room}" for room in ROOMS_OF_NUMBERS)}, path
+    TopologicalSorter(rooms).prepare()
 
 
 def is_numeric(value: ast.expr) -> bool:

@@ -15,7 +15,7 @@ from rigid_motion_batch.places import CHECKOUT, manifest
 from tests.gltf.making import walk
 from tests.thoroughness import sample
 
-pytestmark = pytest.mark.blender
+pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 BESIDES = (
     *("bpy", "filelock", "jinja2", "markdown-it-py", "markupsafe", "mdurl", "numpy", "pebble", "pygments", "rich"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from functools import cache
 
 import bpy
 import numpy as np
@@ -60,17 +61,25 @@ def swords() -> Poses:
     return Poses([one.positions for one in poses], [one.quaternions for one in poses])
 
 
-def perform(sent, clock, *, holds: bool = True, loss: float = 0.0, on_row=lambda row: None) -> None:
-    """Send a dance with a sword, of which a part is lost, and record it from one sample on."""
-    there, poses, rng = swords(), dance(TIMES), np.random.default_rng(3)
+@cache
+def datagrams_of(*, holds: bool) -> list[tuple[list[bytes], list[bytes]]]:
+    """What describes the bodies, and what a sample of the dance with the sword makes, of each sample."""
+    there, poses, result = swords(), dance(TIMES), []
     sender = Sender([StreamBody.rigid("sword", radius=RADIUS), BODY], TOLERANCE, DELAY, rate=60.0)
     for row, moment in enumerate(TIMES.tolist()):
         if holds:
             sender.hold("sword", hand_at(row) and "dancer", hand_at(row))
-        clock[0] += 1.0 / 60.0
         datagrams = sender.add(moment, {"sword": there[row : row + 1], "dancer": poses[:, row]})
-        arriving = [datagram for datagram in datagrams if rng.random() >= loss]
-        sent.send((sender.describe() if row < 2 else []) + arriving, clock[0])
+        result.append((sender.describe() if row < 2 else [], datagrams))
+    return result
+
+
+def perform(sent, clock, *, holds: bool = True, loss: float = 0.0, on_row=lambda row: None) -> None:
+    """Send a dance with a sword, of which a part is lost, and record it from one sample on."""
+    rng = np.random.default_rng(3)
+    for row, (described, datagrams) in enumerate(datagrams_of(holds=holds)):
+        clock[0] += 1.0 / 60.0
+        sent.send(described + [datagram for datagram in datagrams if rng.random() >= loss], clock[0])
         if row == BEGINS:
             assert bpy.ops.rigid_motion.live_record() == {"FINISHED"}
         on_row(row)

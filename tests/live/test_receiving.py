@@ -12,16 +12,8 @@ from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion.streams import Sender, StreamBody
 from rigid_motion.streams.vmc import write_trackers
-from tests.live.performing import (
-    BODY,
-    JOINTS,
-    Sent,
-    dance,
-    frames_of_vmc,
-    heads_of,
-    in_world,
-    new_rig,
-)
+from tests.animation.scenes import linked
+from tests.live.performing import BODY, JOINTS, Sent, dance, frames_of_vmc, heads_of, in_world, new_rig
 from tests.rigs.human import human
 
 pytestmark = pytest.mark.network
@@ -203,10 +195,7 @@ def test_linked_rigs_are_left_alone(live, sent, tmp_path):
     new_rig()
     bpy.data.libraries.write(str(tmp_path / "rig.blend"), {bpy.data.objects["Rig"]})
     bpy.data.objects.remove(bpy.data.objects["Rig"])
-    with bpy.data.libraries.load(str(tmp_path / "rig.blend"), link=True) as (_, expected):
-        expected.objects = ["Rig"]
-    bpy.context.scene.collection.objects.link(expected.objects[0])
-    live.armature = expected.objects[0]
+    live.armature = linked(tmp_path / "rig.blend", "Rig")
     sent.dance(0, 5)
     assert receiving.running.trouble == ""
 

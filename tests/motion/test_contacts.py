@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigid_motion.motion.contacts import slide, standing
+from rigid_motion.motion.contacts import slide, slide_ratios, standing
 
 TIMES = np.arange(90) / 30.0
 HEIGHTS = np.array((1.7, 1.0, 0.05))
@@ -57,3 +57,24 @@ def test_the_slide_is_the_farthest_from_where_it_stood_at_first():
     stands[2, 40:71] = True
     assert slide(positions, stands) == pytest.approx(0.03)
     assert slide(positions, np.zeros_like(stands)) == 0.0
+
+
+def test_a_foot_that_trembles_stands_as_long():
+    stops = (TIMES > 0.5) & (TIMES < 1.5)
+    shaky = body(stepping(stops)) + 0.003 * np.random.default_rng(1).normal(size=(3, 90, 3))
+    assert not standing(TIMES, shaky).any()
+    stands = standing(TIMES, shaky, shaky=True)
+    assert not stands[:2].any()
+    assert np.all(stands[2] <= stops)
+    assert np.count_nonzero(stands[2]) > 0.7 * np.count_nonzero(stops)
+
+
+def test_how_far_it_slides_is_told_of_each_contact_by_what_it_did_there():
+    before, after = body(stepping(np.full(90, False))), body(stepping(np.full(90, True)))
+    stands = np.zeros((3, 90), dtype=bool)
+    stands[2, 10:21] = stands[2, 40:45] = True
+    before[2, 10:21, 0], before[2, 40:45, 0] = np.linspace(0.0, 0.1, 11), 0.2
+    after[2, 10:21, 0], after[2, 40:45, 0] = np.linspace(0.0, -0.3, 11), 0.4
+    ratios = slide_ratios(after, before, stands)
+    assert ratios[2, 10:21] == pytest.approx([3.0, *np.linspace(0.3, 3.0, 10)], rel=1e-6)
+    assert np.count_nonzero(ratios) == 11
