@@ -163,3 +163,30 @@ def test_a_file_that_is_opened_is_as_it_was_saved(live_file, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "held.blend"))
     update()
     assert off(bpy.data.objects["Tool"], Matrix.Translation((1.0, 0.5, 0.2))) < 1e-5
+
+
+@pytest.mark.parametrize("cleared", [False, True])
+@pytest.mark.parametrize("keyed", [False, True])
+def test_it_stays_where_its_parent_is_changed_and_its_transform_is_kept(stage, keyed, cleared):
+    prop, parent = stage(), new_object("Table")
+    parent.location, parent.rotation_euler = (1.0, -2.0, 0.5), (0.2, 0.4, 0.9)
+    if cleared:
+        prop.parent = parent
+    update()
+    go_to(25.0)
+    before = world_of(prop)
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj in (prop, parent))
+    bpy.context.view_layer.objects.active = parent
+    if cleared:
+        parent.select_set(False)
+        bpy.ops.object.parent_clear(type="CLEAR_KEEP_TRANSFORM")
+    else:
+        bpy.ops.object.parent_set(type="OBJECT", keep_transform=True)
+    update()
+    assert off(prop, before) < 1e-5
+    if keyed:
+        key_all(prop, 25.0)
+    go_to(25.0)
+    assert off(prop, before) < 1e-5
+    assert_held([prop], FRAMES)

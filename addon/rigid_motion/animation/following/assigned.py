@@ -2,7 +2,8 @@
 
 Blender gives the channels what is seen then where nothing holds the object. So they are set once more, to what is seen
 there in the hand, and with them keys that were inserted of it. What tells is that the matrix is other than Blender has
-evaluated it: no edit of channels does that, whatever their values. Of bones nothing tells: `matrix` is only evaluated.
+evaluated it: no edit of channels does that, whatever their values. With *Keep Transform* it is the parent that is another
+one. Of bones nothing tells: `matrix` is only evaluated.
 """
 
 from __future__ import annotations
@@ -56,12 +57,17 @@ def assigned(objects: Iterable[bpy.types.Object]) -> list[Assigned]:
 
 def _assigned(obj: bpy.types.Object, graphs: Iterable[bpy.types.Depsgraph]) -> Assigned | None:
     transform, known = Transform(obj), [one for graph in graphs if (one := obj.evaluated_get(graph)).is_evaluated]
-    if not known or any(one.matrix_world == obj.matrix_world for one in known) or _holder_of(transform) is None:
+    as_known = any(one.matrix_world == obj.matrix_world and _parent(one) == obj.parent for one in known)
+    if not known or as_known or _holder_of(transform) is None:
         return None
     taken = world_in(transform, None, obj.matrix_basis, view_layer().depsgraph)
     if not np.allclose(np.array(taken), np.array(obj.matrix_world), rtol=MAX_MATRIX_ROUNDING, atol=MAX_MATRIX_ROUNDING):
         return None
     return Assigned(transform, obj.matrix_world.copy(), transform.components(), np.array(known[0].scale))
+
+
+def _parent(evaluated: bpy.types.Object) -> bpy.types.Object | None:
+    return evaluated.parent and evaluated.parent.original
 
 
 def _holder_of(transform: Transform) -> Holder | None:
