@@ -112,7 +112,7 @@ def test_feet_that_stand_are_held_and_it_says_how_often_they_do(tmp_path, capsys
     times = "MOTION", "Frames: 300", "Frame Time: 0.0166667"
     source.write_text("\n".join(["HIERARCHY", *lines, *"}}}}", *times, *rows, ""]))
     assert run(source) == 0
-    assert "; 5 contacts held: feet that stand slide by 16 mm, and did by 16 mm" in capsys.readouterr().err
+    assert "; contacts held: 5, feet slide by 16 mm there, and did by 16 mm" in capsys.readouterr().err
     after, before = (poses_in_world(path).positions for path in (made, source))
     stands = standing(np.arange(300) / 60.0, before[..., [0, 2, 1]], shaky=True)
     assert (after != before).any()

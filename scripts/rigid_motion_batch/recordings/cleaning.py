@@ -66,7 +66,7 @@ def described(clip: Clip, found: Cleaned, rows: np.ndarray | None = None) -> Ite
         yield f"{share:.0%} is left nearly as it is, as motion cannot be told from noise there"
     if body:
         now, before = (length(slide(_places(clip, poses), found.stands)) for poses in (found.poses, clip.poses))
-        contacts = f"{len(spans(found.stands))} contacts held: feet that stand slide by {now}, and did by {before}"
+        contacts = f"contacts held: {len(spans(found.stands))}, feet slide by {now} there, and did by {before}"
         yield contacts if found.stands.any() else "no foot surely stands: none is held"
 
 
