@@ -39,7 +39,7 @@ exclude_patterns = ["**/__pycache__", "extensions", "templates"]
 nitpicky = True
 nitpick_ignore_regex = [
     ("py:.*", r"(collections|np|numpy|typing)\..*"),
-    ("py:class", r"rigid_motion\.motion\.segments\..*"),
+    ("py:class", r"rigid_motion\.motion\.(cleaning|segments)\..*"),
     ("py:class", r"rigid_motion_batch\.recordings\..*"),
 ]
 """What other people's documentation has, where a link would be none without a network, and what no caller needs."""
