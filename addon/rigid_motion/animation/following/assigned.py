@@ -2,8 +2,8 @@
 
 Blender gives the channels what is seen then where nothing holds the object. So they are set once more, to what is seen
 there in the hand, and with them keys that were inserted of it. What tells is that the matrix is other than Blender has
-evaluated it: no edit of channels does that, whatever their values. With *Keep Transform* it is the parent that is another
-one. Of bones nothing tells: `matrix` is only evaluated.
+evaluated it: no edit of channels does that, whatever their values. With *Keep Transform* it is the parent that is
+another one. Of bones nothing tells: `matrix` is only evaluated.
 """
 
 from __future__ import annotations
