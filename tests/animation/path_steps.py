@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from mathutils import Euler, Matrix
 
 from rigid_motion import animation
-from rigid_motion.animation.edits.path_keys import KeyEdits, KeySpaces, delete_keys, insert_key, near
+from rigid_motion.animation.edits.path_keys import KeyEdits, KeySpaces, delete_keys, insert_key
 from rigid_motion.animation.edits.speed import EASES
+from rigid_motion.animation.evaluation.marks import near
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.motion.affine import AffineMaps
 from tests.animation.body_oracle import DEPENDS_ON_KEYS, location_axes

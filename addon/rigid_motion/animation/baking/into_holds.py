@@ -31,6 +31,7 @@ from ..edits.apply import Readings, Target, apply_edit, readable
 from ..edits.holding import DEFAULT_MODE
 from ..evaluation.components import LOCATION, MODE_NUMBERS, PART_OF, ROTATION, ROWS, SCALE
 from ..evaluation.differences import seen_values
+from ..evaluation.marks import near
 from ..evaluation.sources import SAME_FRAME, KeyedTransform, distinct
 from ..fcurves.keys import CONSTANT, LINEAR
 from ..holds.dependencies import Node, follows, node_of
@@ -362,7 +363,7 @@ class _Switches:
         """Return what keys on these frames (m,) say: see `marks.hold`."""
         source = self.source
         old = np.zeros(len(frames), int) if source.held is None else source.held.at(frames + 0.5 * SAME_FRAME)
-        old[_near(frames, self.resumes)] = hold(0)
+        old[near(frames, self.resumes)] = hold(0)
         place = np.searchsorted(self.begins, frames + SAME_FRAME) - 1
         return np.where(self.are_held(frames), self.holds[np.clip(place, 0, None)], old)
 
@@ -390,9 +391,9 @@ def _hold(
         fields = key_fields(fcurve.keyframe_points)
         left = ~switches.are_held(fields["co"][:, 0].astype(float))
         fields = {name: numbers[left] for name, numbers in fields.items()}
-        lacking = ~_near(outside, fields["co"][:, 0])
+        lacking = ~near(outside, fields["co"][:, 0])
         fields = _with_keys(fields, new_key_fields(outside[lacking], seen[row, lacking], LINEAR, "GENERATED"))
-        fields["interpolation"][_near(fields["co"][:, 0], switches.rests)] = CONSTANT
+        fields["interpolation"][near(fields["co"][:, 0], switches.rests)] = CONSTANT
         fields = _with_keys(fields, new_key_fields(switches.begins, rows[row], CONSTANT))
         set_key_fields(fcurve, fields)
     for fcurve in filter(lambda fcurve: fcurve.keyframe_points, binding.moving.values()):
@@ -415,8 +416,3 @@ def _with_keys(fields: KeyFields, new: KeyFields) -> KeyFields:
     """Return all there is to keys, with others on frames on which there are none."""
     order = np.argsort(np.append(fields["co"][:, 0], new["co"][:, 0]), kind="stable")
     return {name: np.concatenate((numbers, new[name]))[order] for name, numbers in fields.items()}
-
-
-def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return which frames (m,) are one of others to Blender."""
-    return (np.abs(frames[:, None] - others[None]) < SAME_FRAME).any(axis=1)

@@ -18,6 +18,7 @@ from ..actions.marks import read_marks, write_holds, write_marks
 from ..actions.slots import Binding
 from ..evaluation.components import MODE_NUMBERS
 from ..evaluation.differences import seen_values
+from ..evaluation.marks import near
 from ..evaluation.runs import MOST_FRAMES, Switch
 from ..evaluation.sources import SAME_FRAME, KeyedTransform, Marks
 from ..following import follower
@@ -141,5 +142,4 @@ def say_holds(binding: Binding, held: Marks, at_once: Collection[float] = ()) ->
         frames, marks = key_points(fcurve)[:, 0].astype(float), read_marks(fcurve)
         write_marks(fcurve, np.where(marks, marks, MODE_NUMBERS["BLENDER"] + 1))
         holds = held.at(frames + 0.5 * SAME_FRAME)
-        near = (np.abs(frames[:, None] - [*at_once]) < SAME_FRAME).any(axis=1)
-        write_holds(fcurve, np.where(near, holds - holds % (MOST_FRAMES + 1), holds))
+        write_holds(fcurve, np.where(near(frames, np.array([*at_once])), holds - holds % (MOST_FRAMES + 1), holds))

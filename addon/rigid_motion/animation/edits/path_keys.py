@@ -22,7 +22,7 @@ from ..evaluation.bodies import turn_into_quaternions
 from ..evaluation.channel_values import channel_values
 from ..evaluation.components import LOCATION, PART_OF, ROTATION, ROWS
 from ..evaluation.differences import seen_values
-from ..evaluation.sources import SAME_FRAME
+from ..evaluation.marks import SAME_FRAME, near
 from ..following.inserted import set_key
 from ..queries.keyed import active_binding, frames_in
 from ..transforms import Channel, Refused, Transform
@@ -216,11 +216,6 @@ def select_keys(target: Transform, frames: np.ndarray) -> None:
             chosen = near(key_points(fcurve)[:, 0], frames)
             for name in SELECTION_FIELDS:
                 fcurve.keyframe_points.foreach_set(name, chosen)
-
-
-def near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return which frames (n,) are any of others (m,) to Blender, shape (n,)."""
-    return (np.abs(frames[:, None] - others) < SAME_FRAME).any(axis=1)
 
 
 def swings(first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -38,6 +38,11 @@ def distinct(frames: np.ndarray) -> np.ndarray:
     return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
 
 
+def near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return which frames (n,) are any of others (m,) to Blender, shape (n,)."""
+    return (np.abs(frames[:, None] - others) < SAME_FRAME).any(axis=1)
+
+
 @dataclass(frozen=True, eq=False)
 class Marks:
     """Numbers that hold from frames on, each until the next; before the first one there is that one, too."""

@@ -16,7 +16,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from mathutils import Matrix
 
 from ...animation import Refused
-from ...animation.edits.path_keys import KeySpaces, near, select_keys
+from ...animation.edits.path_keys import KeySpaces, select_keys
+from ...animation.evaluation.marks import near
 from ...animation.transforms import Transform
 from ...blender import Operator, Returned, existing
 from ..overlay import cache

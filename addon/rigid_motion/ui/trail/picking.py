@@ -11,7 +11,8 @@ from bpy.app.translations import pgettext_n as n_
 from mathutils import Vector
 
 from ...animation import Refused
-from ...animation.edits.path_keys import delete_keys, insert_key, near
+from ...animation.edits.path_keys import delete_keys, insert_key
+from ...animation.evaluation.marks import near
 from ...animation.holds.placing import world_matrix
 from ...animation.transforms import Transform, transform_of
 from ...blender import BoolProperty, EnumProperty, FloatProperty, Returned, StringProperty, existing, with_properties
