@@ -232,7 +232,9 @@ class _Joint:
         """Leave what is around rows (n,) of a mask as it was."""
         if not rows.any():
             return
-        apart = np.abs(np.arange(len(rows))[:, None] - np.flatnonzero(rows)).min(axis=1)
+        at, here = np.flatnonzero(rows), np.arange(len(rows))
+        following = np.searchsorted(at, here)
+        apart = np.minimum(*(np.abs(at[np.clip(following - back, 0, len(at) - 1)] - here) for back in (0, 1)))
         self.share = np.minimum(self.share, np.clip(apart / GIVEN_BACK_SAMPLES - 1.0, 0.0, 1.0))
         self.alone |= ~self.out & (self.share < 1.0)
 
