@@ -45,8 +45,25 @@ def typed_number(text: str) -> float:
         return 0.0
 
 
-class Slider:
-    """A factor, and how mouse and keyboard change it.
+class TypedNumber:
+    """A number that is typed while the mouse moves, which has no say until it is deleted."""
+
+    def __init__(self) -> None:
+        self.typed = ""
+
+    def type(self, event: bpy.types.Event) -> bool:
+        """Take a key that was pressed, and say whether it was one of the number's."""
+        if event.type == "BACK_SPACE":
+            self.typed = self.typed[:-1]
+            return True
+        if event.unicode and event.unicode in "0123456789.,-":
+            self.typed += event.unicode.replace(",", ".")
+            return True
+        return False
+
+
+class Slider(TypedNumber):
+    """A factor, and how mouse and keyboard change it: numbers are per cent.
 
     Parameters
     ----------
@@ -59,10 +76,9 @@ class Slider:
     """
 
     def __init__(self, factor: float, x: float, scale: float) -> None:
+        super().__init__()
         self.overshoots = False
         """True if the factor may be below 0 and above 1."""
-        self.typed = ""
-        """The number that was typed, in per cent; the mouse has no say until it is deleted."""
         self._dragged, self._x, self._scale, self._snaps = factor, x, scale, False
         self._label = ""
         self._region: bpy.types.Region | None = None
@@ -92,12 +108,8 @@ class Slider:
             return False
         elif event.type == "E":
             self.overshoots = not self.overshoots
-        elif event.type == "BACK_SPACE":
-            self.typed = self.typed[:-1]
-        elif event.unicode and event.unicode in "0123456789.,-":
-            self.typed += event.unicode.replace(",", ".")
         else:
-            return False
+            return self.type(event)
         return True
 
     def show(self, context: bpy.types.Context, label: str) -> None:

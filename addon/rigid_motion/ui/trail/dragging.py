@@ -25,7 +25,7 @@ from mathutils.geometry import intersect_line_line
 from ...animation import Refused
 from ...animation.edits.path_keys import KeyEdits
 from ...blender import FloatProperty, FloatVectorProperty, Returned, existing, with_properties
-from ..breakdown import CANCEL, CONFIRM, SHIFT_RATIO, typed_number
+from ..breakdown import CANCEL, CONFIRM, SHIFT_RATIO, TypedNumber, typed_number
 from .handles import Handles, OnPath, handles_of, key_under, select, selected_spaces
 from .picking import RIGID_MOTION_OT_select_path_keys, mouse_of, pressed_at
 
@@ -41,15 +41,15 @@ FINE_STEP_RATIO = 0.1
 AXES = "XYZ"
 
 
-class DragInput:
+class DragInput(TypedNumber):
     """What mouse and keyboard say while keys are dragged. `place` is where the mouse is, in pixels of the region."""
 
     def __init__(self, place: np.ndarray) -> None:
+        super().__init__()
         self.first, self.place, self._mouse = place.copy(), place.copy(), place.copy()
         self.axis: int | None = None
         """The axis of the world that is locked, 0 to 2."""
         self.is_stepped = self.is_fine = False
-        self.typed = ""
 
     @property
     def number(self) -> float | None:
@@ -70,12 +70,8 @@ class DragInput:
         elif event.type in AXES:
             axis = AXES.index(event.type)
             self.axis = None if self.axis == axis else axis
-        elif event.type == "BACK_SPACE":
-            self.typed = self.typed[:-1]
-        elif event.unicode and event.unicode in "0123456789.,-":
-            self.typed += event.unicode.replace(",", ".")
         else:
-            return False
+            return self.type(event)
         return True
 
 
