@@ -168,6 +168,8 @@ def begin_child() -> bool:
         for item in signals:
             signal.signal(item, relay)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
+    # Where this process is killed, the tracker of shared memory outlives it, and would speak after the last words.
+    sys.warnoptions.append("ignore:resource_tracker")
     _is_child = True
     return True
 

@@ -111,6 +111,16 @@ def test_no_child_outlives_a_command_that_is_killed(tmp_path):
     assert not any(map(alive, processes))
 
 
+def test_the_last_words_are_of_the_command_where_its_child_is_killed(tmp_path):
+    write_csv(tmp_path / "slow.csv")
+    run = start(tmp_path, "reduce.py", "slow.csv", "--jobs", 1, where="slow.csv")
+    run.wait_until_stuck()
+    os.kill(descendants(run.process.pid)[0], signal.SIGKILL)
+    _, said, _ = run.end()
+    assert run.process.returncode == 1, said
+    assert "resource_tracker" not in said
+
+
 def test_ctrl_c_within_an_importer_or_exporter_is_no_fault_of_the_file(tmp_path):
     # As bpy.ops puts it.
     interrupted = RuntimeError("Error: Python: Traceback (most recent call last):\n  File ...\nKeyboardInterrupt\n")
