@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import bpy
@@ -248,7 +249,17 @@ def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[ReadChannels]:
         channels, breakdowns = [fcurves[number].keyframe_points for number in numbers], np.frombuffer(mask, bool)
         stacked, is_linear = np.stack([points[number] for number in numbers]), extrapolation == "LINEAR"
         result.append(ReadChannels(numbers, *_read_together(channels, stacked, is_linear, cycles, breakdowns)))
+    if any((read.holds >= 0).any() for read in result):
+        # Also of channels that say no holds themselves: those of the others are theirs, too.
+        result = [read._replace(keys=replace(read.keys, automatic=_automatic(fcurves, read))) for read in result]
     return result
+
+
+def _automatic(fcurves: Sequence[bpy.types.FCurve], read: ReadChannels) -> np.ndarray:
+    """Return which handles of some of these F-curves Blender sets, to the left and to the right: (c, n, 2)."""
+    channels = [fcurves[number].keyframe_points for number in read.numbers]
+    types = [_read_property(f"handle_{side}_type", channels, CODE) for side in ("left", "right")]
+    return np.isin(np.stack(types, axis=-1), AUTOMATIC_HANDLES)
 
 
 def _read_together(
@@ -274,13 +285,10 @@ def _read_together(
     # What is no number is not smaller, either.
     is_sound = all(number < MAX_NUMBER for number in numbers) and bool(np.all(np.diff(points[0, :, 0]) >= 0.0))
     marked = breakdowns if breakdowns.any() else None
-    holds, automatic = np.full(points.shape[:2], -1), None
+    holds = np.full(points.shape[:2], -1)
     if is_any_flagged(back):
         holds = holds_of(back, amplitude, _read_property("period", channels, np.float32))
-    if (holds >= 0).any():
-        types = [_read_property(f"handle_{side}_type", channels, CODE) for side in ("left", "right")]
-        automatic = np.isin(np.stack(types, axis=-1), AUTOMATIC_HANDLES)
-    keys = Keys(points, interpolation, left, right, easing, settings, linear, cycles, marked, automatic, is_sound)
+    keys = Keys(points, interpolation, left, right, easing, settings, linear, cycles, marked, is_sound=is_sound)
     return keys, marks_of(back, amplitude), holds
 
 

@@ -150,7 +150,7 @@ class Keys:
     @property
     def raw(self) -> bytes:
         """All of it as bytes, for a digest that tells whether anything has changed."""
-        names = ("points", "interpolation", "left", "right", "easing", "easing_settings", "breakdowns")
+        names = ("points", "interpolation", "left", "right", "easing", "easing_settings", "breakdowns", "automatic")
         present = [array for name in names if (array := getattr(self, name)) is not None]
         header = f"{self.points.shape} {len(present)} {self.linear} {self.cycles};"
         return b"".join((header.encode(), *(array.tobytes() for array in present)))

@@ -29,7 +29,10 @@ OF_OBJECTS = (
 OFTEN_CHANGED = ("co", "handle_left", "handle_right")
 """What of keys is dragged: it is looked at first."""
 
-SELDOM_CHANGED = ("interpolation", "easing", "back", "amplitude", "period", "type")
+SELDOM_CHANGED = (
+    *("interpolation", "easing", "back", "amplitude", "period", "type"),
+    *("handle_left_type", "handle_right_type"),
+)
 """What else in-betweens depend on of keys."""
 
 
