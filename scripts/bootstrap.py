@@ -2,27 +2,27 @@
 
     python scripts/bootstrap.py compare                     compare the modes, on the recordings in assets/
     python scripts/bootstrap.py compare hand.csv --axes unity
-    python scripts/bootstrap.py inspect hand.csv            say what is in a recording, and what looks wrong
-    python scripts/bootstrap.py clean hand.csv              take the trembling and the spikes out of a recording
+    python scripts/bootstrap.py inspect hand.csv            show what is in a recording, and what looks wrong
+    python scripts/bootstrap.py clean hand.csv              remove jitter and spikes from a recording
     python scripts/bootstrap.py paper                       reproduce the paper's figures and its table
     python scripts/bootstrap.py test                        run the tests
     python scripts/bootstrap.py test --quick                run some of each file of tests, in a minute
     python scripts/bootstrap.py test -m "not blender"       run those that need no Blender
     python scripts/bootstrap.py test --blender 4.5.15       run the tests on another Blender
-    python scripts/bootstrap.py bake shot.blend             turn in-betweens of .blend files into real keys, or back
-    python scripts/bootstrap.py reduce walk.glb             keep few keys, in glTF and .blend files and of recordings
+    python scripts/bootstrap.py bake shot.blend             bake in-betweens of .blend files to real keys, or back
+    python scripts/bootstrap.py reduce walk.glb             keep few keys, in glTF and .blend files and recordings
     python scripts/bootstrap.py stream --help               send a recording over a network, in real time
     python scripts/bootstrap.py tasks list renders/hand     list the tasks of a comparison, and which are done
     python scripts/bootstrap.py dask scheduler              use many machines, with Dask's own commands
     python scripts/bootstrap.py bundle hand.csv             write a comparison as a job for render farms
     python scripts/bootstrap.py openjd run template.json    run such a job on this machine
-    python scripts/bootstrap.py examples lid                make small complete cases to begin with: examples/README.md
+    python scripts/bootstrap.py examples lid                make small complete cases to start with: examples/README.md
     python scripts/bootstrap.py benchmark                   measure how fast the modes are
     python scripts/bootstrap.py build                       build the extension, dist/rigid_motion-VERSION.zip
     python scripts/bootstrap.py docs                        build the documentation as a site, dist/site
     python scripts/bootstrap.py types                       check types, with Python 3.12 or later as NumPy asks for
     python scripts/bootstrap.py environment [DIR]           set up all but Blender, for compare.py inside a Blender
-    python scripts/bootstrap.py completion bash             print what has a shell complete `rigid-motion`
+    python scripts/bootstrap.py completion bash             print the completion of `rigid-motion` for a shell
 
 The packages go into .venv/ of this checkout; the first run downloads about 500 MB, of which Blender is 400. Where there
 is no Blender for a Python, the commands run that need none: compare --no-video, inspect, clean, stream, tasks. No
@@ -234,7 +234,7 @@ def install(blender: str | None, requirements: list[str], folder: Path | None = 
     # Standard output is for what the command prints.
     pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *requirements]
     if subprocess.call(pip, cwd=ROOT, stdout=sys.stderr) != 0:
-        _fail("the packages above could not be installed; with the network back, the same command goes on")
+        _fail("the packages above could not be installed; with the network back, the same command continues")
         return None
     stamp.write_text(json.dumps([*installed, requested]))
     return python

@@ -1,4 +1,4 @@
-"""Keep the few keys that a motion needs, in glTF and .blend files and of recordings, without a window."""
+"""Keep the few keys that a motion needs, in glTF and .blend files and recordings, without a window."""
 
 import sys
 from pathlib import Path

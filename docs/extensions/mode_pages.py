@@ -67,7 +67,7 @@ class ModeDetails(ModeDirective):
         )
         if same:
             others = joined(link(self, f"{DETAILS}#{anchor(other)}", nodes.literal("", other)) for other in same)
-            facts += fact("The same motion", *others, nodes.Text(", where nothing grows"))
+            facts += fact("The same motion", *others, nodes.Text(", without scaling"))
         formula = link(self, f"{CONVENTIONS}#{anchor(name)}", nodes.Text("its formula"))
         film = [link(self, f"{LOOPS}#loop-{anchor(name)}", nodes.Text("as a film")), nodes.Text("; ")]
         others = (other for other in MODES if other != name and other not in same)

@@ -361,14 +361,14 @@ def test_what_is_held_in_what_is_held_is_baked_to_the_world_with_it_in_a_strip_t
 
 def test_what_cannot_be_baked_to_the_world_says_why_and_the_way_out(live_file):
     prop, hands = new_prop("free"), new_hands()
-    with pytest.raises(Refused, match="Tool is held in nothing"):
+    with pytest.raises(Refused, match="Tool is not held"):
         bake_to_world(prop)
     handled(prop, *hands)
     before = snapshot(prop)
     other = prop.copy()
     bpy.context.scene.collection.objects.link(other)
     for act in (bake_to_world, bake):
-        with pytest.raises(Refused, match=r"Tool moves by an Action that others have, too.*Make Single User"):
+        with pytest.raises(Refused, match=r"Tool shares its Action with others.*Make Single User"):
             act(prop)
     assert snapshot(prop) == before
     assert not is_baked(prop)

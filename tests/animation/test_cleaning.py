@@ -276,14 +276,14 @@ def test_what_has_no_trembling_or_no_dense_keys_says_so_and_others_are_cleaned(l
     (cleaning,) = clean_motion([calm, sparse, few, held], refused=refused)
     assert [one.name for one in cleaning.transforms] == ["Shaky"]
     assert sorted(map(str, refused)) == [
-        "Calm does not tremble: there is nothing to clean",
-        "Few has 3 keys of location and rotation: to tell trembling from motion takes 10",
-        "Sparse has keys 10 frames apart: only recordings can be cleaned, with keys on every frame",
+        "Calm has no jitter: there is nothing to clean",
+        "Few has 3 keys of location and rotation: at least 10 are needed to distinguish jitter from motion",
+        "Sparse has keys 10 frames apart: only keys on every frame can be cleaned",
     ]
     assert all(snapshot(obj) == keys for obj, keys in before.items())
     for fcurve in curves_of(held).values():
         fcurve.keyframe_points.foreach_set("select_control_point", [False] * len(fcurve.keyframe_points))
     with pytest.raises(Refused, match="no key of location, rotation or scale is selected"):
         clean_motion(held, selected=True)
-    with pytest.raises(Refused, match="more than 0 times their trembling, not 0"):
+    with pytest.raises(Refused, match="the strength must be above 0, not 0"):
         clean_motion(held, 0.0)

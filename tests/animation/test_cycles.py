@@ -134,9 +134,9 @@ def test_a_wheel_rolls_on(live_file):
 def test_what_cannot_go_on_from_its_end_is_refused_with_the_way_out(live_file):
     turned = key(new_object("Turned"), FRAMES)
     set_mode(turned, "dq_sclerp")
-    with pytest.raises(Refused, match=r"Turned ends turned or scaled otherwise.*choose Repeat"):
+    with pytest.raises(Refused, match=r"Turned ends with another rotation or scale.*choose Repeat"):
         repeat(turned, "REPEAT_OFFSET")
     for fcurve in curves_of(turned).values():
         add_cycles(fcurve, Cycles("REPEAT_OFFSET", "REPEAT_OFFSET", 0, 0))
     bpy.context.view_layer.update()
-    assert problem_of(turned).startswith("Turned ends turned or scaled otherwise")
+    assert problem_of(turned).startswith("Turned ends with another rotation or scale")

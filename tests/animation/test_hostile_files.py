@@ -151,21 +151,21 @@ NUMBERS: dict[str, tuple[Damage, str]] = {
 REFUSED: dict[str, tuple[Damage, str]] = {
     "a period that is no number": (
         each(numbers(LOCATION_Y, "interpolation", ELASTIC), numbers(LOCATION_Y, "period", INF, 1)),
-        "key 2 of Location Y has a frame, value, handle or easing",
+        "key 2 of Location Y has an invalid frame, value, handle or easing",
     ),
-    "a last key far ahead": (numbers(LOCATION_Y, "co.x", 1e9, 3), "delete the keys that are far off"),
+    "a last key far ahead": (numbers(LOCATION_Y, "co.x", 1e9, 3), "delete distant keys"),
     "keys out of order everywhere": (everywhere("co.x", 30.0, 1), "key 3 of Location X has a.*or move it and back"),
     "values at the end of numbers": (
         each(numbers(LOCATION_Y, "co.y", LARGEST, 0, 2), numbers(LOCATION_Y, "co.y", -LARGEST, 1, 3)),
-        "key 1 of Location Y has a.*no motion can be computed from: delete it",
+        "key 1 of Location Y has an invalid frame.*: delete it",
     ),
     "a mode that there is not": (
         marks(3, 15, 3, 3),
-        "keys have a mode that this version does not know: choose another",
+        "keys have a mode that is unknown to this version: choose another",
     ),
     "a delta transform that is no number": (
         lambda obj: setattr(obj, "delta_scale", (1.0, NAN, 1.0)),
-        "delta transform is not a finite number: set it anew",
+        "delta transform is not a finite number: set it again",
     ),
     **{
         f"{name!r}": (each(called(name), numbers(LOCATION_Y, "co.y", NAN, 1)), "key 2 of Location Y has a")
@@ -260,7 +260,7 @@ def test_a_million_keys_are_refused_soon(tmp_path):
 
     make(damage)
     broken, whole = reopened(tmp_path)
-    assert problem_of(broken).startswith("Broken is to be filled in over 999999 frames, and at most 250000 can be: ")
+    assert problem_of(broken).startswith("Broken needs in-betweens on 999999 frames, and 250000 is the limit: ")
     assert not any(is_term(item) for fcurve in curves_of(broken).values() for item in fcurve.modifiers)
     assert_shown([whole], SEEN)
     use(broken)

@@ -222,10 +222,10 @@ def unkeyed() -> Carrier:
 @pytest.mark.parametrize(
     ("make", "message", "wishes"),
     [
-        (far_apart, "Tool has keys far apart around frame 60.*bake them first", {}),
-        (growing, "Tool grows or shrinks, and what is held is of one size", {}),
-        (unkeyed, "Tool has no keys of location or rotation to be reduced", {}),
-        (growing, "the tolerance has to be a number above zero", {"tolerance": float("nan")}),
+        (far_apart, "Tool has distant keys around frame 60.*bake them first", {}),
+        (growing, "Tool grows or shrinks, but held things have a constant size", {}),
+        (unkeyed, "Tool has no keys of location or rotation to reduce", {}),
+        (growing, "the tolerance must be a number above zero", {"tolerance": float("nan")}),
     ],
 )
 def test_where_nothing_can_be_held_it_says_why_and_the_way_out_and_changes_nothing(live_file, make, message, wishes):

@@ -201,7 +201,7 @@ def test_what_was_done_last_is_taken_back_first_and_the_file_keeps_dense_keys_un
     if let_go:
         unbake(obj)
         assert (state(), reduction_of(obj)) == ((before[1][0], False, False), first)
-        with pytest.raises(Refused, match="Tool is neither reduced nor cleaned, or has another Action by now"):
+        with pytest.raises(Refused, match="Tool is neither reduced nor cleaned, or now has another Action"):
             restore_keys(obj)
     else:
         for back, reduction in ((restore_keys, None), (unbake, first), (restore_keys, None)):
@@ -274,7 +274,7 @@ def test_what_is_held_is_not_reduced_to_a_number_of_keys(live_file):
     handled(prop, *hands, throw=0)
     bake(prop)
     before = snapshot(prop)
-    with pytest.raises(Refused, match=r"Tool is held, and is reduced for each time.*by a tolerance"):
+    with pytest.raises(Refused, match=r"Tool is held, so each hold is reduced separately.*by a tolerance"):
         reduce_keys_of(prop, count=12)
     assert snapshot(prop) == before
 
@@ -309,8 +309,8 @@ def cycle_a_part(obj: bpy.types.Object) -> None:
     path.modifiers.new("CYCLES")
 
 
-NOTHING = "Tool has no more than two keys of location, rotation or scale: there is nothing to reduce.*Bake Action"
-GOES_ON = "Tool goes on outside of its keys.*constant extrapolation"
+NOTHING = "Tool has at most two keys of location, rotation or scale: there is nothing to reduce.*Bake Action"
+GOES_ON = "Tool continues beyond its keys.*constant extrapolation"
 
 
 @pytest.mark.parametrize(
@@ -323,17 +323,17 @@ GOES_ON = "Tool goes on outside of its keys.*constant extrapolation"
         (with_(driven), "Tool: Location Z is driven", {}),
         (
             with_(lambda obj: curves_of(obj)["location", 1].modifiers.new("NOISE")),
-            "Tool has F-curve modifiers of yours: mute them",
+            "Tool has other F-curve modifiers: mute them",
             {},
         ),
         (with_(lambda obj: curves_of(obj)["location", 1].convert_to_samples(1, 50)), "Samples to Keys", {}),
         (lambda: key(new_object(), [1.0, 5.0, 9.0]), "Tool needs its 3 keys to stay within the tolerance", {}),
-        (lambda: key(new_object(), np.arange(1.0, 30.0), scale="uneven"), "its scale changes differently", {}),
+        (lambda: key(new_object(), np.arange(1.0, 30.0), scale="uneven"), "its scale is not uniform", {}),
         (with_(cycle_a_part), GOES_ON, {"tolerance": TOLERANCE, "radius": RADIUS}),
         (from_library, "Tool is linked from another file: make it local first", {}),
-        (recorded, "the tolerance has to be a number above zero", {"tolerance": 0.0}),
-        (recorded, "the tolerance has to be a number above zero", {"tolerance": float("nan")}),
-        (recorded, "a motion has 2 keys at least, not 1", {"count": 1}),
+        (recorded, "the tolerance must be a number above zero", {"tolerance": 0.0}),
+        (recorded, "the tolerance must be a number above zero", {"tolerance": float("nan")}),
+        (recorded, "a motion needs at least 2 keys, not 1", {"count": 1}),
         (recorded, "Tool has 143 keys: ask for fewer", {"count": 100000}),
     ],
 )

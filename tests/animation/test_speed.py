@@ -219,7 +219,7 @@ def test_a_body_that_stands_no_chosen_keys_and_an_unknown_easing_are_refused(liv
     write(obj, "location", np.array((1.0, 9.0)), np.array(((1.0, 0, 0), (1.0, 0, 0))))
     with pytest.raises(Refused, match="key"):
         equalise_speed(obj)
-    with pytest.raises(Refused, match="FAST is no easing"):
+    with pytest.raises(Refused, match="FAST is not an easing"):
         equalise_speed(tool("dq_sclerp"), "FAST")
     with pytest.raises(Refused, match="no two keys"):
         equalise_speed(tool("dq_sclerp"), frames=())

@@ -203,7 +203,7 @@ def test_linked_rigs_are_left_alone(live, sent, tmp_path):
 def test_a_port_that_is_taken_is_named(live, port, sent):
     receiving.stop()
     taken = receiving.Port("127.0.0.1", port)
-    with pytest.raises(RuntimeError, match=f"Port {port} of 127.0.0.1 cannot be listened to"):
+    with pytest.raises(RuntimeError, match=f"Cannot listen to port {port} of 127.0.0.1"):
         bpy.ops.rigid_motion.live_listen()
     taken.close()
     assert receiving.listening() is None

@@ -42,8 +42,8 @@ BAKED = ("Arm", "Axis", "Camera", "Noisy", "Own", "Strips", "Tool", "Wheel")
 REFUSED = {
     "Bent": "Location X has an Envelope",
     "Crane": "Location X is driven: remove the driver",
-    "Future": "its keys have a mode that this version does not know",
-    "Huge": "key 2 of Location X has a frame, value, handle or easing that no motion can be computed from",
+    "Future": "its keys have a mode that is unknown to this version",
+    "Huge": "key 2 of Location X has an invalid frame, value, handle or easing",
     "Prop": "it is linked from //library.blend: use --in-place on that file, or make it local",
 }
 """Objects of the shot that cannot be baked, and what is said of them."""

@@ -70,7 +70,7 @@ def test_a_tool_slips_least_in_the_space_of_the_hand(loss: str, capfd: pytest.Ca
         (["--held", "hold-tool", "hold-hand:palm"], "hold-hand: palm? It has hold-hand"),
         (["--held", "hold-tool", "hold-tool"], "hold-tool cannot be held by hold-tool"),
         (["--held", "hold-tool", "hold-hand", "--output", "shown.csv"], "--held writes no file"),
-        ([], "2 bodies; name one, as FILE:BODY, or two by --held TOOL HAND"),
+        ([], "2 bodies; name one body with FILE:BODY, or two with --held TOOL HAND"),
     ],
 )
 def test_what_is_not_held_is_one_line(options: list[str], what: str, capfd: pytest.CaptureFixture[str]) -> None:

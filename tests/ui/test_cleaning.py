@@ -46,7 +46,7 @@ def test_it_says_how_much_trembled_and_by_how_much_it_was_moved(said):
     before = snapshot(obj)
     assert operators.clean_motion.poll()
     text = said(radius=0.1)
-    assert text.startswith("Info: Tool: trembles by 1.79 mm; moved at most ")
+    assert text.startswith("Info: Tool: jitters by 1.79 mm; moved at most ")
     assert text.endswith("; 1 key was a spike")
     assert len(key_frames(obj)) == len(FRAMES)
     assert [bridged.sum() for *_, bridged in cleaned._cleanings] == [1]
@@ -59,7 +59,7 @@ def test_it_says_how_much_trembled_and_by_how_much_it_was_moved(said):
 def test_a_camera_is_spoken_of_in_pixels_and_several_things_in_lengths(said):
     camera = shaky(new_object("Camera", data=bpy.data.cameras.new("Camera")), repeats=3)
     text = said(nearest=5.0)
-    assert "trembles by 1.2 pixels; moved at most " in text
+    assert "jitters by 1.2 pixels; moved at most " in text
     assert text.endswith("1 key was a spike; repeated keys: 3")
     operators.restore_keys()
     shaky(new_object()).select_set(True)
@@ -71,8 +71,8 @@ def test_of_a_rig_in_object_mode_all_keyed_bones_are_cleaned(said):
     rig = recorded_rig()
     select_only(rig)
     text = said()
-    assert text.startswith("Info: 7 bones: trembles by ")
-    assert text.endswith("; no foot surely stands: none is held")
+    assert text.startswith("Info: 7 bones: jitters by ")
+    assert text.endswith("; no foot clearly stands: none is held")
     ((before, after, _),) = cleaned._cleanings
     assert before.shape == after.shape == (3, 90, 3), "the head and the hands, on which nothing hangs"
 

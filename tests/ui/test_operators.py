@@ -120,7 +120,7 @@ def refusal_of(name: str) -> str:
 
 def test_buttons_with_nothing_to_do_are_greyed_out_with_the_reason(tool):
     assert "choose a mode" in refusal_of("bake")
-    assert "Blender's own in-betweens already" in refusal_of("clear")
+    assert "All keys already have Blender's own in-betweens" in refusal_of("clear")
     assert "Nothing here is baked" in refusal_of("unbake")
     assert "neither reduced nor cleaned" in refusal_of("restore_keys")
     assert refusal_of("reduce_keys") == ""
@@ -132,7 +132,7 @@ def test_buttons_with_nothing_to_do_are_greyed_out_with_the_reason(tool):
     operators.unbake()
     assert refusal_of("bake") == ""
     operators.clear()
-    assert "Blender's own in-betweens already" in refusal_of("clear")
+    assert "All keys already have Blender's own in-betweens" in refusal_of("clear")
 
 
 def test_a_mode_that_waits_for_keys_can_be_cleared_and_has_nothing_to_bake(extension):
@@ -159,7 +159,7 @@ def test_keys_get_the_modes_that_the_active_one_has_on_their_frames(extension):
     model.select_set(False)
     alike.select_set(False)
     other.select_set(False)
-    assert "Select what is to have the mode" in refusal_of("copy_mode")
+    assert "Select the ones to receive the mode" in refusal_of("copy_mode")
 
 
 def test_what_has_no_keys_yet_waits_for_them_with_the_mode_that_is_copied(extension):
@@ -179,7 +179,7 @@ def test_cycles_are_on_all_channels_and_in_front(tool, kind):
         assert (first.type, first.mode_before, first.mode_after) == ("CYCLES", kind, kind)
     curves_of(tool)["location", 0].modifiers[0].mode_after = "NONE"
     bpy.context.view_layer.update()
-    assert "repeats, but not all of it together" in problem_of(tool)
+    assert "repeats, but its channels differ" in problem_of(tool)
     assert operators.add_cycles(mode=kind) == {"FINISHED"}
     assert problem_of(tool) == ""
     curves_of(tool)["location", 0].keyframe_points.insert(50.0, 3.0)

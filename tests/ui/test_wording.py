@@ -33,7 +33,7 @@ PLAIN = SegmentFacts(
         ({"turn": radians(178.0)}, "178.0° is nearly half a turn"),
         ({"long_way": True}, "takes the short way"),
         ({"two_axes": True}, "about the axis of the larger one"),
-        ({"scales_unevenly": True}, "scale is not the same along all axes"),
+        ({"scales_unevenly": True}, "scale is not uniform"),
     ],
 )
 def test_what_one_may_not_expect_is_said_but_not_of_blenders_own(facts, words):

@@ -35,7 +35,7 @@ FIRST_MODES = ("motor_spline", "dq_sclerp")
 """The modes that menus show first: those to take where nothing speaks for another."""
 
 MODE_ITEMS = [
-    ("BLENDER", "Blender", "Blender's own in-betweens: every channel for itself", 0),
+    ("BLENDER", "Blender", "Blender's own in-betweens: each channel separately", 0),
     *(
         (name, mode.label, ". ".join(filter(None, (mode.description, mode.same, mode.algebra))), mode.number)
         for name, mode in sorted(KEYFRAME_MODES.items(), key=lambda item: (*FIRST_MODES, item[0]).index(item[0]))
@@ -47,7 +47,7 @@ TURN_AXIS_ITEMS = [
     (
         SCREW_AXIS,
         "Screw",
-        "About the axis that a segment turns about anyway, or the local Z axis where it does not turn",
+        "About the axis of the segment's rotation, or the local Z axis if it does not rotate",
     ),
     ("X", "X", "Always about the local X axis"),
     ("Y", "Y", "Always about the local Y axis"),
@@ -64,7 +64,7 @@ class ChangedKeys(bpy.types.PropertyGroup):
         items=[
             (BAKED, "Baked", "It has keys for in-betweens too"),
             (REDUCED, "Reduced", "It has few of the keys"),
-            (CLEANED, "Cleaned", "Its keys tremble less"),
+            (CLEANED, "Cleaned", "Its keys have less jitter"),
         ],
         options={"HIDDEN"},
     )
@@ -108,7 +108,7 @@ class RigidMotion(bpy.types.PropertyGroup):
 
     mode: str = EnumProperty(
         name="Mode",
-        description="What happens between the keys, all of them. Editors of keys have it for single ones",
+        description="The motion between all keys. Animation editors set it for single keys",
         items=MODE_ITEMS,
         translation_context=OWN_WORDS,
         options=set(),
@@ -118,8 +118,8 @@ class RigidMotion(bpy.types.PropertyGroup):
     turns: int = IntProperty(
         name="Turns",
         description=(
-            "Whole turns that the body makes more between two keys, in the sense in which it turns anyway; against it "
-            "where negative. A key of this property decides from its frame on"
+            "Extra whole turns between two keys, in the direction of the rotation; negative for the opposite one. A"
+            " key of this property applies from its frame on"
         ),
         min=-MOST_TURNS,
         max=MOST_TURNS,

@@ -187,7 +187,7 @@ class _Breakdown(OnTargets):
 
     bl_options = {"REGISTER", "UNDO", "BLOCKING", "GRAB_CURSOR_X"}  # noqa: RUF012 - Blender reads it
     nothing_to_do = n_(
-        "All of it has Blender's own in-betweens: choose a mode first, or take Blender's Pose > In-Betweens"
+        "All keys have Blender's own in-betweens: choose a mode first, or use Blender's Pose > In-Betweens"
     )
     with_work = staticmethod(with_modes)
     kind: ClassVar[str]
@@ -195,7 +195,7 @@ class _Breakdown(OnTargets):
 
     factor: float = FloatProperty(
         name="Factor",
-        description="How far to go: 0 is the beginning, 1 the end, and beyond that the motion goes on",
+        description="How far to go: 0 is the beginning, 1 the end; the motion continues beyond",
         default=0.5,
         soft_min=0.0,
         soft_max=1.0,
@@ -258,9 +258,7 @@ class _Breakdown(OnTargets):
 class RIGID_MOTION_OT_breakdown(_Breakdown):
     bl_idname = "rigid_motion.breakdown"
     bl_label = "Breakdown along Mode"
-    bl_description = (
-        "Key a pose on the current frame that is between the key before and the key after it, on the path of the mode"
-    )
+    bl_description = "Key a pose on the current frame between the previous and the next key, on the path of the mode"
     kind = BREAKDOWN
     short = n_("Breakdown", OWN_WORDS)
 
@@ -269,7 +267,7 @@ class RIGID_MOTION_OT_breakdown(_Breakdown):
 class RIGID_MOTION_OT_push(_Breakdown):
     bl_idname = "rigid_motion.push"
     bl_label = "Push from In-Between of Mode"
-    bl_description = "Key a more pronounced pose on the current frame: further away from the in-between of the mode"
+    bl_description = "Key a more pronounced pose on the current frame: further from the in-between of the mode"
     kind = PUSH
     short = n_("Push", OWN_WORDS)
 
@@ -278,7 +276,7 @@ class RIGID_MOTION_OT_push(_Breakdown):
 class RIGID_MOTION_OT_relax(_Breakdown):
     bl_idname = "rigid_motion.relax"
     bl_label = "Relax to In-Between of Mode"
-    bl_description = "Key a pose on the current frame that is more like its neighbours: nearer to the mode's in-between"
+    bl_description = "Key a pose on the current frame that is more like its neighbours: closer to the mode's in-between"
     kind = RELAX
     short = n_("Relax", OWN_WORDS)
 

@@ -30,16 +30,16 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
     bl_idname = "rigid_motion.clean_motion"
     bl_label = "Clean Motion"
     bl_description = (
-        "Take the trembling and the spikes out of keys on every frame, and leave hits as they are: of motion capture, "
-        "trackers and solved cameras. Nothing is moved further than by so many times as it trembles, but spikes. "
-        "Restore Keys gives the keys from before back"
+        "Remove jitter and spikes from keys on every frame, as of motion capture, trackers and solved cameras, and "
+        "keep hits. Only spikes move by more than Strength times the jitter. Restore Keys brings the original keys "
+        "back"
     )
-    nothing_to_do = n_("Nothing here has a key on every frame, as a recording or a solved camera has")
+    nothing_to_do = n_("Nothing here has a key on every frame, like a recording or a solved camera")
     with_work = staticmethod(partial(with_more_keys_than, count=MIN_NOISE_KEYS - 1))
 
     strength: float = FloatProperty(
         name="Strength",
-        description="By how many times of its trembling anything may be moved at most. Spikes go where they have to",
+        description="How far anything may move at most, in multiples of its jitter. Spikes move as far as necessary",
         default=MAX_MOVE_PER_NOISE,
         min=0.01,
         soft_max=5.0,
@@ -49,19 +49,19 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
     radius: float = radius_property()
     nearest: float = FloatProperty(
         name="Nearest",
-        description="How far away the nearest thing is that a camera looks at. At 0 that is its focus distance",
+        description="The distance of the nearest thing that a camera looks at. At 0 it is the focus distance",
         min=0.0,
         soft_max=100.0,
         subtype="DISTANCE",
     )
     selected: bool = BoolProperty(
         name="Selected Keys",
-        description="Clean from the first to the last selected key alone, and join the rest",
+        description="Clean only from the first to the last selected key, and join the rest",
         options={"SKIP_SAVE"},
     )
     select_spikes: bool = BoolProperty(
         name="Select Spikes",
-        description="Leave the keys selected that were spikes, or repeated the one before, where there are any",
+        description="Select the keys that were spikes, or repeated the one before, if there are any",
         default=True,
     )
     said: str = StringProperty(description="What became of the keys", options={"HIDDEN", "SKIP_SAVE"})
@@ -110,7 +110,7 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
         else:
             trembling, moved = (spoken(max(ends)) for ends in zip(*spans, strict=True))
         parts = [
-            rpt_("trembles by {length}").format(length=trembling),
+            rpt_("jitters by {length}").format(length=trembling),
             rpt_("moved at most {length}").format(length=moved),
         ]
         spikes, repeats = sum(one.spikes for one in cleanings), sum(one.repeats for one in cleanings)
@@ -122,11 +122,13 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
         if rigs := [one.contacts for one in cleanings if one.contacts]:
             counts, *slides = zip(*rigs, strict=True)
             now, before = (spoken(max(ends)) for ends in slides)
-            text = n_("contacts held: {count}, feet slide by {now} there, and did by {before}")
-            text = text if any(counts) else n_("no foot surely stands: none is held")
+            text = n_("contacts held: {count}, feet slide by {now} there, before by {before}")
+            text = text if any(counts) else n_("no foot clearly stands: none is held")
             parts.append(rpt_(text).format(count=sum(counts), now=now, before=before))
         if (alone := max(one.alone for one in cleanings)) > MIN_UNTOUCHED_RATIO:
-            text = rpt_("{percent:.0f} % of the keys stay nearly as they are: motion cannot be told from noise there")
+            text = rpt_(
+                "{percent:.0f} % of the keys stay nearly unchanged: noise cannot be distinguished from motion there"
+            )
             parts.append(text.format(percent=100.0 * alone))
         return "; ".join(parts)
 

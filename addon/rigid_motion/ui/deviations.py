@@ -91,10 +91,10 @@ def draw_settings(context: Any, layout: bpy.types.UILayout) -> None:
 class RIGID_MOTION_OT_go_to_deviation(Operator):
     bl_idname = "rigid_motion.go_to_deviation"
     bl_label = "Go to Deviation"
-    bl_description = "Go to the next frame, or the one before, on which the selection has a pop or a kink"
+    bl_description = "Go to the next or previous frame with a pop or a kink of the selection"
 
     step: int = IntProperty(
-        name="Step", description="1 for the next one, -1 for the one before", default=1, min=-1, max=1
+        name="Step", description="1 for the next one, -1 for the previous one", default=1, min=-1, max=1
     )
 
     def execute(self, context: bpy.types.Context) -> Returned:

@@ -33,8 +33,8 @@ class RIGID_MOTION_OT_export_gltf(Operator, ExportHelper):
     bl_idname = "rigid_motion.export_gltf"
     bl_label = "Export glTF, Reduced"
     bl_description = (
-        "Write a GLB file with only the keys that its animations need: nothing that is seen is off by more than the "
-        "tolerance in any viewer. All other options are those that glTF 2.0 was exported with last"
+        "Write a GLB file with only the keys that its animations need: nothing visible is off by more than the "
+        "tolerance in any viewer. All other options are those of the last glTF 2.0 export"
     )
     bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
 
@@ -45,7 +45,7 @@ class RIGID_MOTION_OT_export_gltf(Operator, ExportHelper):
 
     tolerance: float = FloatProperty(
         name="Tolerance",
-        description="How far off any vertex, and any point close to a joint, may be in the world, at any time",
+        description="The largest error of any vertex, and of any point close to a joint, in the world, at any time",
         default=0.001,
         min=1e-6,
         soft_max=0.1,

@@ -79,14 +79,14 @@ def apart_text(scene: bpy.types.Scene, facts: HoldFacts) -> str:
 def cautions(prop: Transform, facts: HoldFacts) -> Iterator[str]:
     """Yield what may go wrong with something that is held, and what to do about it."""
     if facts.turned is not None and facts.frames and facts.turned > FAR_TURNED:
-        yield iface_(
-            "It is turned by {angle} while it passes: it may go round either way. Turn a hand, or Match Grip"
-        ).format(angle=degrees(facts.turned))
+        yield iface_("It rotates by {angle} while it passes, in either direction. Rotate a hand, or Match Grip").format(
+            angle=degrees(facts.turned)
+        )
     for holder in facts.holders:
         if holder.target is None:
             continue
         if follows((holder.target, holder.bone), node_of(prop)):
-            yield iface_("{holder} follows {name} by now, which it holds: a cycle. Take that off {holder}").format(
+            yield iface_("{holder} now follows {name}, which it holds: a cycle. Remove that from {holder}").format(
                 holder=holder.name, name=prop.name
             )
         if _grows(holder):

@@ -27,8 +27,8 @@ from .targets import OnTargets, is_posing
 Node = bpy.types.Object | bpy.types.PoseBone
 """Something that holds or is held."""
 
-FIRST_AND_LAST = n_("Select what is to be held, and last what holds it: an object, or in Pose Mode a bone")
-NOTHING_HELD = n_("Nothing selected is held in anything yet: Hold In")
+FIRST_AND_LAST = n_("Select the things to hold, and last their holder: an object, or in Pose Mode a bone")
+NOTHING_HELD = n_("Nothing selected is held yet: use Hold In")
 
 HIDDEN_OPTIONS = {"HIDDEN", "SKIP_SAVE"}
 """The options of properties that menus set."""
@@ -138,7 +138,7 @@ class _Hold(OnTargets):
 
     frames: int = IntProperty(
         name="Pass",
-        description="Frames before this one over which it passes from what held it before: 0 at once, to pick up and "
+        description="Frames before this one in which it passes from its previous holder: 0 at once, to pick up and "
         "put down; 1 to throw; 3 to catch; 4 from hand to hand",
         min=0,
         max=MOST_FRAMES,
@@ -171,8 +171,8 @@ class RIGID_MOTION_OT_hold_in(_Hold):
     bl_idname = "rigid_motion.hold_in"
     bl_label = "Hold In"
     bl_description = (
-        "Have the active object hold the others that are selected from this frame on; in Pose Mode the active bone, "
-        "and of a rig that is active its active bone. They stay where they are, and follow each later edit of it"
+        "Let the active object hold the other selected ones from this frame on; in Pose Mode the active bone, and "
+        "of an active rig its active bone. They stay where they are, and follow all later edits of it"
     )
     summary = n_("held in {holder} from frame {frame:g}")
 
@@ -207,7 +207,7 @@ class RIGID_MOTION_OT_hold_in(_Hold):
 class RIGID_MOTION_OT_hold_in_known(_Hold):
     bl_idname = "rigid_motion.hold_in_known"
     bl_label = "Hold In"
-    bl_description = "Have it held in this from this frame on. It stays where it is"
+    bl_description = "Hold it in this from this frame on. It stays where it is"
     summary = RIGID_MOTION_OT_hold_in.summary
 
     target: str = StringProperty(
@@ -224,7 +224,7 @@ class RIGID_MOTION_OT_hold_in_known(_Hold):
     def holder(self, _context: bpy.types.Context) -> tuple[bpy.types.Object | None, str]:
         found = next((obj for obj in bpy.data.objects if obj.name_full == self.target), None)
         if found is None:
-            raise Refused(n_("There is no object {name} any more: choose another one to hold it"), name=self.target)
+            raise Refused(n_("The object {name} no longer exists: choose another holder"), name=self.target)
         return found, self.bone
 
 
@@ -253,8 +253,7 @@ class RIGID_MOTION_OT_let_go(_OfHeld, _Hold):
     bl_idname = "rigid_motion.let_go"
     bl_label = "Let Go"
     bl_description = (
-        "Have nothing hold the selection from this frame on: it is in the world, or goes with its parent. "
-        "It stays where it is"
+        "Release the selection from this frame on: it is in the world, or follows its parent. It stays where it is"
     )
     summary = n_("let go on frame {frame:g}")
 
@@ -276,8 +275,8 @@ class RIGID_MOTION_OT_pass_frames(_OfHeld):
     bl_idname = "rigid_motion.pass_frames"
     bl_label = "Pass"
     bl_description = (
-        "Choose over how many frames the selection passes to what holds it next: before the key on this frame, "
-        "or before the next one at which another holds it"
+        "Choose the number of frames in which the selection passes to its next holder: before the key on this "
+        "frame, or before the next one with another holder"
     )
 
     frames: int = IntProperty(
@@ -329,7 +328,7 @@ def facts_or_none(prop: Transform | None) -> HoldFacts | None:
 
 class RIGID_MOTION_MT_holders(Menu):
     bl_label = "Hold In"
-    bl_description = "What is to hold it from this frame on: the world, what has held it before, or what is active"
+    bl_description = "The holder from this frame on: the world, a previous holder, or the active one"
 
     def draw(self, context: Any) -> None:
         layout: Any = self.layout
@@ -362,7 +361,7 @@ def _draw_holder(layout: Any, target: Any, bone: str, icon: str) -> None:
 class RIGID_MOTION_MT_hold(Menu):
     bl_label = "Hold"
     bl_translation_context = OWN_WORDS
-    bl_description = "What holds the selection: pick up, hand over, throw, catch and put down"
+    bl_description = "The holder of the selection: pick up, hand over, throw, catch and put down"
 
     def draw(self, _context: Any) -> None:
         layout: Any = self.layout

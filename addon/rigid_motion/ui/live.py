@@ -52,7 +52,7 @@ class LiveBone(bpy.types.PropertyGroup):
     """A joint of a body, and the bone that it moves. Its name is that of the joint."""
 
     bone: str = StringProperty(
-        name="Bone", description="The bone that this joint moves; none where it is empty", update=_on_bones
+        name="Bone", description="The bone that this joint moves; none if empty", update=_on_bones
     )
 
 
@@ -60,7 +60,7 @@ class LiveBone(bpy.types.PropertyGroup):
 class LiveSettings(bpy.types.PropertyGroup):
     host: str = StringProperty(
         name="Address",
-        description="Where to listen: 127.0.0.1 for programs on this machine alone, 0.0.0.0 for others, too",
+        description="Where to listen: 127.0.0.1 for programs on this machine only, 0.0.0.0 for others too",
         default=HOST,
     )
     port: int = IntProperty(
@@ -68,7 +68,7 @@ class LiveSettings(bpy.types.PropertyGroup):
     )
     delay: float = FloatProperty(
         name="Delay",
-        description="By how much the picture of VMC is behind, so that it goes on evenly where data comes unevenly",
+        description="The lag of VMC motion: larger is smoother on an uneven network",
         default=0.05,
         min=0.0,
         max=2.0,
@@ -78,19 +78,19 @@ class LiveSettings(bpy.types.PropertyGroup):
     )
     steady: bool = BoolProperty(
         name="Steady",
-        description="Show what comes on every frame without its trembling, by what has come within the delay, and no "
-        "later for it. What is recorded is as it came: Clean Motion takes more out of that",
+        description="Remove jitter from incoming motion with all frames, within the delay, without extra lag. "
+        "Recordings stay as received: Clean Motion removes more from them",
     )
     armature: bpy.types.Object | None = PointerProperty(
         name="Rig",
-        description="The armature that a body drives, by the names of its bones. Without, it appears as a new one",
+        description="The armature that a body drives, by the names of its bones. Without one, it gets a new armature",
         type=bpy.types.Object,
         poll=lambda _, obj: obj.type == "ARMATURE",
         update=_on_bones,
     )
     body: str = StringProperty(
         name="Body",
-        description="Which of several bodies drives the rig. Without, the first that comes",
+        description="Which of several bodies drives the rig. Without a name, the first to arrive",
         update=_on_bones,
     )
     bones: bpy.types.bpy_prop_collection_idprop[LiveBone] = CollectionProperty(type=LiveBone)
@@ -98,14 +98,14 @@ class LiveSettings(bpy.types.PropertyGroup):
     active_bone: int = IntProperty(options={"HIDDEN"})
     mode: str = EnumProperty(
         name="Mode",
-        description="What fills in between the keys that are recorded",
+        description="The motion between the recorded keys",
         items=MODE_ITEMS,
         translation_context=OWN_WORDS,
         default="lerp_slerp",
     )
     tolerance: float = FloatProperty(
         name="Tolerance",
-        description="How far off any bone may be where a recording of VMC, which comes on every frame, is thinned",
+        description="The largest error of any bone when a recording of VMC, which has all frames, is reduced",
         default=0.002,
         min=1e-5,
         soft_max=0.1,
@@ -113,9 +113,9 @@ class LiveSettings(bpy.types.PropertyGroup):
         precision=4,
         subtype="DISTANCE",
     )
-    to_host: str = StringProperty(name="Address", description="The machine that VMC is sent to", default=HOST)
+    to_host: str = StringProperty(name="Address", description="The machine to send VMC to", default=HOST)
     to_port: int = IntProperty(
-        name="Port", description="The UDP port that VMC is sent to", default=VMC_PORT + 1, min=1, max=65535
+        name="Port", description="The UDP port to send VMC to", default=VMC_PORT + 1, min=1, max=65535
     )
 
 
@@ -177,7 +177,7 @@ class RIGID_MOTION_OT_live_listen(_Registered):
             receiving.start(live.host, live.port, _settings, _pairs)
         except (NotAllowed, OSError) as error:
             text = rpt_(
-                "Port {port} of {host} cannot be listened to, maybe another program does: choose another ({why})"
+                "Cannot listen to port {port} of {host}; another program may be using it: choose another ({why})"
             )
             return self.refuse(error, text, port=live.port, host=live.host)
         return {"FINISHED"}
@@ -192,7 +192,7 @@ class _WhileListening:
 class RIGID_MOTION_OT_live_stop(_WhileListening, _Registered):
     bl_idname = "rigid_motion.live_stop"
     bl_label = "Stop Listening"
-    bl_description = "Close the port. Everything stays as it is shown; a recording that is not finished is given up"
+    bl_description = "Close the port. Everything stays as shown; an unfinished recording is discarded"
 
     def execute(self, _context: bpy.types.Context) -> Returned:
         receiving.stop()
@@ -202,7 +202,7 @@ class RIGID_MOTION_OT_live_stop(_WhileListening, _Registered):
 class RIGID_MOTION_OT_live_record(_WhileListening, _Registered):
     bl_idname = "rigid_motion.live_record"
     bl_label = "Record"
-    bl_description = "Keep what comes from now on, from the current frame on, as keys"
+    bl_description = "Record incoming motion from now on, as keys from the current frame on"
 
     def execute(self, context: bpy.types.Context) -> Returned:
         live = live_settings(context.scene)
@@ -213,7 +213,7 @@ class RIGID_MOTION_OT_live_record(_WhileListening, _Registered):
 class RIGID_MOTION_OT_live_finish(Operator):
     bl_idname = "rigid_motion.live_finish"
     bl_label = "Finish Recording"
-    bl_description = "Give each body that was recorded an Action with its keys. Reduce Keys then makes them fewer"
+    bl_description = "Give each recorded body an Action with its keys. Reduce Keys then makes them fewer"
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
@@ -223,7 +223,7 @@ class RIGID_MOTION_OT_live_finish(Operator):
     def execute(self, _context: bpy.types.Context) -> Returned:
         count = existing(receiving.listening()).finish()
         if not count:
-            self.report({"WARNING"}, rpt_("Nothing came while it was recorded: no keys"))
+            self.report({"WARNING"}, rpt_("Nothing arrived during the recording: no keys"))
             return {"CANCELLED"}
         self.report({"INFO"}, rpt_("{count} poses of objects and bones have keys").format(count=count))
         return {"FINISHED"}
@@ -232,7 +232,7 @@ class RIGID_MOTION_OT_live_finish(Operator):
 class RIGID_MOTION_OT_live_match(_WhileListening, Operator):
     bl_idname = "rigid_motion.live_match"
     bl_label = "Match Names"
-    bl_description = "Fill the table in anew: which bone of the rig each joint moves, as far as names tell"
+    bl_description = "Reset the table of which bone of the rig each joint moves, by their names"
 
     def execute(self, context: bpy.types.Context) -> Returned:
         live = live_settings(context.scene)
@@ -248,7 +248,7 @@ class RIGID_MOTION_OT_live_send(_Registered):
     bl_idname = "rigid_motion.live_send"
     bl_label = "Send Selected"
     bl_description = (
-        "Send the selected rigs as VMC performers and all other selected objects as VMC trackers, as they are seen"
+        "Send the selected rigs as VMC performers and all other selected objects as VMC trackers, as you see them"
     )
 
     @classmethod
@@ -262,14 +262,14 @@ class RIGID_MOTION_OT_live_send(_Registered):
         try:
             sending.start(live.to_host, live.to_port, context.selected_objects)
         except (NotAllowed, OSError) as error:
-            return self.refuse(error, rpt_("{host} is no address that can be sent to ({why})"), host=live.to_host)
+            return self.refuse(error, rpt_("{host} is not an address to send to ({why})"), host=live.to_host)
         return {"FINISHED"}
 
 
 class RIGID_MOTION_OT_live_stop_sending(_Registered):
     bl_idname = "rigid_motion.live_stop_sending"
     bl_label = "Stop Sending"
-    bl_description = "Send nothing any more, and close the port"
+    bl_description = "Stop sending, and close the port"
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:
@@ -302,7 +302,7 @@ class RIGID_MOTION_UL_live_bones(bpy.types.UIList):
 
 class RIGID_MOTION_PT_live(Folded):
     bl_label = "Live"
-    bl_description = "Bodies from other programs, over a network: shown, recorded as keys, and sent"
+    bl_description = "Show, record and send motion over a network, to and from other programs"
     bl_space_type = "VIEW_3D"
 
     def draw_header(self, _context: bpy.types.Context) -> None:

@@ -89,7 +89,7 @@ class RIGID_MOTION_MT_view(_Menu):
 
 
 class RIGID_MOTION_MT_keys(_Menu):
-    bl_description = "How objects and bones move on from the selected keys"
+    bl_description = "How objects and bones move from the selected keys to the next"
     scope, beside, pie = SELECTED, "RIGID_MOTION_MT_whole", "RIGID_MOTION_MT_pie_keys"
 
 
@@ -109,7 +109,7 @@ class RIGID_MOTION_MT_other_keys(Menu):
 
 class RIGID_MOTION_MT_current(Menu):
     bl_label = "Current Segment"
-    bl_description = "How the selected objects or bones move between the two keys that the playhead is between"
+    bl_description = "How the selected objects or bones move between the two keys around the playhead"
 
     def draw(self, context: Any) -> None:
         _draw_modes(context, self.layout, CURRENT)
@@ -117,7 +117,7 @@ class RIGID_MOTION_MT_current(Menu):
 
 class RIGID_MOTION_MT_whole(Menu):
     bl_label = "All Segments"
-    bl_description = "One mode for all segments of the objects and bones that are shown"
+    bl_description = "One mode for all segments of the visible objects and bones"
 
     def draw(self, context: Any) -> None:
         _draw_modes(context, self.layout, WHOLE)

@@ -61,8 +61,8 @@ class RIGID_MOTION_OT_bake(OnTargets):
     bl_idname = "rigid_motion.bake"
     bl_label = "Bake to Keys"
     bl_description = (
-        "Make real keys of the in-betweens, of type Generated: for hand-over to programs that read keys only. "
-        "Un-Bake gives the keys from before back"
+        "Convert the in-betweens to real keys of type Generated, for programs that read only keys. Un-Bake restores"
+        " the original keys"
     )
 
     nothing_to_do = n_("There are no rigid in-betweens to bake: choose a mode first")
@@ -70,7 +70,7 @@ class RIGID_MOTION_OT_bake(OnTargets):
 
     step: float = FloatProperty(
         name="Step",
-        description="Frames from one baked key to the next. Below 1 there are keys between the frames, for motion blur",
+        description="Frames between baked keys. Below 1 there are keys between frames, for motion blur",
         default=1.0,
         min=0.01,
         soft_min=0.1,
@@ -90,8 +90,8 @@ class RIGID_MOTION_OT_bake(OnTargets):
     to_world: bool = BoolProperty(
         name="To World",
         description=(
-            "Have what is held be in the space of its parent, or in the world, as if nothing held it: it no longer "
-            "goes with what held it. Otherwise its keys stay in the spaces of what holds it"
+            "Put held things into the space of their parent, or the world, so that they no longer follow their "
+            "holders. Otherwise their keys stay in the spaces of their holders"
         ),
         options={"SKIP_SAVE"},
     )
@@ -124,11 +124,11 @@ def axis_of_turns(target: Transform) -> str:
 class RIGID_MOTION_OT_set_turns(OnTargets):
     bl_idname = "rigid_motion.set_turns"
     bl_label = "Set Turns"
-    bl_description = "Have the selection make whole turns more from key to key"
+    bl_description = "Add whole turns to the selection from key to key"
 
     turns: int = IntProperty(
         name="Turns",
-        description="Whole turns more than there are without, in the same sense; against it where negative",
+        description="Extra whole turns in the same direction; negative for the opposite one",
         default=1,
         min=-MOST_TURNS,
         max=MOST_TURNS,
@@ -137,7 +137,7 @@ class RIGID_MOTION_OT_set_turns(OnTargets):
     )
     axis: str = EnumProperty(
         name="Axis",
-        description="What the turns are about, in all segments",
+        description="The axis of the turns, in all segments",
         items=TURN_AXIS_ITEMS,
         default=SCREW_AXIS,
         translation_context=OWN_WORDS,
@@ -231,10 +231,10 @@ class RIGID_MOTION_OT_copy_mode(OnTargets):
     bl_idname = "rigid_motion.copy_mode"
     bl_label = "Copy Mode to Selected"
     bl_description = (
-        "Give the rest of the selection the modes of the active one: each key that which the active one has on its "
-        "frame"
+        "Copy the modes of the active one to the rest of the selection: each key gets the mode of the active one on"
+        " its frame"
     )
-    nothing_to_do = n_("Select what is to have the mode, and last what has it")
+    nothing_to_do = n_("Select the ones to receive the mode, and last the one that has it")
 
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
@@ -256,20 +256,20 @@ class RIGID_MOTION_OT_add_cycles(OnTargets):
     bl_idname = "rigid_motion.add_cycles"
     bl_label = "Add Cycles"
     bl_description = (
-        "Have the motion repeat before its first keys and behind its last ones, in all channels together: "
-        "Blender adds no Cycles to channels with in-betweens. Clear Cyclic (F-Modifier) in the Graph Editor (Channel > "
-        "Extrapolation Mode) takes them off again"
+        "Repeat the motion before its first and after its last keys, in all channels at once: Blender itself adds "
+        "no Cycles to channels with in-betweens. Clear Cyclic (F-Modifier) in the Graph Editor (Channel > "
+        "Extrapolation Mode) removes them"
     )
-    nothing_to_do = n_("Nothing here has two keys to repeat")
+    nothing_to_do = n_("Nothing here has the two keys that a cycle needs")
     with_work = staticmethod(partial(with_more_keys_than, count=1))
     leaves_others = True
 
     mode: str = EnumProperty(
         name="Cycles",
-        description="What each round is to the one before",
+        description="How each round follows the one before",
         items=[
             ("REPEAT", "Repeat", "Each round is the same"),
-            ("REPEAT_OFFSET", "Repeat with Offset", "Each round goes on where the one before has ended"),
+            ("REPEAT_OFFSET", "Repeat with Offset", "Each round continues where the one before ended"),
             ("MIRROR", "Mirror", "Every other round runs backwards"),
         ],
         translation_context=OWN_WORDS,
@@ -283,8 +283,8 @@ class RIGID_MOTION_OT_add_cycles(OnTargets):
 class RIGID_MOTION_OT_clear(OnTargets):
     bl_idname = "rigid_motion.clear"
     bl_label = "Clear Modes"
-    bl_description = "Give the selection Blender's own in-betweens again. Its keys stay as they are"
-    nothing_to_do = n_("All of it has Blender's own in-betweens already")
+    bl_description = "Restore Blender's own in-betweens for the selection. Its keys do not change"
+    nothing_to_do = n_("All keys already have Blender's own in-betweens")
     with_work = staticmethod(with_modes)
     leaves_others = True
     verb = staticmethod(partial(animation.set_mode, mode="BLENDER"))
@@ -294,19 +294,19 @@ class RIGID_MOTION_OT_clear(OnTargets):
 class RIGID_MOTION_OT_unbake(OnChanged):
     bl_idname = "rigid_motion.unbake"
     bl_label = "Un-Bake"
-    bl_description = "Give what is baked the Action back that it had before, with its own keys and modes"
+    bl_description = "Restore the Action from before baking, with its keys and modes"
     kinds = (BAKED,)
     nothing_to_do = n_("Nothing here is baked")
     verb = staticmethod(animation.unbake)
-    summary = n_("back to the keys from before baking")
+    summary = n_("keys from before baking restored")
 
 
 class RIGID_MOTION_OT_refresh(Operator):
     bl_idname = "rigid_motion.refresh"
     bl_label = "Refresh In-Betweens"
     bl_description = (
-        "Bring all in-betweens of this file up to date with their keys. "
-        "Needed only while Live Update is off, in the preferences of the extension"
+        "Update all in-betweens of this file from their keys. Only needed while Live Update is off in the "
+        "preferences of the extension"
     )
 
     def execute(self, _context: bpy.types.Context) -> Returned:

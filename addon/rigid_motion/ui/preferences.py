@@ -85,29 +85,27 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
 
     default_mode: str = EnumProperty(
         name="Default Mode",
-        description="What Set Rigid Motion Mode takes where no mode is named: in Search, by a shortcut of your own",
+        description="The mode that Set Rigid Motion Mode uses if none is given: in Search, or by your own shortcut",
         items=MODE_ITEMS,
         default=DEFAULT_MODE,
         translation_context=OWN_WORDS,
     )
     live_update: bool = BoolProperty(
         name="Live Update",
-        description="Follow every edit at once. Otherwise in-betweens stay as they are until Refresh In-Betweens",
+        description="Update after every edit. Otherwise in-betweens do not change until Refresh In-Betweens",
         default=True,
         update=_on_live_update,
     )
     native_color: Color = _color(
-        "Blender's Path", "Color of the path as Blender's own in-betweens have it", DEFAULT_LOOK.native_color
+        "Blender's Path", "Color of the path by Blender's own in-betweens", DEFAULT_LOOK.native_color
     )
-    mode_color: Color = _color("Mode's Path", "Color of the path as the mode has it", DEFAULT_LOOK.mode_color)
+    mode_color: Color = _color("Mode's Path", "Color of the path by the mode", DEFAULT_LOOK.mode_color)
     key_color: Color = _color(
         "Selected Keys", "Color of the selected keys on a path. The others are white", DEFAULT_LOOK.key_color
     )
-    tick_color: Color = _color(
-        "Ticks", "Color of the marks that are evenly timed along a path", DEFAULT_LOOK.tick_color
-    )
+    tick_color: Color = _color("Ticks", "Color of the evenly timed marks along a path", DEFAULT_LOOK.tick_color)
     past_color: Color = _color("Past", "Color of ghosts before the current frame", DEFAULT_LOOK.past_color)
-    future_color: Color = _color("Future", "Color of ghosts behind the current frame", DEFAULT_LOOK.future_color)
+    future_color: Color = _color("Future", "Color of ghosts after the current frame", DEFAULT_LOOK.future_color)
     line_width: float = FloatProperty(
         name="Line Width",
         description="Width of the paths",

@@ -27,7 +27,7 @@ from .wording import NATIVE_LABEL, hold_lines, labelled, reduction_rows, reducti
 
 
 def radius_property(
-    description: str = "At 0 each object has the size of its own bounding box, and each bone that of what it moves",
+    description: str = "At 0 each object has the size of its bounding box, and each bone that of what it moves",
     **more: Any,
 ) -> Any:
     """Return the property `radius` of operators that change keys: around what errors count."""
@@ -56,13 +56,13 @@ class RIGID_MOTION_OT_reduce_keys(OfRigsToo, OnTargets):
     bl_idname = "rigid_motion.reduce_keys"
     bl_label = "Reduce Keys to Poses"
     bl_description = (
-        "Leave only the keys that the motion needs, location and rotation together: for imported motion capture, "
-        "baked simulations and solved cameras. Restore Keys gives all of them back"
+        "Keep only the keys that the motion needs, location and rotation together: for imported motion capture, "
+        "baked simulations and solved cameras. Restore Keys brings all of them back"
     )
 
     nothing_to_do = n_(
-        "Nothing here has more than two keys. Constraints, drivers and simulations are turned into keys first "
-        "(Animation > Bake Action, with Visual Keying)"
+        "Nothing here has more than two keys. First convert constraints, drivers and simulations to keys (Animation"
+        " > Bake Action, with Visual Keying)"
     )
     with_work = staticmethod(partial(with_more_keys_than, count=2))
 
@@ -70,17 +70,17 @@ class RIGID_MOTION_OT_reduce_keys(OfRigsToo, OnTargets):
         name="Reduce By",
         description="What decides how many keys are left",
         items=[
-            ("TOLERANCE", "Tolerance", "As few keys as keep the motion within the tolerance"),
-            ("NUMBER", "Number", "So many keys, or of a rig key poses, with the smallest error that is found"),
+            ("TOLERANCE", "Tolerance", "The fewest keys that keep the motion within the tolerance"),
+            ("NUMBER", "Number", "This many keys, or key poses of a rig, with the smallest error found"),
         ],
         translation_context=OWN_WORDS,
     )
     tolerance: float = FloatProperty(
         name="Tolerance",
         description=(
-            "How far off any point may be at any moment, within the radius around what is moved. Of bones that counts "
-            "where they get through all that they hang on. To begin with a millimetre, and of a rig 0.3 % of its size, "
-            "or 2 % for key poses"
+            "The largest error of any point at any time, within the radius around what moves. For bones it includes"
+            " the errors of their parents. The default is a millimetre, for a rig 0.3 % of its size, or 2 % for key"
+            " poses"
         ),
         default=0.001,
         min=1e-6,
@@ -94,28 +94,28 @@ class RIGID_MOTION_OT_reduce_keys(OfRigsToo, OnTargets):
     )
     count: int = IntProperty(
         name="Number",
-        description="Keys left of each object, or key poses of each rig. Below is how far off the motion is then",
+        description="Remaining keys of each object, or key poses of each rig. The resulting error is below",
         default=12,
         min=2,
         soft_max=100,
     )
     radius: float = radius_property(
-        "How far out from the origin nothing may be off by more: the larger, the more a rotation counts. "
-        "At 0 each object has the size of its own bounding box, and each bone that of what it moves",
+        "The distance from the origin up to which the tolerance applies: the larger, the more rotations count. At 0"
+        " each object has the size of its bounding box, and each bone that of what it moves",
         options={"SKIP_SAVE"},
     )
     mode: str = EnumProperty(
         name="Mode",
         description=(
-            "What fills in between the keys that are left, and which keys those are. To begin with Native Curves, "
+            "The motion between the remaining keys, which decides which ones remain. Starts with Native Curves, "
             "Smooth Screw or another mode, whichever needs the fewest keys"
         ),
         items=[
             (
                 animation.NATIVE,
                 NATIVE_LABEL,
-                "Blender's own Bezier keys with handles, which need no mode and play anywhere. They keep to the "
-                "tolerance on frames. How far they are off between frames is below",
+                "Blender's own Bezier keys with handles, which need no mode and play anywhere. They keep the "
+                "tolerance on frames. Their error between frames is below",
                 0,
             ),
             *(item for item in MODE_ITEMS if item[0] != "BLENDER"),
@@ -131,11 +131,12 @@ class RIGID_MOTION_OT_reduce_keys(OfRigsToo, OnTargets):
     )
     shared: bool = BoolProperty(
         name="Key Poses",
-        description="Give all bones of a rig keys on the same frames. Otherwise each has its own: fewer keys in all",
+        description="Give all bones of a rig keys on the same frames. Otherwise each bone has its own frames: fewer"
+        " keys in total",
     )
     hold: bool = BoolProperty(
         name="Hold Feet",
-        description="Keep bones that stand on the ground to a quarter of the tolerance while they do",
+        description="Keep bones within a quarter of the tolerance while they stand on the ground",
         default=True,
     )
 
@@ -216,18 +217,18 @@ class RIGID_MOTION_OT_reduce_into_holds(OnTargets):
     bl_idname = "rigid_motion.reduce_into_holds"
     bl_label = "Reduce into Holds"
     bl_description = (
-        "Find out what held the selection as it was recorded, and hold it there with a single key: select it, and then "
-        "the rigs or the bone that may have. With nothing else selected all rigs are looked at. Restore Keys gives all "
-        "of its keys back"
+        "Find out what held the selection in the recording, and hold it there with a single key: select it, then "
+        "the rigs or the bone that may have held it. With nothing else selected all rigs are tried. Restore Keys "
+        "brings all of its keys back"
     )
-    nothing_to_do = n_("Select something with dense keys, as of a recording, and then what held it")
+    nothing_to_do = n_("Select something with dense keys, such as a recording, and then what held it")
     with_work = staticmethod(partial(with_more_keys_than, count=DEFAULT_MIN_HOLD_FRAMES - 1))
 
     tolerance: float = FloatProperty(
         name="Tolerance",
         description=(
-            "How far off any point may be on any frame, within the radius around what is held. Recorded hands give way "
-            "by a few millimetres"
+            "The largest error of any point on any frame, within the radius around what is held. Recorded hands "
+            "give by a few millimetres"
         ),
         default=DEFAULT_HAND_TOLERANCE,
         min=1e-6,
@@ -272,7 +273,7 @@ class RIGID_MOTION_OT_reduce_into_holds(OnTargets):
 class RIGID_MOTION_OT_restore_keys(OfRigsToo, OnChanged):
     bl_idname = "rigid_motion.restore_keys"
     bl_label = "Restore Keys"
-    bl_description = "Give back the keys that there were before they were reduced or cleaned last, to the last handle"
+    bl_description = "Restore the keys from before the last reduction or cleaning, with all handles"
     kinds = REDUCED, CLEANED
     nothing_to_do = n_("The keys here are neither reduced nor cleaned")
     verb = staticmethod(animation.restore_keys)
@@ -283,13 +284,13 @@ class RIGID_MOTION_OT_discard_dense_keys(OfRigsToo, OnChanged):
     bl_idname = "rigid_motion.discard_dense_keys"
     bl_label = "Discard Dense Keys"
     bl_description = (
-        "Remove the keys from the file that Restore Keys would give back, once the new ones are good. "
-        "The new keys stay as they are"
+        "Remove the keys that Restore Keys would bring back from the file, once you are happy with the new ones. "
+        "The new keys do not change"
     )
     kinds = REDUCED, CLEANED
     nothing_to_do = n_("The keys here are neither reduced nor cleaned")
     verb = staticmethod(animation.discard_dense_keys)
-    summary = n_("the keys from before are removed from the file")
+    summary = n_("previous keys removed from the file")
 
 
 CLASSES = (

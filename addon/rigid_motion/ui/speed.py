@@ -160,8 +160,8 @@ class RIGID_MOTION_OT_equalise_speed(OnTargets):
     bl_idname = "rigid_motion.equalise_speed"
     bl_label = "Equalise Speed"
     bl_description = (
-        "Have the selection move at an even speed along its path, which stays as it is: keys between the first and the "
-        "last one move in time, and handles say the timing between them"
+        "Move the selection at an even speed along its path, which does not change: keys between the first and the "
+        "last one move in time, and handles set the timing between them"
     )
     nothing_to_do = n_("Nothing here has two keys to move between")
     with_work = staticmethod(partial(with_more_keys_than, count=1))
@@ -180,15 +180,15 @@ class RIGID_MOTION_OT_equalise_speed(OnTargets):
     )
     turning: bool = BoolProperty(
         name="Turning",
-        description="Even out how fast it turns, and not how fast it goes. What stays in place is always taken so",
+        description="Even out the rotation, not the speed along the path. Used for anything that stays in place",
     )
     between_frames: bool = BoolProperty(
         name="Between Frames",
-        description="Have keys be between frames, where it takes that for a speed that is quite even",
+        description="Allow keys between frames if an even speed needs them",
     )
     selected: bool = BoolProperty(
         name="Selected Keys",
-        description="From the first to the last selected key, and not from the first of all to the last",
+        description="From the first to the last selected key, not from the first to the last of all",
         options={"SKIP_SAVE"},
     )
 

@@ -35,8 +35,8 @@ WHOLE, CURRENT, SELECTED = "WHOLE", "CURRENT", "SELECTED"
 
 SCOPES = [
     (WHOLE, "All Segments", "All segments alike"),
-    (CURRENT, "Current Segment", "The segment that the playhead is in. The others stay as they are"),
-    (SELECTED, "Selected Keys", "The segments that the selected keys begin. The others stay as they are"),
+    (CURRENT, "Current Segment", "The segment under the playhead. The others do not change"),
+    (SELECTED, "Selected Keys", "The segments after the selected keys. The others do not change"),
 ]
 """The parts of a target that get a mode or turns, as the items of an enum property."""
 

@@ -36,10 +36,10 @@ DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 NO_KEYS = n_("No keys of location, rotation or scale yet")
 KEYED_BONES = n_("Its bones have keys. Choose their modes in Pose Mode")
 NO_SEGMENT = n_("No segment on this frame")
-RESTING_TEXT = n_("At rest up to the key on frame {frame:g}, which is in another space")
+RESTING_TEXT = n_("At rest until the key on frame {frame:g}, which is in another space")
 PASSING_TEXT = n_("Passing over to the key on frame {frame:g}, which is in another space")
 STRIPS_TEXT = n_("Moved by strips: enter one to see its segments (NLA Editor, Tab)")
-BAKED_TEXT = n_("Baked to keys. Un-Bake brings its own keys back")
+BAKED_TEXT = n_("Baked to keys. Un-Bake restores the original keys")
 OUT_OF_DATE = n_("The keys have changed since: Live Update is off, in the preferences")
 NO_BONE = n_("No Bone Active")
 PART_NAMES = {LOCATION: n_("Location"), ROTATION: n_("Rotation")}
@@ -72,19 +72,19 @@ def cautions(segment: SegmentFacts) -> list[str]:
     if segment.two_axes:
         texts.append(
             iface_(
-                "Two angles go by more than half a turn here; whole turns are made about the axis of the larger one. "
-                "For both, set a key in between"
+                "Two angles change by more than half a turn here; whole turns are about the axis of the larger one."
+                " For both, set a key in between"
             )
         )
     if segment.turn > NEAR_HALF_TURN and not (segment.turns or segment.is_sure):
         texts.append(
             iface_(
-                "{angle} is nearly half a turn: a small change of a key can send it the other way round. "
-                "To be sure, set a key in between"
+                "{angle} is nearly half a turn: a small change of a key can reverse its direction. To be sure, set "
+                "a key in between"
             ).format(angle=degrees(segment.turn))
         )
     if segment.scales_unevenly:
-        texts.append(iface_("The scale is not the same along all axes, and stays Blender's own"))
+        texts.append(iface_("The scale is not uniform, and is left to Blender"))
     return texts
 
 
@@ -130,15 +130,13 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
         summary += rpt_("; it takes {others}").format(others=others)
     before, after = reduction.channel_keys
     if after > before:
-        summary += rpt_(", but channels have {after} keys together, and had {before}").format(
-            before=before, after=after
-        )
+        summary += rpt_(", but channels have {after} keys in total, before {before}").format(before=before, after=after)
     if reduction.rig is not None:
         summary += rpt_(", keys on {frames} frames").format(frames=reduction.rig.frames)
         if (feet := _slides(scene, reduction.rig)) is not None:
             summary += rpt_(", feet that stand slide {distance}").format(distance=feet)
         if bones := reduction.rig.not_promised:
-            text = rpt_("; not promised for what follows constraints or drivers, and hangs on it: {bones}")
+            text = rpt_("; not guaranteed for bones that follow constraints or drivers, or their children: {bones}")
             summary += text.format(bones=listed(bones))
     return summary
 

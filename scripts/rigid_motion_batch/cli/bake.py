@@ -1,7 +1,7 @@
-"""Bake rigid in-betweens into real keys, or take that back, in .blend files and without a window.
+"""Bake rigid in-betweens to real keys, or undo that, in .blend files and without a window.
 
-In each file, every object and every pose bone with rigid-motion modes gets keys that any program can play. Its own keys
-stay in the file, so that it can be un-baked. The result is a new file beside the old one, which stays as it is.
+In each file, every object and every pose bone with rigid-motion modes gets keys that any program can play. The original
+keys stay in the file for un-baking. The result is a new file next to the old one, which does not change.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ examples:
 
 what is written:
   NAME-baked.blend or NAME-unbaked.blend, beside the file or in --output, which for a single input may be the name of
-  the file; nothing where there is nothing to do. A file that was edited since, or that is not the program's own, is
+  the file; nothing if there is nothing to do. A file that was edited since, or that the program did not write, is
   replaced only with --overwrite. With --in-place the program replaces the file itself, and keeps the one before as
   NAME.blend1. The paths of the results are printed on standard output, one a line; everything else goes to standard
   error. Relative paths of renders and caches depend on the place of the file, as after Save As. A folder stands for the
@@ -56,14 +56,14 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG + EXIT_CODES)
     parser.add_argument("files", nargs="+", type=not_empty, metavar="FILE.blend", help="files to bake, folders")
-    parser.add_argument("--unbake", action="store_true", help="give baked objects and bones their own keys back")
+    parser.add_argument("--unbake", action="store_true", help="restore the original keys of baked objects and bones")
     add_target_options(parser, "modes")
     keys = parser.add_argument_group("keys")
     keys.add_argument(
         "--step",
         type=bounded("number of frames", *STEP_RANGE_FRAMES),
         metavar="N",
-        help="frames from key to key; 0.25 for keys between the frames (1)",
+        help="frames between keys; 0.25 for keys between frames (1)",
     )
     keys.add_argument(
         "--hold",

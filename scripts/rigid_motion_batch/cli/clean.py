@@ -1,8 +1,8 @@
-"""Take the trembling and the spikes out of recordings, and move nothing by more than is allowed.
+"""Remove jitter and spikes from recordings, and move nothing by more than the tolerance.
 
-Nothing has to be set: what no motion explains is found in each recording. Every file comes back in its own format, with
-other numbers where something was moved and the same text everywhere else. Of each body the program says by how much it
-trembles, how far anything was moved, and which rows were spikes.
+There is nothing else to set: the jitter of each recording is estimated. Every file keeps its format, with other numbers
+where something was moved and the same text everywhere else. For each body the program reports how much it trembles, how
+far anything was moved, and which rows were spikes.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ what is written:
   hand.csv becomes hand-cleaned.csv beside it or in --output, which for a single input may be the name of the file: with
   all its columns, comments and bodies, and FILE:BODY with that body alone cleaned. A .csv or .tum file may be made of
   any rigid motion: poses alone, in the axes and units of the recording. Other columns, such as velocities, stay as they
-  were recorded, and so do Qualisys's angles beside its matrices. Files of Blender, FBX and glTF are animated and not
-  recorded: there is Clean Motion in Blender.
+  were recorded, and so do Qualisys's angles next to its matrices. Blender, FBX and glTF files are animations, not
+  recordings: use Clean Motion in Blender.
 
-  No row is moved by more than the tolerance but those that are listed, as spikes or as repeats of the row before, and
-  the joints that hang on them. They are counted from 0, without headers. Where the clock trembles the times are written
-  in steady steps, if they are numbers in a single column of that body alone. Gaps stay gaps. What was cleaned before
-  is left alone. A folder stands for the files in it and below that end in {", ".join(IN_FOLDERS)}; the same command
-  again does what is new or has changed.
+  Only listed rows, spikes or repeats of the row before, and the joints below them are moved by more than the tolerance.
+  They are counted from 0, without headers. If the clock jitters the times are written in steady steps, if they are
+  numbers in a single column of that body alone. Gaps stay gaps. Cleaned files are left alone.
+  A folder stands for the files in it and below that end in {", ".join(IN_FOLDERS)}; the same command
+  again does only what is new or changed.
 """
 
 
@@ -94,16 +94,19 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
         "--radius",
         type=radius_in_metres,
         metavar="LENGTH",
-        help="of the ball around each body and joint whose points count (10cm for rigid bodies, 3cm for joints)",
+        help="radius of the ball around each body and joint (10cm for rigid bodies, 3cm for joints)",
     )
     moved.add_argument(
         "--pixels",
         type=bounded("number of pixels", 0.0, 100.0, above=True),
         metavar="N",
-        help="of a camera: how far anything may be moved in its picture, near the middle of it",
+        help="for a camera: how far anything may move in its picture, near the middle",
     )
     moved.add_argument(
-        "--nearest", type=radius_in_metres, metavar="LENGTH", help="with --pixels: how near to the camera anything is"
+        "--nearest",
+        type=radius_in_metres,
+        metavar="LENGTH",
+        help="with --pixels: distance of the nearest thing from the camera",
     )
     moved.add_argument(
         "--focal",
@@ -132,7 +135,7 @@ def _how_far(options: argparse.Namespace) -> tuple[Tolerance | None, float | Non
     if options.tolerance or options.radius:
         raise ValueError("--pixels is a tolerance itself: leave out --tolerance and --radius")
     if not options.nearest:
-        raise ValueError("--pixels needs to know how near anything is: --nearest 2m")
+        raise ValueError("--pixels needs the distance of the nearest thing: --nearest 2m")
     length = options.pixels * options.nearest / (options.focal or DEFAULT_FOCAL_PX)
     return Tolerance(f"{1e3 * length:.6f}mm"), options.nearest
 
@@ -146,7 +149,7 @@ def _planned(options: argparse.Namespace) -> list[InputJob]:
         made = named or folder / f"{name_of(file, body)}{SUFFIX}{file.suffix}"
         problem = ""
         if file.suffix.lower() in ANIMATED:
-            problem = "this is animated, and not recorded: open or import it in Blender, and use Clean Motion"
+            problem = "this is an animation, not a recording: open or import it in Blender, and use Clean Motion"
         return InputJob(source, made.parent, made, is_recording=True, problem=problem)
 
     def is_result(path: Path) -> bool:

@@ -34,15 +34,15 @@ RESEARCH = {
 
 COMMANDS = {
     "compare": ("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
-    "inspect": ("inspect", "look into recordings: bodies, units, axes, rate, and what looks wrong"),
-    "clean": ("clean", "take the trembling and the spikes out of recordings, within a tolerance"),
-    "reduce": ("reduce", "keep the few keys that a motion needs, in glTF and .blend files and of recordings"),
-    "bake": ("bake", "turn the in-betweens of .blend files into real keys, or back"),
+    "inspect": ("inspect", "inspect recordings: bodies, units, axes, rate, and what looks wrong"),
+    "clean": ("clean", "remove jitter and spikes from recordings, within a tolerance"),
+    "reduce": ("reduce", "keep the few keys that a motion needs, in glTF and .blend files and recordings"),
+    "bake": ("bake", "bake the in-betweens of .blend files to real keys, or back"),
     "stream": ("stream", "send a motion over a network in real time, or show what arrives"),
     "bundle": ("job_bundle", "write a comparison as a job for render farms"),
     "tasks": ("tasks", "list what a comparison did, and what failed"),
     "build": ("build_extension", "build the zip that Blender installs"),
-    "completion": ("completion", "have a shell complete commands and options"),
+    "completion": ("completion", "complete commands and options in a shell"),
 }
 """The module of each in this package, with `main(arguments)`, which returns the exit code, and what it is about. Its
 script has the same name."""

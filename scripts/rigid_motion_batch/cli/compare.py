@@ -201,7 +201,7 @@ class _Comparing:
 
     def run(self) -> int:
         """Read the recordings, see what there is to do, do it, and say what it came to."""
-        report(summary="Stopped. There is no new report yet; the same command goes on from here.")
+        report(summary="Stopped. There is no new report yet; the same command continues from here.")
         if not self.options.only or self.options.only == "read":
             self._do("Reading", self.plan.reading)
             if self.work.interrupted or self.work.problem or self.options.only:
@@ -239,7 +239,7 @@ class _Comparing:
             self._do("Reporting", lambda: self.plan.tasks(films=False))
             if self.work.interrupted or self.work.problem:
                 return self._end()
-            report(summary="Stopped. The report holds what was ready; the same command goes on from here.")
+            report(summary="Stopped. The report holds what was ready; the same command continues from here.")
             report(written=os.fspath(self.store.output / steps.PAGE))
             self._note(f"All numbers are there, and films come as they are made: {self.store.output / steps.PAGE}")
             self._do("Filming", self.plan.tasks)
@@ -259,7 +259,7 @@ class _Comparing:
     def _say_nothing_to_compare(self) -> None:
         if not any(self.store.index_of(task.key) for task in self.plan.reading()):
             if self.options.only or not self.work.failures:
-                complain(PROGRAM, "none of the recordings has been read; that is done by --only read")
+                complain(PROGRAM, "none of the recordings has been read; --only read does that")
         elif not self.work.failures:
             higher = "--budget" if self.options.budget else "--rates"
             complain(PROGRAM, f"every clip is too short for two keys at these rates; give higher {higher}")
@@ -269,7 +269,7 @@ class _Comparing:
         tasks = (task for task in chain(self.plan.reading(), self.plan.tasks()) if task.step.stage != "report")
         for task in tasks:
             if not self.store.index_of(task.key):
-                self.work.failures[task.name] = "not done: its own stage said why"
+                self.work.failures[task.name] = "not done: see the message of its stage"
                 complain(PROGRAM, f"{task.name}: {self.work.failures[task.name]}")
 
     def _require_tolerances(self) -> None:
@@ -307,12 +307,12 @@ class _Comparing:
         there = self.page and page.exists() and not self.options.only
         report(ended=True)
         if outcome.problem:
-            complain(PROGRAM, f"{outcome.problem}; nothing that is done is lost: put that right, and run this again")
+            complain(PROGRAM, f"{outcome.problem}; no finished work is lost: fix that, and run this again")
         if outcome.failures and not self.options.quiet:
             print(f"{PROGRAM}: {len(outcome.failures)} failed, as said above", file=sys.stderr)
         if outcome.interrupted:
             holds = "The report holds what was ready" if there else "There is no new report yet"
-            print(f"Stopped. {holds}; the same command goes on from here.", file=sys.stderr)
+            print(f"Stopped. {holds}; the same command continues from here.", file=sys.stderr)
         # After a failure a farm would not begin the stages behind it: what is missing is the report's to say.
         failed = outcome.failures and not (os.environ.get(FARM_VARIABLE) == "openjd" and self.options.only != "report")
         code = 130 if outcome.interrupted else 2 if outcome.problem else int(bool(failed))
@@ -352,7 +352,7 @@ def _explain(plan: ComparisonPlan, store: Store, options: argparse.Namespace) ->
     lines = reasons(plan.reading)
     if any(not store.index_of(task.key) for task in plan.reading()):
         if options.only != "read":
-            lines.append("What follows from these recordings is known when they have been read.")
+            lines.append("The following tasks are known once these recordings have been read.")
     elif options.only != "read":
         plan.inspect_clips()
         plan.conclude()

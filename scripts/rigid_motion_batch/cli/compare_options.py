@@ -32,8 +32,8 @@ from rigid_motion_batch.scenes.settings import ANTIALIASING, ENGINES, SceneSetti
 DESCRIPTION = """Compare interpolation modes on recorded trajectories.
 
 The program keeps only a few keys a second of each recording, evenly spaced or where the motion needs them. Each mode
-computes the in-betweens again. The program measures how far they are off, and shows it in a report and in a video with
-the modes side by side. Without INPUT it compares the recordings in assets/.
+recomputes the in-betweens. The program measures their errors, and shows them in a report and in a video with the modes
+side by side. Without INPUT it compares the recordings in assets/.
 """
 
 RATES = "5,10,15,20"
@@ -70,15 +70,15 @@ examples:
   blender --background --python scripts/compare.py -- hand_left.csv --axes unity
 
 keys:
-  Without more, --rates keys a second are kept, evenly spaced in time and the same for every mode. --tolerance and
+  By default, --rates keys a second are kept, evenly spaced in time and the same for every mode. --tolerance and
   --budget also count the keys that each mode needs to be as good as Blender's own curves, which takes up to two seconds
-  for every 100 samples; --rates beside them adds evenly spaced keys for comparison.
+  for every 100 samples; --rates adds evenly spaced keys for comparison.
 
 output:
   A table of errors, one sentence, and as the last line the path of OUTPUT/report.html; everything else goes to standard
   error. OUTPUT/metrics.csv has all numbers, and every clip and choice of keys has a folder with its keys and motions.
-  What an earlier run of the same recordings wrote is replaced, and what is done already is not done again.
-  docs/comparing.md says what each file has, and how errors are measured.
+  An earlier run of the same recordings is replaced, and finished work is not repeated. docs/comparing.md describes each
+  file, and how errors are measured.
 
 Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could be done, or a wrong option, 130
 stopped by Ctrl-C, and 143 by SIGTERM.
@@ -129,8 +129,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         action="append",
         default=[],
         metavar=("TOOL", "HAND"),
-        help="measure how far the first of two clips slips in the second, which holds it, as is done for pairs that "
-        "are found in a file; can be given several times",
+        help="measure how far the first of two clips slips in the second, which holds it, as for pairs found in a "
+        "file; may be repeated",
     )
     add_reading_options(parser)
     add_clean_option(parser)
@@ -145,17 +145,17 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--overwrite",
         action="store_true",
-        help="replace another comparison in that folder, and files that were edited or are of other programs",
+        help="replace another comparison in that folder, and files that were edited or come from other programs",
     )
-    parser.add_argument("--explain", action="store_true", help="say what would be done and why, and do nothing")
+    parser.add_argument("--explain", action="store_true", help="print what would be done and why, and do nothing")
     output = parser.add_argument_group("output")
     output.add_argument("--open", action="store_true", help="open the report in the browser")
-    output.add_argument("--quiet", action="store_true", help="print the path of the report alone, and what fails")
+    output.add_argument("--quiet", action="store_true", help="print only the path of the report, and failures")
     output.add_argument(
         "--format",
         choices=FORMS,
         default="csv",
-        help="of the poses of each mode and of the keys: csv, or tum, which evo reads (%(default)s)",
+        help="format of each mode's poses and of the keys: csv, or tum for evo (%(default)s)",
     )
     output.add_argument("--json", action="store_true", help="print verdict, table, notes and failures as JSON")
     farm = parser.add_argument_group("farms", "One of many machines that share the folder; docs/farm.md has more.")
@@ -180,17 +180,19 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys.add_argument(
         "--shared",
         action="store_true",
-        help="key poses: all joints of a body have their keys at the same times (each joint where it needs them)",
+        help="key poses: all joints of a body have keys at the same times (default: each joint where it needs them)",
     )
     keys.add_argument(
         "--fit",
         action="store_true",
-        help="also count the keys needed if they are fitted, and need not be recorded poses",
+        help="also count the keys needed if they are fitted, not recorded poses",
     )
     video = parser.add_argument_group("video")
     video.add_argument("--no-video", action="store_true", help="numbers and report only")
     video.add_argument(
-        "--blender", metavar="PROGRAM", help="film, and read FBX and .blend, with this Blender (the module bpy)"
+        "--blender",
+        metavar="PROGRAM",
+        help="make films and read FBX and .blend files with this Blender (the module bpy)",
     )
     video.add_argument("--engine", choices=ENGINES, default="workbench", help="Blender's renderer (%(default)s)")
     video.add_argument(
@@ -216,7 +218,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--films",
         choices=(SPOKEN_OF, ALL),
         default=SPOKEN_OF,
-        help="for each recording one video, with the keys that the verdict speaks of, or one for every choice of keys "
+        help="for each recording one video, with the keys of the verdict, or one for every choice of keys "
         "(%(default)s)",
     )
     video.add_argument("--theme", choices=THEMES, default="dark", help="colours of the videos (%(default)s)")
@@ -224,7 +226,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--deviation",
         type=factor,
         metavar="N",
-        help="magnify errors N times; 1 shows them as they are (a round number that shows them well)",
+        help="magnify errors N times; 1 shows true poses (a suitable round number)",
     )
     video.add_argument(
         "--antialiasing",
@@ -290,8 +292,8 @@ def _choices(options: argparse.Namespace) -> list[Choice]:
         return rates or _amounts(Uniform)(RATES)
     if tolerance and budget:
         raise ValueError(
-            "--tolerance and --budget exclude one another: a tolerance decides how many keys there are, a budget how "
-            "large the error is; give one of them"
+            "--tolerance and --budget exclude one another: a tolerance determines the number of keys, a budget the "
+            "error; give one of them"
         )
     by_motion = tolerance or budget or [Budget(rate.written) for rate in rates or _amounts(Uniform)(RATES)]
     return [*(rates or []), *by_motion]

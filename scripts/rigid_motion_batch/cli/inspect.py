@@ -1,7 +1,7 @@
-"""Look into recordings: bodies, units, axes, rate, length, and what looks wrong, with what to do about it.
+"""Inspect recordings: bodies, units, axes, rate, length, and what looks wrong, with its remedy.
 
-The program reads a recording as the other commands do, with the same options, and says what it found. It changes
-nothing. Blender is needed for FBX and .blend files alone.
+The program reads a recording like the other commands, with the same options, and reports what it found. It changes
+nothing. Only FBX and .blend files need Blender.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def _body(body: Contents) -> Iterator[str]:
     motion += f"{size.turning:.3g} degrees/s; turns up to {size.turned:.3g} degrees away from its first pose"
     yield from _row("  motion", motion + "; it grows or shrinks" * body.scaled)
     if body.trembling:
-        yield from _row("  trembles", _trembling(body.trembling))
+        yield from _row("  jitter", _trembling(body.trembling))
     for repair in body.repairs:
         yield from _row("  repaired", repair)
     for warning in body.warnings:
@@ -123,9 +123,9 @@ def _body(body: Contents) -> Iterator[str]:
 
 
 def _trembling(found: MeasuredTrembling) -> str:
-    text = "not to be told from motion"
+    text = "not distinguishable from motion"
     if found.position or found.rotation:
-        text = f"by {1e3 * found.position:.2g} mm and {found.rotation:.2g} degrees"
+        text = f"{1e3 * found.position:.2g} mm and {found.rotation:.2g} degrees"
     if found.spikes:
         text += f"; {len(found.spikes)} samples are spikes or repeat the one before: at "
         text += f"{listed([f'{time:.4g} s' for time in found.spikes], MAX_LISTED_NAMES)}"

@@ -1,9 +1,9 @@
-"""Keep the few keys that a motion needs, in .blend and glTF files and of recordings, without a window.
+"""Keep the few keys that a motion needs, in .blend and glTF files and recordings, without a window.
 
-In .blend files the program does what *Reduce Keys to Poses* does in Blender's window, for objects and whole rigs. A
-glTF file comes back as it is, with fewer keys in its clips. Of a recording it finds the few samples that a mode needs
-as keys, and writes them as a table or as a .blend file. No point is off by more than the tolerance on any frame. The
-result is a new file; the input stays as it is.
+In .blend files the program does the same as *Reduce Keys to Poses* in Blender's window, for objects and whole rigs. A
+glTF file gets fewer keys in its clips, and nothing else changes. Of a recording it finds the few samples that a mode
+needs as keys, and writes them as a table or a .blend file. No point is off by more than the tolerance on any frame. The
+result is a new file; the input does not change.
 """
 
 from __future__ import annotations
@@ -64,17 +64,16 @@ examples:
 
 .blend files:
   The program reduces every object, and all bones of a rig together, with more than two keys of location or rotation,
-  and sets the mode on the keys that are left. The dense keys stay in the file for Restore Keys. Bones that follow
-  constraints or drivers, and what hangs on them, are not promised: they are named. What needs all of its keys stays as
-  it is, and so does an object whose scale has keys everywhere that differ from axis to axis.
+  and sets the mode on the remaining keys. The dense keys stay in the file for Restore Keys. Bones that follow
+  constraints or drivers, and their children, may be off by more: they are named. Anything that needs all of its keys
+  does not change, and neither does an object with non-uniform scale on all keys.
 
 glTF files:
   walk.glb becomes walk-reduced.glb, and so with .vrm and .vrma; walk.gltf becomes walk-reduced.gltf with its .bin
-  beside it. There are fewer keys in every clip, and nothing else is changed. Blender is not needed. No vertex, and no
-  point within --radius of any node, is off by more than the tolerance in the world, neither at keys nor at eighths
-  between them: what is written is played again. What moves no node, or would become larger, is left alone. With --glb,
-  Blender exports .blend and FBX files and recordings, sampled on every frame as they are shown. What comes compressed
-  by meshopt goes out so.
+  beside it. Every clip has fewer keys, and nothing else changes. Blender is not needed. No vertex, and no point within
+  --radius of any node, is off by more than the tolerance in the world, neither at keys nor at eighths between them: the
+  result is played back to check. Clips that move no node, or would become larger, are left alone. With --glb, Blender
+  exports .blend and FBX files and recordings, sampled on every frame. Files compressed by meshopt stay compressed.
 
 recordings:
   The program reads what compare.py reads; FILE:BODY takes one body of several, FILE:* all. A rigid motion becomes
@@ -139,13 +138,11 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "metres (as far as what it carries reaches, and 3 cm of a grown-up at least, in proportion; in glTF files what "
         f"a node carries counts in any case; for rigid recordings {RIGID_RADIUS_M})",
     )
-    keys.add_argument(
-        "--shared", action="store_true", help="key poses: all bones of a rig get their keys on the same frames"
-    )
+    keys.add_argument("--shared", action="store_true", help="key poses: all bones of a rig get keys on the same frames")
     keys.add_argument(
         "--discard",
         action="store_true",
-        help="leave the dense keys out of the file, which then has no Restore Keys",
+        help="remove the dense keys from the file, which disables Restore Keys",
     )
     recordings = parser.add_argument_group("recordings")
     recordings.add_argument("--blend", action="store_true", help="also write rigid motions as .blend files")
@@ -153,30 +150,30 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--fps",
         type=whole("number of frames a second", *FRAME_RATE_RANGE),
         metavar="N",
-        help="frames a second of .blend and GLB files (the rate of the recording)",
+        help="frames a second of .blend and GLB files (those of the recording)",
     )
     add_clean_option(recordings)
     add_reading_options(parser)
     gltf = parser.add_argument_group("glTF files")
-    gltf.add_argument("--glb", action="store_true", help="write GLB files of .blend and FBX files and of recordings")
+    gltf.add_argument("--glb", action="store_true", help="write GLB files from .blend files, FBX files and recordings")
     gltf.add_argument(
         "--channels",
         choices=CHANNELS,
         default=CHANNELS[0],
-        help="needed: a channel that stays at rest goes, unless another clip of the file moves it or the file has no "
-        "meshes; moving: it goes without meshes, too; all: every channel keeps at least one key (%(default)s)",
+        help="needed: drop channels at rest, unless another clip of the file moves them or the file has no meshes; "
+        "moving: drop them without meshes too; all: every channel keeps at least one key (%(default)s)",
     )
     gltf.add_argument(
         "--meshopt",
         action="store_true",
-        help="compress the file with EXT_meshopt_compression, and search for the keys that take the fewest bytes then; "
-        "for viewers that read it",
+        help="compress the file with EXT_meshopt_compression, and search for the keys that then take the fewest "
+        "bytes; for viewers that read it",
     )
     gltf.add_argument(
         "--feet-may-slide",
         dest="feet",
         action="store_false",
-        help="feet that stand may slide as far as the tolerance allows, not only a millimetre",
+        help="let standing feet slide as far as the tolerance allows, not only a millimetre",
     )
     add_file_options(parser)
     parser.add_argument(
@@ -188,7 +185,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--json",
         action="store_true",
-        help="print JSON in place of paths: a list with what became of each input, or would, in metres and bytes",
+        help="print JSON instead of paths: a list with the result for each input, in metres and bytes",
     )
     options = parser.parse_args(arguments)
     try:
@@ -313,7 +310,7 @@ def _refuse_odd(options: argparse.Namespace) -> None:
     recorded = [job for job in jobs if job.is_recording]
     gltf = [job for job in jobs if not job.is_recording and _is_gltf(job.file)]
     if options.count is not None and options.tolerance is not None:
-        raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
+        raise ValueError("--keys and --tolerance exclude one another: each determines the number of keys")
     if options.curves and options.mode:
         raise ValueError("--curves and --mode exclude one another: curves need no mode")
     if options.curves and options.shared and (gltf or options.glb):
@@ -332,7 +329,7 @@ def _refuse_odd(options: argparse.Namespace) -> None:
     if options.meshopt and not options.glb and (others := [job for job in jobs if job not in gltf]):
         raise ValueError(f"--meshopt is for glTF files, and {others[0].source} is none: add --glb, or leave it out")
     if options.objects and jobs and len(jobs) == len(gltf) + len(recorded):
-        raise ValueError("--objects is for .blend files: of a recording name one body with FILE:BODY")
+        raise ValueError("--objects is for .blend files: name one body of a recording with FILE:BODY")
 
 
 def _refuse_beside_glb(options: argparse.Namespace, jobs: list[InputJob]) -> None:
@@ -352,9 +349,7 @@ def _refuse_beside_glb(options: argparse.Namespace, jobs: list[InputJob]) -> Non
 def _place_of_page(options: argparse.Namespace) -> Path | None:
     """Return where the page goes; None without one. Raises ValueError where nothing is written."""
     if options.report and options.dry_run:
-        raise ValueError(
-            "--report writes a page of what was written, and --dry-run writes nothing: leave one of them out"
-        )
+        raise ValueError("--report describes written files, and --dry-run writes none: leave one of them out")
     first = file_and_body(options.inputs[0])[0]
     named = named_file(options.output, options.inputs, NAMES_OF_FILES) if options.report else None
     folder = named.parent if named else options.output or (first if first.is_dir() else first.parent)

@@ -1,6 +1,6 @@
-"""Measure what a recording costs as a stream, and how well it is shown: `stream measure`.
+"""Measure the cost of a recording as a stream, and how well it is shown: `stream measure`.
 
-The recording is sent over UDP on loopback, by the codec of docs/wire.md; another process shows it. Both go by the clock
+The recording is sent over UDP on loopback, by the codec of docs/wire.md; another process shows it. Both use the clock
 of the recording, however busy the machine is.
 """
 
@@ -34,10 +34,10 @@ examples:
   python scripts/stream.py measure log.csv:left --output shown.csv
   python scripts/stream.py measure log.csv:hand log.csv:tool --held log-tool log-hand --loss 0.05
 
-Bytes a second leave out what somebody who joins gets once (names, parents, rest
-poses); they are a line of their own. Headers are those of UDP and IPv4, 28 bytes a datagram. shown.bvh is what was
-shown at the recording's moments, in its units and axes. With --held it says how far the tool slips in the hand, and
-what that costs, where both are streams of their own; bodies of one stream; and the tool is sent in the hand's space.
+Bytes a second exclude what a new listener gets once (names, parents, rest
+poses), which has its own line. Headers are those of UDP and IPv4, 28 bytes a datagram. shown.bvh is what was
+shown at the recording's moments, in its units and axes. With --held it reports how far the tool slips in the hand, and
+what that costs: as two streams, as bodies of one stream, and with the tool sent in the hand's space.
 """
 
 
@@ -47,16 +47,16 @@ _share = bounded("part of all", 0.0, 0.99)
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options beside those of reading."""
-    help = "a recording of a body; FILE:BODY takes one of several; with --held all that has the two"
+    help = "a recording of a body; FILE:BODY for one of several; with --held everything with these two"
     parser.add_argument("recordings", nargs="+", metavar="RECORDING", help=help)
-    help = "measure how far a body slips in the hand that holds it, by their names; HAND:JOINT is a joint of a skeleton"
+    help = "measure how far a body slips in its hand, by their names; HAND:JOINT is a joint of a skeleton"
     parser.add_argument("--held", nargs=2, metavar=("TOOL", "HAND"), help=help)
     help = "largest error: 5mm, 0.5cm (%(default)s)"
     parser.add_argument("--tolerance", type=Tolerance, default="5mm", metavar="LENGTH", help=help)
     parser.add_argument("--delay", type=_delay, default=0.1, metavar="S", help="seconds of delay (%(default)s)")
-    help = "of each joint's ball: 3cm, or 0.03 (3 cm of a grown-up in proportion, and to the ends of bones)"
+    help = "radius of each joint's ball: 3cm, or 0.03 (3 cm on an adult, in proportion, and to the ends of bones)"
     parser.add_argument("--radius", type=radius_in_metres, metavar="LENGTH", help=help)
-    parser.add_argument("--loss", type=_share, default=0.0, metavar="P", help="part of the datagrams to lose: 0.01")
+    parser.add_argument("--loss", type=_share, default=0.0, metavar="P", help="share of datagrams to lose: 0.01")
     parser.add_argument("--output", "-o", type=Path, metavar="FILE", help="write what was shown, as .bvh or .csv")
     parser.add_argument("--json", action="store_true", help="print numbers as JSON")
 
@@ -69,7 +69,7 @@ def run(options: argparse.Namespace, _stopped: list[int]) -> None:
         return
     if len(clips) > 1:
         raise TrajectoryError(
-            options.recordings[0], f"{len(clips)} bodies", "name one, as FILE:BODY, or two by --held TOOL HAND"
+            options.recordings[0], f"{len(clips)} bodies", "name one body with FILE:BODY, or two with --held TOOL HAND"
         )
     clip, tolerance = clips[0], options.tolerance.tolerance(clips[0])
     times, poses = samples_of(clip)
@@ -91,7 +91,7 @@ def run(options: argparse.Namespace, _stopped: list[int]) -> None:
 def run_held(options: argparse.Namespace, clips: list[Clip]) -> None:
     """Measure a tool in a hand, and print it."""
     if options.output:
-        raise ValueError("--held writes no file of what was shown; leave --output out")
+        raise ValueError("--held writes no file; leave --output out")
     bodies, times, poses = together(clips, radius=options.radius)
     tool, hand = options.held
     tolerance = options.tolerance.tolerance(clips[0])

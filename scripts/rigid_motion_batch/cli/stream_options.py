@@ -23,10 +23,10 @@ DEFAULT_DELAY_S = 0.1
 
 ENDINGS = (".csv", ".bvh")
 
-DESCRIPTION = """Motion over a network, live: bodies in rooms, each within a tolerance, for as few bytes as that takes.
+DESCRIPTION = """Motion over a network, live: bodies in rooms, each within a tolerance, in as few bytes as possible.
 
-`send` plays recordings into a room, `receive` writes what a display would have shown of all who are in it, or hands it
-to Blender, `router` brings rooms of several machines together, and `measure` says what a recording costs.
+`send` plays recordings into a room, `receive` writes what a display would have shown of all users in it, or forwards it
+to Blender, `router` connects rooms of several machines, and `measure` reports the cost of a recording.
 """
 
 SCRIPT = "stream.py"
@@ -36,7 +36,7 @@ EPILOG = """
 examples, in two terminals:
   python scripts/stream.py receive --room studio --output shown.bvh
   python scripts/stream.py send walk.bvh --room studio
-and on several machines, of which one has the router:
+and on several machines, one with the router:
   python scripts/stream.py router --network
   python scripts/stream.py receive --room studio --at studio.local --to-blender 127.0.0.1:39539
   python scripts/stream.py send walk.bvh --room studio --at studio.local
@@ -55,8 +55,8 @@ examples:
   python scripts/stream.py send --from-vmc 39539 --room studio   a performer and trackers of another program
   python scripts/stream.py send walk.bvh --to-vmc 127.0.0.1:39539
 
-All recordings begin together, and take as long as they take, even if nobody listens. What is held does not slip in the
-hand, whatever the network loses: a body that never moves in the space of another is found, --held names any other.
+All recordings start together and play to their end, even without listeners. Held bodies do not slip in the hand,
+whatever the network loses: bodies that never move relative to another are found, --held names any other.
 """
 
 RECEIVE_EPILOG = """
@@ -66,14 +66,14 @@ examples:
   python scripts/stream.py receive --room studio --at studio.local --to-blender 127.0.0.1:39539
   python scripts/stream.py receive --room studio --to-vmc 127.0.0.1:39540
 
-It ends when all who sent have gone, after --seconds, or at Ctrl-C. A .csv file has all bodies, in metres and Blender's
+It ends when all senders have gone, after --seconds, or at Ctrl-C. A .csv file has all bodies, in metres and Blender's
 axes: device,t,x,y,z,qw,qx,qy,qz, where t is the moment of the sender's motion. A .bvh file is written
 for each body, in metres.
 """
 
 ROUTER_EPILOG = """
 examples:
-  python scripts/stream.py router                                this machine alone
+  python scripts/stream.py router                                this machine only
   python scripts/stream.py router --network                      all who reach this machine
   python scripts/stream.py router --config router.json5          with TLS, passwords and access rules
 
@@ -89,17 +89,17 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 
     sending = commands.add_parser("send", help="play recordings", epilog=as_called(SEND_EPILOG, SCRIPT), **style)
     sending.add_argument("recordings", nargs="*", metavar="RECORDING", help="FILE, or FILE:BODY for one of several")
-    help = "send the performer and trackers that come by VMC to this port of this machine, instead of recordings"
+    help = "send the performer and trackers that arrive by VMC at this port of this machine, instead of recordings"
     sending.add_argument("--from-vmc", type=_port, metavar="PORT", help=help)
     _add_room(sending, "to send")
     help = "play it to this program by VMC instead: Blender's panel Live, VSeeFace, Warudo, Unity"
     sending.add_argument("--to-vmc", type=_address, metavar="HOST:PORT", help=help)
     help = "largest error: 5mm, 0.5cm (%(default)s)"
     sending.add_argument("--tolerance", type=Tolerance, default="5mm", metavar="LENGTH", help=help)
-    sending.add_argument("--rate", type=_positive, metavar="HZ", help="send a key at each of so many ticks a second")
+    sending.add_argument("--rate", type=_positive, metavar="HZ", help="send a key this many times a second")
     help = f"seconds by which it is shown later ({DEFAULT_DELAY_S}; with --rate one interval)"
     sending.add_argument("--delay", type=_delay, metavar="S", help=help)
-    help = "a body that another, or its joint HAND:JOINT, holds, by their names (what is found to be held by a body)"
+    help = "a body held by another, or by its joint HAND:JOINT, by their names (pairs found in the recordings)"
     sending.add_argument("--held", nargs=2, action="append", metavar=("TOOL", "HAND"), help=help)
     add_reading_options(sending)
 
@@ -108,31 +108,33 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     _add_room(receiving, "to listen")
     receiving.add_argument("--output", "-o", type=_file, metavar="FILE", help="what was shown, as .csv or .bvh")
-    help = "write the keys that came with the in-betweens of this mode instead"
+    help = "instead write the received keys with the in-betweens of this mode"
     receiving.add_argument("--mode", choices=MODES, metavar="MODE", help=help)
-    help = "take the trembling out of what comes on every frame, with what waits to be shown, and no later for it"
+    help = "remove jitter from motion with all frames, without extra delay"
     receiving.add_argument("--clean", action="store_true", help=help)
-    help = "hand everything on to the panel Live of Blender, by UDP"
+    help = "forward everything to Blender's panel Live, by UDP"
     receiving.add_argument("--to-blender", type=_address, metavar="HOST:PORT", help=help)
-    help = "show it to another program by VMC: the first body there is, and rigid bodies as trackers"
+    help = "show it to another program by VMC: the first body, and rigid bodies as trackers"
     receiving.add_argument("--to-vmc", type=_address, metavar="HOST:PORT", help=help)
-    receiving.add_argument("--seconds", type=_positive, metavar="N", help="stop after so many seconds")
+    receiving.add_argument("--seconds", type=_positive, metavar="N", help="stop after this many seconds")
     help = "frames a second of the display (%(default)g)"
     receiving.add_argument("--fps", type=_fps, default=72.0, metavar="N", help=help)
-    help = "seconds that are waited longer for what is late (%(default)g)"
+    help = "extra seconds to wait for late data (%(default)g)"
     receiving.add_argument("--margin", type=_margin, default=0.0, metavar="S", help=help)
-    receiving.add_argument("--truth", metavar="RECORDING", help="what was sent: report how far off it was shown")
+    receiving.add_argument(
+        "--truth", metavar="RECORDING", help="the recording that was sent: report the error of what was shown"
+    )
     add_reading_options(receiving)
 
     routing = commands.add_parser(
         "router", help="bring rooms together", epilog=as_called(ROUTER_EPILOG, SCRIPT), **style
     )
     _add_place(routing, "where to listen")
-    routing.add_argument("--seconds", type=_positive, metavar="N", help="stop after so many seconds")
+    routing.add_argument("--seconds", type=_positive, metavar="N", help="stop after this many seconds")
 
     measuring = commands.add_parser(
         "measure",
-        help="what a recording costs as a stream",
+        help="measure the cost of a recording as a stream",
         description=stream_measure.__doc__,
         epilog=as_called(stream_measure.EPILOG, SCRIPT),
         **style,
@@ -196,7 +198,7 @@ def _add_room(parser: argparse.ArgumentParser, what: str) -> None:
 def _add_place(parser: argparse.ArgumentParser, what: str) -> None:
     help = f"{what}: HOST, HOST:PORT, or as Zenoh writes it, tls/HOST:PORT ({LOOPBACK_ADDRESS}:{ROUTER_PORT})"
     parser.add_argument("--at", metavar="ADDRESS", help=help)
-    help = "find others on the local network, and be found by them; without it nobody reaches this machine"
+    help = "find others on the local network, and be found by them; without it this machine cannot be reached"
     parser.add_argument("--network", action="store_true", help=help)
     parser.add_argument(
         "--config", type=Path, metavar="FILE", help="configuration of Zenoh: TLS, passwords, access rules"

@@ -25,9 +25,9 @@ def main(arguments: list[str]) -> int:
     """List tasks, and return the exit code."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    listing = commands.add_parser("list", help="the tasks, and which are done")
+    listing = commands.add_parser("list", help="list the tasks, and which are done")
     listing.add_argument("output", type=Path, metavar="OUTPUT", help="the output folder")
-    listing.add_argument("--failed", action="store_true", help="only those that failed, with what Python said")
+    listing.add_argument("--failed", action="store_true", help="only those that failed, with Python's messages")
     options = parser.parse_args(arguments)
     if not (options.output / OWN_FOLDER).is_dir():
         complain(program_of(SCRIPT), f"{options.output}: no comparison was made in this folder")

@@ -38,7 +38,9 @@ def cleaned_first(clip: Clip, tolerance: float | None) -> Clip:
     """Return a clip without its trembling, of whose repairs one says so."""
     cleaned, found = cleaned_clip(clip, tolerance)
     said = "; ".join(described(clip, found))
-    return replace(cleaned, repairs=(*clip.repairs, f"cleaned first: {said}; keys and errors are to what was cleaned"))
+    return replace(
+        cleaned, repairs=(*clip.repairs, f"cleaned first: {said}; keys and errors are relative to the cleaned motion")
+    )
 
 
 def described(clip: Clip, found: Cleaned, rows: np.ndarray | None = None) -> Iterator[str]:
@@ -49,8 +51,8 @@ def described(clip: Clip, found: Cleaned, rows: np.ndarray | None = None) -> Ite
     sizes = [f"{length(metres * position)}"] * (position > 0.0) + [f"{np.degrees(rotation):.2g} degrees"] * (
         rotation > 0.0
     )
-    worst = " where it does most" if body and sizes else ""
-    yield f"trembles by {' and '.join(sizes)}{worst}" if sizes else "no trembling to speak of"
+    worst = " at its worst joint" if body and sizes else ""
+    yield f"jitters by {' and '.join(sizes)}{worst}" if sizes else "no noticeable jitter"
     replaced = found.spikes | found.repeats
     within = np.where(_below(clip, replaced), 0.0, found.moved)
     yield f"moved at most {length(metres * float(within.max()))}"
@@ -61,13 +63,13 @@ def described(clip: Clip, found: Cleaned, rows: np.ndarray | None = None) -> Ite
             what = f"1 row was {single}" if len(some) == 1 else f"{len(some)} rows were {several}"
             yield f"{what}: {listed(list(map(str, some)), MAX_LISTED_ROWS)}"
     if (found.times != clip.times).any():
-        yield "clock trembles"
+        yield "clock jitters"
     if (share := float(np.mean(found.alone))) > MIN_UNTOUCHED_RATIO:
-        yield f"{share:.0%} is left nearly as it is, as motion cannot be told from noise there"
+        yield f"{share:.0%} is left nearly unchanged: noise cannot be distinguished from motion there"
     if body:
         now, before = (length(slide(_places(clip, poses), found.stands)) for poses in (found.poses, clip.poses))
-        contacts = f"contacts held: {len(spans(found.stands))}, feet slide by {now} there, and did by {before}"
-        yield contacts if found.stands.any() else "no foot surely stands: none is held"
+        contacts = f"contacts held: {len(spans(found.stands))}, feet slide by {now} there, before by {before}"
+        yield contacts if found.stands.any() else "no foot clearly stands: none is held"
 
 
 def _places(clip: Clip, poses: Poses) -> np.ndarray:

@@ -75,7 +75,7 @@ class ReadingOptions:
         if self.frame_rate is not None and not 0.0 < self.frame_rate < math.inf:
             raise ValueError(f"there cannot be {self.frame_rate} frames a second; give a number such as 90")
         if self.frame_rate is not None and self.time_unit is not None:
-            raise ValueError("--time-unit and --frame-rate exclude one another: times are counted in one of them")
+            raise ValueError("--time-unit and --frame-rate exclude one another: times are in one of them")
         for name, seconds in (("start", self.start), ("end", self.end)):
             if seconds is not None and not 0.0 <= seconds < math.inf:
                 raise ValueError(f"--{name} cannot be {seconds}: give seconds after the first sample, such as 2.5")
@@ -105,7 +105,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         "--axes",
         type=str.lower,
         choices=AXES,
-        help="axes of the recordings (those of the format; blender where it has none)",
+        help="axes of the recordings (those of the format, or blender)",
     )
     group.add_argument(
         "--columns",
@@ -114,12 +114,12 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         metavar="t=NAME,...",
         help="columns of CSVs by name: t, x, y, z, qx, qy, qz, qw, rx, ry, rz (Euler angles), scale, device",
     )
-    group.add_argument("--time-unit", choices=TICKS_PER_S_BY_UNIT, help="unit of the times, whatever the file says")
+    group.add_argument("--time-unit", choices=TICKS_PER_S_BY_UNIT, help="unit of the times, overriding the file")
     group.add_argument(
         "--frame-rate",
         type=_field("frame_rate", number),
         metavar="HZ",
-        help="frames a second, where a column counts frames, not seconds",
+        help="frames a second, if a column counts frames, not seconds",
     )
     group.add_argument(
         "--scale", type=_field("scale", number), metavar="M", help="metres in a unit of length: 0.01 for centimetres"
@@ -128,7 +128,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         "--euler",
         type=_field("euler", str),
         metavar="ORDER",
-        help="order of the Euler angles of CSVs: YXZ about the moved axes (intrinsic), zxy about those of the world",
+        help="order of the Euler angles of CSVs: YXZ about the moved axes (intrinsic), zxy about the world's",
     )
     group.add_argument(
         "--degrees", action="store_true", help="the Euler angles are in degrees (as the columns' names say, or radians)"
@@ -137,10 +137,10 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         "--start",
         type=_field("start", number),
         metavar="S",
-        help="begin so many seconds after the first sample; 0 keeps a T-pose that would be left out",
+        help="begin this many seconds after the first sample; 0 keeps an initial T-pose",
     )
     group.add_argument(
-        "--end", type=_field("end", number), metavar="S", help="end so many seconds after the first sample"
+        "--end", type=_field("end", number), metavar="S", help="end this many seconds after the first sample"
     )
 
 
@@ -152,8 +152,8 @@ def add_clean_option(parser: argparse._ActionsContainer) -> None:
         const=0.0,
         type=_most_moved,
         metavar="LENGTH",
-        help="take the trembling and the spikes out of recordings first, and move none but spikes by more than 2mm or "
-        "another length with its unit (any); errors are to what was cleaned",
+        help="first remove jitter and spikes from recordings, moving only spikes by more than 2mm or another length"
+        " with its unit (any); errors are relative to the cleaned motion",
     )
 
 

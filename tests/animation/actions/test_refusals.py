@@ -52,11 +52,11 @@ HINDRANCES = {
     ),
     "moving delta": (
         lambda obj: obj.keyframe_insert("delta_rotation_quaternion", frame=7),
-        r"Delta Rotation \(Quaternion\) W is animated, on top of.*to a parent",
+        r"Delta Rotation \(Quaternion\) W is animated on top of.*to a parent",
     ),
     "cycles": (
         lambda obj: add_cycles(curves_of(obj)["location", 2], Cycles("REPEAT", "REPEAT", 0, 0)),
-        "repeats, but not all of it together",
+        "repeats, but its channels differ",
     ),
 }
 """What to do to an object, and what it is told."""

@@ -60,7 +60,7 @@ def complaints(case: SimpleNamespace, folder: Path) -> list[str]:
         report = reduce_keys_of(targets, case.mode, case.tolerance, refused=refused, **wishes)
         done = [transform for transform in targets if len(transform.motion.bakes)]
         result = [f"{item.name} has not fewer keys" for item in done if key_count(item) >= counts[item]]
-        result += [str(refusal) for refusal in refused if "goes on outside" in str(refusal)]
+        result += [str(refusal) for refusal in refused if "continues beyond" in str(refusal)]
         if not any(transform.is_part for transform in done) or not promised[:-1].any():
             return result
         bpy.ops.wm.save_as_mainfile(filepath=str(reduced))

@@ -28,44 +28,44 @@ ENVELOPE_MODIFIER = enum_value(bpy.types.FModifier, "type", "ENVELOPE")
 """The code of this type of modifiers."""
 
 ENVELOPED_CHANNEL = n_(
-    "{name}: {channel} has an Envelope, which in-betweens cannot be put in front of: "
-    "mute or remove it, or bake the channel (Graph Editor, Channel)"
+    "{name}: {channel} has an Envelope modifier, which does not work with modes: mute or remove it, or bake the "
+    "channel (Graph Editor, Channel)"
 )
 DIFFERENT_CYCLES = n_(
-    "{name} repeats, but not all of it together: give all its channels first and last keys on the same frames, "
-    "and Cycles with Key > Rigid Motion > Add Cycles"
+    "{name} repeats, but its channels differ: give all of them first and last keys on the same frames, and Cycles "
+    "with Key > Rigid Motion > Add Cycles"
 )
 OTHER_ROUNDS = n_(
-    "{name} ends turned or scaled otherwise than it begins, and cannot go on from there in one mode: "
+    "{name} ends with another rotation or scale than it begins with, and cannot continue from there in one mode: "
     "choose Repeat or Mirror"
 )
 CHANGED_BY_MODIFIERS = n_(
-    "{name} has F-curve modifiers of yours: mute them while its keys are reduced, or bake them into the keys first"
+    "{name} has other F-curve modifiers: mute them while you reduce its keys, or bake them into the keys first"
 )
 MOVING_DELTA = n_(
-    "{name}: {channel} is animated, on top of the rotation that in-betweens are of: move that animation to a parent"
+    "{name}: {channel} is animated on top of the rotation of the in-betweens: move that animation to a parent"
 )
 DRIVEN_CHANNEL = n_("{name}: {channel} is driven: remove the driver, or bake it to keys")
 SILENT_CHANNEL = n_(
-    "{name}: {channel} is muted, or has samples in place of keys: unmute it, "
-    "turn them into keys (Graph Editor, Channel > Samples to Keys), or delete it first"
+    "{name}: {channel} is muted, or has samples instead of keys: unmute it, convert them to keys (Graph Editor, "
+    "Channel > Samples to Keys), or delete it first"
 )
 TOO_LONG = n_(
-    "{name} is to be filled in over {frames:.0f} frames, and at most {most} can be: delete the keys that are far off, "
-    "or, where it goes on outside of them, shorten the scene or choose constant extrapolation"
+    "{name} needs in-betweens on {frames:.0f} frames, and {most} is the limit: delete distant keys, or, if it "
+    "continues beyond its keys, shorten the scene or choose constant extrapolation"
 )
 NOT_FINITE = n_(
-    "{name}: a property or a delta transform is not a finite number: set it anew "
-    "(sidebar, Item, or Object Properties, Delta Transform)"
+    "{name}: a property or a delta transform is not a finite number: set it again (sidebar, Item, or Object "
+    "Properties, Delta Transform)"
 )
 BAD_KEY = n_(
-    "{name}: key {number} of {channel} has a frame, value, handle or easing that no motion can be computed from: "
-    "delete it, or move it and back (Dope Sheet, X or G)"
+    "{name}: key {number} of {channel} has an invalid frame, value, handle or easing: delete it, or move it and "
+    "back (Dope Sheet, X or G)"
 )
-NO_SUCH_MODE = n_("{name}: its keys have a mode that this version does not know: choose another one")
+NO_SUCH_MODE = n_("{name}: its keys have a mode that is unknown to this version: choose another one")
 NO_SUCH_TURNS = n_(
-    "{name}: key {number} of the channel Turns does not have a number of turns up to {most}: "
-    "delete it (Dope Sheet, X), or set the turns anew"
+    "{name}: key {number} of the channel Turns is not a number of turns up to {most}: delete it (Dope Sheet, X), or"
+    " set the turns again"
 )
 
 

@@ -33,7 +33,7 @@ from .motions import continuous_values, without
 from .originals import BAKED, Originals, last_change, put_back, refuse_without_original
 from .worlds import alone_in, arrivals, say_holds, seen_range, worlds_of
 
-NOT_HELD = n_("{name} is held in nothing: Bake without To World has keys for its in-betweens")
+NOT_HELD = n_("{name} is not held: Bake without To World makes keys for its in-betweens")
 
 MAX_SCALE_ROUNDING = 1e-5
 """Scales that differ by less are the same."""
@@ -157,7 +157,7 @@ def _refuse_wishes(step: float, interpolation: str) -> None:
     if interpolation not in ("LINEAR", "CONSTANT"):
         raise ValueError(f"interpolation: LINEAR or CONSTANT, not {interpolation!r}")
     if not step > 0.0:
-        raise Refused(n_("the step between baked keys has to be above zero, not {step}"), step=step)
+        raise Refused(n_("the step between baked keys must be above zero, not {step}"), step=step)
 
 
 def unbake(targets: Targets, *, refused: list[Refused] | None = None) -> None:

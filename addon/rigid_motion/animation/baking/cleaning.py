@@ -54,7 +54,9 @@ USED_TOLERANCE_RATIO = 0.999
 _LOOKS = Looks()
 """What was found, while a slider is drawn."""
 
-TOO_FEW = n_("{name} has {count} keys of location and rotation: to tell trembling from motion takes {least}")
+TOO_FEW = n_(
+    "{name} has {count} keys of location and rotation: at least {least} are needed to distinguish jitter from motion"
+)
 NO_KEY_SELECTED = n_("{name}: no key of location, rotation or scale is selected")
 
 
@@ -132,7 +134,7 @@ def clean_motion(
         One for each object, or rig, that did not refuse.
     """
     if not 0.0 < strength < math.inf:
-        text = n_("the keys may be moved by more than 0 times their trembling, not {strength:g}")
+        text = n_("the strength must be above 0, not {strength:g}")
         raise Refused(text, strength=strength)
     plans: dict[Transform, list[Planned] | Refused] = {}
     _LOOKS.turn_over()
@@ -210,7 +212,7 @@ def _check(transform: Transform, binding: Binding, source: KeyedTransform) -> No
     if count < MIN_NOISE_KEYS:
         raise Refused(TOO_FEW, name=transform.name, count=count, least=MIN_NOISE_KEYS)
     if (step := float(np.median(np.diff(source.keyed_frames)))) > MAX_KEY_SPACING_FRAMES:
-        text = n_("{name} has keys {step:g} frames apart: only recordings can be cleaned, with keys on every frame")
+        text = n_("{name} has keys {step:g} frames apart: only keys on every frame can be cleaned")
         raise Refused(text, name=transform.name, step=step)
 
 
@@ -253,7 +255,7 @@ def _cleaned(
     bridged = np.zeros((len(joints), len(frames)), dtype=bool)
     bridged[taking] = out & (inside > 0.0)
     if not floor and not bridged.any():
-        raise Refused(n_("{name} does not tremble: there is nothing to clean"), name=obj.name)
+        raise Refused(n_("{name} has no jitter: there is nothing to clean"), name=obj.name)
     corrections = {}
     for at, number in enumerate(taking.tolist()):
         if number in sources:

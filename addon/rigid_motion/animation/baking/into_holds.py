@@ -65,10 +65,10 @@ NOTHING_HELD = n_(
 )
 NO_HANDS = n_("There is nothing that could hold {name}: select objects or rigs, too")
 SPARSE_REFUSAL = n_(
-    "{name} has keys far apart around frame {frame:g}, whose in-betweens would change: bake them first (Bake to Keys)"
+    "{name} has distant keys around frame {frame:g}, whose in-betweens would change: bake them first (Bake to Keys)"
 )
-NO_KEYS = n_("{name} has no keys of location or rotation to be reduced: bake its motion first (Object > Animation)")
-SCALE_REFUSAL = n_("{name} grows or shrinks, and what is held is of one size: remove the keys of its scale first")
+NO_KEYS = n_("{name} has no keys of location or rotation to reduce: bake its motion first (Object > Animation)")
+SCALE_REFUSAL = n_("{name} grows or shrinks, but held things have a constant size: remove the keys of its scale first")
 
 Offer = tuple[Node, RestStretch, float]
 """What may hold something, when, and how far away it is."""
@@ -218,7 +218,7 @@ def _found(
 ) -> list[HeldSegment]:
     """Return `held_segments` of something that is keyed so."""
     if not 0.0 < tolerance < math.inf:
-        raise Refused(n_("the tolerance has to be a number above zero, not {tolerance:g}"), tolerance=tolerance)
+        raise Refused(n_("the tolerance must be a number above zero, not {tolerance:g}"), tolerance=tolerance)
     binding, source = _keyed(transform, readings)
     nodes = _nodes(transform, holders)
     if not nodes:

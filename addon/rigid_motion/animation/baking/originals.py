@@ -23,8 +23,8 @@ BAKED, REDUCED, CLEANED = "BAKED", "REDUCED", "CLEANED"
 """The change that was made to the keys."""
 
 NOT_DONE = {
-    BAKED: n_("{name} is not baked, or has another Action by now"),
-    REDUCED: n_("{name} is neither reduced nor cleaned, or has another Action by now"),
+    BAKED: n_("{name} is not baked, or now has another Action"),
+    REDUCED: n_("{name} is neither reduced nor cleaned, or now has another Action"),
 }
 """The reason why something cannot be taken back."""
 

@@ -31,7 +31,7 @@ from .native_curves import NATIVE, write_keys
 from .originals import CLEANED, REDUCED, Originals, discard_originals, last_change, notes_of
 from .search import NO_FEWER, NOT_SO_MANY, NotFewer, fewer_keys
 
-HELD_REFUSAL = n_("{name} is held, and is reduced for each time that it is so: by a tolerance, not to a number of keys")
+HELD_REFUSAL = n_("{name} is held, so each hold is reduced separately: by a tolerance, not to a number of keys")
 
 SMOOTH_MODE = "motor_spline"
 """The mode that mostly needs the fewest keys."""
@@ -123,9 +123,9 @@ def reduce_keys_of(
     if mode not in (NATIVE, FEWEST) and mode not in KEYFRAME_MODES:
         raise Refused(no_such_mode(mode, KEYFRAME_MODES))
     if not 0.0 < tolerance < math.inf:
-        raise Refused(n_("the tolerance has to be a number above zero, not {tolerance:g}"), tolerance=tolerance)
+        raise Refused(n_("the tolerance must be a number above zero, not {tolerance:g}"), tolerance=tolerance)
     if count is not None and count < 2:
-        raise Refused(n_("a motion has 2 keys at least, not {count}"), count=count)
+        raise Refused(n_("a motion needs at least 2 keys, not {count}"), count=count)
     found: dict[str, Plans] = {}
     needed: dict[str, int] = {}
     originals = Originals(REDUCED)
@@ -316,14 +316,14 @@ def _no_fewer(transform: Transform, keyed: Sequence[tuple[Binding, KeyedTransfor
     before = sum(count_of(source) for _, source in keyed if source.channels)
     if before <= 2:
         text = n_(
-            "{name} has no more than two keys of location, rotation or scale: there is nothing to reduce. Constraints, "
-            "drivers and simulations are turned into keys first (Animation > Bake Action, with Visual Keying)"
+            "{name} has at most two keys of location, rotation or scale: there is nothing to reduce. First convert "
+            "constraints, drivers and simulations to keys (Animation > Bake Action, with Visual Keying)"
         )
         return Refused(text, name=transform.name)
     if any(source.channels and has_uneven_scale(source) for _, source in keyed):
         text = n_(
-            "{name} keeps its {count} keys: its scale changes differently along its axes or passes zero, which is no "
-            "part of a pose; move that animation to a child, or remove keys of the scale by hand"
+            "{name} keeps its {count} keys: its scale is not uniform or passes zero, which poses cannot have; move "
+            "that animation to a child, or remove keys of the scale by hand"
         )
         return Refused(text, name=transform.name, count=before)
     return NeedsItsKeys(NO_FEWER if count is None else NOT_SO_MANY, name=transform.name, count=before)

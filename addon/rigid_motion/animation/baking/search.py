@@ -358,8 +358,8 @@ class _SearchedBody:
         if not changed:
             raise Refused(
                 n_(
-                    "{name} goes on outside of its keys, and with fewer of them would go elsewhere there: "
-                    "give its channels constant extrapolation and no cycles, or cycles that all have the same range"
+                    "{name} continues beyond its keys, which fewer keys would change: give its channels constant "
+                    "extrapolation and no cycles, or cycles that all have the same range"
                 ),
                 name=motion.joints[over[0][1]].name,
             )

@@ -28,10 +28,9 @@ from ..holds.placing import converted, world_matrix
 from ..transforms import Refused, Transform
 
 SEVERAL_REFUSAL = n_(
-    "{name} moves by an Action that others have, too, and is elsewhere than they are: "
-    "give it one of its own (Object > Relations > Make Single User)"
+    "{name} shares its Action with others that are elsewhere: give it its own (Object > Relations > Make Single User)"
 )
-IN_STRIPS = n_("{name} moves by NLA strips: enter the only one that it has (NLA Editor, Tab), or bake the strips first")
+IN_STRIPS = n_("{name} moves by NLA strips: enter its only strip (NLA Editor, Tab), or bake the strips first")
 
 MAX_CHANNEL_ROUNDING = 1e-6
 """Values of channels that differ by less stand still."""

@@ -38,11 +38,11 @@ DEFAULT_MODE = "motor_spline"
 """The mode of the keys of something that is held, where they have none."""
 
 NOT_HELD_YET = n_("{name} is not passed on frame {frame:g} or later: hold it in something first (Hold In)")
-NOT_SHOWN = n_("{name} is hidden or excluded, and Blender does not know where it is: show it first")
+NOT_SHOWN = n_("{name} is hidden or excluded, so Blender does not know where it is: show it first")
 NO_SUCH_BONE = n_("{holder} has no bone {bone}: give the name of one of its pose bones")
-NOT_HELD = n_("{name} is held in nothing, so there is no grip to match: hold it first (Hold In)")
+NOT_HELD = n_("{name} is not held, so there is no grip to match: hold it first (Hold In)")
 NO_GRIP = n_("{name} was not held in {holder} before frame {frame:g}, so there is no grip to match")
-FRAMES_REFUSAL = n_("{frames} is no number of frames to pass over: give a whole number from 0 to {most}")
+FRAMES_REFUSAL = n_("{frames} is not a number of frames for a pass: give a whole number from 0 to {most}")
 
 
 @dataclass(frozen=True)

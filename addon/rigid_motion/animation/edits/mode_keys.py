@@ -125,7 +125,7 @@ def set_turns(
     def plan(transform: Transform, readings: Readings) -> Binding:
         binding = editable_binding(transform, able(transform, readings))
         if turns and not any(modes_in(binding, frames_in(binding) if frames is None else np.asarray(frames))):
-            text = n_("{name}: Blender's own in-betweens make no turns more: choose a mode first")
+            text = n_("{name}: Blender's own in-betweens cannot add turns: choose a mode first")
             raise Refused(text, name=transform.name)
         return binding
 
@@ -133,10 +133,10 @@ def set_turns(
         set_turns_in(binding, turns, frames_in(binding)[:-1] if frames is None else frames, axis)
 
     if isinstance(turns, bool) or not isinstance(turns, int) or abs(turns) > MOST_TURNS:
-        text = n_("{turns} is no number of turns: give a whole number from -{most} to {most}")
+        text = n_("{turns} is not a number of turns: give a whole number from -{most} to {most}")
         raise Refused(text, turns=turns, most=MOST_TURNS)
     if axis is not None and axis not in TURN_AXES:
-        raise Refused(n_("{axis} is no axis of turns: give one of {axes}"), axis=axis, axes=", ".join(TURN_AXES))
+        raise Refused(n_("{axis} is not an axis of turns: give one of {axes}"), axis=axis, axes=", ".join(TURN_AXES))
     apply_edit(targets, plan, act, refused)
 
 

@@ -37,7 +37,7 @@ MAX_STILL_CHANGE = 1e-6
 POINT_FIELDS = ("co", "handle_left", "handle_right")
 SELECTION_FIELDS = ("select_control_point", "select_left_handle", "select_right_handle")
 
-NOT_KEYED = n_("{name} has no keys of location or rotation that could be moved: key it first")
+NOT_KEYED = n_("{name} has no keys of location or rotation to move: key it first")
 
 
 class KeySpaces(NamedTuple):

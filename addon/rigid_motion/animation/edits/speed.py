@@ -109,7 +109,7 @@ def equalise_speed(
         Have keys be where they need to be for an even speed, and not on the nearest whole frame.
     """
     if ease not in EASES:
-        raise Refused(n_("{ease} is no easing of speed: give one of {eases}"), ease=ease, eases=", ".join(EASES))
+        raise Refused(n_("{ease} is not an easing of speed: give one of {eases}"), ease=ease, eases=", ".join(EASES))
 
     def plan(transform: Transform, readings: Readings) -> tuple[Binding, _Run]:
         binding = editable_binding(transform, [binding for binding, _ in readings])
@@ -210,7 +210,7 @@ class _Run:
 def _run_of(transform: Transform, source: KeyedTransform, frames: Sequence[float] | None, turning: bool) -> _Run:
     """Return what is to be evened of a source. `Refused` where it cannot be."""
     if source.switches:
-        text = n_("{name} passes from hand to hand: its keys are in the spaces of these, and have no one path")
+        text = n_("{name} passes from hand to hand: its keys are in the spaces of the hands, not on one path")
         raise Refused(text, name=transform.name)
     varying = [keys for _, keys in source.channels if vary(keys).any()]
     keyed = distinct(np.unique(np.concatenate([np.empty(0), *(keys.times for keys in varying)])))
@@ -222,7 +222,7 @@ def _run_of(transform: Transform, source: KeyedTransform, frames: Sequence[float
     for keys in varying:
         lacks = np.abs(keyed[:, None] - keys.times).min(axis=1) > SAME_FRAME
         if lacks.any():
-            text = n_("{name}: only some channels have a key on frame {frame:g}: key all that moves there, too")
+            text = n_("{name}: only some channels have a key on frame {frame:g}: key everything that moves there")
             raise Refused(text, name=transform.name, frame=float(keyed[lacks][0]))
     run = _measured(source, keyed, turning)
     if not turning and run.ways.sum() <= MIN_WAY:

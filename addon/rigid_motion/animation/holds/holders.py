@@ -36,7 +36,7 @@ _INVERSE_MARK = 2.0**-100
 MAX_SCALE_ROUNDING = 1e-5
 """Scales that differ from one by less do so for rounding."""
 
-TOO_MANY = n_("{name} has had {most} holders, and keys cannot tell more apart: remove constraints that hold nothing")
+TOO_MANY = n_("{name} has had {most} holders, the most that keys can distinguish: remove constraints that hold nothing")
 
 
 class Holder(NamedTuple):

@@ -18,7 +18,7 @@ from .holders import channel_of, constraints_to, passings_in, spoken_of
 MAX_VALUE_ROUNDING = 1e-5
 """Values that differ by less stand still."""
 
-ITSELF = n_("{name} cannot be held in itself: choose what holds it last, so that it is active")
+ITSELF = n_("{name} cannot be held in itself: select its holder last, so that it is active")
 CYCLE = n_("{name} cannot be held in {holder}, which follows it: {holder} would wait for itself")
 REPEATS = n_("{name} repeats by Cycles, and cannot be held: bake the rounds to keys, or remove Cycles")
 DELTAS = n_("{name} has delta transforms: apply them first (Object > Apply > All Deltas)")
@@ -27,11 +27,13 @@ ON_VERTICES = n_(
 )
 CONNECTED = n_("{name} is connected to its parent, which it cannot leave: disconnect it first (Alt P in Edit Mode)")
 LACKS_HOLDER = n_(
-    "The keys of {name} say that it is held from frame {frame:g} on, but not in what: "
-    "hold it there anew (Hold In), or undo what removed its constraint"
+    "The keys of {name} say that it is held from frame {frame:g} on, but not in what: hold it there again (Hold "
+    "In), or undo the removal of its constraint"
 )
 GONE = n_("What held {name} is gone: choose a target in its constraint {constraint}, or hold it in something else")
-MUTED = n_("{name} is not held as its keys say, for its constraint {constraint} is muted: unmute it and its influence")
+MUTED = n_(
+    "{name} is not held as its keys say, because its constraint {constraint} is muted: unmute it and its influence"
+)
 
 
 def refuse_holder(transform: Transform, target: bpy.types.Object, bone: str) -> None:

@@ -41,26 +41,26 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
     mode: str = EnumProperty(
         name="Mode",
-        description="The mode to draw. Another one than keyed shows what it would do, and changes nothing",
+        description="The mode to draw. A mode other than the keyed one is a preview, and changes nothing",
         items=MODE_CHOICES,
         translation_context=OWN_WORDS,
         options=set(),
     )
     show_native: bool = BoolProperty(
         name="Blender's Path",
-        description="Draw Blender's own path too, in its own color",
+        description="Also draw Blender's own path, in its own color",
         default=True,
         options=set(),
     )
     show_axes: bool = BoolProperty(
         name="Axes",
-        description="Draw how it is turned along its path, by its local axes at some of the ticks",
+        description="Draw its orientation along the path, by its local axes at some of the ticks",
         default=True,
         options=set(),
     )
     axes_size: float = FloatProperty(
         name="Size",
-        description="Length of the axes. At 1 they are half as long as the object or bone is",
+        description="Length of the axes. At 1 they are half as long as the object or bone",
         default=1.0,
         min=0.01,
         soft_max=5.0,
@@ -68,15 +68,15 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
     tick_step: int = IntProperty(
         name="Frame Step",
-        description="Frames from one tick to the next. At 0, as many ticks as can be told apart on the screen",
+        description="Frames between ticks. At 0, as many as are distinguishable on the screen",
         min=0,
         soft_max=100,
         options=set(),
     )
     show_ghosts: bool = BoolProperty(
         name="Ghosts",
-        description="Draw the selected objects or bones as they are on frames before the current one and behind it, in "
-        "the mode of the path",
+        description="Draw the selected objects or bones on frames before and after the current one, in the mode of "
+        "the path",
         options=set(),
     )
     ghosts_on: str = EnumProperty(
@@ -100,7 +100,7 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
     ghosts_after: int = IntProperty(
         name="After",
-        description="The most ghosts behind the current frame. Those that would cover the view are left out",
+        description="The most ghosts after the current frame. Those that would cover the view are left out",
         default=5,
         min=0,
         soft_max=20,
@@ -109,14 +109,14 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
     show_bodies: bool = BoolProperty(
         name="Skinned Meshes",
-        description="Of armatures and their bones show the meshes that they deform, on frames that were shown since "
-        "the last edit: play them, or press Update Ghosts",
+        description="For armatures and bones show the meshes that they deform, on frames shown since the last edit:"
+        " play them, or press Update Ghosts",
         default=True,
         options=set(),
     )
     ghost_step: int = IntProperty(
         name="Ghost Step",
-        description="Frames from one ghost to the next",
+        description="Frames between ghosts",
         default=5,
         min=1,
         soft_max=50,
@@ -130,7 +130,7 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
     deviation_threshold: float = FloatProperty(
         name="Threshold",
-        description="By how many times more than around it the velocity has to change to be marked",
+        description="How many times more than around it the velocity must change to be marked",
         default=8.0,
         min=1.5,
         soft_max=50.0,
@@ -140,8 +140,8 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
     show_speed: bool = BoolProperty(
         name="Speed in Graph Editor",
-        description="Draw how fast the active object or bone goes, and how fast it turns, below its F-curves, each "
-        "with a scale of its own: the largest value is at the right",
+        description="Draw the speed and the rotation speed of the active object or bone below its F-curves, each "
+        "with its own scale: the largest value is on the right",
         options=set(),
     )
 
@@ -154,8 +154,8 @@ class RIGID_MOTION_OT_update_path(Operator):
     bl_idname = "rigid_motion.update_path"
     bl_label = "Update Path"
     bl_description = (
-        "Play through all frames of the scene once, so that paths know where hands are that follow constraints. "
-        "A pose without a key is lost, as it is where frames are played"
+        "Play all frames of the scene once, to find hands that follow constraints for the paths. A pose without a "
+        "key is lost, as in any playback"
     )
 
     def execute(self, context: bpy.types.Context) -> Returned:

@@ -21,7 +21,7 @@ from ..overlay.drawing import batch_of
 from ..targets import selected
 from .handles import REACH_PX, Handles, OnPath, handles_of, key_under, select
 
-KEY_THERE = n_("{name} has a key on frame {frame:g} already")
+KEY_THERE = n_("{name} already has a key on frame {frame:g}")
 
 
 def mouse_of(event: bpy.types.Event) -> np.ndarray:
@@ -50,7 +50,7 @@ class _Selecting(OnPath):
 class RIGID_MOTION_OT_select_path_keys(_Selecting):
     bl_idname = "rigid_motion.select_path_keys"
     bl_label = "Select Key on Path"
-    bl_description = "Select the key on a path that is under the mouse"
+    bl_description = "Select the key on a path under the mouse"
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Returned:
         handles = handles_of(context)
@@ -69,7 +69,7 @@ class RIGID_MOTION_OT_select_path_keys(_Selecting):
 class RIGID_MOTION_OT_select_all_path_keys(OnPath):
     bl_idname = "rigid_motion.select_all_path_keys"
     bl_label = "Select All Keys on Paths"
-    bl_description = "Select all keys on the paths that are shown, or none"
+    bl_description = "Select all keys on the visible paths, or none"
 
     deselect: bool = BoolProperty(description="Select none", options={"SKIP_SAVE", "HIDDEN"})
 
@@ -85,7 +85,7 @@ class RIGID_MOTION_OT_select_all_path_keys(OnPath):
 class RIGID_MOTION_OT_box_path_keys(_Selecting):
     bl_idname = "rigid_motion.box_path_keys"
     bl_label = "Box Select Keys on Paths"
-    bl_description = "Select the keys on paths that are in a box"
+    bl_description = "Select the keys on paths in a box"
     bl_options = {"REGISTER", "UNDO", "BLOCKING"}  # noqa: RUF012 - Blender reads it
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Returned:
@@ -136,7 +136,7 @@ class RIGID_MOTION_OT_box_path_keys(_Selecting):
 class RIGID_MOTION_OT_insert_path_key(OnPath):
     bl_idname = "rigid_motion.insert_path_key"
     bl_label = "Insert Key on Path"
-    bl_description = "Key the pose that is seen where a path is clicked on. The motion stays as it is"
+    bl_description = "Key the visible pose where you click on a path. The motion does not change"
 
     target: str = StringProperty(
         description="The object or bone that gets the key; all with a path where it is empty",
@@ -171,7 +171,7 @@ class RIGID_MOTION_OT_insert_path_key(OnPath):
 class RIGID_MOTION_OT_delete_path_keys(OnPath):
     bl_idname = "rigid_motion.delete_path_keys"
     bl_label = "Delete Keys on Path"
-    bl_description = "Delete the selected keys on the paths that are shown, of location, rotation and scale"
+    bl_description = "Delete the selected keys on the visible paths, of location, rotation and scale"
 
     def execute(self, context: bpy.types.Context) -> Returned:
         handles, refused = handles_of(context), list[Refused]()

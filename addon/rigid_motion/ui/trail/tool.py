@@ -70,8 +70,7 @@ class RIGID_MOTION_OT_edit_path(Operator):
     bl_idname = TOOL
     bl_label = "Edit Path"
     bl_description = (
-        "Show the paths of the selected objects or bones, and take the tool that edits them by their keys "
-        "or put it away"
+        "Show the paths of the selected objects or bones, and switch the tool that edits them by their keys on or off"
     )
 
     @classmethod
