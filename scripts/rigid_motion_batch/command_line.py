@@ -138,7 +138,7 @@ def bounded(what: str, least: float, most: float, above: bool = False) -> Callab
     def parse_number(text: str) -> float:
         value = number(text)
         if not least <= value <= most or (above and value == least):
-            raise ValueError(f"{text!r} is no {what}; give {'more than ' * above}{least:.7g} to {most:.7g}")
+            raise ValueError(f"{text!r} is not a {what}; give {'more than ' * above}{least:.7g} to {most:.7g}")
         return value
 
     return parse_number
@@ -149,7 +149,7 @@ def whole(what: str, least: int, most: int) -> Callable[[str], int]:
 
     def parse_whole(text: str) -> int:
         if not (text.isascii() and text.isdecimal() and least <= float(text) <= most):
-            raise ValueError(f"{text!r} is no {what}; give a whole number from {least} to {most}")
+            raise ValueError(f"{text!r} is not a {what}; give a whole number from {least} to {most}")
         return int(text)
 
     return parse_whole
@@ -158,14 +158,14 @@ def whole(what: str, least: int, most: int) -> Callable[[str], int]:
 def folder_path(text: str) -> Path:
     """Return the folder that an option says."""
     if not text.strip() or "\0" in text:
-        raise ValueError(f"{text!r} is no folder; give one such as renders/hand, or . for this one")
+        raise ValueError(f"{text!r} is not a folder; give one such as renders/hand, or . for this one")
     return Path(text)
 
 
 def not_empty(text: str) -> str:
     """Return the file that an argument says."""
     if not text.strip():
-        raise ValueError(f"{text!r} is no file: a variable of a script may be empty")
+        raise ValueError(f"{text!r} is not a file: a variable of a script may be empty")
     return text
 
 

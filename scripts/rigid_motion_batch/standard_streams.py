@@ -55,7 +55,7 @@ def finish(program: str, code: int) -> int:
     error = raw.error if isinstance(raw, _Descriptor) else None
     if error is None or error.errno in READER_GONE:
         return code
-    print(f"{program}: standard output: {error.strerror}; what is printed there is lost", file=sys.stderr, flush=True)
+    print(f"{program}: standard output: {error.strerror}; output there is lost", file=sys.stderr, flush=True)
     return code or 1
 
 

@@ -149,7 +149,7 @@ NUMBERS: dict[str, tuple[Damage, str]] = {
     for at in (0, 1, 2, 3)
 }
 REFUSED: dict[str, tuple[Damage, str]] = {
-    "a period that is no number": (
+    "a period that is not a number": (
         each(numbers(LOCATION_Y, "interpolation", ELASTIC), numbers(LOCATION_Y, "period", INF, 1)),
         "key 2 of Location Y has an invalid frame, value, handle or easing",
     ),
@@ -163,7 +163,7 @@ REFUSED: dict[str, tuple[Damage, str]] = {
         marks(3, 15, 3, 3),
         "keys have a mode that is unknown to this version: choose another",
     ),
-    "a delta transform that is no number": (
+    "a delta transform that is not a number": (
         lambda obj: setattr(obj, "delta_scale", (1.0, NAN, 1.0)),
         "delta transform is not a finite number: set it again",
     ),

@@ -62,12 +62,12 @@ def put(*keys: str | int, to: object) -> Callable[[dict[str, Any]], None]:
         (put("accessors", 1, "byteOffset", to=2**50), "accessor 1 reaches beyond the bytes that it names"),
         (put("accessors", 1, "componentType", to=[]), "components of the type [], which glTF does not know"),
         (put("bufferViews", 1, "byteStride", to=1), "accessor 1 reaches beyond the bytes that it names"),
-        (put("buffers", 0, "byteLength", to=2**30), f"of {2**30} bytes; copy the file again, or export it anew"),
+        (put("buffers", 0, "byteLength", to=2**30), f"of {2**30} bytes; copy the file again, or export it again"),
         (put("nodes", 5, "children", to=[5]), "node 5 hangs on nodes 4 and 5; export it again"),
         (put("nodes", 5, "children", to=[2]), "node 2 hangs on nodes 1 and 5; export it again"),
         (put("nodes", 5, "rotation", to=[0, 0, 0, 0]), "the rotation of node 5 is of length zero; export it again"),
         (put("nodes", 5, "translation", to=[1e300] * 3), "and not 3 numbers; export it again"),
-        (put("nodes", 5, to=None), "nodes is no list of objects; export it again"),
+        (put("nodes", 5, to=None), "nodes is not a list of objects; export it again"),
         (put("animations", 0, "channels", 1, "sampler", to=True), "samplers has no entry True"),
         (put("animations", 0, "samplers", 0, "interpolation", to="CUBIC"), "'CUBIC' is none of LINEAR"),
         (put("animations", 0, "samplers", 0, "input", to=2), "its times are no single numbers; export it again"),
@@ -98,12 +98,12 @@ def test_each_is_refused_in_one_line(tmp_path, capsys, change, line):
 def test_json_that_is_none_or_too_much_is_refused(tmp_path, capsys, monkeypatch):
     path = tmp_path / "walk.glb"
     for text, line in (
-        ("{", "this is no glTF (its JSON cannot be read"),
+        ("{", "this is not glTF (its JSON cannot be read"),
         ("[" * 200_000, "its JSON has 200000 lists and objects in one another, more than the 128 that are read"),
         ('{"extras":' * 900 + "1" + "}" * 900, "its JSON has 900 lists and objects in one another"),
-        (json.dumps(["[" * 900, '"]\\"{' * 900]), "this is no glTF (its JSON is no object)"),
-        ("[]", "this is no glTF (its JSON is no object); export it again"),
-        ('{"nodes": [{"scale": [1e999, 1, 1]}]}', "this is no glTF (its JSON cannot be read: 1e999 is no number)"),
+        (json.dumps(["[" * 900, '"]\\"{' * 900]), "this is not glTF (its JSON is not an object)"),
+        ("[]", "this is not glTF (its JSON is not an object); export it again"),
+        ('{"nodes": [{"scale": [1e999, 1, 1]}]}', "this is not glTF (its JSON cannot be read: 1e999 is not a number)"),
     ):
         assert line in refusal(changed(path, lambda _: None, text), capsys)
     monkeypatch.setattr(documents, "MOST_VALUES", 100)

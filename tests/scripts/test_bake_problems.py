@@ -47,8 +47,8 @@ def newer(path: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "problem"),
     [
-        (text, "this is no .blend file"),
-        (Path.touch, "this is no .blend file, it is empty"),
+        (text, "this is not a .blend file"),
+        (Path.touch, "this is not a .blend file, it is empty"),
         (cut, "Blender cannot read this file, which looks damaged"),
         (newer, "and this is"),
         (Path.mkdir, "there is nothing to be done in this folder"),
@@ -73,7 +73,7 @@ def test_a_file_that_cannot_be_read_is_named_and_the_others_go_on(tmp_path, capf
 def test_a_pipe_is_not_waited_for(tmp_path, capsys):
     os.mkfifo(tmp_path / "pipe.blend")
     assert run(tmp_path / "pipe.blend") == 2
-    assert "this is no file on a disk" in capsys.readouterr().err
+    assert "this is not a file on a disk" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("dry", "below"), [((), "new/folders"), (("--dry-run",), "")])

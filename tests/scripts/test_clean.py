@@ -157,7 +157,7 @@ def test_what_cannot_be_written_as_it_was_read_is_refused_and_becomes_a_table(tm
         (("hand.csv", "--pixels", "1"), "--nearest 2m"),
         (("hand.csv", "--nearest", "1m"), "add --pixels"),
         (("hand.csv", "--pixels", "1", "--nearest", "1m", "--radius", "1m"), "is a tolerance itself"),
-        (("hand.csv", "--tolerance", "0"), "is no tolerance"),
+        (("hand.csv", "--tolerance", "0"), "is not a tolerance"),
     ],
 )
 def test_what_makes_no_sense_is_refused(tmp_path, monkeypatch, capsys, arguments, problem):

@@ -77,7 +77,7 @@ def test_the_page_has_all_files_and_is_the_last_path(folder, tmp_path, capsys):
     assert [unescape(name) for name, _ in rows] == names
     states = [state.partition("<")[0] for _, state in rows]
     assert states == ["written", "written", "written", "failed", "left alone"]
-    assert "this is no glTF" in rows[3][1]
+    assert "this is not glTF" in rows[3][1]
     assert "Of 5 files 1 failed, 1 left alone" in text
     assert "1 file written as .blend files or tables: only GLB files play here" in text
     assert HOSTILE not in text

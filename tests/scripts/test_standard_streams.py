@@ -54,7 +54,7 @@ def test_a_full_disk_is_told_of(tmp_path, line):
     done = shell(line, tmp_path)
     assert done.returncode == 1
     last = done.stderr.splitlines()[-1]
-    assert last.endswith(": standard output: No space left on device; what is printed there is lost")
+    assert last.endswith(": standard output: No space left on device; output there is lost")
     assert "Traceback" not in done.stderr
 
 

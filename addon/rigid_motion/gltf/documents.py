@@ -226,7 +226,7 @@ def chunks_of(content: bytes | FileBytes) -> tuple[Chunk, ...]:
         if version != 2:
             raise GltfError(f"this is GLB {version}, and 2 is known", "export it as glTF 2.0")
         if length > whole:
-            raise GltfError(f"{whole} of {length} bytes are here", "copy the file again, or export it anew")
+            raise GltfError(f"{whole} of {length} bytes are here", "copy the file again, or export it again")
         whole = length
     while offset + 8 <= whole:
         if len(result) == MOST_CHUNKS:
@@ -259,9 +259,9 @@ def parsed(text: bytes) -> Json:
     try:
         document = json.loads(text.decode("utf-8-sig"), parse_float=_finite, parse_constant=_finite)
     except (RecursionError, ValueError) as error:
-        raise GltfError(f"this is no glTF (its JSON cannot be read: {' '.join(str(error).split())[:80]})") from None
+        raise GltfError(f"this is not glTF (its JSON cannot be read: {' '.join(str(error).split())[:80]})") from None
     if not isinstance(document, dict):
-        raise GltfError("this is no glTF (its JSON is no object)")
+        raise GltfError("this is not glTF (its JSON is not an object)")
     return document
 
 
@@ -276,7 +276,7 @@ def objects(parent: Json, name: str) -> list[Json]:
     if result is None:
         return []
     if not isinstance(result, list) or not all(isinstance(entry, dict) for entry in result):
-        raise GltfError(f"{name} is no list of objects")
+        raise GltfError(f"{name} is not a list of objects")
     return result
 
 
@@ -393,7 +393,7 @@ def _buffer(
     if data is None:
         return None
     if len(data) < length:
-        raise GltfError(f"buffer {number} has {len(data)} of {length} bytes", "copy the file again, or export it anew")
+        raise GltfError(f"buffer {number} has {len(data)} of {length} bytes", "copy the file again, or export it again")
     return data[:length]
 
 
@@ -410,5 +410,5 @@ def _chunk_size(part: Chunk) -> int:
 def _finite(text: str) -> float:
     number = float(text) if text[-1:].isdigit() else math.nan
     if not math.isfinite(number):
-        raise ValueError(f"{text[:20]} is no number")
+        raise ValueError(f"{text[:20]} is not a number")
     return number

@@ -121,7 +121,7 @@ def check_radius(radius: float) -> None:
     """Raise a TypeError where the shell's radius is no number, a ValueError where it is no length, nor 0."""
     if not (1.0 / MAX_ABS < (given := number(radius, "radius")) < MAX_ABS or given == 0.0):
         raise ValueError(
-            f"a radius of {radius} is no length: give 0, or a number from {1.0 / MAX_ABS:g} to {MAX_ABS:g}"
+            f"a radius of {radius} is not a length: give 0, or a number from {1.0 / MAX_ABS:g} to {MAX_ABS:g}"
         )
 
 

@@ -69,7 +69,7 @@ class Choice(ABC):
 
     def __post_init__(self) -> None:
         if not re.fullmatch(NUMBER, self.written, re.ASCII) or float(self.written) <= 0.0:
-            raise ValueError(f"{self.written!r} is no rate; give numbers such as 5,7.5,10")
+            raise ValueError(f"{self.written!r} is not a rate; give numbers such as 5,7.5,10")
 
     @abstractmethod
     def keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool = False) -> Keys:
@@ -249,7 +249,7 @@ class Tolerance(Choice):
         """Return the number and the unit, which may be empty."""
         return read_length(
             self.written,
-            "is no tolerance; give a length such as 5mm, 0.5cm or 0.005m, or a plain number in the unit of the "
+            "is not a tolerance; give a length such as 5mm, 0.5cm or 0.005m, or a plain number in the unit of the "
             "recording",
         )
 

@@ -331,7 +331,7 @@ def _modes(text: str) -> tuple[tuple[str, ...], bool]:
 def _part(text: str) -> tuple[int, int]:
     part, of = _two(text, "/", "share; give one such as 1/8")
     if not 1 <= part <= of:
-        raise ValueError(f"{text!r} is no share; give one such as 1/8")
+        raise ValueError(f"{text!r} is not a share; give one such as 1/8")
     return part, of
 
 
@@ -342,5 +342,5 @@ def _resolution(text: str) -> tuple[int, int]:
 def _two(text: str, between: str, what: str) -> tuple[int, int]:
     """Return two whole numbers."""
     if not (numbers := re.fullmatch(rf"(\d{{1,6}}){between}(\d{{1,6}})", text, re.ASCII)):
-        raise ValueError(f"{text!r} is no {what}")
+        raise ValueError(f"{text!r} is not a {what}")
     return int(numbers[1]), int(numbers[2])

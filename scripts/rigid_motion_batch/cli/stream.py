@@ -128,7 +128,7 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
             else:
                 time.sleep(PERFORMER_LOOK_S)
         if sending is None:
-            raise ValueError(f"nothing came by VMC at port {port.number}; give the other program this port")
+            raise ValueError(f"nothing arrived by VMC at port {port.number}; give the other program this port")
         room.send(options.user, MOTION, None)
         _say(f"datagrams: {sending.datagrams}", f"bytes: {sending.bytes}")
 
@@ -166,7 +166,7 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
         _say(f"{user}: {datagrams} datagrams, {receiving.bytes[user]} bytes")
     motions, is_kept = tracks.motions(), options.mode or options.output or truth
     if not (motions if is_kept else receiving.datagrams):
-        came = "nothing that could be shown came" if receiving.datagrams else f"nobody sent anything in {options.room}"
+        came = "nothing that can be shown arrived" if receiving.datagrams else f"no one sent anything in {options.room}"
         raise ValueError(f"{came}, so nothing is written; see --room and --at of the sender")
     if options.mode:
         motions = [motion.even(options.mode, options.fps) for motion in motions]

@@ -214,7 +214,7 @@ _fps = bounded("number of frames a second", 1.0, 1000.0)
 def _named(pattern: re.Pattern[str], what: str) -> Callable[[str], str]:
     def parse_name(text: str) -> str:
         if not pattern.fullmatch(text):
-            raise ValueError(f"{text!r} is no name of a {what}; letters, digits, _, - and . are")
+            raise ValueError(f"{text!r} is not a name for a {what}; letters, digits, _, - and . are")
         return text
 
     return parse_name
@@ -223,7 +223,7 @@ def _named(pattern: re.Pattern[str], what: str) -> Callable[[str], str]:
 def _address(text: str) -> tuple[str, int]:
     host, _, port = text.rpartition(":")
     if not (host and port.isascii() and port.isdecimal() and 0 < int(port) <= 65535):
-        raise ValueError(f"{text!r} is no address; give one such as {LOOPBACK_ADDRESS}:39539")
+        raise ValueError(f"{text!r} is not an address; give one such as {LOOPBACK_ADDRESS}:39539")
     return host.strip("[]"), int(port)
 
 
@@ -234,5 +234,5 @@ def _port(text: str) -> int:
 def _file(text: str) -> Path:
     path = Path(text)
     if not text.strip() or "\0" in text or path.is_dir() or path.suffix.lower() not in ENDINGS:
-        raise ValueError(f"{text!r} is no file to write; give one that ends in {', '.join(ENDINGS)}")
+        raise ValueError(f"{text!r} is not a file to write; give one that ends in {', '.join(ENDINGS)}")
     return path

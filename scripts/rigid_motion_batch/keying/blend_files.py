@@ -46,7 +46,7 @@ class Missing:
 def open_file(path: Path) -> None:
     """Open a .blend file, without running anything that is in it. Raises `Unreadable`."""
     if os.path.exists(path) and not os.path.isfile(path):
-        raise Unreadable("this is no file on a disk: save it as one first")
+        raise Unreadable("this is not a file on a disk: save it as one first")
     try:
         with silenced(errors=True):
             bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=True, use_scripts=False)
@@ -59,7 +59,7 @@ def open_file(path: Path) -> None:
             with path.open("rb") as stream:
                 begin = stream.read(max(map(len, MAGIC)))
             if not begin.startswith(MAGIC):
-                raise Unreadable(f"this is no .blend file{'' if begin else ', it is empty'}") from None
+                raise Unreadable(f"this is not a .blend file{'' if begin else ', it is empty'}") from None
             reason = "cut off, or scrambled behind its first bytes"
         raise Unreadable(
             f"Blender cannot read this file, which looks damaged ({reason}): take a copy of it, or its NAME.blend1"

@@ -84,7 +84,7 @@ def do_cleaning(doing: RunningJob, how: Cleaning) -> None:
                     trajectory, job.source, trajectory.name, axes, how.reading, measured=recording.measured
                 )
             except TrajectoryError as error:
-                doing.say(f"{trajectory.name} stays as it is: {error.problem}")
+                doing.say(f"{trajectory.name} is unchanged: {error.problem}")
                 continue
             tolerance = how.tolerance.tolerance(clip) if how.tolerance else None
             _, found = cleaned_clip(clip, tolerance, how.radius)

@@ -120,7 +120,7 @@ class ComparisonPlan:
                 self.studies.append(Study(ClipOf(name, body), key, facts, enough))
                 of_clips += self._left_out(self.studies[-1])
         if self._shows_object and not comparison.blender:
-            notes.append(f"the report shows a drill, for there is no Blender here that reads {comparison.subject}")
+            notes.append(f"the report shows a drill, since no Blender here can read {comparison.subject}")
         self.held = held_pairs(self.studies, comparison, self.read)
         return notes + of_clips
 

@@ -54,7 +54,7 @@ def reason_against(requested: str, folder: str) -> str:
     if not os.path.isdir(folder):
         return f"it does not see {folder}; choose one on a disk that all share"
     here = version_here()
-    return "" if here == requested else f"it has {here}, and this run is of {requested}; start it anew with that"
+    return "" if here == requested else f"it has {here}, and this run is of {requested}; start it again with that"
 
 
 class DaskExecutor(Executor):

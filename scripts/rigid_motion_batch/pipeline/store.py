@@ -117,7 +117,7 @@ class Store:
 
     def _digest_of(self, path: str) -> str:
         try:
-            status, link = os.stat(path), os.lstat(path)  # noqa: PTH116 - it may be "", which is no folder
+            status, link = os.stat(path), os.lstat(path)  # noqa: PTH116 - it may be "", which is not a folder
         except (OSError, ValueError):
             return ""
         inside = os.path.realpath(path).removeprefix(os.path.realpath(self.output) + os.sep).replace(os.sep, "/")

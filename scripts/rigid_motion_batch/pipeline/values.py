@@ -32,7 +32,7 @@ def plain(value: Any, arrays: MutableMapping[str, Any] | None = None) -> Any:
     if getattr(value, "ndim", None) == 0:
         return value.item()
     if arrays is None or not hasattr(value, "dtype"):
-        raise TypeError(f"{type(value).__name__} is no value for JSON")
+        raise TypeError(f"{type(value).__name__} is not a value for JSON")
     name = str(len(arrays))
     arrays[name] = value
     return {ARRAY: name}
@@ -75,5 +75,5 @@ def _value(content: Any, arrays: Mapping[str, Any]) -> Any:
     module, _, name = content.pop(CLASS).partition(":")
     kind = getattr(sys.modules.get(module), name, None)  # A file loads no module: who reads has loaded it.
     if not (isinstance(kind, type) and is_dataclass(kind)):
-        raise ValueError(f"{module}:{name} is no class of values")
+        raise ValueError(f"{module}:{name} is not a class of values")
     return kind(**content)

@@ -174,7 +174,7 @@ def _moments(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], name: s
         raise TrajectoryError(path, problem, "delete the keys that are far off")
     rate, base = scene.render.fps, scene.render.fps_base
     if not (rate > 0 and base > 0.0):
-        raise TrajectoryError(path, f"{rate} / {base:g} is no frame rate", "set it in the Output Properties")
+        raise TrajectoryError(path, f"{rate} / {base:g} is not a frame rate", "set it in the Output Properties")
     whole = np.arange(np.floor(first), np.ceil(last) + 1.0)
     keys, straight = moments_of(body.obj, JUMP_STEPS)
     units = scene.unit_settings

@@ -257,7 +257,7 @@ class _Words:
         while (word := self.next("{")) != "{":
             words.append(word)
             if len(words) > LONGEST_NAME:
-                self.fail("a { is missing behind a name")
+                self.fail("a { is missing after a name")
         return " ".join(words)
 
     def fail(self, problem: str, way_out: str = "export the BVH again") -> NoReturn:
@@ -317,7 +317,7 @@ def _read_channels(words: _Words) -> list[tuple[str, str]]:
     names = [words.next("the name of a channel") for _ in range(int(count))]
     for name in names:
         if name.lower() not in CHANNELS:
-            words.fail(f"{shown(name)} is no channel")
+            words.fail(f"{shown(name)} is not a channel")
     channels = [CHANNELS[name.lower()] for name in names]
     if len(set(channels)) < len(channels):
         words.fail("a channel occurs twice in a joint")

@@ -298,7 +298,7 @@ def require_time_unit(header: HeaderLine, unit: str) -> None:
     """Raise TrajectoryError where the unit of time is none that is known. Of dates it is no matter: `t [hh:mm:ss]`."""
     if unit and unit not in TICKS_PER_S_BY_UNIT:
         raise header.error(
-            f"{shown(unit)} is no unit of time that is known", f"--time-unit {', '.join(TICKS_PER_S_BY_UNIT)}"
+            f"{shown(unit)} is not a known unit of time", f"--time-unit {', '.join(TICKS_PER_S_BY_UNIT)}"
         )
 
 
@@ -314,6 +314,6 @@ def metres_of(
     units = [layout.units.get(columns[axis], "m") for axis in POSITION]
     unknown = [unit for unit in units if unit not in METRES]
     if unknown:
-        problem = f"{shown(unknown[0])} is no unit of length that is known"
+        problem = f"{shown(unknown[0])} is not a known unit of length"
         raise header.error(problem, "say how many metres it has: --scale 0.001 for millimetres")
     return [METRES[unit] for unit in units]

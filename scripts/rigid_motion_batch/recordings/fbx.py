@@ -105,7 +105,7 @@ def refuse_damaged(path: Path) -> None:
             return
     if head and all(byte in b"\t\r\n" or 32 <= byte < 127 for byte in head):
         raise TrajectoryError(path, "this is an FBX of text, or none", "export it as binary FBX, which Blender imports")
-    raise TrajectoryError(path, "this is no FBX", "export it again")
+    raise TrajectoryError(path, "this is not an FBX file", "export it again")
 
 
 class _Records:
@@ -180,4 +180,4 @@ class _Records:
             self.fail("a list of numbers is not as long as it says")
 
     def fail(self, problem: str) -> NoReturn:
-        raise TrajectoryError(self.path, f"this FBX is damaged ({problem})", "copy the file again, or export it anew")
+        raise TrajectoryError(self.path, f"this FBX is damaged ({problem})", "copy the file again, or export it again")

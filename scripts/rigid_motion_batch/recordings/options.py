@@ -68,7 +68,7 @@ class ReadingOptions:
             raise ValueError(f"a unit cannot be {self.scale} metres long; give a number such as 0.01 for centimetres")
         if self.euler is not None and sorted(self.euler) not in (list("XYZ"), list("xyz")):
             raise ValueError(
-                f"{self.euler!r} is no order of Euler angles; give the three axes once each, in capitals (YXZ) for "
+                f"{self.euler!r} is not an order of Euler angles; give the three axes once each, in capitals (YXZ) for "
                 "turns about the moved axes, in small letters (zxy) about those of the world"
             )
 
@@ -80,7 +80,7 @@ class ReadingOptions:
             if seconds is not None and not 0.0 <= seconds < math.inf:
                 raise ValueError(f"--{name} cannot be {seconds}: give seconds after the first sample, such as 2.5")
         if self.end is not None and self.end <= (self.start or 0.0):
-            raise ValueError(f"--end {self.end:g} leaves nothing: it has to be later than --start {self.start or 0:g}")
+            raise ValueError(f"--end {self.end:g} leaves nothing: it must be later than --start {self.start or 0:g}")
 
     @property
     def given(self) -> tuple[str, ...]:
@@ -160,7 +160,7 @@ def add_clean_option(parser: argparse._ActionsContainer) -> None:
 def _most_moved(text: str) -> float:
     parts = re.fullmatch(r"(\d{1,6}\.?\d{0,6}|\.\d{1,6})\s*(mm|cm|m)", text.strip().lower())
     if not parts or not float(parts[1]):
-        raise ValueError(f"{text!r} is no length such as 2mm: write --clean behind the inputs, or --clean=2mm")
+        raise ValueError(f"{text!r} is not a length such as 2mm: write --clean after the inputs, or --clean=2mm")
     return float(parts[1]) * {"mm": 1e-3, "cm": 1e-2, "m": 1.0}[parts[2]]
 
 

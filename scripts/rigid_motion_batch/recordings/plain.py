@@ -152,7 +152,7 @@ def _header(path: Path, options: ReadingOptions) -> HeaderLine:
         if len(cells) == POSITIONS_ONLY:
             problem = "positions only, and rotations are needed"
             raise TrajectoryError(path, problem, "write t x y z qx qy qz qw in every line", row.number)
-        problem = f"{len(cells)} numbers in a row, which are no poses that are known"
+        problem = f"{len(cells)} numbers in a row, which are not known poses"
         way_out = "write a first line of names, or say which is which by its place: --columns t=1,x=2,..."
         raise TrajectoryError(path, problem, way_out, row.number)
     header = replace(header, names=[*names, *[None] * len(cells)][: len(cells)], warnings=warnings)

@@ -111,7 +111,7 @@ def _of_times(times: np.ndarray, time_unit: bool) -> Iterator[ClipWarning]:
     interval = typical_interval(times)
     if not interval > 0.0:
         return
-    way_out = "if its times are no seconds, --time-unit ms, us or ns" if time_unit else ""
+    way_out = "if its times are not seconds, --time-unit ms, us or ns" if time_unit else ""
     if interval > 1.0 / MIN_SAMPLES_PER_S:
         counted = time_unit and bool(np.all(np.rint(times) == times))
         yield ClipWarning(

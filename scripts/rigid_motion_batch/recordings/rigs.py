@@ -44,7 +44,7 @@ def in_blender(path: Path, again: str) -> Iterator[None]:
     try:
         yield
     except (UnicodeDecodeError, SystemError):
-        raise TrajectoryError(path, "a name in this file is no text", again) from None
+        raise TrajectoryError(path, "a name in this file is not text", again) from None
     except MemoryError:
         raise TrajectoryError(path, "this file needs more memory than there is", "split the recording") from None
 

@@ -169,7 +169,7 @@ def cells_of(path: Path, number: int, line: str, separator: str | None) -> list[
     try:
         return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
     except csv.Error as error:
-        raise TrajectoryError(path, f"this line is no header ({error})", "name a file of columns", number) from None
+        raise TrajectoryError(path, f"this line is not a header ({error})", "name a file of columns", number) from None
 
 
 @dataclass(frozen=True)

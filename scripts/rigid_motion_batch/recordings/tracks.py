@@ -138,7 +138,7 @@ class _TrackedBody:
             return np.radians(angles), warnings
         if "rad" not in self._units and largest > LARGEST_RADIANS:
             way_out = "say so: --degrees; or name the columns of radians rx_rad, ry_rad, rz_rad"
-            raise self.header.error(f"angles go up to {largest:.4g}, which are no radians", way_out)
+            raise self.header.error(f"angles go up to {largest:.4g}, which are not radians", way_out)
         return angles, ()
 
 
@@ -253,7 +253,7 @@ def _of_matrices(
         good = (scales > 0.0) & (squares < 2.0 * MAX_SKEW_SINE)
         if len(good) and not good.any():
             raise header.error(
-                "the nine numbers of each row are no rotation", "its columns have to be three axes, right-handed"
+                "the nine numbers of each row are not a rotation", "its columns must be three axes, right-handed"
             )
         quaternions = np.full((len(rotations), 4), np.nan)
         quaternions[good] = from_matrices(rotations[good])

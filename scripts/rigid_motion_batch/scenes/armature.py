@@ -141,7 +141,7 @@ class Rig:
     def fill_in(self, mode: str) -> None:
         """Have what happens between the keys of all bones be that of a mode of `KEYFRAME_MODES`."""
         if mode not in KEYFRAME_MODES:
-            raise ValueError(f"{mode} is no mode of keys")
+            raise ValueError(f"{mode} is not a mode of keys")
         keyed = [bone for bone in pose_bones(self.obj) if len(animation.key_frames(bone))]
         if keyed:
             animation.set_mode(keyed, mode)

@@ -52,7 +52,7 @@ def test_a_clip_too_short_for_two_keys_is_not_reconstructed(choice: Choice) -> N
 
 @pytest.mark.parametrize("written", ["0mm", "-5mm", "5in", "5 m m", "5,5mm", "nan", "", "mm", ".", ".e1", "../x"])
 def test_what_is_no_length_is_refused_with_the_way_out(written: str) -> None:
-    with pytest.raises(ValueError, match=r"is no tolerance; give a length such as 5mm, 0.5cm or 0.005m"):
+    with pytest.raises(ValueError, match=r"is not a tolerance; give a length such as 5mm, 0.5cm or 0.005m"):
         Tolerance(written)
 
 
@@ -69,7 +69,7 @@ def test_a_length_may_be_written_as_people_do_for_tolerances_and_radii(written: 
 @pytest.mark.parametrize("kind", [Uniform, Budget])
 @pytest.mark.parametrize("written", ["0", "-1", "5mm", "1e3", "../../x", ""])
 def test_what_is_no_rate_is_refused_with_the_way_out(kind: type[Choice], written: str) -> None:
-    with pytest.raises(ValueError, match=r"is no rate; give numbers such as 5,7\.5,10"):
+    with pytest.raises(ValueError, match=r"is not a rate; give numbers such as 5,7\.5,10"):
         kind(written)
 
 

@@ -259,7 +259,7 @@ def test_numbers_and_pages_need_no_blender(output: Path, toss: Path) -> None:
 def test_without_blender_a_page_shows_a_drill_and_a_line_says_so(output: Path, toss: Path) -> None:
     outcome, listener = compared(output, planned(toss, about=ABOUT, subject="controller", blender=""))
     assert outcome.failures == {}
-    assert "the report shows a drill, for there is no Blender here that reads controller" in listener.notes
+    assert "the report shows a drill, since no Blender here can read controller" in listener.notes
     assert "object controller" not in listener.made
     _, again = compared(output, planned(toss, about=ABOUT, subject="controller"))
     assert {*again.made} == {"object controller", "report.html"}

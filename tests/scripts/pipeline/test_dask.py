@@ -209,7 +209,7 @@ def test_ctrl_c_leaves_no_process_at_work(cluster: Cluster, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("version", "folder", "told"),
     [
-        ("program 2", "", ", and this run is of program 2; start it anew with that; it is left out"),
+        ("program 2", "", ", and this run is of program 2; start it again with that; it is left out"),
         (dask.version_here(), "none", "it does not see {}"),
     ],
 )

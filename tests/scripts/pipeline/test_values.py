@@ -76,14 +76,14 @@ def test_a_class_of_another_kind_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["os:system", "pathlib:Path", "nowhere:Circle", "Circle"])
 def test_what_is_no_class_of_values_is_not_made(tmp_path: Path, name: str) -> None:
     (tmp_path / "value.json").write_text(json.dumps({"$": name}))
-    with pytest.raises(ValueError, match="is no class of values"):
+    with pytest.raises(ValueError, match="is not a class of values"):
         values.read(Shape, tmp_path / "value")
 
 
 def test_what_is_no_value_is_refused() -> None:
-    with pytest.raises(TypeError, match="object is no value"):
+    with pytest.raises(TypeError, match="object is not a value"):
         values.plain(object())
-    with pytest.raises(TypeError, match="ndarray is no value"):
+    with pytest.raises(TypeError, match="ndarray is not a value"):
         values.plain(np.zeros(2))
 
 

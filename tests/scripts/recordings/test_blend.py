@@ -111,4 +111,4 @@ def test_a_name_that_is_no_text_is_told(saved, refusal) -> None:
     content = path.read_bytes()
     assert b"OBDrill\0" in content
     path.write_bytes(content.replace(b"OBDrill\0", b"OB\xff\xfell\xff\0"))
-    assert refusal(str(path))[1] == "a name in this file is no text; save it again from Blender"
+    assert refusal(str(path))[1] == "a name in this file is not text; save it again from Blender"

@@ -101,7 +101,7 @@ def test_what_a_file_takes_is_bounded_by_what_it_holds(tmp_path: Path, name: str
         (tables, "LONGEST_LINE", 50, "take.csv", CSV + "1" * 60, 2, "this line is longer than 50 characters; name a"),
         (tables, "MOST_COLUMNS", 5, "take.csv", CSV, 1, "more than 5 columns; export fewer bodies"),
         (bvh, "MOST_JOINTS", 1, "take.bvh", SEEDS[".bvh"][0], 8, "more than 1 joints; export fewer, such as one"),
-        (bvh, "LONGEST_NAME", 0, "take.bvh", SEEDS[".bvh"][0], 2, "a { is missing behind a name; export the BVH"),
+        (bvh, "LONGEST_NAME", 0, "take.bvh", SEEDS[".bvh"][0], 2, "a { is missing after a name; export the BVH"),
         (bvh, "MOST_POSES", 15, "take.bvh", SEEDS[".bvh"][0], None, "2 joints in 8 frames are more than 15 poses;"),
     ],
 )

@@ -169,7 +169,7 @@ WRONG = {
             "no column named rx, ry, rz for 'Drill'",
         ),
         (motive() + "3,0.025" + ",1" * 99 + "\n", 11, "101 columns where 31 have a name"),
-        (motive().replace("Head, left", "x" * 200_000), 4, "this line is no header"),
+        (motive().replace("Head, left", "x" * 200_000), 4, "this line is not a header"),
     ],
     "vicon.csv": [
         (
@@ -199,7 +199,7 @@ WRONG = {
     ],
     "images.txt": [("#   POINTS2D[] as (X, Y)\n", None, "no column of time, only one that counts frames")],
     "walk.tum": [
-        ("0 1 2 3 4 5 6\n", 1, "7 numbers in a row, which are no poses that are known; write a first line of names"),
+        ("0 1 2 3 4 5 6\n", 1, "7 numbers in a row, which are not known poses; write a first line of names"),
         (f"{TUM_COMMENTS}0 1 2 3 0 0 0 1\n0.1 1 2\n", 5, "3 columns where 8 are needed"),
         (f"{TUM_COMMENTS}0 1 2 3 0 0 0 1 9\n", 4, "9 columns where 8 have a name"),
         ("0 1 2 3\n0.1 1 2 3\n", 1, "positions only, and rotations are needed; write t x y z qx qy qz qw"),

@@ -114,8 +114,8 @@ def test_a_column_that_is_named_for_devices_and_is_none_is_refused(write, refusa
         ("t,x,y,z,rx,ry,rz", {}, "rotations are Euler angles here (rx, ry, rz), and their order is not said; say it:"),
         ("t,x,y,z,qx,qy,qz,qw", {"euler": "XYZ"}, "no column named rx, ry, rz (found t, x, y, z, qx, qy, qz, qw); kn"),
         ("t,x,y,z,qx,qy,qz,qw", {"columns": [("t", "when")]}, "no column is named 'when'; --columns t=NAME takes one "),
-        ("t [min],x,y,z,qx,qy,qz,qw", {}, "'min' is no unit of time that is known; --time-unit s, ms, us, ns"),
-        ("t,x [furlong],y,z,qx,qy,qz,qw", {}, "'furlong' is no unit of length that is known; say how many metres it "),
+        ("t [min],x,y,z,qx,qy,qz,qw", {}, "'min' is not a known unit of time; --time-unit s, ms, us, ns"),
+        ("t,x [furlong],y,z,qx,qy,qz,qw", {}, "'furlong' is not a known unit of length; say how many metres it "),
     ],
 )
 def test_a_refusal_says_what_was_found_what_is_known_and_what_helps(write, refusal, header, options, told):
@@ -133,7 +133,7 @@ def test_angles_that_are_no_radians_are_refused(write, refusal) -> None:
     rows = "0,0,0,0,359,0,0\n.1,0,0,0,1,0,0\n"
     source = write("take.csv", f"t,x,y,z,rx,ry,rz\n{rows}")
     read_one(write("said.csv", f"t,x,y,z,rx_rad,ry_rad,rz_rad\n{rows}"), euler="XYZ")
-    assert refusal(source, euler="XYZ")[1].startswith("angles go up to 359, which are no radians; say so: --degrees;")
+    assert refusal(source, euler="XYZ")[1].startswith("angles go up to 359, which are not radians; say so: --degrees;")
 
 
 @pytest.mark.parametrize(

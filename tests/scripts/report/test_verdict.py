@@ -101,7 +101,7 @@ CASES = {
         numbers((TEN,), {REF: (4,), SMOOTH: (2,), "best_of": (1,)}),
         "Smooth Screw has 50 % less error than Blender's Curves with the same 10 keys a second.",
     ),
-    "somebody else's motion is no mode that wins": (
+    "somebody else's motion is not a mode that wins": (
         numbers((TEN,), {REF: (4,), SMOOTH: (2,), "mine": (0.1,)}),
         "Smooth Screw has 50 % less error than Blender's Curves with the same 10 keys a second.",
     ),
