@@ -142,7 +142,7 @@ def test_a_page_that_is_not_its_own_is_not_replaced(folder, tmp_path, capsys):
     assert (folder / "report.html").read_text(encoding="utf-8").startswith("<!doctype html>")
     with pytest.raises(SystemExit):
         reduce.main([str(folder), "--report", "--dry-run"])
-    assert "--dry-run writes nothing" in capsys.readouterr().err
+    assert "--dry-run writes none" in capsys.readouterr().err
 
 
 def test_a_page_is_written_where_nothing_was_reduced(folder, tmp_path):
