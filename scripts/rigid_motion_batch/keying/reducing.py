@@ -97,7 +97,8 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_nu
         slid, slides = (tolerance.alike(slide * unit, unit) for slide in (rig.slide_before, rig.slide_after))
         summary += f"; feet slide {slides}, and {slid} before"
     if rig and rig.not_promised:
-        summary += f"; not guaranteed for bones that follow constraints or drivers, or their children: {', '.join(rig.not_promised)}"
+        bones = ", ".join(rig.not_promised)
+        summary += f"; not guaranteed for bones that follow constraints or drivers, or their children: {bones}"
     return summary
 
 
