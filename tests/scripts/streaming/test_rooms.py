@@ -131,7 +131,7 @@ def test_a_hand_is_shown_within_the_tolerance(tmp_path, at, hand):
     ):
         sent = run("send", hand, "--room", "r", "--user", "ada", "--at", at)
         printed = done(receiver)
-        assert "nobody sent anything in q" in other.communicate(timeout=PATIENCE)[1]
+        assert "no one sent anything in q" in other.communicate(timeout=PATIENCE)[1]
     assert "joined: 1\n" in sent
     assert largest_mm(printed) < 5.1
     assert printed.splitlines()[-1] == str(shown)
@@ -286,7 +286,7 @@ def test_a_stranger_without_rights_neither_hears_nor_speaks(house, hand):
             printed, said = done(bob), eve.communicate(timeout=PATIENCE)[1]
         assert re.findall(r"^(\w+): (?:\d+) datagrams", printed, re.MULTILINE) == ["ada"]
         assert largest_mm(printed) < 5.1
-        assert "nobody sent anything" in said
+        assert "no one sent anything" in said
         said = run("receive", "--room", "studio", "--config", "mallory.json5", code=2, cwd=house)
     assert "there is no way to it" in said
 
@@ -372,12 +372,12 @@ def test_without_zenoh_the_way_out_is_said(monkeypatch, capsys, hand):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("send", "hand.csv", "--room", "a/*"), "no name of a room"),
-        (("send", "hand.csv", "--room", "r", "--user", "a/b"), "no name of a user"),
+        (("send", "hand.csv", "--room", "a/*"), "not a name for a room"),
+        (("send", "hand.csv", "--room", "r", "--user", "a/b"), "not a name for a user"),
         (("send", "hand.csv", "--room", "r", "--tolerance", "5 parsecs"), "5 parsecs"),
-        (("send", "hand.csv", "--room", "r", "--delay", "9"), "no number of seconds"),
+        (("send", "hand.csv", "--room", "r", "--delay", "9"), "not a number of seconds"),
         (("receive", "--room", "r", "--output", "shown.txt"), "one that ends in .csv, .bvh"),
-        (("receive", "--room", "r", "--to-blender", "39539"), "no address"),
+        (("receive", "--room", "r", "--to-blender", "39539"), "not an address"),
     ],
 )
 def test_what_cannot_be_is_refused(capsys, options, said):
