@@ -103,7 +103,10 @@ def progress_at(sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray])
 
 
 def channel_differences(
-    sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray], given: np.ndarray | None = None
+    sources: Sequence[KeyedTransform],
+    frames: Sequence[np.ndarray],
+    given: np.ndarray | None = None,
+    prepared: Prepared | None = None,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return what is to be added to the channels of each source, and the values that they have by themselves.
 
@@ -114,6 +117,8 @@ def channel_differences(
         Rising doubles for each. Those that are not inside of `spans` have no difference.
     given : array, shape (m,), optional
         How far the body of the only source has come in its segment.
+    prepared : dict, optional
+        What does not depend on frames, kept here for the next time that the same sources are asked for.
 
     Returns
     -------
@@ -123,14 +128,17 @@ def channel_differences(
         continuous, and nearest to those of the key at the beginning. Rows that are not filled have no difference.
     """
     if any(source.switches for source in sources):
-        return _differences_of_runs(sources, frames, given)
+        return _differences_of_runs(sources, frames, given, prepared)
+    prepared = {} if prepared is None else prepared
     differences = [np.zeros((10, len(times))) for times in frames]
     natives: dict[int, np.ndarray] = {}
     acting = [number for number, source in enumerate(sources) if source.is_live and source.is_repeatable]
     for portion in _alike([sources[number] for number in acting]):
         numbers = [acting[place] for place in portion]
         some, times = [sources[number] for number in numbers], [frames[number] for number in numbers]
-        values, native, live = _Motion.of(some).values(times, given)
+        if (same := tuple(map(id, some))) not in prepared:
+            prepared[same] = _Motion.of(some)
+        values, native, live = prepared[same].values(times, given)
         for number, (source, span) in zip(numbers, each(some, map(len, times)), strict=True):
             rows = source.filled_rows
             differences[number][rows] = np.where(live[span], values[rows, span] - native[rows, span], 0.0)
@@ -142,7 +150,10 @@ def channel_differences(
 
 
 def _differences_of_runs(
-    sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray], given: np.ndarray | None
+    sources: Sequence[KeyedTransform],
+    frames: Sequence[np.ndarray],
+    given: np.ndarray | None,
+    prepared: Prepared | None,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return `channel_differences` of sources, some of which pass from one holder to another: each run by itself."""
     runs = [(number, run) for number, source in enumerate(sources) for run in source.runs]
@@ -157,7 +168,7 @@ def _differences_of_runs(
     ]
     asked = [run.source if sources[number].switches else sources[number] for number, run in runs]
     if given is None:
-        of_runs = channel_differences(asked, moments)
+        of_runs = channel_differences(asked, moments, prepared=prepared)
     else:
         of_runs = [
             channel_differences([source], [times], given[part])[0]
@@ -341,6 +352,10 @@ def _poses(ends: Ends, modes: np.ndarray, counts: np.ndarray, progress: np.ndarr
         some = (modes == mode).repeat(counts)
         rows[some] = packed(ends.poses(np.where(modes == mode, counts, 0), progress[some], MODE_NAMES[mode]))
     return Poses(rows[:, :3], rows[:, 3:7], None if ends.keys.scales is None else rows[:, 7])
+
+
+Prepared = dict[tuple[int, ...], _Motion]
+"""By the identities of sources, which have to stay alive."""
 
 
 def _segments(sources: Sequence[KeyedTransform]) -> list[tuple[KeyedTransform, slice]]:
