@@ -1,0 +1,158 @@
+"""Tangents of paths at keys: how fast a body leaves a key, or comes to it, by the handles of all its channels.
+
+In a segment of a mode handles say how far the body has come, and nothing of its path: so all channels get handles with
+one slope of that progress, which is 1 where the speed is even. The handle on the other end of the segment stays.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from bpy.app.translations import pgettext_n as n_
+
+from ...blender import existing
+from ..actions.channels import code_of, key_points, set_key_fields
+from ..actions.reading import read
+from ..evaluation.components import SMOOTH_MODES
+from ..evaluation.differences import progress_at
+from ..evaluation.ends import SLOPE_MOMENTS, SLOPE_WEIGHTS
+from ..evaluation.marks import SAME_FRAME
+from ..evaluation.sources import KeyedTransform
+from ..fcurves.keys import BEZIER, LINEAR
+from ..transforms import Channel, Refused, Transform
+from .apply import Readings, TriedEdit, TriedEdits, apply_edit, editable_binding, readable
+
+BEFORE, AFTER = range(2)
+"""The sides of a key."""
+
+HANDLE_RATIO = 1.0 / 3.0
+"""The part of its segment that a handle is long in time, but where it is too steep."""
+
+EVEN_END = (HANDLE_RATIO, HANDLE_RATIO)
+"""Time and progress of the handle at the other end of a segment that was linear."""
+
+FREE = code_of("handle_left_type", "FREE")
+
+END_RATIO = 1e-6
+"""The part of a segment that is left out where progress is measured at its ends, which belong to others, too."""
+
+MIN_GAIN = 0.5
+"""How much of the slope of handles a smooth mode takes over, at least: less is where its path turns back on itself."""
+
+MAX_HANDLE_SHIFT = 1e-5
+"""By how much, in frames and units, Blender may set other handles anew."""
+
+NO_SEGMENT = n_("{name} has no motion of a mode on this side of frame {frame:g}: choose a mode, or drag another handle")
+NO_HANDLES = n_(
+    "{name} is eased, held or at rest on this side of frame {frame:g}: make its keys Bezier (T) or move them"
+)
+
+
+class _Tangent(TriedEdit):
+    """A key of a transform whose handles on one side are edited."""
+
+    def __init__(self, transform: Transform, readings: Readings, frame: float, side: int) -> None:
+        binding = editable_binding(transform, [binding for binding, _ in readings])
+        whole = next(source for one, source in readable(transform, readings) if one is binding)
+        super().__init__(transform, binding, (*binding.moving, transform.turns_channel))
+        source = whole.run_at(frame).source
+        number, other = (int(np.abs(source.key_frames - frame).argmin()) + by for by in (0, 2 * side - 1))
+        segment = min(number, other)
+        if not (0 <= segment < len(source.key_frames) - 1 and source.modes[segment]):
+            raise Refused(NO_SEGMENT, name=transform.name, frame=frame)
+        self.side, self.ends = side, source.key_frames[[number, other]]
+        """The frames of the key, and of the one at the other end of the segment."""
+        self.handles = dict(filter(None, (self._handles(transform.channels[row]) for row in source.filled_rows)))
+        """By the channels with keys on both: the numbers of these keys, and the frames and values between, (2,)."""
+        codes = {
+            int(existing(self.keys[channel])["interpolation"][min(at), 0]) for channel, (at, _) in self.handles.items()
+        }
+        if not any(change[1] for _, change in self.handles.values()) or not codes <= {BEZIER, LINEAR}:
+            raise Refused(NO_HANDLES, name=transform.name, frame=frame)
+        self.shares = self._shares(source)
+        """The parts of its way that are done one, two and three eighths of the segment away from the key, (3,)."""
+        self.slopes = (0.0, 1.0) if source.modes[segment] not in SMOOTH_MODES else None
+        """Those that handles of slope 0 and 1 make; None until that was tried."""
+
+    def _shares(self, whole: KeyedTransform) -> np.ndarray:
+        source = whole.run_at(self.ends[0]).source
+        moments = self.ends[0] + np.diff(self.ends) * (END_RATIO, *SLOPE_MOMENTS[:3], 1.0 - END_RATIO)
+        forth = 1 if self.side == AFTER else -1
+        along = progress_at([source], [moments[::forth]])[0][::forth]
+        return np.asarray((along[1:4] - along[0]) / (along[4] - along[0]))
+
+    def _handles(self, channel: Channel) -> tuple[Channel, tuple[tuple[int, int], np.ndarray]] | None:
+        if (fields := self.keys.get(channel)) is None:
+            return None
+        off = np.abs(fields["co"][:, 0] - self.ends[:, None])
+        at = off.argmin(axis=1)
+        first, other = at.tolist()
+        if off.min(axis=1).max() > SAME_FRAME or abs(first - other) != 1:
+            return None
+        return channel, ((first, other), np.diff(fields["co"][at].astype(np.float64), axis=0)[0])
+
+    def key(self, slope: float) -> None:
+        """Have the progress of its segment have this slope at the key, on its side."""
+        if self.slopes is None:
+            # At keys of a smooth mode it is that of Blender's own in-betweens in the direction of the tangent.
+            self.slopes = self._slope_with(0.0), self._slope_with(1.0)
+            self.put_back()
+        low, high = self.slopes
+        is_steady = MIN_GAIN < high - low < 1.0 / MIN_GAIN
+        self._set_handles(max((slope - low) / (high - low), 0.0) if is_steady else slope)
+
+    def _slope_with(self, slope: float) -> float:
+        self._set_handles(slope)
+        return float(self._shares(read(self.binding)) @ SLOPE_WEIGHTS)
+
+    def _set_handles(self, slope: float) -> None:
+        time = min(HANDLE_RATIO, 1.0 / max(slope, 1.0))
+        names = ("handle_right", "handle_left")[:: 1 if self.side == AFTER else -1]
+        for channel, ((first, other), change) in self.handles.items():
+            fields = {name: numbers.copy() for name, numbers in existing(self.keys[channel]).items()}
+            begins = fields["interpolation"][min(first, other)]
+            for at, name, share in ((first, names[0], (time, slope * time)), (other, names[1], EVEN_END)):
+                if at == first or begins == LINEAR:
+                    away = 1.0 if at == first else -1.0
+                    fields[name][at] = fields["co"][at] + away * change * share
+                    for side in ("left", "right"):
+                        fields[f"handle_{side}_type"][at] = FREE
+            begins[:] = BEZIER
+            set_key_fields(fcurve := self.binding.curves[channel], fields)
+            # Where Blender sets the handles of other keys by those around, they stay as well.
+            now = {name: key_points(fcurve, name) for name in names}
+            moved = np.any([np.abs(now[name] - fields[name]).max(axis=1) > MAX_HANDLE_SHIFT for name in names], axis=0)
+            if moved.any():
+                for side in ("left", "right"):
+                    fields[f"handle_{side}_type"][moved] = FREE
+                set_key_fields(fcurve, fields)
+
+
+class TangentEdit(TriedEdits):
+    """The tangent of a key on one of its sides, tried until it is good. Empty where it was refused."""
+
+    def __init__(self, transform: Transform, frame: float, side: int, *, refused: list[Refused] | None = None) -> None:
+        def plan(one: Transform, readings: Readings) -> _Tangent:
+            return _Tangent(one, readings, frame, side)
+
+        super().__init__(apply_edit(transform, plan, lambda _, one: one, refused).values())
+
+    @property
+    def duration(self) -> float:
+        """The frames of the segment."""
+        return float(abs(np.diff(self.tried[0].ends)[0]))
+
+    @property
+    def shares(self) -> np.ndarray:
+        """See `_Tangent`."""
+        return np.asarray(self.tried[0].shares)
+
+    @property
+    def slope(self) -> float:
+        """The slope of progress at the key: 1 at an even speed, 0 at rest."""
+        return float(self.shares @ SLOPE_WEIGHTS)
+
+    def apply(self, slope: float) -> None:
+        """Have progress have this slope at the key."""
+        with self.edit():
+            for one in self.tried:
+                one.key(max(slope, 0.0))
