@@ -89,7 +89,7 @@ class WithPaths(WithTools):
                 if how == "retime" and not refused:
                     by = edits.retime(by)
                 elif not refused:
-                    edits.move(delta)
+                    edits.move(lambda _: delta)
 
         self._edit(change)
         obj, after = self._found(name), self._keyed()[name]
@@ -147,6 +147,7 @@ class WithPaths(WithTools):
             AffineMaps(along, origins),
             None if is_same else np.tile(turns, (len(frames), 1, 1)),
             worlds[:, :3, 3],
+            np.ones(len(frames)),
         )
 
     def _frames_that_stay(self, name: Name, how: str, chosen: np.ndarray) -> np.ndarray:

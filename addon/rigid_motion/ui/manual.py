@@ -46,7 +46,10 @@ PAGES = (
     *((f"bpy.types.rigidmotionoverlay.{name}", f"{ON_THE_PATH}#ghosts") for name in ("*ghost*", "show_bodies")),
     ("bpy.types.rigidmotionoverlay.*speed*", f"{ON_THE_PATH}#speed"),
     ("bpy.ops.rigid_motion.update_path", f"{ANIMATORS}#see-the-motion"),
-    *((f"bpy.ops.rigid_motion.{name}", EDIT_PATH) for name in ("edit_path", "*_path_key*", "set_path_point")),
+    *(
+        (f"bpy.ops.rigid_motion.{name}", EDIT_PATH)
+        for name in ("edit_path", "*_path_key*", "set_path_point", "drag_path_tangent")
+    ),
     ("bpy.ops.rigid_motion.*bake", f"{ANIMATORS}#bake"),
     ("bpy.ops.rigid_motion.reduce_keys", "reduction.md"),
     ("bpy.ops.rigid_motion.clean_motion", f"{ANIMATORS}#clean-motion"),

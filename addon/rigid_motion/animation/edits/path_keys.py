@@ -7,7 +7,7 @@ For targets, and what is refused, see `apply`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -55,6 +55,9 @@ class KeySpaces(NamedTuple):
     points: np.ndarray
     """The points of the body that lead, in the world, shape (n, 3)."""
 
+    weights: np.ndarray
+    """How much of a movement each takes part in, 0 to 1, shape (n,)."""
+
 
 class _Keys(TriedEdit):
     """Keys of a transform that are edited."""
@@ -86,12 +89,12 @@ class _Keys(TriedEdit):
         """How many frames its keys may go back and forth before they come to others."""
 
     def moved(self, delta: AffineMaps) -> np.ndarray:
-        """Return the components (10, n) with which a map of the world has moved its keys."""
-        _, spaces, turns, points = self.spaces
+        """Return the components (10, n) with which maps of the world (n,) have moved its keys."""
+        _, spaces, turns, points, _ = self.spaces
         rows, original = self.before.copy(), self.source.original[:, None].repeat(len(points), axis=1)
         turn_into_quaternions(rows, self.source.order)
         places = spaces.at((rows[ROWS[LOCATION]] + original[ROWS[LOCATION]]).T)
-        axes = np.broadcast_to(delta.axes, spaces.axes.shape)
+        axes = delta.axes
         if np.allclose(delta.axes, np.eye(3), atol=MAX_STILL_CHANGE) and self.rows[0] >= ROWS[ROTATION].start:
             axes = swings(points - places, delta.at(points) - places)
         along = spaces.axes if turns is None else spaces.axes @ turns
@@ -106,7 +109,7 @@ class _Keys(TriedEdit):
         return channel_values(poses, each, np.zeros(len(points)), ends, original, self.source.order)
 
     def move(self, delta: AffineMaps) -> None:
-        """Have its keys be where a map of the world takes them. Breakdowns shape the path from now on."""
+        """Have its keys be where maps of the world (n,) take them. Breakdowns shape the path from now on."""
         frames, values, source = self.spaces.frames, self.moved(delta), self.source
         passed = source.key_frames[source.passed]
         for row in self.rows:
@@ -149,11 +152,12 @@ class KeyEdits(TriedEdits):
 
         super().__init__(apply_edit(keys, plan, lambda _, one: one, refused).values())
 
-    def move(self, delta: np.ndarray) -> None:
-        """Have all keys be where a rigid map of the world (4, 4) takes them from where they were at first."""
+    def move(self, delta: Callable[[float], np.ndarray]) -> None:
+        """Have all keys be where a rigid map of the world (4, 4), by their weights, takes them from where they were."""
         with self.edit():
             for one in self.tried:
-                one.move(AffineMaps(delta[:3, :3], delta[:3, 3]))
+                maps = np.stack([delta(weight) for weight in one.spaces.weights.tolist()])
+                one.move(AffineMaps(maps[:, :3, :3], maps[:, :3, 3]))
 
     def retime(self, by: float) -> float:
         """Have all keys be so many frames later than at first, as far as none comes to others; return how many."""

@@ -55,7 +55,7 @@ class _Tangent(TriedEdit):
         whole = next(source for one, source in readable(transform, readings) if one is binding)
         super().__init__(transform, binding, (*binding.moving, transform.turns_channel))
         source = whole.run_at(frame).source
-        number, other = (int(np.abs(source.key_frames - frame).argmin()) + by for by in (0, 2 * side - 1))
+        number, other = (int(np.argmin(np.abs(source.key_frames - frame))) + by for by in (0, 2 * side - 1))
         segment = min(number, other)
         if not (0 <= segment < len(source.key_frames) - 1 and source.modes[segment]):
             raise Refused(NO_SEGMENT, name=transform.name, frame=frame)
@@ -89,6 +89,13 @@ class _Tangent(TriedEdit):
         if off.min(axis=1).max() > SAME_FRAME or abs(first - other) != 1:
             return None
         return channel, ((first, other), np.diff(fields["co"][at].astype(np.float64), axis=0)[0])
+
+    def run_straight(self) -> None:
+        """Have the progress of its segment be even."""
+        for channel, (at, _) in self.handles.items():
+            fields = {name: numbers.copy() for name, numbers in existing(self.keys[channel]).items()}
+            fields["interpolation"][min(at)] = LINEAR
+            set_key_fields(self.binding.curves[channel], fields)
 
     def key(self, slope: float) -> None:
         """Have the progress of its segment have this slope at the key, on its side."""
@@ -137,9 +144,9 @@ class TangentEdit(TriedEdits):
         super().__init__(apply_edit(transform, plan, lambda _, one: one, refused).values())
 
     @property
-    def duration(self) -> float:
-        """The frames of the segment."""
-        return float(abs(np.diff(self.tried[0].ends)[0]))
+    def ends(self) -> np.ndarray:
+        """The frames of the key, and of the one at the other end of the segment, (2,)."""
+        return np.asarray(self.tried[0].ends)
 
     @property
     def shares(self) -> np.ndarray:
@@ -151,8 +158,11 @@ class TangentEdit(TriedEdits):
         """The slope of progress at the key: 1 at an even speed, 0 at rest."""
         return float(self.shares @ SLOPE_WEIGHTS)
 
-    def apply(self, slope: float) -> None:
-        """Have progress have this slope at the key."""
+    def apply(self, slope: float | None) -> None:
+        """Have progress have this slope at the key; None for an even one throughout, without handles."""
         with self.edit():
             for one in self.tried:
-                one.key(max(slope, 0.0))
+                if slope is None:
+                    one.run_straight()
+                else:
+                    one.key(max(slope, 0.0))

@@ -6,14 +6,26 @@ handles   keys on the screen, and what their channels are in
 tool      the tool, its keys, and the operator that takes it
 picking   operators that select, insert and delete keys
 dragging  operators that move, turn and retime keys
+arms      tangents on the screen
+tangents  handles by which their speed is set, and paths are bent
+
+proportional  keys around those that are dragged, which follow
 """
 
 from __future__ import annotations
 
-from . import dragging, picking, tool
+from . import dragging, picking, tangents, tool
 
-CLASSES = (*picking.CLASSES, *dragging.CLASSES, *tool.CLASSES)
+CLASSES = (*picking.CLASSES, *dragging.CLASSES, *tangents.CLASSES, *tool.CLASSES)
 
 __all__ = ["CLASSES", "register", "unregister"]
 
-register, unregister = tool.register, tool.unregister
+
+def register() -> None:
+    tool.register()
+    tangents.register()
+
+
+def unregister() -> None:
+    tangents.unregister()
+    tool.unregister()

@@ -26,6 +26,7 @@ from ...animation import Refused
 from ...animation.edits.path_keys import KeyEdits
 from ...blender import FloatProperty, FloatVectorProperty, Returned, existing, with_properties
 from ..breakdown import CANCEL, CONFIRM, SHIFT_RATIO, TypedNumber, typed_number
+from . import proportional
 from .handles import Handles, OnPath, handles_of, key_under, select, selected_spaces
 from .picking import RIGID_MOTION_OT_select_path_keys, mouse_of, pressed_at
 
@@ -75,37 +76,36 @@ class DragInput(TypedNumber):
         return True
 
 
-class _Dragging(OnPath):
+class Dragging(OnPath):
     """Operators that try edits of the selected keys while the mouse moves."""
 
     bl_options = {"REGISTER", "UNDO", "BLOCKING"}  # noqa: RUF012 - Blender reads it
     leaves_carried: ClassVar[bool] = True
     """True if keys go along with those of what carries them."""
+    takes_neighbours: ClassVar[bool] = True
+    """True if Proportional Editing takes the keys around along."""
+    _hit: tuple[Handles, float] | None = None
+    """The key that is under the mouse, by its frame, or else the first that is selected."""
+    shown_reach: ClassVar[float] = 0.0
+    """The frames around moved keys on which others follow them, while these are dragged."""
     keys_text: ClassVar[str] = n_(
-        "LMB, Enter: Confirm | Esc, RMB: Cancel | X, Y, Z: Axis | Ctrl: Steps | Shift: Precision | 0-9: Number"
+        "LMB, Enter: Confirm | Esc, RMB: Cancel | X, Y, Z: Axis | Ctrl: Steps | Shift: Precision | "
+        "0-9: Number | O, Wheel: Proportional"
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Returned:
         handles, self._is_drag = handles_of(context), event.value == "CLICK_DRAG"
         place = pressed_at(event) if self._is_drag else mouse_of(event)
-        self._hit: tuple[Handles, float] | None
-        if self._is_drag:
-            self._hit = key_under(context, handles, place)
-            if self._hit is None:
-                return {"PASS_THROUGH", "CANCELLED"}
-            one, frame = self._hit
-            if frame not in one.selected:
-                select(context, handles, {one.target: np.array([frame])})
-                # What is adjusted after the drag (F9) is then what was dragged.
-                bpy.ops.ed.undo_push(message=RIGID_MOTION_OT_select_path_keys.bl_label)
-                handles = handles_of(context)
-        else:
+        if self._is_drag and not self.grab(context, handles, place):
+            return {"PASS_THROUGH", "CANCELLED"}
+        handles = handles_of(context)
+        if not self._is_drag:
             self._hit = next(((one, float(one.selected[0])) for one in handles if len(one.selected)), None)
-        if not self._read(handles):
+        if not self.read(handles):
             return self.without_keys(handles, self._refused)
         self._input = DragInput(place)
         self.begin(context)
-        existing(context.workspace).status_text_set(iface_(self.keys_text))
+        self.tell(context)
         existing(context.window_manager).modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -117,7 +117,7 @@ class _Dragging(OnPath):
         if is_released or (event.type in CONFIRM and event.value == "PRESS"):
             self._hide(context)
             return self.finish(self._refused)
-        if self._input.handle(event):
+        if self.press(context, event) or self._input.handle(event):
             existing(context.area).header_text_set(self.drag(context))
             self.finish(())
         return {"RUNNING_MODAL"}
@@ -130,18 +130,45 @@ class _Dragging(OnPath):
 
     def execute(self, context: bpy.types.Context) -> Returned:
         handles = handles_of(context)
-        if not self._read(handles):
+        if not self.read(handles):
             return self.without_keys(handles, self._refused)
         self.apply()
         return self.finish(self._refused)
 
-    def _read(self, handles: list[Handles]) -> bool:
+    def grab(self, context: bpy.types.Context, handles: list[Handles], place: np.ndarray) -> bool:
+        """Take the key at a place on the screen, and select it alone unless it is selected; return whether one is."""
+        self._hit = key_under(context, handles, place)
+        if self._hit is None:
+            return False
+        one, frame = self._hit
+        if frame not in one.selected:
+            select(context, handles, {one.target: np.array([frame])})
+            # What is adjusted after the drag (F9) is then what was dragged.
+            bpy.ops.ed.undo_push(message=RIGID_MOTION_OT_select_path_keys.bl_label)
+        return True
+
+    def read(self, handles: list[Handles]) -> bool:
         """Get ready to edit the selected keys, and return whether there are any that can be."""
-        spaces, self._refused = selected_spaces(handles, leave_carried=self.leaves_carried), list[Refused]()
-        self._edits = KeyEdits(spaces, refused=self._refused)
+        reach = proportional.reach() if self.takes_neighbours else 0.0
+        spaces, self._refused = selected_spaces(handles, reach, leave_carried=self.leaves_carried), list[Refused]()
+        self._edits: Any = KeyEdits(spaces, refused=self._refused)
         if spaces:
-            self._pivot = Vector(np.concatenate([one.points for one in spaces.values()]).mean(axis=0).tolist())
+            chosen = [one.points[one.weights >= 1.0] for one in spaces.values()]
+            self._pivot = Vector(np.concatenate(chosen).mean(axis=0).tolist())
         return len(self._edits) > 0
+
+    def press(self, context: Any, event: bpy.types.Event) -> bool:
+        """Take a key that is none of the mouse's or of a number, and say whether it changed anything."""
+        if not self.takes_neighbours or event.value != "PRESS" or not proportional.change(event):
+            return False
+        self._edits.cancel()
+        self.tell(context)
+        return self.read(handles_of(context))
+
+    def tell(self, context: Any) -> None:
+        """Have the status bar show the keys, and the viewport the range of Proportional Editing."""
+        Dragging.shown_reach = proportional.reach() if self.takes_neighbours else 0.0
+        existing(context.workspace).status_text_set(iface_(self.keys_text))
 
     def begin(self, context: Any) -> None:
         """Note how the viewport is when the drag begins."""
@@ -154,45 +181,7 @@ class _Dragging(OnPath):
         """Edit the keys as the properties have it."""
         raise NotImplementedError
 
-    def _hide(self, context: bpy.types.Context) -> None:
-        existing(context.area).header_text_set(None)
-        existing(context.workspace).status_text_set(None)
-
-
-def _direction(axis: int | None) -> Vector | None:
-    return None if axis is None else Vector([float(axis == row) for row in range(3)])
-
-
-@with_properties
-class RIGID_MOTION_OT_move_path_keys(_Dragging):
-    bl_idname = "rigid_motion.move_path_keys"
-    bl_label = "Move Keys on Path"
-    bl_description = "Move the selected keys on paths in the world, each with the whole body"
-
-    value: Any = FloatVectorProperty(name="Move", description="How far, in the world", subtype="TRANSLATION", size=3)
-
-    def drag(self, context: Any) -> str:
-        given, number = self._input, self._input.number
-        direction = _direction(given.axis)
-        first, last = (self._at(context, place, direction) for place in (given.first, given.place))
-        move = last - first
-        if number is not None:
-            move = number * (direction or Vector((1.0, 0.0, 0.0)))
-        elif given.is_stepped:
-            beside = given.first + np.array((STEP_PX * context.preferences.system.ui_scale, 0.0))
-            away = (self._at(context, beside, None) - self._at(context, given.first, None)).length
-            step = 10.0 ** math.floor(math.log10(max(away, 1e-9)))
-            step *= FINE_STEP_RATIO if given.is_fine else 1.0
-            move = Vector([round(part / step) * step for part in move[:]])
-        self.value = move
-        self.apply()
-        parts = [f"D{name.lower()} {part:.4g}" for name, part in zip(AXES, move[:], strict=True)]
-        return "   ".join((*parts, f"({move.length:.4g})"))
-
-    def apply(self) -> None:
-        self._edits.move(np.array(Matrix.Translation(self.value[:])))
-
-    def _at(self, context: Any, place: np.ndarray, direction: Vector | None) -> Vector:
+    def at(self, context: Any, place: np.ndarray, direction: Vector | None) -> Vector:
         """Return the point of the world at a place on the screen: as deep as the keys, or on the axis through them."""
         where = context.region, context.region_data, place.tolist()
         if direction is None:
@@ -201,9 +190,50 @@ class RIGID_MOTION_OT_move_path_keys(_Dragging):
         both = intersect_line_line(self._pivot, self._pivot + direction, origin, origin + ray)
         return self._pivot if both is None else both[0]
 
+    def _hide(self, context: bpy.types.Context) -> None:
+        Dragging.shown_reach = 0.0
+        existing(context.area).header_text_set(None)
+        existing(context.workspace).status_text_set(None)
+
+
+def direction_of(axis: int | None) -> Vector | None:
+    """Return the direction of an axis of the world, None where none is locked."""
+    return None if axis is None else Vector([float(axis == row) for row in range(3)])
+
 
 @with_properties
-class RIGID_MOTION_OT_rotate_path_keys(_Dragging):
+class RIGID_MOTION_OT_move_path_keys(Dragging):
+    bl_idname = "rigid_motion.move_path_keys"
+    bl_label = "Move Keys on Path"
+    bl_description = "Move the selected keys on paths in the world, each with the whole body"
+
+    value: Any = FloatVectorProperty(name="Move", description="How far, in the world", subtype="TRANSLATION", size=3)
+
+    def drag(self, context: Any) -> str:
+        given, number = self._input, self._input.number
+        direction = direction_of(given.axis)
+        first, last = (self.at(context, place, direction) for place in (given.first, given.place))
+        move = last - first
+        if number is not None:
+            move = number * (direction or Vector((1.0, 0.0, 0.0)))
+        elif given.is_stepped:
+            beside = given.first + np.array((STEP_PX * context.preferences.system.ui_scale, 0.0))
+            away = (self.at(context, beside, None) - self.at(context, given.first, None)).length
+            step = 10.0 ** math.floor(math.log10(max(away, 1e-9)))
+            step *= FINE_STEP_RATIO if given.is_fine else 1.0
+            move = Vector([round(part / step) * step for part in move[:]])
+        self.value = move
+        self.apply()
+        parts = [f"D{name.lower()} {part:.4g}" for name, part in zip(AXES, move[:], strict=True)]
+        return "   ".join((*parts, f"({move.length:.4g})", proportional.text()))
+
+    def apply(self) -> None:
+        move = Vector(self.value[:])
+        self._edits.move(lambda share: np.array(Matrix.Translation((share * move)[:])))
+
+
+@with_properties
+class RIGID_MOTION_OT_rotate_path_keys(Dragging):
     bl_idname = "rigid_motion.rotate_path_keys"
     bl_label = "Rotate Keys on Path"
     bl_description = "Rotate the selected keys on paths about the middle of their points, each with the whole body"
@@ -223,7 +253,7 @@ class RIGID_MOTION_OT_rotate_path_keys(_Dragging):
         self._turned += math.atan2(x * to_y - y * to_x, x * to_x + y * to_y)
         self._before = given.place.copy()
         toward = context.region_data.view_rotation @ Vector((0.0, 0.0, 1.0))
-        axis = _direction(given.axis) or toward
+        axis = direction_of(given.axis) or toward
         angle = math.degrees(self._turned if axis.dot(toward) >= 0.0 else -self._turned)
         if number is not None:
             angle = number
@@ -232,22 +262,27 @@ class RIGID_MOTION_OT_rotate_path_keys(_Dragging):
             angle = round(angle / step) * step
         self.angle, self.axis = math.radians(angle), axis
         self.apply()
-        return f"{angle:.2f}°" + ("" if given.axis is None else f"   {AXES[given.axis]}")
+        axis_name = "" if given.axis is None else AXES[given.axis]
+        return "   ".join((f"{angle:.2f}°", axis_name, proportional.text()))
 
     def apply(self) -> None:
         middle = Matrix.Translation(tuple(self._pivot[:]))
-        self._edits.move(np.array(middle @ Matrix.Rotation(self.angle, 4, self.axis[:]) @ middle.inverted()))
+
+        def turned(share: float) -> np.ndarray:
+            return np.array(middle @ Matrix.Rotation(share * self.angle, 4, self.axis[:]) @ middle.inverted())
+
+        self._edits.move(turned)
 
 
 @with_properties
-class RIGID_MOTION_OT_retime_path_keys(_Dragging):
+class RIGID_MOTION_OT_retime_path_keys(Dragging):
     bl_idname = "rigid_motion.retime_path_keys"
     bl_label = "Retime Keys on Path"
     bl_description = (
         "Move the selected keys in time. They keep their poses, and the key that is dragged gets the frame on which "
         "the path is nearest to the mouse"
     )
-    leaves_carried = False
+    leaves_carried = takes_neighbours = False
     keys_text = n_("LMB, Enter: Confirm | Esc, RMB: Cancel | Shift: Fractions of Frames | 0-9: Number")
 
     frames: float = FloatProperty(name="Frames", description="How much later, in frames")

@@ -5,7 +5,7 @@ Places on the screen are x, y in pixels of the viewport's region, shape (2,) or 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -27,6 +27,7 @@ from ..overlay.kinds import space_of
 from ..overlay.parents import CarriedTargets, Parents, identity, maps_of
 from ..overlay.points import DrawnPath, on_screen
 from ..overlay.settings import is_shown, overlay_settings
+from .proportional import falloff
 
 REACH_PX = 14.0
 """How far from a key or a path the mouse may be to mean it, at a resolution scale of 1."""
@@ -99,20 +100,38 @@ def select(context: bpy.types.Context, handles: Iterable[Handles], chosen: dict[
     redraw(context, *KEY_EDITORS)
 
 
-def selected_spaces(handles: Iterable[Handles], *, leave_carried: bool) -> dict[Transform, KeySpaces]:
-    """Return the selected keys, and what their channels are in; without those, if these are to be left, whose parent or
-    holder has one selected on the same frame, which carries them along.
+def selected_spaces(
+    handles: Iterable[Handles], reach: float = 0.0, *, leave_carried: bool
+) -> dict[Transform, KeySpaces]:
+    """Return the selected keys, with those within so many frames of them, and what their channels are in; see `spaces`.
+
+    The weight of each is that which Proportional Editing gives it.
+    """
+    keys = {}
+    for one in (one for one in handles if len(one.selected)):
+        away = np.abs(one.path.key_frames[:, None] - one.selected).min(axis=1)
+        weights = falloff(away, reach)
+        keys[one] = one.path.key_frames[weights > 0.0], weights[weights > 0.0]
+    return spaces(keys, leave_carried=leave_carried)
+
+
+def spaces(
+    keys: Mapping[Handles, tuple[np.ndarray, np.ndarray]], *, leave_carried: bool = False
+) -> dict[Transform, KeySpaces]:
+    """Return what the channels of keys are in, from their frames and weights, (n,) each; without those, if these are
+    to be left, whose parent or holder has one on the same frame, which carries them along.
     """
     carried, depsgraph = CarriedTargets(), existing(bpy.context.view_layer).depsgraph
-    frames = {one.target: one.selected for one in handles if len(one.selected)}
+    frames = {one.target: at for one, (at, _) in keys.items()}
     result = {}
-    for one in (one for one in handles if one.target in frames):
-        target, at = one.target, frames[one.target]
+    for one, (at, weights) in keys.items():
+        target = one.target
         _, source = carried.read((target,))[target]
         held = HolderMotion(target, source, carried) if source is not None and is_held(source) else None
         above = Parents(target, carried) if held is None else held
         for carrier in above.carriers & frames.keys() if leave_carried else ():
-            at = at[~near(at, frames[carrier])]
+            stays = ~near(at, frames[carrier])
+            at, weights = at[stays], weights[stays]
         if not len(at):
             continue
         turns: np.ndarray | None
@@ -124,7 +143,7 @@ def selected_spaces(handles: Iterable[Handles], *, leave_carried: bool) -> dict[
             space, turn = space_of(target, existing(depsgraph))
             maps, turns = identity(len(at)) @ maps_of(space), None if turn is None else turn[None].repeat(len(at), 0)
         points = one.in_world(one.path.keys)[near(one.path.key_frames, at)]
-        result[target] = KeySpaces(at, maps, turns, points)
+        result[target] = KeySpaces(at, maps, turns, points, weights)
     return result
 
 

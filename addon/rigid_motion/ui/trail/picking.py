@@ -19,6 +19,7 @@ from ...blender import BoolProperty, EnumProperty, FloatProperty, Returned, Stri
 from ..breakdown import CANCEL, LINE_COLOUR
 from ..overlay.drawing import batch_of
 from ..targets import selected
+from .arms import tangent_under
 from .handles import REACH_PX, Handles, OnPath, handles_of, key_under, select
 
 KEY_THERE = n_("{name} already has a key on frame {frame:g}")
@@ -91,8 +92,9 @@ class RIGID_MOTION_OT_box_path_keys(_Selecting):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Returned:
         handles, is_drag = handles_of(context), event.value == "CLICK_DRAG"
         self._first = pressed_at(event) if is_drag else None
-        # A key that is dragged is moved, in whatever order Blender asks those that drags are for.
-        if not handles or (is_drag and not self.extend and key_under(context, handles, pressed_at(event))):
+        # A key or tangent that is dragged is moved, in whatever order Blender asks those that drags are for.
+        takes = () if not is_drag or self.extend else (key_under, tangent_under)
+        if not handles or any(take(context, handles, pressed_at(event)) for take in takes):
             return {"PASS_THROUGH", "CANCELLED"}
         self._last, self._region = mouse_of(event), context.region
         self._drawing = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_PIXEL")

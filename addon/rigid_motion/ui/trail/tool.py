@@ -34,7 +34,8 @@ KEYMAP = (
     ("rigid_motion.select_path_keys", CLICK, None),
     ("rigid_motion.select_path_keys", CLICK | {"shift": True}, EXTEND),
     ("rigid_motion.insert_path_key", CLICK | {"ctrl": True}, None),
-    # What is dragged is a key or a box.
+    # What is dragged is a tangent, a key or a box.
+    ("rigid_motion.drag_path_tangent", DRAG, None),
     ("rigid_motion.move_path_keys", DRAG, None),
     ("rigid_motion.box_path_keys", DRAG, None),
     ("rigid_motion.box_path_keys", DRAG | {"shift": True}, EXTEND),
@@ -44,6 +45,7 @@ KEYMAP = (
     ("rigid_motion.select_all_path_keys", _pressed("A", alt=True), {"properties": [("deselect", True)]}),
     ("rigid_motion.move_path_keys", _pressed("G"), None),
     ("rigid_motion.rotate_path_keys", _pressed("R"), None),
+    ("wm.context_toggle", _pressed("O"), {"properties": [("data_path", "tool_settings.use_proportional_action")]}),
     ("rigid_motion.delete_path_keys", _pressed("X"), None),
     ("rigid_motion.delete_path_keys", _pressed("DEL"), None),
 )

@@ -1,0 +1,105 @@
+"""Tangents at the selected keys of paths, on the screen: handles on both sides, which say how fast it is there."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
+
+import bpy
+import numpy as np
+
+from ...blender import scene
+from ..overlay.points import DrawnPath, on_screen
+from ..overlay.settings import overlay_settings
+from .handles import REACH_PX, Handles, key_under
+from .tool import TOOL
+
+HANDLE_SECONDS = 1.0 / 3.0
+"""A handle is as long as the way in this time."""
+
+MIN_HANDLE_PX = 28.0
+"""At a resolution scale of 1, so that slow motion has handles that can be taken."""
+
+
+class Arms(NamedTuple):
+    """The tangents of k keys: before them and behind them, away from the key, shape (k, 2, 3); NaN where none is."""
+
+    velocities: np.ndarray
+    """By a frame."""
+
+    ways: np.ndarray
+    """To the nearest sample of the path, which has a direction also where the body comes to rest."""
+
+
+SAMPLES = (1, 2, 3)
+"""How many samples beside a key its tangents are read from."""
+
+_known: WeakKeyDictionary[DrawnPath, Arms] = WeakKeyDictionary()
+
+
+def arms_of(path: DrawnPath) -> Arms:
+    """Return the tangents at the keys of a path, in its space, from the samples beside them."""
+    if path not in _known:
+        line = path.native if path.desired is None else path.desired
+        at = np.searchsorted(path.frames, path.key_frames)
+        steps = at[:, None, None] + np.array((-1, 1))[:, None] * SAMPLES
+        within = np.clip(steps, 0, len(line) - 1)
+        times = np.abs(path.frames[within] - path.key_frames[:, None, None])
+        ways = np.where((steps == within)[..., None], line[within] - line[at][:, None, None], np.nan)
+        # The slope of the cubic through the key and three samples.
+        apart = times[..., None] - times[..., None, :] + np.eye(len(SAMPLES))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            weights = times.prod(axis=-1, keepdims=True) / (times**2 * apart.prod(axis=-1))
+            velocities = np.einsum("ksn,ksnc->ksc", weights, ways)
+        _known[path] = Arms(velocities, ways[:, :, 0])
+    return _known[path]
+
+
+def ends_of(path: DrawnPath, projection: np.ndarray, size: tuple[float, float], scale: float) -> np.ndarray:
+    """Return where the handles of the selected keys end, in the space of the path, shape (k, 2, 3).
+
+    `projection` (4, 4) leads from there to clip space of a view of this size.
+    """
+    velocities, ways = (rows[path.selected] for rows in arms_of(path))
+    keys, frames = path.keys[path.selected][:, None], HANDLE_SECONDS * frame_rate()
+    lengths = np.linalg.norm(frames * velocities, axis=-1, keepdims=True)
+    directions = np.where(lengths > 1e-9, frames * velocities, ways)
+
+    def pixels(arms: np.ndarray) -> np.ndarray:
+        both = (on_screen(points.reshape(-1, 3), projection, size) for points in (keys + arms, keys + 0.0 * arms))
+        return np.linalg.norm(np.subtract(*both), axis=-1).reshape(*arms.shape[:2], 1)
+
+    return keys + directions * np.maximum(1.0, MIN_HANDLE_PX * scale / np.maximum(pixels(directions), 1e-6))
+
+
+def frame_rate() -> float:
+    """Return the frames of a second."""
+    render = scene().render
+    return float(render.fps / render.fps_base)
+
+
+def is_shown(path: DrawnPath, overlay: Any) -> bool:
+    """Return whether the handles of a path are shown: while the tool is taken, of modes as they are keyed."""
+    context: Any = bpy.context
+    is_taken = context.workspace.tools.from_space_view3d_mode(context.mode).idname == TOOL
+    return bool(is_taken and overlay.show_paths and overlay.mode == "CHOSEN" and path.desired is not None)
+
+
+def tangent_under(context: Any, handles: list[Handles], place: np.ndarray) -> tuple[Handles, float, int] | None:
+    """Return whose handle a place on the screen is on, the frame of its key, and its side.
+
+    None where it is on none, or on a key.
+    """
+    if key_under(context, handles, place) is not None:
+        return None
+    nearest, result = REACH_PX * context.preferences.system.ui_scale, None
+    for one in handles:
+        if one.path.selected.any() and is_shown(one.path, overlay_settings(scene())):
+            size, view = (context.region.width, context.region.height), context.region_data.perspective_matrix
+            ends = ends_of(one.path, np.array(view @ one.space), size, context.preferences.system.ui_scale)
+            places = on_screen(ends.reshape(-1, 3), np.array(view @ one.space), size)
+            away = np.nan_to_num(np.linalg.norm(places - place, axis=1), nan=np.inf)
+            if away.min() <= nearest:
+                nearest, (number, side) = away.min(), divmod(int(away.argmin()), 2)
+                result = one, float(one.selected[number]), side
+    return result

@@ -1,0 +1,73 @@
+"""Proportional Editing of keys on paths: those around a moved one follow it, the less the more frames they are away.
+
+It goes by frames, and not by distance, as in the Dope Sheet, whose settings these are: a path that crosses itself or
+rests has keys side by side that have nothing to do with one another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+
+from ...blender import scene
+
+RANGE_FACTOR = 1.2
+"""By what a step of the wheel multiplies the range, or divides it."""
+
+LARGER, SMALLER = {"WHEELDOWNMOUSE", "PAGE_UP"}, {"WHEELUPMOUSE", "PAGE_DOWN"}
+"""Events that change the range, as in Blender's own transforms."""
+
+FALLOFFS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "SMOOTH": lambda near: near * near * (3.0 - 2.0 * near),
+    "SPHERE": lambda near: np.sqrt(near * (2.0 - near)),
+    "ROOT": np.sqrt,
+    "INVERSE_SQUARE": lambda near: near * (2.0 - near),
+    "SHARP": np.square,
+    "LINEAR": np.asarray,
+    "CONSTANT": np.ceil,
+    "RANDOM": lambda near: near * np.random.default_rng(0).random(near.shape),
+}
+"""How much of a movement is left, from 1 at the moved keys to 0 at the end of the range: Blender's, by their names."""
+
+
+def settings() -> Any:
+    """Return the settings of Proportional Editing."""
+    return scene().tool_settings
+
+
+def reach() -> float:
+    """Return the range in frames, 0 where it is switched off."""
+    return float(settings().proportional_size) if settings().use_proportional_action else 0.0
+
+
+def falloff(away: np.ndarray, within: float) -> np.ndarray:
+    """Return the weights of keys that are so many frames away from moved ones, (n,): 1 where these are."""
+    near = np.clip(1.0 - away / within, 0.0, 1.0) if within > 0.0 else np.zeros(away.shape)
+    return np.where(away > 0.0, FALLOFFS[settings().proportional_edit_falloff](near), 1.0)
+
+
+def change(event: bpy.types.Event) -> bool:
+    """Take a key that switches it or changes its range, and say whether it was one."""
+    tools = settings()
+    if event.type == "O":
+        tools.use_proportional_action = not tools.use_proportional_action
+    elif tools.use_proportional_action and event.type in LARGER:
+        tools.proportional_size *= RANGE_FACTOR
+    elif tools.use_proportional_action and event.type in SMALLER:
+        tools.proportional_size /= RANGE_FACTOR
+    else:
+        return False
+    return True
+
+
+def text() -> str:
+    """Return what the header says of it; nothing where it is switched off."""
+    if not reach():
+        return ""
+    tools = settings()
+    name = tools.bl_rna.properties["proportional_edit_falloff"].enum_items[tools.proportional_edit_falloff].name
+    return iface_("Proportional ({falloff}): {frames:.3g} frames").format(falloff=iface_(name), frames=reach())

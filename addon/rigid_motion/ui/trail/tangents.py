@@ -1,0 +1,233 @@
+"""Tangents at the selected keys of paths: handles in both directions, as long as the way of a third of a second.
+
+Where one is dragged along itself the body becomes faster or slower on that side of the key, and its path stays. B bends
+the path, too: a key is inserted a third of the segment away, and moved so that the path leaves where the handle points.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import gpu
+import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from mathutils import Matrix, Vector
+
+from ...animation import Refused
+from ...animation.edits.path_keys import KeyEdits, insert_key
+from ...animation.edits.path_tangents import AFTER, BEFORE, HANDLE_RATIO, TangentEdit
+from ...animation.evaluation.ends import SLOPE_STEP_RATIO
+from ...animation.transforms import Transform
+from ...blender import (
+    BoolProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    StringProperty,
+    existing,
+    view_layer,
+    with_properties,
+)
+from ..overlay.drawing import KEY_COLOUR, Pen, batch_of, beside
+from ..overlay.parents import maps_of
+from ..overlay.points import DrawnPath
+from ..overlay.settings import RigidMotionOverlay
+from .arms import HANDLE_SECONDS, arms_of, ends_of, frame_rate, is_shown, tangent_under
+from .dragging import Dragging, direction_of
+from .handles import Handles, handles_of, spaces
+
+HANDLE_DIAMETER_PX, HANDLE_WIDTH_PX = 8.0, 1.5
+
+MIN_SLOPE = 0.05
+"""The progress at a key up to which its speed says nothing of the direction."""
+
+TRIED_RATIO = 0.1
+"""The part of the way of a segment by which the key that bends it is moved to see what that does."""
+
+STEP, FINE_STEP = 0.1, 0.01
+"""Steps of Ctrl, and with Shift, in parts of an even speed."""
+
+RANGE_COLOUR, RANGE_WIDTH_PX = (1.0, 1.0, 1.0, 0.35), 9.0
+
+NO_ROOM = n_("{name} has no frame between the keys for one that bends the path: move them apart")
+
+
+def draw(pen: Pen, _: Transform, path: DrawnPath, _frame: float, overlay: RigidMotionOverlay) -> None:
+    """Draw the handles of a path, and while keys are dragged the range of Proportional Editing, in its space."""
+    if not path.selected.any() or not is_shown(path, overlay):
+        return
+    if Dragging.shown_reach:
+        line = existing(path.desired)
+        away = np.abs(path.frames[:, None] - path.key_frames[path.selected]).min(axis=1)
+        within = (away[:-1] <= Dragging.shown_reach) & (away[1:] <= Dragging.shown_reach)
+        pieces = np.stack((line[:-1][within], line[1:][within]), axis=1).reshape(-1, 3)
+        pen.line(batch_of("LINES", pieces), RANGE_COLOUR, RANGE_WIDTH_PX)
+    projection = np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
+    ends = ends_of(path, projection, pen.size, pen.scale)
+    starts = np.broadcast_to(path.keys[path.selected][:, None], ends.shape)
+    is_there = np.isfinite(ends).all(axis=-1)
+    lines = np.stack((starts[is_there], ends[is_there]), axis=1).reshape(-1, 3)
+    pen.outlined_line(batch_of("LINES", lines), pen.look.key_color, HANDLE_WIDTH_PX)
+    pen.dot(batch_of("POINTS", ends[is_there]), pen.look.key_color, HANDLE_DIAMETER_PX, KEY_COLOUR, 1.5)
+
+
+@with_properties
+class RIGID_MOTION_OT_drag_path_tangent(Dragging):
+    bl_idname = "rigid_motion.drag_path_tangent"
+    bl_label = "Drag Tangent of Path"
+    bl_description = (
+        "Set how fast the body leaves a key or comes to it, by the handles of all its channels. The path stays, unless "
+        "it is bent: then it leaves the key in the direction of the tangent"
+    )
+    takes_neighbours = False
+
+    speed: float = FloatProperty(name="Speed", description="At the key, in units a second", min=0.0)
+    bend: Any = FloatVectorProperty(
+        name="Bend",
+        description="How far the key that is inserted to bend the path is moved, in the world. Zero bends nothing",
+        subtype="TRANSLATION",
+        size=3,
+    )
+    after: bool = BoolProperty(name="After the Key", description="Set the speed behind the key", default=True)
+    frame: float = FloatProperty(name="Frame", description="That of the key")
+    target: str = StringProperty(description="What has the key", options={"HIDDEN"})
+
+    def grab(self, context: bpy.types.Context, handles: list[Handles], place: np.ndarray) -> bool:
+        hit = tangent_under(context, handles, place)
+        if hit is not None:
+            self.target, self.frame, self.after = hit[0].target.name, hit[1], hit[2] == AFTER
+        return hit is not None
+
+    def read(self, handles: list[Handles]) -> bool:
+        self._refused, self._is_bending = list[Refused](), False
+        self._bent: KeyEdits | None = None
+        if self._hit is not None:
+            self.target, self.frame = self._hit[0].target.name, self._hit[1]
+        one = self._one(handles)
+        if one is None:
+            return False
+        self._target, self._edits = one.target, self._tangent(one.target)
+        if not self._edits:
+            return False
+        self._pivot = Vector(one.in_world(one.path.keys)[self._number(one)].tolist())
+        self._even = self._at_even_speed(one, self._edits)
+        return True
+
+    def begin(self, _context: Any) -> None:
+        self._arm = self._even * self._edits.slope * HANDLE_SECONDS * frame_rate()
+
+    def tell(self, context: Any) -> None:
+        super().tell(context)
+        text = iface_(
+            "LMB, Enter: Confirm | Esc, RMB: Cancel | B: Bend the Path ({bends}) | Ctrl: Steps | Shift: Precision | "
+            "0-9: Speed"
+        ).format(bends=iface_("On") if self._is_bending else iface_("Off"))
+        existing(context.workspace).status_text_set(text)
+
+    def press(self, context: Any, event: bpy.types.Event) -> bool:
+        if event.type != "B" or event.value != "PRESS":
+            return False
+        self._is_bending = not self._is_bending and self._can_bend()
+        if self._is_bending:
+            self._learn()
+        self.tell(context)
+        return True
+
+    def drag(self, context: Any) -> str:
+        given, number = self._input, self._input.number
+        direction = direction_of(given.axis) if self._is_bending else Vector(self._even.tolist()).normalized()
+        first, last = (self.at(context, place, direction) for place in (given.first, given.place))
+        arm = self._arm + np.array(last - first)
+        even = float(np.linalg.norm(self._even)) * frame_rate()
+        self.speed = max(float(np.linalg.norm(arm) if self._is_bending else arm @ direction), 0.0) / HANDLE_SECONDS
+        if number is not None:
+            self.speed = max(number, 0.0)
+        elif given.is_stepped:
+            step = even * (FINE_STEP if given.is_fine else STEP)
+            self.speed = round(self.speed / step) * step
+        self.bend = self._bend_towards(arm) if self._is_bending else (0.0, 0.0, 0.0)
+        self.apply()
+        return iface_("Speed {speed:.4g} a second ({share:.0f} % of even)").format(
+            speed=self.speed, share=100.0 * self.speed / even
+        )
+
+    def apply(self) -> None:
+        edits, even = self._edits, self._even
+        if any(self.bend) and self._can_bend():
+            self._move(np.array(self.bend))
+            edits = self._tangent(self._target)
+            even = self._at_even_speed(existing(self._one(handles_of(bpy.context))), edits)
+        else:
+            self._bent = None
+        edits.apply(self.speed / frame_rate() / max(float(np.linalg.norm(even)), 1e-9))
+
+    def _one(self, handles: list[Handles]) -> Handles | None:
+        return next((one for one in handles if one.target.name == self.target), None)
+
+    def _number(self, one: Handles) -> int:
+        return int(np.argmin(np.abs(one.path.key_frames - self.frame)))
+
+    def _tangent(self, target: Transform) -> TangentEdit:
+        return TangentEdit(target, self.frame, AFTER if self.after else BEFORE, refused=self._refused)
+
+    def _at_even_speed(self, one: Handles, edits: TangentEdit) -> np.ndarray:
+        """Return how far it would go from the key in a frame, in the world, were its progress even, shape (3,)."""
+        path, number = one.path, self._number(one)
+        if edits.slope > MIN_SLOPE:
+            arm = arms_of(path).velocities[number, int(self.after)] / edits.slope
+        else:
+            line, frame = existing(path.desired), edits.ends[0] + SLOPE_STEP_RATIO * np.diff(edits.ends)[0]
+            place = np.array([np.interp(frame, path.frames, column) for column in line.T])
+            arm = (place - path.keys[number]) / (edits.shares[0] * abs(np.diff(edits.ends)[0]))
+        return np.asarray(maps_of(one.space).axes @ arm)
+
+    def _can_bend(self) -> bool:
+        """Insert the key that bends the path, if it is not there; return whether there is room for it."""
+        if self._bent is None:
+            first, last = self._edits.ends
+            at = float(round(first + HANDLE_RATIO * (last - first)))
+            if not min(first, last) < at < max(first, last):
+                self._refused.append(Refused(NO_ROOM, name=self._target.name))
+                return False
+            self._edits.cancel()
+            insert_key(self._target, at)
+            view_layer().update()
+            one = existing(self._one(handles_of(bpy.context)))
+            self._bent = KeyEdits(spaces({one: (np.array((at,)), np.ones(1))}))
+        return True
+
+    def _move(self, by: np.ndarray) -> None:
+        existing(self._bent).move(lambda _: np.array(Matrix.Translation(by.tolist())))
+
+    def _learn(self) -> None:
+        """Find how the tangent at the key turns as the key that bends the path moves: evenly, where no handle acts."""
+
+        def tangent_with(by: np.ndarray) -> np.ndarray:
+            self._move(by)
+            self._tangent(self._target).apply(None)
+            one = existing(self._one(handles_of(bpy.context)))
+            return np.asarray(
+                maps_of(one.space).axes @ arms_of(one.path).velocities[self._number(one), int(self.after)]
+            )
+
+        self._straight = tangent_with(np.zeros(3))
+        step = TRIED_RATIO * float(np.linalg.norm(self._straight) * abs(np.diff(self._edits.ends)[0]))
+        tried = [tangent_with(step * axis) for axis in np.eye(3)]
+        self._turns = (np.array(tried) - self._straight).T / step
+
+    def _bend_towards(self, arm: np.ndarray) -> np.ndarray:
+        """Return how far the key that bends the path is to be moved for the tangent to point along an arm, (3,)."""
+        goal = arm * (np.linalg.norm(self._straight) / max(float(np.linalg.norm(arm)), 1e-9))
+        return np.asarray(np.linalg.lstsq(self._turns, goal - self._straight, rcond=1e-6)[0])
+
+
+CLASSES = (RIGID_MOTION_OT_drag_path_tangent,)
+
+
+def register() -> None:
+    beside.append(draw)
+
+
+def unregister() -> None:
+    beside.remove(draw)
