@@ -78,7 +78,7 @@ def dragged(given: DragInput, kind: str) -> SimpleNamespace:
     cls = getattr(dragging, f"RIGID_MOTION_OT_{kind}_path_keys")
     operator = SimpleNamespace(_input=given, _pivot=Vector(), apply=lambda: None)
     if kind == "move":
-        operator._at = MethodType(cls._at, operator)
+        operator.at = MethodType(cls.at, operator)
     else:
         cls.begin(operator, context)
     cls.drag(operator, context)

@@ -16,7 +16,7 @@ from bpy.app.translations import pgettext_n as n_
 from mathutils import Matrix, Vector
 
 from ...animation import Refused
-from ...animation.edits.path_keys import KeyEdits, insert_key
+from ...animation.edits.path_keys import KeyEdits, insert_key, select_keys
 from ...animation.edits.path_tangents import AFTER, BEFORE, HANDLE_RATIO, TangentEdit
 from ...animation.evaluation.ends import SLOPE_STEP_RATIO
 from ...animation.transforms import Transform
@@ -44,6 +44,9 @@ MIN_SLOPE = 0.05
 
 TRIED_RATIO = 0.1
 """The part of the way of a segment by which the key that bends it is moved to see what that does."""
+
+MIN_LENGTH_RATIO = 0.5
+"""How much of its length a tangent keeps at least, at an even speed, where the path is bent."""
 
 STEP, FINE_STEP = 0.1, 0.01
 """Steps of Ctrl, and with Shift, in parts of an even speed."""
@@ -190,8 +193,10 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
             if not min(first, last) < at < max(first, last):
                 self._refused.append(Refused(NO_ROOM, name=self._target.name))
                 return False
+            chosen = existing(self._one(handles_of(bpy.context))).selected
             self._edits.cancel()
             insert_key(self._target, at)
+            select_keys(self._target, chosen)
             view_layer().update()
             one = existing(self._one(handles_of(bpy.context)))
             self._bent = KeyEdits(spaces({one: (np.array((at,)), np.ones(1))}))
@@ -218,8 +223,11 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
 
     def _bend_towards(self, arm: np.ndarray) -> np.ndarray:
         """Return how far the key that bends the path is to be moved for the tangent to point along an arm, (3,)."""
-        goal = arm * (np.linalg.norm(self._straight) / max(float(np.linalg.norm(arm)), 1e-9))
-        return np.asarray(np.linalg.lstsq(self._turns, goal - self._straight, rcond=1e-6)[0])
+        both = np.stack((arm / max(float(np.linalg.norm(arm)), 1e-9), self._straight), axis=1)
+        along, stays = np.linalg.lstsq(self._turns, both, rcond=1e-6)[0].T
+        # As long a tangent as moves the key least.
+        length = float(np.linalg.norm(self._straight))
+        return np.asarray(np.clip(along @ stays / (along @ along), MIN_LENGTH_RATIO * length, length) * along - stays)
 
 
 CLASSES = (RIGID_MOTION_OT_drag_path_tangent,)

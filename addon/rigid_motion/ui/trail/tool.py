@@ -58,7 +58,8 @@ class _EditPath(bpy.types.WorkSpaceTool):
     bl_label = "Edit Path"
     bl_description = n_(
         "Edit the paths of the selected objects or bones by their keys: click or drag a box to select, drag or G to "
-        "move, R to rotate, Alt-drag to retime along the path, Ctrl-click on the path to insert a key, X to delete"
+        "move, R to rotate, Alt-drag to retime along the path, drag a tangent to set the speed, Ctrl-click on the path "
+        "to insert a key, X to delete"
     )
     bl_icon = "ops.curve.pen"
     bl_keymap = KEYMAP

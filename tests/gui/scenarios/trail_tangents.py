@@ -1,0 +1,147 @@
+"""Tangents at the keys of a path dragged by their handles, and keys that follow those around them."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from rigid_motion.animation import key_frames
+from tests.animation.keyed import snapshot
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+from tests.gui.keyed import FRAMES, cube, key_the_cube
+from tests.gui.places import Place
+from tests.gui.scenarios.trail import at, back_and_forth, drag, frames_selected, take_the_tool, world_of
+
+MIDDLE = FRAMES[1]
+INSTANT = 0.02
+"""Frames over which a speed is measured."""
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    key_the_cube()
+    cube().scale = (0.4, 0.6, 0.25)
+    view = hand.area("VIEW_3D")
+    view.spaces.active.region_3d.view_distance = 14
+    bpy.ops.rigid_motion.set_mode(mode="motor_spline")
+    yield from take_the_tool(hand, view)
+    yield from hand.press("A", alt=True)
+    yield from hand.click(at(view, cube(), MIDDLE))
+    yield from hand.picture("tangents", places.box_around(at(view, cube(), MIDDLE), 760, 480))
+    yield from faster(hand, view)
+    yield from given_up(hand, view)
+    yield from typed(hand, view)
+    yield from bent(hand, view)
+    yield from followed(hand, view)
+
+
+def velocity(side: int) -> Vector:
+    """How the cube leaves the middle key (1) or comes to it (-1), in units a second, away from the key."""
+    scene = bpy.context.scene
+    ends = []
+    for frame in (MIDDLE, MIDDLE + side * INSTANT):
+        scene.frame_set(int(frame // 1), subframe=frame % 1)
+        cube().evaluated_get(bpy.context.evaluated_depsgraph_get())
+        ends.append(cube().evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation.copy())
+    return (ends[1] - ends[0]) / INSTANT * scene.render.fps
+
+
+def handle(view: bpy.types.Area, side: int) -> Place:
+    """Where the handle is, on the screen."""
+    return places.point(view, world_of(cube(), MIDDLE) + velocity(side) / 3.0)
+
+
+def towards(first: Place, last: Place, factor: float) -> Place:
+    return tuple(round(a + factor * (b - a)) for a, b in zip(first, last, strict=True))
+
+
+def faster(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """Half as fast again behind the key: there alone, and on the path as it was."""
+    before, key = snapshot(cube()), at(view, cube(), MIDDLE)
+    stays = [world_of(cube(), frame) for frame in (*range(1, MIDDLE + 1), FRAMES[2])]
+    speeds, end = [velocity(side).length for side in (-1, 1)], handle(view, 1)
+    yield from drag(hand, end, towards(key, end, 1.5))
+    now = [velocity(side).length for side in (-1, 1)]
+    np.testing.assert_allclose(now, np.multiply(speeds, (1.0, 1.5)), rtol=0.1)
+    for frame, place in zip((*range(1, MIDDLE + 1), FRAMES[2]), stays, strict=True):
+        assert (world_of(cube(), frame) - place).length < 1e-4, frame
+    yield from hand.picture("faster", places.box(view))
+    yield from back_and_forth(hand, cube, before)
+
+
+def given_up(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """Aside nothing happens, and Esc brings all back."""
+    before, key, end = snapshot(cube()), at(view, cube(), MIDDLE), handle(view, 1)
+    yield from held_down(hand, end)
+    yield from hand.glide(towards(key, end, 0.4))
+    assert snapshot(cube()) != before
+    yield from hand.picture("slower", places.box(view))
+    yield from hand.press("ESC")
+    hand._event("LEFTMOUSE", "RELEASE")
+    yield
+    assert snapshot(cube()) == before
+
+
+def held_down(hand: Hand, place: Place) -> Steps[None]:
+    """Press the left button at a place, and begin to drag."""
+    yield from hand.hover(place)
+    hand._event("LEFTMOUSE", "PRESS")
+    yield
+    yield from hand.glide((place[0] + 8, place[1]), 2)
+
+
+def typed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """A speed in units a second."""
+    before = snapshot(cube())
+    yield from held_down(hand, handle(view, -1))
+    yield from hand.type("4")
+    yield from hand.press("RET")
+    hand._event("LEFTMOUSE", "RELEASE")
+    yield
+    assert abs(velocity(-1).length - 4.0) < 0.1, velocity(-1).length
+    yield from back_and_forth(hand, cube, before)
+
+
+def bent(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """With B the path leaves the key where the handle is dragged."""
+    before, key, end = snapshot(cube()), at(view, cube(), MIDDLE), handle(view, 1)
+    aside = end[0] + 10, end[1] + 110
+    yield from held_down(hand, end)
+    yield from hand.press("B")
+    yield from hand.glide(aside)
+    yield from hand.picture("bent")
+    yield from hand.picture("bending", places.box_around(key, 760, 480))
+    hand._event("LEFTMOUSE", "RELEASE")
+    yield
+    assert len(key_frames(cube())) == len(FRAMES) + 1
+    assert frames_selected(cube) == [MIDDLE]
+    wanted, now = np.subtract(aside, key), np.subtract(handle(view, 1), key)
+    assert wanted @ now > 0.99 * np.linalg.norm(wanted) * np.linalg.norm(now), (wanted, now)
+    yield from back_and_forth(hand, cube, before)
+
+
+def followed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """Keys on both sides follow one that is moved, as far as the range goes that the wheel sets."""
+    for frame in (10, 15, 25, 30):
+        bpy.ops.rigid_motion.insert_path_key(frame=frame)
+    yield from hand.press("A", alt=True)
+    yield from hand.click(at(view, cube(), MIDDLE))
+    before, (x, y) = snapshot(cube()), at(view, cube(), MIDDLE)
+    stands = {frame: world_of(cube(), frame) for frame in (1, 10, 15, 20, 25, 30, 40)}
+    tools = bpy.context.scene.tool_settings
+    yield from hand.press("G")
+    yield from hand.press("O")
+    assert tools.use_proportional_action
+    while tools.proportional_size < 7.0:
+        yield from hand.press("PAGE_UP")
+    yield from hand.glide((x, y + 120))
+    yield from hand.picture("proportional", places.box(view))
+    yield from hand.click()
+    moved = {frame: (world_of(cube(), frame) - place).length for frame, place in stands.items()}
+    assert all(moved[frame] < 1e-5 for frame in (1, 10, 30, 40)), moved
+    assert moved[20] > moved[15] > 0.2 < moved[25] < moved[20], moved
+    yield from back_and_forth(hand, cube, before)
+    is_on = bpy.context.scene.tool_settings.use_proportional_action
+    yield from hand.press("O")
+    assert bpy.context.scene.tool_settings.use_proportional_action != is_on, "O is a key of the tool, too"
