@@ -66,7 +66,7 @@ def shown_from_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert seen[NATIVE] > without[NATIVE] + 100, seen
     assert cube().rigid_motion.mode == "BLENDER", "looking changes nothing"
     x, y, width, height = places.box(places.region(view))
-    yield from hand.picture("path-and-panel", (x + width - 860, y + height - 660, 860, 440))
+    yield from hand.picture("path-and-panel", (x + width - 860, y + height - 725, 860, 475))
     # The line is seen between fewer ticks, and the keys are all there, however short the path is on the screen.
     for distance in (40, 90):
         view.spaces.active.region_3d.view_distance = distance

@@ -23,7 +23,7 @@ def scenario(hand: Hand) -> Steps[None]:
     key_the_cube()
     cube().scale = (0.4, 0.6, 0.25)
     view = hand.area("VIEW_3D")
-    view.spaces.active.region_3d.view_distance = 14
+    view.spaces.active.region_3d.view_distance = 11
     bpy.ops.rigid_motion.set_mode(mode="motor_spline")
     yield from take_the_tool(hand, view)
     yield from hand.press("A", alt=True)

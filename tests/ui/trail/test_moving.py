@@ -5,12 +5,14 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix, Quaternion
 
 from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.ui.trail.handles import handles_of
 from tests.animation.held import worlds
 from tests.animation.keyed import curves_of, snapshot
-from tests.animation.scenes import FRAMES, new_object
+from tests.animation.scenes import FRAMES, key, new_object
+from tests.ui.conftest import select_keys
 from tests.ui.trail.conftest import CARRIERS, MIDDLE, MOVE, TURN, about, bone, choose, held_prop
 
 NEAR = 2e-5
@@ -193,3 +195,88 @@ def test_what_has_no_key_of_its_own_there_goes_along(scene, part, mode, edit):
     assert edit() == {"FINISHED"}
     assert worlds(carrier, [MIDDLE]) == pytest.approx(expected(before, edit), abs=NEAR)
     assert worlds(carrier, others) == pytest.approx(stay, abs=NEAR)
+
+
+FALLOFFS = {
+    "LINEAR": lambda near: near,
+    "SMOOTH": lambda near: 3.0 * near**2 - 2.0 * near**3,
+    "SPHERE": lambda near: np.sqrt(2.0 * near - near**2),
+    "ROOT": np.sqrt,
+    "SHARP": lambda near: near**2,
+    "INVERSE_SQUARE": lambda near: 2.0 * near - near**2,
+    "CONSTANT": lambda near: 1.0 * (near > 0.0),
+}
+"""Blender's, of what is left of the range."""
+
+
+@pytest.fixture
+def proportional(scene):
+    """Proportional Editing over 20 frames."""
+    tools = scene.tool_settings
+    before = tools.use_proportional_action, tools.proportional_size, tools.proportional_edit_falloff
+    tools.use_proportional_action, tools.proportional_size, tools.proportional_edit_falloff = True, 20.0, "LINEAR"
+    yield tools
+    tools.use_proportional_action, tools.proportional_size, tools.proportional_edit_falloff = before
+
+
+@pytest.mark.parametrize("edit", [moved, turned])
+@pytest.mark.parametrize("kind", ["QUATERNION", "XYZ", "with deltas", "parented", "hung", "bone"])
+@pytest.mark.parametrize("mode", ["BLENDER", "motor_spline"])
+def test_keys_around_follow_the_less_the_more_frames_they_are_away(proportional, kind, mode, edit):
+    carrier = choose(CARRIERS[kind](), MIDDLE)
+    set_mode(carrier, mode)
+    before = worlds(carrier, FRAMES)
+    edit()
+    for frame, old, new in zip(FRAMES, before, worlds(carrier, FRAMES), strict=True):
+        share = max(1.0 - abs(frame - MIDDLE) / 20.0, 0.0)
+        middle = before[FRAMES.index(MIDDLE), :3, 3]
+        whole = about(middle, Quaternion(TURN.axis, share * TURN.angle))
+        delta = np.array(Matrix.Translation(share * MOVE.translation)) if edit is moved else whole
+        assert new == pytest.approx(delta @ old, abs=NEAR), f"on frame {frame}, by {share}"
+
+
+@pytest.mark.parametrize("falloff", FALLOFFS)
+def test_they_follow_by_the_falloff_that_is_chosen(proportional, falloff):
+    carrier = choose(CARRIERS["QUATERNION"](), MIDDLE)
+    proportional.proportional_edit_falloff = falloff
+    before = worlds(carrier, FRAMES)[:, :3, 3]
+    moved()
+    near = np.clip(1.0 - np.abs(np.array(FRAMES) - MIDDLE) / 20.0, 0.0, 1.0)
+    shares = FALLOFFS[falloff](near)
+    assert worlds(carrier, FRAMES)[:, :3, 3] - before == pytest.approx(np.outer(shares, MOVE.translation), abs=NEAR)
+
+
+def test_of_several_things_each_has_keys_that_follow_its_own(proportional):
+    alone = choose(CARRIERS["with deltas"]())
+    tools = [choose(CARRIERS[kind](), MIDDLE) for kind in ("QUATERNION", "XYZ")]
+    for tool in (*tools, alone):
+        tool.select_set(True)
+    before = [worlds(tool, FRAMES) for tool in (*tools, alone)]
+    moved()
+    shares = np.clip(1.0 - np.abs(np.array(FRAMES) - MIDDLE) / 20.0, 0.0, 1.0)
+    for tool, old in zip(tools, before, strict=False):
+        by = worlds(tool, FRAMES)[:, :3, 3] - old[:, :3, 3]
+        assert by == pytest.approx(np.outer(shares, MOVE.translation), abs=NEAR)
+    assert worlds(alone, FRAMES) == pytest.approx(before[2], abs=NEAR), "none of its keys was selected"
+
+
+def test_keys_that_what_carries_them_takes_along_do_not_follow_twice(proportional):
+    prop = choose(CARRIERS["parented"](), MIDDLE)
+    table = prop.parent
+    table.animation_data_clear()
+    select_keys(key(table), MIDDLE)
+    table.select_set(True)
+    prop.select_set(True)
+    in_table = [np.linalg.inv(a) @ b for a, b in zip(worlds(table, FRAMES), worlds(prop, FRAMES), strict=True)]
+    before = worlds(table, FRAMES)[:, :3, 3]
+    moved()
+    shares = np.clip(1.0 - np.abs(np.array(FRAMES) - MIDDLE) / 20.0, 0.0, 1.0)
+    assert worlds(table, FRAMES)[:, :3, 3] - before == pytest.approx(np.outer(shares, MOVE.translation), abs=NEAR)
+    now = [np.linalg.inv(a) @ b for a, b in zip(worlds(table, FRAMES), worlds(prop, FRAMES), strict=True)]
+    assert now == pytest.approx(np.array(in_table), abs=NEAR)
+
+
+def test_keys_in_time_do_not_follow(proportional):
+    carrier = choose(CARRIERS["QUATERNION"](), MIDDLE)
+    operators.retime_path_keys(frames=2.0)
+    assert key_frames(carrier).tolist() == [FRAMES[0], MIDDLE + 2.0, *FRAMES[2:]]
