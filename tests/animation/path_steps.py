@@ -11,6 +11,7 @@ from mathutils import Euler, Matrix
 
 from rigid_motion import animation
 from rigid_motion.animation.edits.path_keys import KeyEdits, KeySpaces, delete_keys, insert_key
+from rigid_motion.animation.edits.path_tangents import AFTER, BEFORE, TangentEdit
 from rigid_motion.animation.edits.speed import EASES
 from rigid_motion.animation.evaluation.marks import near
 from rigid_motion.animation.transforms import transform_of
@@ -114,6 +115,37 @@ class WithPaths(WithTools):
         assert error < (1e-3 if how == "insert" else 1e-5) * max(1.0, np.abs(poses).max(initial=0.0)), (
             f"{name} moves by {error} where it was to stay"
         )
+
+    @while_on(
+        who=shares, which=seeds, side=st.sampled_from((BEFORE, AFTER)), slope=st.sampled_from((0.0, 0.4, 1.0, 2.5))
+    )
+    def set_its_speed_at_a_key(self, who, which, side, slope):
+        """Its keys stay, and so does all of its motion but on one side of one of them."""
+        name = self._named(who)
+        keys = key_frames(self._found(name))
+        if len(keys) < 2 or self._sharing(name) != {name}:
+            return
+        number = which % len(keys)
+        other = number + (1 if side == AFTER else -1)
+        first, last = sorted(keys[[number, min(max(other, 0), len(keys) - 1)]])
+        stay = np.union1d(np.arange(keys[0], keys[-1], 0.5), keys)
+        stay = stay[(stay <= first) | (stay >= last)]
+        before, poses = self._keyed()[name], self._expected(name, stay)
+        refused: list[animation.Refused] = []
+
+        def change() -> None:
+            edits = TangentEdit(transform_of(self._found(name)), keys[number], side, refused=refused)
+            if edits:
+                edits.apply(slope)
+
+        self._edit(change)
+        after = self._keyed()[name]
+        if refused:
+            assert after == before
+            return
+        assert_keys_at(before, after, lambda x: x, (1, 7, 8, 9, 12, 13))
+        error = np.abs(self._expected(name, stay) - poses).max(initial=0.0)
+        assert error < 1e-5 * max(1.0, np.abs(poses).max(initial=0.0)), f"{name} moves by {error} where it was to stay"
 
     def _free_handles(self, name: Name) -> None:
         for fcurve in moving_curves(self._found(name)):

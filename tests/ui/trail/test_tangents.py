@@ -125,11 +125,17 @@ def test_a_linear_segment_gets_handles_and_keeps_its_other_speed(scene):
     assert np.diff(worlds(tool, [FRAMES[2] - INSTANT, FRAMES[2]])[:, :3, 3], axis=0) == pytest.approx(before, rel=0.02)
 
 
-def test_what_is_held_is_faster_in_its_hand_alone(scene):
-    prop = held_prop("free", 9.0)
-    before = worlds(prop, [9.0, 20.0, 28.0, 40.0, 60.0])
-    operators.drag_path_tangent(speed=3.0, after=True, frame=9.0, target=prop.name)
-    assert_same(worlds(prop, [9.0, 20.0, 28.0, 40.0, 60.0]), before)
+@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize("after", SIDES)
+def test_what_is_held_is_faster_in_its_hand_alone(scene, number, after):
+    prop = held_prop("free")
+    keys = key_frames(prop)
+    choose(prop, keys[number])
+    frames = np.union1d(np.arange(keys[0], keys[-1], 0.5), keys)
+    ends = sorted(keys[[number, min(max(number + (1 if after else -1), 0), len(keys) - 1)]])
+    others = worlds(prop, outside(ends, frames))
+    operators.drag_path_tangent(speed=3.0, after=after, frame=keys[number], target=prop.name)
+    assert worlds(prop, outside(ends, frames)) == pytest.approx(others, abs=2e-5)
 
 
 def begun(tool: Carrier, after: bool) -> SimpleNamespace:

@@ -6,6 +6,8 @@ one slope of that progress, which is 1 where the speed is even. The handle on th
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
@@ -63,6 +65,12 @@ class _Tangent(TriedEdit):
         """The frames of the key, and of the one at the other end of the segment."""
         self.handles = dict(filter(None, (self._handles(transform.channels[row]) for row in source.filled_rows)))
         """By the channels with keys on both: the numbers of these keys, and the frames and values between, (2,)."""
+        self.held = {
+            transform.channels[row]: (keys.times, existing(keys.left)[place], existing(keys.right)[place])
+            for rows, keys in (source.channels if whole.switches else ())
+            for place, row in enumerate(rows if keys.left is not None else ())
+        }
+        """The frames and handles of keys in one hand: by these keys alone, as long as Blender sets all of them."""
         codes = {
             int(existing(self.keys[channel])["interpolation"][min(at), 0]) for channel, (at, _) in self.handles.items()
         }
@@ -116,6 +124,12 @@ class _Tangent(TriedEdit):
         names = ("handle_right", "handle_left")[:: 1 if self.side == AFTER else -1]
         for channel, ((first, other), change) in self.handles.items():
             fields = {name: numbers.copy() for name, numbers in existing(self.keys[channel]).items()}
+            keys: Any = slice(None)
+            if channel in self.held:
+                times, *handles = self.held[channel]
+                keys = np.abs(fields["co"][:, 0] - times[:, None]).argmin(axis=1)
+                for side, points in zip(("left", "right"), handles, strict=True):
+                    fields[f"handle_{side}"][keys], fields[f"handle_{side}_type"][keys] = points, FREE
             begins = fields["interpolation"][min(first, other)]
             for at, name, share in ((first, names[0], (time, slope * time)), (other, names[1], EVEN_END)):
                 if at == first or begins == LINEAR:
@@ -127,8 +141,9 @@ class _Tangent(TriedEdit):
             set_key_fields(fcurve := self.binding.curves[channel], fields)
             # Where Blender sets the handles of other keys by those around, they stay as well.
             now = {name: key_points(fcurve, name) for name in names}
-            moved = np.any([np.abs(now[name] - fields[name]).max(axis=1) > MAX_HANDLE_SHIFT for name in names], axis=0)
-            if moved.any():
+            shifts = np.max([np.abs(now[name] - fields[name]).max(axis=1) for name in names], axis=0)
+            moved = np.arange(len(shifts))[keys][shifts[keys] > MAX_HANDLE_SHIFT]
+            if len(moved):
                 for side in ("left", "right"):
                     fields[f"handle_{side}_type"][moved] = FREE
                 set_key_fields(fcurve, fields)
