@@ -11,7 +11,7 @@ from mathutils import Euler, Matrix
 
 from rigid_motion import animation
 from rigid_motion.animation.edits.path_keys import KeyEdits, KeySpaces, delete_keys, insert_key
-from rigid_motion.animation.edits.path_tangents import AFTER, BEFORE, TangentEdit
+from rigid_motion.animation.edits.path_tangents import SIDE_AFTER, SIDE_BEFORE, TangentEdit
 from rigid_motion.animation.edits.speed import EASES
 from rigid_motion.animation.evaluation.marks import near
 from rigid_motion.animation.transforms import transform_of
@@ -117,7 +117,10 @@ class WithPaths(WithTools):
         )
 
     @while_on(
-        who=shares, which=seeds, side=st.sampled_from((BEFORE, AFTER)), slope=st.sampled_from((0.0, 0.4, 1.0, 2.5))
+        who=shares,
+        which=seeds,
+        side=st.sampled_from((SIDE_BEFORE, SIDE_AFTER)),
+        slope=st.sampled_from((0.0, 0.4, 1.0, 2.5)),
     )
     def set_its_speed_at_a_key(self, who, which, side, slope):
         """Its keys stay, and so does all of its motion but on one side of one of them."""
@@ -126,7 +129,7 @@ class WithPaths(WithTools):
         if len(keys) < 2 or self._sharing(name) != {name}:
             return
         number = which % len(keys)
-        other = number + (1 if side == AFTER else -1)
+        other = number + (1 if side == SIDE_AFTER else -1)
         first, last = sorted(keys[[number, min(max(other, 0), len(keys) - 1)]])
         stay = np.union1d(np.arange(keys[0], keys[-1], 0.5), keys)
         stay = stay[(stay <= first) | (stay >= last)]

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Quaternion, Vector
 
 from rigid_motion.animation import key_frames
 from tests.animation.keyed import snapshot
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.keyed import FRAMES, cube, key_the_cube
+from tests.gui.keyed import FRAMES, cube
 from tests.gui.places import Place
-from tests.gui.scenarios.trail import at, back_and_forth, drag, frames_selected, take_the_tool, world_of
+from tests.gui.scenarios.trail import at, back_and_forth, frames_selected, take_the_tool, world_of
 
 MIDDLE = FRAMES[1]
 INSTANT = 0.02
@@ -20,11 +20,12 @@ INSTANT = 0.02
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    key_the_cube()
-    cube().scale = (0.4, 0.6, 0.25)
+    key_an_arc()
     view = hand.area("VIEW_3D")
     view.spaces.active.region_3d.view_distance = 11
     bpy.ops.rigid_motion.set_mode(mode="motor_spline")
+    overlay = bpy.context.scene.rigid_motion_overlay
+    overlay.show_native = overlay.show_axes = False
     yield from take_the_tool(hand, view)
     yield from hand.press("A", alt=True)
     yield from hand.click(at(view, cube(), MIDDLE))
@@ -36,6 +37,18 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from followed(hand, view)
 
 
+def key_an_arc() -> None:
+    """Three keys on an arc, which the cube follows as it turns."""
+    obj = cube()
+    obj.scale, obj.rotation_mode = (0.4, 0.6, 0.25), "QUATERNION"
+    for frame, location, angle in zip(FRAMES, ((-3, -2, 0), (-0.5, 1.5, 0.8), (3, 2.5, 0)), (0.9, 0.4, 0), strict=True):
+        obj.location, obj.rotation_quaternion = location, Quaternion((0.1, 0, 1), angle)
+        for path in ("location", "rotation_quaternion"):
+            obj.keyframe_insert(path, frame=frame)
+    bpy.context.scene.frame_set(FRAMES[0])
+    bpy.ops.ed.undo_push(message="Keys")
+
+
 def velocity(side: int) -> Vector:
     """How the cube leaves the middle key (1) or comes to it (-1), in units a second, away from the key."""
     scene = bpy.context.scene
@@ -44,6 +57,7 @@ def velocity(side: int) -> Vector:
         scene.frame_set(int(frame // 1), subframe=frame % 1)
         cube().evaluated_get(bpy.context.evaluated_depsgraph_get())
         ends.append(cube().evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation.copy())
+    scene.frame_set(FRAMES[0])
     return (ends[1] - ends[0]) / INSTANT * scene.render.fps
 
 
@@ -57,13 +71,17 @@ def towards(first: Place, last: Place, factor: float) -> Place:
 
 
 def faster(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Half as fast again behind the key: there alone, and on the path as it was."""
+    """Faster by six tenths behind the key: there alone, and on the path as it was."""
     before, key = snapshot(cube()), at(view, cube(), MIDDLE)
     stays = [world_of(cube(), frame) for frame in (*range(1, MIDDLE + 1), FRAMES[2])]
     speeds, end = [velocity(side).length for side in (-1, 1)], handle(view, 1)
-    yield from drag(hand, end, towards(key, end, 1.5))
+    yield from held_down(hand, end)
+    yield from hand.glide(towards(key, end, 1.6))
+    yield from hand.picture("dragging", places.box_around(key, 700, 420))
+    hand._event("LEFTMOUSE", "RELEASE")
+    yield
     now = [velocity(side).length for side in (-1, 1)]
-    np.testing.assert_allclose(now, np.multiply(speeds, (1.0, 1.5)), rtol=0.1)
+    np.testing.assert_allclose(now, np.multiply(speeds, (1.0, 1.6)), rtol=0.1)
     for frame, place in zip((*range(1, MIDDLE + 1), FRAMES[2]), stays, strict=True):
         assert (world_of(cube(), frame) - place).length < 1e-4, frame
     yield from hand.picture("faster", places.box(view))
@@ -76,7 +94,7 @@ def given_up(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from held_down(hand, end)
     yield from hand.glide(towards(key, end, 0.4))
     assert snapshot(cube()) != before
-    yield from hand.picture("slower", places.box(view))
+    yield from hand.picture("slower", places.box_around(key, 700, 420))
     yield from hand.press("ESC")
     hand._event("LEFTMOUSE", "RELEASE")
     yield
@@ -106,12 +124,12 @@ def typed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 def bent(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """With B the path leaves the key where the handle is dragged."""
     before, key, end = snapshot(cube()), at(view, cube(), MIDDLE), handle(view, 1)
-    aside = end[0] + 10, end[1] + 110
+    aside = end[0] - 20, end[1] + 90
     yield from held_down(hand, end)
     yield from hand.press("B")
     yield from hand.glide(aside)
     yield from hand.picture("bent")
-    yield from hand.picture("bending", places.box_around(key, 760, 480))
+    yield from hand.picture("bending", places.box_around(key, 700, 420))
     hand._event("LEFTMOUSE", "RELEASE")
     yield
     assert len(key_frames(cube())) == len(FRAMES) + 1
@@ -137,6 +155,7 @@ def followed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
         yield from hand.press("PAGE_UP")
     yield from hand.glide((x, y + 120))
     yield from hand.picture("proportional", places.box(view))
+    yield from hand.picture("following", places.box_around((x, y), 700, 500))
     yield from hand.click()
     moved = {frame: (world_of(cube(), frame) - place).length for frame, place in stands.items()}
     assert all(moved[frame] < 1e-5 for frame in (1, 10, 30, 40)), moved

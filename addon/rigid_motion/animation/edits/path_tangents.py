@@ -23,7 +23,7 @@ from ..fcurves.keys import BEZIER, LINEAR
 from ..transforms import Channel, Refused, Transform
 from .apply import Readings, TriedEdit, TriedEdits, apply_edit, editable_binding, readable
 
-BEFORE, AFTER = range(2)
+SIDE_BEFORE, SIDE_AFTER = range(2)
 """The sides of a key."""
 
 HANDLE_RATIO = 1.0 / 3.0
@@ -84,7 +84,7 @@ class _Tangent(TriedEdit):
     def _shares(self, whole: KeyedTransform) -> np.ndarray:
         source = whole.run_at(self.ends[0]).source
         moments = self.ends[0] + np.diff(self.ends) * (END_RATIO, *SLOPE_MOMENTS[:3], 1.0 - END_RATIO)
-        forth = 1 if self.side == AFTER else -1
+        forth = 1 if self.side == SIDE_AFTER else -1
         along = progress_at([source], [moments[::forth]])[0][::forth]
         return np.asarray((along[1:4] - along[0]) / (along[4] - along[0]))
 
@@ -121,7 +121,7 @@ class _Tangent(TriedEdit):
 
     def _set_handles(self, slope: float) -> None:
         time = min(HANDLE_RATIO, 1.0 / max(slope, 1.0))
-        names = ("handle_right", "handle_left")[:: 1 if self.side == AFTER else -1]
+        names = ("handle_right", "handle_left")[:: 1 if self.side == SIDE_AFTER else -1]
         for channel, ((first, other), change) in self.handles.items():
             fields = {name: numbers.copy() for name, numbers in existing(self.keys[channel]).items()}
             keys: Any = slice(None)

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...blender import scene
-from ..overlay.points import DrawnPath, on_screen
+from ..overlay.points import MAX_TICKS, DrawnPath, on_screen
 from ..overlay.settings import overlay_settings
 from .handles import REACH_PX, Handles, key_under
 from .tool import TOOL
@@ -31,7 +31,7 @@ class Arms(NamedTuple):
     """To the nearest sample of the path, which has a direction also where the body comes to rest."""
 
 
-SAMPLES = (1, 2, 3)
+SAMPLES_BESIDE_KEY = (1, 2, 3)
 """How many samples beside a key its tangents are read from."""
 
 _known: WeakKeyDictionary[DrawnPath, Arms] = WeakKeyDictionary()
@@ -42,12 +42,12 @@ def arms_of(path: DrawnPath) -> Arms:
     if path not in _known:
         line = path.native if path.desired is None else path.desired
         at = np.searchsorted(path.frames, path.key_frames)
-        steps = at[:, None, None] + np.array((-1, 1))[:, None] * SAMPLES
+        steps = at[:, None, None] + np.array((-1, 1))[:, None] * SAMPLES_BESIDE_KEY
         within = np.clip(steps, 0, len(line) - 1)
         times = np.abs(path.frames[within] - path.key_frames[:, None, None])
         ways = np.where((steps == within)[..., None], line[within] - line[at][:, None, None], np.nan)
         # The slope of the cubic through the key and three samples.
-        apart = times[..., None] - times[..., None, :] + np.eye(len(SAMPLES))
+        apart = times[..., None] - times[..., None, :] + np.eye(len(SAMPLES_BESIDE_KEY))
         with np.errstate(invalid="ignore", divide="ignore"):
             weights = times.prod(axis=-1, keepdims=True) / (times**2 * apart.prod(axis=-1))
             velocities = np.einsum("ksn,ksnc->ksc", weights, ways)
@@ -79,10 +79,11 @@ def frame_rate() -> float:
 
 
 def is_shown(path: DrawnPath, overlay: Any) -> bool:
-    """Return whether the handles of a path are shown: while the tool is taken, of modes as they are keyed."""
+    """Return whether the handles of a path are shown: of modes as they are keyed, while the tool is taken."""
     context: Any = bpy.context
-    is_taken = context.workspace.tools.from_space_view3d_mode(context.mode).idname == TOOL
-    return bool(is_taken and overlay.show_paths and overlay.mode == "CHOSEN" and path.desired is not None)
+    tool = context.workspace.tools.from_space_view3d_mode(context.mode)
+    is_edited = tool is not None and tool.idname == TOOL and overlay.show_paths and overlay.mode == "CHOSEN"
+    return bool(is_edited and path.desired is not None and 0 < np.count_nonzero(path.selected) <= MAX_TICKS)
 
 
 def tangent_under(context: Any, handles: list[Handles], place: np.ndarray) -> tuple[Handles, float, int] | None:
@@ -94,7 +95,7 @@ def tangent_under(context: Any, handles: list[Handles], place: np.ndarray) -> tu
         return None
     nearest, result = REACH_PX * context.preferences.system.ui_scale, None
     for one in handles:
-        if one.path.selected.any() and is_shown(one.path, overlay_settings(scene())):
+        if is_shown(one.path, overlay_settings(scene())):
             size, view = (context.region.width, context.region.height), context.region_data.perspective_matrix
             ends = ends_of(one.path, np.array(view @ one.space), size, context.preferences.system.ui_scale)
             places = on_screen(ends.reshape(-1, 3), np.array(view @ one.space), size)

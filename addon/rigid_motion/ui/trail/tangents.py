@@ -1,7 +1,7 @@
 """Tangents at the selected keys of paths: handles in both directions, as long as the way of a third of a second.
 
 Where one is dragged along itself the body becomes faster or slower on that side of the key, and its path stays. B bends
-the path, too: a key is inserted a third of the segment away, and moved so that the path leaves where the handle points.
+the path, too: a key is inserted halfway in the segment, and moved so that the path leaves where the handle points.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mathutils import Matrix, Vector
 
 from ...animation import Refused
 from ...animation.edits.path_keys import KeyEdits, insert_key, select_keys
-from ...animation.edits.path_tangents import AFTER, BEFORE, HANDLE_RATIO, TangentEdit
+from ...animation.edits.path_tangents import SIDE_AFTER, SIDE_BEFORE, TangentEdit
 from ...animation.evaluation.ends import SLOPE_STEP_RATIO
 from ...animation.transforms import Transform
 from ...blender import (
@@ -42,13 +42,17 @@ HANDLE_DIAMETER_PX, HANDLE_WIDTH_PX = 8.0, 1.5
 MIN_SLOPE = 0.05
 """The progress at a key up to which its speed says nothing of the direction."""
 
+BEND_RATIO = 0.5
+"""The part of the segment after which the key is inserted that bends the path. At the keys of *Smooth Screw* segments of
+like durations have most say: were it nearer, it would have to be far off."""
+
 TRIED_RATIO = 0.1
 """The part of the way of a segment by which the key that bends it is moved to see what that does."""
 
 MIN_LENGTH_RATIO = 0.5
 """How much of its length a tangent keeps at least, at an even speed, where the path is bent."""
 
-STEP, FINE_STEP = 0.1, 0.01
+SPEED_STEP_RATIO, FINE_SPEED_STEP_RATIO = 0.1, 0.01
 """Steps of Ctrl, and with Shift, in parts of an even speed."""
 
 RANGE_COLOUR, RANGE_WIDTH_PX = (1.0, 1.0, 1.0, 0.35), 9.0
@@ -58,14 +62,14 @@ NO_ROOM = n_("{name} has no frame between the keys for one that bends the path: 
 
 def draw(pen: Pen, _: Transform, path: DrawnPath, _frame: float, overlay: RigidMotionOverlay) -> None:
     """Draw the handles of a path, and while keys are dragged the range of Proportional Editing, in its space."""
-    if not path.selected.any() or not is_shown(path, overlay):
-        return
-    if Dragging.shown_reach:
-        line = existing(path.desired)
+    if Dragging.shown_reach and path.selected.any():
+        line = path.native if path.desired is None else path.desired
         away = np.abs(path.frames[:, None] - path.key_frames[path.selected]).min(axis=1)
         within = (away[:-1] <= Dragging.shown_reach) & (away[1:] <= Dragging.shown_reach)
         pieces = np.stack((line[:-1][within], line[1:][within]), axis=1).reshape(-1, 3)
         pen.line(batch_of("LINES", pieces), RANGE_COLOUR, RANGE_WIDTH_PX)
+    if not is_shown(path, overlay):
+        return
     projection = np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
     ends = ends_of(path, projection, pen.size, pen.scale)
     starts = np.broadcast_to(path.keys[path.selected][:, None], ends.shape)
@@ -99,7 +103,7 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
     def grab(self, context: bpy.types.Context, handles: list[Handles], place: np.ndarray) -> bool:
         hit = tangent_under(context, handles, place)
         if hit is not None:
-            self.target, self.frame, self.after = hit[0].target.name, hit[1], hit[2] == AFTER
+            self.target, self.frame, self.after = hit[0].target.name, hit[1], hit[2] == SIDE_AFTER
         return hit is not None
 
     def read(self, handles: list[Handles]) -> bool:
@@ -147,7 +151,7 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         if number is not None:
             self.speed = max(number, 0.0)
         elif given.is_stepped:
-            step = even * (FINE_STEP if given.is_fine else STEP)
+            step = even * (FINE_SPEED_STEP_RATIO if given.is_fine else SPEED_STEP_RATIO)
             self.speed = round(self.speed / step) * step
         self.bend = self._bend_towards(arm) if self._is_bending else (0.0, 0.0, 0.0)
         self.apply()
@@ -172,7 +176,7 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         return int(np.argmin(np.abs(one.path.key_frames - self.frame)))
 
     def _tangent(self, target: Transform) -> TangentEdit:
-        return TangentEdit(target, self.frame, AFTER if self.after else BEFORE, refused=self._refused)
+        return TangentEdit(target, self.frame, SIDE_AFTER if self.after else SIDE_BEFORE, refused=self._refused)
 
     def _at_even_speed(self, one: Handles, edits: TangentEdit) -> np.ndarray:
         """Return how far it would go from the key in a frame, in the world, were its progress even, shape (3,)."""
@@ -189,7 +193,7 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         """Insert the key that bends the path, if it is not there; return whether there is room for it."""
         if self._bent is None:
             first, last = self._edits.ends
-            at = float(round(first + HANDLE_RATIO * (last - first)))
+            at = float(round(first + BEND_RATIO * (last - first)))
             if not min(first, last) < at < max(first, last):
                 self._refused.append(Refused(NO_ROOM, name=self._target.name))
                 return False
