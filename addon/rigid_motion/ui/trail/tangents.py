@@ -43,8 +43,8 @@ MIN_SLOPE = 0.05
 """The progress at a key up to which its speed says nothing of the direction."""
 
 BEND_RATIO = 0.5
-"""The part of the segment after which the key is inserted that bends the path. At the keys of *Smooth Screw* segments of
-like durations have most say: were it nearer, it would have to be far off."""
+"""The part of the segment after which the key is inserted that bends the path. At the keys of *Smooth Screw* segments
+of like durations have most say: were it nearer, it would have to be far off."""
 
 TRIED_RATIO = 0.1
 """The part of the way of a segment by which the key that bends it is moved to see what that does."""
