@@ -34,7 +34,7 @@ class Written:
 def written():
     """Plan from what is written out here, and not from keys."""
 
-    def channel_differences(sources, frames, *_):
+    def channel_differences(sources, frames):
         result = []
         for source, times in zip(sources, frames, strict=True):
             assert np.all(np.diff(times) > 0.0)

@@ -98,22 +98,19 @@ class _Tangent(TriedEdit):
             return None
         return channel, ((first, other), np.diff(fields["co"][at].astype(np.float64), axis=0)[0])
 
-    def run_straight(self) -> None:
-        """Have the progress of its segment be even."""
-        for channel, (at, _) in self.handles.items():
-            fields = {name: numbers.copy() for name, numbers in existing(self.keys[channel]).items()}
-            fields["interpolation"][min(at)] = LINEAR
-            set_key_fields(self.binding.curves[channel], fields)
-
-    def key(self, slope: float) -> None:
-        """Have the progress of its segment have this slope at the key, on its side."""
+    def key(self, slope: float | None) -> None:
+        """Have the progress of its segment have this slope at the key, on its side; None for straight F-curves."""
+        if slope is None:
+            for channel, (at, _) in self.handles.items():
+                self.binding.curves[channel].keyframe_points[min(at)].interpolation = "LINEAR"
+            return
         if self.slopes is None:
             # At keys of a smooth mode it is that of Blender's own in-betweens in the direction of the tangent.
             self.slopes = self._slope_with(0.0), self._slope_with(1.0)
             self.put_back()
         low, high = self.slopes
         is_steady = MIN_GAIN < high - low < 1.0 / MIN_GAIN
-        self._set_handles(max((slope - low) / (high - low), 0.0) if is_steady else slope)
+        self._set_handles(max((slope - low) / (high - low) if is_steady else slope, 0.0))
 
     def _slope_with(self, slope: float) -> float:
         self._set_handles(slope)
@@ -177,7 +174,4 @@ class TangentEdit(TriedEdits):
         """Have progress have this slope at the key; None for an even one throughout, without handles."""
         with self.edit():
             for one in self.tried:
-                if slope is None:
-                    one.run_straight()
-                else:
-                    one.key(max(slope, 0.0))
+                one.key(slope)

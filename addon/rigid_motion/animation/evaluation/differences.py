@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,9 @@ from .channel_values import channel_values, steps_of
 from .components import MODE_NAMES, MODE_NUMBERS, ROWS, SCALE, SMOOTH_MODES
 from .ends import SLOPE_MOMENTS, Ends, corrected, packed
 from .sources import KeyedTransform, each, sampled, values_of
+
+MOST_PREPARED = 4
+"""Motions of as many groups of sources stay prepared: each round of planning asks for other frames of the same ones."""
 
 
 class InBetweens(NamedTuple):
@@ -103,10 +107,7 @@ def progress_at(sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray])
 
 
 def channel_differences(
-    sources: Sequence[KeyedTransform],
-    frames: Sequence[np.ndarray],
-    given: np.ndarray | None = None,
-    prepared: Prepared | None = None,
+    sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray], given: np.ndarray | None = None
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return what is to be added to the channels of each source, and the values that they have by themselves.
 
@@ -117,8 +118,6 @@ def channel_differences(
         Rising doubles for each. Those that are not inside of `spans` have no difference.
     given : array, shape (m,), optional
         How far the body of the only source has come in its segment.
-    prepared : dict, optional
-        What does not depend on frames, kept here for the next time that the same sources are asked for.
 
     Returns
     -------
@@ -128,17 +127,14 @@ def channel_differences(
         continuous, and nearest to those of the key at the beginning. Rows that are not filled have no difference.
     """
     if any(source.switches for source in sources):
-        return _differences_of_runs(sources, frames, given, prepared)
-    prepared = {} if prepared is None else prepared
+        return _differences_of_runs(sources, frames, given)
     differences = [np.zeros((10, len(times))) for times in frames]
     natives: dict[int, np.ndarray] = {}
     acting = [number for number, source in enumerate(sources) if source.is_live and source.is_repeatable]
     for portion in _alike([sources[number] for number in acting]):
         numbers = [acting[place] for place in portion]
         some, times = [sources[number] for number in numbers], [frames[number] for number in numbers]
-        if (same := tuple(map(id, some))) not in prepared:
-            prepared[same] = _Motion.of(some)
-        values, native, live = prepared[same].values(times, given)
+        values, native, live = _prepared(*some).values(times, given)
         for number, (source, span) in zip(numbers, each(some, map(len, times)), strict=True):
             rows = source.filled_rows
             differences[number][rows] = np.where(live[span], values[rows, span] - native[rows, span], 0.0)
@@ -150,10 +146,7 @@ def channel_differences(
 
 
 def _differences_of_runs(
-    sources: Sequence[KeyedTransform],
-    frames: Sequence[np.ndarray],
-    given: np.ndarray | None,
-    prepared: Prepared | None,
+    sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray], given: np.ndarray | None
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return `channel_differences` of sources, some of which pass from one holder to another: each run by itself."""
     runs = [(number, run) for number, source in enumerate(sources) for run in source.runs]
@@ -168,7 +161,7 @@ def _differences_of_runs(
     ]
     asked = [run.source if sources[number].switches else sources[number] for number, run in runs]
     if given is None:
-        of_runs = channel_differences(asked, moments, prepared=prepared)
+        of_runs = channel_differences(asked, moments)
     else:
         of_runs = [
             channel_differences([source], [times], given[part])[0]
@@ -354,8 +347,9 @@ def _poses(ends: Ends, modes: np.ndarray, counts: np.ndarray, progress: np.ndarr
     return Poses(rows[:, :3], rows[:, 3:7], None if ends.keys.scales is None else rows[:, 7])
 
 
-Prepared = dict[tuple[int, ...], _Motion]
-"""By the identities of sources, which have to stay alive."""
+@lru_cache(maxsize=MOST_PREPARED)
+def _prepared(*sources: KeyedTransform) -> _Motion:
+    return _Motion.of(sources)
 
 
 def _segments(sources: Sequence[KeyedTransform]) -> list[tuple[KeyedTransform, slice]]:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..evaluation.components import LOCATION, ROTATION, ROWS
-from ..evaluation.differences import Prepared, channel_differences
+from ..evaluation.differences import channel_differences
 from ..evaluation.sources import KeyedTransform
 from ..evaluation.spans import Span, spans
 from .carriers import CARRIER_TOLERANCE_RATIO, Term, carry, fit_of
@@ -95,7 +95,7 @@ class _Spans:
     """The spans of all sources, and their differences on any frames: where planning meets evaluation."""
 
     def __init__(self, sources: Sequence[KeyedTransform]) -> None:
-        self.sources, self.prepared = sources, Prepared()
+        self.sources = sources
         found = [(number, span) for number, source in enumerate(sources) for span in spans(source)]
         self.all: list[Span] = [span for _, span in found]
         self.owners = np.array([number for number, _ in found], int)
@@ -117,9 +117,7 @@ class _Spans:
         frames = np.clip(frames, first + SPAN_EDGE_RATIO * (last - first), last - SPAN_EDGE_RATIO * (last - first))
         owners, starts = np.unique(self.owners[numbers], return_index=True)
         asked = [np.unique(of_source, return_inverse=True) for of_source in np.split(frames, starts[1:])]
-        values = channel_differences(
-            [self.sources[owner] for owner in owners], [rising for rising, _ in asked], None, self.prepared
-        )
+        values = channel_differences([self.sources[owner] for owner in owners], [rising for rising, _ in asked])
         shape = (len(COMPONENT_TOLERANCES), -1, frames.shape[1])
         both = [np.stack(pair)[:, :, places.ravel()] for pair, (_, places) in zip(values, asked, strict=True)]
         difference, native = np.concatenate(both, axis=2).reshape(2, *shape).transpose(0, 2, 1, 3)

@@ -11,7 +11,7 @@ import numpy as np
 from ...blender import scene
 from ..overlay.points import MAX_TICKS, DrawnPath, on_screen
 from ..overlay.settings import overlay_settings
-from .handles import REACH_PX, Handles, key_under
+from .handles import Handles, key_under, nearest_under
 from .tool import TOOL
 
 HANDLE_SECONDS = 1.0 / 3.0
@@ -93,14 +93,13 @@ def tangent_under(context: Any, handles: list[Handles], place: np.ndarray) -> tu
     """
     if key_under(context, handles, place) is not None:
         return None
-    nearest, result = REACH_PX * context.preferences.system.ui_scale, None
-    for one in handles:
-        if is_shown(one.path, overlay_settings(scene())):
-            size, view = (context.region.width, context.region.height), context.region_data.perspective_matrix
-            ends = ends_of(one.path, np.array(view @ one.space), size, context.preferences.system.ui_scale)
-            places = on_screen(ends.reshape(-1, 3), np.array(view @ one.space), size)
-            away = np.nan_to_num(np.linalg.norm(places - place, axis=1), nan=np.inf)
-            if away.min() <= nearest:
-                nearest, (number, side) = away.min(), divmod(int(away.argmin()), 2)
-                result = one, float(one.selected[number]), side
-    return result
+    size, view = (context.region.width, context.region.height), context.region_data.perspective_matrix
+
+    def ends(one: Handles) -> np.ndarray:
+        projection = np.array(view @ one.space)
+        there = ends_of(one.path, projection, size, context.preferences.system.ui_scale)
+        return on_screen(there.reshape(-1, 3), projection, size)
+
+    shown = ((one, ends(one)) for one in handles if is_shown(one.path, overlay_settings(scene())))
+    hit = nearest_under(context, shown, place)
+    return None if hit is None else (hit[0], float(hit[0].selected[hit[1] // 2]), hit[1] % 2)

@@ -84,11 +84,19 @@ def _on_screen(context: Any, points: np.ndarray) -> np.ndarray:
 
 def key_under(context: Any, handles: Iterable[Handles], place: np.ndarray) -> tuple[Handles, float] | None:
     """Return the key that a place on the screen is on, by its frame; None where it is on none."""
+    hit = nearest_under(context, ((one, one.at_keys(context)) for one in handles), place)
+    return None if hit is None else (hit[0], float(hit[0].path.key_frames[hit[1]]))
+
+
+def nearest_under(
+    context: Any, shown: Iterable[tuple[Handles, np.ndarray]], place: np.ndarray
+) -> tuple[Handles, int] | None:
+    """Return which of the points (n, 2) of which path a place on the screen is on; None where it is on none."""
     nearest, result = REACH_PX * context.preferences.system.ui_scale, None
-    for one in handles:
-        distances = np.nan_to_num(np.linalg.norm(one.at_keys(context) - place, axis=1), nan=np.inf)
+    for one, points in shown:
+        distances = np.nan_to_num(np.linalg.norm(points - place, axis=1), nan=np.inf)
         if (distance := float(distances.min())) <= nearest:
-            nearest, result = distance, (one, float(one.path.key_frames[int(distances.argmin())]))
+            nearest, result = distance, (one, int(distances.argmin()))
     return result
 
 

@@ -163,7 +163,8 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         edits, even = self._edits, self._even
         if any(self.bend) and self._can_bend():
             self._move(np.array(self.bend))
-            edits = self._tangent(self._target)
+            if not (edits := self._tangent(self._target)):
+                return
             even = self._at_even_speed(existing(self._one(handles_of(bpy.context))), edits)
         else:
             self._bent = None
@@ -180,13 +181,16 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
 
     def _at_even_speed(self, one: Handles, edits: TangentEdit) -> np.ndarray:
         """Return how far it would go from the key in a frame, in the world, were its progress even, shape (3,)."""
-        path, number = one.path, self._number(one)
         if edits.slope > MIN_SLOPE:
-            arm = arms_of(path).velocities[number, int(self.after)] / edits.slope
-        else:
-            line, frame = existing(path.desired), edits.ends[0] + SLOPE_STEP_RATIO * np.diff(edits.ends)[0]
-            place = np.array([np.interp(frame, path.frames, column) for column in line.T])
-            arm = (place - path.keys[number]) / (edits.shares[0] * abs(np.diff(edits.ends)[0]))
+            return self._velocity(one) / edits.slope
+        by = SLOPE_STEP_RATIO * np.diff(edits.ends)[0]
+        first, last = one.in_world(
+            np.stack([existing(one.path.at(at)[1]) for at in (edits.ends[0], edits.ends[0] + by)])
+        )
+        return np.asarray((last - first) * SLOPE_STEP_RATIO / (edits.shares[0] * abs(by)))
+
+    def _velocity(self, one: Handles) -> np.ndarray:
+        arm = arms_of(one.path).velocities[self._number(one), int(self.after)]
         return np.asarray(maps_of(one.space).axes @ arm)
 
     def _can_bend(self) -> bool:
@@ -215,10 +219,7 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         def tangent_with(by: np.ndarray) -> np.ndarray:
             self._move(by)
             self._tangent(self._target).apply(None)
-            one = existing(self._one(handles_of(bpy.context)))
-            return np.asarray(
-                maps_of(one.space).axes @ arms_of(one.path).velocities[self._number(one), int(self.after)]
-            )
+            return self._velocity(existing(self._one(handles_of(bpy.context))))
 
         self._straight = tangent_with(np.zeros(3))
         step = TRIED_RATIO * float(np.linalg.norm(self._straight) * abs(np.diff(self._edits.ends)[0]))
