@@ -52,7 +52,7 @@ def not_promised(rig: bpy.types.Object) -> tuple[str, ...]:
     animated |= {driver.data_path for driver in drivers}
     bones, followers = pose_bones(rig), set()
     for bone in bones:
-        if not driven.isdisjoint(f"{bone.path_from_id()}.{name}" for name in MOVING_CHANNELS):
+        if driven and not driven.isdisjoint(f"{bone.path_from_id()}.{name}" for name in MOVING_CHANNELS):
             followers.add(bone.name)
         for constraint in bone.constraints:
             switches = {f"{constraint.path_from_id()}.{name}" for name in ("influence", "mute", "enabled")}
@@ -63,6 +63,8 @@ def not_promised(rig: bpy.types.Object) -> tuple[str, ...]:
                     count = constraint.chain_count - getattr(constraint, "use_tail", True)
                     above = bone.parent_recursive[:count] if constraint.chain_count else bone.parent_recursive
                     followers |= {parent.name for parent in above}
+    if not followers:
+        return ()
     return tuple(bone.name for bone in bones if any(item.name in followers for item in (bone, *bone.parent_recursive)))
 
 
