@@ -109,7 +109,7 @@ def test_a_body_is_as_fast_as_was_asked_for_on_one_side(scene, mode, after, spee
 @pytest.mark.parametrize("after", SIDES)
 def test_a_handle_is_as_long_as_the_body_is_fast(scene, after):
     tool = arc("motor_spline")
-    arm = arms_of(handle().path).velocities[1, int(after)] * frame_rate()
+    arm = arms_of(handle().path)[0][1, int(after)] * frame_rate()
     assert arm == pytest.approx(velocity(tool, after), rel=0.02, abs=0.05)
 
 

@@ -161,14 +161,14 @@ class TangentEdit(TriedEdits):
         return np.asarray(self.tried[0].ends)
 
     @property
-    def shares(self) -> np.ndarray:
-        """See `_Tangent`."""
-        return np.asarray(self.tried[0].shares)
+    def first_share(self) -> float:
+        """The part of the segment that is done an eighth of it away from the key."""
+        return float(self.tried[0].shares[0])
 
     @property
     def slope(self) -> float:
         """The slope of progress at the key: 1 at an even speed, 0 at rest."""
-        return float(self.shares @ SLOPE_WEIGHTS)
+        return float(self.tried[0].shares @ SLOPE_WEIGHTS)
 
     def apply(self, slope: float | None) -> None:
         """Have progress have this slope at the key; None for an even one throughout, without handles."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
+from typing import Any
 
 import bpy
 import numpy as np
@@ -21,38 +20,27 @@ MIN_HANDLE_PX = 28.0
 """At a resolution scale of 1, so that slow motion has handles that can be taken."""
 
 
-class Arms(NamedTuple):
-    """The tangents of k keys: before them and behind them, away from the key, shape (k, 2, 3); NaN where none is."""
-
-    velocities: np.ndarray
-    """By a frame."""
-
-    ways: np.ndarray
-    """To the nearest sample of the path, which has a direction also where the body comes to rest."""
-
-
 SAMPLES_BESIDE_KEY = (1, 2, 3)
 """How many samples beside a key its tangents are read from."""
 
-_known: WeakKeyDictionary[DrawnPath, Arms] = WeakKeyDictionary()
 
+def arms_of(path: DrawnPath) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tangents at the keys of a path, before them and behind them, in its space, away from the key.
 
-def arms_of(path: DrawnPath) -> Arms:
-    """Return the tangents at the keys of a path, in its space, from the samples beside them."""
-    if path not in _known:
-        line = path.native if path.desired is None else path.desired
-        at = np.searchsorted(path.frames, path.key_frames)
-        steps = at[:, None, None] + np.array((-1, 1))[:, None] * SAMPLES_BESIDE_KEY
-        within = np.clip(steps, 0, len(line) - 1)
-        times = np.abs(path.frames[within] - path.key_frames[:, None, None])
-        ways = np.where((steps == within)[..., None], line[within] - line[at][:, None, None], np.nan)
-        # The slope of the cubic through the key and three samples.
-        apart = times[..., None] - times[..., None, :] + np.eye(len(SAMPLES_BESIDE_KEY))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            weights = times.prod(axis=-1, keepdims=True) / (times**2 * apart.prod(axis=-1))
-            velocities = np.einsum("ksn,ksnc->ksc", weights, ways)
-        _known[path] = Arms(velocities, ways[:, :, 0])
-    return _known[path]
+    By a frame, from the samples beside keys; and the ways to the nearest samples, which have a direction also where the
+    body comes to rest; each (k, 2, 3). They are NaN where there is no path.
+    """
+    line = path.native if path.desired is None else path.desired
+    at = np.searchsorted(path.frames, path.key_frames)
+    steps = at[:, None, None] + np.array((-1, 1))[:, None] * SAMPLES_BESIDE_KEY
+    within = np.clip(steps, 0, len(line) - 1)
+    times = np.abs(path.frames[within] - path.key_frames[:, None, None])
+    ways = np.where((steps == within)[..., None], line[within] - line[at][:, None, None], np.nan)
+    # The slope of the cubic through the key and three samples.
+    apart = times[..., None] - times[..., None, :] + np.eye(len(SAMPLES_BESIDE_KEY))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        weights = times.prod(axis=-1, keepdims=True) / (times**2 * apart.prod(axis=-1))
+        return np.einsum("ksn,ksnc->ksc", weights, ways), ways[:, :, 0]
 
 
 def ends_of(path: DrawnPath, projection: np.ndarray, size: tuple[float, float], scale: float) -> np.ndarray:

@@ -168,7 +168,11 @@ class Dragging(OnPath):
     def tell(self, context: Any) -> None:
         """Have the status bar show the keys, and the viewport the range of Proportional Editing."""
         Dragging.shown_reach = proportional.reach() if self.takes_neighbours else 0.0
-        existing(context.workspace).status_text_set(iface_(self.keys_text))
+        existing(context.workspace).status_text_set(self.keys_shown())
+
+    def keys_shown(self) -> str:
+        """Return what the status bar says of keys."""
+        return iface_(self.keys_text)
 
     def begin(self, context: Any) -> None:
         """Note how the viewport is when the drag begins."""

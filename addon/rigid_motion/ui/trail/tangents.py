@@ -124,13 +124,11 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
     def begin(self, _context: Any) -> None:
         self._arm = self._even * self._edits.slope * HANDLE_SECONDS * frame_rate()
 
-    def tell(self, context: Any) -> None:
-        super().tell(context)
-        text = iface_(
+    def keys_shown(self) -> str:
+        return iface_(
             "LMB, Enter: Confirm | Esc, RMB: Cancel | B: Bend the Path ({bends}) | Ctrl: Steps | Shift: Precision | "
             "0-9: Speed"
         ).format(bends=iface_("On") if self._is_bending else iface_("Off"))
-        existing(context.workspace).status_text_set(text)
 
     def press(self, context: Any, event: bpy.types.Event) -> bool:
         if event.type != "B" or event.value != "PRESS":
@@ -187,10 +185,10 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         first, last = one.in_world(
             np.stack([existing(one.path.at(at)[1]) for at in (edits.ends[0], edits.ends[0] + by)])
         )
-        return np.asarray((last - first) * SLOPE_STEP_RATIO / (edits.shares[0] * abs(by)))
+        return np.asarray((last - first) * SLOPE_STEP_RATIO / (edits.first_share * abs(by)))
 
     def _velocity(self, one: Handles) -> np.ndarray:
-        arm = arms_of(one.path).velocities[self._number(one), int(self.after)]
+        arm = arms_of(one.path)[0][self._number(one), int(self.after)]
         return np.asarray(maps_of(one.space).axes @ arm)
 
     def _can_bend(self) -> bool:
