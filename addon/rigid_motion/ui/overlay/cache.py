@@ -27,9 +27,9 @@ from ...handlers import append_handlers, remove_handlers
 from ..targets import selected_in_view
 from . import records
 from .ghosts import ghosts_of
-from .held import HolderMotion, is_held
+from .held import HolderMotion, carrier_of
 from .kinds import axis_length_of, followed, space_of
-from .parents import CarriedTargets, Parents
+from .parents import CarriedTargets
 from .points import DrawnPath, trace
 
 MAX_SPARE_PATHS = 64
@@ -181,17 +181,16 @@ def _read(
     if binding is None or source is None:
         # Where it was refused, the panel says why.
         return entry
-    if is_held(source):
-        return _read_held(target, binding, source, entry, settings, before, carried)
-    parents = None if existing(target.animated.animation_data).use_tweak_mode else Parents(target, carried)
-    if parents is not None and parents.move_by_keys:
-        entry.above, entry.settings = frozenset(parents.ids), (*settings, b"")
-    else:
-        parents = None
+    carrier, is_tweaked = carrier_of(target, source, carried), existing(data).use_tweak_mode
+    held = carrier if isinstance(carrier, HolderMotion) else None
+    if carrier is not None:
+        entry.above, entry.settings = frozenset(carrier.ids), (*settings, b"")
+    if held is not None and is_tweaked:  # In a strip that is entered it has no path.
+        return entry
     mode, tick_step, axes_size, ghost_step, *_ = settings
-    point = followed(target, source, turn)
-    size = axis_length_of(target, source)
-    entry.selected = _selection(binding)
+    point = None if held else followed(target, source, turn)
+    size = axes_size * axis_length_of(target, source)
+    entry.selected, entry.records = _selection(binding), held.records if held else ()
     # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
     of_point = () if point is None else (point.moves, point.stays.tobytes(), point.tip.tobytes())
     selected = frames_in(binding, selected=True)
@@ -199,45 +198,24 @@ def _read(
     entry.digest = (
         *(source.digest, source.original.tobytes(), tuple(source.rest.items()), of_point, selected.tobytes(), size),
         entry.settings,
-        *(tuple(stands) if ghost_step else (), parents and parents.digest),
+        *(tuple(stands) if ghost_step else (), carrier and carrier.digest),
     )
     if before is not None and before.digest == entry.digest:
         entry.path = before.path
-    else:
-        with suppress(ValueError):  # numbers that make no motion
-            chosen = None if mode == "CHOSEN" else mode
-            entry.path = trace(source, chosen, tick_step, axes_size * size, selected, point, parents)
-            if ghost_step and entry.path is not None:
-                entry.path = replace(entry.path, ghosts=ghosts_of(target, source, chosen, ghost_step, turn, parents))
-    return entry
-
-
-def _read_held(
-    target: Transform,
-    binding: Binding,
-    source: KeyedTransform,
-    entry: _Entry,
-    settings: tuple,
-    before: _Entry | None,
-    carried: CarriedTargets,
-) -> _Entry:
-    """Fill the entry of something that is held. In a strip that is tweaked it has no path."""
-    entry.settings = (*settings, b"")
-    if existing(target.animated.animation_data).use_tweak_mode:
         return entry
-    held = HolderMotion(target, source, carried)
-    mode, tick_step, axes_size, ghost_step, *_ = settings
-    selected, size = frames_in(binding, selected=True), axes_size * axis_length_of(target, source)
-    entry.above, entry.records, entry.selected = held.ids, held.records, _selection(binding)
-    entry.digest = (source.digest, tuple(source.rest.items()), selected.tobytes(), size, entry.settings, held.digest)
-    if before is not None and before.digest == entry.digest:
-        entry.path = before.path
-    else:
-        with suppress(ValueError):  # numbers that make no motion
-            chosen = None if mode == "CHOSEN" else mode
-            entry.path = held.trace(chosen, tick_step, size, selected)
-            if ghost_step and entry.path is not None:
-                entry.path = replace(entry.path, ghosts=held.ghosts(ghost_step, chosen))
+    with suppress(ValueError):  # numbers that make no motion
+        chosen = None if mode == "CHOSEN" else mode
+        if isinstance(carrier, HolderMotion):
+            entry.path = carrier.trace(chosen, tick_step, size, selected)
+        else:
+            entry.path = trace(source, chosen, tick_step, size, selected, point, carrier)
+        if ghost_step and entry.path is not None:
+            ghosts = (
+                carrier.ghosts(ghost_step, chosen)
+                if isinstance(carrier, HolderMotion)
+                else ghosts_of(target, source, chosen, ghost_step, turn, carrier)
+            )
+            entry.path = replace(entry.path, ghosts=ghosts)
     return entry
 
 

@@ -17,6 +17,7 @@ from ...animation.evaluation.components import MODE_NUMBERS
 from ...animation.evaluation.sources import HoldRun, KeyedTransform
 from ...animation.holds.holders import Holder, holders_of
 from ...animation.transforms import Transform, transform_of
+from ...blender import existing
 from ...motion.affine import AffineMaps
 from .blends import blended, smoothstep
 from .ghosts import Ghosts, ghost_frames, in_space_of_path, matrices_of
@@ -203,6 +204,19 @@ class HolderMotion:
 def is_held(source: KeyedTransform) -> bool:
     """Return whether anything holds what has these keys at any time."""
     return source.held is not None and any(source.hold_at(run.stretch.first)[0] for run in source.runs)
+
+
+def carrier_of(target: Transform, source: KeyedTransform, carried: CarriedTargets) -> HolderMotion | Parents | None:
+    """Return what holds something with keys, or the parents that carry it where these move by keys; None for neither.
+
+    In a strip that is entered parents are taken as they are on the current frame.
+    """
+    if is_held(source):
+        return HolderMotion(target, source, carried)
+    if existing(target.animated.animation_data).use_tweak_mode:
+        return None
+    parents = Parents(target, carried)
+    return parents if parents.move_by_keys else None
 
 
 def pieces_of(holders: np.ndarray) -> tuple[Piece, ...]:

@@ -17,7 +17,7 @@ from ...blender import existing
 from ...motion.affine import AffineMaps
 from .cache import paths_of
 from .ghosts import in_space_of_path
-from .held import HolderMotion, is_held
+from .held import HolderMotion, carrier_of
 from .kinds import axis_length_of, followed, space_of
 from .parents import CarriedTargets, Parents, maps_of
 from .points import DrawnPath
@@ -49,14 +49,8 @@ class SeenMotion:
         """Return the motion of a target that has a path."""
         carried = CarriedTargets()
         source = existing(carried.read([target])[target][1])
-        carrier: HolderMotion | Parents | None = None
-        if is_held(source):
-            carrier = HolderMotion(target, source, carried)
-        elif not existing(target.animated.animation_data).use_tweak_mode:
-            parents = Parents(target, carried)
-            carrier = parents if parents.move_by_keys else None
         space, turn = space_of(target, depsgraph)
-        return cls(target, source, carrier, (maps_of(space), turn))
+        return cls(target, source, carrier_of(target, source, carried), (maps_of(space), turn))
 
     @property
     def range(self) -> tuple[int, int]:
