@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 
 import bpy
 import numpy as np
@@ -68,12 +69,19 @@ def evaluated(fcurve: bpy.types.FCurve, frame: float) -> float:
     reach = max(abs(x[1] - x[0]) + abs(x[3] - x[2]), x[3] - x[0])
     for ends in (x, y) if reach > x[3] - x[0] else ():
         ends[1:3] += (1.0 - (x[3] - x[0]) / reach) * (ends[[0, 3]] - ends[1:3])
-    low, high, frames = 0.0, 1.0, x.tolist()
+    exact = _bezier(*y.tolist(), _reached(*x.tolist(), frame))
+    return exact if abs(exact - value) <= 1e-5 * max(1.0, abs(value)) else value
+
+
+@lru_cache(maxsize=2**16)
+def _reached(first: float, second: float, third: float, fourth: float, frame: float) -> float:
+    """How far along itself a Bezier segment with these frames is on a frame: the same for most channels of a body."""
+    low, high = 0.0, 1.0
     for _ in range(50):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _bezier(*frames, middle) < frame else (low, middle)
-    exact = _bezier(*y.tolist(), low)
-    return exact if abs(exact - value) <= 1e-5 * max(1.0, abs(value)) else value
+        is_before = _bezier(first, second, third, fourth, middle) < frame
+        low, high = (middle, high) if is_before else (low, middle)
+    return low
 
 
 def _bezier(first: float, second: float, third: float, fourth: float, t: float) -> float:
