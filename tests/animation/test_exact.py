@@ -32,9 +32,9 @@ def errors(obj: bpy.types.Object, frames: np.ndarray, owns: dict) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("how", "mode"), in_turn(zip(cycle(ORDERS), TIMINGS, strict=False), list(KEYFRAME_MODES)))
-@pytest.mark.parametrize("shift", SHIFTS)
-@pytest.mark.parametrize("placed", [False, True], ids=["", "with a parent and delta transforms"])
+@pytest.mark.parametrize(("shift", "placed"), in_turn(SHIFTS, (False, True)))
 def test_every_mode_is_exact_at_any_time_with_any_timing(live_file, how, mode, shift, placed):
+    """Also with a parent and delta transforms."""
     (order, timing), owns = how, {}
     obj = new_object("Tool", order)
     if placed and order != "AXIS_ANGLE":

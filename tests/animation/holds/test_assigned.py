@@ -8,6 +8,7 @@ import pytest
 from mathutils import Euler, Matrix, Quaternion
 
 from rigid_motion import animation
+from tests.animation.bones.rigs import in_turn
 from tests.animation.holds.model import assert_held, shown, world_of
 from tests.animation.holds.staging import FRAMES, PROPS, found, go_to, stage, update
 from tests.animation.keyed import rotation_path
@@ -27,9 +28,10 @@ def off(prop: bpy.types.Object, world: Matrix) -> float:
     return float(np.abs(world_of(prop) - np.array(world)).max())
 
 
-@pytest.mark.parametrize("order", ["QUATERNION", "XZY", "AXIS_ANGLE"])
 @pytest.mark.parametrize("name", PROPS[:2])
-@pytest.mark.parametrize("frame", [10.0, 25.0, 40.5, 36.0, 55.0])
+@pytest.mark.parametrize(
+    ("frame", "order"), in_turn((10.0, 25.0, 40.5, 36.0, 55.0), ("QUATERNION", "XZY", "AXIS_ANGLE"))
+)
 def test_it_is_where_it_is_assigned_to_be_whatever_holds_it(stage, name, frame, order):
     prop = stage(name)
     prop.rotation_mode = order

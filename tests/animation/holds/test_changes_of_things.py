@@ -11,7 +11,7 @@ from mathutils import Matrix, Quaternion
 
 from rigid_motion import animation
 from rigid_motion.animation.following import refreshing
-from tests.animation.bones.rigs import with_edit_bones
+from tests.animation.bones.rigs import in_turn, with_edit_bones
 from tests.animation.holds.model import assert_held, shown, world_of
 from tests.animation.holds.staging import (
     FRAMES,
@@ -87,8 +87,7 @@ CHANGES: dict[str, Callable[[bpy.types.Object], object]] = {
 }
 
 
-@pytest.mark.parametrize("change", CHANGES)
-@pytest.mark.parametrize("name", PROPS[:2])
+@pytest.mark.parametrize(("change", "name"), in_turn(CHANGES, PROPS[:2]))
 def test_what_is_held_is_so_whatever_is_done_to_it(stage, name, change, tmp_path):
     stage(name)
     CHANGES[change](found(name))
@@ -144,6 +143,7 @@ def test_keys_that_say_nothing_let_it_go(stage):
     prop.animation_data.action = None
     key(prop, (1.0, 40.0), seed=3)
     update()
+    assert spaces(prop) == []
     assert_held([prop], FRAMES)
 
 
@@ -416,8 +416,7 @@ def test_blender_puts_what_a_child_of_holds_elsewhere(stage, own, by_hand):
     assert np.abs(world_of(prop) - np.array(matrix)).max() > 1.0
 
 
-@pytest.mark.parametrize("name", PROPS)
-@pytest.mark.parametrize("frame", [10.0, 25.0, 36.0, 55.5])
+@pytest.mark.parametrize(("frame", "name"), in_turn((10.0, 25.0, 36.0, 55.5), PROPS))
 def test_a_pose_that_is_keyed_stays_where_it_is_seen_in_whatever_holds_it(stage, name, frame):
     """By *Insert Keyframe*, for its channels are in the hand; not by visual keying."""
     prop = stage(name)

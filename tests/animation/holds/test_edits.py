@@ -10,6 +10,7 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation.actions.marks import read_holds
+from tests.animation.bones.rigs import in_turn
 from tests.animation.holds.model import assert_held, shown, world_of
 from tests.animation.holds.staging import (
     FRAMES,
@@ -70,8 +71,7 @@ EDITS: dict[str, tuple[Callable[[Carrier], object], list[tuple[float, int]]]] = 
 }
 
 
-@pytest.mark.parametrize("name", PROPS)
-@pytest.mark.parametrize("edit", EDITS)
+@pytest.mark.parametrize(("edit", "name"), in_turn(EDITS, PROPS))
 def test_keys_take_their_space_along(stage, name, edit):
     change, expected = EDITS[edit]
     before = shown([stage(name)], FRAMES)[0]
@@ -105,8 +105,7 @@ def test_edits_that_were_not_followed_are_made_up_for(stage, edit):
     assert_held([prop], FRAMES)
 
 
-@pytest.mark.parametrize("name", PROPS)
-@pytest.mark.parametrize("frame", [-3.0, 1.0, 20.0, 20.4, 36.0, 34.0, 49.5, 75.0])
+@pytest.mark.parametrize(("frame", "name"), in_turn((-3.0, 1.0, 20.0, 20.4, 36.0, 34.0, 49.5, 75.0), PROPS))
 def test_it_stays_where_it_is_seen_in_whatever_it_is_held(stage, name, frame):
     stage(name)
     for holder in ("Other", "Hand", "Rig/Grip", None, "Other"):
@@ -189,8 +188,7 @@ def test_what_is_hidden_holds_and_what_is_not_there_is_refused(stage, hide):
             animation.hold_in(prop, None)
 
 
-@pytest.mark.parametrize("name", PROPS)
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("seed", "name"), in_turn(range(6), PROPS))
 def test_a_setting_that_is_typed_takes_no_hold_and_no_mode_off(stage, name, seed):
     """*Back*, *Amplitude* or *Period* of the active key, in the sidebar of the Graph Editor: one key of one channel."""
     prop, random = stage(name), np.random.default_rng(seed)
@@ -209,9 +207,8 @@ def test_a_setting_that_is_typed_takes_no_hold_and_no_mode_off(stage, name, seed
     assert np.abs(shown([prop], FRAMES)[0] - before).max() < 1e-5
 
 
-@pytest.mark.parametrize("name", PROPS)
 @pytest.mark.parametrize("setting", ["back", "amplitude", "period"])
-@pytest.mark.parametrize("typed", [0.0, 0.8, 1.70158, 5.0, 8.3])
+@pytest.mark.parametrize(("typed", "name"), in_turn((0.0, 0.8, 1.70158, 5.0, 8.3), PROPS))
 def test_a_setting_that_all_keys_get_at_once_takes_no_hold_off(stage, name, setting, typed):
     """As *Copy to Selected* of a field does."""
     prop = stage(name)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import bpy
 import numpy as np
 import pytest
@@ -11,11 +13,14 @@ from tests.animation.bones.rigs import in_turn
 from tests.animation.holds.hands import by_an_object, by_fk, free
 from tests.animation.holds.oracle import Carrier, apart, shown
 from tests.animation.holds.test_edges import KEPT, edited, thrown
-from tests.animation.holds.test_passing import MODES, MOVING, QUARTERS, juggled
+from tests.animation.holds.test_passing import MODES, MOMENTS, MOVING, juggled
 from tests.animation.keyed import curve_of, rotation_path
 
 PLACES = 6, 15, 18, 26, 37, 42, 43.5, 46, 60, 64.5, 68, 77
 """Frames between keys, behind the last key in something, and of the passing from there."""
+
+PASSES = (0, 0, 0, 0), (3, 4, 4, 3)
+"""Over how many frames it passes each time: at once, or smoothly."""
 
 
 def calm(prop: Carrier) -> None:
@@ -31,26 +36,25 @@ def calm(prop: Carrier) -> None:
 
 def with_key(prop: Carrier, at: float, index: int = -1) -> float:
     """How far something is, at most, from where it was before a key was inserted of its location and rotation."""
-    (before,) = shown([prop], QUARTERS)
+    (before,) = shown([prop], MOMENTS)
     bpy.context.scene.frame_set(int(at), subframe=at % 1)
     for path in ("location", rotation_path(prop)) if index < 0 else ("location",):
         prop.keyframe_insert(path, index=index, frame=at)
     bpy.context.view_layer.update()
-    (after,) = shown([prop], QUARTERS)
+    (after,) = shown([prop], MOMENTS)
     return apart(before, after)
 
 
-@pytest.mark.parametrize("frames", [(0, 0, 0, 0), (3, 4, 4, 3)])
-@pytest.mark.parametrize("at", PLACES)
+@pytest.mark.parametrize(("at", "frames"), in_turn(PLACES, PASSES))
 def test_what_rests_in_hands_rests_on(live_file, frames, at):
     prop, _ = free()
     juggled(prop, (by_fk("First", 11), by_an_object("Second", 31)), frames, moves=False)
     assert with_key(prop, at) < KEPT
 
 
-@pytest.mark.parametrize("frames", [(0, 0, 0, 0), (3, 4, 4, 3)])
-@pytest.mark.parametrize(("at", "mode"), in_turn(PLACES, MODES))
-def test_what_moves_in_hands_moves_on(live_file, mode, at, frames):
+@pytest.mark.parametrize(("at", "move"), in_turn(PLACES, list(product(MODES, PASSES))))
+def test_what_moves_in_hands_moves_on(live_file, at, move):
+    mode, frames = move
     prop, _, _ = thrown(frames)
     calm(prop)
     set_mode(prop, mode)

@@ -9,12 +9,15 @@ import pytest
 
 from rigid_motion.animation import set_mode
 from rigid_motion.motion import KEYFRAME_MODES
+from tests.animation.bones.rigs import in_turn
 from tests.animation.holds.hands import HOLDERS, PROPS, by_an_object, by_fk, free, pairs, place, take
 from tests.animation.holds.oracle import Carrier, Held, Motion, apart, carried, shown
 from tests.animation.holds.runs import motion_of
 from tests.thoroughness import THOROUGH
 
-QUARTERS = np.arange(0.0, 84.0, 0.25)
+MOMENTS = np.arange(0.0, 84.0, 0.375)
+"""Whole frames among them, and all eighths between, at which the poses of passes are made."""
+
 LENGTHS = 0, 1, 3, 4, 10
 MODES = "motor_spline", "dq_sclerp", "lerp_slerp", "BLENDER"
 RESTING, MOVING = 2e-6, 1e-5
@@ -38,7 +41,7 @@ def motions_of(prop: Carrier, holds: Sequence[Held], goes_on: bool = False) -> l
 
 
 def off(
-    prop: Carrier, twin: Carrier, holds: Sequence[Held], frames: np.ndarray = QUARTERS, goes_on: bool = False
+    prop: Carrier, twin: Carrier, holds: Sequence[Held], frames: np.ndarray = MOMENTS, goes_on: bool = False
 ) -> float:
     """How far it is from where it has to be, in metres."""
     expected = carried(twin, holds, motions_of(prop, holds, goes_on), frames)
@@ -58,8 +61,7 @@ def juggled(prop: Carrier, holders: Sequence[Carrier], frames: Sequence[int], *,
     return holds
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("length", LENGTHS)
+@pytest.mark.parametrize(("length", "mode"), in_turn(LENGTHS, MODES))
 def test_a_pass_is_the_formula(live_file, length, mode):
     for moves in (False, True) if THOROUGH else (length % 2 == MODES.index(mode) % 2,):
         prop, twin = free(("QUATERNION", "XYZ", "AXIS_ANGLE")[length % 3])
@@ -75,8 +77,8 @@ def test_all_things_pass_between_all_hands(live_file, by, what):
     holders = HOLDERS[by]("First", 11), HOLDERS[by]("Second", 31)
     holds = juggled(prop, holders, (3, 4, 10, 3), moves=True)
     # What inherits its location otherwise than its rotation has no space of its own in the world.
-    in_hands = (QUARTERS >= 20.0) & (QUARTERS < 56.0)
-    frames = QUARTERS[in_hands] if "without" in what else QUARTERS
+    in_hands = (MOMENTS >= 20.0) & (MOMENTS < 56.0)
+    frames = MOMENTS[in_hands] if "without" in what else MOMENTS
     assert off(prop, twin, holds, frames) < MOVING
 
 

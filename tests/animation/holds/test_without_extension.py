@@ -14,7 +14,7 @@ from rigid_motion import animation
 from tests.animation.farm import played_on_a_farm
 from tests.animation.holds.hands import HOLDERS, PROPS, by_an_object, by_fk, free
 from tests.animation.holds.oracle import Carrier, apart, shown
-from tests.animation.holds.test_passing import MOVING, QUARTERS, juggled, off
+from tests.animation.holds.test_passing import MOMENTS, MOVING, juggled, off
 from tests.animation.holds.test_promises import HELD, assert_held, handed_over
 from tests.animation.scenes import enabled, new_object
 from tests.animation.test_export import FORMATS, Format
@@ -74,11 +74,11 @@ def test_files_are_played_by_a_blender_without_it_as_with_it(live_file, tmp_path
     holders = HOLDERS[by]("First", 11), HOLDERS[by]("Second", 31)
     for each in (prop, other):
         handed_over(each, *holders)
-    expected = shown([prop, other], QUARTERS)
+    expected = shown([prop, other], MOMENTS)
     path = tmp_path / "held.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     rig, names = other.id_data, [bone.name for bone in other.id_data.pose.bones]
-    played = played_on_a_farm(path, [prop.name, rig.name], QUARTERS)
+    played = played_on_a_farm(path, [prop.name, rig.name], MOMENTS)
     posed = played.worlds[1] @ played.poses[names.index(other.name)]
     for one, seen in zip((played.worlds[0], posed), expected, strict=True):
         assert np.abs(one - seen).max() < 1e-6
