@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import bpy
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from mathutils import Matrix, Quaternion
 
 from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.ui.trail.handles import handles_of
+from tests.animation.bones.rigs import in_turn
 from tests.animation.held import worlds
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.scenes import FRAMES, key, new_object
@@ -29,16 +32,20 @@ def turned() -> set[str]:
     return operators.rotate_path_keys(angle=TURN.angle, axis=TURN.axis)
 
 
+EDITS = moved, turned
+
+
 def expected(before: np.ndarray, edit, frames: int = 1) -> np.ndarray:
     """Where keys (n, 4, 4) are to be after an edit of them."""
     middle = before[:, :3, 3].mean(axis=0)
     return (np.array(MOVE) if edit is moved else about(middle, TURN)) @ before
 
 
-@pytest.mark.parametrize("edit", [moved, turned])
-@pytest.mark.parametrize("kind", CARRIERS)
-@pytest.mark.parametrize("mode", ["BLENDER", "dq_sclerp", "motor_spline"])
-def test_a_key_goes_where_it_is_moved_to_and_the_others_stay(scene, kind, mode, edit):
+@pytest.mark.parametrize(
+    ("kind", "how"), in_turn(CARRIERS, tuple(product(("BLENDER", "dq_sclerp", "motor_spline"), EDITS)))
+)
+def test_a_key_goes_where_it_is_moved_to_and_the_others_stay(scene, kind, how):
+    mode, edit = how
     carrier = choose(CARRIERS[kind](), MIDDLE)
     set_mode(carrier, mode)
     others = [frame for frame in FRAMES if frame != MIDDLE]
@@ -57,10 +64,11 @@ def test_several_keys_turn_about_their_middle(scene, kind):
     assert worlds(carrier, FRAMES) == pytest.approx(expected(before, turned), abs=NEAR)
 
 
-@pytest.mark.parametrize("edit", [moved, turned])
-@pytest.mark.parametrize("frame", [9.0, 20.0, 28.0, 40.0, 60.0, 70.0])
-@pytest.mark.parametrize("kind", ["free", "parented", "bone"])
-def test_keys_of_what_is_held_go_where_they_are_moved_to(scene, kind, frame, edit):
+@pytest.mark.parametrize(
+    ("frame", "how"), in_turn((9.0, 20.0, 28.0, 40.0, 60.0, 70.0), tuple(product(("free", "parented", "bone"), EDITS)))
+)
+def test_keys_of_what_is_held_go_where_they_are_moved_to(scene, frame, how):
+    kind, edit = how
     prop = held_prop(kind, frame)
     before = worlds(prop, [frame])
     assert edit() == {"FINISHED"}
@@ -180,7 +188,7 @@ def test_vertices_and_the_tail_lead(scene):
     assert hand.rigid_motion.lead[:] == pytest.approx((0.0, hand.length, 0.0))
 
 
-@pytest.mark.parametrize("edit", [moved, turned])
+@pytest.mark.parametrize("edit", EDITS)
 @pytest.mark.parametrize("mode", ["BLENDER", "dq_sclerp"])
 @pytest.mark.parametrize("part", ["location", "rotation_euler"])
 def test_what_has_no_key_of_its_own_there_goes_along(scene, part, mode, edit):
