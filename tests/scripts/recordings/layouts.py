@@ -98,6 +98,10 @@ RAW: dict[str, Layout] = {
     "TUM": Layout("take.txt", rows(SECONDS, *POSE)),
     "TUM by name": Layout("take.tum", rows(SECONDS, *POSE, separator="\t")),
     "TUM under names with commas": Layout("take.txt", "# t, x, y, z, qx, qy, qz, qw\n" + rows(SECONDS, *POSE)),
+    "TUM under comments": Layout(
+        "take.txt",
+        "# ground truth trajectory\n# file: 'dataset.bag'\n# timestamp tx ty tz qx qy qz qw\n\n" + rows(SECONDS, *POSE),
+    ),
     "TUM in nanoseconds": Layout("take.txt", rows(NANOSECONDS, *POSE)),
     "VINS": Layout(
         "take.csv", rows(NANOSECONDS, LEFT.positions, quaternions("wxyz"), separator=",", end=","), warned=True

