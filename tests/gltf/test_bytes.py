@@ -15,6 +15,7 @@ from rigid_motion.gltf.rewriting import stored
 from rigid_motion.gltf.tracks import Track
 from tests.gltf.making import Making, turns, walk
 from tests.gltf.player import File
+from tests.thoroughness import tried
 
 POINTER = "KHR_animation_pointer"
 
@@ -166,7 +167,7 @@ def test_quaternions_of_any_length_are_stored_as_the_turns_that_they_are():
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=tried(25), deadline=None)
 @given(st.integers(0, 10**9))
 def test_no_file_grows_and_only_node_channels_change(tmp_path_factory, seed):
     random, folder = np.random.default_rng(seed), tmp_path_factory.mktemp("random")

@@ -16,6 +16,7 @@ from rigid_motion.gltf.tracks import read_clips
 from rigid_motion_batch.cli import reduce
 from tests.gltf.making import glb, walk
 from tests.gltf.player import File, shown
+from tests.thoroughness import tried
 
 RESULT = "walk-reduced"
 
@@ -162,8 +163,8 @@ def test_whatever_is_damaged_is_refused_or_does_no_harm(tmp_path):
     file = File(walk(joints=2, seconds=0.3).write(tmp_path / "walk.glb"))
     random, path = np.random.default_rng(3), tmp_path / "damaged.glb"
     values = [None, -1, 0, 1, 3, 2**40, 1.5, "x", "../x", [], {}, True, [[]], {"uri": 3}]
-    refused = 0
-    for _ in range(300):
+    refused, count = 0, tried(300)
+    for _ in range(count):
         document = json.loads(json.dumps(file.json))
         for _ in range(int(random.integers(1, 4))):
             part: Any = document
@@ -184,4 +185,4 @@ def test_whatever_is_damaged_is_refused_or_does_no_harm(tmp_path):
         except GltfError as error:
             lines = str(error).splitlines()
             refused += len(lines)
-    assert 100 < refused < 300, "one line each, and not all of them are refused"
+    assert count / 3 < refused < count, "one line each, and not all of them are refused"

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from rigid_motion.gltf import Options, Report, read_document, reduce_file, reduced
 from tests.gltf.making import Making, turns, walk
 from tests.gltf.player import File, off
+from tests.thoroughness import tried
 
 RADIUS = 0.03
 
@@ -234,7 +235,7 @@ def test_channels_of_extensions_stay(tmp_path):
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=tried(25), deadline=None)
 @given(st.integers(0, 10**9))
 @example(46804)  # A sheared node that is largest between two keys, and nearly as large elsewhere in another shape.
 def test_whatever_hangs_on_whatever_keeps_to_the_tolerance(tmp_path_factory, seed):

@@ -14,6 +14,7 @@ from rigid_motion.motion.differences import coefficients, turned_in_world
 from rigid_motion.motion.quaternions import align_signs, multiply, normalise, rotate
 from rigid_motion.motion.trembling import trembling
 from tests.motion.bodies import random_parents
+from tests.thoroughness import combined, tried
 
 NOISE, TURNS = 1e-3, np.radians(0.3)
 
@@ -144,8 +145,7 @@ def test_a_drum_stroke_keeps_its_hit():
     assert not cleaned.spikes.any()
 
 
-@pytest.mark.parametrize("late", [0.0, 0.33, 0.5], ids="{} samples".format)
-@pytest.mark.parametrize("shape", ["drum", "throw", "step"])
+@pytest.mark.parametrize(("shape", "late"), combined(("drum", "throw", "step"), (0.5, 0.0, 0.33)))
 def test_a_hit_is_no_further_off_than_it_was_recorded_be_it_on_a_sample_or_between_two(shape, late):
     times = (np.arange(900) + late) / 90.0
     phase = np.mod(times, 1.0) - 0.5
@@ -166,7 +166,7 @@ def test_a_hit_is_no_further_off_than_it_was_recorded_be_it_on_a_sample_or_betwe
     assert max(ratios) < 1.2
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=tried(30), deadline=None)
 @given(st.integers(0, 10**6), st.floats(1e-5, 0.05), st.floats(0.01, 1.0), st.integers(8, 150))
 def test_nothing_is_moved_by_more_than_the_tolerance(seed, tolerance, radius, count):
     random = np.random.default_rng(seed)
@@ -184,7 +184,7 @@ def test_nothing_is_moved_by_more_than_the_tolerance(seed, tolerance, radius, co
     assert np.isfinite(cleaned.poses.positions).all()
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(tried(12)))
 def test_what_has_been_cleaned_is_not_moved_again(seed):
     random = np.random.default_rng(seed)
     count, size, turn = int(random.integers(60, 900)), 10 ** random.uniform(-4, -2), 10 ** random.uniform(-4, -2)
@@ -264,7 +264,7 @@ def test_a_body_is_cleaned_joint_by_joint_and_bounded_in_the_world(tolerance):
         assert rms(world, real) < 0.7 * rms(before, real)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=tried(60), deadline=None)
 @given(st.integers(0, 10**6), st.none() | st.floats(1e-4, 0.1), st.integers(8, 200), st.integers(1, 6))
 def test_what_stands_slides_no_further_than_it_did_and_nothing_is_moved_by_more(seed, tolerance, count, joints):
     random = np.random.default_rng(seed)
