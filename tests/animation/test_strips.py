@@ -86,8 +86,8 @@ BLENDS = ("REPLACE", "COMBINE", "ADD", "SUBTRACT", "MULTIPLY")
 )
 def test_a_strip_over_another_shows_what_dense_keys_would(live_file, case, place):
     (kind, how, blend), ((start, scale, repeat, reverse), order) = case, place
-    # Eighths of frames in both Actions, before and after the strip, too.
-    frames = start + np.arange(-9.0, LENGTH * repeat * scale + 9.0, max(scale, 1.0) / 8.0)
+    # In steps of three eighths of a frame, which are on all eighths, before and after the strip, too.
+    frames = start + np.arange(-9.0, LENGTH * repeat * scale + 9.0, 0.375 * max(scale, 1.0))
     shown = []
     for dense in (False, True):
         obj = new(kind, order)
