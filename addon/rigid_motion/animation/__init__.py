@@ -21,6 +21,8 @@ from .baking.bake import bake, bake_poses, bake_to_world, is_baked, unbake
 from .baking.cleaning import Cleaning, clean_motion
 from .baking.fewer_keys import NeedsItsKeys, WholeRig
 from .baking.into_holds import HeldSegment, held_segments, reduce_into_holds
+from .baking.layers import add_layer
+from .baking.merging_layers import merge_layer
 from .baking.native_curves import NATIVE
 from .baking.reducing import (
     FEWEST,
@@ -56,6 +58,7 @@ __all__ = [
     "Reduction",
     "Refused",
     "WholeRig",
+    "add_layer",
     "bake",
     "bake_poses",
     "bake_to_world",
@@ -74,6 +77,7 @@ __all__ = [
     "is_reduced",
     "key_frames",
     "match_grip",
+    "merge_layer",
     "modes_of",
     "pass_frames",
     "problem_of",

@@ -139,6 +139,10 @@ class RigidMotion(bpy.types.PropertyGroup):
     )
     # The mode that was chosen before there was an Action to keep it.
     awaited: str = EnumProperty(items=MODE_ITEMS, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
+    # What has its motion below an offset layer: see `baking.layers`.
+    base: bpy.types.Object | None = PointerProperty(
+        type=bpy.types.Object, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"}
+    )
     bakes: bpy.types.bpy_prop_collection[ChangedKeys] = CollectionProperty(
         type=ChangedKeys, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
     )

@@ -62,6 +62,7 @@ BAD_KEY = n_(
     "{name}: key {number} of {channel} has an invalid frame, value, handle or easing: delete it, or move it and "
     "back (Dope Sheet, X or G)"
 )
+LAYERED = n_("{name} has a layer: pose and key it, or merge it first (Merge Layer)")
 NO_SUCH_MODE = n_("{name}: its keys have a mode that is unknown to this version: choose another one")
 NO_SUCH_TURNS = n_(
     "{name}: key {number} of the channel Turns is not a number of turns up to {most}: delete it (Dope Sheet, X), or"
@@ -75,6 +76,12 @@ def refuse_drivers(user: Transform, binding: Binding, driven: Collection[int]) -
         fcurve = binding.curves.get(channel)
         is_silent = fcurve is not None and (fcurve.mute or len(fcurve.sampled_points))
         raise Refused(SILENT_CHANNEL if is_silent else DRIVEN_CHANNEL, name=user.name, channel=_label(*channel))
+
+
+def refuse_layered(user: Transform) -> None:
+    """Raise `Refused` where a user moves by an offset layer."""
+    if user.motion.base is not None:
+        raise Refused(LAYERED, name=user.name)
 
 
 def refuse_linked(user: Transform, binding: Binding | None = None) -> None:
@@ -104,7 +111,9 @@ def refuse_envelope(name: str, fcurve: bpy.types.FCurve) -> None:
 
 
 def refuse_modified(name: str, binding: Binding) -> None:
-    """Raise `Refused` where modifiers change what keys say, so that other keys would not say the same."""
+    """Raise `Refused` where modifiers or layers change what keys say, so that other keys would not say the same."""
+    for user in binding.users:
+        refuse_layered(user)
     if any(any(on_top(fcurve)) for fcurve in binding.curves.values()):
         raise Refused(CHANGED_BY_MODIFIERS, name=name)
 

@@ -17,7 +17,7 @@ from ...motion import Poses
 from ..actions.channels import code_of, empty_key_fields, key_fields, replace_keys, set_key_fields, write_channel
 from ..actions.modifiers import add_cycles, on_top
 from ..actions.reading import added_values
-from ..actions.refusals import refuse_drivers, refuse_linked
+from ..actions.refusals import refuse_drivers, refuse_layered, refuse_linked
 from ..actions.slots import Binding
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable
 from ..edits.mode_keys import set_mode_in
@@ -89,6 +89,7 @@ def bake(
     originals = Originals(BAKED)
 
     def plan(transform: Transform, readings: Readings) -> list[Planned]:
+        refuse_layered(transform)
         live = [(binding, source) for binding, source in readable(transform, readings) if source.is_live]
         if not live:
             raise Refused(
@@ -177,6 +178,7 @@ def go_back(
     """
 
     def plan(transform: Transform, readings: Readings) -> tuple[str, list[Binding]]:
+        refuse_layered(transform)
         kind = refuse_without_original(transform, *kinds)
         for binding, _ in readings:
             refuse_linked(transform, binding)

@@ -148,7 +148,7 @@ def discard_originals(transform: Transform, kind: str, bindings: Iterable[Bindin
                     for same in _on(user, binding):
                         if (same.original, same.kept_as) == (keeper, note.kept_as):
                             same.original = None
-                _remove_unused(keeper)
+                remove_unused(keeper)
 
 
 def _moving(binding: Binding) -> Curves:
@@ -182,9 +182,9 @@ def _forget_from(first: Note, binding: Binding) -> None:
                 keepers.add(keeper)
             bakes.remove(number)
     for keeper in keepers:
-        _remove_unused(keeper)
+        remove_unused(keeper)
 
 
-def _remove_unused(keeper: bpy.types.Action) -> None:
+def remove_unused(keeper: bpy.types.Action) -> None:
     if not keeper.users:
         bpy.data.actions.remove(keeper)

@@ -286,7 +286,7 @@ def _write(
     if isinstance(fewer, FewerRuns):
         write_runs(transform, fewer, mode)
     else:
-        _write_keys(transform, fewer)
+        write_fewer(transform, fewer)
         set_mode_in(binding, "BLENDER" if mode == NATIVE else mode)
     keys = before, channel_keys(binding)
     counts = count_of(fewer.source), fewer.after
@@ -295,7 +295,8 @@ def _write(
         note.reduction = json.dumps(asdict(reduction))
 
 
-def _write_keys(transform: Transform, fewer: FewerKeys) -> None:
+def write_fewer(transform: Transform, fewer: FewerKeys) -> None:
+    """Give the channels of a transform their fewer keys, without a mode."""
     binding = fewer.binding
     for rows, keys in fewer.fewer.channels:
         for channel, row in enumerate(rows):

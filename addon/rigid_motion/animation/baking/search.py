@@ -88,7 +88,7 @@ def fewer_keys(
     `reduce_keys_of`. `Refused` where none of several can have fewer. With a `space`, see `BodyMotion`, the only member
     is looked at by itself. `NotFewer` where a mode needs so many keys, `below`, even before they are proven.
     """
-    body = _SearchedBody(obj, members, math.inf if count is not None else tolerance, radius, hold=hold, space=space)
+    body = SearchedBody(obj, members, math.inf if count is not None else tolerance, radius, hold=hold, space=space)
     shared |= count is not None
     if mode == NATIVE:
         fewer = body.curved(count, shared=shared)
@@ -103,7 +103,7 @@ def fewer_keys(
     return body.plans(fewer)
 
 
-class _SearchedBody:
+class SearchedBody:
     """An object and its bones as one slot moves them: those that are to have fewer keys, and all others as they are."""
 
     def __init__(
@@ -115,6 +115,7 @@ class _SearchedBody:
         *,
         hold: bool,
         space: np.ndarray | None,
+        places: np.ndarray | None = None,
     ) -> None:
         self.obj, self.tolerance, self.members = obj, tolerance, members
         bones = pose_bones(obj) if space is None and any(transform.is_part for transform in members) else ()
@@ -122,8 +123,10 @@ class _SearchedBody:
         self.sources = {number: members[joint][1] for number, joint in enumerate(joints) if joint in members}
         samples = united(map(samples_of, self.sources.values()))
         self.frames = seen_frames(samples, list(self.sources.values()))
-        self.sampled = np.isin(self.frames, samples)
+        self.sampled = np.isin(self.frames, samples if places is None else places)
         """True for the moments that keys may be on."""
+        # Handles are fitted to all moments where keys are on some of them alone.
+        self._fitted = self.sampled if places is None else np.ones(len(self.frames), dtype=bool)
         slot = next(binding.slot for binding, _ in members.values())
         self.motion = BodyMotion(joints, slot, self.sources, self.frames, radius, space)
         self.allowed = tolerance + self.motion.rounding
@@ -138,9 +141,9 @@ class _SearchedBody:
         """The largest displacement of any point in each joint's ball, as was proven last, shape (joints,)."""
         self.between: np.ndarray = np.zeros(len(joints))
         """The largest displacement at any moment, where errors are those on frames; or nothing, shape (joints,)."""
-        self._stretches = self._split(moments(self.frames, list(self.sources.values())))
+        self.stretches = self.split(moments(self.frames, list(self.sources.values())))
 
-    def _split(self, frames: np.ndarray) -> list[np.ndarray]:
+    def split(self, frames: np.ndarray) -> list[np.ndarray]:
         """Return frames in stretches that are looked at in one go."""
         step = max(1, AT_ONCE // len(self.motion.joints))
         return [frames[first : first + step] for first in range(0, len(frames), step)]
@@ -168,21 +171,19 @@ class _SearchedBody:
 
         They keep to the tolerance on frames. `between` becomes how far off joints are at all moments.
         """
-        every, self._stretches = self._stretches, self._split(self.frames)
-        curves = self._curves(
-            every=shared, tolerance=self.motion.extent * self.motion.unit if count else self.tolerance
-        )
+        every, self.stretches = self.stretches, self.split(self.frames)
+        curves = self.curves(every=shared, tolerance=self.motion.extent * self.motion.unit if count else self.tolerance)
         fewer, scales = self._so_many(curves, count) if count else self._fewest(curves, shared=shared)
-        fewer = self._automatic(curves, fewer, scales)
-        on_frames, self._stretches = self._stretches, every
-        self._keep_to(math.inf, fewer)
-        self.between, self._stretches = self.errors.copy(), on_frames
-        self._keep_to(math.inf, fewer)
+        fewer = self.automatic(curves, fewer, scales)
+        on_frames, self.stretches = self.stretches, every
+        self.keep_to(math.inf, fewer)
+        self.between, self.stretches = self.errors.copy(), on_frames
+        self.keep_to(math.inf, fewer)
         return fewer
 
-    def _curves(self, tolerance: float, *, every: bool) -> dict[int, JointCurves]:
+    def curves(self, tolerance: float, *, every: bool) -> dict[int, JointCurves]:
         """Return the curves that joints need, by their numbers: with keys between their ends, or on every sample."""
-        samples, motion = self.frames[self.sampled], self.motion
+        samples, motion = self.frames[self._fitted], self.motion
         result = {}
         for number, source in self.sources.items():
             first, last = self._ends(number)
@@ -239,7 +240,7 @@ class _SearchedBody:
             left = np.setdiff1d(self.frames[self.sampled], keys)
             keys = np.union1d(keys, next((frame for frame in off if frame in left), left[0]))
 
-    def _automatic(
+    def automatic(
         self, curves: dict[int, JointCurves], fewer: dict[int, KeyedTransform], scales: dict[int, float]
     ) -> dict[int, KeyedTransform]:
         """Return the joints with the handles that Blender sets wherever all stays within the tolerance with them."""
@@ -254,7 +255,7 @@ class _SearchedBody:
             result.update({number: fewer[number] for number in changed})
             return bool(changed)
 
-        self._keep_to(self.allowed, result, mend)
+        self.keep_to(self.allowed, result, mend)
         return result
 
     def plans(self, fewer: Mapping[int, KeyedTransform]) -> dict[Transform, FewerKeys]:
@@ -317,10 +318,10 @@ class _SearchedBody:
             return bool(changed)
 
         have(list(chosen))
-        self._keep_to(self.allowed, fewer, mend)
+        self.keep_to(self.allowed, fewer, mend)
         return fewer
 
-    def _keep_to(
+    def keep_to(
         self, allowed: float, fewer: dict[int, KeyedTransform], mend: Callable[[Over, BodyMotion], bool] | None = None
     ) -> None:
         """Have `fewer` mended, of which all is shown, until nothing is over what is allowed at any moment.
@@ -331,7 +332,7 @@ class _SearchedBody:
         while not settled:
             settled = True
             self.errors[:] = 0.0
-            for frames in self._stretches:
+            for frames in self.stretches:
                 motion = self.motion.at(frames)
                 # Between two frames the smaller of their weights counts.
                 before, behind = (np.searchsorted(self.frames, frames, side) for side in ("right", "left"))
@@ -355,7 +356,7 @@ class _SearchedBody:
                     break
             chosen.update(added)
             changed.update(added)
-        if not changed:
+        if not changed and self._fitted is self.sampled:
             raise Refused(
                 n_(
                     "{name} continues beyond its keys, which fewer keys would change: give its channels constant "
@@ -370,7 +371,7 @@ class _SearchedBody:
     ) -> dict[int, np.ndarray]:
         """Return the keys of those of these joints that get any more: on the samples around a frame, or else there."""
         samples = self.frames[self.sampled]
-        for around in (True, False):
+        for around in (True, False) if self._fitted is self.sampled else (True,):
             added = {}
             for number in numbers:
                 # Before and behind its keys it stays where they leave it, or goes through them again.

@@ -17,6 +17,7 @@ from mathutils import Matrix
 from ..actions.channels import key_points
 from ..actions.marks import hold, read_holds, read_marks, write_holds, write_marks
 from ..actions.reading import is_marked
+from ..actions.refusals import refuse_layered
 from ..actions.slots import Binding, bindings_of
 from ..evaluation.components import MODE_NUMBERS, PART_OF, ROWS, SCALE
 from ..evaluation.differences import seen_values
@@ -110,6 +111,7 @@ def hold_in(
         if isinstance(source, Refused):
             raise source
         refuse_space(transform)
+        refuse_layered(transform)
         if target is not None:
             refuse_motion(transform, source)
             for user in (transform,) if binding is None else binding.users:
@@ -173,11 +175,11 @@ def match_grip(prop: Target) -> None:
             holder = next((one.name for one in holders_of(transform) if one.number == numbers[place]), "")
             raise Refused(NO_GRIP, name=transform.name, holder=holder or "World", frame=frame)
         grip = runs[before[-1]].source
-        return binding, _rows_of(transform, grip, grip.keyed_range[1])
+        return binding, components_on(transform, grip, grip.keyed_range[1])
 
     def act(transform: Transform, planned: tuple[Binding, np.ndarray]) -> None:
         _, rows = planned
-        _key(transform, rows, ("location", transform.rotation))
+        key_components(transform, rows, ("location", transform.rotation))
 
     apply_edit(prop, plan, act, None)
 
@@ -262,8 +264,8 @@ def _hold(
     seen, posed, frame = world_matrix(transform), transform.components(), _frame(transform)
     before = 0 if source is None else source.hold_at(frame - 2 * SAME_FRAME)[0]
     if _needs_key_before(source, frame):
-        rows = _rows_of(transform, source, frame - 1.0)
-        _key(transform, rows, ("location", transform.rotation), frame - 1.0)
+        rows = components_on(transform, source, frame - 1.0)
+        key_components(transform, rows, ("location", transform.rotation), frame - 1.0)
         # As any key that is inserted, it leaves the motion as it is.
         follower.refresh([transform])
     binding = _binding_of(transform)
@@ -271,7 +273,7 @@ def _hold(
     passes = source is not None and any(one.begin < frame < one.frame for one in source.switches)
     if number == (0 if source is None else source.hold_at(frame)[0]) and not passes:
         # By way of the world rounding would move what rests.
-        _key(transform, posed, ("location", transform.rotation), frame)
+        key_components(transform, posed, ("location", transform.rotation), frame)
     else:
         _key_seen(transform, number, seen, frame)
     binding = _binding_of(transform)
@@ -296,7 +298,7 @@ def _key_seen(transform: Transform, number: int, seen: Matrix, frame: float) -> 
     paths = ["location", transform.rotation]
     if not np.allclose(rows[ROWS[SCALE]], transform.components()[ROWS[SCALE]], rtol=1e-4):
         paths.append("scale")
-    _key(transform, rows, paths, frame)
+    key_components(transform, rows, paths, frame)
 
 
 def _needs_key_before(source: KeyedTransform | None, frame: float) -> bool:
@@ -309,7 +311,7 @@ def _needs_key_before(source: KeyedTransform | None, frame: float) -> bool:
     return bool(np.abs(last - first).max() > MAX_VALUE_ROUNDING)
 
 
-def _rows_of(transform: Transform, source: KeyedTransform | None, frame: float) -> np.ndarray:
+def components_on(transform: Transform, source: KeyedTransform | None, frame: float) -> np.ndarray:
     """Return the components (10,) that a transform has on a frame by a source. What has no keys there is as it is."""
     rows = transform.components()
     if source is not None:
@@ -323,20 +325,19 @@ def _carried(transform: Transform, source: KeyedTransform, holder: Holder | None
     run = next((run for run in source.runs if run.stretch.until > frame - SAME_FRAME), None)
     if run is None:
         return None
-    rows = _rows_of(transform, run.source, float(run.moments(np.array([frame]))[0]))
+    rows = components_on(transform, run.source, float(run.moments(np.array([frame]))[0]))
     return world_in(transform, holder, Matrix(matrices_of(rows[:, None], transform.order)[0].tolist()))
 
 
-def _key(transform: Transform, rows: np.ndarray, paths: Iterable[str], frame: float | None = None) -> None:
+def key_components(transform: Transform, rows: np.ndarray, paths: Iterable[str], frame: float | None = None) -> None:
     """Key components (10,) of a transform as Blender does it by hand, on a frame of its Action: else the one shown."""
     scene_frame, data = cast(bpy.types.Scene, bpy.context.scene).frame_current_final, transform.animated.animation_data
     if frame is not None:
         scene_frame = frame if data is None else data.nla_tweak_strip_time_to_scene(frame)
     starts = {prop: ROWS[part].start for part, prop in transform.properties.items()}
-    group = transform.carrier.name if transform.is_part else "Object Transforms"
     for path in paths:
         setattr(transform.carrier, path, rows[starts[path] :][: WIDTHS[path]])
-        transform.carrier.keyframe_insert(path, frame=scene_frame, group=group)
+        transform.carrier.keyframe_insert(path, frame=scene_frame, group=transform.group)
 
 
 def _binding_of(transform: Transform) -> Binding:

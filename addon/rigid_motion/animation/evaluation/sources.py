@@ -88,6 +88,9 @@ class KeyedTransform:
     shaping: np.ndarray | None = None
     """The frames of the keys that segments run between, where they are not those of the channels."""
 
+    carried: tuple[int, int] | None = None
+    """First and last frame on which its base moves, where it is the offset of a layer."""
+
     @cached_property
     def digest(self) -> str:
         """Differs wherever anything differs that the motion depends on."""
@@ -346,6 +349,8 @@ class KeyedTransform:
         first, last = self.keyed_range
         if self.seen is not None and self.goes_on:
             first, last = min(first, self.seen[0]), max(last, self.seen[1])
+        if self.carried is not None:
+            first, last = min(first, self.carried[0]), max(last, self.carried[1])
         return math.floor(first), math.ceil(last)
 
     @property

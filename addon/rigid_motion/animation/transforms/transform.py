@@ -62,6 +62,7 @@ class ObjectMotion(Protocol):
     turns: int
     lead: Sequence[float]
     awaited: str
+    base: bpy.types.Object | None
     bakes: bpy.types.bpy_prop_collection_idprop[Note]
 
 
@@ -110,6 +111,11 @@ class Transform:
     def label(self) -> str:
         """The name in front of its mode, in English."""
         return n_("Bone", OWN_WORDS) if self.is_part else n_("Object", OWN_WORDS)
+
+    @property
+    def group(self) -> str:
+        """The group that Blender puts its channels into."""
+        return self.carrier.name if self.is_part else "Object Transforms"
 
     @property
     def location_axes(self) -> np.ndarray | None:

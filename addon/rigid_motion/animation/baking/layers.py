@@ -1,0 +1,235 @@
+"""Offset layers: keys on top of a motion, so that what is seen is the motion times the offset, as of rigid bodies.
+
+Blender's additive strips add locations along the axes of the parent. So what moves something goes to an Empty, its
+*base*, in the same space; the thing itself hangs on that, an object as its child and a bone by a *Child Of*, and its
+own channels are the offset, in an NLA strip whose influence is keyed. All of it is Blender's own, and plays without
+the extension. Merging writes what is seen as keys of the Action that there was before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, cast
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_n as n_
+from mathutils import Matrix
+
+from ...blender import existing, scene
+from ..actions.channels import channelbag_of, copy_fcurve, key_points
+from ..actions.reading import read
+from ..actions.refusals import refuse_drivers, refuse_layered, refuse_linked
+from ..actions.slots import Binding, bindings_in_slot, slots_alone
+from ..edits.apply import Readings, Targets, apply_edit, editable_binding
+from ..edits.holding import key_components
+from ..edits.mode_keys import set_mode_in
+from ..evaluation.components import LOCATION, MODE_NAMES, ROTATION, SCALE
+from ..evaluation.sources import KeyedTransform
+from ..following import follower
+from ..holds.apply import has_holders
+from ..holds.placing import hang_of
+from ..holds.problems import refuse_space
+from ..queries.keyed import active_binding
+from ..transforms import TURNS_PROPERTY, Refused, Transform, transform_of
+from ..transforms.sizes import radius_of
+from .originals import remove_unused
+from .worlds import alone_in
+
+BELOW, LAYER = "Rigid Motion Base", "Rigid Motion Layer"
+"""The NLA tracks with what else the Action moves, and with the offset; and the constraint of a bone."""
+
+HELD = n_("{name} is held: Bake to Keys with To World first, or add the layer to what holds it")
+CONSTRAINED = n_("{name} has the constraint {constraint}: mute it, or bake it to keys first (Animation > Bake Action)")
+OTHERWISE = n_(
+    "{name} does not inherit all from its parent bone: check Local Location and Inherit Rotation, and set Inherit "
+    "Scale to Full (Bone, Relations)"
+)
+
+
+def strips_of(obj: bpy.types.Object) -> tuple[bpy.types.NlaStrip, bpy.types.NlaStrip] | None:
+    """Return the strip with what else moves an object, and that of its layer; None where they are not all it has."""
+    data = obj.animation_data
+    tracks = [] if data is None else [track for track in data.nla_tracks if track.strips]
+    if data is None or [track.name for track in tracks] != [BELOW, LAYER] or (data.action and not data.use_tweak_mode):
+        return None
+    return tracks[0].strips[0], tracks[1].strips[0]
+
+
+def is_plain(obj: bpy.types.Object) -> bool:
+    """Return whether the layer of an object is edited, with all that it has: its strips where the Actions have their
+    frames, and its influence 1 throughout.
+    """
+    strips = strips_of(obj)
+    if strips is None or not existing(obj.animation_data).use_tweak_mode:
+        return False
+    moved = any((strip.frame_start, strip.scale) != (strip.action_frame_start, 1.0) for strip in strips)
+    return not moved and bool(np.all(influence_of(strips[1])[:, 1] == 1.0))
+
+
+def influence_of(layer: bpy.types.NlaStrip) -> np.ndarray:
+    """Return frame and value of the keys of a layer's influence, shape (n, 2)."""
+    return key_points(existing(layer.fcurves.find("influence"))).astype(float)
+
+
+def layered(obj: bpy.types.Object) -> list[Transform]:
+    """Return what has a base of an object and its bones."""
+    carriers = (obj, *(() if obj.pose is None else obj.pose.bones))
+    return [one for one in map(transform_of, carriers) if one.motion.base is not None]
+
+
+def add_layer(targets: Targets, *, refused: list[Refused] | None = None) -> None:
+    """Give targets an offset layer, which is at rest on the frame that is shown, and enter its strip.
+
+    What moves each goes to an Empty, which is where the target was. Its scale goes along where that is keyed, the same
+    along all axes. Bones of one rig share a layer. For targets see `edits.apply`.
+    """
+
+    def plan(transform: Transform, readings: Readings) -> tuple[Binding, KeyedTransform]:
+        refuse_layered(transform)
+        if (strips := strips_of(transform.animated)) is None:
+            editable_binding(transform, bindings := [binding for binding, _ in readings])
+            binding = alone_in(transform, bindings)
+        else:
+            binding = binding_below(transform, strips)
+        refuse_linked(transform, binding)
+        source = read(binding)
+        refuse_drivers(transform, binding, source.driven)
+        if source.held is not None or has_holders(binding):
+            raise Refused(HELD, name=transform.name)
+        _refuse_space(transform)
+        return binding, source
+
+    def act(transform: Transform, planned: tuple[Binding, KeyedTransform]) -> None:
+        binding, source = planned
+        mode = MODE_NAMES[int(source.modes_at(source.keyed_frames[:1])[0])] if source.channels else "BLENDER"
+        parts = [LOCATION, ROTATION, *([SCALE] if source.uniform_scale else [])]
+        _hang(transform, _base(transform, binding, parts))
+        _enter_layer(transform.animated, binding)
+        key_components(transform, transform.components(), ("location", transform.rotation))
+        set_mode_in(existing(active_binding(transform)), mode)
+
+    done = apply_edit(targets, plan, act, refused)
+    follower.refresh(transform_of(existing(transform.motion.base)) for transform in done)
+
+
+def _refuse_space(transform: Transform) -> None:
+    """Raise `Refused` where nothing can be where a transform is and carry it."""
+    if not transform.is_part:
+        refuse_space(transform)
+    else:
+        bone = transform.pose_bone.bone
+        inherits = bone.parent is None or (bone.use_inherit_rotation and bone.inherit_scale == "FULL")
+        if transform.location_axes is not None or not inherits:
+            raise Refused(OTHERWISE, name=transform.name)
+    for constraint in transform.carrier.constraints:
+        if not constraint.mute:
+            raise Refused(CONSTRAINED, name=transform.name, constraint=constraint.name)
+
+
+def binding_below(transform: Transform, strips: tuple[bpy.types.NlaStrip, bpy.types.NlaStrip]) -> Binding:
+    """Return what else moves a transform than its layer."""
+    key = existing(strips[0].action), strips[0].action_slot_handle
+    slot = next(slot for slot in slots_alone(transform.animated) if slot.key == key)
+    return bindings_in_slot(slot, (transform.prefix,))[0]
+
+
+def _base(transform: Transform, binding: Binding, parts: Iterable[str]) -> bpy.types.Object:
+    """Return an Empty that moves as these parts of a transform did, in the same space; the transform is at rest."""
+    carrier, obj = transform.carrier, transform.animated
+    base = bpy.data.objects.new(f"{carrier.name} Base", None)
+    for collection in obj.users_collection:
+        collection.objects.link(base)
+    base.rotation_mode = carrier.rotation_mode
+    base.empty_display_size = radius_of(carrier)
+    moved = {transform.properties[part] for part in parts}
+    for prop in moved:
+        setattr(base, prop, getattr(carrier, prop))
+        setattr(carrier, prop, cast(Any, carrier.bl_rna.properties[prop]).default_array)
+    moved.add(TURNS_PROPERTY)
+    for channel, fcurve in list(binding.curves.items()):
+        path = channel[0].removeprefix(transform.prefix)
+        if path in moved:
+            copy_fcurve(fcurve, channelbag_of(base), path)
+            binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+    if not transform.is_part:
+        _hang_alike(base, obj)
+        return base
+    bone, parent = transform.pose_bone.bone, transform.pose_bone.parent
+    base.parent, base.matrix_parent_inverse, offset = obj, Matrix(), bone.matrix_local
+    if parent is not None:
+        base.parent_type, base.parent_bone = "BONE", parent.name
+        offset = parent.bone.matrix_local.inverted() @ offset
+    base.matrix_parent_inverse = hang_of(transform_of(base)).inverted() @ offset
+    return base
+
+
+def _hang(transform: Transform, base: bpy.types.Object) -> None:
+    """Have a transform hang on its base."""
+    transform.motion.base = base
+    if transform.is_part:
+        constraint = cast(Any, transform.pose_bone.constraints.new("CHILD_OF"))
+        constraint.name = LAYER
+        constraint.target, constraint.set_inverse_pending = base, False
+        # It is not converted back: so the bone is where its channels are in the base, whatever its parents do.
+        constraint.inverse_matrix, constraint.owner_space, constraint.target_space = Matrix(), "LOCAL", "WORLD"
+    else:
+        obj = transform.animated
+        obj.parent, obj.parent_type, obj.matrix_parent_inverse = base, "OBJECT", Matrix()
+
+
+def _enter_layer(obj: bpy.types.Object, binding: Binding) -> None:
+    """Have the strip of a layer be edited, made where there is none, over all that the Action has besides."""
+    data = existing(obj.animation_data)
+    if strips_of(obj) is None:
+        action, slot = existing(data.action), data.action_slot
+        data.action = None
+        offset = bpy.data.actions.new(f"{obj.name} Layer")
+        keyed = action.frame_range if any(True for _ in binding.slot.fcurves) else (np.inf, -np.inf)
+        first = int(np.floor(min(scene().frame_start, keyed[0])))
+        last = int(np.ceil(max(scene().frame_end, keyed[1])))
+        for name, shown, of in ((BELOW, action, slot), (LAYER, offset, offset.slots.new("OBJECT", obj.name))):
+            track = data.nla_tracks.new()
+            track.name = name
+            strip = track.strips.new(name, first, shown)
+            strip.action_slot = of
+            strip.action_frame_start, strip.action_frame_end = first, last
+        # While the strip is edited Blender reads its influence only within the range of the Action.
+        offset.use_frame_range, offset.frame_start, offset.frame_end = True, first, last
+        strip.blend_type, strip.use_animated_influence = "COMBINE", True
+        existing(strip.fcurves.find("influence")).keyframe_points.insert(first, 1.0)
+    data.nla_tracks.active, existing(strips_of(obj))[1].select = existing(data.nla_tracks.get(LAYER)), True
+    data.use_tweak_mode = True
+
+
+def remove_base(transform: Transform) -> None:
+    """Have a transform hang on its base no longer, and remove that where nothing else does."""
+    base, carrier = existing(transform.motion.base), transform.carrier
+    transform.motion.base = None
+    if isinstance(carrier, bpy.types.PoseBone):
+        for constraint in [one for one in carrier.constraints if getattr(one, "target", None) == base]:
+            carrier.constraints.remove(constraint)
+    else:
+        _hang_alike(carrier, base)
+    if not bpy.data.user_map(subset=[base], value_types={"OBJECT"})[base]:
+        action = None if base.animation_data is None else base.animation_data.action
+        bpy.data.objects.remove(base)
+        if action is not None:
+            remove_unused(action)
+
+
+def remove_layer(obj: bpy.types.Object) -> None:
+    """Give an object the Action back that its layer is on, without the layer."""
+    data, (below, layer) = existing(obj.animation_data), existing(strips_of(obj))
+    data.use_tweak_mode = False
+    action, slot, offset = below.action, below.action_slot, existing(layer.action)
+    for name in (LAYER, BELOW):
+        data.nla_tracks.remove(existing(data.nla_tracks.get(name)))
+    data.action, data.action_slot = action, slot
+    remove_unused(offset)
+
+
+def _hang_alike(obj: bpy.types.Object, model: bpy.types.Object) -> None:
+    """Have an object hang on what another one hangs on, and in the same way."""
+    obj.parent, obj.parent_type, obj.parent_bone = model.parent, model.parent_type, model.parent_bone
+    obj.matrix_parent_inverse = model.matrix_parent_inverse

@@ -1,0 +1,127 @@
+"""Things with a motion and an offset layer, and where they have to be: matrices by Blender's own, nothing of ours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix, Quaternion, Vector
+
+from rigid_motion.animation import set_mode
+from tests.animation.bones.rigs import new_rig
+from tests.animation.keyed import Carrier, curves_of, rotation_path
+from tests.animation.scenes import key, new_object, random_values, write
+from tests.balls import largest_displacements
+
+KEYS = (1.0, 11.0, 24.0, 40.0)
+OFFSET_KEYS = (1.0, 15.0, 33.0)
+FRAMES = np.arange(-2.0, 46.0, 0.375)
+"""At all eighths of frames, before and behind the keys, too."""
+
+KINDS = ("object", "child", "on a bone", "root", "bone", "connected")
+
+
+def moving_parent() -> bpy.types.Object:
+    return key(new_object("Parent", "XYZ"), KEYS, seed=7)
+
+
+def new(kind: str, order: str) -> Carrier:
+    """Something of a kind with nothing keyed, of which all that carries it moves."""
+    if kind == "object":
+        return new_object("Tool", order)
+    if kind == "child":
+        obj = new_object("Tool", order)
+        obj.parent, obj.matrix_parent_inverse = moving_parent(), Matrix.Translation((0.3, 1.0, 0.0))
+        return obj
+    rig = new_rig("Rig", rotation_mode=order, use_connect=kind == "connected")
+    rig.parent = moving_parent()
+    for bone in rig.pose.bones:
+        if bone.name != {"root": "Body"}.get(kind, "Hand"):
+            key(bone, KEYS, seed=3)
+    if kind == "on a bone":
+        key(rig.pose.bones["Hand"], KEYS, seed=3)
+        obj = new_object("Tool", order)
+        obj.parent, obj.parent_type, obj.parent_bone = rig, "BONE", "Hand"
+        return obj
+    return rig.pose.bones["Body" if kind == "root" else "Hand"]
+
+
+def key_base(carrier: Carrier, mode: str, frames: Sequence[float] = KEYS, **how) -> Carrier:
+    """Key it at random, by unit quaternions without a flip, as posing does."""
+    key(carrier, frames, **how)
+    if carrier.rotation_mode == "QUATERNION":
+        turns = random_values(carrier, "rotation_quaternion", len(frames))
+        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        for before, turn in pairwise(turns):
+            turn *= np.sign(before @ turn)
+        write(carrier, "rotation_quaternion", np.array(frames), turns, how.get("interpolation", "BEZIER"))
+    set_mode(carrier, mode, frames)
+    return carrier
+
+
+def key_offset(carrier: Carrier, mode: str = "BLENDER", frames: Sequence[float] = OFFSET_KEYS, size: float = 0.3):
+    """Key a layer whose strip is edited: at rest on the first of these frames."""
+    random, path = np.random.default_rng(5), rotation_path(carrier)
+    turns = size * random.normal(size=(len(frames), 3))
+    turns[0] = 0.0
+    places = np.vstack([np.zeros(3), size * random.normal(size=(len(frames) - 1, 3))])
+    order = carrier.rotation_mode
+    rotations = {
+        "QUATERNION": [Euler(turn).to_quaternion() for turn in turns],
+        "AXIS_ANGLE": [(np.linalg.norm(turn), *(turn if turn.any() else (0.0, 1.0, 0.0))) for turn in turns],
+    }.get(order, turns)
+    write(carrier, "location", np.array(frames), places, "BEZIER")
+    write(carrier, path, np.array(frames), np.array(rotations), "BEZIER")
+    set_mode(carrier, mode)
+
+
+def key_influence(obj: bpy.types.Object, *points: tuple[float, float]) -> None:
+    fcurve = obj.animation_data.nla_tracks["Rigid Motion Layer"].strips[0].fcurves.find("influence")
+    fcurve.keyframe_points.clear()
+    for frame, influence in points:
+        fcurve.keyframe_points.insert(frame, influence)
+
+
+def seen(carrier: Carrier, frames: np.ndarray = FRAMES) -> np.ndarray:
+    """Where something is: an object in the world, a bone relative to its parent bone or the rig, shape (m, 4, 4)."""
+    scene, result = bpy.context.scene, []
+    for frame in frames:
+        scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
+        shown = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        if isinstance(carrier, bpy.types.Object):
+            result.append(np.array(shown.matrix_world))
+        else:
+            bone = shown.pose.bones[carrier.name]
+            parent = Matrix() if bone.parent is None else bone.parent.matrix
+            result.append(np.array(parent.inverted() @ bone.matrix))
+    scene.frame_set(1)
+    return np.array(result)
+
+
+def offsets(carrier: Carrier, frames: np.ndarray = FRAMES) -> np.ndarray:
+    """What a layer whose strip is edited adds, to the power of its influence, shape (m, 4, 4)."""
+    curves, path, order = curves_of(carrier), rotation_path(carrier), carrier.rotation_mode
+    influence = carrier.id_data.animation_data.nla_tracks["Rigid Motion Layer"].strips[0].fcurves.find("influence")
+    connected = isinstance(carrier, bpy.types.PoseBone) and carrier.bone.use_connect
+    result = []
+    for frame in frames:
+        power = influence.evaluate(frame)
+        place = Vector(curves["location", index].evaluate(frame) for index in range(3)) * power * (not connected)
+        numbers = [curves[path, index].evaluate(frame) for index in range(4 if order == "QUATERNION" else 3)]
+        if order == "QUATERNION":
+            w, *xyz = np.array(numbers) / np.linalg.norm(numbers) * np.sign(numbers[0])
+            size = np.linalg.norm(xyz)
+            angle = 2.0 * power * np.arctan2(size, w)
+            turn = Quaternion(np.array(xyz) / (size or 1.0), angle)
+        else:
+            turn = Euler(np.array(numbers) * power, order).to_quaternion()
+        result.append(np.array(Matrix.LocRotScale(place, turn, None)))
+    return np.array(result)
+
+
+def displaced(one: np.ndarray, other: np.ndarray, radius: float) -> np.ndarray:
+    """How far any point of a ball is from one place to the other, (m, 4, 4) each, shape (m,)."""
+    off = one - other
+    return largest_displacements(off[:, :3, 3], radius * off[:, :3, :3])

@@ -1,0 +1,357 @@
+"""Offset layers: what is seen is the motion below times the offset, and merged it stays so within the tolerance."""
+
+from __future__ import annotations
+
+import itertools
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion import animation
+from rigid_motion.animation import Refused, add_layer, key_frames, merge_layer, modes_of, radius_of
+from tests.animation.bones.rigs import in_turn, new_rig
+from tests.animation.keyed import MODE_IDS, curves_of
+from tests.animation.layered import (
+    FRAMES,
+    KEYS,
+    KINDS,
+    OFFSET_KEYS,
+    displaced,
+    key_base,
+    key_influence,
+    key_offset,
+    new,
+    offsets,
+    seen,
+)
+from tests.animation.scenes import key, linked, new_object, push_down
+
+PRECISION = 1e-5
+QUATERNION_PRECISION = 1e-3
+"""Blender takes a quaternion of a strip to the power of its influence by an arc cosine in single precision, which knows
+no angle below 0.04 degrees.
+"""
+
+WHOLE = np.arange(1.0, 41.0)
+EIGHTHS = np.arange(1.0, 40.01, 0.125)
+
+
+def layers_of(carrier):
+    return carrier.id_data.animation_data.nla_tracks
+
+
+def update():
+    bpy.context.view_layer.update()
+
+
+MODES = [*zip(MODE_IDS, (*MODE_IDS[3:], *MODE_IDS[:3]), strict=True)]
+ORDERS = ("QUATERNION", "XYZ", "ZXY", "YZX")
+
+
+@pytest.mark.parametrize(("case", "order"), in_turn(itertools.product(KINDS, MODES), ORDERS))
+def test_what_is_seen_is_the_motion_below_times_the_offset_to_the_power_of_the_influence(live_file, case, order):
+    kind, (below, above) = case
+    carrier = key_base(new(kind, order), below)
+    before = seen(carrier)
+    add_layer(carrier)
+    assert np.abs(seen(carrier) - before).max() < PRECISION, "a layer at rest moves nothing"
+    key_offset(carrier, above)
+    key_influence(carrier.id_data, (1.0, 1.0), (20.0, 0.3), (40.0, 0.8))
+    update()
+    expected = before @ offsets(carrier)
+    assert np.abs(expected - before).max() > 0.05
+    error = np.abs(seen(carrier) - expected).max()
+    assert error < (QUATERNION_PRECISION if order == "QUATERNION" else PRECISION)
+
+
+@pytest.mark.parametrize(("case", "order"), in_turn(itertools.product(KINDS, MODES), ORDERS))
+def test_a_merged_layer_is_seen_within_the_tolerance_on_frames(live_file, case, order):
+    kind, (below, above) = case
+    carrier = key_base(new(kind, order), below)
+    names = {*bpy.data.objects.keys()}, {*bpy.data.actions.keys()}
+    action, radius = carrier.id_data.animation_data.action, radius_of(carrier)
+    add_layer(carrier)
+    key_offset(carrier, above)
+    key_influence(carrier.id_data, (1.0, 1.0), (20.0, 0.3), (40.0, 0.8))
+    update()
+    expected, between = seen(carrier, WHOLE), seen(carrier, EIGHTHS)
+    merged = merge_layer(carrier, 0.005)
+    assert displaced(seen(carrier, WHOLE), expected, radius).max() < 0.005 + 1e-4
+    off = displaced(seen(carrier, EIGHTHS), between, radius).max()
+    assert off < max(0.005, 2.0 * merged.between) + 1e-4
+    assert {*bpy.data.objects.keys()} == names[0], "the Empty is gone"
+    assert {*bpy.data.actions.keys()} == names[1], "and the Action of the layer"
+    assert carrier.id_data.animation_data.action == action
+    assert not len(layers_of(carrier))
+    assert not len(carrier.constraints)
+    assert {*KEYS, *OFFSET_KEYS} <= {*key_frames(carrier).tolist()}
+    assert np.all(key_frames(carrier) % 1.0 == 0.0)
+    assert len(key_frames(carrier)) == merged.after
+
+
+@pytest.mark.parametrize("mode", MODE_IDS)
+@pytest.mark.parametrize("kind", ["object", "child", "bone"])
+def test_a_layer_at_rest_is_merged_into_the_keys_and_modes_that_there_were(live_file, kind, mode):
+    carrier = key_base(new(kind, "QUATERNION"), mode)
+    before, keys = seen(carrier), {place: curve.range()[:] for place, curve in curves_of(carrier).items()}
+    add_layer(carrier)
+    merged = merge_layer(carrier, 0.001)
+    assert (merged.before, merged.after) == (len(KEYS), len(KEYS))
+    assert key_frames(carrier).tolist() == [*KEYS]
+    assert modes_of(carrier, key_frames(carrier)) == [mode] * len(KEYS)
+    assert {place: curve.range()[:] for place, curve in curves_of(carrier).items()} == keys
+    assert displaced(seen(carrier), before, radius_of(carrier)).max() < 0.001
+
+
+def test_where_a_layer_leaves_the_motion_its_modes_stay_and_there_are_curves_elsewhere(live_file):
+    tool = key_base(new("object", "XYZ"), "dq_sclerp")
+    before = seen(tool, EIGHTHS)
+    add_layer(tool)
+    key_offset(tool, frames=(24.0, 30.0, 40.0), size=0.5)
+    update()
+    merge_layer(tool, 0.002)
+    modes = dict(zip(key_frames(tool).tolist(), modes_of(tool, key_frames(tool)), strict=True))
+    assert [frame for frame in modes if frame < 24.0] == [1.0, 11.0]
+    assert modes[1.0] == modes[11.0] == "dq_sclerp"
+    assert displaced(seen(tool, EIGHTHS), before, 1.0)[EIGHTHS <= 24.0].max() < 1e-4
+    assert "BLENDER" in {mode for frame, mode in modes.items() if frame > 24.0}
+
+
+def test_bones_share_a_layer_and_all_else_of_the_rig_plays_on(live_file):
+    rig = new_rig("Rig")
+    rig["glow"] = 0.0
+    for bone in rig.pose.bones:
+        key_base(bone, "dq_sclerp")
+    rig.keyframe_insert('["glow"]', frame=1)
+    rig["glow"] = 1.0
+    rig.keyframe_insert('["glow"]', frame=40)
+    poses = {bone.name: seen(bone) for bone in rig.pose.bones}
+    bpy.context.scene.frame_set(1)
+    add_layer([rig.pose.bones["Upper"]])
+    add_layer([rig.pose.bones["Hand"], rig.pose.bones["Lower"]])
+    assert len(layers_of(rig)) == 2
+    for name in ("Upper", "Hand", "Lower"):
+        key_offset(rig.pose.bones[name], "motor_spline")
+    update()
+    for bone in rig.pose.bones:
+        added = offsets(bone) if bone.name != "Body" else np.eye(4)
+        assert np.abs(seen(bone) - poses[bone.name] @ added).max() < QUATERNION_PRECISION
+    bpy.context.scene.frame_set(40)
+    assert rig["glow"] == 1.0
+    expected = {bone.name: seen(bone, WHOLE) for bone in rig.pose.bones}
+    merge_layer(rig.pose.bones["Hand"], 0.005)
+    assert not len(layers_of(rig))
+    assert not any(len(bone.constraints) for bone in rig.pose.bones)
+    for bone in rig.pose.bones:
+        assert displaced(seen(bone, WHOLE), expected[bone.name], radius_of(bone)).max() < 0.006
+    bpy.context.scene.frame_set(40)
+    assert rig["glow"] == 1.0
+    assert key_frames(rig.pose.bones["Body"]).tolist() == [*KEYS]
+
+
+def test_scale_stays_with_what_is_seen_or_goes_along_where_it_is_keyed_evenly(live_file):
+    for how in (None, "even", "uneven"):
+        tool = key_base(new_object(f"Tool {how}"), "cga_slerp", scale=how)
+        if how is None:
+            tool.scale = 1.0, 2.0, 0.5
+        before, scale = seen(tool), np.array([np.diag((*values, 1.0)) for values in scales_of(tool)])
+        add_layer(tool)
+        key_offset(tool, "dq_sclerp")
+        update()
+        added = offsets(tool)
+        expected = before @ added if how == "even" else before @ np.linalg.inv(scale) @ added @ scale
+        assert np.abs(seen(tool) - expected).max() < 10.0 * QUATERNION_PRECISION
+        whole = seen(tool, WHOLE)
+        merge_layer(tool, 0.005)
+        assert displaced(seen(tool, WHOLE), whole, radius_of(tool)).max() < 0.006
+
+
+def scales_of(tool):
+    curves = [curves_of(tool).get(("scale", index)) for index in range(3)]
+    return [
+        [tool.scale[index] if curve is None else curve.evaluate(frame) for index, curve in enumerate(curves)]
+        for frame in FRAMES
+    ]
+
+
+def test_a_base_that_repeats_is_merged_over_the_scene(live_file):
+    tool = key_base(new("object", "XYZ"), "dq_sclerp", (1.0, 6.0, 11.0))
+    animation.repeat(tool, "REPEAT")
+    bpy.context.scene.frame_end = 40
+    add_layer(tool)
+    key_offset(tool)
+    update()
+    expected = seen(tool, WHOLE)
+    merge_layer(tool, 0.005)
+    assert not any(modifier.type == "CYCLES" for curve in curves_of(tool).values() for modifier in curve.modifiers)
+    assert displaced(seen(tool, WHOLE), expected, radius_of(tool)).max() < 0.006
+
+
+def test_stepped_keys_stay_stepped_on_frames(live_file):
+    tool = key_base(new("object", "QUATERNION"), "BLENDER", interpolation="CONSTANT")
+    add_layer(tool)
+    key_offset(tool)
+    update()
+    expected = seen(tool, WHOLE)
+    merge_layer(tool, 0.002)
+    assert displaced(seen(tool, WHOLE), expected, radius_of(tool)).max() < 0.0021
+
+
+@pytest.mark.parametrize("kind", ["child", "bone"])
+def test_a_layer_is_merged_after_its_strip_was_left_and_the_file_opened_again(live_file, tmp_path, kind):
+    tool = key_base(new(kind, "XYZ"), "motor_spline")
+    bpy.context.scene.frame_set(1)
+    add_layer(tool)
+    key_offset(tool)
+    update()
+    expected = seen(tool, WHOLE)
+    tool.id_data.animation_data.use_tweak_mode = False
+    path = str(tmp_path / "layer.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    tool = bpy.data.objects["Tool"] if kind == "child" else bpy.data.objects["Rig"].pose.bones["Hand"]
+    assert np.abs(seen(tool, WHOLE) - expected).max() < PRECISION
+    merge_layer(tool, 0.002)
+    assert tool.id_data.parent == bpy.data.objects["Parent"]
+    assert displaced(seen(tool, WHOLE), expected, radius_of(tool)).max() < 0.0021
+
+
+def test_an_action_on_top_of_a_layer_is_removed_before_it_is_merged(live_file):
+    tool = key_base(new("object", "XYZ"), "dq_sclerp")
+    add_layer(tool)
+    tool.animation_data.use_tweak_mode = False
+    tool.keyframe_insert("location", frame=5)
+    with pytest.raises(Refused, match="on top"):
+        merge_layer(tool)
+    tool.animation_data.action = None
+    assert merge_layer(tool)
+
+
+def snapshot():
+    return (
+        sorted(bpy.data.objects.keys()),
+        sorted(bpy.data.actions.keys()),
+        [(obj.name, obj.parent, obj.animation_data and len(obj.animation_data.nla_tracks)) for obj in bpy.data.objects],
+    )
+
+
+def held(tool):
+    hand = new_object("Hand")
+    animation.hold_in(tool, hand)
+
+
+def constrained(tool):
+    tool.constraints.new("TRACK_TO")
+
+
+def delta(tool):
+    tool.delta_location.x = 1.0
+
+
+def driven(tool):
+    tool.driver_add("location", 0)
+
+
+def shared(tool):
+    other = new_object("Other")
+    other.animation_data_create().action = tool.animation_data.action
+    other.animation_data.action_slot = tool.animation_data.action_slot
+
+
+def stripped(tool):
+    push_down(tool)
+
+
+def on_vertices(tool):
+    tool.parent, tool.parent_type = new_object("Mesh", data=bpy.data.meshes.new("Mesh")), "VERTEX"
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (held, "held"),
+        (constrained, "constraint"),
+        (delta, "delta transforms"),
+        (driven, "driven"),
+        (shared, "shares its Action"),
+        (stripped, "enter a strip"),
+        (on_vertices, "vertices"),
+        (add_layer, "merge it first"),
+    ],
+)
+def test_what_can_have_no_layer_says_why_and_stays_as_it_is(live_file, spoil, reason):
+    tool = key(new_object("Tool"))
+    spoil(tool)
+    update()
+    before = snapshot()
+    with pytest.raises(Refused, match=reason):
+        add_layer(tool)
+    assert snapshot() == before
+
+
+def test_bones_that_inherit_otherwise_are_refused(live_file):
+    rig = new_rig("Rig", use_inherit_rotation=False)
+    key(rig.pose.bones["Hand"])
+    with pytest.raises(Refused, match="Inherit Rotation"):
+        add_layer(rig.pose.bones["Hand"])
+
+
+def test_what_has_a_layer_is_held_baked_and_reduced_only_when_that_is_merged(live_file):
+    tool, hand = key_base(new("object", "XYZ"), "dq_sclerp"), new_object("Hand")
+    add_layer(tool)
+    key_offset(tool, "dq_sclerp")
+    update()
+    before = snapshot()
+    for act in (
+        lambda: animation.hold_in(tool, hand),
+        lambda: animation.bake(tool),
+        lambda: animation.reduce_keys_of(tool),
+        lambda: animation.unbake(tool),
+        lambda: animation.clean_motion(tool),
+        lambda: animation.bake_to_world(tool),
+    ):
+        with pytest.raises(Refused):
+            act()
+    assert snapshot() == before
+
+
+def test_a_layer_with_keys_of_what_has_no_base_is_not_merged(live_file):
+    rig = new_rig("Rig")
+    for bone in rig.pose.bones:
+        key(bone)
+    bpy.context.scene.frame_set(1)
+    add_layer(rig.pose.bones["Hand"])
+    rig.pose.bones["Body"].keyframe_insert("location", frame=5)
+    with pytest.raises(Refused, match="Body"):
+        merge_layer(rig)
+    add_layer(rig.pose.bones["Body"])
+    assert merge_layer(rig).after
+
+
+def test_nothing_is_merged_where_there_is_no_layer_or_no_tolerance(live_file):
+    tool = key(new_object("Tool"))
+    with pytest.raises(Refused, match="no layer alone"):
+        merge_layer(tool)
+    add_layer(tool)
+    with pytest.raises(Refused, match="tolerance"):
+        merge_layer(tool, 0.0)
+
+
+def test_of_a_copy_the_base_stays_until_the_last_one_is_merged(live_file):
+    tool = key_base(new_object("Tool", "XYZ"), "dq_sclerp")
+    add_layer(tool)
+    copy = tool.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    with pytest.raises(Refused, match="Single User"):
+        merge_layer(tool)
+
+
+def test_what_is_in_another_file_is_refused(live_file, tmp_path):
+    key(new_object("Tool"))
+    path = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    bpy.data.objects.remove(bpy.data.objects["Tool"])
+    tool = linked(path, "Tool")
+    with pytest.raises(Refused, match="linked"):
+        add_layer(tool)
