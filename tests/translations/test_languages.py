@@ -20,6 +20,7 @@ GERMAN = LANGUAGES["de"]
 
 UNSEEN = {
     *(" Live", " Original", " to ", " passing", "Pass To", "rigid_motion ", "Rigid Motion", "Object Transforms"),
+    *(" Base", " Layer", "Rigid Motion Base", "Rigid Motion Layer"),
     "list[FewerKeys | FewerRuns] | Refused",
 }
 """Names in files, and a type."""

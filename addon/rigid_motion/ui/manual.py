@@ -42,6 +42,7 @@ PAGES = (
     ("bpy.types.scene.rigid_motion_pass", f"{HOLDING}#pass"),
     ("bpy.ops.rigid_motion.go_to_deviation", f"{ON_THE_PATH}#deviations"),
     ("bpy.types.rigidmotionoverlay.*deviation*", f"{ON_THE_PATH}#deviations"),
+    ("bpy.ops.rigid_motion.*_layer", f"{ON_THE_PATH}#layers"),
     ("bpy.ops.rigid_motion.equalise_speed", f"{ON_THE_PATH}#speed"),
     *((f"bpy.types.rigidmotionoverlay.{name}", f"{ON_THE_PATH}#ghosts") for name in ("*ghost*", "show_bodies")),
     ("bpy.types.rigidmotionoverlay.*speed*", f"{ON_THE_PATH}#speed"),

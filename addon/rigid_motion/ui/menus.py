@@ -73,6 +73,8 @@ class _Menu(Menu):
         layout.operator_menu_enum("rigid_motion.add_cycles", "mode")
         layout.operator("rigid_motion.copy_mode")
         layout.operator("rigid_motion.equalise_speed")
+        layout.operator("rigid_motion.add_layer")
+        layout.operator("rigid_motion.merge_layer")
         _draw_breakdowns(self, context)
         layout.separator()
         layout.menu(RIGID_MOTION_MT_other_keys.__name__)

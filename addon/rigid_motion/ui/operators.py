@@ -14,12 +14,14 @@ from bpy.app.translations import pgettext_tip as tip_
 from .. import animation
 from ..animation.actions.marks import read_marks
 from ..animation.actions.refusals import MOST_TURNS
+from ..animation.baking.layers import strips_of
 from ..animation.baking.originals import BAKED
 from ..animation.evaluation.sources import SCREW_AXIS, TURN_AXES
 from ..animation.properties import MODE_ITEMS, TURN_AXIS_ITEMS
 from ..animation.queries.keyed import active_binding
 from ..animation.queries.polls import with_holders, with_in_betweens, with_modes, with_more_keys_than
 from ..animation.transforms import OWN_WORDS, Refused, Transform
+from ..animation.transforms.sizes import first_tolerance
 from ..blender import (
     BoolProperty,
     EnumProperty,
@@ -31,6 +33,7 @@ from ..blender import (
     with_properties,
 )
 from .preferences import DEFAULT_MODE, default_mode
+from .reducing import radius_property, tolerance_property
 from .targets import (
     CURRENT,
     SCOPES,
@@ -45,7 +48,7 @@ from .targets import (
     scope_for,
     targets_of,
 )
-from .wording import DESCRIPTIONS, LABELS, listed, split
+from .wording import DESCRIPTIONS, LABELS, listed, reduction_summary, split
 
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
 
@@ -280,6 +283,48 @@ class RIGID_MOTION_OT_add_cycles(OnTargets):
         return rpt_("the motion repeats")
 
 
+class RIGID_MOTION_OT_add_layer(OnTargets):
+    bl_idname = "rigid_motion.add_layer"
+    bl_label = "Add Layer"
+    bl_description = (
+        "Key an offset on top of the motion, as one rigid motion on another: from now on the keys of the selection are "
+        "the offset, in an NLA strip whose influence is keyed. The motion below goes to an Empty, where its keys stay"
+    )
+    nothing_to_do = n_("All of it has a layer: merge it first")
+    with_work = staticmethod(partial(filter, lambda target: target.motion.base is None))
+    leaves_others = True
+    verb = staticmethod(animation.add_layer)
+    summary = n_("its keys are an offset now; the motion below is that of the Empty")
+
+
+@with_properties
+class RIGID_MOTION_OT_merge_layer(OnTargets):
+    bl_idname = "rigid_motion.merge_layer"
+    bl_label = "Merge Layer"
+    bl_description = (
+        "Write what is seen as keys of the Action from before the layer, and remove the layer and its Empty. Keys stay "
+        "on their frames, and come in between where the motion needs them. Of a rig that is the layer of all bones"
+    )
+    nothing_to_do = n_("Nothing here has a layer")
+    with_work = staticmethod(partial(filter, lambda target: target.motion.base or strips_of(target.animated)))
+    leaves_others = True
+
+    tolerance: float = tolerance_property(
+        "How far off any point may be on any frame, within the radius around what is moved. To begin with a "
+        "millimetre, and of a rig 0.3 % of its size"
+    )
+    radius: float = radius_property(options={"SKIP_SAVE"})
+
+    def execute(self, context: bpy.types.Context) -> Returned:
+        if not self.properties.is_property_set("tolerance"):
+            self.tolerance = first_tolerance(existing(context.scene), self.meant(context))
+        return super().execute(context)
+
+    def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        merged = animation.merge_layer(targets, self.tolerance, self.radius or None, refused=refused)
+        return "" if merged is None else reduction_summary(existing(context.scene), merged)
+
+
 class RIGID_MOTION_OT_clear(OnTargets):
     bl_idname = "rigid_motion.clear"
     bl_label = "Clear Modes"
@@ -324,4 +369,6 @@ CLASSES = (
     RIGID_MOTION_OT_bake,
     RIGID_MOTION_OT_unbake,
     RIGID_MOTION_OT_refresh,
+    RIGID_MOTION_OT_add_layer,
+    RIGID_MOTION_OT_merge_layer,
 )

@@ -10,6 +10,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from .. import animation
 from ..animation.actions.reading import planned_from
+from ..animation.baking.layers import is_plain, strips_of
 from ..animation.evaluation.components import LOCATION, PART_OF, ROTATION
 from ..animation.evaluation.sources import KeyedTransform
 from ..animation.properties import TURN_AXIS_ITEMS
@@ -29,6 +30,7 @@ from .wording import (
     MOVED_ALONE,
     NO_BONE,
     NO_KEYS,
+    NO_PATH,
     NO_SEGMENT,
     OUT_OF_DATE,
     PART_NAMES,
@@ -212,6 +214,21 @@ class _Speed(Folded):
         speed.draw_panel(context, self.layout)
 
 
+class _Layer(Folded):
+    bl_label = "Layer"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, target = self.layout, active_target(context)
+        strips = strips_of(target.animated) if target is not None and target.motion.base is not None else None
+        if target is not None and strips is not None:
+            layout.prop(strips[1], "influence")
+            if not is_plain(target.animated):
+                draw_text(context, layout, NO_PATH, "INFO")
+        row = layout.row(align=True)
+        row.operator("rigid_motion.add_layer")
+        row.operator("rigid_motion.merge_layer")
+
+
 def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segment: SegmentFacts) -> None:
     _draw_mode_menu(labelled(layout, iface_("Segment", OWN_WORDS)), CURRENT, {segment.mode})
     frames = f"{segment.first:g} \N{EN DASH} {segment.last:g}"
@@ -273,6 +290,7 @@ def _panels() -> Iterator[type[Panel]]:
         yield _in_space(_Path, space, main)
         yield _in_space(_HeldIn, space, main)
         yield _in_space(_Speed, space, main)
+        yield _in_space(_Layer, space, main)
 
 
 CLASSES = tuple(_panels())

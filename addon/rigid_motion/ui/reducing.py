@@ -43,6 +43,20 @@ def radius_property(
     )
 
 
+def tolerance_property(description: str, default: float = 0.001) -> Any:
+    """Return the property `tolerance` of operators that change keys."""
+    return FloatProperty(
+        name="Tolerance",
+        description=description,
+        default=default,
+        min=1e-6,
+        soft_max=1.0,
+        step=0.1,
+        precision=4,
+        subtype="DISTANCE",
+    )
+
+
 class OfRigsToo:
     """Operators that act on all keyed bones of a rig where it is selected outside of Pose Mode: an import is."""
 
@@ -75,19 +89,10 @@ class RIGID_MOTION_OT_reduce_keys(OfRigsToo, OnTargets):
         ],
         translation_context=OWN_WORDS,
     )
-    tolerance: float = FloatProperty(
-        name="Tolerance",
-        description=(
-            "The largest error of any point at any time, within the radius around what moves. For bones it includes"
-            " the errors of their parents. The default is a millimetre, for a rig 0.3 % of its size, or 2 % for key"
-            " poses"
-        ),
-        default=0.001,
-        min=1e-6,
-        soft_max=1.0,
-        step=0.1,
-        precision=4,
-        subtype="DISTANCE",
+    tolerance: float = tolerance_property(
+        "The largest error of any point at any time, within the radius around what moves. For bones it includes"
+        " the errors of their parents. The default is a millimetre, for a rig 0.3 % of its size, or 2 % for key"
+        " poses"
     )
     offered: float = FloatProperty(
         description="The tolerance that was offered last, for as long as nobody sets another", options={"HIDDEN"}
@@ -224,18 +229,10 @@ class RIGID_MOTION_OT_reduce_into_holds(OnTargets):
     nothing_to_do = n_("Select something with dense keys, such as a recording, and then what held it")
     with_work = staticmethod(partial(with_more_keys_than, count=DEFAULT_MIN_HOLD_FRAMES - 1))
 
-    tolerance: float = FloatProperty(
-        name="Tolerance",
-        description=(
-            "The largest error of any point on any frame, within the radius around what is held. Recorded hands "
-            "give by a few millimetres"
-        ),
-        default=DEFAULT_HAND_TOLERANCE,
-        min=1e-6,
-        soft_max=1.0,
-        step=0.1,
-        precision=4,
-        subtype="DISTANCE",
+    tolerance: float = tolerance_property(
+        "The largest error of any point on any frame, within the radius around what is held. Recorded hands "
+        "give by a few millimetres",
+        DEFAULT_HAND_TOLERANCE,
     )
     least: int = IntProperty(
         name="At Least",

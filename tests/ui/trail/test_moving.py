@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Quaternion
 
-from rigid_motion.animation import key_frames, set_mode
+from rigid_motion.animation import add_layer, key_frames, set_mode
 from rigid_motion.ui.trail.handles import handles_of
 from tests.animation.bones.rigs import in_turn
 from tests.animation.held import worlds
 from tests.animation.keyed import curves_of, snapshot
+from tests.animation.layered import key_offset
 from tests.animation.scenes import FRAMES, key, new_object
 from tests.ui.conftest import select_keys
 from tests.ui.trail.conftest import CARRIERS, MIDDLE, MOVE, TURN, about, bone, choose, held_prop
@@ -54,6 +55,19 @@ def test_a_key_goes_where_it_is_moved_to_and_the_others_stay(scene, kind, how):
     assert worlds(carrier, [MIDDLE]) == pytest.approx(expected(before, edit), abs=NEAR)
     assert worlds(carrier, others) == pytest.approx(stay, abs=NEAR)
     assert key_frames(carrier).tolist() == list(FRAMES)
+
+
+@pytest.mark.parametrize("edit", [moved, turned])
+@pytest.mark.parametrize("kind", ["XYZ", "parented", "bone"])
+def test_a_key_of_a_layer_goes_where_it_is_moved_to_whatever_the_base_does(scene, kind, edit):
+    carrier = CARRIERS[kind]()
+    add_layer(carrier)
+    key_offset(carrier, frames=FRAMES)
+    bpy.context.view_layer.update()
+    choose(carrier, MIDDLE)
+    before = worlds(carrier, [MIDDLE])
+    assert edit() == {"FINISHED"}
+    assert worlds(carrier, [MIDDLE]) == pytest.approx(expected(before, edit), abs=50 * NEAR)
 
 
 @pytest.mark.parametrize("kind", ["XYZ", "parented", "bone"])

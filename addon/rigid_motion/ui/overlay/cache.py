@@ -19,6 +19,7 @@ from mathutils import Matrix
 
 from ...animation.actions.channels import selected_keys
 from ...animation.actions.slots import Binding
+from ...animation.baking.layers import is_plain
 from ...animation.evaluation.sources import KeyedTransform
 from ...animation.queries.keyed import active_bindings, frames_in
 from ...animation.transforms import Transform, transform_of
@@ -181,6 +182,8 @@ def _read(
     if binding is None or source is None:
         # Where it was refused, the panel says why.
         return entry
+    if target.motion.base is not None and not is_plain(target.animated):
+        return entry  # keys are not where it is seen
     carrier, is_tweaked = carrier_of(target, source, carried), existing(data).use_tweak_mode
     held = carrier if isinstance(carrier, HolderMotion) else None
     if carrier is not None:

@@ -17,12 +17,11 @@ from ...animation.evaluation.components import MODE_NUMBERS
 from ...animation.evaluation.sources import HoldRun, KeyedTransform
 from ...animation.holds.holders import Holder, holders_of
 from ...animation.transforms import Transform, transform_of
-from ...blender import existing
 from ...motion.affine import AffineMaps
 from .blends import blended, smoothstep
 from .ghosts import Ghosts, ghost_frames, in_space_of_path, matrices_of
 from .kinds import space_of
-from .parents import CarriedTargets, Parents, identity, maps_of
+from .parents import CarriedTargets, Parents, followed_parents, identity, maps_of
 from .points import PASSING_HOLDER, DrawnPath, Piece, axis_frames, sample_frames, tick_frames
 from .records import PlaceRecord, record_of
 
@@ -207,16 +206,8 @@ def is_held(source: KeyedTransform) -> bool:
 
 
 def carrier_of(target: Transform, source: KeyedTransform, carried: CarriedTargets) -> HolderMotion | Parents | None:
-    """Return what holds something with keys, or the parents that carry it where these move by keys; None for neither.
-
-    In a strip that is entered parents are taken as they are on the current frame.
-    """
-    if is_held(source):
-        return HolderMotion(target, source, carried)
-    if existing(target.animated.animation_data).use_tweak_mode:
-        return None
-    parents = Parents(target, carried)
-    return parents if parents.move_by_keys else None
+    """Return what holds something with keys, or the parents that carry it if these move by keys; None for neither."""
+    return HolderMotion(target, source, carried) if is_held(source) else followed_parents(target, carried)
 
 
 def pieces_of(holders: np.ndarray) -> tuple[Piece, ...]:

@@ -76,6 +76,8 @@ def space_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> tuple[Matr
     """Return where a path leads in the world, and what stands between rotation and location in it, None where nothing
     does.
     """
+    if transform.is_part and (base := transform.motion.base) is not None:
+        return base.evaluated_get(depsgraph).matrix_world.copy(), None
     if transform.is_part:
         return space_of_bone(transform.pose_bone, depsgraph)
     return space_of_object(transform.animated, depsgraph), None

@@ -8,18 +8,20 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
 from ...animation.actions.slots import Binding
+from ...animation.baking.layers import binding_below, is_plain, strips_of
 from ...animation.baking.motions import MOVING_CHANNELS, not_promised, shown
 from ...animation.evaluation.sources import KeyedTransform
 from ...animation.queries.keyed import active_bindings, sources_of
 from ...animation.transforms import Transform, transform_of
 from ...animation.transforms.posing import Hierarchy
-from ...blender import pose_bones
+from ...blender import existing, pose_bones
 from ...motion.affine import AffineMaps
 
 MAX_DIRECTION_ROUNDING = 1e-5
@@ -50,7 +52,16 @@ class CarriedTargets:
         transforms = list(transforms)
         if missing := [transform for transform in transforms if transform not in self._read]:
             bindings = active_bindings(missing)
+            for item in missing:
+                # What else a rig with a layer moves is in the strip below.
+                keyed = (binding := bindings.get(item)) is not None and binding.is_keyed
+                if item.motion.base is None and not keyed and is_plain(item.animated):
+                    bindings[item] = binding_below(item, existing(strips_of(item.animated)))
             sources = dict(zip(bindings, sources_of(list(bindings.values())), strict=True))
+            for item, source in sources.items():
+                if source is not None and item.motion.base is not None:
+                    (_, below), *_ = self.read([transform_of(item.motion.base)]).values()
+                    sources[item] = source if below is None else replace(source, carried=below.seen_range)
             self._read |= {item: (bindings.get(item), sources.get(item)) for item in missing}
         return {transform: self._read[transform] for transform in transforms}
 
@@ -147,6 +158,8 @@ class Parents:
     def _spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
         if not self.target.is_part:
             return self._carrying(self.target.animated, frames), None
+        if (base := self.target.motion.base) is not None:
+            return self._world(base, frames), None
         bone, stands = self.target.pose_bone, identity(len(frames))
         hierarchy, numbers = self._carried.hierarchy(self.target.animated)
         number = numbers[bone.name]
@@ -178,6 +191,19 @@ class Parents:
         return carried @ maps_of(obj.matrix_parent_inverse)
 
 
+def followed_parents(target: Transform, carried: CarriedTargets) -> Parents | None:
+    """Return what carries a target as its keys are edited, where that moves by keys alone.
+
+    Strips may be elsewhere in time: what hangs on something is seen on the current frame as long as they are edited,
+    but for those of layers.
+    """
+    obj = target.animated
+    if existing(obj.animation_data).use_tweak_mode and not (target.motion.base and is_plain(obj)):
+        return None
+    parents = Parents(target, carried)
+    return parents if parents.move_by_keys else None
+
+
 def unless_same(turned: np.ndarray) -> np.ndarray | None:
     """Return turns (..., 3, 3), or None where all of them are by nothing."""
     return None if np.abs(turned - np.eye(3)).max() < MAX_DIRECTION_ROUNDING else turned
@@ -186,6 +212,9 @@ def unless_same(turned: np.ndarray) -> np.ndarray | None:
 def _above(target: Transform) -> Iterator[Transform]:
     """Yield all that carries something: the bones that it hangs on, and the objects."""
     obj = target.animated
+    if target.is_part and (base := target.motion.base) is not None:
+        yield from (transform_of(base), *_above(transform_of(base)))
+        return
     if target.is_part:
         yield from map(transform_of, target.pose_bone.parent_recursive)
         yield transform_of(obj)
@@ -203,6 +232,7 @@ def _moves_by_keys(transform: Transform, carried: CarriedTargets) -> bool:
         return not carried.follows(transform)
     data, body = obj.animation_data, obj.rigid_body
     in_strips = data is not None and (data.use_tweak_mode or any(track.strips for track in data.nla_tracks))
+    in_strips = in_strips and not is_plain(obj)
     driven = data is not None and any(
         driver.data_path.removeprefix("delta_") in MOVING_CHANNELS for driver in data.drivers
     )

@@ -190,7 +190,7 @@ def trace(
     ValueError
         Where the keys make no motion.
     """
-    if len(source.key_frames) < 2:
+    if len(source.key_frames) < 2 and source.carried is None:
         return None
     first, last = source.seen_range
     keys = source.keyed_frames

@@ -1,0 +1,60 @@
+"""The paths of things with offset layers: where they are seen, or none."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import add_layer
+from rigid_motion.animation.transforms import transform_of
+from rigid_motion.ui.overlay import cache
+from tests.animation.layered import key_base, key_influence, key_offset, new
+
+FRAMES = np.arange(1, 41)
+
+
+def world_points(carrier) -> np.ndarray:
+    """Where the origin of something is on all frames, (m, 3)."""
+    result = []
+    for frame in FRAMES.tolist():
+        bpy.context.scene.frame_set(frame)
+        obj = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        bone = isinstance(carrier, bpy.types.PoseBone)
+        world = obj.matrix_world @ obj.pose.bones[carrier.name].matrix if bone else obj.matrix_world
+        result.append(world.translation[:])
+    return np.array(result)
+
+
+@pytest.mark.parametrize("kind", ["object", "child", "on a bone", "root", "bone"])
+@pytest.mark.parametrize("modes", [("dq_sclerp", "motor_spline"), ("motor_spline", "BLENDER")])
+def test_a_path_is_where_it_is_seen_from_the_first_to_the_last_key_of_the_base(extension, kind, modes):
+    carrier = key_base(new(kind, "XYZ"), modes[0])
+    bpy.context.scene.frame_set(1)
+    add_layer(carrier)
+    key_offset(carrier, modes[1], frames=(1.0, 15.0, 33.0))
+    bpy.context.view_layer.update()
+    seen = world_points(carrier)
+    path = cache.path_of(carrier, bpy.context.scene)
+    assert path.in_world or kind == "object"
+    assert (path.frames[0], path.frames[-1]) == (1.0, 40.0)
+    line = path.native if path.desired is None else path.desired
+    space = np.eye(4) if path.in_world else np.array(carrier.parent.matrix_world)
+    drawn = np.stack([np.interp(FRAMES, path.frames, column) for column in line.T], axis=1) @ space[:3, :3].T
+    assert np.abs(drawn + space[:3, 3] - seen).max() < 2e-3
+
+
+def test_where_the_influence_is_not_one_or_the_strip_is_left_there_is_no_path(extension):
+    tool = key_base(new("object", "XYZ"), "dq_sclerp")
+    add_layer(tool)
+    key_offset(tool)
+    key_influence(tool, (1.0, 1.0), (20.0, 0.5))
+    bpy.context.view_layer.update()
+    assert cache.path_of(tool, bpy.context.scene) is None
+    key_influence(tool, (1.0, 1.0))
+    bpy.context.view_layer.update()
+    assert cache.path_of(tool, bpy.context.scene) is not None
+    tool.animation_data.use_tweak_mode = False
+    bpy.context.view_layer.update()
+    assert cache.path_of(tool, bpy.context.scene) is None
+    assert cache.path_of(transform_of(tool).motion.base, bpy.context.scene) is not None
