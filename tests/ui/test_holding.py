@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import hold_facts, hold_in
+from rigid_motion.animation import hold_facts, hold_in, pass_frames
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.ui import held_in, holding
 from tests.animation.bones.rigs import select_bones
@@ -198,6 +198,20 @@ def test_the_number_in_the_panel_is_that_at_the_key(stage):
     assert scene.rigid_motion_pass == 4
     scene.rigid_motion_pass = 9
     assert hold_facts(mug).frames == scene.rigid_motion_pass == 9
+
+
+def test_that_uneven_scale_shears_what_passes_is_said(stage):
+    mug, left, right = stage
+    right.scale = (1.0, 2.0, 1.0)
+    hold_in(mug, left)
+    at(21)
+    hold_in(mug, right, frames=4)
+    assert [text[:31] for text in held_in.cautions(transform_of(mug), hold_facts(mug))] == [
+        "Right is scaled unevenly: what "
+    ]
+    left.scale = (3.0, 3.0, 3.0)
+    pass_frames(mug, 0)
+    assert list(held_in.cautions(transform_of(mug), hold_facts(mug))) == []
 
 
 def test_what_may_go_wrong_is_said(stage):

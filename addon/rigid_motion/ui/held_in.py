@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
 
 from ..animation import HoldFacts, hold_facts, reduction_of
 from ..animation.actions.channels import key_points
@@ -16,6 +17,7 @@ from ..animation.actions.slots import active_fcurves
 from ..animation.evaluation.components import SCALE
 from ..animation.holds.dependencies import follows, node_of
 from ..animation.holds.holders import Holder
+from ..animation.holds.placing import unevenness_of
 from ..animation.transforms import OWN_WORDS, Transform, prefix_of
 from .holding import PASS_PROPERTY, RIGID_MOTION_MT_holders, has_been_held, icon_of, name_of, shown_prop
 from .wording import degrees, draw_text, hold_lines, labelled, length
@@ -28,6 +30,12 @@ MAX_TOUCHING_DISTANCE = 1e-5
 
 MAX_SCALE_ROUNDING = 1e-4
 """Scales that differ by less are the same."""
+
+
+UNEVEN = n_(
+    "{holder} is scaled unevenly: what passes to it is sheared until it arrives. "
+    "Apply that scale, or pass over 0 frames"
+)
 
 
 def draw(context: Any, layout: Any) -> None:
@@ -93,6 +101,8 @@ def cautions(prop: Transform, facts: HoldFacts) -> Iterator[str]:
             yield iface_("{holder} has keys of its scale: what it holds grows and shrinks with it").format(
                 holder=holder.name
             )
+        if facts.frames and unevenness_of(holder.offset) > MAX_SCALE_ROUNDING:
+            yield iface_(UNEVEN).format(holder=holder.name)
 
 
 def _grows(holder: Holder) -> bool:

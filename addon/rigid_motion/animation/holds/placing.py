@@ -76,6 +76,13 @@ def hangs_on_bone(user: Transform) -> bool:
     return not user.is_part and obj.parent is not None and obj.parent_type == "BONE" and bool(obj.parent_bone)
 
 
+def unevenness_of(matrix: Matrix) -> float:
+    """Return how far the axes of a matrix are from being at right angles and of one length, 0 where they are."""
+    axes = np.array(matrix.to_3x3())
+    squares = axes.T @ axes
+    return float(np.abs(squares / (np.trace(squares) / 3.0) - np.eye(3)).max())
+
+
 def poses_of(matrices: np.ndarray) -> tuple[Poses, np.ndarray]:
     """Return the rigid part of matrices (..., 4, 4) without shear, shape (...), and their scales, shape (..., 3)."""
     axes = matrices[..., :3, :3]
