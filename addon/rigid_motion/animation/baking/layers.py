@@ -186,8 +186,9 @@ def _enter_layer(obj: bpy.types.Object, binding: Binding) -> None:
         data.action = None
         offset = bpy.data.actions.new(f"{obj.name} Layer")
         keyed = action.frame_range if any(True for _ in binding.slot.fcurves) else (np.inf, -np.inf)
-        first = int(np.floor(min(scene().frame_start, keyed[0])))
-        last = int(np.ceil(max(scene().frame_end, keyed[1])))
+        # Outside of its strip a layer stays as it is at its ends, whatever is keyed there.
+        first = int(np.floor(min(scene().frame_start, scene().frame_current, keyed[0])))
+        last = int(np.ceil(max(scene().frame_end, scene().frame_current, keyed[1])))
         for name, shown, of in ((BELOW, action, slot), (LAYER, offset, offset.slots.new("OBJECT", obj.name))):
             track = data.nla_tracks.new()
             track.name = name

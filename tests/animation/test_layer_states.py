@@ -1,0 +1,213 @@
+"""Whatever is edited of a layer and of what is below it, in whatever order, one is seen on top of the other."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+import numpy as np
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from rigid_motion import animation
+from rigid_motion.animation import Refused, add_layer, merge_layer, radius_of, set_mode
+from tests.animation.keyed import MODE_IDS, Carrier, curves_of, rotation_path
+from tests.animation.layered import displaced, key_base, new, offsets, seen
+from tests.animation.machine import SETTINGS, Edit, seeds, shares
+from tests.blank import blank
+from tests.thoroughness import THOROUGH
+
+FRAMES = np.arange(-3.0, 46.0, 1.625)
+WHOLE = np.arange(1.0, 41.0)
+PRECISION = 2e-5
+TOLERANCE = 0.01
+
+
+class Layering(RuleBasedStateMachine):
+    """An animator at work on an object or a bone, on the offset of its layer, and on the Empty below."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        blank()
+        bpy.utils.register_class(Edit)
+        animation.register()
+        self.folder = tempfile.TemporaryDirectory()
+        self.history: list[np.ndarray] = []
+        self.place = -1
+
+    def teardown(self) -> None:
+        animation.unregister()
+        bpy.utils.unregister_class(Edit)
+        self.folder.cleanup()
+
+    @initialize(kind=st.sampled_from(("child", "root", "bone")), mode=st.sampled_from(MODE_IDS))
+    def begin(self, kind, mode):
+        self.kind = kind
+        bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 40
+        key_base(new(kind, "XYZ"), mode)
+        self._start_history()
+
+    @property
+    def tool(self) -> Carrier:
+        if self.kind == "child":
+            return bpy.data.objects["Tool"]
+        return bpy.data.objects["Rig"].pose.bones["Body" if self.kind == "root" else "Hand"]
+
+    @property
+    def base(self) -> bpy.types.Object | None:
+        return self.tool.rigid_motion.base
+
+    def _below(self) -> np.ndarray:
+        """Where the Empty is, relative to what `seen` is relative to."""
+        result, scene = [], bpy.context.scene
+        for frame in FRAMES:
+            scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            world = self.base.evaluated_get(depsgraph).matrix_world
+            if self.kind != "child":
+                rig, parent = self.tool.id_data.evaluated_get(depsgraph), self.tool.parent
+                hangs_on = rig.matrix_world @ rig.pose.bones[parent.name].matrix if parent else rig.matrix_world
+                world = hangs_on.inverted() @ world
+            result.append(np.array(world))
+        scene.frame_set(1)
+        return np.array(result)
+
+    def _start_history(self) -> None:
+        bpy.ops.ed.undo_push(message="Begin")
+        self.history, self.place = [seen(self.tool, FRAMES)], 0
+
+    def _edit(self, change: Callable[[], None]) -> None:
+        Edit.change = change
+        bpy.ops.test.edit("EXEC_DEFAULT", True)
+        bpy.context.view_layer.update()
+        self.history[self.place + 1 :] = [seen(self.tool, FRAMES)]
+        self.place += 1
+
+    @invariant()
+    def it_is_seen_where_the_motion_below_and_the_offset_say(self):
+        if self.history and self.base is not None:
+            strip = self.tool.id_data.animation_data.nla_tracks["Rigid Motion Layer"].strips[0]
+            # Outside of its strip a layer stays as it is at its ends.
+            expected = self._below() @ offsets(self.tool, np.clip(FRAMES, strip.frame_start, strip.frame_end))
+            error = np.abs(seen(self.tool, FRAMES) - expected).max()
+            assert error < PRECISION * max(1.0, np.abs(expected).max()), f"it is off by {error}"
+
+    @precondition(lambda self: self.base is None)
+    @rule(frame=st.integers(-5, 45))
+    def add(self, frame):
+        before = seen(self.tool, FRAMES)
+        bpy.context.scene.frame_set(frame)
+        self._edit(lambda: add_layer(self.tool))
+        assert np.abs(seen(self.tool, FRAMES) - before).max() < PRECISION * max(1.0, np.abs(before).max())
+
+    @precondition(lambda self: self.base is not None)
+    @rule()
+    def merge(self):
+        before = seen(self.tool, WHOLE)
+        refused: list[Refused] = []
+        self._edit(lambda: merge_layer(self.tool, TOLERANCE, refused=refused))
+        if refused:
+            assert self.base is not None
+            return
+        assert self.base is None
+        assert not len(self.tool.id_data.animation_data.nla_tracks)
+        # Outside of all keys it stays where it was on the first and last of them.
+        frames = sorted({key.co.x for curve in curves_of(self.tool).values() for key in curve.keyframe_points})
+        inside = (frames[0] <= WHOLE) & (frames[-1] >= WHOLE)
+        off = displaced(seen(self.tool, WHOLE), before, radius_of(self.tool))[inside].max(initial=0.0)
+        assert off < TOLERANCE + 1e-4, f"merged it is off by {off}"
+
+    @precondition(lambda self: self.base is not None)
+    @rule(frame=st.integers(-3, 44), seed=seeds, below=st.booleans())
+    def pose_and_key(self, frame, seed, below):
+        def change() -> None:
+            random, carrier = np.random.default_rng(seed), self.base if below else self.tool
+            bpy.context.scene.frame_set(frame)
+            carrier.location = 0.3 * random.normal(size=3)
+            carrier.rotation_euler = 0.3 * random.normal(size=3)
+            for path in ("location", rotation_path(carrier)):
+                carrier.keyframe_insert(path, frame=frame)
+
+        self._edit(change)
+
+    @precondition(lambda self: self.base is not None)
+    @rule(which=shares, below=st.booleans(), by=st.sampled_from((-3.0, 0.5, 2.0)), how=st.sampled_from(("move", "set")))
+    def edit_a_key(self, which, below, by, how):
+        curves = [*curves_of(self.base if below else self.tool).values()]
+        curves = [curve for curve in curves if curve.keyframe_points]
+        if not curves:
+            return
+
+        def change() -> None:
+            curve = curves[int(which * len(curves))]
+            point = curve.keyframe_points[int(which * len(curve.keyframe_points))]
+            setattr(point.co_ui, "x" if how == "move" else "y", (point.co.x if how == "move" else 0.0) + 0.3 * by)
+            curve.update()
+            curve.id_data.update_tag()
+
+        self._edit(change)
+
+    @precondition(lambda self: self.base is not None)
+    @rule(mode=st.sampled_from(MODE_IDS), below=st.booleans())
+    def choose_a_mode(self, mode, below):
+        self._edit(lambda: set_mode(self.base if below else self.tool, mode))
+
+    @precondition(lambda self: self.base is not None)
+    @rule(frame=st.integers(1, 40), influence=st.floats(0.0, 1.0))
+    def key_the_influence(self, frame, influence):
+        def change() -> None:
+            strip = self.tool.id_data.animation_data.nla_tracks["Rigid Motion Layer"].strips[0]
+            strip.fcurves.find("influence").keyframe_points.insert(frame, influence)
+            bpy.context.view_layer.update()
+
+        self._edit(change)
+
+    @precondition(lambda self: self.base is not None)
+    @rule(seed=seeds)
+    def rename_the_empty(self, seed):
+        self._edit(lambda: setattr(self.base, "name", f"Below {seed}"))
+
+    @precondition(lambda self: self.base is not None)
+    @rule()
+    def leave_the_strip_and_enter_it_again(self):
+        data, before = self.tool.id_data.animation_data, seen(self.tool, FRAMES)
+
+        def change() -> None:
+            data.use_tweak_mode = False
+            bpy.context.view_layer.update()
+            assert np.abs(seen(self.tool, FRAMES) - before).max() < PRECISION * max(1.0, np.abs(before).max())
+            data.use_tweak_mode = True
+
+        self._edit(change)
+
+    @rule()
+    def save_and_open(self):
+        before, path = seen(self.tool, FRAMES), str(Path(self.folder.name) / "layer.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path, compress=False)
+        bpy.ops.wm.open_mainfile(filepath=path)
+        assert np.abs(seen(self.tool, FRAMES) - before).max() < PRECISION * max(1.0, np.abs(before).max())
+        self._start_history()
+
+    @rule(steps=st.integers(-4, 4))
+    def undo_or_redo(self, steps):
+        place = min(max(self.place + steps, 0), len(self.history) - 1)
+        for _ in range(abs(place - self.place)):
+            assert (bpy.ops.ed.undo if steps < 0 else bpy.ops.ed.redo)() == {"FINISHED"}
+        self.place, expected = place, self.history[place]
+        assert np.abs(seen(self.tool, FRAMES) - expected).max() < PRECISION * max(1.0, np.abs(expected).max())
+
+    @rule()
+    def play_without_the_extension(self):
+        before = seen(self.tool, FRAMES)
+        animation.unregister()
+        try:
+            assert np.abs(seen(self.tool, FRAMES) - before).max() < PRECISION * max(1.0, np.abs(before).max())
+        finally:
+            animation.register()
+
+
+Layering.TestCase.settings = settings(SETTINGS, max_examples=12 if THOROUGH else 3, stateful_step_count=20)
+TestLayering = Layering.TestCase
