@@ -269,5 +269,5 @@ def test_workers_may_come_and_die_and_the_scheduler_too_and_nothing_is_lost(clip
             wait_for(lambda: (out / "report.html").exists() and at_work(out))
             cluster.scheduler.kill()
             assert process.wait(120) == 2
-        gone = f"{cluster.address}: the Dask scheduler is gone; nothing that is done is lost"
+        gone = f"{cluster.address}: the Dask scheduler is gone; no finished work is lost"
         assert gone in " ".join(said.read_text().split())
