@@ -45,6 +45,9 @@ PATIENCE = 30.0
 PIE_RADIUS = 150
 """Pixels from the middle of a pie menu to one of its items."""
 
+FOLDED_PANEL = 25
+"""Pixels from the header of a panel that is folded to that of the next one."""
+
 FOLDED = 50
 """Pixels: the redo panel is higher than this once it is unfolded."""
 

@@ -12,7 +12,7 @@ from mathutils import Matrix, Quaternion, Vector
 
 from rigid_motion.animation import hold_facts
 from tests.gui import places
-from tests.gui.driver import Hand, Steps
+from tests.gui.driver import FOLDED_PANEL, Hand, Steps
 from tests.gui.keyed import on_screen
 from tests.rigs.human import human
 from tests.rigs.scenes import GRIP, HANDSHAKE, key, make_fist, turned
@@ -21,9 +21,6 @@ TAKEN, PASSED, THROWN, CAUGHT, END = 20, 44, 66, 84, 110
 
 TABLE = Vector((-0.22, -0.42, 1.0))
 """Where the mug stands."""
-
-HEADER = 25
-"""Pixels from the header of a panel that is folded to that of the next one."""
 
 SLIP = 2e-6
 """How far a thing may be from where it was in the hand that holds it: parts of its matrix, lengths in metres."""
@@ -220,11 +217,11 @@ def seen_in_the_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
     for _ in range(3):
         yield from hand.press("NUMPAD_PLUS", ctrl=True)
     x, y = yield from hand.find_button(sheet, "UI", "show_paths", narrow=True)
-    yield from hand.click((x + 60, y - HEADER))
+    yield from hand.click((x + 60, y - FOLDED_PANEL))
     yield 0.3
     yield from hand.picture("panel")
     number = yield from hand.find_button(sheet, "UI", "rigid_motion_pass")
-    yield from hand.click((number[0] + HEADER, number[1] + HEADER))
+    yield from hand.click((number[0] + FOLDED_PANEL, number[1] + FOLDED_PANEL))
     yield 0.3
     yield from hand.picture("holders")
     yield from hand.press("ESC")

@@ -7,11 +7,8 @@ import numpy as np
 
 from rigid_motion.animation import key_frames
 from tests.gui import places
-from tests.gui.driver import Hand, Steps
+from tests.gui.driver import FOLDED_PANEL, Hand, Steps
 from tests.gui.keyed import FRAMES, cube, hand_bone, key_the_cube, only_the_hand, pose_the_rig, rig
-
-HEADER = 25
-"""Pixels from the header of a panel that is folded to that of the next one."""
 
 EVERY = range(FRAMES[0], FRAMES[-1] + 1)
 
@@ -41,7 +38,7 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.open_sidebar(view, "Animation")
     before = worlds("Cube")
     x, y = yield from hand.find_button(view, "UI", "show_speed", narrow=True)
-    yield from hand.click((x + 60, y - HEADER))  # the header of Layer, to unfold it
+    yield from hand.click((x + 60, y - FOLDED_PANEL))  # the header of Layer, to unfold it
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.search("Add Layer")
     assert cube().parent.name == "Cube Base"

@@ -110,6 +110,12 @@ def refuse_envelope(name: str, fcurve: bpy.types.FCurve) -> None:
         raise Refused(ENVELOPED_CHANNEL, name=name, channel=_label(fcurve.data_path, fcurve.array_index))
 
 
+def refuse_tolerance(tolerance: float) -> None:
+    """Raise `Refused` where a tolerance is no finite number above zero."""
+    if not 0.0 < tolerance < np.inf:
+        raise Refused(n_("the tolerance must be a number above zero, not {tolerance:g}"), tolerance=tolerance)
+
+
 def refuse_modified(name: str, binding: Binding) -> None:
     """Raise `Refused` where modifiers or layers change what keys say, so that other keys would not say the same."""
     for user in binding.users:

@@ -25,7 +25,7 @@ from ..actions.channels import (
     set_key_fields,
 )
 from ..actions.marks import hold, read_marks, write_holds, write_marks
-from ..actions.refusals import refuse_drivers, refuse_linked, refuse_modified
+from ..actions.refusals import refuse_drivers, refuse_linked, refuse_modified, refuse_tolerance
 from ..actions.slots import Binding
 from ..edits.apply import Readings, Target, apply_edit, readable
 from ..edits.holding import DEFAULT_MODE
@@ -217,8 +217,7 @@ def _found(
     least: int,
 ) -> list[HeldSegment]:
     """Return `held_segments` of something that is keyed so."""
-    if not 0.0 < tolerance < math.inf:
-        raise Refused(n_("the tolerance must be a number above zero, not {tolerance:g}"), tolerance=tolerance)
+    refuse_tolerance(tolerance)
     binding, source = _keyed(transform, readings)
     nodes = _nodes(transform, holders)
     if not nodes:

@@ -12,7 +12,7 @@ from bpy.app.translations import pgettext_n as n_
 from ...blender import existing
 from ..actions.channels import ensure_group, key_points
 from ..actions.marks import write_marks
-from ..actions.refusals import refuse_linked
+from ..actions.refusals import refuse_linked, refuse_tolerance
 from ..actions.slots import Binding
 from ..edits.apply import Readings, Targets, apply_edit, readable, transforms_of
 from ..edits.holding import components_on
@@ -73,8 +73,7 @@ def merge_layer(
         Of the keys of all that did not refuse; None where all did. Errors are those on frames, and `between` those on
         any quarter of one.
     """
-    if not 0.0 < tolerance < np.inf:
-        raise Refused(n_("the tolerance must be a number above zero, not {tolerance:g}"), tolerance=tolerance)
+    refuse_tolerance(tolerance)
     plans: dict[Transform, Planned | Refused] = {}
 
     def survey(readings: Mapping[Transform, Readings]) -> None:

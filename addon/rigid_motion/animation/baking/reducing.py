@@ -17,7 +17,7 @@ from bpy.app.translations import pgettext_n as n_
 
 from ...motion import KEYFRAME_MODES
 from ...motion.modes import no_such_mode
-from ..actions.refusals import refuse_drivers, refuse_modified
+from ..actions.refusals import refuse_drivers, refuse_modified, refuse_tolerance
 from ..actions.slots import Binding
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
 from ..edits.mode_keys import set_mode_in
@@ -122,8 +122,7 @@ def reduce_keys_of(
         modes = (NATIVE, SMOOTH_MODE) if count else tuple(dict.fromkeys((NATIVE, SMOOTH_MODE, *KEYFRAME_MODES)))
     if mode not in (NATIVE, FEWEST) and mode not in KEYFRAME_MODES:
         raise Refused(no_such_mode(mode, KEYFRAME_MODES))
-    if not 0.0 < tolerance < math.inf:
-        raise Refused(n_("the tolerance must be a number above zero, not {tolerance:g}"), tolerance=tolerance)
+    refuse_tolerance(tolerance)
     if count is not None and count < 2:
         raise Refused(n_("a motion needs at least 2 keys, not {count}"), count=count)
     found: dict[str, Plans] = {}
