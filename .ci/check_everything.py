@@ -1,12 +1,12 @@
-"""Run all tests on every Blender that the Pythons of this machine can install, in a window, and check what users get.
+"""Run all tests on every Blender that this machine's Pythons can install, in a window too, and check what users get.
 
-    .ci/run               all of it; red unless every part of it ran and was green
-    .ci/run --list        the parts, and what they run
-    .ci/run site 5.2.3    the parts that are named, once what they need is set up
+    .ci/run               all parts; red unless every part ran and was green
+    .ci/run --list        the parts and their commands
+    .ci/run site 5.2.3    only the named parts, after their setup
 
-What is marked `blender` runs on each Blender; all else runs without one, once for each Python and its NumPy, which
-shows that it needs none. What is marked `once` or `any_blender` runs on the newest Blender alone, where tests that try
-many cases try all of them. Environments are set up, the site is built and the wheel is installed while tests run.
+Tests marked `blender` run on each Blender. All others run without Blender, once for each Python and its NumPy, which
+proves that they do not need it. Tests marked `once` or `any_blender` run only on the newest Blender, where tests with
+many cases try all of them. Setting up environments, building the site and installing the wheel happen while tests run.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ WINDOW_TESTS = "tests/gui/test_window.py"
 NOT_IN_WINDOWS = ("--ignore", WINDOW_TESTS)
 
 BROWSER = "chromium"
-"""In which the pages of reports are opened."""
+"""The browser that opens the pages of reports."""
 
 MINUTES_A_TEST = 10
-"""A test that waits for longer ends its process, with a traceback, instead of the whole run."""
+"""A test that hangs for longer than this ends its own process with a traceback, instead of blocking the whole run."""
 
 
 @dataclass
 class Part:
-    """A part of the run: commands that have to end with 0, and what sets it up, which has to before."""
+    """A part of the run: commands that must exit with 0, and a setup command that must succeed first."""
 
     name: str
     commands: list[list[str]]
@@ -47,11 +47,11 @@ class Part:
     environment: Mapping[str, str] = field(default_factory=dict)
     folder: Path = ROOT
     is_of_tests: bool = True
-    """The others run beside these, and take one processor at most."""
+    """Parts without tests run in parallel with the tests, on one processor at most."""
 
 
 def main(arguments: list[str]) -> int:
-    """Set up and run the parts that are named, or all, and return 1 unless each of them was green."""
+    """Set up and run the named parts (default: all), and return 1 unless all of them were green."""
     os.chdir(ROOT)
     with tempfile.TemporaryDirectory() as folder:
         parts = every_part(Path(folder))
@@ -72,7 +72,7 @@ def main(arguments: list[str]) -> int:
 
 
 def every_part(folder: Path) -> list[Part]:
-    """Return all that is to run here, in the order in which it begins."""
+    """Return all parts that run on this machine, in the order in which they start."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     known = project["tool"]["rigid-motion"]["blender"]
     window = os.environ.setdefault("BLENDER", OWN_WINDOW)
@@ -85,7 +85,7 @@ def every_part(folder: Path) -> list[Part]:
         ((python, blender) for version, python in pythons.items() for blender in known[version]),
         key=lambda pair: as_numbers(pair[1]),
     )
-    # A commit is tried with the same random examples each time, so it is green or red for what it did.
+    # The seed comes from the commit: a commit always gets the same random examples, so only its changes turn it red.
     commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True).stdout
     options = ["--hypothesis-seed", str(int(commit or "0", 16))]
     options += ["-o", f"faulthandler_timeout={60 * MINUTES_A_TEST}", "-o", "faulthandler_exit_on_timeout=true"]
@@ -108,8 +108,8 @@ def every_part(folder: Path) -> list[Part]:
             parts.append(tests(f"Blender {blender}", python, *where, **several))
             if blender == newest:
                 set_up_newest = parts[-1].setup
-    # One file of tests runs in one process unless asked otherwise; these hardly share anything, each has its own
-    # Blender, and a hand in it waits now and then.
+    # By default, a test file runs in one process. These tests share almost nothing, each has its own Blender, and
+    # its simulated hand pauses now and then.
     hands = str((os.cpu_count() or 1) + 1)
     where = ("--blender", newest, WINDOW_TESTS, "-n", hands, "--dist", "worksteal")
     in_windows = tests(f"a window of {window}", newest_python, *where)
@@ -123,7 +123,7 @@ def every_part(folder: Path) -> list[Part]:
 
 
 def installation(python: str, folder: Path) -> Part:
-    """Return the part that has pip install this checkout where nothing else is, and runs the main job."""
+    """Return the part that installs this checkout with pip into an empty environment and runs the main command."""
     folder = folder / "empty"
     programs = folder / "bin"
     made = [str(programs / "pip"), "install", "-q", f"{ROOT}[blender]"]
@@ -132,10 +132,10 @@ def installation(python: str, folder: Path) -> Part:
 
 
 def python_of(version: str) -> str | None:
-    """Return the Python of a version such as "3.11", on the path or among pyenv's; None where there is none."""
+    """Return the path of a Python of a version such as "3.11", from PATH or pyenv, or None if there is none."""
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
     for candidate in (shutil.which(f"python{version}"), *map(str, pyenv.glob(f"{version}.*/bin/python"))):
-        # A shim of pyenv's is there for versions that are not chosen, and fails.
+        # A pyenv shim exists even for versions that are not selected, and then fails.
         if candidate:
             asked = [candidate, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"]
             if subprocess.run(asked, capture_output=True, text=True).stdout.strip() == version:
@@ -148,7 +148,7 @@ def as_numbers(version: str) -> list[int]:
 
 
 def install_system_libraries() -> None:
-    """Install what Blender takes from a Debian system, and a browser; elsewhere they are thought to be there."""
+    """Install Blender's system libraries and a browser on Debian; other systems are assumed to have them."""
     if not shutil.which("apt-get") or os.getuid() != 0:
         return
     sys.path.insert(0, str(ROOT / "scripts"))
@@ -161,10 +161,10 @@ def install_system_libraries() -> None:
 
 
 def run_parts(parts: list[Part]) -> dict[str, str]:
-    """Run parts, those with tests one after the other, and return for each what became of it."""
+    """Run parts, those with tests one after another, and return the result line of each part by its name."""
     set_up: dict[tuple[str, ...], Future[tuple[bool, str]]] = {}
     with ThreadPoolExecutor(2) as sets_up, ThreadPoolExecutor(1) as beside:
-        # What a window needs takes longest. Two that set up one environment at once would get in each other's way.
+        # The window setup takes longest, so it starts first. Two setups of the same environment at once would conflict.
         for part in sorted(parts, key=lambda part: part.setup[0] != OWN_WINDOW):
             if (key := tuple(part.setup)) not in set_up:
                 set_up[key] = sets_up.submit(run, [part.setup], {}, ROOT)
@@ -178,7 +178,7 @@ def run_parts(parts: list[Part]) -> dict[str, str]:
 
 
 def run_part(part: Part, set_up: Future[tuple[bool, str]]) -> str:
-    """Run a part, show what it says, and return one line: green or red, its minutes and its tests."""
+    """Run a part, show its output, and return one line: green or red, minutes taken, and test counts."""
     ready, said = set_up.result()
     if not ready:
         print(f"=== {part.name}", said, sep="\n", flush=True)
@@ -196,7 +196,7 @@ def run_part(part: Part, set_up: Future[tuple[bool, str]]) -> str:
 
 
 def run(commands: list[list[str]], variables: Mapping[str, str], folder: Path, shown: bool = False) -> tuple[bool, str]:
-    """Run commands in a folder, up to the first that fails, and return whether none did and what they said."""
+    """Run commands in a folder, stop at the first failure, and return whether all succeeded, and their output."""
     folder.mkdir(exist_ok=True)
     said: list[str] = []
     for command in commands:

@@ -1,4 +1,4 @@
-"""Print what CHANGELOG.md says of the version that a tag names, and refuse a tag that is not of this checkout.
+"""Print the CHANGELOG.md entry of the version that a tag names; refuse a tag that does not match this checkout.
 
 python .ci/release_notes.py v1.2.3
 """
@@ -14,9 +14,9 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def notes_of(tag: str, manifest: str, changelog: str) -> str:
-    """Return the entry of the changelog, without its heading, for the tag "v" and the manifest's version.
+    """Return the changelog entry, without its heading, for a tag: "v" followed by the manifest's version.
 
-    Raises ValueError if the tag names another version, or the changelog has no entry with a day for it.
+    Raises ValueError if the tag names another version, or if the changelog has no dated entry for the version.
     """
     version = tomllib.loads(manifest)["version"]
     if tag != f"v{version}":
@@ -29,7 +29,7 @@ def notes_of(tag: str, manifest: str, changelog: str) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Print the notes of a tag, or what is wrong with it, and return the exit code."""
+    """Print the release notes of a tag, or an error message, and return the exit code."""
     try:
         (tag,) = arguments
         files = (ROOT / "blender_manifest.toml", ROOT / "CHANGELOG.md")

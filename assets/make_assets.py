@@ -1,9 +1,9 @@
-"""Makes what is in this folder: the clips (*.csv), the models (models.blend) and a drill of few triangles (drill.npz).
+"""Make the files in this folder: the clips (*.csv), the models (models.blend) and a low-poly drill (drill.npz).
 
-Every run makes the same.
+Every run makes the same files.
 
-The clips need NumPy. The models need Blender's Python module besides, of the oldest version that the program supports,
-because an older Blender cannot open what a newer one has written; with another version, or none, they stay as they are.
+The clips need only NumPy. The models also need Blender's Python module, in the oldest version that the program
+supports, because an older Blender cannot open files of a newer one. With another version, or none, they are kept.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ DRILL_TRIANGLES = 1500
 
 
 def clip(name: str) -> str:
-    """The text of a clip: seconds, metres, and quaternions with the scalar last."""
+    """Return the CSV text of a clip: seconds, metres, and quaternions with the scalar last."""
     motion = (MOTIONS | OTHER_MOTIONS)[name]
     rng = np.random.default_rng((SEED, zlib.crc32(name.encode())))
     times = tick(rng, motion.duration)
     if name == HOLD:
-        # One system sees both markers at one moment, each with a noise of its own.
+        # One tracking system sees both markers at the same moment, each with its own noise.
         hand = motion.poses(rng, times + STAMP_ERROR * rng.standard_normal(len(times)))
         devices = {"hand": hand, "tool": held_in(hand, GRIP)}
         return table_of_devices(times, {name: noisy(rng, poses, times) for name, poses in devices.items()})
@@ -43,7 +43,7 @@ def clip(name: str) -> str:
 
 
 def write(path: Path, fill: Callable[[Path], None]) -> None:
-    """Have a file filled beside its place, and move it there only when it is whole."""
+    """Fill a file in a temporary folder next to its destination, and move it into place only when it is complete."""
     with tempfile.TemporaryDirectory(prefix=".making-", dir=path.parent) as folder:
         whole = Path(folder) / path.name
         fill(whole)

@@ -1,6 +1,6 @@
-"""Makes the pictures of the extension's page on extensions.blender.org: listing/icon.png and listing/featured.png.
+"""Make the pictures of the extension's page on extensions.blender.org: listing/icon.png and listing/featured.png.
 
-They need Blender's Python module and Matplotlib. Look at both before you commit them, also made small.
+This needs Blender's Python module and Matplotlib. Look at both pictures before you commit them, also at small size.
 """
 
 from __future__ import annotations

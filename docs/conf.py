@@ -1,6 +1,6 @@
-"""How Sphinx makes the documentation site of this folder: `python scripts/bootstrap.py docs`.
+"""Sphinx configuration of the documentation site in this folder: `python scripts/bootstrap.py docs`.
 
-Everything on the site is of the site: it needs no network, and opens from a folder.
+The site is self-contained: it needs no network, and opens from a folder.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ nitpick_ignore_regex = [
     ("py:class", r"rigid_motion\.motion\.(cleaning|segments)\..*"),
     ("py:class", r"rigid_motion_batch\.recordings\..*"),
 ]
-"""What other people's documentation has, where a link would be none without a network, and what no caller needs."""
+"""Names without links: those documented by other projects, which would need a network, and those no caller needs."""
 
 myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_fence_as_directive = ["math"]

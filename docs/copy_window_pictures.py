@@ -1,4 +1,4 @@
-"""Copy the window pictures that these pages show from where the window tests left them.
+"""Copy the screenshots that these pages show from the output of the window tests.
 
     BLENDER=/path/to/blender python scripts/bootstrap.py test tests/gui
     python docs/copy_window_pictures.py
@@ -18,7 +18,7 @@ TAKEN = DOCS.parent / "renders" / "gui"
 
 
 def main() -> int:
-    """Copy what is shown, and return the exit code: 1 where a picture is missing."""
+    """Copy the pictures that pages show, and return the exit code: 1 if a picture is missing."""
     pages = [page.read_text(encoding="utf-8") for page in sorted(DOCS.glob("*.md"))]
     shown = sorted({name for page in pages for name in re.findall(r"\(window/([\w/-]+\.png)\)", page)})
     missing = [name for name in shown if not (TAKEN / name).is_file()]

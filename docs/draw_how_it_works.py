@@ -1,4 +1,4 @@
-"""Draw how a mode gets from keys to what Blender plays, with a hammer that a hand holds by its grip.
+"""Draw the four steps from keys through a mode to Blender's playback: a hammer that a hand holds by its grip.
 
 python docs/draw_how_it_works.py
 """
@@ -20,13 +20,13 @@ from rigid_motion_batch.files import write_text
 FRAMES = np.array((1.0, 9.0))
 DEGREES = np.array((65.0, -65.0))
 HALF = 0.5
-"""Half the length of the hammer, in metres: its origin is in the middle, the hand at its lower end."""
+"""Half the length of the hammer, in metres. Its origin is in the middle, the hand at its lower end."""
 
 PANEL = np.array((300.0, 250.0))
-"""Pixels of each of the four pictures."""
+"""Width and height of each of the four panels, in pixels."""
 
 SCALE, BASE = 105.0, np.array((150.0, 185.0))
-"""Pixels to a metre, and where the hand is in a panel."""
+"""Pixels per metre, and the position of the hand in a panel, in pixels."""
 
 STYLE = """
 .paper{fill:#fff}.ink{fill:#1b2026}.frame{fill:none;stroke:#1b2026;opacity:.25}
@@ -81,7 +81,7 @@ def _in_betweens(keys: Poses, mode: str, count: int) -> Poses:
 
 
 def _hammers(poses: Poses, class_: str) -> str:
-    """Handles from the grip to the head, with the head across."""
+    """Return the outlines of hammers: a handle from grip to head, with the head across it."""
     handles = bars(poses, HALF)
     along = handles[:, 1] - handles[:, 0]
     across = 0.16 * np.stack((-along[:, 1], along[:, 0]), axis=1)
@@ -91,7 +91,7 @@ def _hammers(poses: Poses, class_: str) -> str:
 
 
 def _graph(keys: Poses) -> str:
-    """The F-curve of Z Location by Blender's own curves and by the mode, and what the mode adds between them."""
+    """Return a graph of the Z Location F-curve as Blender interpolates it and by the mode, the difference shaded."""
     frames = 30.0 + np.linspace(0.0, 240.0, 60)
     native, mode = (
         np.stack((frames, 235.0 - 240.0 * _in_betweens(keys, name, 60).positions[:, 1]), axis=1)

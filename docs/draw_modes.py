@@ -1,8 +1,8 @@
-"""Draw each mode between the same keys: where the body goes, and how fast, for the reference of the modes.
+"""Draw the path and speed of a body in each mode, with the same keys, for the reference page of the modes.
 
 python docs/draw_modes.py
 
-It writes docs/modes/MODE.svg. The body turns by 150 degrees and comes back by 120, growing by half on the way.
+This writes docs/modes/MODE.svg. The body turns by 150 degrees, then back by 120 while growing by half.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ DEGREES = np.array((0.0, 150.0, 30.0))
 SIZES = np.array((1.0, 1.0, 1.5))
 
 STEPS = 12
-"""Bodies and dots in a segment."""
+"""Bodies and dots drawn per segment."""
 
 FINE = 120
-"""Samples of a segment for its lines."""
+"""Samples per segment for the lines."""
 
 HALF = 0.16
-"""Of the bar that stands for the body, in metres."""
+"""Half the length of the bar that represents the body, in metres."""
 
 WIDTH, HEIGHT = 720, 270
 SCALE = 160.0
-"""Pixels to a metre."""
+"""Pixels per metre."""
 
 LEFT, BASE = 40.0, 180.0
-"""Where the first key stands, in pixels."""
+"""Position of the first key, in pixels."""
 
 GRAPH = (460.0, 60.0, 240.0, 170.0)
-"""Left, top, width and height of the graph of the speed."""
+"""Left, top, width and height of the speed graph, in pixels."""
 
 FASTEST = 3.0
-"""Metres a unit of time at the top of the graph."""
+"""The speed at the top of the graph, in metres per unit of time."""
 
 STYLE = """
 .mode{stroke:LIGHT;fill:none}.dot{fill:LIGHT}.faint{stroke:#9aa4b2;fill:none}.key{stroke:#1b2026;stroke-width:4}
@@ -66,12 +66,12 @@ def main() -> None:
 
 
 def keys() -> Poses:
-    """The three of `POINTS`, `DEGREES` and `SIZES`, in a plane."""
+    """Return the three keys of `POINTS`, `DEGREES` and `SIZES`, in a plane."""
     return poses_of(POINTS, DEGREES, SIZES)
 
 
 def path_of(mode: str) -> list[str]:
-    """The way of the body's middle, and the body at even times, thick on the keys."""
+    """Return the path of the body's middle, and the body at even times, with thick bars at the keys."""
     way = interpolate(TIMES, keys(), moments(FINE), mode)
     bodies = interpolate(TIMES, keys(), moments(STEPS), mode)
     dots = [
@@ -87,7 +87,7 @@ def path_of(mode: str) -> list[str]:
 
 
 def speed_of(mode: str) -> list[str]:
-    """How fast the body's middle is, over time."""
+    """Return a graph of the speed of the body's middle over time."""
     times = moments(FINE)
     positions = interpolate(TIMES, keys(), times, mode).positions
     speeds = np.linalg.norm(np.diff(positions, axis=0), axis=1) / np.diff(times)
@@ -106,12 +106,12 @@ def speed_of(mode: str) -> list[str]:
 
 
 def moments(count: int) -> np.ndarray:
-    """So many even steps in each segment."""
+    """Return the times of `count` even steps in each segment."""
     return np.linspace(TIMES[0], TIMES[-1], count * (len(TIMES) - 1) + 1)
 
 
 def strokes(poses: Poses) -> str:
-    """The bodies as an SVG path."""
+    """Return the bars of bodies as an SVG path."""
     return "".join(map(polyline, _on_paper(bars(poses, HALF))))
 
 

@@ -1,4 +1,4 @@
-"""Draw what the bound on the twists at keys does: the same keys at uneven times, without it and with it.
+"""Draw the effect of the bound on twists at keys: the same unevenly timed keys, without the bound and with it.
 
 python docs/draw_spline.py
 """
@@ -24,13 +24,13 @@ DEGREES = 25.0 - 12.5 * np.arange(5)
 
 WIDTH, HEIGHT = 720, 320
 SCALE = 400.0
-"""Pixels to a metre."""
+"""Pixels per metre."""
 
 LEFT, BASE = 160.0, 230.0
-"""Where the first key stands, in pixels."""
+"""Position of the first key, in pixels."""
 
 HALF = 0.045
-"""Of the bar that stands for the body, in metres."""
+"""Half the length of the bar that represents the body, in metres."""
 
 STYLE = """
 .paper{fill:#fff}.ink{fill:#1b2026}.key{stroke:#1b2026;stroke-width:3}
@@ -44,12 +44,12 @@ text{font:14px system-ui,"Segoe UI",Roboto,"Liberation Sans",sans-serif}
 
 
 def keys() -> Poses:
-    """An arch, walked at a steady pace but for the step from the second key to the third, which takes one frame."""
+    """Return keys on an arch, at a steady pace except from the second key to the third, which takes one frame."""
     return poses_of(POINTS, DEGREES)
 
 
 def parabola(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """The share of the twist before a key without a bound."""
+    """Return the weight of the twist before a key, without a bound, from the durations of the segments around it."""
     return after / (before + after)
 
 
@@ -75,7 +75,7 @@ def main() -> None:
 
 
 def motion(name: str) -> str:
-    """The path of the body's middle, and the body on every frame."""
+    """Return the path of the body's middle, and the body on every frame."""
     fine = interpolate(FRAMES, keys(), np.linspace(FRAMES[0], FRAMES[-1], 600), "motor_spline")
     frames = interpolate(FRAMES, keys(), np.arange(FRAMES[0], FRAMES[-1] + 1.0), "motor_spline")
     bodies = "".join(map(polyline, _on_paper(bars(frames, HALF))))

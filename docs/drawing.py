@@ -1,4 +1,4 @@
-"""What drawings of motions in a plane share: poses, the bar that stands for a body, and SVG."""
+"""Helpers for drawing motions in a plane: poses, the bar that represents a body, and SVG elements."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def poses_of(points: np.ndarray, degrees: np.ndarray, sizes: np.ndarray | None =
 
 
 def bars(poses: Poses, half: float) -> np.ndarray:
-    """Return both ends of bars along the bodies' y axes, half so long to each side, shape (n, 2, 2)."""
+    """Return both ends of bars along the bodies' y axes, `half` long to each side, shape (n, 2, 2)."""
     angles = 2.0 * np.arctan2(poses.quaternions[:, 3], poses.quaternions[:, 0])
     along = half * np.stack((-np.sin(angles), np.cos(angles)), axis=1)
     if poses.scales is not None:
@@ -26,19 +26,19 @@ def bars(poses: Poses, half: float) -> np.ndarray:
 
 
 def polyline(points: np.ndarray) -> str:
-    """Return a line through points (n, 2) in pixels as the `d` of a path."""
+    """Return a line through points (n, 2) in pixels, as the `d` attribute of an SVG path."""
     return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
 
 
 def element(name: str, *content: str, **attributes: object) -> str:
-    """Return an element of SVG; `class_` and `text_anchor` are class and text-anchor."""
+    """Return an SVG element; `class_` and `text_anchor` become class and text-anchor."""
     named = {key.rstrip("_").replace("_", "-"): value for key, value in attributes.items()}
     written = "".join(f' {key}="{escape(str(value))}"' for key, value in named.items())
     return f"<{name}{written}>{''.join(content)}</{name}>"
 
 
 def drawing(title: str, style: str, width: int, height: int, *content: str) -> str:
-    """Return a picture of so many pixels as the text of a file."""
+    """Return the text of an SVG file of this width and height in pixels."""
     about = element("title", escape(title)), element("style", style)
     size = {"viewBox": f"0 0 {width} {height}", "width": width, "height": height}
     return element("svg", *about, *content, xmlns="http://www.w3.org/2000/svg", **size, role="img") + "\n"

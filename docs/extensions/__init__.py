@@ -1,1 +1,1 @@
-"""What the site needs beside Sphinx's own extensions: each module is one of them."""
+"""Sphinx extensions of this site, one per module."""

@@ -1,4 +1,4 @@
-"""The directive `command`: what a command says of itself and of its options when it is asked for --help."""
+"""The directive `command`: the description and options of a command, taken from its --help."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from sphinx.util.docutils import SphinxDirective
 READER = Path(__file__).with_name("help_of.py")
 
 TITLE = re.compile(r"(?m)^(\w[\w ,-]*):\n(?=  )")
-"""What begins a part of an epilog: a word or two on a line of its own, and lines that are indented."""
+"""The start of a section of an epilog: a title of a few words on its own line, followed by indented lines."""
 
 
 class Command(SphinxDirective):
-    """A command of a script or a package: `{command} scripts/stream.py send`, `{command} rigid_motion_batch tasks`."""
+    """The help of a script or package: `{command} scripts/stream.py send`, `{command} rigid_motion_batch tasks`."""
 
     required_arguments = 1
     final_argument_whitespace = True
@@ -47,17 +47,17 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def help_of(root: Path, asked: str, *subcommands: str) -> dict:
-    """What `help_of.py` finds out about a script or a package of the checkout at `root`."""
+    """Return the output of `help_of.py` for a script or package of the checkout at `root`."""
     environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONPATH": str(root / "scripts")}
     run = [sys.executable, str(READER), str(root / asked) if asked.endswith(".py") else asked, *subcommands]
     done = subprocess.run(run, capture_output=True, text=True, encoding="utf-8", env=environment)
     if done.returncode != 0:
         raise ExtensionError(f"{asked} has no help to give:\n{done.stderr}")
-    return json.loads(done.stdout.splitlines()[-1])  # Blender may have had something to say before.
+    return json.loads(done.stdout.splitlines()[-1])  # Blender may have printed lines before it.
 
 
 def option_list(name: str, options: list[dict[str, str]]) -> nodes.definition_list:
-    """Options and what they do, each with a place to link to: `#compare-rates`."""
+    """Return a list of options with their help, each with an anchor such as `#compare-rates`."""
     listed = nodes.definition_list(classes=["options"])
     for option in options:
         term = nodes.term("", "", nodes.literal(option["written"], option["written"]))
@@ -69,7 +69,7 @@ def option_list(name: str, options: list[dict[str, str]]) -> nodes.definition_li
 
 
 def epilog(text: str) -> list[nodes.Node]:
-    """The parts of an epilog, with their titles: examples as they are typed, everything else as text."""
+    """Return the sections of an epilog with their titles: examples as literal blocks, everything else as text."""
     first, *parts = TITLE.split(text.strip("\n"))
     result = prose(first)
     for title, body in zip(parts[::2], parts[1::2], strict=True):
@@ -80,7 +80,7 @@ def epilog(text: str) -> list[nodes.Node]:
 
 
 def prose(text: str) -> list[nodes.Node]:
-    """Paragraphs; what is indented, typed or set in columns stays line by line."""
+    """Return paragraphs; indented text, typed commands and columns become literal blocks."""
     result: list[nodes.Node] = []
     for block in re.split(r"\n\s*\n", text.strip("\n")):
         if not block.strip():
@@ -94,6 +94,6 @@ def prose(text: str) -> list[nodes.Node]:
 
 
 def inline_code(text: str) -> list[nodes.Node]:
-    """Text in which what stands in backquotes is code."""
+    """Return text whose parts in backquotes are code."""
     parts = text.split("`")
     return [nodes.literal(part, part) if i % 2 else nodes.Text(part) for i, part in enumerate(parts) if part]

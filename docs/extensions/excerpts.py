@@ -1,6 +1,6 @@
-"""Excerpts in the results of a search where the site is opened from a folder: there browsers let no page read another.
+"""Search excerpts for a site opened from a folder, where browsers do not let one page read another.
 
-The text of all pages is written as a script, which the search page alone loads (static/site.js).
+The text of all pages is written to a script that only the search page loads (static/site.js).
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from pathlib import Path
 from sphinx.application import Sphinx
 
 MAIN = re.compile(r'<article role="main".*?</article>', re.S)
-"""What Sphinx's own search takes an excerpt from."""
+"""The part of a page from which Sphinx's own search takes excerpts."""
 
 WITHOUT_TEXT = re.compile(
     r'<(svg|script|style)\b.*?</\1>|<a class="headerlink".*?</a>'
     r"|<(?![^>]*\sid=|/?(?:section|article|dt|dd|dl|p)\b)[^>]*>",
     re.S,
 )
-"""Elements and tags that an excerpt needs neither for its text nor to be found by its anchor."""
+"""Elements and tags that an excerpt does not need, neither for its text nor for its anchors."""
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
@@ -28,7 +28,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def write_texts(app: Sphinx, exception: Exception | None) -> None:
-    """Write `_static/texts.js`, which maps the address of each page to its main part."""
+    """Write `_static/texts.js`, which maps the address of each page to its main content."""
     if exception is not None or app.builder.name != "html":
         return
     texts = {}

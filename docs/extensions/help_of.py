@@ -1,6 +1,6 @@
-"""What a script or a package says of its options, as JSON: `python help_of.py NAME [SUBCOMMAND]` asks it for --help.
+"""Print the --help of a script or package as JSON: `python help_of.py NAME [SUBCOMMAND]`.
 
-So the reference of commands has what they have, without a copy of it that could be wrong.
+The reference of commands is made from this, so it cannot differ from the commands themselves.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 
 
 def main(name: str, *subcommands: str) -> None:
-    """Print the description of the parser that answers to --help."""
+    """Run a program with --help, and print the description of its parser as JSON."""
     argparse.ArgumentParser.print_help = print_description
     sys.argv = [Path(name).name, *subcommands, "--help"]
     if name.endswith(".py"):
@@ -25,7 +25,7 @@ def main(name: str, *subcommands: str) -> None:
 
 
 def print_description(parser: argparse.ArgumentParser, file: object = None) -> None:  # noqa: ARG001 - as of argparse
-    """In place of the help for people, and the end of the program."""
+    """Print a parser as JSON and exit; replaces `ArgumentParser.print_help`."""
     formatter = argparse.HelpFormatter(prog=parser.prog, width=100)
     print(
         json.dumps(
@@ -43,7 +43,7 @@ def print_description(parser: argparse.ArgumentParser, file: object = None) -> N
         )
     )
     sys.stdout.flush()
-    # Blender may not be taken down in the middle of starting.
+    # Blender must not be shut down while it is still starting.
     os._exit(0)
 
 
@@ -53,7 +53,7 @@ def subcommands_of(parser: argparse.ArgumentParser) -> list[str]:
 
 
 def of_option(formatter: argparse.HelpFormatter, action: argparse.Action) -> dict[str, str]:
-    """How an option is written, and what it does."""
+    """Return how an option is written, and its help text."""
     written = formatter._format_action_invocation(action)
     if not action.option_strings:
         written = formatter._format_args(action, formatter._get_default_metavar_for_positional(action))

@@ -1,4 +1,4 @@
-"""Formulas as MathML, by docutils' own converter: browsers set it by themselves, without scripts, fonts or network."""
+"""Formulas as MathML, converted by docutils: browsers render it without scripts, fonts or network."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sphinx.util import logging
 logger = logging.getLogger(__name__)
 
 THIN = "0.167em"
-"""The space beside the name of a function, as in TeX."""
+"""The space around the name of a function, as in TeX."""
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
@@ -23,20 +23,20 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def inline(translator: nodes.NodeVisitor, node: nodes.math) -> None:
-    """A formula within a line."""
+    """Write a formula within a line."""
     translator.body.append(mathml(node, display=False))
     raise nodes.SkipNode
 
 
 def display(translator: nodes.NodeVisitor, node: nodes.math_block) -> None:
-    """A formula of its own, which scrolls where it is wider than the page."""
+    """Write a formula in its own block, which scrolls if it is wider than the page."""
     opening = translator.starttag(node, "div", CLASS="math", tabindex="0")
     translator.body.append(f"{opening}{mathml(node, display=True)}</div>\n")
     raise nodes.SkipNode
 
 
 def mathml(node: nodes.Element, *, display: bool) -> str:
-    """The formula for browsers. One that cannot be set is a warning, and stays as it was written."""
+    """Return the MathML of a formula. A formula that cannot be converted causes a warning and is shown as written."""
     try:
         result = tex2mathml(node.astext(), as_block=display)
     except MathError as error:
@@ -54,7 +54,7 @@ def mathml(node: nodes.Element, *, display: bool) -> str:
 
 
 def space_names(row: ElementTree.Element) -> None:
-    """Put a thin space between the name of a function and what stands beside it, as browsers do not."""
+    """Put a thin space between the name of a function and its neighbours, which browsers do not do."""
     if row.tag not in ("math", "mrow", "mtd", "mstyle", "msqrt"):
         return
     children = list(row)
@@ -65,18 +65,18 @@ def space_names(row: ElementTree.Element) -> None:
 
 
 def is_name(element: ElementTree.Element) -> bool:
-    """Whether it is a function such as sin, or a power of it."""
+    """Return whether an element is the name of a function such as sin, or a power of it."""
     if element.tag in ("msup", "msub", "msubsup") and len(element):
         return is_name(element[0])
     return element.tag == "mi" and len(element.text or "") > 1
 
 
 def ends(element: ElementTree.Element) -> bool:
-    """Whether something ends here that a name is multiplied with: no sign, and no space."""
+    """Return whether an element can be a factor before a function's name: a closing bracket, but no sign or space."""
     return element.text == ")" if element.tag == "mo" else element.tag != "mspace"
 
 
 def close_bars(element: ElementTree.Element) -> None:
-    """Bars and slashes stand close to what is between them."""
+    """Remove the space around a bar or slash."""
     if element.tag == "mo" and element.text in ("|", "/"):
         element.attrib |= {"lspace": "0", "rspace": "0"}

@@ -1,6 +1,6 @@
-"""Directives for the interpolation modes, all made from the table `MODES`: what is said of a mode stands there.
+"""Directives that describe the interpolation modes, all generated from the table `MODES`.
 
-`mode-loops` shows each mode as a film, `mode-details` says what programs need to know of it, `mode-table` lists them.
+`mode-loops` shows each mode as a film, `mode-details` gives details for programmers, `mode-table` lists all modes.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ LOOPS = "modes"
 CONVENTIONS = "conventions"
 
 SAME = 1e-9
-"""Motions that are never further apart than this are one motion."""
+"""The largest shell error between two motions that count as the same motion."""
 
 
 class ModeDirective(SphinxDirective):
-    """What is written in it is for people who read the page as a file."""
+    """A directive whose content is ignored: it is only for people who read the page as a file."""
 
     has_content = True
 
 
 class ModeLoops(ModeDirective):
-    """A section for each mode: its film, and what it does."""
+    """A section for each mode: its film and its description."""
 
     def run(self) -> list[nodes.Node]:
         return [self.section(name, mode) for name, mode in MODES.items() if not mode.is_reference]
@@ -49,7 +49,7 @@ class ModeLoops(ModeDirective):
 
 
 class ModeDetails(ModeDirective):
-    """A section for each mode: its name in programs, path and speed, the keys it looks at, and modes like it."""
+    """A section for each mode: its name in programs, path and speed, the keys it uses, and related modes."""
 
     def run(self) -> list[nodes.Node]:
         alike = same_motions(MODES)
@@ -77,7 +77,7 @@ class ModeDetails(ModeDirective):
 
 
 class ModeTable(ModeDirective):
-    """One row for each mode."""
+    """A table with one row for each mode."""
 
     def run(self) -> list[nodes.Node]:
         head = ("Mode", "In menus and reports", "What it does")
@@ -96,12 +96,12 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def anchor(mode: str) -> str:
-    """Where the mode is to be found on each of the pages."""
+    """Return the anchor of a mode on each of the pages."""
     return f"mode-{mode.replace('_', '-')}"
 
 
 def same_motions(modes: Iterable[str]) -> dict[str, list[str]]:
-    """Of each mode those that are the same motion for bodies that keep their size, on keys drawn at random."""
+    """Return, for each mode, the modes with the same motion on random keys without scaling."""
     draw = np.random.default_rng(0)
     keys = Poses(draw.normal(size=(8, 3)), draw.normal(size=(8, 4)))
     times = np.linspace(0.0, 7.0, 141)
@@ -113,7 +113,7 @@ def same_motions(modes: Iterable[str]) -> dict[str, list[str]]:
 
 
 def keys_it_looks_at(mode: Mode) -> str:
-    """In words."""
+    """Return a description of the keys that a mode uses."""
     if mode.is_reference:
         return "all keys of a channel, those far away ever less"
     around = [f"{count} {where}" for count, where in ((mode.behind, "before"), (mode.ahead, "after")) if count]
@@ -121,14 +121,14 @@ def keys_it_looks_at(mode: Mode) -> str:
 
 
 def link(directive: SphinxDirective, target: str, content: nodes.Node) -> nodes.reference:
-    """A link to a place of another page."""
+    """Return a link to an anchor on another page."""
     page, _, place = target.partition("#")
     uri = directive.env.app.builder.get_relative_uri(directive.env.docname, page)
     return nodes.reference("", "", content, refuri=f"{uri}#{place}", internal=True)
 
 
 def code(function: object) -> nodes.literal:
-    """The full name of a function."""
+    """Return the full name of a function as code."""
     return nodes.literal("", f"{function.__module__}.{function.__qualname__}")
 
 
@@ -137,13 +137,13 @@ def fact(name: str, *content: nodes.Node) -> nodes.field:
 
 
 def joined(links: Iterable[nodes.Node]) -> list[nodes.Node]:
-    """With commas between them."""
+    """Return nodes with commas between them."""
     listed = [node for item in links for node in (nodes.Text(", "), item)]
     return listed[1:]
 
 
 def table(head: Iterable[str], rows: Iterable[Iterable[nodes.Node | str]]) -> nodes.table:
-    """A table with these cells."""
+    """Return a table with this head and these rows."""
     head = tuple(head)
     group = nodes.tgroup(cols=len(head))
     group += [nodes.colspec(colwidth=1) for _ in head]

@@ -1,4 +1,4 @@
-"""The directive `module-map`: every room and module of the program, with the first sentence of its docstring."""
+"""The directive `module-map`: all packages and modules of the program, with the first sentence of their docstrings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FOLDERS = "addon/rigid_motion", "scripts/rigid_motion_batch", "scripts/research"
 
 
 class ModuleMap(SphinxDirective):
-    """What is written in it is for people who read the page as a file."""
+    """The map of modules; the directive's content is ignored: it is only for people who read the page as a file."""
 
     has_content = True
 
@@ -23,7 +23,7 @@ class ModuleMap(SphinxDirective):
 
 
 def item(path: Path, name: str) -> nodes.list_item:
-    """Return an entry for a module, or for a folder and what is in it."""
+    """Return an entry for a module, or for a folder and its contents."""
     source = path / "__init__.py" if path.is_dir() else path
     text = nodes.paragraph("", "", nodes.literal("", name), nodes.Text(f": {summary(source)}"))
     inside = [item(below, below.name) for below in sorted(path.iterdir()) if is_shown(below)] if path.is_dir() else []
@@ -31,7 +31,7 @@ def item(path: Path, name: str) -> nodes.list_item:
 
 
 def is_shown(path: Path) -> bool:
-    """Return whether the map lists a path: modules, and packages with modules."""
+    """Return whether the map lists a path: a module or a package."""
     return (path.suffix == ".py" and path.stem != "__init__") or (path / "__init__.py").exists()
 
 

@@ -1,6 +1,6 @@
-"""Docstrings as they are written for people who read the source.
+"""Roles and hooks that render the project's docstrings, which are written for people who read the source.
 
-`names` in single backquotes are code, and links where they name what the site documents; bars are lengths of vectors.
+`names` in single backquotes are code, and links if the site documents them. Bars mean lengths of vectors.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ PAGE = re.compile(r"docs/([\w/]+)\.md")
 
 
 class NameRole(XRefRole):
-    """A reference that may lead nowhere: docstrings name parameters and private functions too."""
+    """A reference that may have no target: docstrings also name parameters and private functions."""
 
     def process_link(
         self, env: BuildEnvironment, refnode: nodes.Element, has_explicit_title: bool, title: str, target: str
     ) -> tuple[str, str]:
         page = PAGE.fullmatch(target)
-        if page and page[1] in env.found_docs:  # Other programs have files of such names too.
+        if page and page[1] in env.found_docs:  # Other programs have files of the same names.
             refnode["refdomain"], refnode["reftype"], refnode["refexplicit"] = "std", "doc", True
             return title, f"/{page[1]}"
         refnode["refdomain"], refnode["reftype"], refnode["optional"] = "py", "obj", True
@@ -46,12 +46,12 @@ def setup(app: Sphinx) -> dict[str, bool]:
 def leave_as_code(
     app: Sphinx, env: BuildEnvironment, node: addnodes.pending_xref, content: nodes.Element
 ) -> nodes.Element | None:
-    """Names that lead nowhere stay what they are, without a warning."""
+    """Keep names without a target as plain code, without a warning."""
     return content if node.get("optional") else None
 
 
 def document_data(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Give data that a package imports what stands below it in the module that it comes from, and not its type's."""
+    """Document data that a package imports by the string below it in its module, not by its type's docstring."""
     package, _, attribute = name.rpartition(".")
     modules = [module for module in sys.modules if module.startswith(f"{package}.")] if what == "data" else []
     for module in modules:
@@ -62,7 +62,7 @@ def document_data(app: Sphinx, what: str, name: str, obj: object, options: objec
 
 
 def keep_bars(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Have |v| be |v|, and not the name of a substitution."""
+    """Escape bars: |v| stays |v|, and is not read as a substitution."""
     for number, line in enumerate(lines):
         if not line.lstrip().startswith(">>>"):
             parts = CODE.split(line)

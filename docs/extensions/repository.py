@@ -1,4 +1,4 @@
-"""Pages that are files elsewhere in the checkout, such as CHANGELOG.md, and links between these and docs/."""
+"""Pages made from files elsewhere in the checkout, such as CHANGELOG.md, and links between them and docs/."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sphinx import addnodes
 from sphinx.application import Sphinx
 
 HOME = {"README.md": "index"}
-"""A file that has a page in its place."""
+"""Files that the site replaces by another page, and the page."""
 
 EXAMPLES = "lid", "sword", "hand", "dancer", "camera", "farm"
 
@@ -23,12 +23,12 @@ SHOWN = {
     **{f"examples/{name}/README.md": f"examples/{name}" for name in EXAMPLES},
     "examples/modes_in_python/README.md": "notebook",
 }
-"""Files to the pages of the site that show them; what these have in docs/ is for people who read it there."""
+"""Files and the pages of the site that show them. A page's own text in docs/ is only for people who read it there."""
 
 PAGES = HOME | SHOWN
 
 LINK = re.compile(r"(?<=\]\()(?![a-z]+:|#)([^)\s]+)")
-"""The path that a link or a picture of a Markdown file names."""
+"""The path in a link or picture of a Markdown file."""
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
@@ -38,7 +38,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def read_elsewhere(app: Sphinx, page: str, source: list[str]) -> None:
-    """Show a file in the place of its page, with links that count from docs/."""
+    """Replace the text of a page by its file, with links made relative to docs/."""
     for name, shown_as in SHOWN.items():
         if shown_as == page:
             file = Path(app.srcdir).parent / name
@@ -47,13 +47,13 @@ def read_elsewhere(app: Sphinx, page: str, source: list[str]) -> None:
 
 
 def as_in_docs(text: str, folder: str, page: str) -> str:
-    """The text of a file in this folder of the checkout, as it would be where the page is in docs/."""
+    """Return the text of a file in a folder of the checkout, with links that work from the page's place in docs/."""
     place = posixpath.join("docs", posixpath.dirname(page))
     return LINK.sub(lambda link: posixpath.relpath(posixpath.join(folder, link[1]), place), text)
 
 
 def lead_to_pages(app: Sphinx, doctree: nodes.document) -> None:
-    """Turn links to files that are pages of the site into links to these pages."""
+    """Turn links to files that the site shows as pages into links to these pages."""
     root = Path(app.srcdir).parent
     for link in [*doctree.findall(addnodes.download_reference), *doctree.findall(leads_outside)]:
         if isinstance(link, addnodes.pending_xref):
@@ -69,7 +69,7 @@ def lead_to_pages(app: Sphinx, doctree: nodes.document) -> None:
 
 
 def leads_outside(node: nodes.Node) -> bool:
-    """Whether something is a link to a Markdown file outside of docs/, which has a path for MyST, and no page."""
+    """Return whether a node links to a Markdown file outside docs/, which MyST gives an absolute path and no page."""
     return (
         isinstance(node, addnodes.pending_xref)
         and node.get("refdomain") == "doc"

@@ -1,7 +1,7 @@
-"""Films in pages, which show pictures where they are read as files: on the site the pictures move.
+"""Films in pages: on the site, pictures become films; in the Markdown files, they stay pictures.
 
-A PNG beside which there is an MP4 of the same name becomes that film, with itself as the poster; so does a picture that
-is a link to any film. Other links to films stay links, and the film comes after their paragraph.
+A PNG next to an MP4 of the same name becomes that film, with the PNG as its poster. So does a picture that links to a
+film. Other links to films stay links, and the film is inserted after their paragraph.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from sphinx.util.osutil import relative_uri
 
 
 class video(nodes.General, nodes.Element):
-    """A film: `film` and `poster` are paths in docs/, the poster may be empty, `label` is what it shows.
+    """A film: `film` and `poster` are paths in docs/ (the poster may be empty), `label` describes the content.
 
-    In lower case as docutils' own nodes.
+    The class name is lower case like docutils' own nodes.
     """
 
 
@@ -29,12 +29,12 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def make_video(film: str, poster: str, label: str) -> video:
-    """A film with these paths in docs/."""
+    """Return a film node with these paths in docs/."""
     return video(film=film, poster=poster, label=label)
 
 
 def show_films(app: Sphinx, doctree: nodes.document) -> None:
-    """Put films in the place of their pictures, and below links to them."""
+    """Replace pictures by their films, and insert films below links to them."""
     shown = set()
     for image in list(doctree.findall(nodes.image)):
         place, film = image, str(PurePosixPath(image["uri"]).with_suffix(".mp4"))
@@ -55,19 +55,19 @@ def show_films(app: Sphinx, doctree: nodes.document) -> None:
 
 
 def _film_of(app: Sphinx, link: nodes.Element) -> str | None:
-    """The path in docs/ of the film that a link leads to."""
+    """Return the path in docs/ of the film that a link leads to, or None."""
     return app.env.relfn2path(link["reftarget"], app.env.docname)[0] if link["reftarget"].endswith(".mp4") else None
 
 
 def _enclosing(node: nodes.Node, kind: type[nodes.Element]) -> nodes.Element | None:
-    """What of this kind a node is in."""
+    """Return the closest node of a kind that contains a node, or the node itself, or None."""
     while node is not None and not isinstance(node, kind):
         node = node.parent
     return node
 
 
 def copy_films(app: Sphinx, doctree: nodes.document, docname: str) -> None:
-    """Have the builder copy films and posters to where it has its pictures."""
+    """Make the builder copy films and posters to its folder of pictures."""
     for node in doctree.findall(video):
         for path in filter(None, (node["film"], node["poster"])):
             app.builder.images.setdefault(path, path.replace("/", "-"))
