@@ -1,8 +1,8 @@
-"""Make the film of a whole body under several modes, a still of it, and the heat map of its errors.
+"""Make the film of a whole body in several modes, a still of the film, and a heat map of the joint errors.
 
 python docs/make_body_pictures.py
 
-The body is the dancer of the examples, clothed. Writes bodies.mp4, bodies.png and bodies-heat.svg beside this file.
+The body is the dancer of the examples, clothed. Writes bodies.mp4, bodies.png and bodies-heat.svg next to this file.
 """
 
 from __future__ import annotations
@@ -36,21 +36,21 @@ from rigid_motion_batch.scenes.materials import surface
 RATE, MODES = "4", ("bezier", "dq_sclerp", "motor_spline")
 
 MAPPED = "motor_spline"
-"""The mode whose errors are mapped."""
+"""The mode whose errors the heat map shows."""
 
 MOMENT = 3.85
-"""Seconds into the film: the still."""
+"""The time of the still, in seconds into the film."""
 
 
 def main() -> None:
-    """Make everything anew."""
+    """Make the film and both pictures."""
     with tempfile.TemporaryDirectory() as folder:
         recording = Path(folder) / "dancer.blend"
         save_dancer(recording)
         source = f"{recording}:Dancer"
         output = Path(folder) / "out"
         options = ["--rates", RATE, "--modes", ",".join(MODES), "--antialiasing", "5", "--output", str(output)]
-        compare.main([source, *options, "--jobs", "0"])  # Others could not start in a program that has loaded Blender.
+        compare.main([source, *options, "--jobs", "0"])  # Workers cannot start from a process that has loaded Blender.
         (film,) = output.glob(f"*/{RATE}/comparison.mp4")
         shutil.copy(film, DOCS / "bodies.mp4")
 
@@ -65,7 +65,7 @@ def main() -> None:
 
 
 def draw_errors(clip: Clip, result: ChoiceResult, path: Path) -> None:
-    """Draw the error of each joint over time under the mode `MAPPED`, in the colours of the report."""
+    """Draw the error of each joint over time in the mode `MAPPED`, in the colours of the report."""
     top = 1e3 * full_colour(motion.joint_errors for motion in result.motions)
     errors = 1e3 * next(motion.joint_errors for motion in result.motions if MAPPED in motion.modes)
     joints, samples = errors.shape
@@ -83,7 +83,7 @@ def draw_errors(clip: Clip, result: ChoiceResult, path: Path) -> None:
 
 
 def save_dancer(path: Path) -> None:
-    """Write the dancer with a key on every frame, and a body."""
+    """Save a .blend with the dancer: a key on every frame, and a body mesh."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     animation.register()
     try:

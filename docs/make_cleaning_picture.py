@@ -2,8 +2,8 @@
 
 python docs/make_cleaning_picture.py
 
-writes cleaning.svg beside this file, and cleaning-film.svg, which moves by itself in every browser. The motions are
-those of assets/ and of the dancer among the examples, with noise.
+writes cleaning.svg next to this file, and cleaning-film.svg, which every browser animates. The motions come from
+assets/ and from the dancer of the examples, with noise added.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from rigid_motion_batch.recordings.clips import Clip
 
 WIDTH, HEIGHT, TOP, LEFT = 860, 200, 54, 12
 FILM_PX = 260
-"""The height of the film."""
+"""The height of the film, in pixels."""
 
 FILM_S, FILM_RATE_HZ = 4.0, 24
 STYLE = "text{font:14px sans-serif;fill:#2b3440}.small{font-size:12px;fill:#5b6675}path{fill:none}"
@@ -43,7 +43,7 @@ RECORDED, CLEANED, TRUTH = "#e08a3c", "#3b73d1", "#2b3440"
 
 
 def shaken(poses: Poses, place: float, degrees: float, seed: int) -> Poses:
-    """Return poses with white noise, of a body places of the root alone."""
+    """Return poses with white noise added (metres, degrees). In a body, only the root's position gets noise."""
     random = np.random.default_rng(seed)
     noise, turns = (
         random.normal(size=(2, *poses.positions.shape))
@@ -61,7 +61,7 @@ def asset(name: str) -> Clip:
 
 
 def dancer() -> Clip:
-    """Return the dancer as motion capture would have her."""
+    """Return the dancer as motion capture would record her, read from a BVH file."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.view_layer.objects.active = dance.dancer()
     with tempfile.TemporaryDirectory() as folder:
@@ -72,7 +72,7 @@ def dancer() -> Clip:
 
 
 def panel(row: int, title: str, truth: Clip, shaky: Clip, cleaned: Clip, said: str, part: slice, **joint: str) -> str:
-    """Return the graph of a height, or of an angle about the axis up of what is no body, in a part of a clip."""
+    """Return a graph of part of a clip: the height of an object or of a body's joint, or an object's turn about Z."""
     lines, seconds = [], truth.times[part] - truth.times[part][0]
     for clip in (shaky, truth, cleaned):
         if clip.rest_body:
@@ -107,7 +107,7 @@ def panel(row: int, title: str, truth: Clip, shaky: Clip, cleaned: Clip, said: s
 
 
 def strokes_of_body(clip: Clip) -> np.ndarray:
-    """Return lines from the joints to their parents, from the front, in metres, shape (t, n, 2, 2)."""
+    """Return lines from joints to their parents, seen from the front, in metres, shape (t, n, 2, 2)."""
     skeleton = existing(clip.rest_body).skeleton
     places = np.stack([clip.in_blender(pose).positions for pose in skeleton.in_root_space(clip.poses)], axis=1)
     child = np.flatnonzero(np.asarray(skeleton.parents) >= 0)
@@ -115,7 +115,7 @@ def strokes_of_body(clip: Clip) -> np.ndarray:
 
 
 def strokes_of_hand(clip: Clip) -> np.ndarray:
-    """Return its axes, seen from a corner, in metres, shape (t, 3, 2, 2)."""
+    """Return the axes of a hand, seen from a corner, in metres, shape (t, 3, 2, 2)."""
     poses = clip.in_blender(clip.poses)
     tips = poses.positions[:, None] + 0.25 * np.moveaxis(matrices(poses.quaternions), -1, 0).swapaxes(1, 2)
     ends = np.stack((np.repeat(poses.positions[:, None], 3, axis=1), tips), axis=2)
@@ -123,7 +123,7 @@ def strokes_of_hand(clip: Clip) -> np.ndarray:
 
 
 def strokes_of_camera(clip: Clip, placed: Poses) -> np.ndarray:
-    """Return the edges of a cube that stands in front of the placed camera, as the camera sees them, (t, 12, 2, 2)."""
+    """Return the edges of a cube in front of the placed camera, as a camera clip sees them, shape (t, 12, 2, 2)."""
     corners = np.array(list(np.ndindex(2, 2, 2)), dtype=float) - 0.5
     edges = [
         (one, other) for one in range(8) for other in range(one) if np.abs(corners[one] - corners[other]).sum() == 1.0
@@ -135,7 +135,7 @@ def strokes_of_camera(clip: Clip, placed: Poses) -> np.ndarray:
 
 
 def film(row: int, title: str, clips: tuple[Clip, Clip], strokes_of: Callable[[Clip], np.ndarray], part: slice) -> str:
-    """Return both clips as they play in a part, side by side, in loops of as many seconds."""
+    """Return an animation of the same part of both clips, side by side, looping after at most `FILM_S` seconds."""
     times = clips[0].times[part] - clips[0].times[part][0]
     shown = np.searchsorted(times, np.arange(0.0, min(times[-1], FILM_S), 1.0 / FILM_RATE_HZ))
     drawn = [strokes_of(clip)[part][shown] for clip in clips]
@@ -165,7 +165,7 @@ def film(row: int, title: str, clips: tuple[Clip, Clip], strokes_of: Callable[[C
 
 
 def main() -> None:
-    """Draw the three."""
+    """Draw all three recordings."""
     hand, camera, body = asset("throw"), asset("reach"), dancer()
     shaky = shaken(hand.poses, 0.006, 0.5, 1)
     for first, off in ((60, 0.2), (180, -0.15)):

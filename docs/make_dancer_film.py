@@ -1,9 +1,9 @@
-"""Make the film of a dancer with a key on every frame, and beside it what reducing keys leaves of that: key poses.
+"""Make the film of two dancers: one with a key on every frame, one with only the key poses left by reducing keys.
 
 python docs/make_dancer_film.py
 
-prints what became of the keys, and writes dancer.png and dancer.mp4 beside this file. With --still it writes only the
-picture.
+prints the number of keys before and after, and writes dancer.png and dancer.mp4 next to this file. With --still it
+writes only the picture.
 """
 
 from __future__ import annotations
@@ -41,44 +41,44 @@ RECORDED, REDUCED = "#C9CED6", palette.MODE_COLOURS[MODE]
 FLASH = "#D9FF9E"
 
 GLOW, AFTERGLOW = 3, 14
-"""For how many frames a dancer who passes a key pose is lit, and for how many the pose stays in the air."""
+"""How long the dancer lights up at a key pose, and how long the pose stays visible, in frames."""
 
 WIDTH = 2.5
-"""Metres from side to side of a lane."""
+"""Width of a lane, in metres."""
 
 MIDDLE, CAMERA = (0.03, 0.0, 0.79), (80.0, 0.0, 0.0)
-"""What the camera looks at, in the space of a rig, and its rotation in degrees."""
+"""The point that the camera looks at, in the space of a rig, and the camera's rotation in degrees."""
 
 STILL = 98
 """The frame of the picture."""
 
 LEFT, RIGHT, TITLE, STRIP, SAYS = -0.45, 0.45, 0.15, 0.104, 0.03
-"""Where captions are in a lane: from its middle, and up from the bottom, in widths of it."""
+"""Positions of captions in a lane, in lane widths: x from its middle (the first two), y from its bottom."""
 
 
 def main() -> None:
-    """Render everything anew."""
+    """Render the picture and the film."""
     animation.register()
     scene = build()
     scene.frame_set(STILL)
     image, kind = scene.render.image_settings, scene.render.image_settings.file_format
     render_still(scene, DOCS / "dancer.png")
     if "--still" not in sys.argv:
-        if hasattr(image, "media_type"):  # Blender 5 asks for the kind of output first.
+        if hasattr(image, "media_type"):  # Blender 5 needs the kind of output first.
             image.media_type = "VIDEO"
         image.file_format = kind
         render_film(scene, DOCS / "dancer.mp4")
 
 
 def build() -> bpy.types.Scene:
-    """Both dancers, side by side."""
+    """Return the scene with both dancers side by side."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     set_up_render(scene, SETTINGS, len(dance.FRAMES))
     video = scene.render.ffmpeg
     video.constant_rate_factor, video.ffmpeg_preset, video.gopsize = "MEDIUM", "BEST", 5 * SETTINGS.fps
     make_lights(scene)
-    scene.render.dither_intensity = 0.0  # Its grain is most of a file.
+    scene.render.dither_intensity = 0.0  # The grain of dithering would be most of the file.
     camera = _camera(scene)
 
     recorded, reduced = dance.dancer(), dance.dancer()
@@ -113,7 +113,7 @@ def build() -> bpy.types.Scene:
 
 
 def key_frames(rig: bpy.types.Object) -> np.ndarray:
-    """The frames that bones of a dancer have keys on, shape (k,)."""
+    """Return the frames on which any bone of a dancer has keys, shape (k,)."""
     moved = rig.animation_data
     curves = moved.action.layers[0].strips[0].channelbag(moved.action_slot).fcurves
     return np.unique([key.co.x for curve in curves for key in curve.keyframe_points])
@@ -132,7 +132,7 @@ def _camera(scene: bpy.types.Scene) -> bpy.types.Object:
 
 
 def _flash(material: bpy.types.Material, colour: str, bright: str, frames: np.ndarray) -> None:
-    """Let a material light up on some frames, and go back to its colour."""
+    """Make a material light up on some frames, then fade back to its colour."""
     every = dance.FRAMES
     since = np.array([min((frame - key for key in frames if key <= frame), default=GLOW) for frame in every])
     share = np.clip(1.0 - since / GLOW, 0.0, 1.0)[:, None]
@@ -141,7 +141,7 @@ def _flash(material: bpy.types.Material, colour: str, bright: str, frames: np.nd
 
 
 def _ghost(scene: bpy.types.Scene, body: bpy.types.Object, frame: int) -> None:
-    """The pose of a frame, which stays behind and fades."""
+    """Add a copy of the body in the pose of a frame, which stays in place and fades."""
     scene.frame_set(frame)
     seen = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
     material = surface(f"Ghost {frame}", REDUCED, alpha=0.5)
@@ -150,7 +150,7 @@ def _ghost(scene: bpy.types.Scene, body: bpy.types.Object, frame: int) -> None:
     mesh.materials.append(material)
     ghost = bpy.data.objects.new(f"Ghost {frame}", mesh)
     ghost.matrix_world = seen.matrix_world.copy()
-    # Behind the dancer, whom it would dim, as the camera sees it.
+    # Behind the dancer as the camera sees her; in front, it would dim her.
     ghost.location += 0.25 * (Euler([math.radians(angle) for angle in CAMERA]).to_matrix() @ Vector((0.0, 0.0, -1.0)))
     scene.collection.objects.link(ghost)
     ages = np.arange(AFTERGLOW + 1.0)
@@ -161,13 +161,13 @@ def _ghost(scene: bpy.types.Scene, body: bpy.types.Object, frame: int) -> None:
 
 
 def _show(obj: bpy.types.Object, first: float, last: float) -> None:
-    """Have an object be there from one frame up to another only."""
+    """Show an object in renders from one frame until another frame."""
     frames = np.array((first - 1.0, first, last))
     write_channel(obj, "hide_render", frames, np.array((1.0, 0.0, 1.0)), interpolation="CONSTANT")
 
 
 def _captions(camera: bpy.types.Object, side: float, title: str, colour: str, poses: np.ndarray, says: str) -> None:
-    """Title, poses that have passed, all of them on a strip, and what there is to say, below a lane."""
+    """Add captions below a lane: title, number of poses passed, a strip of all poses, and a sentence."""
     bright, faint, dim = ink(f"{title} ink", colour), ink("Faint", palette.DARK.faint), ink("Dim", palette.DARK.track)
     bottom = -WIDTH * SETTINGS.resolution[1] / SETTINGS.resolution[0]
     every, collection = dance.FRAMES, bpy.context.scene.collection

@@ -1,8 +1,8 @@
-"""Make the film of a hammer that goes from hand to hand: by keyed influences of Child Of, and beside it by holds.
+"""Make the film of a hammer that goes from hand to hand, by keyed influences of Child Of and, side by side, by holds.
 
 python docs/make_holding_film.py
 
-prints how far the hammer is off the hands, and writes holding.png and holding.mp4 beside this file. With --still it
+prints how far the hammer is off the hands, and writes holding.png and holding.mp4 next to this file. With --still it
 writes only the picture.
 """
 
@@ -41,24 +41,24 @@ PICK, OVER, THROWN, CAUGHT, DOWN = 24, 62, 104, 118, 164
 """The frames on which the hammer is picked up, handed over, thrown, caught and put down."""
 
 COLOURS = "#4FA8E8", "#F0A04B", "#C9CED6"
-"""Of either person, and of what nobody holds."""
+"""Colours of the first and second person, and of a hammer that no hand holds."""
 
 STEEL, WOOD, STAND, FLOOR = "#DDE3EA", "#8A5A33", "#4A5462", "#242932"
 
 WIDTH = 2.4
-"""Metres from side to side of a lane."""
+"""Width of a lane, in metres."""
 
 MIDDLE = Vector((0.0, 0.0, 0.79))
-"""What the camera looks at, halfway between two lanes."""
+"""The point that the camera looks at, halfway between the two lanes."""
 
 DEPTH = -0.20
-"""Where the hammer is, towards the camera: before the shoulders of the near arms."""
+"""The Y coordinate of the hammer, in metres: towards the camera, in front of the shoulders of the near arms."""
 
 TABLE, AIR = 2, 3
-"""What has the hammer where neither of the two people, 0 and 1, does."""
+"""Numbers of the holders that are not people: the two people are 0 and 1."""
 
 HELD = (1, TABLE, 0), (PICK, 0, 0), (OVER, 1, 4), (THROWN, AIR, 1), (CAUGHT, 0, 3), (DOWN, TABLE, 0)
-"""From which frame on what has it, and over how many frames before that it passes."""
+"""First frame of each hold, its holder, and how many frames the hand-over before that frame takes."""
 
 STILL = OVER - 2
 """The frame of the picture."""
@@ -66,21 +66,21 @@ STILL = OVER - 2
 
 @dataclass(frozen=True)
 class Person:
-    """Someone who stands beside the table: where, by how many degrees turned, and the hand that is near the camera."""
+    """A person next to the table: X position, turn in degrees about Z, and the side of the hand near the camera."""
 
     colour: str
     place: float
     turn: float
     side: str
     grip: Matrix
-    """The hand in the space of the hammer that it holds."""
+    """Matrix of the hand in the space of the hammer that it holds."""
 
     idle: Vector
-    """Where the wrist is while the hand has nothing to do."""
+    """Position of the wrist while the hand is idle."""
 
 
 def _grip(along: float, forward: float) -> Matrix:
-    """A hand that points along X of the hammer, or against it, so far along the handle."""
+    """Return a hand's matrix: `along` metres up the handle, pointing along (1) or against (-1) the hammer's X axis."""
     axes = Matrix(((0.0, forward, 0.0), (-forward, 0.0, 0.0), (0.0, 0.0, 1.0))).to_4x4()
     return Matrix.Translation((-0.075 * forward, 0.0, along)) @ axes
 
@@ -92,7 +92,7 @@ PEOPLE = (
 
 
 def _pose(x: float, z: float, degrees: float) -> Matrix:
-    """The hammer with its grip here, its head tilted from upright towards +X."""
+    """Return the hammer's matrix: its grip at (x, z), its head tilted from upright towards +X by an angle."""
     return Matrix.Translation((x, DEPTH, z)) @ Matrix.Rotation(math.radians(degrees), 4, "Y")
 
 
@@ -102,10 +102,10 @@ TURNS = -10.0, 350.0
 LET_GO, CATCH = _pose(0.20, 1.22, TURNS[0]), _pose(-0.20, 1.22, TURNS[1])
 
 CENTRE, HEAD = Vector((0.0, 0.0, 0.18)), Vector((0.0, 0.0, 0.24))
-"""In the space of the hammer: its centre of mass, and the middle of its head."""
+"""Centre of mass and middle of the head, in the space of the hammer."""
 
 HELD_AT = Vector(), Vector((0.0, 0.0, 0.12)), CENTRE, CENTRE
-"""And where each of what has it does so."""
+"""The point of the hammer that each holder holds, in the space of the hammer, by number of the holder."""
 
 CARRIED: tuple[dict[int, Matrix], ...] = (
     {
@@ -126,7 +126,7 @@ CARRIED: tuple[dict[int, Matrix], ...] = (
         THROWN: LET_GO,
     },
 )
-"""Where each hand is, by where the hammer would be in it, on some frames."""
+"""Keys of each person's hand by frame, given as the pose of the hammer in that hand."""
 
 FREE: tuple[dict[int, tuple[float, float, float]], ...] = (
     {
@@ -147,7 +147,7 @@ FREE: tuple[dict[int, tuple[float, float, float]], ...] = (
         192: (0.0, 0.0, -45.0),
     },
 )
-"""Where the wrists are beside their idle place, along X and Z, on others, and by how many degrees they are turned."""
+"""Keys of each person's empty hand by frame: offset of the wrist from its idle place in X and Z, turn in degrees."""
 
 LEANS: tuple[dict[int, float], ...] = (
     {
@@ -163,34 +163,34 @@ LEANS: tuple[dict[int, float], ...] = (
     },
     {1: 1.0, OVER - 28: 1.0, OVER: 9.0, OVER + 20: -4.0, THROWN - 9: 7.0, THROWN + 6: -4.0, THROWN + 36: 1.0, 192: 1.0},
 )
-"""By how many degrees the people bend forward on some frames."""
+"""Keys of each person's forward bend by frame, in degrees."""
 
 TITLE, SAYS, STRIP, LEFT, RIGHT = 0.150, 0.098, 0.045, -0.45, 0.45
-"""Where captions are in a lane: up from the bottom, and from its middle, in widths of it."""
+"""Positions of captions in a lane, in lane widths: y from its bottom (the first three), x from its middle."""
 
 
 def main() -> None:
-    """Render everything anew."""
+    """Render the picture and the film."""
     animation.register()
     scene = build()
     scene.frame_set(STILL)
     image, kind = scene.render.image_settings, scene.render.image_settings.file_format
     render_still(scene, DOCS / "holding.png")
     if "--still" not in sys.argv:
-        if hasattr(image, "media_type"):  # Blender 5 asks for the kind of output first.
+        if hasattr(image, "media_type"):  # Blender 5 needs the kind of output first.
             image.media_type = "VIDEO"
         image.file_format = kind
         render_film(scene, DOCS / "holding.mp4")
 
 
 def build() -> bpy.types.Scene:
-    """Both ways to hold, side by side."""
+    """Return the scene with both ways to hold, side by side."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     set_up_render(scene, SETTINGS, len(FRAMES))
     video = scene.render.ffmpeg
     video.constant_rate_factor, video.ffmpeg_preset, video.gopsize = "MEDIUM", "BEST", 5 * SETTINGS.fps
-    scene.render.dither_intensity = 0.0  # Its grain is most of a file.
+    scene.render.dither_intensity = 0.0  # The grain of dithering would be most of the file.
     make_lights(scene)
     camera = _camera(scene)
     for side, title, hold in ((-0.5, "Child Of, influence keyed", by_influence), (0.5, "Hold In", by_holds)):
@@ -206,11 +206,11 @@ def build() -> bpy.types.Scene:
     return scene
 
 
-# -- people, and what they hold ----------------------------------------------------------------------------------------
+# -- people, and the held hammer ---------------------------------------------------------------------------------------
 
 
 def person(who: Person, lane: Matrix) -> bpy.types.Object:
-    """A body whose near hand has keys, which the arm follows by IK."""
+    """Add a person: the hand control near the camera has keys, and the arm follows it by IK."""
     rig = bpy.data.objects.new("Person", bpy.data.armatures.new("Person"))
     bpy.context.scene.collection.objects.link(rig)
     rig.matrix_world = (
@@ -263,7 +263,7 @@ def _key(bone: bpy.types.PoseBone, frame: float, world: Matrix) -> None:
 
 
 def hammer() -> bpy.types.Object:
-    """A hammer with its origin where it is held first."""
+    """Add a hammer with its origin at the point where it is first held."""
     head = figure.boxes("Head", surface("Steel", STEEL), ((0.0, 0.0, 0.24), (0.15, 0.06, 0.06)))
     tool = figure.boxes("Hammer", surface("Handle", WOOD), ((0.0, 0.0, 0.08), (0.028, 0.028, 0.36)))
     head.parent, tool.rotation_mode = tool, "QUATERNION"
@@ -271,7 +271,7 @@ def hammer() -> bpy.types.Object:
 
 
 def by_holds(tool: bpy.types.Object, hands: Sequence[bpy.types.PoseBone], lane: Matrix) -> None:
-    """Hold it as an animator does: go to a frame, select the hammer, then the hand, Hold In."""
+    """Hold the hammer as an animator does: go to a frame, select the hammer, then the hand, and use Hold In."""
     scene = bpy.context.scene
     _key_tool(tool, 1, lane @ LIES)
     for frame, who, frames in HELD[1:]:
@@ -285,9 +285,9 @@ def by_holds(tool: bpy.types.Object, hands: Sequence[bpy.types.PoseBone], lane: 
 
 
 def by_influence(tool: bpy.types.Object, hands: Sequence[bpy.types.PoseBone], lane: Matrix) -> None:
-    """Give it a Child Of for each hand, set its inverse where that takes it first, and key influence and hammer.
+    """Give the hammer a Child Of for each hand, with inverses set when first taken, and key influences and hammer.
 
-    On every key of the hammer it is where it should be: all that is left to Blender is what is between keys.
+    The hammer is in the right place on each of its keys. Only the in-betweens are left to Blender.
     """
     scene, constraints = bpy.context.scene, []
     for hand, frame in zip(hands, (PICK, OVER), strict=True):
@@ -327,7 +327,7 @@ def _key_tool(tool: bpy.types.Object, frame: float, pose: Matrix) -> None:
 
 
 def flight(frame: float) -> Matrix:
-    """The thrown hammer: its centre of mass on a parabola, turned evenly, once around."""
+    """Return the matrix of the thrown hammer: centre of mass on a parabola, one full turn at constant speed."""
     seconds, share = (CAUGHT - THROWN) / SETTINGS.fps, (frame - THROWN) / (CAUGHT - THROWN)
     first, last = (pose @ CENTRE for pose in (LET_GO, CATCH))
     rise = 0.5 * 9.81 * seconds**2 * share * (1.0 - share)
@@ -336,13 +336,13 @@ def flight(frame: float) -> Matrix:
     return Matrix.LocRotScale(place - turned @ CENTRE, turned, None)
 
 
-# -- what became of it -------------------------------------------------------------------------------------------------
+# -- the measured error ------------------------------------------------------------------------------------------------
 
 
 def measure(tool: bpy.types.Object, rigs: Sequence[bpy.types.Object], lane: Matrix) -> tuple[np.ndarray, np.ndarray]:
-    """The path of the head in its lane, shape (q, 3), and how far the hammer is off what has it, at quarters of frames.
+    """Return the hammer head's path in its lane, (q, 3), and its distance from its holder, (q,), every quarter frame.
 
-    That is in metres, at the place where it is held. While it passes from one to the other, the nearer of both counts.
+    The distance is in metres, at the point where the hammer is held. During a hand-over, the nearer holder counts.
     """
     scene, back, moments = bpy.context.scene, lane.inverted(), np.arange(FRAMES[0], FRAMES[-1] + 0.1, 0.25)
     ways, off = np.empty((len(moments), 3)), np.empty((4, len(moments)))
@@ -372,7 +372,7 @@ def _world(bone: bpy.types.PoseBone) -> Matrix:
 
 
 def _trails(ways: np.ndarray) -> list[bpy.types.Object]:
-    """The path of the head, in the colour of who holds it, drawn as it comes about."""
+    """Draw the path of the head as it forms, in the colour of the holder."""
     result = []
     for (first, who, _), (last, *_) in pairwise((*HELD, (int(FRAMES[-1]), TABLE, 0))):
         part = ways[4 * (first - 1) : 4 * (last - 1) + 1]
@@ -406,7 +406,7 @@ def _camera(scene: bpy.types.Scene) -> bpy.types.Object:
 
 
 def _captions(camera: bpy.types.Object, side: float, title: str, off: np.ndarray) -> None:
-    """Title, how far the hammer is off, and by colours who has it when, below a lane."""
+    """Add captions below a lane: title, largest error so far, and a strip in the colours of the holders."""
     bright, faint = ink("Bright", palette.DARK.ink), ink("Faint", palette.DARK.faint)
     bottom = -WIDTH * SETTINGS.resolution[1] / SETTINGS.resolution[0]
     collection = bpy.context.scene.collection

@@ -1,9 +1,9 @@
-"""Make the films of docs/modes.md: each mode with the same keys, beside Blender's own in-betweens in grey.
+"""Make the films of docs/modes.md: each mode with the same keys, with Blender's own in-betweens in grey.
 
 python docs/make_mode_loops.py [MODE ...]
 
-A hammer is swung about the end of its handle, flies off, growing, and comes back to where it began, so that the film
-has no end. It writes MODE.mp4, and MODE.png in the middle of the swing, into docs/modes/.
+A hammer swings about the end of its handle, flies off while growing, and returns to its start, so the film can loop.
+This writes MODE.mp4, and MODE.png in the middle of the swing, to docs/modes/.
 """
 
 from __future__ import annotations
@@ -39,37 +39,37 @@ SETTINGS = SceneSettings(resolution=(960, 540), antialiasing="5", fps=24)
 THEME = palette.DARK
 
 HANDLE = Vector((0.0, 0.0, -0.8))
-"""The end of the handle in the hammer's own space; its origin is in the head."""
+"""The end of the handle in the hammer's own space, whose origin is in the head."""
 
 KEYS = (
-    # frame, where the end of the handle is (x, z), clockwise degrees, size
+    # frame, end of the handle (x, z), clockwise degrees, size
     (1, (-0.95, -0.42), -75.0, 1.0),
     (25, (-0.95, -0.42), 65.0, 1.0),
     (49, (1.05, 0.30), 190.0, 1.45),
     (73, (-0.95, -0.42), 285.0, 1.0),
 )
-"""The last is the first again: the film ends a frame before it."""
+"""The last key repeats the first pose; the film ends one frame before it."""
 
 FRAMES = np.arange(KEYS[0][0], KEYS[-1][0])
 
 STILL = 14
-"""The frame of the picture, in which the mode and Blender are far apart."""
+"""The frame of the picture: there, the mode and Blender are far apart."""
 
 WIDTH = 5.4
-"""Metres from side to side of the picture."""
+"""Width of the picture, in metres."""
 
 MIDDLE = (-0.1, 0.0, -0.3)
 
 LINE = 0.014
-"""Half the thickness of the head's way, in metres; that of the handle's end is half as thick."""
+"""Radius of the line along the head's path, in metres; the line of the handle's end is half as thick."""
 
 
 IN_FRONT = Vector((0.0, -1.0, 0.0))
-"""Of the hammers, as the camera sees it."""
+"""Offset to a place in front of the hammers, as the camera sees them."""
 
 
 def main(modes: Iterable[str]) -> None:
-    """Render the films of these modes."""
+    """Render the films and pictures of these modes."""
     animation.register()
     for mode in modes:
         scene = build(mode)
@@ -81,19 +81,19 @@ def main(modes: Iterable[str]) -> None:
 
 
 def build(mode: str) -> bpy.types.Scene:
-    """The scene of a mode: the hammer that goes by it, the one that Blender moves, and the ways of both."""
+    """Return the scene of a mode: a hammer moved by the mode, a hammer moved by Blender, and the paths of both."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     set_up_render(scene, SETTINGS, len(FRAMES), THEME.background)
     video = scene.render.ffmpeg
     video.constant_rate_factor, video.ffmpeg_preset, video.gopsize = "MEDIUM", "BEST", len(FRAMES)
-    scene.render.dither_intensity = 0.0  # Noise would be most of the picture's bytes.
+    scene.render.dither_intensity = 0.0  # The grain of dithering would be most of the file.
     make_lights(scene)
     make_camera(scene)
     native = hammer("Blender", surface("Blender", THEME.faint, alpha=0.5))
     key(native)
     shown = read_poses(native, FRAMES)
-    native.delta_location.y = 0.6  # Behind the other, and its way behind both.
+    native.delta_location.y = 0.6  # Behind the other hammer; its path is behind both.
     moved = hammer(MODES[mode].label, surface(mode, palette.colour_of(mode)))
     poses = by_mode(native, mode)
     animation.bake_poses(moved, FRAMES.astype(float), poses)
@@ -108,7 +108,7 @@ def build(mode: str) -> bpy.types.Scene:
 
 
 def make_camera(scene: bpy.types.Scene) -> None:
-    """Square to the plane of the motion, with parallel rays."""
+    """Add an orthographic camera, perpendicular to the plane of the motion."""
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)
     scene.camera = camera
@@ -118,7 +118,7 @@ def make_camera(scene: bpy.types.Scene) -> None:
 
 
 def hammer(name: str, material: bpy.types.Material) -> bpy.types.Object:
-    """A hammer with its origin in the head."""
+    """Add a hammer with its origin in the head."""
     parts = (
         ((0.0, 0.0, -0.4), (0.09, 0.09, 0.86)),
         ((0.02, 0.0, 0.04), (0.46, 0.2, 0.2)),
@@ -130,7 +130,7 @@ def hammer(name: str, material: bpy.types.Material) -> bpy.types.Object:
 
 
 def key_poses() -> Poses:
-    """The poses of `KEYS`."""
+    """Return the hammer's poses on `KEYS`."""
     turns = [Quaternion((0.0, 1.0, 0.0), math.radians(angle)) for _, _, angle, _ in KEYS]
     heads = [
         Vector((x, 0.0, z)) - size * (turn @ HANDLE) for (_, (x, z), _, size), turn in zip(KEYS, turns, strict=True)
@@ -139,7 +139,7 @@ def key_poses() -> Poses:
 
 
 def key(obj: bpy.types.Object) -> None:
-    """Give an object the keys, eased as Blender eases them."""
+    """Give an object the keys, with Blender's own easing."""
     poses, frames = key_poses(), np.array([float(frame) for frame, *_ in KEYS])
     scales = np.repeat(poses.scales[:, None], 3, axis=1)
     channels = ("location", poses.positions), ("rotation_quaternion", poses.quaternions), ("scale", scales)
@@ -148,10 +148,10 @@ def key(obj: bpy.types.Object) -> None:
 
 
 def by_mode(keyed: bpy.types.Object, mode: str) -> Poses:
-    """The poses on all frames by a mode, at the times that the keys of an object ask for.
+    """Return the poses of a mode on all frames, with the easing of an object's keys.
 
-    Modes for streams are none of Blender's, so all are asked in the same way: how far along a segment the body is, is
-    the share of the straight way that Straight has gone.
+    Blender does not offer the modes for streams, so all modes are evaluated in the same way: the progress in a segment
+    is the fraction of the straight line that the mode Straight has covered.
     """
     keys = key_poses()
     straight = in_betweens(source_of(keyed), FRAMES, "lerp_slerp").desired.positions
@@ -165,7 +165,7 @@ def by_mode(keyed: bpy.types.Object, mode: str) -> Poses:
 
 
 def draw_ways(poses: Poses, material: bpy.types.Material, behind: float) -> None:
-    """The ways of the head and of the end of the handle, round and round, behind the hammers."""
+    """Draw the closed paths of the head and of the end of the handle, behind the hammers."""
     sizes = 1.0 if poses.scales is None else poses.scales[:, None]
     for point, thickness in ((Vector(), LINE), (HANDLE, LINE / 2.0)):
         way = poses.positions * (1.0, 0.0, 1.0) + sizes * rotate(poses.quaternions, np.array(point))
@@ -174,7 +174,7 @@ def draw_ways(poses: Poses, material: bpy.types.Material, behind: float) -> None
 
 
 def caption(camera: bpy.types.Object, title: str, colour: str) -> None:
-    """Whose way is whose, in the corners above."""
+    """Name both hammers in the upper corners, in their colours."""
     top = 0.5 * WIDTH * SETTINGS.resolution[1] / SETTINGS.resolution[0]
     for text, material, x, align in (
         (title, ink("Title", colour), -0.47, "LEFT"),

@@ -1,4 +1,4 @@
-"""Make the pictures of these pages: stills of the comparison's own scene, and a film of it.
+"""Make the comparison pictures of these pages: stills of the comparison scene, and a film of it.
 
 python docs/make_pictures.py
 """
@@ -31,7 +31,7 @@ SMOOTH = ("bezier", "lerp_slerp", "dq_sclerp", "motor_spline")
 
 @dataclass(frozen=True)
 class Still:
-    """A moment of an asset, in seconds, kept at so many keys a second."""
+    """A still: a moment of an asset, in seconds, reconstructed from `rate` keys per second."""
 
     asset: str
     rate: str
@@ -48,7 +48,7 @@ STILLS = {
 
 
 def main() -> None:
-    """Render everything anew."""
+    """Render the stills and the film."""
     for picture, still in STILLS.items():
         settings = SceneSettings(resolution=still.resolution, antialiasing="8", subject=still.subject, distinct=True)
         (clip,), _ = read_clips([str(DOCS.parent / "assets" / f"{still.asset}.csv")], "blender")

@@ -1,8 +1,8 @@
-"""Make the moving picture of a GLB file before and after `reduce`: a dancer, and all keys of both.
+"""Make the animated picture of a GLB file before and after `reduce`: the dancer, and all keys of both files.
 
 python docs/make_reduce_picture.py
 
-prints what became of the file, and writes reduce.svg beside this file: it moves by itself in every browser.
+prints the size of the file before and after, and writes reduce.svg next to this file. Every browser animates it.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ TOLERANCE, RADIUS = 0.005, 0.03
 """Metres."""
 
 SECONDS, RATE = 5.0, 15
-"""What is shown, and the pictures a second."""
+"""Length of the animation in seconds, and its frames per second."""
 
 WIDTH, FIGURE, STRIP = 420, 300, 110
-"""Pixels of a half, from side to side, and the heights of the dancer and of the keys."""
+"""Width of each half, and heights of the dancer and of the keys, in pixels."""
 
 METRE = 150.0
-"""Pixels."""
+"""Pixels per metre."""
 
 INK, PALE, KEY = "#2b3440", "#8a94a3", "#3b73d1"
 
@@ -77,7 +77,7 @@ def _half(path: Path, title: str, told: str, left: int) -> str:
 
 
 def _figure(nodes: Nodes, clip: Clip, middle: float) -> str:
-    """Lines from each joint to its parent, from the front, at every picture."""
+    """Return an animation of lines from each joint to its parent, seen from the front."""
     times = np.arange(SECONDS * RATE) / RATE + min(track.times[0] for track in clip.tracks)
     moved = nodes.below(np.unique([track.node for track in clip.tracks]))
     places = nodes.worlds(moved, by_target(clip.tracks), times).origins
@@ -96,7 +96,7 @@ def _figure(nodes: Nodes, clip: Clip, middle: float) -> str:
 
 
 def _keys(clip: Clip, left: int) -> str:
-    """A row for each channel, a dot for each key, and where the film is."""
+    """Return a chart of keys: a row for each channel, a dot for each key, and a moving playhead."""
     first = min(track.times[0] for track in clip.tracks)
     height, across = (STRIP - 40) / len(clip.tracks), WIDTH - 40
     dots = "".join(

@@ -1,8 +1,8 @@
-"""Make the pictures and the film of the chapter on rigs: Rigify's human with Blender's in-betweens and with a screw.
+"""Make the pictures and the film of the chapter on rigs: Rigify's human with Blender's in-betweens and with Screw.
 
 python docs/make_rig_pictures.py
 
-prints what is measured on every scene, and writes rigs.png and rigs.mp4 beside this file.
+prints the measured errors of each scene, and writes rigs-SHOT.png and rigs.mp4 next to this file.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ SETTINGS = SceneSettings(resolution=(960, 540), antialiasing="8", fps=24)
 SKIN, STEEL, WOOD, FLOOR = "#93A0B3", "#DDE3EA", "#C98B4A", "#2B313B"
 
 LANES = (("Blender", "#C9CED6", None), ("Screw", "#38B6FF", "dq_sclerp"))
-"""Title, colour and mode."""
+"""Title, colour and mode of each lane."""
 
 FRAMES = range(scenes.FRAMES[0], scenes.FRAMES[-1] + 1)
 
@@ -52,17 +52,17 @@ class Shot:
     Attributes
     ----------
     says
-        What the number is of.
+        What the displayed number measures.
     build
-        Keys a rig.
+        Function that keys a rig.
     traced
-        The bone and the point in its space whose path is drawn.
+        Pairs of a bone and a point in its space, whose path is drawn.
     camera
-        Its rotation in degrees.
+        Rotation of the camera in degrees.
     middle
-        What it looks at, in the space of a rig.
+        The point that the camera looks at, in the space of a rig.
     width
-        Metres from side to side of one lane.
+        Width of one lane, in metres.
     still
         The frame of the picture.
     """
@@ -78,7 +78,7 @@ class Shot:
 
 
 def lever(rig: bpy.types.Object) -> scenes.Scene:
-    """A lever on a stand, with a ball where the fist has to be."""
+    """Build the lever scene: a lever on a stand, with a grip where the fist has to stay."""
     wood, steel = surface("Wood", WOOD), surface("Steel", STEEL)
     rod = figure.boxes("Lever", steel, ((0.0, 0.0, 0.27), (0.026, 0.026, 0.66)))
     knob = figure.ball("Knob", wood, 0.036)
@@ -91,7 +91,7 @@ def lever(rig: bpy.types.Object) -> scenes.Scene:
 
 
 def sword(rig: bpy.types.Object) -> scenes.Scene:
-    """A sword in the fist, its blade where the thumb points."""
+    """Build the sword scene: a sword in the fist, its blade in the direction of the thumb."""
     steel, wood = surface("Steel", STEEL), surface("Wood", WOOD)
     blade = figure.boxes(
         "Sword", steel, ((0.0, 0.0, 0.45), (0.008, 0.045, 0.70)), ((0.0, 0.0, 0.09), (0.02, 0.17, 0.02))
@@ -103,7 +103,7 @@ def sword(rig: bpy.types.Object) -> scenes.Scene:
 
 
 def twist(rig: bpy.types.Object) -> scenes.Scene:
-    """Crosses where the balls of the feet have to stay, seen through the feet."""
+    """Build the twist scene: crosses, visible through the feet, mark where the balls of the feet have to stay."""
     wood = ink("Mark", WOOD)
     for side in "LR":
         mark = figure.boxes("Mark", wood, ((0, 0, 0), (0.14, 0.006, 0.002)), ((0, 0, 0), (0.006, 0.14, 0.002)))
@@ -149,7 +149,7 @@ SHOTS = (
 
 
 def main() -> None:
-    """Render everything anew."""
+    """Render the pictures and the film."""
     animation.register()
     with tempfile.TemporaryDirectory() as folder:
         for shot in SHOTS:
@@ -160,7 +160,7 @@ def main() -> None:
 
 
 def build(shot: Shot) -> bpy.types.Scene:
-    """Both lanes of a shot, side by side."""
+    """Return the scene of a shot, with both lanes side by side."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     set_up_render(scene, SETTINGS, len(FRAMES))
@@ -193,7 +193,7 @@ def build(shot: Shot) -> bpy.types.Scene:
 
 
 def caption(camera: bpy.types.Object, shot: Shot, side: float, title: str, colour: str, strays: np.ndarray) -> None:
-    """Title, number and what it is of, below a lane."""
+    """Add captions below a lane: title, number, and what the number measures."""
     bright, faint = ink(f"{title} ink", colour), ink("Faint", palette.DARK.faint)
     unit = shot.width
     bottom = -unit * SETTINGS.resolution[1] / SETTINGS.resolution[0]
@@ -222,7 +222,7 @@ def take(scene: bpy.types.Scene, shot: Shot, folder: Path) -> None:
 
 
 def cut_together(folders: Sequence[Path]) -> bpy.types.Scene:
-    """A scene that shows the frames of shots, one shot after the other."""
+    """Return a scene whose sequencer shows the rendered frames of all shots, one after another."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene, frame = bpy.context.scene, 1
     strips = scene.sequence_editor_create().strips

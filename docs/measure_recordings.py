@@ -1,10 +1,10 @@
-"""Measure the recordings of other people that these pages speak of: docs/figures/recordings.json.
+"""Measure the public recordings that these pages cite, and write docs/figures/recordings.json.
 
     python docs/measure_recordings.py --recordings FOLDER
     python scripts/research pages
 
-It takes five minutes; the second command puts the figures into the pages. Of the folder those count that the table of
-the paper's page counts in all its rows: single bodies that move, with two samples to each of 30 updates a second.
+This takes five minutes; the second command puts the figures into the pages. Only recordings that belong to every row
+of the table on the paper's page count: single bodies that move, with two samples per update at 30 updates a second.
 Errors are RMS shell errors at a radius of 0.1 m, means are geometric.
 """
 
@@ -46,35 +46,35 @@ from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 
 RATES = ("5", "10", "15", "20", "30")
-"""Evenly spaced keys a second."""
+"""Evenly spaced keys per second."""
 
 STREAMED = (REFERENCE, BLENDERS, "dq_sclerp", "motor_spline_causal", "motor_spline")
-"""Modes of the table of errors."""
+"""Modes in the table of errors."""
 
 COUNTED = (REFERENCE, "dq_sclerp", "pga_lerp", "motor_spline")
-"""Modes whose keys are counted."""
+"""Modes for which the keys needed are counted."""
 
 CHOICES = {
     "all": "lerp_slerp,dq_sclerp,pga_lerp,motor_spline,best_of",
     "without_spline": "lerp_slerp,dq_sclerp,pga_lerp,best_of",
 }
-"""What `best_of` chooses from: a mode of each motion."""
+"""Modes that `best_of` chooses from, one for each distinct motion, and `best_of` itself."""
 
 BUDGETS = ("5", "10", "20")
-"""Adaptive keys a second, of which `best_of` chooses the modes as well."""
+"""Adaptive keys per second, for which `best_of` also chooses the modes."""
 
 
 def parabola(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """The share of the twist before a key without a bound."""
+    """Return the weight of the twist before a key, without a bound, from the durations of the segments around it."""
     return after / (before + after)
 
 
 def bounded(
     factor: float, power: float = 1.0, least_part: float = 0.0
 ) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """The same, where the shorter segment's share is at most so many times (short / long) to a power.
+    """Return the parabola's rule with the shorter segment's weight limited to factor * (short / long) ** power.
 
-    Up to `least_part` of the longer one's time it has none.
+    A segment of at most `least_part` times the longer segment's duration has no weight.
     """
 
     def shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -95,14 +95,14 @@ RULES = {
     "squared": bounded(1.0, 2.0),
     "between_neighbours": lambda before, after: before / (before + after),
 }
-"""Rules for the share of the twist before a key; that of the program is "1, none up to 1/16"."""
+"""Rules for the weight of the twist before a key. The program uses "1, none up to 1/16"."""
 
 PARTS = {"whole": 1.0, "none": 0.0}
-"""How much of what the parabola adds a key of `motor_spline_causal` could have, where the program gives half."""
+"""Fractions of the parabola's addition that a key of `motor_spline_causal` could use. The program uses half."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, and write the file."""
+    """Measure the recordings, and write the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", required=True)
     parser.add_argument("--root", type=Path, default=ROOT, help="write ROOT/docs/figures (this checkout)")
@@ -130,7 +130,7 @@ def _counting(paths: Sequence[Path]) -> Iterator[tuple[Path, Clip]]:
 
 
 def _assets() -> dict[str, object]:
-    """The errors of smooth.png in mm, and how much closer `best_of` is on `throw` than the best single mode."""
+    """Return the errors in smooth.png, in mm, and how much closer `best_of` is on `throw` than the best single mode."""
     gains = {}
     for rate in ("5", "10"):
         errors = _asset_errors("throw", rate, (*KEYFRAME_MODES, BEST_OF))
@@ -141,7 +141,7 @@ def _assets() -> dict[str, object]:
 
 
 def _asset_errors(asset: str, rate: str, modes: Sequence[str]) -> dict[str, float]:
-    """By mode, the RMS shell error of an asset that is kept at so many keys a second, in metres."""
+    """Return the RMS shell error by mode of an asset reconstructed from `rate` keys per second, in metres."""
     (clip,), _ = read_clips([str(ASSETS / f"{asset}.csv")], "blender")
     return {row.mode: row.rms_shell_m for row in measured(reconstruct(clip, Uniform(rate), modes, SHELL_RADIUS_M)).rows}
 
@@ -150,14 +150,14 @@ def _asset_errors(asset: str, rate: str, modes: Sequence[str]) -> dict[str, floa
 
 
 def _errors(paths: Sequence[Path]) -> dict[str, dict[str, float]]:
-    """By mode and rate, the error as a multiple of that of `REFERENCE`."""
+    """Return the error by mode and rate, as a multiple of the error of `REFERENCE`."""
     with _compared(paths, "--rates", ",".join(RATES), "--modes", ",".join(STREAMED)) as folder:
         table = _Metrics(folder)
         return {mode: {rate: table.mean(partial(table.ratio, rate, mode)) for rate in RATES} for mode in STREAMED[1:]}
 
 
 def _errors_of_clips(clips: Sequence[Clip], part: float) -> dict[str, float]:
-    """By rate, the error of `motor_spline_causal` where keys have another part of what the parabola adds."""
+    """Return the error of `motor_spline_causal` by rate, if keys use this fraction of the parabola's addition."""
     bent = curves._bent
 
     def with_part(segments: Segments, at_keys: Callable[..., np.ndarray]) -> Curves:
@@ -185,7 +185,7 @@ def _errors_of_clips(clips: Sequence[Clip], part: float) -> dict[str, float]:
 
 
 def _needed(clips: Sequence[Clip], modes: Sequence[str], *, fit: bool) -> dict[str, dict[str, dict[str, float]]]:
-    """By mode, way to have keys and rate, the keys needed as a share of those of `REFERENCE`."""
+    """Return the keys needed by mode, decimation and rate, as a fraction of those of `REFERENCE`."""
     result = []
     for clip in clips:
         _say(f"keys needed, {clip.name} ...")
@@ -203,7 +203,7 @@ def _needed(clips: Sequence[Clip], modes: Sequence[str], *, fit: bool) -> dict[s
 
 
 def _apart(result: KeysNeeded) -> KeysNeeded:
-    """With a row for each mode, also where several are one motion."""
+    """Return the result with one row per mode, even if several modes are the same motion."""
     rows = [row for row, group in enumerate(result.groups) for _ in group]
     groups = tuple((mode,) for group in result.groups for mode in group)
     return KeysNeeded(
@@ -220,7 +220,7 @@ def _apart(result: KeysNeeded) -> KeysNeeded:
 
 
 def _by_rule(clips: Sequence[Clip], name: str) -> dict[str, dict[str, float]]:
-    """By way to have keys and rate, what `motor_spline` needs under a rule."""
+    """Return the keys that `motor_spline` needs under a rule, by decimation and rate."""
     _say(f"rule {name} ...")
     rule = RULES[name]
     with mock.patch.object(curves, "twist_shares", rule), mock.patch.object(key_splines, "twist_shares", rule):
@@ -231,14 +231,14 @@ def _by_rule(clips: Sequence[Clip], name: str) -> dict[str, dict[str, float]]:
 
 
 def _best_of(paths: Sequence[Path], modes: str) -> dict[str, dict[str, float]]:
-    """By rate, what `best_of` has of the errors of the best single mode of each clip, and how it changes modes."""
+    """Return by rate the errors of `best_of` relative to the best single mode of each clip, and its changes of mode."""
     with _compared(paths, "--rates", ",".join(RATES), "--modes", modes) as folder:
         table = _Metrics(folder)
         return {rate: _best_at(table, folder, rate) for rate in RATES}
 
 
 def _best_of_adaptive(paths: Sequence[Path]) -> dict[str, float]:
-    """The same with adaptive keys, as many on average: the errors alone."""
+    """Return the relative errors of `best_of` with adaptive keys, by average number of keys per second."""
     with _compared(
         paths, "--decimate", "adaptive", "--budget", ",".join(BUDGETS), "--modes", ",".join((*COUNTED, BEST_OF))
     ) as folder:
@@ -281,7 +281,7 @@ def _best_at(table: _Metrics, folder: Path, rate: str) -> dict[str, float]:
 
 
 class _Metrics:
-    """The table of a run: `metrics.csv`."""
+    """The table of a `compare.py` run: `metrics.csv`."""
 
     def __init__(self, folder: Path) -> None:
         self._at = {(row["clip"], row["rate_hz"], row["mode"]): row for row in _rows(folder / "metrics.csv")}
@@ -295,7 +295,7 @@ class _Metrics:
         return self.value(clip, rate, mode) / self.value(clip, rate, REFERENCE)
 
     def best(self, clip: str, rate: str) -> str:
-        """The single mode with the least error."""
+        """Return the single mode with the smallest error."""
         return min(self._single, key=lambda mode: self.value(clip, rate, mode))
 
     def mean(self, of_clip: Callable[[str], float]) -> float:
@@ -304,7 +304,7 @@ class _Metrics:
 
 @contextmanager
 def _compared(paths: Sequence[Path], *options: str) -> Iterator[Path]:
-    """The folder of a run of `compare.py`."""
+    """Run `compare.py`, and yield its output folder."""
     _say(f"compare.py {' '.join(options)} ...")
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, DOCS.parent / "scripts" / "compare.py", *paths, "--no-video", "--jobs", "1"]
