@@ -1,4 +1,4 @@
-"""A body for a rig, to be looked at: a capsule around each bone that deforms, in one mesh, and props made of boxes."""
+"""A visible body for a rig (one mesh with a capsule around each deforming bone), and props such as boxes and balls."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ RADII = {
     "foot": (0.04, 0.04),
     "toe": (0.036, 0.024),
 }
-"""Half of the width and depth of a body part in metres, by what the name of its bone begins with, after DEF-."""
+"""Half the width and depth of a body part in metres, by the start of its bone's name after DEF-."""
 
 HEAD = "DEF-spine.006"
-"""The one that is no longer than its bone."""
+"""The bone of the head, whose capsule hardly extends beyond the bone."""
 
 SIDES, RINGS = 16, 5
-"""Corners around a capsule, and rings of each of its ends."""
+"""Corners around a capsule, and rings at each of its ends."""
 
 Box = tuple[Sequence[float], Sequence[float]]
-"""Middle and size."""
+"""Middle and size of a box, per axis."""
 
 
 def clothe(rig: bpy.types.Object, material: bpy.types.Material) -> bpy.types.Object:
-    """A body that the rig deforms, as it stands in rest pose."""
+    """Add a body mesh in rest pose that the rig deforms."""
     corners: list[np.ndarray] = []
     faces: list[tuple[int, ...]] = []
     owners: dict[str, range] = {}
@@ -76,9 +76,9 @@ def _size(bone: bpy.types.Bone) -> tuple[float, float] | None:
 
 
 def _capsule(length: float, size: tuple[float, float], inset: float = 0.0) -> tuple[np.ndarray, list[tuple[int, ...]]]:
-    """Corners and faces of a capsule along Y, from the origin to `length`, round beyond both ends.
+    """Return the corners and faces of a capsule along Y, from the origin to `length`, with round caps beyond both ends.
 
-    `inset` is how much of that roundness is to be within its length.
+    `inset` is the fraction of the caps that lies within `length`.
     """
     reach = min(size)
     angles = np.linspace(0.0, 0.5 * math.pi, RINGS + 1)[1:]
@@ -105,7 +105,7 @@ def _capsule(length: float, size: tuple[float, float], inset: float = 0.0) -> tu
 
 
 def boxes(name: str, material: bpy.types.Material, *parts: Box) -> bpy.types.Object:
-    """An object of boxes around its origin."""
+    """Add an object made of boxes around its origin."""
     corners: list[list[float]] = []
     faces: list[list[int]] = []
     sides = (0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)
@@ -123,7 +123,7 @@ def boxes(name: str, material: bpy.types.Material, *parts: Box) -> bpy.types.Obj
 
 
 def ball(name: str, material: bpy.types.Material, radius: float) -> bpy.types.Object:
-    """A ball around its origin."""
+    """Add a ball around its origin."""
     points, faces = _capsule(0.0, (radius, radius))
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points, [], faces)
@@ -137,7 +137,7 @@ def ball(name: str, material: bpy.types.Material, radius: float) -> bpy.types.Ob
 def trail(
     name: str, material: bpy.types.Material, points: Iterable[Sequence[float]], radius: float
 ) -> bpy.types.Object:
-    """A line through points."""
+    """Add a line through points."""
     points = [Vector(point) for point in points]
     curve = bpy.data.curves.new(name, "CURVE")
     curve.dimensions, curve.bevel_depth, curve.bevel_resolution = "3D", radius, 3
@@ -151,7 +151,7 @@ def trail(
 
 
 def hold(obj: bpy.types.Object, rig: bpy.types.Object, bone: str, in_bone: Matrix) -> None:
-    """Have a bone carry an object, which has this matrix in the bone's own space, from its head."""
+    """Parent an object to a bone, with this matrix in the bone's own space, relative to its head."""
     obj.parent, obj.parent_type, obj.parent_bone = rig, "BONE", bone
-    # Blender counts from the tail.
+    # Blender measures from the tail.
     obj.matrix_local = Matrix.Translation((0.0, -rig.data.bones[bone].length, 0.0)) @ in_bone

@@ -1,9 +1,9 @@
-"""Make the examples: the files that each of them begins with, in its own folder.
+"""Make the examples: write the start files of each example to its own folder.
 
 python scripts/bootstrap.py examples [NAME ...] [--picture] [--check]
 
-With --picture the pictures of the READMEs are rendered anew. With --check every command that the READMEs name is run in
-a temporary folder, without films, to see whether it works.
+With --picture, also render the pictures of the READMEs. With --check, run every command in the READMEs in a temporary
+folder, without films, to see whether it works.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from scripts import bootstrap
 NAMES = "lid", "sword", "hand", "dancer", "camera", "farm"
 
 PROMPT = "python scripts/bootstrap.py "
-"""What the commands in the READMEs begin with."""
+"""The start of every command in the READMEs."""
 
 QUICK = {"compare": ("--no-video", "--jobs", "0"), "bundle": ("--no-video", "--jobs", "0")}
-"""What is added to commands where they are only to be seen to work."""
+"""Options added to commands by --check, to make them quicker."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Make or check the examples that are named, and return the exit code."""
+    """Make or check the named examples (default: all), and return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"some of {', '.join(NAMES)} (all)")
     parser.add_argument("--picture", action="store_true", help="render the pictures of the READMEs anew, too")
@@ -50,7 +50,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def check(names: tuple[str, ...] | list[str]) -> int:
-    """Run what the READMEs of these say, and say which of them do not work."""
+    """Run the commands in the READMEs of these examples, print which READMEs fail, and return 1 if any does."""
     failed = 0
     with tempfile.TemporaryDirectory() as folder:
         copy_to(Path(folder))
@@ -65,13 +65,13 @@ def check(names: tuple[str, ...] | list[str]) -> int:
 
 
 def copy_to(folder: Path) -> None:
-    """Copy the examples, without what they have made, to a folder that commands can be run in."""
+    """Copy the examples, without generated files, to a folder in which commands can run."""
     made = shutil.ignore_patterns("*.blend", "*.csv", "takes", "__pycache__")
     shutil.copytree(HERE, folder / HERE.name, ignore=made)
 
 
 def commands_of(name: str) -> list[str]:
-    """The commands in the README of an example, as one types them."""
+    """Return the commands in the README of an example, as typed."""
     lines = (HERE / name / "README.md").read_text(encoding="utf-8").splitlines()
     return [line.strip() for line in lines if line.startswith(f"    {PROMPT}")]
 
@@ -79,12 +79,12 @@ def commands_of(name: str) -> list[str]:
 def run_readme(name: str, folder: Path) -> str:
     """Run the commands of a README in a folder with a copy of the examples, and return what they print.
 
-    Behind `bundle` comes the command that it prints last, as that README says.
+    After `bundle`, also run the command in its last line of output, as that README says.
 
     Raises
     ------
     subprocess.CalledProcessError
-        Where one of them fails.
+        If a command fails.
     """
     printed = []
     for line in commands_of(name):
@@ -95,12 +95,12 @@ def run_readme(name: str, folder: Path) -> str:
 
 
 def run(words: list[str], folder: Path) -> str:
-    """Run a command of bootstrap.py by this Python, quickly, and return what it prints."""
+    """Run a command of bootstrap.py with this Python and the `QUICK` options, and return its output."""
     command, *rest = words
     (program, *options), _ = bootstrap.COMMANDS[command]
     if Path(program).is_relative_to(HERE):
         program = folder / HERE.name / Path(program).name
-    # Not those of pathlib, which refuse absolute words.
+    # Not pathlib's glob, which refuses absolute patterns.
     rest = [result for word in rest for result in (sorted(glob.glob(word, root_dir=folder)) or [word])]  # noqa: PTH207
     paths = [folder, ROOT, ROOT / "addon", ROOT / "scripts"]
     done = subprocess.run(

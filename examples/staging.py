@@ -1,6 +1,6 @@
-"""What the scenes of the examples share: a camera with captions, paths of points, a sensible first view, and saving.
+"""Shared helpers for the scenes of the examples: a camera with captions, paths of points, first view, and saving.
 
-Captions hang on the camera, in units of the picture's width, so that they are in the .blend as they are in the picture.
+Captions are parented to the camera, in units of the picture's width, so the .blend and the picture show the same.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from rigid_motion_batch.scenes.settings import SceneSettings
 RESOLUTION = 960, 540
 
 VIEW = 13.0, (0.08, 0.0)
-"""Zoom and offset of the view through the camera: the frame fills what the sidebar leaves of the viewport."""
+"""Zoom and offset of the camera view: the camera frame fills the viewport next to the sidebar."""
 
 BLENDER, RIGID = "#C9CED6", "#38B6FF"
-"""The colours of what Blender's own in-betweens move, and of what a mode of Rigid Motion does."""
+"""Colours of objects moved by Blender's own in-betweens, and by a mode of Rigid Motion."""
 
 STEEL, WOOD, STONE, SKIN = "#DDE3EA", "#F0A04B", "#4A5462", "#93A0B3"
 
 
 def parse(folder: Path, description: str, arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    """The options that every example has."""
+    """Parse the options that every example has, and make the output folder."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--output", type=Path, default=folder, metavar="FOLDER", help="where to write (its own folder)")
     parser.add_argument("--picture", action="store_true", help="render the picture of the README anew, too")
@@ -48,7 +48,7 @@ def parse(folder: Path, description: str, arguments: Sequence[str] | None = None
 
 
 def put(folder: Path, name: str, text: str) -> Path:
-    """Write a file of text below a folder, say so, and return its path."""
+    """Write a text file below a folder, print its name, and return its path."""
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8", newline="\n")
@@ -57,26 +57,26 @@ def put(folder: Path, name: str, text: str) -> Path:
 
 
 def run(main: Callable[[], None]) -> None:
-    """Call what a script is for, and leave: Blender's module complains of memory while it is taken down."""
+    """Run the main function of a script, then exit at once: Blender prints memory warnings at a normal exit."""
     main()
     sys.stdout.flush()
     os._exit(0)
 
 
 def begin(frames: int, fps: int = 24) -> bpy.types.Scene:
-    """An empty scene with so many frames and the extension's properties and handlers."""
+    """Return an empty scene with this number of frames, after registering the extension's properties and handlers."""
     if not hasattr(bpy.types.Object, "rigid_motion"):
         animation.register()
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     set_up_render(scene, SceneSettings(resolution=RESOLUTION, antialiasing="8", fps=fps), frames)
-    scene.render.dither_intensity = 0.0  # Its grain is most of a file.
+    scene.render.dither_intensity = 0.0  # The grain of dithering would be most of the file.
     make_lights(scene)
     return scene
 
 
 def look(middle: Sequence[float], degrees: Sequence[float], width: float) -> bpy.types.Object:
-    """A camera with parallel rays that shows so many metres from left to right."""
+    """Add an orthographic camera that looks at `middle` and shows `width` metres from left to right."""
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)
@@ -90,7 +90,7 @@ def look(middle: Sequence[float], degrees: Sequence[float], width: float) -> bpy
 
 
 def write(camera: bpy.types.Object, text: str, x: float, y: float, size: float, colour: str) -> None:
-    """A line of text from a place in the picture, counted from its middle in widths of it."""
+    """Add a line of text that starts at (x, y), measured from the middle of the picture in widths of the picture."""
     width = camera.data.ortho_scale
     obj = captions.words("Caption", text, size * width, ink("Caption", colour))
     obj.parent, obj.location, obj.hide_select = camera, (x * width, y * width, -width), True
@@ -98,30 +98,30 @@ def write(camera: bpy.types.Object, text: str, x: float, y: float, size: float, 
 
 
 def path(name: str, points: np.ndarray, colour: str, radius: float) -> None:
-    """The way of a point, shape (n, 3), as a line."""
+    """Draw the path of a point, shape (n, 3), as a line."""
     figure.trail(name, ink(name, colour), points, radius).hide_select = True
 
 
 def title(camera: bpy.types.Object, x: float, head: str, says: str, colour: str) -> None:
-    """What a lane is, and what there is to say of it."""
+    """Write the heading of a lane, and a line of text below it."""
     write(camera, head, x, 0.232, 0.034, colour)
     write(camera, says, x, 0.2, 0.022, palette.DARK.faint)
 
 
 def foot(camera: bpy.types.Object, text: str) -> None:
-    """How to read the picture, on its lower edge."""
+    """Write the explanation of the picture at its lower edge."""
     write(camera, text, -0.47, -0.262, 0.02, palette.DARK.faint)
 
 
 def key(obj: bpy.types.Object | bpy.types.PoseBone, frame: float, matrix: Matrix) -> None:
-    """Key location and rotation of an object or bone, with Blender's own easing, so that it has this matrix."""
+    """Key the location and rotation of an object or bone from a basis matrix, with Blender's own easing."""
     obj.matrix_basis, obj.rotation_mode = matrix, "QUATERNION"
     for path in ("location", "rotation_quaternion"):
         obj.keyframe_insert(path, frame=frame)
 
 
 def on_frames(frames: Iterable[float], measure: Callable[[], Sequence[float]]) -> np.ndarray:
-    """What is measured on each frame, shape (frames, n). The scene is left where it was."""
+    """Return the values of `measure` on each frame, shape (frames, n). The scene returns to its current frame."""
     scene = bpy.context.scene
     before, result = scene.frame_current, []
     for frame in frames:
@@ -132,23 +132,23 @@ def on_frames(frames: Iterable[float], measure: Callable[[], Sequence[float]]) -
 
 
 def all_frames() -> range:
-    """Those of the scene."""
+    """Return all frames of the scene."""
     scene = bpy.context.scene
     return range(scene.frame_start, scene.frame_end + 1)
 
 
 def evaluated(obj: bpy.types.Object) -> bpy.types.Object:
-    """An object as it is on the frame that the scene is at."""
+    """Return the evaluated object on the scene's current frame."""
     return obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
 
 
 def farthest(points: np.ndarray, place: np.ndarray) -> float:
-    """How far any of the points (n, 3) is from where it should be, shape (3,) or (n, 3)."""
+    """Return the largest distance of points (n, 3) from a target place, shape (3,) or (n, 3)."""
     return float(np.linalg.norm(points - place, axis=-1).max())
 
 
 def length(metres: float) -> str:
-    """A length as a caption has it."""
+    """Return a length in cm or mm, as text for a caption."""
     return f"{100.0 * metres:.1f} cm" if metres >= 5e-4 else f"{1000.0 * metres:.1f} mm"
 
 
@@ -161,21 +161,21 @@ def finish(
     bone: str | None = None,
     dress: Callable[[], None] | None = None,
 ) -> None:
-    """Save the scene as it shall open, and render its picture where asked to.
+    """Save the scene in the state in which it opens, and render its picture if asked to.
 
     Parameters
     ----------
     options : argparse.Namespace
     name : str
-        Of the example.
+        Name of the example.
     active : bpy.types.Object
-        What is selected.
+        The selected object.
     still : int
         The frame of the picture.
     bone : str, optional
-        What is selected in Pose Mode, of a rig.
+        The bone of a rig selected in Pose Mode.
     dress : callable, optional
-        Adds what is in the picture alone.
+        Called before rendering, to add objects for the picture alone.
     """
     scene = bpy.context.scene
     scene.frame_set(scene.frame_start)
@@ -197,7 +197,7 @@ def finish(
 
 
 def _open_in_camera_view() -> None:
-    """Have every 3D viewport look through the camera, in the colours of the materials, with its sidebar open."""
+    """Make every 3D viewport show the camera view in material colours, with the sidebar open."""
     for screen in bpy.data.screens:
         for space in (space for area in screen.areas for space in area.spaces if space.type == "VIEW_3D"):
             region = space.region_3d

@@ -1,4 +1,4 @@
-"""Single pictures of scenes, for pages and examples."""
+"""Rendering of single frames of scenes to PNG, for pages and examples."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from rigid_motion_batch.silencing import silenced
 
 
 def render_still(scene: bpy.types.Scene, path: Path) -> None:
-    """Render the frame that the scene is at to a PNG.
+    """Render the current frame of a scene to a PNG.
 
     Raises
     ------
     RuntimeError
-        Where Blender cannot render.
+        If Blender writes no picture.
     """
     image = scene.render.image_settings
-    if hasattr(image, "media_type"):  # Blender 5 asks for the kind of output first.
+    if hasattr(image, "media_type"):  # Blender 5 needs the kind of output first.
         image.media_type = "IMAGE"
     image.file_format = "PNG"
     image.compression = 90

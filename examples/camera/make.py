@@ -1,4 +1,4 @@
-"""A camera as a tracker solved it, with jitter and gaps, and the same shot from the few keys of a smooth path."""
+"""A camera as solved by a tracker, with jitter and gaps, and the same shot from the few keys of a smooth path."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ from rigid_motion_batch.scenes.materials import ink, surface
 SEED, FPS, FRAMES = 11, 24, 240
 
 JITTER, SHAKE = 0.006, math.radians(0.1)
-"""Standard deviations of what the solver is off by, in metres and radians, new on every frame."""
+"""Standard deviations of the solver's error, independent on every frame, in metres and radians."""
 
 LOST = (70, 77), (151, 163)
-"""Frames that the solver has no camera for."""
+"""Frames without a solution: first, and one past the last."""
 
 MODE, TOLERANCE, RADIUS = "motor_spline", 0.025, 0.3
-"""Metres: how far off anything within the radius around the camera may be."""
+"""Largest error allowed anywhere within the radius around the camera, both in metres."""
 
 COLOUR = palette.MODE_COLOURS[MODE]
 
 WIDTH = 3.6
-"""Metres from left to right of the picture."""
+"""Width of the picture, in metres."""
 
 STILL = 110
 
 GRAPH = 0.38, 0.08
-"""How wide a graph is, and how high a degree, in widths of the picture."""
+"""Width of a graph, and height of one degree in it, in widths of the picture."""
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Write the solution, and a scene with both cameras."""
+    """Write the solved camera track, and a scene with both cameras."""
     options = staging.parse(HERE, __doc__, arguments)
     path = staging.put(options.output, "solve.csv", solution())
 
@@ -82,7 +82,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def path_of(times: np.ndarray) -> Poses:
-    """Where the camera really was: a walk around a table, rising, with the eyes on what stands there."""
+    """Return the true camera path: a rising walk around a table, aimed at the objects on the table."""
     share = np.clip(times * FPS / FRAMES, 0.0, 1.0)
     eased = share * share * (3.0 - 2.0 * share)
     angle = np.radians(-190.0 + 200.0 * eased)
@@ -99,7 +99,7 @@ def path_of(times: np.ndarray) -> Poses:
 
 
 def solution() -> str:
-    """What the tracker writes: seconds, metres and quaternions, a row for each frame that it has solved."""
+    """Return the tracker's CSV: seconds, metres and quaternions, one row for each solved frame."""
     rng = np.random.default_rng(SEED)
     times = np.arange(FRAMES) / FPS
     truth = path_of(times)
@@ -111,7 +111,7 @@ def solution() -> str:
 
 
 def camera(name: str, times: np.ndarray, poses: Poses) -> bpy.types.Object:
-    """A camera with a key at each of these times."""
+    """Add a camera with a key at each of these times, in seconds."""
     obj = bpy.data.objects.new(name, bpy.data.cameras.new(name))
     obj.data.display_size = 0.12
     obj.rotation_mode = "QUATERNION"
@@ -121,7 +121,7 @@ def camera(name: str, times: np.ndarray, poses: Poses) -> bpy.types.Object:
 
 
 def poses_on(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
-    """Where an object is on these frames."""
+    """Return the world poses of an object on these frames."""
 
     def pose() -> tuple[float, ...]:
         location, rotation, _ = staging.evaluated(obj).matrix_world.decompose()
@@ -132,14 +132,14 @@ def poses_on(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
 
 
 def shake(poses: Poses, frames: np.ndarray) -> np.ndarray:
-    """By how many degrees the view leaves the middle of the views before and after, up and down, shape (n,)."""
+    """Return the vertical deviation of each view from the mean of its two neighbours, in degrees, shape (n,)."""
     aims = np.array([Quaternion(q) @ Vector((0.0, 0.0, -1.0)) for q in poses.quaternions])
     bends = aims[1:-1, 2] - (aims[2:, 2] + aims[:-2, 2]) / 2.0
     return np.degrees(bends[np.abs(frames[2:] - frames[:-2] - 2.0) < 1e-3])
 
 
 def graph(view: bpy.types.Object, x: float, values: np.ndarray, colour: str) -> None:
-    """The values, shape (n,), as a line below what is said of them."""
+    """Draw values, shape (n,), as a line below the lane's captions."""
     width = view.data.ortho_scale
     across, up = x + np.linspace(0.0, GRAPH[0], len(values)), 0.165 + GRAPH[1] * values
     points = width * np.stack((across, up, np.full(len(values), -1.0)), axis=-1)
@@ -148,7 +148,7 @@ def graph(view: bpy.types.Object, x: float, values: np.ndarray, colour: str) -> 
 
 
 def furnish(times: np.ndarray, solved: Poses, smooth: Poses, kept: np.ndarray) -> None:
-    """What the camera films, and both paths, that of the solution with its gaps."""
+    """Add the objects that the camera films, the solved path with its gaps, and the smooth path with its keys."""
     stone = surface("Stone", staging.STONE)
     for obj in (
         figure.boxes("Table", stone, ((0.0, 0.0, -0.02), (0.9, 0.9, 0.04))),
@@ -166,7 +166,7 @@ def furnish(times: np.ndarray, solved: Poses, smooth: Poses, kept: np.ndarray) -
 
 
 def body(smooth: bpy.types.Object) -> None:
-    """Something to be seen behind the lens of the smooth camera, which itself is in no picture."""
+    """Add a visible body to the smooth camera, because renders do not show cameras."""
     box = figure.boxes(
         "Body", surface("Body", COLOUR), ((0.0, 0.02, 0.16), (0.1, 0.16, 0.22)), ((0, 0, 0.03), (0.07, 0.07, 0.06))
     )

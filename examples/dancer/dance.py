@@ -1,10 +1,10 @@
-"""A dancer with a key on every frame on every bone, as motion capture leaves them. The dance is designed here.
+"""A dancer with a key on every bone and frame, like motion capture; this module generates the dance from a plan.
 
-Ten seconds of sixteen beats: steps to the side, a kick, a full turn, a lunge. A plan says where feet, hips, chest
-and hands are on some beats; in between they go smoothly. Legs and arms follow by two-bone IK, so feet stay where they
-stand, and everything is then written as plain rotations in parents' spaces, with the noise of a recording.
+Ten seconds, sixteen beats: steps to the side, a kick, a full turn, a lunge. The plan gives the positions of feet, hips,
+chest and hands on some beats; the in-betweens are smooth. Legs and arms follow by two-bone IK, so planted feet stay
+in place. The result is written as rotations in the parents' spaces, with the noise of a recording.
 
-X is to the dancer's left, Z up, and the audience at -Y. Metres.
+X is the dancer's left, Z is up, and the audience is at -Y. Lengths are in metres.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ from examples.dancer.plan import (
 from rigid_motion.animation import write_channel
 
 FPS, BEAT = 30, 18.75
-"""Frames a second, and a beat."""
+"""Frames per second, and frames per beat."""
 
 FRAMES = np.arange(1.0, 301.0)
 
 NOISE, JITTER = np.radians(0.05), 0.00025
-"""Standard deviations of the noise: of each rotation of trunk, shoulders and hands, and of where hips and wrists are.
+"""Standard deviations of the noise: radians for trunk, shoulders and hands, metres for hips, wrists and (0.3x) ankles.
 
-It is white, and adds up from bone to bone. Within 10 mm, 65 key poses tell this dance; with twice this noise it takes
-78, and with four times, 0.2 degrees, 187.
+The noise is white and adds up along bone chains. Within 10 mm, this dance needs 65 key poses; with twice the noise it
+needs 78, and with four times (0.2 degrees) 187.
 """
 
 KNEES = 0.965
-"""Legs are not straighter than this share of their length: nearly straight knees would snap."""
+"""The longest reach of a leg, as a fraction of its length: nearly straight knees would snap."""
 
 WIDTH = 0.72
-"""What steps and hips go sideways of what the plans say."""
+"""Factor on the plans' sideways positions of steps and hips."""
 
 Vectors = np.ndarray
 """Shape (n, 3)."""
@@ -60,7 +60,7 @@ Turns = np.ndarray
 
 
 def dancer(seed: int = 0, last: float = FRAMES[-1]) -> bpy.types.Object:
-    """A figure of 1.7 m and 22 bones with its dance in the open scene, up to a frame."""
+    """Add a dancer 1.7 m tall with 22 bones to the open scene, with its dance up to the frame `last`."""
     rig = _skeleton()
     frames = FRAMES[last >= FRAMES]
     turns, hips = _dance(frames, np.random.default_rng(seed))
@@ -94,7 +94,7 @@ def _skeleton() -> bpy.types.Object:
 
 
 def _dance(frames: np.ndarray, random: np.random.Generator) -> tuple[dict[str, Turns], Vectors]:
-    """How every bone is turned away from its rest pose, in the rig's space, and where the hips begin."""
+    """Return the rotation of every bone from its rest pose, in the rig's space, and the position of the hips."""
     count = len(frames)
     beats = (frames - FRAMES[0]) / BEAT
 
@@ -108,7 +108,7 @@ def _dance(frames: np.ndarray, random: np.random.Generator) -> tuple[dict[str, T
         return JITTER * random.normal(size=(count, 3))
 
     def turned(up: np.ndarray, side: np.ndarray, forward: np.ndarray) -> Turns:
-        """By angles in degrees around Z, then Y, then X, in the turned space."""
+        """Return rotations by angles in degrees around Z, then the turned Y, then the turned X."""
         return _about(2, up) @ _about(1, side) @ _about(0, forward)
 
     none = np.zeros(count)
@@ -156,7 +156,7 @@ def _dance(frames: np.ndarray, random: np.random.Generator) -> tuple[dict[str, T
 
 
 def _too_far(turns: dict[str, Turns], hips: Vectors, beats: np.ndarray) -> np.ndarray:
-    """How far hips have to go down for knees to stay bent."""
+    """Return how far the hips must go down to keep the knees bent, smoothed over time."""
     reach = KNEES * (_length("thigh.L") + _length("shin.L"))
     lower = np.zeros(len(beats))
     for side in "LR":
@@ -169,7 +169,7 @@ def _too_far(turns: dict[str, Turns], hips: Vectors, beats: np.ndarray) -> np.nd
 
 
 def _foot(side: str, beats: np.ndarray) -> tuple[Vectors, np.ndarray, np.ndarray]:
-    """Where the ankle is, the heading of the foot and how far its heel is up, in degrees."""
+    """Return the position of the ankle, and the heading of the foot and the lift of its heel, both in degrees."""
     (x, y), heading = START[side]
     place, raised = np.array((x, y, 0.0)), 0.0
     ways = np.tile(place, (len(beats), 1))
@@ -185,7 +185,7 @@ def _foot(side: str, beats: np.ndarray) -> tuple[Vectors, np.ndarray, np.ndarray
         headings += share * (new - heading)
         heels += share * (heel - raised) + (18.0 if number and not kicks else 8.0) * bump
         place, heading, raised = goal, new, heel
-    # The ball of the foot is where it stands; the ankle goes up around it.
+    # The plan places the ball of the foot; the ankle rises around it.
     _, ankle, ball = BONES["foot.L"]
     ankle = np.tile(ankle - ball, (len(beats), 1))
     ankle = _apply(_about(2, headings) @ _about(0, heels), ankle)
@@ -203,13 +203,13 @@ def _bend(
     pole: Vectors,
     rest_pole: np.ndarray,
 ) -> None:
-    """Turn two bones so that the second ends on a target, the joint in between towards a pole."""
+    """Set the rotations of two bones by IK: the second bone ends on a target, the joint points towards a pole."""
     upper, lower = (f"{name}.{side}" for name in names)
     a, b = _length(upper), _length(lower)
     way = target - root
     far = np.linalg.norm(way, axis=1, keepdims=True)
     along = way / far
-    # Nearly straight limbs straighten ever slower, so that joints do not snap.
+    # Limbs straighten more slowly when nearly straight, so joints do not snap.
     far = _softly(far, 0.995 * (a + b), 0.02)
     normal = np.cross(along, pole)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -225,12 +225,12 @@ def _bend(
 
 
 def _softly(values: np.ndarray, limit: float, width: float) -> np.ndarray:
-    """The values, bent off below a limit which they do not reach."""
+    """Return values that approach a limit smoothly and never reach it."""
     return limit - width * np.logaddexp(0.0, (limit - values) / width)
 
 
 def _carried(turns: Mapping[str, Turns], hips: Vectors, name: str) -> Vectors:
-    """Where a bone begins, from those that it hangs on."""
+    """Return the head position of a bone, from the rotations of its ancestors."""
     chain = [name]
     while (parent := BONES[chain[-1]][0]) is not None:
         chain.append(parent)
@@ -246,7 +246,7 @@ def _length(name: str) -> float:
 
 
 def _smooth(plan: Plan, beats: np.ndarray, width: float = 0.3) -> np.ndarray:
-    """What a plan says, eased by a Gaussian of so many beats."""
+    """Return the values of a plan at these beats, smoothed by a Gaussian with a standard deviation of `width` beats."""
     offsets = np.linspace(-3.0, 3.0, 61)
     weights = np.exp(-0.5 * offsets**2)
     when = np.array([beat for beat, _ in plan], dtype=float)
@@ -270,7 +270,7 @@ def _about(axis: int, degrees: np.ndarray) -> Turns:
 
 
 def _turn(vectors: Vectors) -> Turns:
-    """Rotations by rotation vectors."""
+    """Return the rotation matrices of rotation vectors."""
     angles = np.linalg.norm(vectors, axis=1)
     x, y, z = (vectors / np.maximum(angles, 1e-12)[:, None]).T
     o = np.zeros_like(x)
@@ -294,9 +294,9 @@ def _matrices(q: np.ndarray) -> Turns:
 
 
 def _quaternions(turns: Turns) -> np.ndarray:
-    """Of matrices, of like signs from frame to frame, shape (n, 4)."""
+    """Return the quaternions of matrices, with continuous signs from frame to frame, shape (n, 4)."""
     m, trace = turns, np.trace(turns, axis1=1, axis2=2)
-    # The column of the largest component of each: no other is near zero.
+    # Use the row with the largest component: it is never near zero.
     four = np.empty((len(m), 4, 4))
     four[:, 0] = np.stack(
         (1.0 + trace, m[:, 2, 1] - m[:, 1, 2], m[:, 0, 2] - m[:, 2, 0], m[:, 1, 0] - m[:, 0, 1]), axis=1

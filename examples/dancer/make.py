@@ -1,4 +1,4 @@
-"""A dancer with a key on every bone and frame, and beside her the same dance from its key poses alone."""
+"""A dancer with a key on every bone and frame, and next to her the same dance from its key poses alone."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from rigid_motion_batch.scenes.materials import surface
 
 MODE = "motor_spline"
 TOLERANCE, RADIUS = 0.01, 0.03
-"""Metres: how far off a joint may be, and how far around it that holds."""
+"""Largest error allowed within the radius around each joint, both in metres."""
 
 LANES = ("Recorded", staging.SKIN, -1.1), ("Key poses", palette.MODE_COLOURS[MODE], 1.1)
-"""Title, colour, and where the dancer stands."""
+"""Title, colour and X position of each dancer."""
 
 WIDTH = 4.6
-"""Metres from left to right of the picture."""
+"""Width of the picture, in metres."""
 
 STILL, GHOSTS = 98, 3
-"""The frame of the picture, and how many key poses before it are in the air."""
+"""The frame of the picture, and the number of earlier key poses shown in it."""
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Make both dancers, and say how many keys are left and how far off that is."""
+    """Make both dancers, and print the number of keys left and the largest error."""
     options = staging.parse(HERE, __doc__, arguments)
     count = len(dance.FRAMES)
     staging.begin(count, dance.FPS)
@@ -69,7 +69,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def measure(recorded: bpy.types.Object, reduced: bpy.types.Object) -> float:
-    """How far any joint is off on any frame, in millimetres."""
+    """Return the largest error of any joint on any frame, in millimetres."""
 
     def off() -> tuple[float]:
         joints = [[bone.head for bone in staging.evaluated(rig).pose.bones] for rig in (recorded, reduced)]
@@ -79,7 +79,7 @@ def measure(recorded: bpy.types.Object, reduced: bpy.types.Object) -> float:
 
 
 def ghost(body: bpy.types.Object, frame: int) -> None:
-    """The pose of a frame, behind the dancer, for the picture alone."""
+    """Add a copy of the body in the pose of a frame, behind the dancer, only for the picture."""
     bpy.context.scene.frame_set(frame)
     seen = staging.evaluated(body)
     mesh = bpy.data.meshes.new_from_object(seen)

@@ -1,4 +1,4 @@
-"""What the dancer is and does: its bones, and where feet, hips, chest and hands are on some beats."""
+"""The bones of the dancer, and the plan of its dance: positions of feet, hips, chest and hands on some beats."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 Plan = Sequence[tuple[float, object]]
-"""Beats, and what is so on them."""
+"""Pairs of a beat and the value on that beat."""
 
 TRUNK = {
     "spine": (None, (0.0, 0.03, 0.875), (0.0, 0.01, 1.0)),
@@ -27,7 +27,7 @@ LIMBS = {
     "foot": ("shin", (0.09, 0.025, 0.085), (0.09, -0.10, 0.036)),
     "toe": ("foot", (0.09, -0.10, 0.036), (0.09, -0.155, 0.03)),
 }
-"""Parent, head and tail of the bones in rest pose, those of the left side."""
+"""Parent, head and tail of each bone in rest pose. `LIMBS` has the left side only."""
 
 
 def _bones() -> dict[str, tuple[str | None, np.ndarray, np.ndarray]]:
@@ -56,7 +56,7 @@ HEADING: Plan = (
     (14, 350),
     (15, 360),
 )
-"""Of the hips, in degrees to the left, seen from above counterclockwise."""
+"""Heading of the hips, in degrees to the left (counterclockwise from above)."""
 
 STEPS = {
     "L": (
@@ -74,10 +74,10 @@ STEPS = {
         (10.0, 11.2, (-0.12, 0.00), 346, 0.07, 0),
     ),
 }
-"""First and last beat, where to, heading there, height in between, and how far the heel is up then, in degrees."""
+"""First and last beat, goal (x, y), heading there, height in between, and lift of the heel there; angles in degrees."""
 
 KICK = "R", 0, 0.62
-"""The step that ends in the air, and how high."""
+"""The step that ends in the air (side and number), and its height in metres."""
 
 START = {"L": ((0.11, 0.0), 8), "R": ((-0.11, 0.0), -8)}
 
@@ -101,7 +101,7 @@ HIPS: Plan = (
     (14.8, (0.13, 0.0)),
     (16, (0.10, 0.0)),
 )
-"""Where they are, seen from above."""
+"""Position of the hips (x, y), seen from above."""
 
 DIP: Plan = (
     (0, 5),
@@ -123,7 +123,7 @@ DIP: Plan = (
     (14.8, 5),
     (16, 5),
 )
-"""How far they are lower than with straight legs, in centimetres."""
+"""How far the hips are below their rest height, in centimetres."""
 
 SWAY: Plan = (
     (0, 0),
@@ -145,7 +145,7 @@ SWAY: Plan = (
     (14.8, -7),
     (16, -9),
 )
-"""Hips raised on the right, in degrees."""
+"""Tilt of the hips, raised on the right, in degrees."""
 
 LEAN: Plan = (
     (0, 2),
@@ -160,7 +160,7 @@ LEAN: Plan = (
     (15, -6),
     (16, -7),
 )
-"""Of the trunk, forward, in degrees."""
+"""Forward lean of the trunk, in degrees."""
 
 BEND: Plan = (
     (0, 0),
@@ -181,7 +181,7 @@ BEND: Plan = (
     (14.8, 10),
     (16, 13),
 )
-"""Of the trunk to its right, in degrees: against the hips."""
+"""Sideways bend of the trunk to its left, in degrees, against the tilt of the hips."""
 
 TWIST: Plan = (
     (0, 0),
@@ -201,7 +201,7 @@ TWIST: Plan = (
     (15, -16),
     (16, -18),
 )
-"""Of the trunk against the hips, to the left, in degrees."""
+"""Twist of the trunk relative to the hips, to the left, in degrees."""
 
 GAZE: Plan = (
     (0, 0),
@@ -220,7 +220,7 @@ GAZE: Plan = (
     (14.8, 356),
     (16, 352),
 )
-"""Where the face points, in degrees to the left. In the turn it stays with the audience and then is there first."""
+"""Heading of the face, in degrees to the left. In the full turn it leaves the audience last and returns first."""
 
 NOD: Plan = (
     (0, 0),
@@ -242,7 +242,7 @@ NOD: Plan = (
     (15, -16),
     (16, -18),
 )
-"""Of the face, down, in degrees."""
+"""Downward nod of the face, in degrees."""
 
 HANDS = {
     "L": (
@@ -294,7 +294,7 @@ HANDS = {
         (16, (0.94, 0.0, 0.22)),
     ),
 }
-"""From the shoulder, in the chest's space: outwards, forwards, up, in lengths of the arm."""
+"""Hand positions from the shoulder, in the chest's space: outwards, forwards, up, in units of 1.1 arm lengths."""
 
 ELBOWS = (0.6, 0.5, -0.55)
-"""Which way they point, likewise, but backwards."""
+"""Direction of the elbows in the chest's space: outwards, backwards, up."""

@@ -1,4 +1,4 @@
-"""Three takes of a tool, to be compared as a job of several tasks, as a render farm runs them."""
+"""Three takes of a tool, compared as a job of several tasks that a render farm can run."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from rigid_motion_batch.scenes import captions
 from rigid_motion_batch.scenes.materials import ink, surface
 
 TAKES = {"drill": "screw", "probe": "pivot", "toss": "throw"}
-"""Name of a take to the motion that it is of."""
+"""The name of each take, and its motion."""
 
 SEED, SECONDS = 5, 2.0
 
 RATES, PARTS = "5,10", "3"
-"""Of the picture's job: keys a second, and the tasks of a step."""
+"""Options of the job in the picture: keys per second, and tasks per step."""
 
 PICTURE = 960, 300
 
 WIDTH, STEP, CARD, SQUARE = 10.0, 1.56, (1.46, 1.3), 0.2
-"""Of the picture; from card to card; of a card, and of a task on it."""
+"""Width of the picture, distance between cards, width and height of a card, and width of a task's square."""
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Write the takes."""
+    """Write the takes, and render the picture if asked to."""
     options = staging.parse(HERE, __doc__, arguments)
     for number, (name, motion) in enumerate(TAKES.items()):
         rng = np.random.default_rng((SEED, number))
@@ -52,7 +52,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def picture(takes: Path, output: Path) -> None:
-    """Draw the steps of the job, a card for each, with a square for each of its tasks."""
+    """Draw the steps of the job: a card for each step, with a square for each task."""
     counts = tasks_of_steps(takes)
     scene = staging.begin(1)
     scene.render.resolution_x, scene.render.resolution_y = PICTURE
@@ -75,18 +75,18 @@ def picture(takes: Path, output: Path) -> None:
 
 
 def lay(mesh: bpy.types.Mesh, x: float, y: float, height: float) -> None:
-    """Put a flat mesh somewhere."""
+    """Add a flat mesh to the scene at a position."""
     obj = bpy.data.objects.new(mesh.name, mesh)
     obj.location = (x, y, height)
     bpy.context.scene.collection.objects.link(obj)
 
 
 def tasks_of_steps(takes: Path) -> dict[str, int]:
-    """The steps of the job, in their order, and how many tasks each has."""
+    """Return the names of the job's steps, in order, and the number of tasks of each."""
     with tempfile.TemporaryDirectory() as scratch:
         job = Path(scratch) / "job"
         recordings = [str(path) for path in sorted(takes.glob("*.csv"))]
-        with redirect_stdout(StringIO()):  # It names the command that runs a job which is gone in a moment.
+        with redirect_stdout(StringIO()):  # It prints a command for this temporary job.
             own = ["--parts", PARTS, "--output", f"{scratch}/out", "--bundle", str(job)]
             job_bundle.main([*recordings, "--rates", RATES, *own])
         template = json.loads((job / "template.json").read_text(encoding="utf-8"))
@@ -94,7 +94,7 @@ def tasks_of_steps(takes: Path) -> dict[str, int]:
 
 
 def count_of(step: dict) -> int:
-    """The tasks of a step of a job template: its parameter goes from 1 to their number."""
+    """Return the number of tasks of a step in a job template: its parameter has the range 1 to that number."""
     (part,) = step["parameterSpace"]["taskParameterDefinitions"]
     return int(part["range"].removeprefix("1-"))
 

@@ -1,4 +1,4 @@
-"""Five reaches of a hand with a controller, in the CSV that a logger in Unity writes, with the faults of such logs."""
+"""Five reaches of a hand with a controller, as the CSV of a logger in Unity, with the usual faults of such logs."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ SEED = 7
 HEADER = "timestamp_ms,PosX,PosY,PosZ,RotX,RotY,RotZ,RotW"
 
 STARTED = 48_213.0
-"""Milliseconds that the game had run for by then."""
+"""How long the game had been running at the first row, in milliseconds."""
 
 TWICE, LOST, FLIPPED = slice(60, 63), slice(150, 158), slice(200, None)
-"""Rows that are written twice, that are missing, and whose quaternions have the other sign."""
+"""Rows that are written twice, rows that are missing, and rows whose quaternions have the opposite sign."""
 
 RATE, MODES, MOMENT = "5", ("bezier", "lerp_slerp", "dq_sclerp", "motor_spline"), 3.32
-"""Of the picture: keys a second, modes, and seconds."""
+"""Keys per second, modes and time in seconds of the picture."""
 
 SIZE = 800, 360
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Write the log."""
+    """Write the log, and render the picture if asked to."""
     options = staging.parse(HERE, __doc__, arguments)
     path = staging.put(options.output, "hand.csv", log())
     if options.picture:
@@ -46,7 +46,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def log() -> str:
-    """The text of the log."""
+    """Return the text of the log."""
     rng = np.random.default_rng(SEED)
     reach = MOTIONS["reach"]
     times = tick(rng, reach.duration)
@@ -62,7 +62,7 @@ def log() -> str:
 
 
 def picture(recording: Path, path: Path) -> None:
-    """A moment of the comparison's own scene."""
+    """Render one moment of the comparison scene."""
     settings = SceneSettings(resolution=SIZE, antialiasing="8", subject="controller", distinct=True)
     (clip,), _ = read_clips([str(recording)], "unity")
     scene = build_scene(reconstruct(clip, Uniform(RATE), MODES, radius=0.1), settings)

@@ -1,4 +1,4 @@
-"""The lid of a chest with four keys: Blender's own in-betweens take it off its hinge, the screw keeps it there."""
+"""The lid of a chest with four keys: Blender's own in-betweens move it off its hinge, Screw keeps it there."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from rigid_motion import animation
 from rigid_motion_batch.scenes.materials import ink, surface
 
 KEYS = (1, 0.0), (25, 115.0), (49, 40.0), (65, 0.0)
-"""Frames, and how far the lid is open on them, in degrees."""
+"""Frames, and the lid's opening angle on each, in degrees."""
 
 LANES = ("Blender", staging.BLENDER, "BLENDER", -0.52), ("Screw", staging.RIGID, "dq_sclerp", 0.52)
-"""Title, colour, mode, and where the chest stands."""
+"""Title, colour, mode and sideways position of each chest."""
 
 WIDTH, DEPTH, HEIGHT, THICKNESS = 0.6, 0.4, 0.3, 0.07
 HINGE = Vector((0.0, DEPTH / 2.0, HEIGHT))
-"""In the chest's space."""
+"""The hinge, in the chest's space."""
 
 IN_LID = Vector((0.0, DEPTH / 2.0, -THICKNESS / 2.0))
-"""The hinge, in the space of the lid, which has its origin in its middle."""
+"""The hinge, in the space of the lid, whose origin is in its middle."""
 
 ACROSS = 1.9
-"""Metres from left to right of the picture."""
+"""Width of the picture, in metres."""
 
 STILL = 12
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Make the scene, and say how far each lid leaves its hinge."""
+    """Make the scene, and print how far each lid leaves its hinge."""
     options = staging.parse(HERE, __doc__, arguments)
     staging.begin(frames=KEYS[-1][0] + 15)
     camera = staging.look((0.0, 0.0, 0.36), (75.0, 0.0, 68.0), ACROSS)
@@ -60,7 +60,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def chest(name: str, colour: str, place: Vector) -> bpy.types.Object:
-    """A chest that stands at a place, and its lid with keys, which is returned."""
+    """Add a chest with a keyed lid at a place, and return the lid."""
     box = figure.boxes(f"{name} chest", surface("Chest", staging.STONE), ((0, 0, HEIGHT / 2), (WIDTH, DEPTH, HEIGHT)))
     box.location, box.hide_select = place, True
     pin = figure.boxes(f"{name} hinge", ink("Hinge", staging.WOOD), (HINGE, (WIDTH + 0.06, 0.022, 0.022)))
@@ -74,18 +74,18 @@ def chest(name: str, colour: str, place: Vector) -> bpy.types.Object:
 
 
 def pose(degrees: float) -> Matrix:
-    """The lid turned about its hinge, in the chest's space."""
+    """Return the matrix of the lid turned about its hinge, in the chest's space."""
     turned = Matrix.Rotation(np.radians(-degrees), 4, "X")
     return Matrix.Translation(HINGE) @ turned @ Matrix.Translation(-IN_LID)
 
 
 def hinge_points(lid: bpy.types.Object) -> np.ndarray:
-    """Where the lid's own end of the hinge is on each frame, shape (frames, 3)."""
+    """Return the position of the hinge as a point of the lid on each frame, shape (frames, 3)."""
     return staging.on_frames(staging.all_frames(), lambda: staging.evaluated(lid).matrix_world @ IN_LID)
 
 
 def corner_points(lid: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
-    """The way of the corner at the hinge that faces the camera, shape (frames, 3)."""
+    """Return the path of the lid's corner at the hinge, on the camera's side, shape (frames, 3)."""
     corner = IN_LID + Vector((WIDTH / 2.0 + 0.01, 0.0, 0.0))
     return staging.on_frames(frames, lambda: staging.evaluated(lid).matrix_world @ corner)
 

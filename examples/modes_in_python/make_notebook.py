@@ -1,10 +1,11 @@
-"""Makes modes.ipynb from the cells of modes.py, and runs it, so that what the notebook shows came out of this checkout.
-Its first picture is modes.png, for the page beside it.
+"""Make modes.ipynb from the cells of modes.py, and run it, so its outputs come from this checkout.
+
+The first picture of the notebook is saved as modes.png for the README next to it.
 
     pip install ".[notebook]"
     python examples/modes_in_python/make_notebook.py
 
-Made twice with the same packages it is the same file, byte for byte: without times, and with cells that are counted.
+The same packages always make the same file, byte for byte: it has no timestamps, and its cells have numbered ids.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ CHECKOUT = HERE.parents[1]
 SOURCE, NOTEBOOK, PICTURE = HERE / "modes.py", HERE / "modes.ipynb", HERE / "modes.png"
 
 LONGEST = 300
-"""Seconds that a cell may take."""
+"""Time limit of a cell, in seconds."""
 
 PALETTE = 64
-"""Colours of a picture: enough for smooth lines, and a third of the bytes."""
+"""Number of colours in a picture: enough for smooth lines, at a third of the bytes."""
 
 
 def cells(source: str) -> Iterator[tuple[str, str]]:
-    """The cells of a script, from one `# %%` to the next: "markdown" or "code", and the text."""
+    """Yield the cells of a script, each starting at a `# %%` line: "markdown" or "code", and the text."""
     for cell in re.split(r"^# %%", source, flags=re.MULTILINE)[1:]:
         head, text = cell.split("\n", 1)
         if head.strip() == "[markdown]":
@@ -38,7 +39,7 @@ def cells(source: str) -> Iterator[tuple[str, str]]:
 
 
 def smaller(png: bytes) -> bytes:
-    """The same picture in few colours."""
+    """Return the same picture with few colours."""
     from PIL import Image
 
     picture = Image.open(io.BytesIO(png)).convert("RGB").quantize(PALETTE, dither=Image.Dither.NONE)
@@ -57,7 +58,7 @@ def main() -> None:
     result = cells(SOURCE.read_text(encoding="utf-8"))
     notebook.cells = [new[kind](text, id=f"cell-{number}") for number, (kind, text) in enumerate(result)]
     notebook.metadata.kernelspec = {"display_name": "Python 3", "language": "python", "name": "python3"}
-    # The kernel is a process of its own: it takes the packages from this checkout too, whatever is installed.
+    # The kernel is a separate process: make it use the packages of this checkout too, not installed ones.
     packages = [str(CHECKOUT / "addon"), str(CHECKOUT / "scripts")]
     os.environ["PYTHONPATH"] = os.pathsep.join([*packages, os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
     NotebookClient(notebook, timeout=LONGEST, record_timing=False).execute()

@@ -1,4 +1,4 @@
-"""A sword in a fist that swings by its control bone: Blender's own in-betweens fold the arm, the screw does not."""
+"""A sword in a fist, swung by the hand control: Blender's own in-betweens fold the arm, Screw does not."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from rigid_motion import animation
 from rigid_motion_batch.scenes.materials import surface
 
 KEYS = (1, 75.0), (19, -45.0), (31, -45.0), (55, 75.0)
-"""Frames, and how far the arm is raised on them, in degrees."""
+"""Frames, and the angle of the raised arm on each, in degrees."""
 
 LANES = ("Blender", staging.BLENDER, "BLENDER", -1.4), ("Screw", staging.RIGID, "dq_sclerp", 1.4)
-"""Title, colour, mode, and where the fighter stands."""
+"""Title, colour, mode and Y position of each fighter."""
 
 SHOULDER, ELBOW, WRIST = Vector((0.0, 0.0, 1.36)), Vector((0.0, 0.29, 1.32)), Vector((0.0, 0.58, 1.36))
 BONES = {
@@ -35,19 +35,19 @@ BONES = {
     "DEF-foot": ("DEF-shin", (0.0, 0.0, 0.06), (0.0, 0.14, 0.04)),
     "hand": (None, WRIST, (0.0, 0.66, 1.36)),
 }
-"""Parent, head and tail. The forearm follows the control `hand` by IK."""
+"""Parent, head and tail of each bone. The forearm follows the control `hand` by IK."""
 
 TIP = Vector((0.0, 0.0, 0.85))
-"""In the sword's space, which has its origin in the grip."""
+"""The tip, in the sword's space, whose origin is in the grip."""
 
 WIDTH = 5.6
-"""Metres from left to right of the picture."""
+"""Width of the picture, in metres."""
 
 STILL = 10
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Make the scene, and say what becomes of grip and arm."""
+    """Make the scene, and print the errors of grip and wrist."""
     options = staging.parse(HERE, __doc__, arguments)
     staging.begin(frames=KEYS[-1][0] + 10)
     camera = staging.look((0.0, 0.2, 1.35), (90.0, 0.0, 90.0), WIDTH)
@@ -70,7 +70,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def fighter(name: str, colour: str, place: float) -> bpy.types.Object:
-    """A rig of trunk, legs and an arm that follows its hand control, with keys on that."""
+    """Add a rig of trunk, legs and an arm that follows a keyed hand control."""
     rig = bpy.data.objects.new(f"{name} rig", bpy.data.armatures.new("Fighter"))
     bpy.context.scene.collection.objects.link(rig)
     rig.location.y = place
@@ -98,7 +98,7 @@ def fighter(name: str, colour: str, place: float) -> bpy.types.Object:
 
 
 def sword(name: str, rig: bpy.types.Object) -> bpy.types.Object:
-    """A sword that is held in the hand, upright where the arm is level."""
+    """Add a sword that the hand holds, upright when the arm is level."""
     steel, gold = surface("Steel", staging.STEEL), surface("Gold", staging.WOOD)
     blade = figure.boxes(f"{name} sword", steel, ((0.0, 0.0, 0.47), (0.012, 0.05, 0.76)))
     hilt = figure.boxes(f"{name} hilt", gold, ((0, 0, 0), (0.03, 0.03, 0.18)), ((0, 0, 0.09), (0.02, 0.2, 0.025)))
@@ -113,7 +113,7 @@ def sword(name: str, rig: bpy.types.Object) -> bpy.types.Object:
 
 
 def measure(rig: bpy.types.Object, blade: bpy.types.Object) -> tuple[float, float]:
-    """How far the grip is from the hand on any frame, and the wrist from its circle about the shoulder, in metres."""
+    """Return the largest distances of the grip from the hand and of the wrist from its circle, in metres."""
 
     def look() -> tuple[float, float]:
         bones = staging.evaluated(rig).pose.bones
