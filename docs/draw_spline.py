@@ -55,7 +55,7 @@ def parabola(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     """Write docs/spline.svg."""
-    with mock.patch.object(curves, "_shares", parabola):
+    with mock.patch.object(curves, "twist_shares", parabola):
         before = motion("before")
     marks = [_key(frame, bar) for frame, bar in zip(FRAMES, _on_paper(bars(keys(), HALF)), strict=True)]
     picture = drawing(

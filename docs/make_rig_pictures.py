@@ -2,7 +2,8 @@
 
 python docs/make_rig_pictures.py
 
-prints the measured errors of each scene, and writes rigs-SHOT.png and rigs.mp4 next to this file.
+prints the measured errors of each scene, and writes rigs-SHOT.png and rigs.mp4 next to this file. With --still it
+writes only the pictures.
 """
 
 from __future__ import annotations
@@ -155,7 +156,7 @@ def main() -> None:
         for shot in SHOTS:
             scene = build(shot)
             take(scene, shot, Path(folder) / shot.name)
-        if "--stills" not in sys.argv:
+        if "--still" not in sys.argv:
             render_film(cut_together([Path(folder) / shot.name for shot in SHOTS]), DOCS / "rigs.mp4")
 
 
@@ -215,7 +216,7 @@ def take(scene: bpy.types.Scene, shot: Shot, folder: Path) -> None:
     image = scene.render.image_settings
     scene.frame_set(shot.still)
     render_still(scene, DOCS / f"rigs-{shot.name}.png")
-    if "--stills" not in sys.argv:
+    if "--still" not in sys.argv:
         image.compression = 15
         scene.render.filepath = str(folder / "####")
         bpy.ops.render.render(animation=True)

@@ -29,7 +29,7 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
 from research.pages import ROOT, write_figures
 from research.paper.motions import read_all, read_motion
-from research.paper.table import SAMPLES_AN_UPDATE, SHELL_RADIUS_M
+from research.paper.table import SHELL_RADIUS_M, has_samples_for
 from research.studies import files_in
 from rigid_motion.motion import KEYFRAME_MODES, curves, decimate, key_splines
 from rigid_motion.motion.segments import Curves, Segments
@@ -125,7 +125,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _counting(paths: Sequence[Path]) -> Iterator[tuple[Path, Clip]]:
     for path, clip in read_all(paths, lambda path: (path, read_motion(path)))[0]:
-        if clip.samples_a_second >= SAMPLES_AN_UPDATE * float(TABLE_RATES[0]):
+        if has_samples_for(clip, float(TABLE_RATES[0])):
             yield path, clip
 
 
