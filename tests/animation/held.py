@@ -11,7 +11,7 @@ from mathutils import Matrix, Quaternion
 from rigid_motion.animation import hold_in, refresh, set_mode
 from tests.animation.bones.rigs import HANDS, Rest, key_all, new_rig
 from tests.animation.keyed import Carrier, rotation_path
-from tests.animation.oracle import play
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import new_object
 
 PLAYED = np.arange(1.0, 91.0)
@@ -20,16 +20,8 @@ WITH_PROP = (*HANDS, Rest("Prop", (0.1, 0.4, 0.8), (0.1, 0.5, 0.9), "Body", roll
 
 
 def worlds(carrier: Carrier, frames: Sequence[float] = PLAYED) -> np.ndarray:
-    """Where Blender shows an object or a bone, (m, 4, 4). The scene returns to its frame."""
-    scene, result = bpy.context.scene, np.empty((len(frames), 4, 4))
-    before, subframe = scene.frame_current, scene.frame_subframe
-    for row, frame in enumerate(frames):
-        play([carrier.id_data], frame)
-        obj = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        bone = obj.pose.bones[carrier.name].matrix if carrier != carrier.id_data else Matrix()
-        result[row] = np.array(obj.matrix_world, float) @ np.array(bone, float)
-    scene.frame_set(before, subframe=subframe)
-    return result
+    """Where Blender shows an object or a bone, (m, 4, 4)."""
+    return shown_worlds([carrier], frames)[0]
 
 
 def in_holder(prop: Carrier, holder: Carrier, frames: Sequence[float]) -> np.ndarray:

@@ -61,7 +61,7 @@ def matrices(location: np.ndarray, quaternion: np.ndarray, scale: np.ndarray) ->
     return made
 
 
-def play(objects: Iterable[bpy.types.Object], frame: float) -> None:
+def play(carriers: Iterable[Carrier], frame: float) -> None:
     """Go to a frame, as playback does.
 
     A driver of one component of a channel may run while Blender's animation still writes the others, which then are
@@ -69,29 +69,36 @@ def play(objects: Iterable[bpy.types.Object], frame: float) -> None:
     extension, too (4.5 to 5.2). So where something is driven a frame is evaluated twice.
     """
     whole = int(np.floor(frame))
-    driven = any(obj.animation_data and obj.animation_data.drivers for obj in objects)
+    data = [carrier.id_data.animation_data for carrier in carriers]
+    driven = any(one and one.drivers for one in data)
     for _ in range(2 if driven else 1):
         bpy.context.scene.frame_set(whole, subframe=float(frame - whole))
 
 
-def shown_worlds(objects: Iterable[bpy.types.Object], frames: Sequence[float]) -> list[np.ndarray]:
-    """The world matrices of objects as the scene evaluates them. It returns to its frame."""
-    objects, scene = list(objects), bpy.context.scene
+def shown_worlds(carriers: Iterable[Carrier], frames: Sequence[float]) -> list[np.ndarray]:
+    """The world matrices of objects and bones as the scene evaluates them. It returns to its frame."""
+    carriers, scene = list(carriers), bpy.context.scene
     before, subframe = scene.frame_current, scene.frame_subframe
-    shown = [np.empty((len(frames), 4, 4)) for _ in objects]
+    shown = [np.empty((len(frames), 4, 4)) for _ in carriers]
     for row, frame in enumerate(frames):
-        play(objects, frame)
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        for result, obj in zip(shown, objects, strict=True):
-            result[row] = obj.evaluated_get(depsgraph).matrix_world
+        play(carriers, frame)
+        for result, carrier in zip(shown, carriers, strict=True):
+            result[row] = world_of(carrier)
     scene.frame_set(before, subframe=subframe)
     return shown
+
+
+def world_of(carrier: Carrier) -> np.ndarray:
+    """The world matrix of an object or a bone as it is evaluated now, multiplied in double precision."""
+    shown = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    world = np.array(shown.matrix_world, float)
+    return world if carrier == carrier.id_data else world @ np.array(shown.pose.bones[carrier.name].matrix, float)
 
 
 def world_now(name: str = "Tool") -> np.ndarray:
     """The world matrix of an object as it is on the screen."""
     bpy.context.view_layer.update()
-    return np.array(bpy.data.objects[name].evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+    return world_of(bpy.data.objects[name])
 
 
 def assert_shown(

@@ -17,9 +17,9 @@ from rigid_motion.animation.evaluation.marks import near
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.motion.affine import AffineMaps
 from tests.animation.body_oracle import DEPENDS_ON_KEYS, location_axes
-from tests.animation.holds.model import shown
 from tests.animation.keyed import WIDTHS, curve_of, key_frames, mode_at, moving_curves, transform_paths
 from tests.animation.machine import TURNS, Name, seeds, shares, while_on
+from tests.animation.oracle import shown_worlds
 from tests.animation.tool_steps import WithTools
 
 VALUE_AND_SETTINGS = 1, *range(6, 14)
@@ -67,7 +67,7 @@ class WithPaths(WithTools):
         delta = Matrix.Translation(random.normal(size=3))
         delta = np.array(delta @ Euler(random.normal(size=3)).to_matrix().to_4x4() if how == "turn" else delta)
         stay = self._frames_that_stay(name, how, chosen)
-        before, poses, worlds = self._keyed()[name], self._expected(name, stay), shown([obj], keys)[0]
+        before, poses, worlds = self._keyed()[name], self._expected(name, stay), shown_worlds([obj], keys)[0]
         is_possible = how in ("insert", "delete") or any(
             curve_of(obj, path, index) in moving_curves(obj)
             for path in transform_paths(obj)[:2]
@@ -105,7 +105,8 @@ class WithPaths(WithTools):
         elif how in ("move", "turn") and self._is_whole(name):
             # Where other keys lack a channel, they are on its way to the chosen ones.
             kept = chosen | (len(self._timings(name)) == 1)
-            there, now = np.where(chosen[:, None, None], delta @ worlds, worlds)[kept], shown([obj], keys[kept])[0]
+            there = np.where(chosen[:, None, None], delta @ worlds, worlds)[kept]
+            (now,) = shown_worlds([obj], keys[kept])
             # What is in a space of uneven scale cannot be turned in the world: it comes as near as it can.
             scales = np.swapaxes(spaces.maps.axes, 1, 2) @ spaces.maps.axes
             is_even = np.allclose(scales, scales[:, :1, :1] * np.eye(3), atol=1e-5 * np.abs(scales).max())
@@ -170,7 +171,7 @@ class WithPaths(WithTools):
     def _spaces(self, name: Name, frames: np.ndarray) -> KeySpaces | None:
         """What its channels are in on frames, by where it is shown; None where that is flat."""
         carrier = self._found(name)
-        (worlds,), bases = shown([carrier], frames), self._expected(name, frames)
+        (worlds,), bases = shown_worlds([carrier], frames), self._expected(name, frames)
         if np.abs(np.linalg.det(bases[:, :3, :3])).min() < 1e-3:
             return None
         axes, turns = worlds[:, :3, :3] @ np.linalg.inv(bases[:, :3, :3]), location_axes(carrier).T

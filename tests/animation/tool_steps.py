@@ -13,7 +13,6 @@ from hypothesis.stateful import precondition, rule
 from rigid_motion import animation
 from tests.animation.bones.rigs import pose_mode, select_only
 from tests.animation.editing import ORDERS, Editing
-from tests.animation.holds.model import world_of
 from tests.animation.keyed import (
     WIDTHS,
     curve_of,
@@ -25,6 +24,7 @@ from tests.animation.keyed import (
     transform_paths,
 )
 from tests.animation.machine import LAST, frames_in, goes_on, seeds, shares, while_on
+from tests.animation.oracle import world_of
 from tests.animation.scenes import editor, random_values
 
 

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from rigid_motion import animation
 from tests.animation.editing import SAME_FRAME
-from tests.animation.holds.model import assert_held, poses_in_holders, shown, world_of
+from tests.animation.holds.model import assert_held, poses_in_holders
 from tests.animation.keyed import HOLD_BITS, Carrier, curves_of, key_frames, snapshot
 from tests.animation.machine import Name, goes_on, shares, while_on
+from tests.animation.oracle import shown_worlds, world_of
 from tests.animation.path_steps import WithPaths
 
 
@@ -73,7 +74,7 @@ class WithHolds(WithPaths):
             return [(chosen, poses)]
         switches = animation.queries.keyed.source_of(self._found(name)).switches
         passing = [(frames > switch.begin) & (frames < switch.frame) for switch in switches]
-        return [(chosen & ~np.any(passing, axis=0), poses), (chosen, *shown([self._found(name)], frames))]
+        return [(chosen & ~np.any(passing, axis=0), poses), (chosen, *shown_worlds([self._found(name)], frames))]
 
     def _snaps(self, name: Name) -> bool:
         """Blender moves what passes by a part of it alone, and snaps what is held to where it would be in the world."""
@@ -151,7 +152,7 @@ class WithHolds(WithPaths):
             linked = self._brought(own.id_data.name, link=True, is_local=is_local)
             bpy.context.view_layer.update()
             both = [own, linked if own == own.id_data else linked.pose.bones[own.name]]
-            here, there = shown(both, frames)
+            here, there = shown_worlds(both, frames)
             error = np.abs(here - there).max() / max(1.0, np.abs(here).max())
             assert error < 1e-5, f"{name} is off by {error} where it is linked"
             for obj in set(bpy.data.objects) - objects:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
@@ -17,7 +16,7 @@ from rigid_motion.animation.holds.placing import unevenness_of
 from rigid_motion.animation.queries.keyed import active_binding
 from rigid_motion.animation.transforms import transform_of
 from tests.animation.keyed import Carrier, rotation_path
-from tests.animation.oracle import matrices
+from tests.animation.oracle import matrices, shown_worlds
 
 OVER = 1e-3
 """How far off something may be that passes over to where it moves: `test_promises` has what is promised of passes."""
@@ -26,31 +25,12 @@ HALF_A_TURN = 0.02
 """Quaternions whose cosine is less turn either way."""
 
 
-def shown(carriers: Iterable[Carrier], frames: Sequence[float]) -> list[np.ndarray]:
-    """Where Blender shows things in the world, (m, 4, 4) each. The scene returns to its frame."""
-    carriers, scene = list(carriers), bpy.context.scene
-    before, result = scene.frame_current_final, [np.empty((len(frames), 4, 4)) for _ in carriers]
-    for row, frame in enumerate(frames):
-        scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
-        for worlds, carrier in zip(result, carriers, strict=True):
-            worlds[row] = world_of(carrier)
-    scene.frame_set(int(np.floor(before)), subframe=float(before - np.floor(before)))
-    return result
-
-
-def world_of(carrier: Carrier) -> np.ndarray:
-    """Where it is shown now."""
-    evaluated = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    world = np.array(evaluated.matrix_world, float)
-    return world if carrier == carrier.id_data else world @ np.array(evaluated.pose.bones[carrier.name].matrix, float)
-
-
 def assert_held(props: Iterable[Carrier], frames: Sequence[float], tolerance: float = 1e-5) -> None:
     """Props are shown where their keys say, to a share of what is largest, and to `OVER` while they pass over."""
     frames = np.asarray(frames, float)
     for prop in props:
         expected, tolerances = expected_worlds(prop, frames, tolerance)
-        error = np.abs(shown([prop], frames)[0] - expected).max(axis=(1, 2)) / max(1.0, np.abs(expected).max())
+        error = np.abs(shown_worlds([prop], frames)[0] - expected).max(axis=(1, 2)) / max(1.0, np.abs(expected).max())
         worst = int((error / tolerances).argmax())
         assert error[worst] < tolerances[worst], f"{prop!r} is off by {error[worst]:.3g} on frame {frames[worst]}"
 
@@ -82,7 +62,7 @@ def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) 
                 _spaces(prop, frames)
                 if holder is None
                 # What holds it takes it along, also where it changes its size from what that was at first.
-                else shown([holder.target.pose.bones[holder.bone] if holder.bone else holder.target], frames)[0]
+                else shown_worlds([holder.target.pose.bones[holder.bone] if holder.bone else holder.target], frames)[0]
                 @ np.array(holder.offset)
             )
         return spaces[number][chosen] @ _poses(prop, run, frames[chosen])
@@ -135,11 +115,11 @@ def _spaces(prop: Carrier, frames: np.ndarray) -> np.ndarray:
     if prop != prop.id_data:
         rest = np.array(prop.bone.matrix_local)
         if prop.parent is None:
-            return shown([prop.id_data], frames)[0] @ rest
-        return shown([prop.parent], frames)[0] @ np.linalg.inv(prop.parent.bone.matrix_local) @ rest
+            return shown_worlds([prop.id_data], frames)[0] @ rest
+        return shown_worlds([prop.parent], frames)[0] @ np.linalg.inv(prop.parent.bone.matrix_local) @ rest
     if prop.parent is None:
         return np.tile(np.eye(4), (len(frames), 1, 1))
-    return shown([prop.parent], frames)[0] @ np.array(prop.matrix_parent_inverse)
+    return shown_worlds([prop.parent], frames)[0] @ np.array(prop.matrix_parent_inverse)
 
 
 def _between(one: Matrix, other: Matrix, share: float) -> tuple[np.ndarray, bool]:

@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import bpy
 import numpy as np
 
-Carrier = bpy.types.Object | bpy.types.PoseBone
+from tests.animation.keyed import Carrier
+from tests.animation.oracle import shown_worlds
+
+__all__ = ["Carrier"]
 
 POINTS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * (*3 * (0.1 / 3**0.5,), 1.0)
 """Points on what is held, 10 cm from its origin."""
@@ -24,25 +26,6 @@ class Held(NamedTuple):
     holder: Carrier | None
     frames: int = 0
     """Over how many frames before the key it passes over."""
-
-
-def shown(carriers: Sequence[Carrier], frames: Sequence[float]) -> list[np.ndarray]:
-    """Where Blender shows objects and bones in the world."""
-    result, scene = [np.empty((len(frames), 4, 4)) for _ in carriers], bpy.context.scene
-    for row, frame in enumerate(frames):
-        whole = int(np.floor(frame))
-        scene.frame_set(whole, subframe=float(frame - whole))
-        graph = bpy.context.evaluated_depsgraph_get()
-        for matrices, carrier in zip(result, carriers, strict=True):
-            matrices[row] = world_of(carrier, graph)
-    return result
-
-
-def world_of(carrier: Carrier, graph: bpy.types.Depsgraph) -> np.ndarray:
-    """Where an object or a bone is now, (4, 4), multiplied in double precision."""
-    evaluated = carrier.id_data.evaluated_get(graph)
-    world = np.array(evaluated.matrix_world, float)
-    return world if carrier == carrier.id_data else world @ np.array(evaluated.pose.bones[carrier.name].matrix, float)
 
 
 def rigid(matrices: np.ndarray) -> np.ndarray:
@@ -114,11 +97,11 @@ def carried(
     their units in all holders: those that they have there, at the first key in each.
     """
     holders = [twin if hold.holder is None else hold.holder for hold in holds]
-    spaces = list(shown(holders, frames))
+    spaces = list(shown_worlds(holders, frames))
     for hold, space in zip(holds, spaces, strict=True):
         if hold.holder is not None:
             first = next(one.frame for one in holds if one.holder == hold.holder)
-            at_first, own = (np.linalg.norm(m[0, :3, :3], axis=0) for m in shown([hold.holder, twin], [first]))
+            at_first, own = (np.linalg.norm(m[0, :3, :3], axis=0) for m in shown_worlds([hold.holder, twin], [first]))
             space[:, :3, :3] *= own / at_first
     number = np.searchsorted([hold.frame for hold in holds], frames, side="right") - 1
     number = np.clip(number, 0, None)

@@ -9,9 +9,10 @@ from mathutils import Euler, Matrix, Quaternion
 
 from rigid_motion import animation
 from tests.animation.bones.rigs import in_turn
-from tests.animation.holds.model import assert_held, shown, world_of
+from tests.animation.holds.model import assert_held
 from tests.animation.holds.staging import FRAMES, PROPS, found, go_to, stage, update
 from tests.animation.keyed import rotation_path
+from tests.animation.oracle import shown_worlds, world_of
 from tests.animation.scenes import new_object
 
 __all__ = ["stage"]
@@ -60,7 +61,7 @@ def test_keys_of_what_was_assigned_are_in_the_hand_frame_by_frame(stage, name):
         prop.matrix_world = world
         key_all(prop, frame)
     go_to(1.0)
-    assert np.abs(shown([prop], frames)[0] - np.array(worlds)).max() < 1e-5
+    assert np.abs(shown_worlds([prop], frames)[0] - np.array(worlds)).max() < 1e-5
     assert_held([prop], FRAMES)
 
 

@@ -12,7 +12,7 @@ from mathutils import Matrix, Quaternion
 from rigid_motion import animation
 from rigid_motion.animation.following import refreshing
 from tests.animation.bones.rigs import in_turn, with_edit_bones
-from tests.animation.holds.model import assert_held, shown, world_of
+from tests.animation.holds.model import assert_held
 from tests.animation.holds.staging import (
     FRAMES,
     LET_GO,
@@ -30,6 +30,7 @@ from tests.animation.holds.staging import (
     update,
 )
 from tests.animation.keyed import Carrier, curves_of, key_frames, snapshot
+from tests.animation.oracle import shown_worlds, world_of
 from tests.animation.scenes import key, linked, new_object, push_down
 
 __all__ = ["stage"]
@@ -94,10 +95,10 @@ def test_what_is_held_is_so_whatever_is_done_to_it(stage, name, change, tmp_path
     update()
     assert animation.problem_of(found(name)) == ""
     assert_held([found(name)], FRAMES)
-    before = shown([found(name)], FRAMES)[0]
+    before = shown_worlds([found(name)], FRAMES)[0]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "held.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "held.blend"))
-    assert np.abs(shown([found(name)], FRAMES)[0] - before).max() < 1e-5
+    assert np.abs(shown_worlds([found(name)], FRAMES)[0] - before).max() < 1e-5
 
 
 @pytest.mark.parametrize(("order", "mode"), [("QUATERNION", "pga_lerp"), ("YXZ", "motor_spline"), ("ZYX", "BLENDER")])
@@ -183,25 +184,25 @@ def test_two_strips_pass_each_in_its_own_way(stage):
     inside = FRAMES[(FRAMES > 4.0) & (FRAMES < 60.0)]
     for carrier in ("Hand", "Rig/Grip"):
         animation.repeat(found(carrier))
-    first = shown([prop], inside)[0]
+    first = shown_worlds([prop], inside)[0]
     single_user(prop)
     retime(prop, lambda x: x + (3.0 if x < LET_GO else 0.0), moving(prop))
     update()
-    second = shown([prop], inside)[0]
+    second = shown_worlds([prop], inside)[0]
     push_down(prop, 4)
     strip = prop.animation_data.nla_tracks.new().strips.new("First", 178, action)
     strip.action_slot, strip.extrapolation = slot, "HOLD_FORWARD"
     update()
-    assert np.abs(shown([prop], inside)[0] - second).max() < 1e-5
+    assert np.abs(shown_worlds([prop], inside)[0] - second).max() < 1e-5
     # Three rounds of the hands later.
-    assert np.abs(shown([prop], inside + 177.0)[0] - first).max() < 1e-4
+    assert np.abs(shown_worlds([prop], inside + 177.0)[0] - first).max() < 1e-4
 
 
 @pytest.mark.parametrize("name", ["Tool", "Rig"])
 def test_what_is_appended_or_linked_is_held_along(stage, name, tmp_path):
     stage("Rig/Bone" if name == "Rig" else "Tool")
     path = "Rig/Bone" if name == "Rig" else "Tool"
-    before = shown([found(path)], FRAMES)[0]
+    before = shown_worlds([found(path)], FRAMES)[0]
     library = tmp_path / "library.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(library))
     for is_linked in (False, True):
@@ -215,7 +216,7 @@ def test_what_is_appended_or_linked_is_held_along(stage, name, tmp_path):
             bpy.context.scene.collection.objects.link(obj)
         update()
         prop = obj.pose.bones["Bone"] if name == "Rig" else obj
-        assert np.abs(shown([prop], FRAMES)[0] - before).max() < 1e-5
+        assert np.abs(shown_worlds([prop], FRAMES)[0] - before).max() < 1e-5
         if not is_linked:
             go_to(56.0)
             animation.hold_in(prop, new_object("New Hand"))

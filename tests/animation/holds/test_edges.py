@@ -8,9 +8,10 @@ import pytest
 
 from rigid_motion.animation import refresh, set_mode, set_turns
 from tests.animation.holds.hands import by_an_object, by_fk, free, place, take
-from tests.animation.holds.oracle import Carrier, Held, apart, carried, shown
+from tests.animation.holds.oracle import Carrier, Held, apart, carried
 from tests.animation.holds.test_passing import MOVING, RESTING, juggled, keys_of, motions_of, off
 from tests.animation.keyed import WIDTHS, curve_of, curves_of
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import push_down
 
 KEPT = 2e-6
@@ -134,11 +135,11 @@ def test_the_motion_in_one_hand_has_nothing_of_the_numbers_in_the_next(live_file
     prop, _, _ = thrown((0, 4, 0, 3))
     set_mode(prop, mode)
     frames = np.arange(20.0, 40.0, 0.25)
-    (before,) = shown([prop], frames)
+    (before,) = shown_worlds([prop], frames)
     for key in keys_on(prop, 44) + keys_on(prop, 66):
         key.co_ui.y += 0.7
     edited(prop)
-    (after,) = shown([prop], frames)
+    (after,) = shown_worlds([prop], frames)
     assert apart(before, after) < KEPT
 
 
@@ -166,7 +167,7 @@ def test_what_is_held_in_a_strip_is_held_and_passed_on_its_frames(live_file, sca
     held = [hold._replace(frame=in_scene(hold.frame), frames=scale * hold.frames) for hold in holds]
     slow = [lambda at, motion=motion: motion(1.0 + (at - 1.0) / scale) for motion in motions]
     frames = in_scene(np.arange(1.0, 82.0, 0.25))
-    (seen,) = shown([prop], frames)
+    (seen,) = shown_worlds([prop], frames)
     assert apart(seen, carried(twin, held, slow, frames, soon=scale / 64.0)) < MOVING
 
 

@@ -11,7 +11,7 @@ import pytest
 from rigid_motion import animation
 from rigid_motion.animation.actions.marks import read_holds
 from tests.animation.bones.rigs import in_turn
-from tests.animation.holds.model import assert_held, shown, world_of
+from tests.animation.holds.model import assert_held
 from tests.animation.holds.staging import (
     FRAMES,
     LET_GO,
@@ -30,6 +30,7 @@ from tests.animation.holds.staging import (
     update,
 )
 from tests.animation.keyed import Carrier
+from tests.animation.oracle import shown_worlds, world_of
 from tests.animation.scenes import new_object, push_down, tweak
 
 __all__ = ["stage"]
@@ -74,20 +75,20 @@ EDITS: dict[str, tuple[Callable[[Carrier], object], list[tuple[float, int]]]] = 
 @pytest.mark.parametrize(("edit", "name"), in_turn(EDITS, PROPS))
 def test_keys_take_their_space_along(stage, name, edit):
     change, expected = EDITS[edit]
-    before = shown([stage(name)], FRAMES)[0]
+    before = shown_worlds([stage(name)], FRAMES)[0]
     go_to(30.0)
     change(found(name))
     update()
     bpy.ops.ed.undo_push(message="Edit")
-    after = shown([found(name)], FRAMES)[0]
+    after = shown_worlds([found(name)], FRAMES)[0]
     for _ in range(2):
         assert spaces(found(name)) == expected
         assert_held([found(name)], FRAMES)
         assert animation.problem_of(found(name)) == ""
         bpy.ops.ed.undo()
-        assert np.abs(shown([found(name)], FRAMES)[0] - before).max() < 1e-5
+        assert np.abs(shown_worlds([found(name)], FRAMES)[0] - before).max() < 1e-5
         bpy.ops.ed.redo()
-    assert np.abs(shown([found(name)], FRAMES)[0] - after).max() < 1e-5
+    assert np.abs(shown_worlds([found(name)], FRAMES)[0] - after).max() < 1e-5
     if edit.startswith("in"):
         assert np.abs(after - before).max() < (1e-5 if "influence" in edit or "hold" in edit else np.inf)
 
@@ -125,9 +126,9 @@ def test_what_moves_does_so_until_it_is_held(stage):
     prop = stage(held=False)
     go_to(PICKED_UP)
     frames = FRAMES[FRAMES <= 19.0]
-    before = shown([prop], frames)[0]
+    before = shown_worlds([prop], frames)[0]
     animation.hold_in(prop, found("Hand"))
-    assert np.abs(shown([prop], frames)[0] - before).max() < 2e-5
+    assert np.abs(shown_worlds([prop], frames)[0] - before).max() < 2e-5
 
 
 def test_it_is_held_in_tweak_mode_of_a_strip(stage):
@@ -193,7 +194,7 @@ def test_a_setting_that_is_typed_takes_no_hold_and_no_mode_off(stage, name, seed
     """*Back*, *Amplitude* or *Period* of the active key, in the sidebar of the Graph Editor: one key of one channel."""
     prop, random = stage(name), np.random.default_rng(seed)
     frames = animation.key_frames(prop)
-    before, expected, modes = shown([prop], FRAMES)[0], spaces(prop), animation.modes_of(prop, frames)
+    before, expected, modes = shown_worlds([prop], FRAMES)[0], spaces(prop), animation.modes_of(prop, frames)
     for _ in range(30):
         fcurve = moving(prop)[random.integers(len(moving(prop)))]
         point = fcurve.keyframe_points[random.integers(len(fcurve.keyframe_points))]
@@ -204,7 +205,7 @@ def test_a_setting_that_is_typed_takes_no_hold_and_no_mode_off(stage, name, seed
         assert spaces(prop) == expected
         assert animation.modes_of(prop, frames) == modes
     assert {bytes(read_holds(fcurve)) for fcurve in moving(prop)} == {bytes(read_holds(moving(prop)[0]))}
-    assert np.abs(shown([prop], FRAMES)[0] - before).max() < 1e-5
+    assert np.abs(shown_worlds([prop], FRAMES)[0] - before).max() < 1e-5
 
 
 @pytest.mark.parametrize("setting", ["back", "amplitude", "period"])
@@ -212,7 +213,7 @@ def test_a_setting_that_is_typed_takes_no_hold_and_no_mode_off(stage, name, seed
 def test_a_setting_that_all_keys_get_at_once_takes_no_hold_off(stage, name, setting, typed):
     """As *Copy to Selected* of a field does."""
     prop = stage(name)
-    before, expected = shown([prop], FRAMES)[0], spaces(prop)
+    before, expected = shown_worlds([prop], FRAMES)[0], spaces(prop)
     for fcurve in moving(prop):
         for point in fcurve.keyframe_points:
             setattr(point, setting, typed)
@@ -221,4 +222,4 @@ def test_a_setting_that_all_keys_get_at_once_takes_no_hold_off(stage, name, sett
     assert spaces(prop) == expected
     if setting != "back":
         # The mode is in there, too.
-        assert np.abs(shown([prop], FRAMES)[0] - before).max() < 1e-5
+        assert np.abs(shown_worlds([prop], FRAMES)[0] - before).max() < 1e-5

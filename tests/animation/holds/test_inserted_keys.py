@@ -11,10 +11,11 @@ import pytest
 from rigid_motion.animation import set_mode
 from tests.animation.bones.rigs import in_turn
 from tests.animation.holds.hands import by_an_object, by_fk, free
-from tests.animation.holds.oracle import Carrier, apart, shown
+from tests.animation.holds.oracle import Carrier, apart
 from tests.animation.holds.test_edges import KEPT, edited, thrown
 from tests.animation.holds.test_passing import MODES, MOMENTS, MOVING, juggled
 from tests.animation.keyed import curve_of, rotation_path
+from tests.animation.oracle import shown_worlds
 
 PLACES = 6, 15, 18, 26, 37, 42, 43.5, 46, 60, 64.5, 68, 77
 """Frames between keys, behind the last key in something, and of the passing from there."""
@@ -36,12 +37,12 @@ def calm(prop: Carrier) -> None:
 
 def with_key(prop: Carrier, at: float, index: int = -1) -> float:
     """How far something is, at most, from where it was before a key was inserted of its location and rotation."""
-    (before,) = shown([prop], MOMENTS)
+    (before,) = shown_worlds([prop], MOMENTS)
     bpy.context.scene.frame_set(int(at), subframe=at % 1)
     for path in ("location", rotation_path(prop)) if index < 0 else ("location",):
         prop.keyframe_insert(path, index=index, frame=at)
     bpy.context.view_layer.update()
-    (after,) = shown([prop], MOMENTS)
+    (after,) = shown_worlds([prop], MOMENTS)
     return apart(before, after)
 
 

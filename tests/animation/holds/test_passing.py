@@ -11,8 +11,9 @@ from rigid_motion.animation import set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.rigs import in_turn
 from tests.animation.holds.hands import HOLDERS, PROPS, by_an_object, by_fk, free, pairs, place, take
-from tests.animation.holds.oracle import Carrier, Held, Motion, apart, carried, shown
+from tests.animation.holds.oracle import Carrier, Held, Motion, apart, carried
 from tests.animation.holds.runs import motion_of
+from tests.animation.oracle import shown_worlds
 from tests.thoroughness import THOROUGH
 
 MOMENTS = np.arange(0.0, 84.0, 0.375)
@@ -45,7 +46,7 @@ def off(
 ) -> float:
     """How far it is from where it has to be, in metres."""
     expected = carried(twin, holds, motions_of(prop, holds, goes_on), frames)
-    (seen,) = shown([prop], frames)
+    (seen,) = shown_worlds([prop], frames)
     return apart(seen, expected)
 
 

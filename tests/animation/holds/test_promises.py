@@ -9,7 +9,8 @@ from mathutils import Euler
 
 from rigid_motion.animation import hold_in, write_channel
 from tests.animation.holds.hands import HOLDERS, PROPS, pairs, place, take
-from tests.animation.holds.oracle import Carrier, shown, slip
+from tests.animation.holds.oracle import Carrier, slip
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import new_object
 
 SLIP = 2e-6
@@ -31,9 +32,9 @@ def handed_over(prop: Carrier, *holders: Carrier) -> None:
 
 def assert_held(prop: Carrier, twin: Carrier, *holders: Carrier) -> None:
     for holder, frames in zip(holders, HELD, strict=True):
-        held, moved = shown([holder, prop], frames)
+        held, moved = shown_worlds([holder, prop], frames)
         assert np.ptp(held[:, :3, 3], axis=0).max() > 0.05, "the hand moves, or this test says nothing"
-        reach = max(1.0, *(np.abs(worlds[:, :3, 3]).max() for worlds in (held, moved, *shown([twin], frames))))
+        reach = max(1.0, *(np.abs(worlds[:, :3, 3]).max() for worlds in (held, moved, *shown_worlds([twin], frames))))
         assert slip(held, moved) < SLIP * reach
 
 
@@ -57,4 +58,4 @@ def test_a_hand_near_gimbal_lock_holds_as_well(live_file):
     hand.location = 0.5, 0.4, 1.2
     hold_in(tool, hand)
     place(tool, 3, 0.1, frame=1)
-    assert slip(*shown([hand, tool], frames)) < SLIP
+    assert slip(*shown_worlds([hand, tool], frames)) < SLIP

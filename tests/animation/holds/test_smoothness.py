@@ -10,7 +10,8 @@ from mathutils import Matrix
 from rigid_motion.animation import hold_in, set_mode, write_channel
 from tests.animation.bones.rigs import Rest, new_rig
 from tests.animation.holds.hands import place, wander
-from tests.animation.holds.oracle import Carrier, apart, shown
+from tests.animation.holds.oracle import Carrier, apart
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import new_object
 from tests.recordings import RECORDINGS
 
@@ -71,7 +72,7 @@ def test_a_tool_that_goes_from_hand_to_hand_has_no_pop(live_file, first, frames)
     place(tool, 4, 0.02, frame=40)
     for seam, hand in ((40.0 - frames, left), (40.0, right)):
         near = seam + MOMENT * np.arange(-2, 3)
-        moved, carried = (velocities(one, MOMENT / FPS) for one in shown([tool, hand], near))
+        moved, carried = (velocities(one, MOMENT / FPS) for one in shown_worlds([tool, hand], near))
         # What the hand's own keys bring is no fault of ours.
         pop = np.linalg.norm(moved[2] - moved[1]) - np.linalg.norm(carried[2] - carried[1])
         assert pop < STEP
@@ -91,7 +92,7 @@ def test_between_parts_of_one_body_it_is_vector_and_quaternion_with_a_smoothstep
     ends = np.array([40.0 - frames, 40.0 - 1.0 / 64.0])
     for frame, grip in zip(ends, (30.0, 40.0), strict=True):
         # The board has the tool where both bones of it have it, which do not move in it.
-        board, seen = shown([rig, tool], [grip])
+        board, seen = shown_worlds([rig, tool], [grip])
         now = np.linalg.inv(board[0]) @ seen[0]
         turn = Matrix(now).to_quaternion()
         if frame == ends[1]:
@@ -101,7 +102,7 @@ def test_between_parts_of_one_body_it_is_vector_and_quaternion_with_a_smoothstep
             other.keyframe_insert(path, frame=frame)
     set_mode(other, "lerp_slerp")
     quarters = np.arange(ends[0], ends[1] + 0.25, 0.25)
-    assert apart(*shown([tool, other], quarters)) < 1e-6
+    assert apart(*shown_worlds([tool, other], quarters)) < 1e-6
 
 
 @pytest.mark.parametrize("frames", [3, 5])
@@ -119,8 +120,8 @@ def test_a_catch_has_no_more_pop_than_the_flight_has(live_file, frames):
     hand.location = ball.location
     hand.keyframe_insert("location", frame=30)
     hold_in(ball, hand, frames=frames)
-    flying = velocities(shown([ball], np.arange(20.0, 30.0, MOMENT))[0], MOMENT / FPS)
+    flying = velocities(shown_worlds([ball], np.arange(20.0, 30.0, MOMENT))[0], MOMENT / FPS)
     flight = np.linalg.norm(np.diff(flying, axis=0), axis=1).max()
     for seam in (40.0 - frames, 40.0):
-        moved = velocities(shown([ball], seam + MOMENT * np.arange(-2, 3))[0], MOMENT / FPS)
+        moved = velocities(shown_worlds([ball], seam + MOMENT * np.arange(-2, 3))[0], MOMENT / FPS)
         assert np.linalg.norm(moved[2] - moved[1]) < flight + STEP

@@ -14,9 +14,9 @@ from rigid_motion import animation
 from tests.animation.bones.rigs import Rest, new_rig, select_only
 from tests.animation.editing import ORDERS
 from tests.animation.holds.hold_steps import WithHolds
-from tests.animation.holds.model import world_of
 from tests.animation.keyed import MODE_IDS, Carrier, curves_of, key_frames
 from tests.animation.machine import LAST, SETTINGS, seeds, shares, while_on
+from tests.animation.oracle import world_of
 from tests.animation.scenes import key, new_object, push_down, tweak
 
 HANDS = "Hand", "Other", "Rig/Grip"

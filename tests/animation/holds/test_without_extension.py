@@ -13,9 +13,10 @@ from mathutils import Quaternion
 from rigid_motion import animation
 from tests.animation.farm import played_on_a_farm
 from tests.animation.holds.hands import HOLDERS, PROPS, by_an_object, by_fk, free
-from tests.animation.holds.oracle import Carrier, apart, shown
+from tests.animation.holds.oracle import Carrier, apart
 from tests.animation.holds.test_passing import MOMENTS, MOVING, juggled, off
 from tests.animation.holds.test_promises import HELD, assert_held, handed_over
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import enabled, new_object
 from tests.animation.test_export import FORMATS, Format
 from tests.blank import blank
@@ -50,10 +51,10 @@ def test_it_follows_edits_of_the_hand_while_the_extension_is_off(file_to_switch,
     holders = by_fk("First", 11), by_fk("Second", 31)
     handed_over(prop, *holders)
     animation.unregister()
-    (before,) = shown([prop], HELD[0])
+    (before,) = shown_worlds([prop], HELD[0])
     for hand in holders:
         move_by_hand(hand)
-    assert apart(before, shown([prop], HELD[0])[0]) > 0.05
+    assert apart(before, shown_worlds([prop], HELD[0])[0]) > 0.05
     assert_held(prop, twin, *holders)
 
 
@@ -74,7 +75,7 @@ def test_files_are_played_by_a_blender_without_it_as_with_it(live_file, tmp_path
     holders = HOLDERS[by]("First", 11), HOLDERS[by]("Second", 31)
     for each in (prop, other):
         handed_over(each, *holders)
-    expected = shown([prop, other], MOMENTS)
+    expected = shown_worlds([prop, other], MOMENTS)
     path = tmp_path / "held.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     rig, names = other.id_data, [bone.name for bone in other.id_data.pose.bones]
@@ -111,8 +112,8 @@ def test_what_is_held_is_exported_as_it_is_seen(live_file, tmp_path, kind):
             juggled(each, holders, (3, 4, 0, 3), moves=True)
         frames = np.arange(1.0, 81.0)
         names = [obj.name for obj in (prop, other, *holders)]
-        expected = shown([prop, other, *holders], frames)
+        expected = shown_worlds([prop, other, *holders], frames)
         found = baked_out([prop, other], tmp_path / f"shot.{kind}", FORMATS[kind])
-        for name, one, seen in zip(names, shown([found[name] for name in names], frames), expected, strict=True):
+        for name, one, seen in zip(names, shown_worlds([found[name] for name in names], frames), expected, strict=True):
             moved, right = (worlds @ np.linalg.inv(worlds[:1]) for worlds in (one, seen))
             assert np.abs(moved - right).max() < 1e-5 * max(1.0, np.abs(right).max()), name
