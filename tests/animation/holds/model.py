@@ -19,7 +19,7 @@ from tests.animation.keyed import Carrier, rotation_path
 from tests.animation.oracle import matrices, shown_worlds
 
 OVER = 1e-3
-"""How far off something may be that passes over to where it moves: `test_promises` has what is promised of passes."""
+"""How far off something may be that passes over to where it moves: `test_passing` has what is promised of passes."""
 
 HALF_A_TURN = 0.02
 """Quaternions whose cosine is less turn either way."""

@@ -35,17 +35,6 @@ def rigid(matrices: np.ndarray) -> np.ndarray:
     return result
 
 
-def slip(holder: np.ndarray, prop: np.ndarray) -> float:
-    """The farthest that any point within 10 cm of a prop wanders in what holds it, from the first moment on.
-
-    In the world's units; of a holder that grows the points grow along, as those of a hand do.
-    """
-    sizes = np.linalg.norm(prop[:, :3, 0], axis=1)
-    there = np.linalg.inv(holder) @ prop @ (POINTS / (*3 * (sizes[0],), 1.0)).T
-    wandered = holder[:, :3, :3] @ (there[:, :3] - there[:1, :3])
-    return float(np.linalg.norm(wandered, axis=1).max())
-
-
 def apart(one: np.ndarray, other: np.ndarray) -> float:
     """The farthest that any point within 10 cm of a prop is from where it is by other matrices."""
     return float(np.linalg.norm(((rigid(one) - rigid(other)) @ POINTS.T)[:, :3], axis=1).max(initial=0.0))

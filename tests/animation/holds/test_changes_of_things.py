@@ -7,7 +7,6 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix, Quaternion
 
 from rigid_motion import animation
 from rigid_motion.animation.following import refreshing
@@ -29,9 +28,9 @@ from tests.animation.holds.staging import (
     stage,
     update,
 )
-from tests.animation.keyed import Carrier, curves_of, key_frames, snapshot
+from tests.animation.keyed import snapshot
 from tests.animation.oracle import shown_worlds, world_of
-from tests.animation.scenes import key, linked, new_object, push_down
+from tests.animation.scenes import key, new_object, push_down
 
 __all__ = ["stage"]
 
@@ -45,46 +44,10 @@ def single_user(prop: bpy.types.Object) -> None:
     data.action_slot = data.action.slots[slot.identifier]
 
 
-def relink(prop: bpy.types.Object) -> None:
-    action, slot = prop.animation_data.action, prop.animation_data.action_slot
-    prop.animation_data.action = None
-    update()
-    prop.animation_data.action = action
-    prop.animation_data.action_slot = slot
-
-
-def rename_bones(prop: Carrier) -> None:
-    for bone in found("Rig/Grip").id_data.data.bones:
-        bone.name += "'s"
-
-
-def new_parent(prop: bpy.types.Object) -> None:
-    """What is in the space of its parent goes with it; what is held does not."""
-    prop.parent = None if prop.parent else found("Parent")
-
-
-def hand_over_handles(prop: bpy.types.Object) -> None:
-    """Handles that stay where they are, but are Blender's from now on, which do not see the keys in other things."""
-    points = [point for fcurve in moving(prop) for point in fcurve.keyframe_points]
-    for handle_type in ("FREE", "AUTO_CLAMPED"):
-        for point in points:
-            point.handle_left_type = point.handle_right_type = handle_type
-        prop.animation_data.action.update_tag()
-        update()
-
-
 CHANGES: dict[str, Callable[[bpy.types.Object], object]] = {
-    "single user": single_user,
-    "linked anew": relink,
-    "bones renamed": rename_bones,
     "holder renamed": lambda _: setattr(found("Hand"), "name", "Left Hand"),
-    "constraints renamed": lambda prop: [setattr(one, "name", f"Anew {n}") for n, one in enumerate(prop.constraints)],
     "other constraint": lambda prop: setattr(prop.constraints.new("LIMIT_SCALE"), "name", "Held In Nothing"),
-    "parented or not": new_parent,
-    "turns otherwise": lambda prop: setattr(prop, "rotation_mode", "XYZ"),
-    "handles of Blender's": hand_over_handles,
     "passing constraint deleted": lambda prop: prop.constraints.remove(prop.constraints["Pass To Grip"]),
-    "hand keyed": lambda _: retime(found("Hand"), lambda x: x + 1.0),
 }
 
 
@@ -101,43 +64,6 @@ def test_what_is_held_is_so_whatever_is_done_to_it(stage, name, change, tmp_path
     assert np.abs(shown_worlds([found(name)], FRAMES)[0] - before).max() < 1e-5
 
 
-@pytest.mark.parametrize(("order", "mode"), [("QUATERNION", "pga_lerp"), ("YXZ", "motor_spline"), ("ZYX", "BLENDER")])
-def test_keys_that_do_not_say_what_they_are_held_in_are_held_as_others_on_their_frames_say(live_file, order, mode):
-    prop = key(new_object("Tool", order), (1.0, 13.0, 26.0, 37.0), seed=6)
-    animation.set_mode(prop, mode)
-    for frame, holder in ((11.0, key(new_object("Hand"), seed=2)), (24.0, None)):
-        go_to(frame)
-        animation.hold_in(prop, holder, frames=3)
-    frames, prop.rotation_mode = key_frames(prop), "AXIS_ANGLE"
-    random = np.random.default_rng(401)
-    for frame in frames:
-        prop.rotation_axis_angle = random.normal(size=4)
-        prop.keyframe_insert("rotation_axis_angle", frame=frame)
-    update()
-    assert_held([prop], np.arange(1.0, 37.25, 0.25))
-
-
-def test_unlinked_it_stays_in_what_it_is_held_in(stage):
-    prop = stage()
-    go_to(25.0)
-    before = world_of(prop)
-    prop.animation_data.action = None
-    update()
-    assert np.abs(world_of(prop) - before).max() < 1e-6
-
-
-def test_without_keys_it_stays_in_what_it_is_held_in(stage):
-    prop = stage()
-    go_to(25.0)
-    before = world_of(prop)
-    for fcurve in moving(prop):
-        fcurve.keyframe_points.clear()
-    prop.animation_data.action.update_tag()
-    update()
-    assert np.abs(world_of(prop) - before).max() < 1e-6
-    assert not any(path.startswith("constraints") for path, _ in curves_of(prop))
-
-
 def test_keys_that_say_nothing_let_it_go(stage):
     """An Action of its own from before it was held, on what has been held since."""
     prop = stage()
@@ -146,35 +72,6 @@ def test_keys_that_say_nothing_let_it_go(stage):
     update()
     assert spaces(prop) == []
     assert_held([prop], FRAMES)
-
-
-@pytest.mark.parametrize("with_hand", [False, True])
-@pytest.mark.parametrize("is_linked", [False, True])
-def test_duplicates_are_held_in_the_same_or_in_what_was_duplicated_along(stage, with_hand, is_linked):
-    prop = stage()
-    for obj in bpy.data.objects:
-        obj.select_set(obj == prop or (with_hand and obj.name == "Hand"))
-    bpy.context.view_layer.objects.active = prop
-    bpy.ops.object.duplicate(linked=is_linked)
-    update()
-    copy = bpy.data.objects["Tool.001"]
-    holders = {holder.name for holder in animation.hold_facts(copy).holders}
-    assert holders == {"Hand.001" if with_hand else "Hand", "Grip"}
-    go_to(55.0)
-    animation.hold_in(copy, found("Other"))
-    assert_held([prop, copy], FRAMES)
-    passing = {item.action for item in copy.constraints if item.type == "ACTION"}
-    assert passing == {copy.animation_data.action}
-
-
-def test_an_action_on_another_object_has_that_held_likewise(stage):
-    prop, other = stage(), new_object("Second", "QUATERNION")
-    other.animation_data_create().action = prop.animation_data.action
-    other.animation_data.action_slot = prop.animation_data.action_slot
-    prop.animation_data.action = None
-    update()
-    assert animation.problem_of(other) == ""
-    assert_held([other], FRAMES)
 
 
 def test_two_strips_pass_each_in_its_own_way(stage):
@@ -196,31 +93,6 @@ def test_two_strips_pass_each_in_its_own_way(stage):
     assert np.abs(shown_worlds([prop], inside)[0] - second).max() < 1e-5
     # Three rounds of the hands later.
     assert np.abs(shown_worlds([prop], inside + 177.0)[0] - first).max() < 1e-4
-
-
-@pytest.mark.parametrize("name", ["Tool", "Rig"])
-def test_what_is_appended_or_linked_is_held_along(stage, name, tmp_path):
-    stage("Rig/Bone" if name == "Rig" else "Tool")
-    path = "Rig/Bone" if name == "Rig" else "Tool"
-    before = shown_worlds([found(path)], FRAMES)[0]
-    library = tmp_path / "library.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(library))
-    for is_linked in (False, True):
-        bpy.ops.wm.read_homefile(use_empty=True)
-        if is_linked:
-            obj = linked(library, name).override_create(remap_local_usages=True)
-        else:
-            with bpy.data.libraries.load(str(library)) as (_, wanted):
-                wanted.objects = [name]
-            (obj,) = wanted.objects
-            bpy.context.scene.collection.objects.link(obj)
-        update()
-        prop = obj.pose.bones["Bone"] if name == "Rig" else obj
-        assert np.abs(shown_worlds([prop], FRAMES)[0] - before).max() < 1e-5
-        if not is_linked:
-            go_to(56.0)
-            animation.hold_in(prop, new_object("New Hand"))
-            assert_held([prop], FRAMES)
 
 
 def test_a_mirrored_bone_is_held_when_it_is_keyed(stage):
@@ -378,57 +250,6 @@ def test_keys_are_only_moved_while_blender_moves_keys(stage, monkeypatch):
     monkeypatch.undo()
     retime(prop, lambda x: 22.0 if x == PICKED_UP else x, moving(prop))
     update()
-    assert_held([prop], FRAMES)
-
-
-def visual_key(prop: Carrier, _: Matrix) -> None:
-    for path in ("location", "rotation_quaternion"):
-        prop.keyframe_insert(path, options={"INSERTKEY_VISUAL"})
-
-
-def visual_transform(prop: Carrier, _: Matrix) -> None:
-    for obj in bpy.data.objects:
-        obj.select_set(obj == prop)
-    bpy.context.view_layer.objects.active = prop
-    bpy.ops.object.visual_transform_apply()
-
-
-BLENDERS_OWN: dict[str, Callable[[Carrier, Matrix], object]] = {
-    "visual key": visual_key,
-    "Apply Visual Transform": visual_transform,
-    "matrix_world": lambda prop, matrix: setattr(prop, "matrix_world", matrix),
-}
-
-
-@pytest.mark.parametrize("own", BLENDERS_OWN)
-@pytest.mark.parametrize("by_hand", [False, True])
-def test_blender_puts_what_a_child_of_holds_elsewhere(stage, own, by_hand):
-    """Ours as any: should a Blender know better, the documentation is to be changed."""
-    prop = stage(held=not by_hand)
-    go_to(25.0)
-    if by_hand:
-        constraint = prop.constraints.new("CHILD_OF")
-        constraint.target, constraint.set_inverse_pending = found("Hand"), False
-        update()
-    matrix = Matrix(world_of(prop))
-    BLENDERS_OWN[own](prop, matrix)
-    update()
-    go_to(25.0) if own == "visual key" else None
-    assert np.abs(world_of(prop) - np.array(matrix)).max() > 1.0
-
-
-@pytest.mark.parametrize(("frame", "name"), in_turn((10.0, 25.0, 36.0, 55.5), PROPS))
-def test_a_pose_that_is_keyed_stays_where_it_is_seen_in_whatever_holds_it(stage, name, frame):
-    """By *Insert Keyframe*, for its channels are in the hand; not by visual keying."""
-    prop = stage(name)
-    go_to(frame)
-    prop.matrix_basis = Matrix.LocRotScale((0.1, 0.2, -0.3), Quaternion((0.6, 0.0, 0.8, 0.0)), None)
-    update()
-    there = world_of(prop)
-    for path in ("location", "rotation_quaternion"):
-        prop.keyframe_insert(path, frame=frame)
-    go_to(frame)
-    assert np.abs(world_of(prop) - there).max() < 1e-5
     assert_held([prop], FRAMES)
 
 

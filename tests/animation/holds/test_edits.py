@@ -31,7 +31,7 @@ from tests.animation.holds.staging import (
 )
 from tests.animation.keyed import Carrier
 from tests.animation.oracle import shown_worlds, world_of
-from tests.animation.scenes import new_object, push_down, tweak
+from tests.animation.scenes import new_object
 
 __all__ = ["stage"]
 
@@ -93,35 +93,6 @@ def test_keys_take_their_space_along(stage, name, edit):
         assert np.abs(after - before).max() < (1e-5 if "influence" in edit or "hold" in edit else np.inf)
 
 
-@pytest.mark.parametrize("edit", EDITS)
-def test_edits_that_were_not_followed_are_made_up_for(stage, edit):
-    change, expected = EDITS[edit]
-    prop = stage()
-    animation.set_enabled(False)
-    change(prop)
-    update()
-    animation.set_enabled(True)
-    animation.refresh()
-    assert spaces(prop) == expected
-    assert_held([prop], FRAMES)
-
-
-@pytest.mark.parametrize(("frame", "name"), in_turn((-3.0, 1.0, 20.0, 20.4, 36.0, 34.0, 49.5, 75.0), PROPS))
-def test_it_stays_where_it_is_seen_in_whatever_it_is_held(stage, name, frame):
-    stage(name)
-    for holder in ("Other", "Hand", "Rig/Grip", None, "Other"):
-        go_to(frame)
-        before = world_of(found(name))
-        animation.hold_in(found(name), holder and found(holder))
-        update()
-        assert np.abs(world_of(found(name)) - before).max() < 1e-5
-        go_to(frame)
-        assert np.abs(world_of(found(name)) - before).max() < 1e-5
-        now = animation.hold_facts(found(name)).now
-        assert (now and now.name) == (holder and holder.split("/")[-1])
-        assert_held([found(name)], FRAMES)
-
-
 def test_what_moves_does_so_until_it_is_held(stage):
     prop = stage(held=False)
     go_to(PICKED_UP)
@@ -129,19 +100,6 @@ def test_what_moves_does_so_until_it_is_held(stage):
     before = shown_worlds([prop], frames)[0]
     animation.hold_in(prop, found("Hand"))
     assert np.abs(shown_worlds([prop], frames)[0] - before).max() < 2e-5
-
-
-def test_it_is_held_in_tweak_mode_of_a_strip(stage):
-    prop = stage("Tool")
-    strip = push_down(prop, 10)
-    strip.scale = 2.0
-    tweak(prop, strip)
-    go_to(101.0)
-    before = world_of(prop)
-    animation.hold_in(prop, found("Other"))
-    update()
-    assert np.abs(world_of(prop) - before).max() < 1e-5
-    assert spaces(prop) == [(20.0, 1), (36.0, 2), (46.5, 3), (50.0, 0)]
 
 
 def test_all_users_of_a_slot_are_held(stage):
