@@ -134,10 +134,11 @@ BESIDE_KEYS = {
 
 
 @pytest.mark.parametrize(
-    ("of_bones", "order"), [(False, "QUATERNION"), (False, "XYZ"), (False, "AXIS_ANGLE"), (True, "XYZ")]
+    ("beside", "what"),
+    in_turn(BESIDE_KEYS, [(False, "QUATERNION"), (False, "XYZ"), (False, "AXIS_ANGLE"), (True, "XYZ")]),
 )
-@pytest.mark.parametrize("beside", BESIDE_KEYS)
-def test_baked_keys_are_shown_as_before_whatever_there_is_beside_keys(live_file, beside, of_bones, order):
+def test_baked_keys_are_shown_as_before_whatever_there_is_beside_keys(live_file, beside, what):
+    of_bones, order = what
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 70
     obj, targets = moving(of_bones, "BLENDER", order=order, seed=len(beside), scale="even")
     BESIDE_KEYS[beside](targets[0])
@@ -221,8 +222,7 @@ ARRANGED = {
 }
 
 
-@pytest.mark.parametrize("arranged", ARRANGED)
-@OF_BOTH
+@pytest.mark.parametrize(("arranged", "of_bones"), in_turn(ARRANGED, [False, True]))
 def test_what_plays_in_strips_or_several_slots_is_baked_there_and_gets_its_keys_back(live_file, of_bones, arranged):
     (obj, targets), (other, _) = moving(of_bones, name="A"), moving(of_bones, "pga_lerp", "B", seed=1)
     ARRANGED[arranged](obj, other)

@@ -31,11 +31,13 @@ def errors(obj: bpy.types.Object, frames: np.ndarray, owns: dict) -> np.ndarray:
     return np.linalg.norm(shown - expected, axis=2).max(axis=(1, 2))
 
 
-@pytest.mark.parametrize(("how", "mode"), in_turn(zip(cycle(ORDERS), TIMINGS, strict=False), list(KEYFRAME_MODES)))
-@pytest.mark.parametrize(("shift", "placed"), in_turn(SHIFTS, (False, True)))
-def test_every_mode_is_exact_at_any_time_with_any_timing(live_file, how, mode, shift, placed):
+@pytest.mark.parametrize(
+    ("how", "where"),
+    in_turn(zip(cycle(ORDERS), TIMINGS, strict=False), [*zip(KEYFRAME_MODES, cycle(SHIFTS), cycle((False, True)))]),
+)
+def test_every_mode_is_exact_at_any_time_with_any_timing(live_file, how, where):
     """Also with a parent and delta transforms."""
-    (order, timing), owns = how, {}
+    (order, timing), (mode, shift, placed), owns = how, where, {}
     obj = new_object("Tool", order)
     if placed and order != "AXIS_ANGLE":
         owns["Tool"] = give_own_deltas(obj)

@@ -94,8 +94,7 @@ def test_objects_that_are_exported_and_imported_move_alike(tmp_path, kind):
 OF_RIGS = {"glb": FORMATS["glb"], "fbx": (*FORMATS["fbx"][:2], {"bake_anim_simplify_factor": 0.0}, {})}
 
 
-@pytest.mark.parametrize("kind", OF_RIGS)
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(("order", "kind"), in_turn(ORDERS, [*OF_RIGS]))
 def test_a_rig_that_is_exported_has_its_modes_in_one_animation_of_the_actions_own_range(tmp_path, kind, order):
     rig = key_all(new_rig("Rig", rotation_mode=order))
     # Twelve bones in all orders, which are as many as there are modes or more.

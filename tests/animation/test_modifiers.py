@@ -51,10 +51,19 @@ def some_of(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
 
 
 @pytest.mark.parametrize(
-    ("what", "order"), in_turn([*MODIFIERS, "twos, then noise"], ("QUATERNION", "ZXY", "AXIS_ANGLE"))
+    ("what", "how"),
+    in_turn(
+        [*MODIFIERS, "twos, then noise"],
+        [
+            ("QUATERNION", "after the mode"),
+            ("ZXY", "before the mode"),
+            ("AXIS_ANGLE", "after the mode"),
+            ("QUATERNION", "before the mode, in rounds"),
+        ],
+    ),
 )
-@pytest.mark.parametrize("when", ["after the mode", "before the mode", "before the mode, in rounds"])
-def test_a_modifier_acts_on_what_is_seen(live_file, what, order, when):
+def test_a_modifier_acts_on_what_is_seen(live_file, what, how):
+    order, when = how
     obj, dense = (key(new_object(name, order), seed=4, scale="even") for name in ("Tool", "Dense"))
     keys, in_rounds = snapshot(obj), when.endswith("rounds")
     modifiers = [MODIFIERS[name] for name in what.split(", then ")]

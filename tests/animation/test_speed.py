@@ -13,6 +13,7 @@ from mathutils import Euler
 from rigid_motion.animation import Refused, equalise_speed, key_frames, modes_of, set_mode, set_turns
 from rigid_motion.animation.edits.speed import on_whole_frames
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import FRAMES as FEW_FRAMES
@@ -80,8 +81,7 @@ def unevenness(obj: bpy.types.Object, ease: str) -> float:
     return float(np.abs(np.diff(done) - meant)[whole].max() / meant.mean())
 
 
-@pytest.mark.parametrize("ease", SHARES)
-@pytest.mark.parametrize("mode", FOR_MODES)
+@pytest.mark.parametrize(("mode", "ease"), in_turn(FOR_MODES, [*SHARES]))
 def test_the_speed_is_even_and_the_path_stays(live_file, mode, ease):
     obj = tool(mode)
     expected = path_of(shown_worlds([obj], FRAMES)[0], mode)
@@ -182,15 +182,6 @@ def test_the_turning_is_evened_where_asked_for(live_file):
     keys = key_frames(obj)
     whole = ~np.any((keys[:, None] > frames[:-1:16]) & (keys[:, None] < frames[16::16]), axis=0)
     assert np.ptp(turned[whole]) < 0.01 * turned.mean()
-
-
-def test_twice_is_once(live_file):
-    obj = tool("dq_sclerp")
-    equalise_speed(obj, "EASE_IN", between_frames=True)
-    once = snapshot(obj)
-    equalise_speed(obj, "EASE_IN", between_frames=True)
-    for name, (*_, keys) in snapshot(obj).items():
-        np.testing.assert_allclose([one[:2] for one in keys], [one[:2] for one in once[name][-1]], atol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -81,10 +81,13 @@ BLENDS = ("REPLACE", "COMBINE", "ADD", "SUBTRACT", "MULTIPLY")
 
 
 @pytest.mark.parametrize(
-    ("case", "place"),
-    in_turn(itertools.product(KINDS, INFLUENCES, BLENDS), [*zip(PLACES, itertools.cycle(ORDERS), strict=False)]),
+    ("place", "case"),
+    in_turn(
+        zip(PLACES, itertools.cycle(ORDERS), strict=False),
+        [*zip(itertools.cycle(KINDS), itertools.cycle(INFLUENCES), BLENDS, strict=False)],
+    ),
 )
-def test_a_strip_over_another_shows_what_dense_keys_would(live_file, case, place):
+def test_a_strip_over_another_shows_what_dense_keys_would(live_file, place, case):
     (kind, how, blend), ((start, scale, repeat, reverse), order) = case, place
     # In steps of three eighths of a frame, which are on all eighths, before and after the strip, too.
     frames = start + np.arange(-9.0, LENGTH * repeat * scale + 9.0, 0.375 * max(scale, 1.0))

@@ -114,8 +114,7 @@ def test_deltas_that_move_themselves_are_on_top_of_the_mode(live_file):
             assert tuple(getattr(obj, path)) == pytest.approx(tuple(getattr(plain, path)), abs=1e-5)
 
 
-@pytest.mark.parametrize("leaves", ["its Action", "its slot"])
-@pytest.mark.parametrize("first", ["the mode", "the difference"])
+@pytest.mark.parametrize(("first", "leaves"), [("the mode", "its Action"), ("the difference", "its slot")])
 @pytest.mark.parametrize(
     "difference", [("rotation_mode", "XYZ"), ("delta_rotation_quaternion", (1.0, 2.0, 3.0, 0.0))], ids=itemgetter(0)
 )

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import set_mode
+from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curve_of, rotation_path
 from tests.animation.oracle import assert_shown, world_now
 from tests.animation.scenes import key, new_object, random_values
@@ -28,9 +29,9 @@ def posed(order: str) -> bpy.types.Object:
     return obj
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize(("part", "index"), [(0, -1), (1, -1), (2, -1), (0, 1)])
-def test_what_is_not_keyed_stays_until_the_next_frame(live_file, order, part, index):
+@pytest.mark.parametrize(("keyed", "order"), in_turn([(0, -1), (1, -1), (2, -1), (0, 1)], ORDERS))
+def test_what_is_not_keyed_stays_until_the_next_frame(live_file, keyed, order):
+    part, index = keyed
     obj = posed(order)
     paths = ["location", rotation_path(obj), "scale"]
     pose, seen = {path: np.array(getattr(obj, path)) for path in paths}, world_now()
