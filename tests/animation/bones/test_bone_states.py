@@ -81,7 +81,7 @@ class EditingBones(WithHolds):
             assert_there(self._found(name), frames, bases, expected_bases(self._found(name), frames))
 
     def _may_be_held(self, name: Name) -> bool:
-        """Not what moves along other axes than it turns about: see `test_promises`."""
+        """Not what moves along other axes than it turns about: see `test_passing`."""
         return self._found(name).bone.use_local_location
 
     # Bones and rigs that come and go

@@ -70,16 +70,11 @@ OWN = {"Body": "BLENDER", "Hand.L": "dq_sclerp", "Hand.R": "pga_lerp"}
 SWAPPED = OWN | {"Hand.L": "pga_lerp", "Hand.R": "dq_sclerp"}
 
 
-def operate(operator: str, edit_bones: bpy.types.ArmatureEditBones, which: str = "Hand.L") -> None:
+def operate(operator: str, edit_bones: bpy.types.ArmatureEditBones) -> None:
     for bone in edit_bones:
-        bone.select = bone.select_head = bone.select_tail = which in bone.name
+        bone.select = bone.select_head = bone.select_tail = bone.name == "Hand.L"
     edit_bones.active = edit_bones["Hand.L"]
     assert getattr(bpy.ops.armature, operator)() == {"FINISHED"}
-
-
-def add_one(edit_bones: bpy.types.ArmatureEditBones) -> None:
-    finger = edit_bones.new("Finger")
-    finger.head, finger.tail, finger.parent = (0.1, 0.2, 0.3), (1.0, 0.3, 1.2), edit_bones["Hand.L"]
 
 
 def join(rig: bpy.types.Object) -> None:
@@ -91,18 +86,13 @@ def join(rig: bpy.types.Object) -> None:
 
 
 IN_EDIT_MODE: dict[str, tuple[Callable[[bpy.types.ArmatureEditBones], object], dict[str, str]]] = {
-    "nothing": (lambda bones: None, {}),
-    "a bone more": (add_one, {"Finger": "BLENDER"}),
     "two halves": (partial(operate, "subdivide"), {"Hand.L.001": "BLENDER"}),
     "symmetrized": (partial(operate, "symmetrize"), {}),
-    "names flipped": (partial(operate, "flip_names", which=""), SWAPPED),
     "other rest": (lambda bones: setattr(bones["Hand.L"], "tail", (0.1, 0.9, 1.4)), {}),
-    "another roll of the parent": (lambda bones: setattr(bones["Body"], "roll", 1.5), {}),
     "another parent": (lambda bones: setattr(bones["Hand.L"], "parent", bones["Hand.R"]), {}),
 }
 EDITS = {name: (partial(with_edit_bones, edit=edit), others) for name, (edit, others) in IN_EDIT_MODE.items()} | {
     "joined": (join, {f"Other {rest.name}": "BLENDER" for rest in HANDS}),
-    "Action flipped": (lambda rig: rig.animation_data.action.flip_with_pose(rig), SWAPPED),
 }
 """What is done to a rig, and which bones have other modes by then."""
 

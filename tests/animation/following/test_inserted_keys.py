@@ -12,7 +12,7 @@ from mathutils import Euler, Matrix
 from rigid_motion.animation import key_frames, repeat, set_mode, write_channel
 from rigid_motion.animation.evaluation import source_cache
 from rigid_motion.animation.queries.keyed import source_of
-from tests.animation.bones.rigs import select_only
+from tests.animation.bones.rigs import in_turn, select_only
 from tests.animation.keyed import curves_of, rotation_path, transform_paths
 from tests.animation.oracle import shown_worlds, world_now
 from tests.animation.scenes import key, new_object, push_down, random_values, tweak
@@ -50,29 +50,7 @@ def test_a_pose_pasted_by_copy_global_transform_with_auto_key_is_where_it_lands(
     assert 15.0 in key_frames(obj)
 
 
-@pytest.mark.parametrize("keyed", ["location", "rotation"])
-@pytest.mark.parametrize("order", ORDERS)
-def test_a_key_keeps_the_pose_also_where_it_is_the_first_of_a_property(live_file, order, keyed):
-    obj = new_object("Tool", order)
-    path = rotation_path(obj) if keyed == "rotation" else keyed
-    write_channel(obj, path, np.array((1.0, 25.0)), random_values(obj, path, 2, 3), interpolation="LINEAR")
-    values = random_values(obj, rotation_path(obj), 1, 5)[0]
-    obj.scale = (0.5, 2.0, 1.5)
-    if keyed == "location":
-        setattr(obj, rotation_path(obj), values)
-    else:
-        obj.location = (1.0, 2.0, 3.0)
-    set_mode(obj, "dq_sclerp")
-    bpy.context.scene.frame_set(15)
-    before, motion = world_now(), shown_worlds([obj], np.arange(1.0, 26.0))[0]
-    insert(obj)
-    assert np.abs(world_now() - before).max() < 1e-5
-    if keyed == "location":
-        assert np.abs(shown_worlds([obj], np.arange(1.0, 26.0))[0] - motion).max() < 1e-3
-
-
-@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(("order", "mode"), in_turn(ORDERS, ["dq_sclerp", "motor_spline"]))
 def test_a_key_of_one_component_keys_all_of_the_body_there_and_on_the_keys_around(live_file, order, mode):
     obj = new_object("Tool", order)
     for path, frames in (("location", (1.0, 40.0)), (rotation_path(obj), (1.0, 20.0, 40.0))):
@@ -116,9 +94,8 @@ def test_a_key_of_another_user_of_a_slot_has_the_pose_of_that_one(live_file):
     assert np.abs(np.array(second.matrix_world) - before).max() < 1e-5
 
 
-@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+@pytest.mark.parametrize(("how", "mode"), in_turn(["LINEAR", "REPEAT", "MIRROR"], ["dq_sclerp", "motor_spline"]))
 @pytest.mark.parametrize("frame", [-7, 47])
-@pytest.mark.parametrize("how", ["LINEAR", "REPEAT", "MIRROR"])
 def test_a_key_outside_of_the_keys_keeps_the_pose_where_the_motion_goes_on(live_file, how, frame, mode):
     live_file.scene.frame_start, live_file.scene.frame_end = -20, 60
     obj = key(new_object())
