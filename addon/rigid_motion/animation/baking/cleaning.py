@@ -23,7 +23,7 @@ from ...motion.trembling import DIFFERENCE_ORDERS, trembling
 from ..actions.channels import key_fields, set_key_fields
 from ..actions.refusals import refuse_drivers, refuse_linked, refuse_modified
 from ..actions.slots import Binding
-from ..edits.apply import Readings, Targets, apply_edit, readable
+from ..edits.apply import Readings, Targets, apply_together, readable
 from ..evaluation.bodies import turn_into_quaternions
 from ..evaluation.channel_values import rotation_values
 from ..evaluation.components import LOCATION, PART_OF, ROTATION, ROWS, SCALE
@@ -136,12 +136,12 @@ def clean_motion(
     if not 0.0 < strength < math.inf:
         text = n_("the strength must be above 0, not {strength:g}")
         raise Refused(text, strength=strength)
-    plans: dict[Transform, list[Planned] | Refused] = {}
     _LOOKS.turn_over()
     found: list[Cleaning] = []
     originals = Originals(CLEANED)
 
-    def survey(readings: Mapping[Transform, Readings]) -> None:
+    def plan(readings: Mapping[Transform, Readings]) -> dict[Transform, list[Planned] | Refused]:
+        plans: dict[Transform, list[Planned] | Refused] = {}
         together: dict[tuple, dict[Transform, tuple[Binding, KeyedTransform]]] = {}
         for transform, reading in readings.items():
             plans[transform] = []
@@ -160,22 +160,17 @@ def clean_motion(
                 continue
             found.append(cleaning)
             for transform, one in planned.items():
-                if isinstance(plan := plans[transform], list):
-                    plan.append(one)
-
-    def plan(transform: Transform, _: Readings) -> list[Planned]:
-        if isinstance(result := plans[transform], Refused):
-            raise result
-        if not result:
-            raise Refused(TOO_FEW, name=transform.name, count=0, least=MIN_NOISE_KEYS)
-        return result
+                if isinstance(of_slots := plans[transform], list):
+                    of_slots.append(one)
+        few = {"count": 0, "least": MIN_NOISE_KEYS}
+        return {transform: one or Refused(TOO_FEW, name=transform.name, **few) for transform, one in plans.items()}
 
     def act(transform: Transform, planned: list[Planned]) -> None:
         for one in planned:
             if originals.keep(one[0]):
                 _write(transform, *one, select=select_spikes and any(cleaning.bridged.any() for cleaning in found))
 
-    done = apply_edit(targets, plan, act, refused, survey=survey)
+    done = apply_together(targets, plan, act, refused)
     return [cleaning for cleaning in found if not done.keys().isdisjoint(cleaning.transforms)]
 
 

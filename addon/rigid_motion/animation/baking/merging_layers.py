@@ -14,7 +14,7 @@ from ..actions.channels import ensure_group, key_points
 from ..actions.marks import write_marks
 from ..actions.refusals import refuse_linked, refuse_tolerance
 from ..actions.slots import Binding
-from ..edits.apply import Readings, Targets, apply_edit, readable, transforms_of
+from ..edits.apply import Readings, Targets, apply_together, readable, transforms_of
 from ..edits.holding import components_on
 from ..evaluation.components import LOCATION, PART_OF, ROTATION, ROWS
 from ..evaluation.differences import seen_values
@@ -74,20 +74,16 @@ def merge_layer(
         any quarter of one.
     """
     refuse_tolerance(tolerance)
-    plans: dict[Transform, Planned | Refused] = {}
 
-    def survey(readings: Mapping[Transform, Readings]) -> None:
+    def plan(readings: Mapping[Transform, Readings]) -> dict[Transform, Planned | Refused]:
+        plans: dict[Transform, Planned | Refused] = {}
         for obj in dict.fromkeys(transform.animated for transform in readings):
             members = {one: reading for one, reading in readings.items() if one.animated == obj}
             try:
                 plans.update(_planned(obj, members, tolerance, radius))
             except Refused as refusal:
                 plans.update(dict.fromkeys(members, refusal))
-
-    def plan(transform: Transform, _: Readings) -> Planned:
-        if isinstance(result := plans[transform], Refused):
-            raise result
-        return result
+        return plans
 
     def act(transform: Transform, planned: Planned) -> Planned:
         _write(transform, planned[0])
@@ -96,7 +92,7 @@ def merge_layer(
         return planned
 
     every = [one for target in transforms_of(targets) for one in layered(target.animated) or [target]]
-    done = apply_edit(every, plan, act, refused, survey=survey).values()
+    done = apply_together(every, plan, act, refused).values()
     if not done:
         return None
     errors, between = (max(getattr(one, name) for one, _ in done) for name in ("largest_error", "between"))

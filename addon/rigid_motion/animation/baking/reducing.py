@@ -19,7 +19,7 @@ from ...motion import KEYFRAME_MODES
 from ...motion.modes import no_such_mode
 from ..actions.refusals import refuse_drivers, refuse_modified, refuse_tolerance
 from ..actions.slots import Binding
-from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
+from ..edits.apply import Readings, Target, Targets, apply_together, readable, transforms_of
 from ..edits.mode_keys import set_mode_in
 from ..evaluation.components import PART_OF, SCALE
 from ..evaluation.sources import KeyedTransform
@@ -129,7 +129,7 @@ def reduce_keys_of(
     needed: dict[str, int] = {}
     originals = Originals(REDUCED)
 
-    def survey(readings: Mapping[Transform, Readings]) -> None:
+    def plan(readings: Mapping[Transform, Readings]) -> Plans:
         for name in modes:
             with suppress(NotFewer):
                 found[name] = _plans(
@@ -145,20 +145,16 @@ def reduce_keys_of(
                 needed[name] = _keys_left(found[name], readings)
         nonlocal mode
         mode = min(needed, key=lambda name: (needed[name], name in modes[2:], _error_of(found[name])))
-
-    def plan(transform: Transform, readings: Readings) -> list[FewerKeys | FewerRuns]:
-        result = found[mode][transform]
-        if isinstance(result, Refused):
-            raise result
-        if not result:
-            raise _no_fewer(transform, readable(transform, readings), count)
-        return result
+        return {
+            transform: one or _no_fewer(transform, readable(transform, readings[transform]), count)
+            for transform, one in found[mode].items()
+        }
 
     def act(transform: Transform, fewer: list[FewerKeys | FewerRuns]) -> None:
         for reduced in fewer:
             _write(transform, reduced, mode, needed, originals)
 
-    done = apply_edit(targets, plan, act, refused, survey=survey)
+    done = apply_together(targets, plan, act, refused)
     return reduction_of(done) if done else None
 
 

@@ -47,12 +47,33 @@ def apply_edit(
     plan: Callable[[Transform, Readings], Plan],
     act: Callable[[Transform, Plan], Result],
     refused: list[Refused] | None,
-    survey: Callable[[Mapping[Transform, Readings]], None] | None = None,
 ) -> dict[Transform, Result]:
     """Do something to each target, and return what `act` returned for each of those that did not refuse.
 
-    `plan` says for one what there is to do, without doing any of it, and may raise `Refused`; `act` does it. `survey`
-    is shown all readings before the first plan, where plans depend on one another.
+    `plan` says for one what there is to do, without doing any of it, and may raise `Refused`; `act` does it.
+    """
+
+    def plans(readings: Mapping[Transform, Readings]) -> dict[Transform, Plan | Refused]:
+        result: dict[Transform, Plan | Refused] = {}
+        for transform, reading in readings.items():
+            try:
+                result[transform] = plan(transform, reading)
+            except Refused as refusal:
+                result[transform] = refusal
+        return result
+
+    return apply_together(targets, plans, act, refused)
+
+
+def apply_together(
+    targets: Targets,
+    plan: Callable[[Mapping[Transform, Readings]], Mapping[Transform, Plan | Refused]],
+    act: Callable[[Transform, Plan], Result],
+    refused: list[Refused] | None,
+) -> dict[Transform, Result]:
+    """Do what `apply_edit` does where what there is to do for one target depends on the others.
+
+    `plan` says for all of them what there is to do, or why not.
     """
     readings: dict[Transform, Readings] = {transform: [] for transform in transforms_of(targets)}
     bindings = bindings_of(readings)
@@ -60,14 +81,12 @@ def apply_edit(
         for user, source in zip(binding.users, sources, strict=True):
             if user in readings:
                 readings[user].append((binding, source))
-    if survey is not None:
-        survey(readings)
     plans, refusals = [], []
-    for transform, reading in readings.items():
-        try:
-            plans.append((transform, plan(transform, reading)))
-        except Refused as refusal:
-            refusals.append(refusal)
+    for transform, planned in plan(readings).items():
+        if isinstance(planned, Refused):
+            refusals.append(planned)
+        else:
+            plans.append((transform, planned))
     if refusals and refused is None:
         raise refusals[0] if len(refusals) == 1 else Refused("\n".join(map(str, refusals)))
     if refused is not None:
@@ -99,6 +118,14 @@ def editable_binding(transform: Transform, bindings: Iterable[Binding]) -> Bindi
     return binding
 
 
+def editable_keys(transform: Transform, readings: Readings) -> tuple[Binding, KeyedTransform]:
+    """Return the slot whose keys the editors show, and what is keyed in it. `Refused` where there is nothing to edit or
+    to fill in.
+    """
+    binding = editable_binding(transform, [binding for binding, _ in readings])
+    return binding, next(source for one, source in readable(transform, readings) if one is binding)
+
+
 class TriedEdit:
     """A transform whose keys are edited again and again, each time from those that it had."""
 
@@ -126,9 +153,11 @@ class TriedEdits:
     It is not generic: `typing` keeps what a generic class was made for, and Blender 4.5 never ends while it does.
     """
 
-    def __init__(self, tried: Iterable[Any]) -> None:
-        self.tried = list(tried)
-        """Each is a `TriedEdit`."""
+    def __init__(
+        self, targets: Targets, plan: Callable[[Transform, Readings], Any], refused: list[Refused] | None
+    ) -> None:
+        self.tried = list(apply_edit(targets, plan, lambda _, tried: tried, refused).values())
+        """A `TriedEdit` for each target that did not refuse: what `plan` returns."""
 
     def __len__(self) -> int:
         return len(self.tried)

@@ -26,7 +26,7 @@ from ..following.kept_timing import nearest_key
 from ..following.shared_turns import share_out_turns
 from ..queries.segments import frame_in_action
 from ..transforms import Refused, Transform
-from .apply import Readings, Targets, TriedEdit, TriedEdits, apply_edit, editable_binding, readable
+from .apply import Readings, Targets, TriedEdit, TriedEdits, editable_keys
 
 BREAKDOWN, PUSH, RELAX = KINDS = ("BREAKDOWN", "PUSH", "RELAX")
 """From the key before to the key after; away from the in-between of the mode; towards it."""
@@ -54,9 +54,8 @@ class _Between(TriedEdit):
     """A transform, and what it is between on a frame of the scene. `Refused` where it is between no keys."""
 
     def __init__(self, transform: Transform, readings: Readings, frame: float) -> None:
-        binding = editable_binding(transform, [binding for binding, _ in readings])
+        binding, whole = editable_keys(transform, readings)
         self.frame = frame = frame_in_action(transform.animated, frame)
-        whole = next(source for one, source in readable(transform, readings) if one is binding)
         is_switch = any(abs(switch.frame - frame) < SAME_FRAME for switch in whole.switches)
         self.source = _without(whole, frame)
         """The keys without those of this frame."""
@@ -134,7 +133,7 @@ class Breakdowns(TriedEdits):
         def plan(transform: Transform, readings: Readings) -> _Between:
             return _Between(transform, readings, frame)
 
-        super().__init__(apply_edit(targets, plan, lambda _, between: between, refused).values())
+        super().__init__(targets, plan, refused)
 
     def apply(self, factor: float) -> None:
         """Key the poses of this factor, in place of those of the factor before."""

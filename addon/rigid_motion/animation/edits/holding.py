@@ -30,7 +30,7 @@ from ..holds.problems import MAX_VALUE_ROUNDING, refuse_holder, refuse_motion, r
 from ..queries.keyed import active_binding, modes_in, source_of
 from ..queries.segments import frame_in_action
 from ..transforms import WIDTHS, Refused, Transform, transform_of
-from .apply import Readings, Target, apply_edit, editable_binding
+from .apply import Readings, Target, apply_edit, editable_binding, editable_keys
 
 HAND_TO_HAND = 4
 """Frames over which something passes from hand to hand, where nothing else is said. All else is at once."""
@@ -162,9 +162,9 @@ def hold_keys(prop: Target, frames: np.ndarray, holders: Sequence[tuple[bpy.type
 def match_grip(prop: Target) -> None:
     """Give the key of something on the frame that is shown the grip that the same holder had on it before."""
 
-    def plan(transform: Transform, readings: Readings) -> tuple[Binding, np.ndarray]:
-        binding = editable_binding(transform, [one for one, _ in readings])
-        source, frame = _source_in(binding, readings), _frame(transform)
+    def plan(transform: Transform, readings: Readings) -> np.ndarray:
+        _, source = editable_keys(transform, readings)
+        frame = _frame(transform)
         if not source.switches:
             raise Refused(NOT_HELD, name=transform.name)
         runs = source.runs
@@ -175,10 +175,9 @@ def match_grip(prop: Target) -> None:
             holder = next((one.name for one in holders_of(transform) if one.number == numbers[place]), "")
             raise Refused(NO_GRIP, name=transform.name, holder=holder or "World", frame=frame)
         grip = runs[before[-1]].source
-        return binding, components_on(transform, grip, grip.keyed_range[1])
+        return components_on(transform, grip, grip.keyed_range[1])
 
-    def act(transform: Transform, planned: tuple[Binding, np.ndarray]) -> None:
-        _, rows = planned
+    def act(transform: Transform, rows: np.ndarray) -> None:
         key_components(transform, rows, ("location", transform.rotation))
 
     apply_edit(prop, plan, act, None)
@@ -192,8 +191,8 @@ def pass_frames(prop: Target, frames: int, *, at: float | None = None) -> None:
     _refuse_frames(frames)
 
     def plan(transform: Transform, readings: Readings) -> tuple[Binding, float, int]:
-        binding = editable_binding(transform, [one for one, _ in readings])
-        source, frame = _source_in(binding, readings), _frame(transform) if at is None else at
+        binding, source = editable_keys(transform, readings)
+        frame = _frame(transform) if at is None else at
         switch = next((one for one in source.switches if one.frame > frame - SAME_FRAME), None)
         if switch is None:
             raise Refused(NOT_HELD_YET, name=transform.name, frame=frame)
@@ -243,13 +242,6 @@ def _target(holder: object, bone: str | None) -> tuple[bpy.types.Object | None, 
 def _refuse_frames(frames: int) -> None:
     if isinstance(frames, bool) or not isinstance(frames, int) or not 0 <= frames <= MOST_FRAMES:
         raise Refused(FRAMES_REFUSAL, frames=frames, most=MOST_FRAMES)
-
-
-def _source_in(binding: Binding, readings: Readings) -> KeyedTransform:
-    source = next(source for one, source in readings if one is binding)
-    if isinstance(source, Refused):
-        raise source
-    return source
 
 
 def _frame(transform: Transform) -> float:

@@ -26,7 +26,7 @@ from ..evaluation.marks import SAME_FRAME, near
 from ..following.inserted import set_key
 from ..queries.keyed import active_binding, frames_in
 from ..transforms import Channel, Refused, Transform
-from .apply import Readings, Target, TriedEdit, TriedEdits, apply_edit, editable_binding, readable
+from .apply import Readings, Target, TriedEdit, TriedEdits, apply_edit, editable_binding, editable_keys
 
 MIN_KEY_DISTANCE_FRAMES = 1.0
 """From a key that is retimed to its neighbours, at least, where these were not nearer before."""
@@ -63,8 +63,8 @@ class _Keys(TriedEdit):
     """Keys of a transform that are edited."""
 
     def __init__(self, transform: Transform, readings: Readings, spaces: KeySpaces) -> None:
-        binding = editable_binding(transform, [binding for binding, _ in readings])
-        self.source = source = next(source for one, source in readable(transform, readings) if one is binding)
+        binding, source = editable_keys(transform, readings)
+        self.source = source
         self.spaces = spaces
         super().__init__(transform, binding, (*binding.moving, transform.turns_channel))
         is_tied = transform.is_part and transform.pose_bone.bone.use_connect and transform.pose_bone.parent is not None
@@ -150,7 +150,7 @@ class KeyEdits(TriedEdits):
         def plan(transform: Transform, readings: Readings) -> _Keys:
             return _Keys(transform, readings, keys[transform])
 
-        super().__init__(apply_edit(keys, plan, lambda _, one: one, refused).values())
+        super().__init__(keys, plan, refused)
 
     def move(self, delta: Callable[[float], np.ndarray]) -> None:
         """Have all keys be where a rigid map of the world (4, 4), by their weights, takes them from where they were."""
@@ -173,8 +173,7 @@ def insert_key(target: Target, frame: float) -> None:
     """Key something in all channels with keys on a frame of its Action, as it is seen there: the motion stays."""
 
     def plan(transform: Transform, readings: Readings) -> tuple[Binding, dict[Channel, float], bool]:
-        binding = editable_binding(transform, [binding for binding, _ in readings])
-        source = next(source for one, source in readable(transform, readings) if one is binding)
+        binding, source = editable_keys(transform, readings)
         run = source.run_at(frame)
         values, channels = seen_values(run.source, run.moments(np.array([frame])))[:, 0].tolist(), transform.channels
         first, last = run.source.keyed_range

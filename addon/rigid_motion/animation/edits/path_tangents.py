@@ -21,7 +21,7 @@ from ..evaluation.marks import SAME_FRAME
 from ..evaluation.sources import KeyedTransform
 from ..fcurves.keys import BEZIER, LINEAR
 from ..transforms import Channel, Refused, Transform
-from .apply import Readings, TriedEdit, TriedEdits, apply_edit, editable_binding, readable
+from .apply import Readings, TriedEdit, TriedEdits, editable_keys
 
 SIDE_BEFORE, SIDE_AFTER = range(2)
 """The sides of a key."""
@@ -53,8 +53,7 @@ class _Tangent(TriedEdit):
     """A key of a transform whose handles on one side are edited."""
 
     def __init__(self, transform: Transform, readings: Readings, frame: float, side: int) -> None:
-        binding = editable_binding(transform, [binding for binding, _ in readings])
-        whole = next(source for one, source in readable(transform, readings) if one is binding)
+        binding, whole = editable_keys(transform, readings)
         super().__init__(transform, binding, (*binding.moving, transform.turns_channel))
         source = whole.run_at(frame).source
         number, other = (int(np.argmin(np.abs(source.key_frames - frame))) + by for by in (0, 2 * side - 1))
@@ -153,7 +152,7 @@ class TangentEdit(TriedEdits):
         def plan(one: Transform, readings: Readings) -> _Tangent:
             return _Tangent(one, readings, frame, side)
 
-        super().__init__(apply_edit(transform, plan, lambda _, one: one, refused).values())
+        super().__init__(transform, plan, refused)
 
     @property
     def ends(self) -> np.ndarray:

@@ -29,7 +29,7 @@ from ..evaluation.sources import SAME_FRAME, KeyedTransform, distinct
 from ..fcurves.keys import BEZIER, LINEAR
 from ..fcurves.keys import CONSTANT as CONSTANT_KEY
 from ..transforms import Refused, Transform
-from .apply import Readings, Targets, apply_edit, editable_binding, readable
+from .apply import Readings, Targets, apply_edit, editable_keys
 
 CONSTANT, EASE_IN, EASE_OUT, EASE_IN_OUT = EASES = ("CONSTANT", "EASE_IN", "EASE_OUT", "EASE_IN_OUT")
 
@@ -112,8 +112,7 @@ def equalise_speed(
         raise Refused(n_("{ease} is not an easing of speed: give one of {eases}"), ease=ease, eases=", ".join(EASES))
 
     def plan(transform: Transform, readings: Readings) -> tuple[Binding, _Run]:
-        binding = editable_binding(transform, [binding for binding, _ in readings])
-        source = next(source for one, source in readable(transform, readings) if one is binding)
+        binding, source = editable_keys(transform, readings)
         return binding, _run_of(transform, source, frames, turning)
 
     def act(_: Transform, planned: tuple[Binding, _Run]) -> EvenSpeed:
