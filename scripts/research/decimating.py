@@ -79,7 +79,7 @@ def bend(obj: bpy.types.Object) -> None:
     """Put curves between all keys of an object and its bones, with the handles that Blender gives new keys."""
     for fcurve in fcurves_of(obj).values():
         keys = np.array([key.co for key in fcurve.keyframe_points])
-        replace_keys(fcurve, keys[:, 0], keys[:, 1], interpolation="BEZIER", handle_type="AUTO_CLAMPED")
+        replace_keys(fcurve, keys[:, 0], keys[:, 1], interpolation="BEZIER")
 
 
 def decimated_within(

@@ -112,53 +112,45 @@ def replace_keys(
     *,
     interpolation: str | np.ndarray = "LINEAR",
     key_type: str | np.ndarray = "KEYFRAME",
-    handle_type: str | None = None,
-    selected: np.ndarray | None = None,
+    selected: np.ndarray | bool = True,
 ) -> None:
-    """Give an F-curve these keys in place of those it has: frames that rise, and values, shape (n,) each.
-
-    What every key gets, see `write_channel`; codes are each key's own interpolation or type (n,). Handles and selection
-    are Blender's default without a type, or without a mask (n,) of keys that are selected.
-    """
-    points = np.empty((len(frames), 2), dtype=np.float32)
-    points[:, 0], points[:, 1] = frames, values
-    keys = fcurve.keyframe_points
-    keys.clear()
-    keys.add(len(frames))
-    keys.foreach_set("co", points.ravel())
-    codes = {"interpolation": interpolation, "type": key_type}
-    if handle_type is not None:
-        codes |= {"handle_left_type": handle_type, "handle_right_type": handle_type}
-    for name, value in codes.items():
-        codes_of_keys = code_of(name, value) if isinstance(value, str) else value
-        keys.foreach_set(name, np.full(len(frames), codes_of_keys, dtype=np.int32))
-    if selected is not None:
-        for part in ("select_control_point", "select_left_handle", "select_right_handle"):
-            keys.foreach_set(part, selected)
-    fcurve.update()
-
-
-def empty_key_fields(count: int) -> KeyFields:
-    """Return all there is to so many keys, zero."""
-    return {name: np.zeros((count, width), kind) for name, (width, kind) in KEY_FIELDS.items()}
+    """Give an F-curve these new keys in place of those it has: see `new_key_fields`."""
+    set_key_fields(fcurve, new_key_fields(frames, values, interpolation, key_type, selected=selected))
 
 
 def new_key_fields(
-    frames: np.ndarray, values: np.ndarray, interpolation: np.ndarray | int, key_type: str = "KEYFRAME"
+    frames: np.ndarray,
+    values: np.ndarray | float,
+    interpolation: str | np.ndarray | int = "LINEAR",
+    key_type: str | np.ndarray = "KEYFRAME",
+    *,
+    selected: np.ndarray | bool = False,
 ) -> KeyFields:
-    """Return all there is to new keys on frames (n,), whose handles Blender sets; interpolations are codes."""
-    fields = empty_key_fields(len(frames))
+    """Return all there is to new keys, whose handles Blender sets: on frames that rise, with these values, (n,) each.
+
+    Interpolation and type are names for every key, see `write_channel`, or codes for each (n,).
+    """
+    fields: KeyFields = {name: np.zeros((len(frames), width), kind) for name, (width, kind) in KEY_FIELDS.items()}
     for name in ("co", "handle_left", "handle_right"):
         fields[name][:, 0], fields[name][:, 1] = frames, values
     for name in ("handle_left_type", "handle_right_type"):
         fields[name][:] = code_of(name, "AUTO_CLAMPED")
-    fields["interpolation"][:, 0], fields["type"][:] = interpolation, code_of("type", key_type)
+    for name, codes in (("interpolation", interpolation), ("type", key_type)):
+        fields[name][:, 0] = code_of(name, codes) if isinstance(codes, str) else codes
+    for name in ("select_control_point", "select_left_handle", "select_right_handle"):
+        fields[name][:, 0] = selected
     return fields
+
+
+def merged_keys(fields: KeyFields, others: KeyFields) -> KeyFields:
+    """Return all there is to keys, and to others on frames on which there are none of these."""
+    order = np.argsort(np.append(fields["co"][:, 0], others["co"][:, 0]), kind="stable")
+    return {name: np.concatenate((numbers, others[name]))[order] for name, numbers in fields.items()}
 
 
 def key_fields(keys: bpy.types.bpy_prop_collection) -> KeyFields:
     """Return all there is to the `keyframe_points` of an F-curve."""
-    fields = empty_key_fields(len(keys))
+    fields: KeyFields = {name: np.empty((len(keys), width), kind) for name, (width, kind) in KEY_FIELDS.items()}
     for name, numbers in fields.items():
         keys.foreach_get(name, numbers.ravel())
     return fields

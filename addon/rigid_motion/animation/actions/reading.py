@@ -182,12 +182,12 @@ def _on_frames(reads: list[ReadChannels], of_keys: list[np.ndarray]) -> Marks | 
 
 def is_marked(binding: Binding) -> bool:
     """Return whether the keys of a slot say a mode, Blender's own among them."""
-    return any(fcurve.keyframe_points and has_marks(fcurve) for fcurve in binding.moving.values())
+    return any(map(has_marks, binding.keyed))
 
 
 def modes_said(binding: Binding) -> int | Marks:
     """Return the modes that the keys of a slot say, as a `KeyedTransform` has them."""
-    keyed = [fcurve for fcurve in binding.moving.values() if fcurve.keyframe_points and not fcurve.mute]
+    keyed = [fcurve for fcurve in binding.keyed if not fcurve.mute]
     return _modes_in(read_keys(keyed))
 
 

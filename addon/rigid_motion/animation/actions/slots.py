@@ -98,6 +98,11 @@ class Binding:
         }
 
     @property
+    def keyed(self) -> list[bpy.types.FCurve]:
+        """Those of these channels that have keys."""
+        return [fcurve for fcurve in self.moving.values() if fcurve.keyframe_points]
+
+    @property
     def is_keyed(self) -> bool:
         """Return whether it has channels of location, rotation or scale, with keys or samples."""
         return any(fcurve.keyframe_points or fcurve.sampled_points for fcurve in self.moving.values())

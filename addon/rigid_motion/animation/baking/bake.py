@@ -14,7 +14,15 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
 from ...motion import Poses
-from ..actions.channels import code_of, empty_key_fields, key_fields, replace_keys, set_key_fields, write_channel
+from ..actions.channels import (
+    code_of,
+    key_fields,
+    merged_keys,
+    new_key_fields,
+    replace_keys,
+    set_key_fields,
+    write_channel,
+)
 from ..actions.modifiers import add_cycles, on_top
 from ..actions.reading import added_values
 from ..actions.refusals import refuse_drivers, refuse_layered, refuse_linked
@@ -282,19 +290,11 @@ def _show_pass(transform: Transform, switch: Switch, frames: np.ndarray, values:
 
 def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray, interpolation: str) -> None:
     """Put keys on these frames, all of this interpolation, beside those that there are."""
-    old, code = key_fields(fcurve.keyframe_points), code_of("interpolation", interpolation)
-    at = old["co"][:, 0]
-    added = without(frames, at)
-    new = empty_key_fields(len(added))
-    new["type"][:] = code_of("type", "GENERATED")
-    for name in POINT_ATTRIBUTES:
-        new[name][:, 0] = added
-    order = np.argsort(np.append(at, added), kind="stable")
-    fields = {name: np.concatenate((numbers, new[name]))[order] for name, numbers in old.items()}
-    times = fields["co"][:, 0]
-    fields["interpolation"][:] = code
+    old = key_fields(fcurve.keyframe_points)
+    fields = merged_keys(old, new_key_fields(without(frames, old["co"][:, 0]), 0.0, key_type="GENERATED"))
+    fields["interpolation"][:] = code_of("interpolation", interpolation)
     # Handles keep their distance from the key.
-    moved = np.interp(times, frames, values) - fields["co"][:, 1]
+    moved = np.interp(fields["co"][:, 0], frames, values) - fields["co"][:, 1]
     for name in POINT_ATTRIBUTES:
         fields[name][:, 1] += moved
     set_key_fields(fcurve, fields)

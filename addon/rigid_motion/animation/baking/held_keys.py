@@ -27,7 +27,7 @@ from ..holds.placing import channel_space
 from ..transforms import Transform
 from ..transforms.sizes import radius_of, reaches_of, scale_in_scene
 from .fewer_keys import WholeRig, count_of, has_uneven_scale
-from .native_curves import handles_of
+from .native_curves import fields_of
 from .search import fewer_keys
 from .worlds import MAX_CHANNEL_ROUNDING, say_holds
 
@@ -134,7 +134,7 @@ def write_runs(transform: Transform, fewer: FewerRuns, mode: str) -> None:
             parts.append(new)
         set_key_fields(fcurve, {name: np.concatenate([part[name] for part in parts]) for name in old})
     frames = [run.stretch.first for run in source.runs]
-    for fcurve in filter(lambda fcurve: fcurve.keyframe_points, binding.moving.values()):
+    for fcurve in binding.keyed:
         at = key_points(fcurve)[:, 0].astype(float) + 0.5 * SAME_FRAME
         numbers = source.modes_at(at)
         for first, until in pairwise([*frames, np.inf]):
@@ -149,6 +149,5 @@ def _keys_of(source: KeyedTransform | None, row: int) -> KeyFields | None:
     """Return the keys of a component of a source, None where it has none."""
     for rows, keys in () if source is None else source.channels:
         if row in rows:
-            place = rows.index(row)
-            return new_key_fields(keys.times, keys.values[place], keys.interpolation[place]) | handles_of(keys, place)
+            return fields_of(keys, rows.index(row))
     return None

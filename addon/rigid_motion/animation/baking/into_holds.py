@@ -17,13 +17,7 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 
 from ...motion.quaternions import matrices
-from ..actions.channels import (
-    KeyFields,
-    key_fields,
-    key_points,
-    new_key_fields,
-    set_key_fields,
-)
+from ..actions.channels import key_fields, key_points, merged_keys, new_key_fields, set_key_fields
 from ..actions.marks import hold, read_marks, write_holds, write_marks
 from ..actions.refusals import refuse_drivers, refuse_linked, refuse_modified, refuse_tolerance
 from ..actions.slots import Binding
@@ -391,11 +385,11 @@ def _hold(
         left = ~switches.are_held(fields["co"][:, 0].astype(float))
         fields = {name: numbers[left] for name, numbers in fields.items()}
         lacking = ~near(outside, fields["co"][:, 0])
-        fields = _with_keys(fields, new_key_fields(outside[lacking], seen[row, lacking], LINEAR, "GENERATED"))
+        fields = merged_keys(fields, new_key_fields(outside[lacking], seen[row, lacking], "LINEAR", "GENERATED"))
         fields["interpolation"][near(fields["co"][:, 0], switches.rests)] = CONSTANT
-        fields = _with_keys(fields, new_key_fields(switches.begins, rows[row], CONSTANT))
+        fields = merged_keys(fields, new_key_fields(switches.begins, rows[row], "CONSTANT"))
         set_key_fields(fcurve, fields)
-    for fcurve in filter(lambda fcurve: fcurve.keyframe_points, binding.moving.values()):
+    for fcurve in binding.keyed:
         frames, marks = key_points(fcurve)[:, 0].astype(float), read_marks(fcurve)
         marks = np.where(marks, marks, MODE_NUMBERS["BLENDER"] + 1)
         write_marks(fcurve, np.where(switches.are_held(frames), MODE_NUMBERS[DEFAULT_MODE] + 1, marks))
@@ -409,9 +403,3 @@ def _hold(
     )
     for note in notes:
         note.reduction = json.dumps(asdict(reduction))
-
-
-def _with_keys(fields: KeyFields, new: KeyFields) -> KeyFields:
-    """Return all there is to keys, with others on frames on which there are none."""
-    order = np.argsort(np.append(fields["co"][:, 0], new["co"][:, 0]), kind="stable")
-    return {name: np.concatenate((numbers, new[name]))[order] for name, numbers in fields.items()}

@@ -25,7 +25,7 @@ from ...motion.cubic_keys import (
     fitted_together,
     keyed_at,
 )
-from ..actions.channels import KeyFields, code_of, key_points, replace_keys
+from ..actions.channels import KeyFields, code_of, key_points, new_key_fields, set_key_fields
 from ..evaluation.components import LOCATION, PART_OF, ROTATION, ROWS
 from ..evaluation.sources import KeyedTransform
 from ..fcurves.evaluation import evaluate
@@ -243,15 +243,16 @@ def write_keys(fcurve: bpy.types.FCurve, keys: Keys, channel: int) -> None:
     if keys.automatic is not None and keys.right is not None:
         longest = (keys.right[channel, :-1, 0] - points[:-1, 0]) / np.diff(points[:, 0])
         fcurve.auto_smoothing = "NONE" if np.any(longest > (THIRD_RATIO + UNSMOOTHED_RATIO) / 2.0) else "CONT_ACCEL"
-    replace_keys(
-        fcurve, keys.times, points[:, 1], interpolation=keys.interpolation[channel], handle_type="AUTO_CLAMPED"
-    )
-    for name, numbers in handles_of(keys, channel).items():
-        fcurve.keyframe_points.foreach_set(name, numbers.ravel())
-    fcurve.update()
+    set_key_fields(fcurve, fields_of(keys, channel))
 
 
-def handles_of(keys: Keys, channel: int) -> KeyFields:
+def fields_of(keys: Keys, channel: int) -> KeyFields:
+    """Return all there is to the keys of a channel, with the types of their handles where they have handles."""
+    fields = new_key_fields(keys.times, keys.values[channel], keys.interpolation[channel], selected=True)
+    return fields | _handles_of(keys, channel)
+
+
+def _handles_of(keys: Keys, channel: int) -> KeyFields:
     """Return the handles of n keys of a channel and their types, each of shape (n, width); nothing without handles."""
     if keys.left is None or keys.right is None:
         return {}

@@ -137,7 +137,7 @@ def say_holds(binding: Binding, held: Marks, at_once: Collection[float] = ()) ->
 
     Keys without a mode get Blender's own.
     """
-    for fcurve in binding.moving.values():
+    for fcurve in binding.keyed:
         frames, marks = key_points(fcurve)[:, 0].astype(float), read_marks(fcurve)
         write_marks(fcurve, np.where(marks, marks, MODE_NUMBERS["BLENDER"] + 1))
         holds = held.at(frames + 0.5 * SAME_FRAME)

@@ -340,7 +340,7 @@ def _binding_of(transform: Transform) -> Binding:
 def _mark_all(binding: Binding, held: Marks | None) -> None:
     """Have all keys say a mode and what they are held in: so far by others, or by none."""
     is_new = not is_marked(binding)
-    for fcurve in filter(lambda fcurve: fcurve.keyframe_points, binding.moving.values()):
+    for fcurve in binding.keyed:
         frames = key_points(fcurve)[:, 0].astype(np.float64)
         modes = np.full(len(frames), MODE_NUMBERS[DEFAULT_MODE]) if is_new else modes_in(binding, frames)
         marks, holds = read_marks(fcurve), read_holds(fcurve)
@@ -351,7 +351,7 @@ def _mark_all(binding: Binding, held: Marks | None) -> None:
 
 def _let_go_of_handles(binding: Binding, frame: float) -> None:
     """Have Blender set the handles of the keys on a frame: those that there were are in another space."""
-    for fcurve in binding.moving.values():
+    for fcurve in binding.keyed:
         for key in fcurve.keyframe_points:
             if abs(key.co.x - frame) < SAME_FRAME:
                 key.handle_left_type = key.handle_right_type = "AUTO_CLAMPED"
@@ -360,6 +360,6 @@ def _let_go_of_handles(binding: Binding, frame: float) -> None:
 
 def _say(binding: Binding, frame: float, code: int) -> None:
     """Have the keys on a frame say a hold: see `marks.hold`."""
-    for fcurve in filter(lambda fcurve: fcurve.keyframe_points, binding.moving.values()):
+    for fcurve in binding.keyed:
         is_there = np.abs(key_points(fcurve)[:, 0] - frame) < SAME_FRAME
         write_holds(fcurve, np.where(is_there, code, read_holds(fcurve)))

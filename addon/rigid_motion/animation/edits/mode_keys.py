@@ -67,9 +67,8 @@ def set_mode_in(binding: Binding, mode: str, frames: Sequence[float] | None = No
 
 def _mark(binding: Binding, numbers_on: Callable[[np.ndarray], np.ndarray]) -> None:
     """Have the keys of a slot say the modes of these numbers (n,), which are asked for by their frames (n,)."""
-    keyed = [fcurve for fcurve in binding.moving.values() if fcurve.keyframe_points]
-    marks = [numbers_on(key_points(fcurve)[:, 0].astype(np.float64)) + 1 for fcurve in keyed]
-    for fcurve, of_keys in zip(keyed, marks, strict=True):
+    marks = [numbers_on(key_points(fcurve)[:, 0].astype(np.float64)) + 1 for fcurve in binding.keyed]
+    for fcurve, of_keys in zip(binding.keyed, marks, strict=True):
         write_marks(fcurve, of_keys)
 
 
@@ -167,7 +166,7 @@ def repeat(targets: Targets, mode: str = "REPEAT", *, refused: list[Refused] | N
         return binding
 
     def act(_: Transform, binding: Binding) -> None:
-        for fcurve in binding.moving.values():
+        for fcurve in binding.keyed:
             if len(fcurve.keyframe_points) > 1:
                 add_cycles(fcurve, cycles)
 
