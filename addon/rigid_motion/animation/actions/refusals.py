@@ -13,8 +13,7 @@ from ...blender import enum_value
 from ..evaluation.components import UNKNOWN_MODE
 from ..evaluation.sources import KeyedTransform
 from ..fcurves.keys import MAX_NUMBER, Keys
-from ..transforms import LINKED_REFUSAL, WIDTHS, Channel, Refused, Transform
-from ..transforms.transform import channels_under, rotation_by
+from ..transforms import LINKED_REFUSAL, WIDTHS, Channel, Refused, Transform, channels_under, rotation_by
 from .modifiers import on_top
 from .slots import Binding
 

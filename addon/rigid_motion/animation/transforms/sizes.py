@@ -10,7 +10,7 @@ import numpy as np
 
 from ...blender import pose_bones, scene
 from ...gltf.sizes import MIN_BALL_RADIUS_RATIO, OF_A_BODY, OF_KEY_POSES
-from .transform import Transform, transform_of
+from . import Transform, transform_of
 
 SOME_SIZE = 0.1
 """The radius, in metres, of what has no size."""
