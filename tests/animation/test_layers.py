@@ -206,31 +206,10 @@ def snapshot():
     )
 
 
-def held(tool):
-    hand = new_object("Hand")
-    animation.hold_in(tool, hand)
-
-
-def constrained(tool):
-    tool.constraints.new("TRACK_TO")
-
-
-def delta(tool):
-    tool.delta_location.x = 1.0
-
-
-def driven(tool):
-    tool.driver_add("location", 0)
-
-
 def shared(tool):
     other = new_object("Other")
     other.animation_data_create().action = tool.animation_data.action
     other.animation_data.action_slot = tool.animation_data.action_slot
-
-
-def stripped(tool):
-    push_down(tool)
 
 
 def on_vertices(tool):
@@ -240,12 +219,12 @@ def on_vertices(tool):
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [
-        (held, "held"),
-        (constrained, "constraint"),
-        (delta, "delta transforms"),
-        (driven, "driven"),
+        (lambda tool: animation.hold_in(tool, new_object("Hand")), "held"),
+        (lambda tool: tool.constraints.new("TRACK_TO"), "constraint"),
+        (lambda tool: setattr(tool, "delta_location", (1.0, 0.0, 0.0)), "delta transforms"),
+        (lambda tool: tool.driver_add("location", 0), "driven"),
         (shared, "shares its Action"),
-        (stripped, "enter a strip"),
+        (push_down, "enter a strip"),
         (on_vertices, "vertices"),
         (add_layer, "merge it first"),
     ],

@@ -10,7 +10,7 @@ import numpy as np
 from mathutils import Matrix, Quaternion
 
 from rigid_motion.animation import hold_in, write_channel
-from tests.animation.bones.rigs import Rest, new_rig, with_edit_bones
+from tests.animation.bones.rigs import Rest, new_rig
 from tests.animation.holds.oracle import Carrier
 from tests.animation.keyed import rotation_path
 from tests.animation.scenes import new_object, push_down
@@ -69,30 +69,10 @@ def by_ik(name: str, seed: int) -> Carrier:
     return rig.pose.bones["Hand"]
 
 
-def in_a_strip(name: str, seed: int) -> Carrier:
-    rig = arm(name, seed)
-    push_down(rig)
-    return rig.pose.bones["Hand"]
-
-
 def in_a_scaled_strip(name: str, seed: int) -> Carrier:
     rig = arm(name, seed)
     push_down(rig, scale=1.7)
     return rig.pose.bones["Hand"]
-
-
-def by_drivers(name: str, seed: int) -> Carrier:
-    """An object whose location and angles follow those of another."""
-    hand, leader = new_object(name, "XYZ"), new_object(f"{name} leader", "XYZ")
-    wander(leader, seed)
-    for path in ("location", "rotation_euler"):
-        for index, axis in enumerate("XYZ"):
-            driver = hand.driver_add(path, index).driver
-            variable = driver.variables.new()
-            variable.type, variable.targets[0].id = "TRANSFORMS", leader
-            variable.targets[0].transform_type = f"{'LOC' if path == 'location' else 'ROT'}_{axis}"
-            driver.type = "SUM"
-    return hand
 
 
 def by_an_object(name: str, seed: int) -> Carrier:
@@ -117,22 +97,6 @@ def on_one_that_grows(name: str, seed: int) -> Carrier:
     return hand
 
 
-def on_a_vertex(name: str, seed: int) -> Carrier:
-    """An object that goes along with a corner of a mesh that moves."""
-    mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata([(0.3, 0.1, 0.2)], [], [])
-    hand, parent = by_an_object(name, seed), new_object(f"{name} parent", data=mesh)
-    wander(parent, seed + 5, 0.2)
-    hand.parent, hand.parent_type = parent, "VERTEX"
-    return hand
-
-
-def by_a_connected_bone(name: str, seed: int) -> Carrier:
-    rig = arm(name, seed)
-    with_edit_bones(rig, lambda bones: setattr(bones["Hand"], "use_connect", True))
-    return rig.pose.bones["Hand"]
-
-
 def in_a_scaled_rig(name: str, seed: int) -> Carrier:
     """A rig as importers of FBX leave it: bones in centimetres, and an object that is scaled for it."""
     rig = arm(name, seed)
@@ -152,15 +116,11 @@ def in_a_scaled_rig(name: str, seed: int) -> Carrier:
 HOLDERS: dict[str, Callable[[str, int], Carrier]] = {
     "FK": by_fk,
     "IK": by_ik,
-    "strip": in_a_strip,
     "scaled strip": in_a_scaled_strip,
-    "drivers": by_drivers,
     "object": by_an_object,
     "scaled parent": on_a_scaled_parent,
     "growing parent": on_one_that_grows,
     "scaled rig": in_a_scaled_rig,
-    "vertex": on_a_vertex,
-    "connected bone": by_a_connected_bone,
 }
 
 

@@ -53,17 +53,6 @@ def test_passes_that_are_closer_than_they_are_long_follow_one_another(live_file)
     assert off(prop, twin, holds) < RESTING
 
 
-def test_a_holder_that_comes_later_holds_before_all_passes(live_file):
-    prop, twin = free()
-    first, second, third = by_fk("First", 11), by_an_object("Second", 31), by_an_object("Third", 51)
-    keys_of(prop, (1,), 1)
-    holds = [Held(1, None)]
-    for at, holder in ((15, first), (30, second), (45, third), (60, second), (70, first)):
-        take(prop, holder, at, frames=4, seed=at)
-        holds.append(Held(at, holder, 4))
-    assert off(prop, twin, holds) < RESTING
-
-
 def test_a_pass_begins_at_the_first_key_at_the_earliest(live_file):
     prop, twin = free("XYZ")
     hand = by_fk("First", 11)
@@ -72,18 +61,7 @@ def test_a_pass_begins_at_the_first_key_at_the_earliest(live_file):
     assert off(prop, twin, [Held(28, None), Held(30, hand, 10)]) < RESTING
 
 
-def test_keys_on_parts_of_frames_hold_and_pass(live_file):
-    prop, twin, holds = thrown()
-    for curve in curves_of(prop).values():
-        if curve.data_path in WIDTHS:
-            for key in curve.keyframe_points:
-                key.co_ui.x += 0.4 if key.co.x > 30 else 0.15
-    edited(prop)
-    moved = [hold._replace(frame=np.float32(hold.frame + (0.4 if hold.frame > 30 else 0.15))) for hold in holds]
-    assert off(prop, twin, moved) < MOVING
-
-
-@pytest.mark.parametrize("interpolation", ["CONSTANT", "LINEAR", "ELASTIC", "BOUNCE", "BACK", "SINE"])
+@pytest.mark.parametrize("interpolation", ["CONSTANT", "LINEAR", "ELASTIC", "SINE"])
 def test_eases_before_a_switch_end_in_their_own_holder(live_file, interpolation):
     prop, twin, holds = thrown((0, 4, 0, 3) if interpolation == "CONSTANT" else (3, 4, 0, 3))
     for curve in curves_of(prop).values():
