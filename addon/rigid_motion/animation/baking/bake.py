@@ -31,13 +31,14 @@ from ..edits.apply import Readings, Target, Targets, apply_edit, readable
 from ..edits.mode_keys import set_mode_in
 from ..evaluation.channel_values import rotation_values
 from ..evaluation.components import PART_OF, SCALE
+from ..evaluation.marks import near, without
 from ..evaluation.runs import Switch
 from ..evaluation.sources import SAME_FRAME, KeyedTransform, distinct
 from ..fcurves.keys import Cycles
 from ..holds.holders import holders_of
 from ..holds.placing import poses_of, rows_of
 from ..transforms import WIDTHS, Channel, Refused, Transform, transform_of
-from .motions import continuous_values, without
+from .motions import continuous_values
 from .originals import BAKED, Originals, last_change, put_back, refuse_without_original
 from .worlds import alone_in, arrivals, say_holds, seen_range, worlds_of
 
@@ -148,7 +149,7 @@ def bake_to_world(
     def act(transform: Transform, planned: Planned) -> list[float]:
         binding, source, frames, rows, _ = planned
         originals.keep(binding)
-        own = ~np.isin(frames, without(frames, distinct(source.keyed_frames)))
+        own = near(frames, source.keyed_frames)
         types = np.where(own, code_of("type", "KEYFRAME"), code_of("type", "GENERATED"))
         for row, channel in transform.channels.items():
             if PART_OF[row] != SCALE or channel in binding.curves or np.ptp(rows[row]) > MAX_SCALE_ROUNDING:

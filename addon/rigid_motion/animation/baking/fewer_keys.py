@@ -15,10 +15,11 @@ import numpy as np
 from ...gltf.errors import PARTS_PER_GAP
 from ..actions.slots import Binding
 from ..evaluation.components import MODE_NUMBERS, PART_OF, ROWS, SCALE
+from ..evaluation.marks import without
 from ..evaluation.sources import SAME_FRAME, KeyedTransform, distinct
 from ..fcurves.keys import CODE, CONSTANT, LINEAR, Keys
 from ..transforms import Refused, Transform
-from .motions import SINGLE_PRECISION_RATIO, continuous_values, without
+from .motions import SINGLE_PRECISION_RATIO, continuous_values
 
 
 class NeedsItsKeys(Refused):

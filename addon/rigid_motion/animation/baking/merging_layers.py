@@ -18,6 +18,7 @@ from ..edits.apply import Readings, Targets, apply_together, readable, transform
 from ..edits.holding import components_on
 from ..evaluation.components import LOCATION, PART_OF, ROTATION, ROWS
 from ..evaluation.differences import seen_values
+from ..evaluation.marks import without
 from ..evaluation.sources import SAME_FRAME, KeyedTransform
 from ..fcurves.keys import CODE, LINEAR, Keys
 from ..holds.dependencies import node_of
@@ -27,7 +28,6 @@ from ..transforms import TURNS_PROPERTY, WIDTHS, Refused, Transform, bone_name, 
 from .fewer_keys import FewerKeys, has_uneven_scale, united
 from .kept_keys import Kept, kept_keys
 from .layers import influence_of, layered, remove_base, remove_layer, strips_of
-from .motions import without
 from .reducing import Reduction, write_fewer
 from .worlds import SEVERAL_REFUSAL, worlds_of
 

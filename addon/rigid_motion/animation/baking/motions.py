@@ -23,7 +23,7 @@ from ..evaluation.bodies import turn_into_quaternions
 from ..evaluation.channel_values import rotation_values
 from ..evaluation.components import LOCATION, ROTATION, ROWS, SCALE
 from ..evaluation.differences import channel_differences, seen_values
-from ..evaluation.sources import SAME_FRAME, KeyedTransform
+from ..evaluation.sources import KeyedTransform
 from ..fcurves.keys import MAX_NUMBER
 from ..transforms import WIDTHS, Channel, Transform
 from ..transforms.posing import Hierarchy
@@ -66,11 +66,6 @@ def not_promised(rig: bpy.types.Object) -> tuple[str, ...]:
     if not followers:
         return ()
     return tuple(bone.name for bone in bones if any(item.name in followers for item in (bone, *bone.parent_recursive)))
-
-
-def without(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the frames that are none of the others, which rise, to Blender."""
-    return frames[np.searchsorted(others, frames - SAME_FRAME) == np.searchsorted(others, frames + SAME_FRAME)]
 
 
 def shown(transform: Transform, source: KeyedTransform, frames: np.ndarray) -> tuple[Poses, AffineMaps]:

@@ -19,6 +19,7 @@ from ...blender import pose_bones, scene
 from ...motion import reduce_keys, reduce_skeleton_keys
 from ...motion.contacts import slide, standing
 from ..actions.slots import Binding
+from ..evaluation.marks import without
 from ..evaluation.sources import SAME_FRAME, KeyedTransform, distinct
 from ..transforms import Refused, Transform, transform_of
 from .fewer_keys import (
@@ -33,7 +34,7 @@ from .fewer_keys import (
     values_on,
     with_keys,
 )
-from .motions import BodyMotion, not_promised, without
+from .motions import BodyMotion, not_promised
 from .native_curves import NATIVE, JointCurves, choose_handles, needed, scratch_curve
 
 NO_FEWER = n_("{name} needs its {count} keys to stay within the tolerance: allow a larger one")

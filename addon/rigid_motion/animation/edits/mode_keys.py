@@ -20,10 +20,11 @@ from ..actions.modifiers import add_cycles
 from ..actions.refusals import MOST_TURNS, refuse_linked, refuse_numbers
 from ..actions.slots import Binding
 from ..evaluation.components import MODE_NUMBERS
+from ..evaluation.marks import near
 from ..evaluation.sources import TURN_AXES, KeyedTransform
 from ..fcurves.keys import Cycles
 from ..following.refreshing import mark_all
-from ..following.shared_turns import is_among, set_turns_in
+from ..following.shared_turns import set_turns_in
 from ..queries.keyed import active_binding, frames_in, key_frames, mode_shown, modes_in, modes_of, source_of
 from ..queries.segments import frame_in_action, segment_at
 from ..transforms import Refused, Transform, transform_of
@@ -61,8 +62,8 @@ def set_mode_in(binding: Binding, mode: str, frames: Sequence[float] | None = No
     if frames is None:
         mark_all(binding, MODE_NUMBERS[mode])
         return
-    chosen = np.asarray(frames, dtype=np.float64)
-    _mark(binding, lambda keyed: np.where(is_among(chosen, keyed), MODE_NUMBERS[mode], modes_in(binding, keyed)))
+    chosen = np.asarray(frames)
+    _mark(binding, lambda keyed: np.where(near(keyed, chosen), MODE_NUMBERS[mode], modes_in(binding, keyed)))
 
 
 def _mark(binding: Binding, numbers_on: Callable[[np.ndarray], np.ndarray]) -> None:

@@ -40,7 +40,14 @@ def distinct(frames: np.ndarray) -> np.ndarray:
 
 def near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return which frames (n,) are any of others (m,) to Blender, shape (n,)."""
-    return (np.abs(frames[:, None] - others) < SAME_FRAME).any(axis=1)
+    frames, others = np.asarray(frames, dtype=np.float64), np.sort(others)
+    first = np.searchsorted(others, frames - SAME_FRAME, side="right")
+    return first < np.searchsorted(others, frames + SAME_FRAME)
+
+
+def without(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return the frames (n,) that are none of others (m,) to Blender."""
+    return frames[~near(frames, others)]
 
 
 @dataclass(frozen=True, eq=False)

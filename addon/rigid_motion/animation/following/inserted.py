@@ -17,7 +17,7 @@ from ...blender import existing
 from ..actions.slots import Binding
 from ..evaluation.components import DEPENDS_ON_KEYS
 from ..evaluation.differences import seen_values
-from ..evaluation.marks import SAME_VALUE
+from ..evaluation.marks import SAME_VALUE, near, without
 from ..evaluation.sources import SAME_FRAME, KeyedTransform
 from ..evaluation.turning import needs_turning
 from .kept_runs import keep_run
@@ -34,11 +34,11 @@ def key_fellows(binding: Binding, new: KeyedTransform, old: KeyedTransform) -> b
     times, before, none = _times_of(new), _times_of(old), np.empty(0)
     rows = sorted({*old.filled_rows, *new.filled_rows} & times.keys())
     # Where keys were moved or replaced none was inserted, nor where channels came with others in their place.
-    if any(len(_without(before.get(row, none), times[row])) for row in rows):
+    if any(len(without(before.get(row, none), times[row])) for row in rows):
         return False
-    added = [none, *(_without(times[row], before.get(row, none)) for row in rows)]
+    added = [none, *(without(times[row], before.get(row, none)) for row in rows)]
     # Where terms needed a channel it has a key on the first frame of all.
-    frames = _without(np.unique(np.concatenate(added)), np.union1d(old.key_frames, old.keyed_range[0]))
+    frames = without(np.unique(np.concatenate(added)), np.union1d(old.key_frames, old.keyed_range[0]))
     frames = frames[[_is_in_between(old, frame) for frame in frames.tolist()]] if len(frames) else frames
     if not len(frames):
         return False
@@ -47,7 +47,7 @@ def key_fellows(binding: Binding, new: KeyedTransform, old: KeyedTransform) -> b
     frames = np.union1d(frames, around)
     curves, seen, result = _curves_of(binding), seen_values(old, frames), False
     for row in rows:
-        lacking = np.isin(frames, _without(frames, times[row]))
+        lacking = ~near(frames, times[row])
         for number in np.flatnonzero(lacking).tolist():
             set_key(curves[row], float(frames[number]), seen[row, number])
             result = True
@@ -56,7 +56,7 @@ def key_fellows(binding: Binding, new: KeyedTransform, old: KeyedTransform) -> b
 
 def divided(binding: Binding, new: KeyedTransform, old: KeyedTransform) -> Insertion | None:
     """Return the insertion of a single key of all channels that has the pose of the motion as it was, if it is one."""
-    added = _without(new.key_frames, old.key_frames)
+    added = without(new.key_frames, old.key_frames)
     if len(added) != 1 or len(new.key_frames) != len(old.key_frames) + 1 or old.order != new.order:
         return None
     frame, run = float(added[0]), None
@@ -104,14 +104,6 @@ def _is_in_between(source: KeyedTransform, frame: float) -> bool:
     """Return whether a mode acts on a frame: between two keys, and outside where the motion goes on."""
     first, last = source.key_frames[[0, -1]]
     return (first < frame < last or source.goes_on) and source.mode_at(frame) != 0
-
-
-def _without(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the frames that are none of the others; both rise."""
-    if not len(others):
-        return frames
-    indices = np.clip(np.searchsorted(others, frames)[:, None] - (0, 1), 0, len(others) - 1)
-    return frames[np.abs(others[indices] - frames[:, None]).min(axis=1) >= SAME_FRAME]
 
 
 def _mark_breakdown(curves: Mapping[int, bpy.types.FCurve], frame: float) -> None:

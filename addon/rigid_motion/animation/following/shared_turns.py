@@ -14,7 +14,7 @@ from ..actions.marks import read_marks, write_marks
 from ..actions.slots import Binding
 from ..evaluation.components import LOCATION, MODE_NAMES, ROWS
 from ..evaluation.differences import in_betweens
-from ..evaluation.marks import WHOLE_TURN
+from ..evaluation.marks import WHOLE_TURN, near
 from ..evaluation.sources import SAME_FRAME, TURN_AXES, KeyedTransform
 from ..evaluation.turning import Turning, needs_turning, shortest_turns, turning_in
 from ..queries.keyed import frames_in, turns_in
@@ -30,7 +30,7 @@ def set_turns_in(
     Where there are no turns in any segment, the channel goes.
     """
     keyed, channel = frames_in(binding), binding.users[0].turns_channel
-    is_chosen, numbers = is_among(np.asarray(frames, dtype=np.float64), keyed), turns_in(binding, keyed)
+    is_chosen, numbers = near(keyed, np.asarray(frames)), turns_in(binding, keyed)
     numbers[is_chosen] = turns
     if not numbers.any():
         if channel in binding.curves:
@@ -45,17 +45,11 @@ def set_turns_in(
         (np.empty(0), np.empty(0, bool)) if fcurve.mute else (key_points(fcurve)[:, 0], selected_keys(fcurve))
     )
     fcurve.mute = False
-    kept = is_chosen | is_among(old, keyed) | ~(np.abs(np.diff(numbers, prepend=np.nan)) <= WHOLE_TURN)
+    kept = is_chosen | near(keyed, old) | ~(np.abs(np.diff(numbers, prepend=np.nan)) <= WHOLE_TURN)
     # Selected as the key of the pose is, so that both move together.
-    selected = is_chosen | is_among(old[selected], keyed)
+    selected = is_chosen | near(keyed, old[selected])
     replace_keys(fcurve, keyed[kept], numbers[kept], interpolation="CONSTANT", selected=selected[kept])
     write_marks(fcurve, np.full(np.count_nonzero(kept), mark))
-
-
-def is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Return which of the frames (n,) are one of the chosen, shape (n,)."""
-    chosen = np.sort(chosen)
-    return np.searchsorted(chosen, frames + SAME_FRAME) > np.searchsorted(chosen, frames - SAME_FRAME, side="right")
 
 
 STRAIGHT_MODES = ("lerp_slerp",)
