@@ -41,7 +41,7 @@ def layers_of(carrier):
     return carrier.id_data.animation_data.nla_tracks
 
 
-def update():
+def update(_=None):
     bpy.context.view_layer.update()
 
 
@@ -187,17 +187,6 @@ def test_stepped_keys_stay_stepped_on_frames(live_file):
     assert displaced(seen(tool, WHOLE), expected, radius_of(tool)).max() < 0.0021
 
 
-def test_an_action_on_top_of_a_layer_is_removed_before_it_is_merged(live_file):
-    tool = key_base(new("object", "XYZ"), "dq_sclerp")
-    add_layer(tool)
-    tool.animation_data.use_tweak_mode = False
-    tool.keyframe_insert("location", frame=5)
-    with pytest.raises(Refused, match="on top"):
-        merge_layer(tool)
-    tool.animation_data.action = None
-    assert merge_layer(tool)
-
-
 def snapshot():
     return (
         sorted(bpy.data.objects.keys()),
@@ -278,22 +267,31 @@ def test_a_layer_with_keys_of_what_has_no_base_is_not_merged(live_file):
     assert merge_layer(rig).after
 
 
-def test_nothing_is_merged_where_there_is_no_layer_or_no_tolerance(live_file):
+def with_a_copy(tool):
+    add_layer(tool)
+    bpy.context.scene.collection.objects.link(tool.copy())
+
+
+def with_an_action_on_top(tool):
+    add_layer(tool)
+    tool.animation_data.use_tweak_mode = False
+    tool.keyframe_insert("location", frame=5)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason", "tolerance"),
+    [
+        (update, "no layer alone", 0.001),
+        (add_layer, "tolerance", 0.0),
+        (with_a_copy, "Single User", 0.001),
+        (with_an_action_on_top, "on top", 0.001),
+    ],
+)
+def test_what_cannot_be_merged_says_why(live_file, spoil, reason, tolerance):
     tool = key(new_object("Tool"))
-    with pytest.raises(Refused, match="no layer alone"):
-        merge_layer(tool)
-    add_layer(tool)
-    with pytest.raises(Refused, match="tolerance"):
-        merge_layer(tool, 0.0)
-
-
-def test_of_a_copy_the_base_stays_until_the_last_one_is_merged(live_file):
-    tool = key_base(new_object("Tool", "XYZ"), "dq_sclerp")
-    add_layer(tool)
-    copy = tool.copy()
-    bpy.context.scene.collection.objects.link(copy)
-    with pytest.raises(Refused, match="Single User"):
-        merge_layer(tool)
+    spoil(tool)
+    with pytest.raises(Refused, match=reason):
+        merge_layer(tool, tolerance)
 
 
 def test_what_is_in_another_file_is_refused(live_file, tmp_path):

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import problem_of, refresh, repeat, set_mode
-from rigid_motion.animation.actions.modifiers import is_term, set_settings
+from rigid_motion.animation.actions.modifiers import set_settings
 from tests.animation.bones.rigs import in_turn
 from tests.animation.keyed import curves_of, rotation_path, snapshot
-from tests.animation.oracle import shown_worlds, world_now
+from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, key_densely, new_object
 
 PLAYED, IN_ROUNDS = np.arange(1.0, 40.0, 0.25), np.arange(-60.0, 120.0, 0.5)
@@ -117,53 +117,3 @@ def test_stepped_looks_at_frames_that_are_not_seen(live_file, step):
         assert np.abs(shown - long[(held + 90.0).astype(int)]).max() < 1e-5
         for fcurve, modifier in zip(curves_of(obj).values(), added, strict=True):
             fcurve.modifiers.remove(modifier)
-
-
-@pytest.mark.parametrize(
-    ("kind", "settings"), [("STEPPED", {"frame_offset": 1.0}), ("NOISE", {}), ("FNGENERATOR", {"use_additive": True})]
-)
-def test_what_adds_is_not_made_anew_but_goes_behind_once_it_replaces(live_file, kind, settings):
-    """Scripts that added it go on with it."""
-    obj, dense = (key(new_object(name), seed=4, scale="even") for name in ("Tool", "Dense"))
-    for fcurve in [*curves_of(obj).values(), *curves_of(dense).values()]:
-        fcurve.extrapolation = "LINEAR"
-    live_file.scene.frame_end = 40
-    set_mode([obj, dense], "dq_sclerp")
-    key_densely(dense)
-    for moved in (obj, dense):
-        modify(some_of(moved), (kind, settings))
-    kept = [fcurve.modifiers[-1] for fcurve in some_of(obj)]
-    live_file.scene.frame_end = 400
-    bpy.context.view_layer.update()
-    assert all(is_term(fcurve.modifiers[-1]) for fcurve in some_of(obj))
-    assert all(modifier == fcurve.modifiers[modifier.name] for fcurve, modifier in zip(some_of(obj), kept, strict=True))
-    for moved in (obj, dense):
-        for fcurve in some_of(moved):
-            (modifier,) = (item for item in fcurve.modifiers if item.type == kind)
-            if kind == "NOISE":
-                modifier.blend_type = "MULTIPLY"
-            elif kind == "FNGENERATOR":
-                modifier.use_additive = False
-    bpy.context.view_layer.update()
-    shown, expected = shown_worlds([obj, dense], PLAYED)
-    assert np.abs(shown - expected).max() < 2e-5 * max(1.0, np.abs(expected).max())
-
-
-@pytest.mark.parametrize("paths", [("location",), ("location", "rotation_quaternion")], ids=len)
-def test_a_key_in_between_has_what_is_seen_and_the_noise_once_more_as_in_blender(live_file, paths):
-    obj, twin = (key(new_object(name), seed=5) for name in ("Tool", "Twin"))
-    set_mode([obj, twin], "dq_sclerp")
-    key_densely(twin)
-    for moved in (obj, twin):
-        curves = curves_of(moved)
-        modify([curves["location", 1], curves["rotation_quaternion", 3]], MODIFIERS["noise"])
-    live_file.scene.frame_set(17)
-    seen = obj.location.y
-    for moved in (obj, twin):
-        for path in paths:
-            moved.keyframe_insert(path, frame=17)
-    for frame in (18, 17):
-        live_file.scene.frame_set(frame)
-    np.testing.assert_allclose(world_now("Tool"), world_now("Twin"), atol=1e-5)
-    (added,) = (point.co.y for point in curves_of(obj)["location", 1].keyframe_points if point.co.x == 17.0)
-    assert added == pytest.approx(seen, abs=1e-5)
