@@ -28,7 +28,7 @@ from ..transforms import Transform
 from ..transforms.sizes import radius_of, reaches_of, scale_in_scene
 from .fewer_keys import WholeRig, count_of, has_uneven_scale
 from .native_curves import fields_of
-from .search import fewer_keys
+from .search import Wishes, fewer_keys
 from .worlds import MAX_CHANNEL_ROUNDING, say_holds
 
 
@@ -52,11 +52,10 @@ class FewerRuns(NamedTuple):
         return count_of(self.source) - sum(count_of(run.source) - count_of(fewer) for run, fewer in self.runs)
 
 
-def fewer_runs(
-    transform: Transform, binding: Binding, source: KeyedTransform, mode: str, tolerance: float, radius: float | None
-) -> FewerRuns | None:
+def fewer_runs(transform: Transform, binding: Binding, source: KeyedTransform, wishes: Wishes) -> FewerRuns | None:
     """Return the runs of something held that can have fewer keys, None where none can. For the rest `fewer_keys`."""
-    radius, depsgraph = _reach(transform, radius), bpy.context.evaluated_depsgraph_get()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    alone = Wishes(wishes.mode, wishes.tolerance, _reach(transform, wishes.radius))
     spaces = {one.number: one.matrix(depsgraph) for one in holders_of(transform) if one.target is not None}
     own = channel_space(transform, depsgraph)
     begins = [source.keyed_range[0], *(switch.begin for switch in source.switches)]
@@ -70,9 +69,8 @@ def fewer_runs(
         space = np.array(spaces.get(source.hold_at(run.stretch.first)[0], own))[:3, :3]
         # One that goes on where fewer keys would not stays as it is.
         with suppress(ValueError):
-            members, wishes = {transform: (binding, shown)}, (mode, tolerance, radius)
-            plans = fewer_keys(transform.animated, members, *wishes, shared=False, hold=False, count=None, space=space)
-            for plan in plans.values():
+            members = {transform: (binding, shown)}
+            for plan in fewer_keys(transform.animated, members, alone, space=space).values():
                 chosen.append((run, _begun(plan.fewer, run.stretch.first)))
                 largest, between = max(largest, plan.largest_error), max(between, plan.between)
     return FewerRuns(binding, source, chosen, largest, between=between) if chosen else None

@@ -29,7 +29,7 @@ from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, count_of, has_uneven_
 from .held_keys import FewerRuns, fewer_runs, write_runs
 from .native_curves import NATIVE, write_keys
 from .originals import CLEANED, REDUCED, Originals, discard_originals, last_change, notes_of
-from .search import NO_FEWER, NOT_SO_MANY, NotFewer, fewer_keys
+from .search import NO_FEWER, NOT_SO_MANY, NotFewer, Wishes, fewer_keys
 
 HELD_REFUSAL = n_("{name} is held, so each hold is reduced separately: by a tolerance, not to a number of keys")
 
@@ -132,16 +132,8 @@ def reduce_keys_of(
     def plan(readings: Mapping[Transform, Readings]) -> Plans:
         for name in modes:
             with suppress(NotFewer):
-                found[name] = _plans(
-                    readings,
-                    mode=name,
-                    tolerance=tolerance,
-                    radius=radius,
-                    shared=shared,
-                    hold=hold,
-                    count=count,
-                    below=min(needed.values()) if name in modes[2:] else math.inf,
-                )
+                wishes = Wishes(name, tolerance, radius, shared, hold, count)
+                found[name] = _plans(readings, wishes, min(needed.values()) if name in modes[2:] else math.inf)
                 needed[name] = _keys_left(found[name], readings)
         nonlocal mode
         mode = min(needed, key=lambda name: (needed[name], name in modes[2:], _error_of(found[name])))
@@ -158,17 +150,7 @@ def reduce_keys_of(
     return reduction_of(done) if done else None
 
 
-def _plans(
-    readings: Mapping[Transform, Readings],
-    *,
-    mode: str,
-    tolerance: float,
-    radius: float | None,
-    count: int | None,
-    shared: bool,
-    hold: bool,
-    below: float,
-) -> Plans:
+def _plans(readings: Mapping[Transform, Readings], wishes: Wishes, below: float) -> Plans:
     """Return plans for all targets, those together that one slot of an object moves: see `fewer_keys`.
 
     What is held moves with its holder, and so by itself. `NotFewer` where so many keys are left, or more.
@@ -189,15 +171,13 @@ def _plans(
         for binding, source in keyed:
             if source.held is None:
                 together.setdefault((transform.animated, *binding.slot.key), {})[transform] = binding, source
-            elif count is not None:
+            elif wishes.count is not None:
                 plans[transform] = Refused(HELD_REFUSAL, name=transform.name)
-            elif (runs := fewer_runs(transform, binding, source, mode, tolerance, radius)) is not None:
+            elif (runs := fewer_runs(transform, binding, source, wishes)) is not None:
                 of_runs.append(runs)
     for (obj, *_), members in together.items():
         try:
-            fewer = fewer_keys(
-                obj, members, mode, tolerance, radius, shared=shared, hold=hold, count=count, below=below
-            )
+            fewer = fewer_keys(obj, members, wishes, below=below)
         except ValueError as problem:
             text = n_("{name} cannot be reduced: {problem}")
             why = problem if isinstance(problem, Refused) else Refused(text, name=obj.name, problem=problem)

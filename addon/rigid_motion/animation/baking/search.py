@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -66,6 +67,18 @@ Over = list[tuple[float, int, int]]
 """What is over the tolerance, see `BodyMotion.over`."""
 
 
+@dataclass(frozen=True)
+class Wishes:
+    """What is wanted of fewer keys: see `reduce_keys_of`. With a count it is so many, whatever the tolerance."""
+
+    mode: str
+    tolerance: float
+    radius: float | None
+    shared: bool = False
+    hold: bool = False
+    count: int | None = None
+
+
 class NotFewer(Exception):
     """As many keys are needed as something else needs, or more."""
 
@@ -73,24 +86,20 @@ class NotFewer(Exception):
 def fewer_keys(
     obj: bpy.types.Object,
     members: Members,
-    mode: str,
-    tolerance: float,
-    radius: float | None,
+    wishes: Wishes,
     *,
-    shared: bool,
-    hold: bool,
-    count: int | None,
     below: float = math.inf,
     space: np.ndarray | None = None,
 ) -> dict[Transform, FewerKeys]:
     """Return the plans for those of an object and its bones that can have fewer keys.
 
-    With a count there are so many keys, or key poses, whatever the tolerance. What is wanted besides, see
-    `reduce_keys_of`. `Refused` where none of several can have fewer. With a `space`, see `BodyMotion`, the only member
+    `Refused` where none of several can have fewer. With a `space`, see `BodyMotion`, the only member
     is looked at by itself. `NotFewer` where a mode needs so many keys, `below`, even before they are proven.
     """
-    body = SearchedBody(obj, members, math.inf if count is not None else tolerance, radius, hold=hold, space=space)
-    shared |= count is not None
+    mode, count = wishes.mode, wishes.count
+    tolerance = wishes.tolerance if count is None else math.inf
+    body = SearchedBody(obj, members, tolerance, wishes.radius, hold=wishes.hold, space=space)
+    shared = wishes.shared or count is not None
     if mode == NATIVE:
         fewer = body.curved(count, shared=shared)
     else:
