@@ -40,15 +40,15 @@ def shown(obj) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("case", "mode"),
+    ("case", "when"),
     in_turn(
-        itertools.product(SILENT, [("location", 2), ("rotation_euler", 1), ("scale", 1)], [False, True]),
-        ["dq_sclerp", "cga_lerp", "motor_spline"],
+        itertools.product(SILENT, [("location", 2), ("rotation_euler", 1), ("scale", 1)]),
+        [(False, "dq_sclerp"), (True, "cga_lerp"), (False, "motor_spline"), (True, "dq_sclerp")],
     ),
 )
-def test_what_is_left_alone_is_blenders_and_the_rest_moves_as_if_it_were_still(live_file, case, mode):
+def test_what_is_left_alone_is_blenders_and_the_rest_moves_as_if_it_were_still(live_file, case, when):
     """A constant added to a coordinate moves a whole path along: the others cannot know what it is."""
-    how, (path, index), is_later = case
+    (how, (path, index)), (is_later, mode) = case, when
     obj, still = (key(new_object(name, "XYZ"), scale="even") for name in ("Tool", "Still"))
     for (name, row), fcurve in curves_of(still).items():
         if name == path and (row == index or path != "location"):
