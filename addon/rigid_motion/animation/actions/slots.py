@@ -115,6 +115,11 @@ class Binding:
             fcurve = self.curves[channel] = fcurves.find(path, index=index) or fcurves.new(path, index=index)
         return fcurve
 
+    def remove_curve(self, channel: Channel) -> None:
+        """Remove the F-curve of a channel, if it has one."""
+        if (fcurve := self.curves.pop(channel, None)) is not None:
+            self.channelbag.fcurves.remove(fcurve)
+
 
 def bindings_in_slot(slot: Slot, prefixes: Collection[str] | None = None) -> list[Binding]:
     """Return what a slot moves, transform by transform: these, or all that it has something of."""

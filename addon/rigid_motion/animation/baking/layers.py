@@ -151,7 +151,7 @@ def _base(transform: Transform, binding: Binding, parts: Iterable[str]) -> bpy.t
         path = channel[0].removeprefix(transform.prefix)
         if path in moved:
             copy_fcurve(fcurve, channelbag_of(base), path)
-            binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+            binding.remove_curve(channel)
     if not transform.is_part:
         _hang_alike(base, obj)
         return base

@@ -135,7 +135,7 @@ def put_back(transform: Transform, kind: str, bindings: Iterable[Binding]) -> No
                 # The group from before may have the name of a bone that was renamed.
                 binding.curves[channel].group = group
         for channel in old.keys() - {(binding.prefix + path, index) for path, index in kept}:
-            binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+            binding.remove_curve(channel)
         _forget_from(target, binding)
 
 

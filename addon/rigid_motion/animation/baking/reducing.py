@@ -279,8 +279,7 @@ def write_fewer(transform: Transform, fewer: FewerKeys) -> None:
                 fcurve = binding.ensure_curve(transform.channels[row])
                 write_keys(fcurve, keys, channel)
                 fcurve.mute = False
-    if transform.turns_channel in binding.curves:
-        binding.channelbag.fcurves.remove(binding.curves.pop(transform.turns_channel))
+    binding.remove_curve(transform.turns_channel)
 
 
 def channel_keys(binding: Binding) -> int:

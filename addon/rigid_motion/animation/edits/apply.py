@@ -143,8 +143,8 @@ class TriedEdit:
         for channel, fields in self.keys.items():
             if fields is not None:
                 set_key_fields(self.binding.ensure_curve(channel), fields)
-            elif channel in self.binding.curves:
-                self.binding.channelbag.fcurves.remove(self.binding.curves.pop(channel))
+            else:
+                self.binding.remove_curve(channel)
 
 
 class TriedEdits:

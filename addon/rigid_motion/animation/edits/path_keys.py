@@ -207,7 +207,7 @@ def delete_keys(keys: Mapping[Transform, np.ndarray], *, refused: list[Refused] 
                     fields = key_fields(fcurve.keyframe_points)
                     set_key_fields(fcurve, {name: numbers[stays] for name, numbers in fields.items()})
                 else:
-                    binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+                    binding.remove_curve(channel)
 
     apply_edit(keys, plan, act, refused)
 

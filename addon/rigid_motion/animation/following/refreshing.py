@@ -96,7 +96,7 @@ def _tidy(binding: Binding) -> None:
             continue
         if not fcurve.keyframe_points and not fcurve.sampled_points:
             if len(terms := terms_in(fcurve)) == len(modifiers):
-                binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+                binding.remove_curve(channel)
                 continue
             for term in terms:
                 modifiers.remove(term)

@@ -33,8 +33,7 @@ def set_turns_in(
     is_chosen, numbers = near(keyed, np.asarray(frames)), turns_in(binding, keyed)
     numbers[is_chosen] = turns
     if not numbers.any():
-        if channel in binding.curves:
-            binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+        binding.remove_curve(channel)
         return
     fcurve = binding.ensure_curve(channel)
     if fcurve.group is None:

@@ -130,7 +130,7 @@ def _release(binding: Binding) -> bool:
     """Remove the influences of all constraints of ours. Returns whether there were any."""
     there = channels_of(binding) & binding.curves.keys()
     for channel in there:
-        binding.channelbag.fcurves.remove(binding.curves.pop(channel))
+        binding.remove_curve(channel)
     return bool(there)
 
 

@@ -36,12 +36,6 @@ class Hierarchy:
         self.offsets = AffineMaps(offsets[:, :3, :3], offsets[:, :3, 3])
         """The poses of bones at rest in the spaces of their parents."""
 
-    def posed(self, channels: AffineMaps) -> AffineMaps:
-        """Return where matrices of channels (bones, n) put bones in the space of the rig, (bones, n)."""
-        placed = AffineMaps(np.empty_like(channels.axes), np.empty_like(channels.origins))
-        self.pose(range(len(self.bones)), channels, placed)
-        return placed
-
     def pose(self, numbers: Iterable[int], channels: AffineMaps, placed: AffineMaps) -> None:
         """Place these bones anew, and all that hang on them, in `placed`, shape (bones, n)."""
         changed = set(numbers)
