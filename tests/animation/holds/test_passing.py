@@ -18,7 +18,7 @@ from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import new_object
 from tests.thoroughness import THOROUGH
 
-MOMENTS = np.arange(0.0, 84.0, 0.375)
+MOMENTS = np.arange(0.0, 84.0, 0.625)
 """Whole frames among them, and all eighths between, at which the poses of passes are made."""
 
 LENGTHS = 0, 1, 3, 4, 10
