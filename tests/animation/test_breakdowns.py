@@ -75,30 +75,6 @@ def test_where_a_segment_is_blenders_a_breakdown_is_blenders_own(live_file):
         np.testing.assert_allclose(getattr(obj, path), 0.75 * values[1] + 0.25 * values[2], atol=1e-5)
 
 
-def test_another_factor_and_cancelling_leave_nothing_behind(live_file):
-    obj = key(new_object(), seed=6)
-    set_mode(obj, "dq_sclerp")
-    before, played = snapshot(obj), shown_worlds([obj], np.arange(1.0, 41.0))[0]
-    bpy.context.scene.frame_set(int(NOW))
-    # A pose without a key is the animator's as well.
-    obj.location = (7.0, 8.0, 9.0)
-    seen = world_now()
-    tries = Breakdowns(obj)
-    for factor in (0.1, 0.9, 0.7):
-        tries.apply(factor)
-        bpy.context.view_layer.update()
-    tried = snapshot(obj)
-    tries.cancel()
-    assert snapshot(obj) == before
-    assert tuple(obj.location) == (7.0, 8.0, 9.0)
-    np.testing.assert_allclose(world_now(), seen, atol=1e-6)
-    # Terms are the same, but summed in another order.
-    np.testing.assert_allclose(shown_worlds([obj], np.arange(1.0, 41.0))[0], played, rtol=0, atol=2e-6)
-    bpy.context.scene.frame_set(int(NOW))
-    breakdown(obj, 0.7)
-    assert snapshot(obj) == tried, "as if it had been this factor from the first"
-
-
 @pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline", "pga_lerp", "lerp_slerp"])
 @pytest.mark.parametrize("kind", ["PUSH", "RELAX"])
 def test_push_and_relax_go_from_the_pose_that_is_seen_along_the_mode(live_file, kind, mode):
