@@ -5,10 +5,6 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from rigid_motion.animation.transforms import transform_of
-from rigid_motion.ui.overlay.cache import paths_of
-from rigid_motion.ui.overlay.kinds import space_of_bone
-from rigid_motion.ui.overlay.points import DrawnPath
 from tests.animation.bones import rigs
 from tests.animation.bones.rigs import Rest, select_bones
 from tests.animation.scenes import key
@@ -42,11 +38,3 @@ def keyed_rig(name: str = "Rig") -> bpy.types.Object:
         key_bone(bone)
     select_bones(rig, "Hand", "Arm")
     return rig
-
-
-def path_and_space(bone: bpy.types.PoseBone) -> tuple[DrawnPath, np.ndarray]:
-    """The path of a bone, and the space (4, 4) that the overlay draws it in on the current frame."""
-    target = transform_of(bone)
-    space, turned = space_of_bone(bone, bpy.context.evaluated_depsgraph_get())
-    (path,) = paths_of([target], bpy.context.scene, {target: turned})
-    return path, np.array(space)

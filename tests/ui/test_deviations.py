@@ -84,7 +84,7 @@ def test_they_are_looked_for_anew_after_an_edit_alone(extension, monkeypatch, ca
     monkeypatch.setattr(deviations, "jumps", lambda *args: looked.append(1) or real(*args))
     obj = circling(0.1)
     frames_of(bpy.context)
-    path = path_of(obj, bpy.context.scene)
+    path = path_of(obj, bpy.context)
     frames_of(bpy.context)
     assert len(looked) == 1
     curve = obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves[0]
@@ -93,5 +93,5 @@ def test_they_are_looked_for_anew_after_an_edit_alone(extension, monkeypatch, ca
     bpy.context.view_layer.update()
     frames_of(bpy.context)
     assert len(looked) == 2
-    assert path_of(obj, bpy.context.scene) is not path
+    assert path_of(obj, bpy.context) is not path
     assert complaints(caplog) == []

@@ -17,9 +17,11 @@ from ..animation.transforms import Transform
 from ..blender import IntProperty, Operator, Returned, existing, view_layer, with_properties
 from ..motion.speeds import jumps
 from .overlay import overlay_settings
+from .overlay.cache import drawn_paths
 from .overlay.drawing import Pen, batch_of, beside
+from .overlay.held import motion_now
+from .overlay.kinds import axis_length_of
 from .overlay.points import DrawnPath
-from .overlay.seen import SeenMotion, seen_paths
 from .overlay.settings import RigidMotionOverlay
 from .targets import targets_of
 from .wording import labelled
@@ -40,9 +42,10 @@ def deviations_on(path: DrawnPath, target: Transform, settings: RigidMotionOverl
     """Return the whole frames of the Action on which a target deviates, (d,), as its path shows it."""
     threshold, mode = settings.deviation_threshold, settings.mode
     if (known := _known.get(path)) is None or known[0] != threshold:
-        motion = SeenMotion.of(target, existing(view_layer().depsgraph))
+        motion = motion_now(target, existing(view_layer().depsgraph))
         frames = motion.frames()
-        measured = jumps(motion.maps(frames, None if mode == "CHOSEN" else mode), motion.size)
+        maps = motion.space @ motion.at_point(frames, None if mode == "CHOSEN" else mode)
+        measured = jumps(maps, axis_length_of(target) * float(np.linalg.norm(maps.axes[0], axis=0).max()))
         # Of jumps side by side, which one pop makes, the largest.
         near = np.pad(measured, 2)
         largest = np.max([near[:-4], near[1:-3], near[3:-1], near[4:]], axis=0)
@@ -53,8 +56,8 @@ def deviations_on(path: DrawnPath, target: Transform, settings: RigidMotionOverl
 def draw(pen: Pen, target: Transform, path: DrawnPath, _now: float, settings: RigidMotionOverlay) -> None:
     """Draw rings around the deviations on a path, in its space."""
     if settings.show_deviations and settings.show_paths:
-        frames, line = deviations_on(path, target, settings), path.native if path.desired is None else path.desired
-        places = np.stack([np.interp(frames, path.frames, column) for column in line.T], axis=1)
+        frames = deviations_on(path, target, settings)
+        places = np.stack([np.interp(frames, path.frames, column) for column in path.line.T], axis=1)
         ring = (*MARK_COLOR[:3], 0.0)
         pen.dot(batch_of("POINTS", places), ring, MARK_DIAMETER_PX, MARK_COLOR, MARK_BORDER_PX)
 
@@ -63,10 +66,10 @@ def frames_of(context: Any) -> np.ndarray:
     """Return the frames of the scene on which any of the targets deviates, (d,), rising."""
     targets, settings = targets_of(context), overlay_settings(context.scene)
     found = [np.empty(0)]
-    for target, path in zip(targets, seen_paths(targets, context), strict=True):
+    for target, path in zip(targets, drawn_paths(targets, context), strict=True):
         if path is not None:
             to_scene = existing(target.animated.animation_data).nla_tweak_strip_time_to_scene
-            found.append(np.array([to_scene(frame) for frame in deviations_on(path, target, settings).tolist()]))
+            found.append(np.array([to_scene(frame) for frame in deviations_on(path[1], target, settings).tolist()]))
     return np.unique(np.concatenate(found))
 
 

@@ -24,9 +24,10 @@ from ..animation.transforms import OWN_WORDS, Transform
 from ..blender import BoolProperty, EnumProperty, Returned, existing, with_properties
 from ..motion.speeds import ways_and_turns
 from .overlay import overlay_settings
+from .overlay.cache import path_of
 from .overlay.drawing import KEY_COLOUR, Pen, batch_of, complain
+from .overlay.held import motion_now
 from .overlay.points import DrawnPath
-from .overlay.seen import SeenMotion, seen_paths
 from .targets import SELECTED, WHOLE, OnTargets, active_target, grouped_by_frames, is_key_editor
 from .wording import degrees, labelled, length
 
@@ -70,15 +71,15 @@ _known: WeakKeyDictionary[DrawnPath, Speeds] = WeakKeyDictionary()
 
 def speeds_of(target: Transform, context: Any) -> Speeds | None:
     """Return how fast something moves in the world; None where it has no path."""
-    path = seen_paths([target], context)[0]
+    path = path_of(target, context)
     if path is None or path in _known:
         return None if path is None else _known[path]
-    motion = SeenMotion.of(target, context.view_layer.depsgraph)
+    motion = motion_now(target, context.view_layer.depsgraph)
     keys, even = motion.source.keyed_frames, motion.frames(SAMPLES_PER_FRAME)
     # Between samples that are all but one, rounding would be speed.
     far = np.abs(even[:, None] - keys).min(axis=1) > 0.1 / SAMPLES_PER_FRAME
     frames = np.union1d(even[far], keys)
-    going, turning = (part / np.diff(frames) for part in ways_and_turns(motion.maps(frames)))
+    going, turning = (part / np.diff(frames) for part in ways_and_turns(motion.space @ motion.at_point(frames)))
     _known[path] = Speeds(frames, going, turning, keys)
     return _known[path]
 

@@ -6,12 +6,12 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.ui.overlay.cache import path_of
-from rigid_motion.ui.overlay.points import DrawnPath, space_of_object
+from rigid_motion.animation.transforms import transform_of
+from rigid_motion.ui.overlay.cache import drawn_paths
+from rigid_motion.ui.overlay.points import DrawnPath
 from tests.animation.bones.poses import shown_poses
 from tests.animation.keyed import Carrier
 from tests.animation.oracle import shown_worlds
-from tests.ui.rigs import path_and_space
 
 WHOLE = np.arange(1.0, 42.0)
 """The whole frames of `tests.ui.rigs.FRAMES`."""
@@ -32,13 +32,8 @@ def assert_where_it_is_seen(carrier: Carrier, scene: bpy.types.Scene, point: tup
     scene.rigid_motion_overlay.show_ghosts = True
     bpy.context.view_layer.update()
     expected = shown(carrier)
-    if isinstance(carrier, bpy.types.PoseBone) and not carrier.constraints:
-        path, space = path_and_space(carrier)
-    else:
-        path, space = path_of(carrier, scene), np.eye(4)
-        if not path.in_world:
-            space = np.array(space_of_object(carrier, bpy.context.evaluated_depsgraph_get()))
-    space = np.eye(4) if path.in_world else space
+    (drawn,) = drawn_paths([transform_of(carrier)], bpy.context)
+    space, path = np.array(drawn[0]), drawn[1]
     places, ghosts = (expected @ (*point, 1.0))[:, :3], path.ghosts
     whole = WHOLE[(path.frames[0] <= WHOLE) & (path.frames[-1] >= WHOLE)]
     drawn = path.desired[np.searchsorted(path.frames, whole)] @ space[:3, :3].T + space[:3, 3]

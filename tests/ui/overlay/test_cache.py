@@ -23,11 +23,11 @@ def updated() -> None:
 
 
 def test_an_edit_that_does_not_matter_leaves_the_path(scene, obj):
-    path = path_of(obj, scene)
+    path = path_of(obj, bpy.context)
     obj.color = (1, 0, 0, 1)
     obj["note"] = 7
     updated()
-    assert path_of(obj, scene) is path
+    assert path_of(obj, bpy.context) is path
 
 
 def key_of(obj: bpy.types.Object) -> bpy.types.Keyframe:
@@ -57,40 +57,40 @@ EDITS = {
 @pytest.mark.parametrize("edit", EDITS)
 def test_an_edit_that_matters_gives_another_path(scene, obj, edit):
     updated()
-    path = path_of(obj, scene)
+    path = path_of(obj, bpy.context)
     EDITS[edit](obj, scene.rigid_motion_overlay)
     updated()
-    assert path_of(obj, scene) is not path
+    assert path_of(obj, bpy.context) is not path
 
 
 def test_a_path_goes_along_with_a_component_that_is_not_keyed(scene, obj):
     fcurves = obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
     fcurves.remove(fcurves.find("location", index=2))
     updated()
-    before = path_of(obj, scene).native
+    before = path_of(obj, bpy.context).native
     obj.location.z += 5.0
     updated()
-    assert path_of(obj, scene).native - before == pytest.approx(np.broadcast_to((0.0, 0.0, 5.0), before.shape))
+    assert path_of(obj, bpy.context).native - before == pytest.approx(np.broadcast_to((0.0, 0.0, 5.0), before.shape))
 
 
 def test_keys_selected_without_a_word_from_blender_are_noticed_when_asked_for(scene, obj):
     """As in the Dope Sheet, where selecting is no edit."""
-    path = path_of(obj, scene)
+    path = path_of(obj, bpy.context)
     assert not notice_selection([obj])
     select(obj)
-    assert path_of(obj, scene) is path
+    assert path_of(obj, bpy.context) is path
     assert notice_selection([obj])
-    assert (path_of(obj, scene).selected != path.selected).tolist() == [False, True, False, False]
+    assert (path_of(obj, bpy.context).selected != path.selected).tolist() == [False, True, False, False]
     assert not notice_selection([obj])
 
 
 def test_paths_that_were_not_drawn_for_long_are_dropped(scene):
     objects = [key(new_object(f"Tool {number}")) for number in range(MAX_SPARE_PATHS + 20)]
     updated()
-    paths = [path_of(obj, scene) for obj in objects]
-    path_of(objects[0], scene)
+    paths = [path_of(obj, bpy.context) for obj in objects]
+    path_of(objects[0], bpy.context)
     keep_only(drawn=1)
-    assert path_of(objects[0], scene) is paths[0]
-    kept = [path_of(obj, scene) is path for obj, path in zip(objects[20:], paths[20:], strict=True)]
+    assert path_of(objects[0], bpy.context) is paths[0]
+    kept = [path_of(obj, bpy.context) is path for obj, path in zip(objects[20:], paths[20:], strict=True)]
     assert all(kept)
-    assert path_of(objects[1], scene) is not paths[1]
+    assert path_of(objects[1], bpy.context) is not paths[1]

@@ -69,13 +69,13 @@ def test_a_bone_in_hands(scene, hands):
 def test_an_edit_of_the_hand_moves_the_path(scene, hands):
     prop = new_object("Prop")
     passed_around(prop, hands)
-    before = path_of(prop, scene)
+    before = path_of(prop, bpy.context)
     for point in curves_of(hands[0])["location", 2].keyframe_points:
         point.co.y += 1.0
     bpy.context.view_layer.update()
     path = assert_where_it_is_seen(prop, scene)
     assert np.abs(path.desired - before.desired).max() > 0.5
-    assert path_of(prop, scene) is path
+    assert path_of(prop, bpy.context) is path
 
 
 def test_a_hand_that_follows_is_known_where_it_was_seen(scene, hands):
@@ -83,11 +83,11 @@ def test_a_hand_that_follows_is_known_where_it_was_seen(scene, hands):
     follower.constraints.new("COPY_TRANSFORMS").target = hands[0]
     prop = new_object("Prop")
     passed_around(prop, (follower, hands[1]))
-    before = path_of(prop, scene)
+    before = path_of(prop, bpy.context)
     scene.frame_end = 41
     bpy.ops.rigid_motion.update_path()
     assert scene.frame_current == 36
-    assert np.abs(path_of(prop, scene).desired - before.desired).max() > 0.1
+    assert np.abs(path_of(prop, bpy.context).desired - before.desired).max() > 0.1
     assert_where_it_is_seen(prop, scene)
     for point in curves_of(hands[0])["location", 2].keyframe_points:
         point.co.y += 1.0

@@ -35,7 +35,7 @@ def test_a_path_is_where_it_is_seen_from_the_first_to_the_last_key_of_the_base(e
     key_offset(carrier, modes[1], frames=(1.0, 15.0, 33.0))
     bpy.context.view_layer.update()
     seen = world_points(carrier)
-    path = cache.path_of(carrier, bpy.context.scene)
+    path = cache.path_of(carrier, bpy.context)
     assert path.in_world or kind == "object"
     assert (path.frames[0], path.frames[-1]) == (1.0, 40.0)
     line = path.native if path.desired is None else path.desired
@@ -50,11 +50,11 @@ def test_where_the_influence_is_not_one_or_the_strip_is_left_there_is_no_path(ex
     key_offset(tool)
     key_influence(tool, (1.0, 1.0), (20.0, 0.5))
     bpy.context.view_layer.update()
-    assert cache.path_of(tool, bpy.context.scene) is None
+    assert cache.path_of(tool, bpy.context) is None
     key_influence(tool, (1.0, 1.0))
     bpy.context.view_layer.update()
-    assert cache.path_of(tool, bpy.context.scene) is not None
+    assert cache.path_of(tool, bpy.context) is not None
     tool.animation_data.use_tweak_mode = False
     bpy.context.view_layer.update()
-    assert cache.path_of(tool, bpy.context.scene) is None
-    assert cache.path_of(transform_of(tool).motion.base, bpy.context.scene) is not None
+    assert cache.path_of(tool, bpy.context) is None
+    assert cache.path_of(transform_of(tool).motion.base, bpy.context) is not None

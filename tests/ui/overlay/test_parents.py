@@ -49,10 +49,10 @@ OTHERS = {
 def test_parents_that_do_not_move_by_keys_alone_are_as_they_are_now(scene, table, other):
     obj = key(new_object(), FRAMES)
     obj.parent = table
-    assert path_of(obj, scene).in_world
+    assert path_of(obj, bpy.context).in_world
     OTHERS[other](table)
     bpy.context.view_layer.update()
-    assert not path_of(obj, scene).in_world
+    assert not path_of(obj, bpy.context).in_world
 
 
 STANDING = {
@@ -68,7 +68,7 @@ def test_a_path_follows_what_its_parents_stand_on(scene, edit):
     table.parent, obj.parent, floor.rotation_euler = floor, table, (0.5, 0.9, -0.4)
     set_mode([table, obj], "dq_sclerp")
     bpy.context.view_layer.update()
-    path_of(obj, scene)
+    path_of(obj, bpy.context)
     STANDING[edit](floor)
     bpy.context.view_layer.update()
     assert assert_where_it_is_seen(obj, scene).in_world
@@ -77,12 +77,12 @@ def test_a_path_follows_what_its_parents_stand_on(scene, edit):
 def test_a_path_follows_edits_of_its_parents(scene, table):
     obj = key(new_object(), FRAMES)
     obj.parent = table
-    before = path_of(obj, scene)
+    before = path_of(obj, bpy.context)
     scene.frame_set(20)
-    assert path_of(obj, scene) is before
+    assert path_of(obj, bpy.context) is before
     curves_of(table)["location", 0].keyframe_points[1].co.y += 1.0
     bpy.context.view_layer.update()
-    after = path_of(obj, scene)
+    after = path_of(obj, bpy.context)
     assert after is not before
     set_mode(obj, "dq_sclerp")
     bpy.context.view_layer.update()

@@ -62,7 +62,7 @@ def mesh() -> bpy.types.Object:
 def test_a_modes_path_shows_beforehand_where_the_object_will_be(scene, mode, order):
     obj = key(new_object(rotation_mode=order), scale="even")
     scene.rigid_motion_overlay.mode = mode
-    before = path_of(obj, scene)
+    before = path_of(obj, bpy.context)
     native = shown_origins(obj, WHOLE)
     set_mode(obj, mode)
     assert on(before, before.desired, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=2e-5)
@@ -72,7 +72,7 @@ def test_a_modes_path_shows_beforehand_where_the_object_will_be(scene, mode, ord
 def test_each_segment_runs_in_its_own_mode(scene):
     obj = key(new_object())
     set_mode(obj, "lerp_slerp", [FRAMES[1]])
-    path = path_of(obj, scene)
+    path = path_of(obj, bpy.context)
     same = np.isclose(path.native, path.desired, atol=1e-9).all(axis=1)
     inside = (path.frames > FRAMES[1]) & (path.frames < FRAMES[2])
     assert same[~inside].all()
@@ -100,7 +100,7 @@ def test_the_world_is_where_the_parent_takes_the_path(scene, parenting):
 def test_keys_off_whole_frames_are_on_the_path(scene):
     obj = key(new_object(), frames=(1.25, 10.5, 20.0))
     set_mode(obj, "dq_sclerp")
-    path = path_of(obj, scene)
+    path = path_of(obj, bpy.context)
     keyed = source_of(obj).values_at(np.array((1.25, 10.5, 20.0)))[ROWS["location"]].T
     assert path.keys == pytest.approx(keyed, abs=1e-6)
     for frame, place in zip((1.25, 10.5, 20.0), keyed, strict=True):
@@ -114,7 +114,7 @@ def test_selected_keys_are_told_apart(scene):
     for fcurve in obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
         for number, point in enumerate(fcurve.keyframe_points):
             point.select_control_point = number == 2
-    assert path_of(obj, scene).selected.tolist() == [False, False, True, False]
+    assert path_of(obj, bpy.context).selected.tolist() == [False, False, True, False]
 
 
 @pytest.mark.parametrize("mode", ["CHOSEN", "dq_sclerp"])
@@ -122,7 +122,7 @@ def test_axes_point_where_the_object_is_turned(scene, mode):
     obj = key(new_object())
     obj.empty_display_size = 0.5
     scene.rigid_motion_overlay.mode, scene.rigid_motion_overlay.axes_size = mode, 3.0
-    path = path_of(obj, scene)
+    path = path_of(obj, bpy.context)
     if mode != "CHOSEN":
         set_mode(obj, mode)
     frames = axis_frames(tick_frames(int(FRAMES[0]), int(FRAMES[-1])))
@@ -136,7 +136,7 @@ def test_axes_point_where_the_object_is_turned(scene, mode):
 def test_ticks_are_on_the_same_frames_in_all_paths(scene):
     obj = key(new_object())
     scene.rigid_motion_overlay.tick_step, scene.rigid_motion_overlay.mode = 5, "dq_sclerp"
-    path = path_of(obj, scene)
+    path = path_of(obj, bpy.context)
     fives = np.arange(5.0, 41.0, 5.0)
     assert (path.native_ticks == on(path, path.native, fives)).all()
     assert (path.desired_ticks == on(path, path.desired, fives)).all()
@@ -166,11 +166,11 @@ def test_samples_run_evenly_from_end_to_end_over_whole_frames_as_many_as_a_round
 
 
 def test_without_a_second_key_there_is_no_path(scene):
-    assert path_of(new_object("None"), scene) is None
-    assert path_of(key(new_object("One"), frames=(7,)), scene) is None
+    assert path_of(new_object("None"), bpy.context) is None
+    assert path_of(key(new_object("One"), frames=(7,)), bpy.context) is None
     still = new_object("Faded")
     still.keyframe_insert("hide_viewport", frame=1)
-    assert path_of(still, scene) is None
+    assert path_of(still, bpy.context) is None
 
 
 def test_what_rigid_motion_refuses_or_a_driver_moves_has_no_path(scene):
@@ -178,8 +178,8 @@ def test_what_rigid_motion_refuses_or_a_driver_moves_has_no_path(scene):
     curves_of(enveloped)["location", 0].modifiers.new("ENVELOPE")
     driven = key(new_object("Driven"))
     driven.driver_add("location", 0)
-    assert path_of(enveloped, scene) is None
-    assert path_of(driven, scene) is None
+    assert path_of(enveloped, bpy.context) is None
+    assert path_of(driven, bpy.context) is None
 
 
 def test_a_line_that_leads_back_is_not_thinned_to_a_point():

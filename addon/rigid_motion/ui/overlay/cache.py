@@ -8,7 +8,7 @@ that is merely played, or looked at from elsewhere, costs no more than looking p
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -27,11 +27,10 @@ from ...blender import existing, original_uid, persistent
 from ...handlers import append_handlers, remove_handlers
 from ..targets import selected_in_view
 from . import records
-from .ghosts import ghosts_of
-from .held import HolderMotion, carrier_of
-from .kinds import axis_length_of, followed, space_of
+from .held import motion_of
+from .kinds import Space, axis_length_of, space_of
 from .parents import CarriedTargets
-from .points import DrawnPath, trace
+from .points import DrawnPath
 
 MAX_SPARE_PATHS = 64
 """The number of paths kept that are not drawn any more."""
@@ -73,56 +72,55 @@ _entries: OrderedDict[tuple[int, str], _Entry] = OrderedDict()
 """By the identity of what is moved; those drawn last come last."""
 
 
-def path_of(target: bpy.types.Object | bpy.types.PoseBone | Transform, scene: bpy.types.Scene) -> DrawnPath | None:
+def path_of(target: bpy.types.Object | bpy.types.PoseBone | Transform, context: Any) -> DrawnPath | None:
     """Return the path of a target, as the overlay of the scene is set.
 
     None where it has none: without keys in its Action, with a single one, and where rigid motion is refused.
     """
-    return paths_of([transform_of(target)], scene)[0]
+    (path,) = drawn_paths([transform_of(target)], context)
+    return path and path[1]
 
 
-def paths_of(
-    targets: Sequence[Transform], scene: bpy.types.Scene, turned: Mapping[Transform, np.ndarray | None] | None = None
-) -> list[DrawnPath | None]:
-    """Return the paths of several targets. `turned` is what stands between the rotation of a bone and its location."""
+def drawn_paths(targets: Sequence[Transform], context: Any) -> list[tuple[Matrix, DrawnPath] | None]:
+    """Return the paths of several targets, with the maps from their spaces into the world."""
+    scene, is_playing = context.scene, _plays()
     overlay: Any = getattr(scene, OVERLAY)
     settings = (
         *(overlay.mode, overlay.tick_step, overlay.axes_size, _ghost_step(overlay)),
         *(scene.frame_start, scene.frame_end),
     )
-    stale: dict[Transform, np.ndarray | None] = {}
-    is_playing = _plays()
-    for target in targets:
-        entry, turn = _entries.get(target.identity), (turned or {}).get(target)
+    spaces = {target: space_of(target, context.view_layer.depsgraph) for target in targets}
+    stale = []
+    for target, space in spaces.items():
+        entry = _entries.get(target.identity)
         if (
             entry is None
             or entry.stale
             or (entry.is_outdated and not is_playing)
-            or entry.settings != (*settings, b"" if entry.above else _bytes(turn))
+            or entry.settings != (*settings, b"" if entry.above else _bytes(space.turn))
         ):
-            stale[target] = turn
+            stale.append(target)
     if stale:
         carried = CarriedTargets()
         for target, (binding, source) in carried.read(stale).items():
             before = _entries.get(target.identity)
-            entry = _read(target, binding, source, settings, stale[target], before, carried)
+            entry = _read(target, binding, source, settings, spaces[target], before, carried)
             _entries[target.identity] = entry
     for target in targets:
         _entries.move_to_end(target.identity)
-    return [_entries[target.identity].path for target in targets]
+    paths = [_entries[target.identity].path for target in targets]
+    return [
+        None if path is None else (Matrix() if path.in_world else spaces[target].matrix, path)
+        for target, path in zip(targets, paths, strict=True)
+    ]
 
 
 def shown_paths(context: Any) -> list[tuple[Transform, Matrix, DrawnPath]]:
     """Return the selected objects or bones that have paths, each with the map from its path's space into the world."""
-    depsgraph, targets = context.view_layer.depsgraph, list(map(transform_of, selected_in_view(context)))
-    spaces = {target: space_of(target, depsgraph) for target in targets}
-    paths = paths_of(targets, context.scene, {target: turned for target, (_, turned) in spaces.items()})
+    targets = list(map(transform_of, selected_in_view(context)))
+    paths = drawn_paths(targets, context)
     keep_only(len(targets))
-    return [
-        (target, Matrix() if path.in_world else spaces[target][0], path)
-        for target, path in zip(targets, paths, strict=True)
-        if path is not None
-    ]
+    return [(target, *path) for target, path in zip(targets, paths, strict=True) if path is not None]
 
 
 def _ghost_step(overlay: Any) -> int:
@@ -172,53 +170,41 @@ def _read(
     binding: Binding | None,
     source: KeyedTransform | None,
     settings: tuple,
-    turn: np.ndarray | None,
+    space: Space,
     before: _Entry | None,
     carried: CarriedTargets,
 ) -> _Entry:
     data = target.animated.animation_data
     action = data.action if data else None
-    entry = _Entry(None, (), (*settings, _bytes(turn)), action.session_uid if action else 0)
+    entry = _Entry(None, (), (*settings, _bytes(space.turn)), action.session_uid if action else 0)
     if binding is None or source is None:
         # Where it was refused, the panel says why.
         return entry
     if target.motion.base is not None and not is_plain(target.animated):
         return entry  # keys are not where it is seen
-    carrier, is_tweaked = carrier_of(target, source, carried), existing(data).use_tweak_mode
-    held = carrier if isinstance(carrier, HolderMotion) else None
-    if carrier is not None:
-        entry.above, entry.settings = frozenset(carrier.ids), (*settings, b"")
-    if held is not None and is_tweaked:  # In a strip that is entered it has no path.
+    motion = motion_of(target, source, carried, space)
+    entry.above = motion.ids
+    if entry.above:
+        entry.settings = (*settings, b"")
+    if not motion.has_path:
         return entry
-    mode, tick_step, axes_size, ghost_step, *_ = settings
-    point = None if held else followed(target, source, turn)
-    size = axes_size * axis_length_of(target, source)
-    entry.selected, entry.records = _selection(binding), held.records if held else ()
-    # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
-    of_point = () if point is None else (point.moves, point.stays.tobytes(), point.tip.tobytes())
+    entry.selected, entry.records = _selection(binding), motion.records
     selected = frames_in(binding, selected=True)
+    # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
     stands = [getattr(target.carrier, prop)[:] for name, prop in target.properties.items() if name not in source.keyed]
     entry.digest = (
-        *(source.digest, source.original.tobytes(), tuple(source.rest.items()), of_point, selected.tobytes(), size),
-        entry.settings,
-        *(tuple(stands) if ghost_step else (), carrier and carrier.digest),
+        *(source.digest, source.original.tobytes(), tuple(source.rest.items()), tuple(stands), motion.digest),
+        *(motion.point.tobytes(), axis_length_of(target), selected.tobytes(), entry.settings),
     )
     if before is not None and before.digest == entry.digest:
         entry.path = before.path
         return entry
+    mode, tick_step, axes_size, ghost_step, *_ = settings
+    chosen = None if mode == "CHOSEN" else mode
     with suppress(ValueError):  # numbers that make no motion
-        chosen = None if mode == "CHOSEN" else mode
-        if isinstance(carrier, HolderMotion):
-            entry.path = carrier.trace(chosen, tick_step, size, selected)
-        else:
-            entry.path = trace(source, chosen, tick_step, size, selected, point, carrier)
+        entry.path = motion.trace(chosen, tick_step, axes_size, selected)
         if ghost_step and entry.path is not None:
-            ghosts = (
-                carrier.ghosts(ghost_step, chosen)
-                if isinstance(carrier, HolderMotion)
-                else ghosts_of(target, source, chosen, ghost_step, turn, carrier)
-            )
-            entry.path = replace(entry.path, ghosts=ghosts)
+            entry.path = replace(entry.path, ghosts=motion.ghosts(ghost_step, chosen))
     return entry
 
 

@@ -128,8 +128,7 @@ class _Batches:
             keys=batch_of("POINTS", path.keys[~path.selected]),
             selected=batch_of("POINTS", path.keys[path.selected]),
             pieces=tuple(
-                (piece.holder, batch_of("LINE_STRIP", thinned(line[piece.first : piece.last + 1])))
-                for line in (path.native if path.desired is None else path.desired,)
+                (piece.holder, batch_of("LINE_STRIP", thinned(path.line[piece.first : piece.last + 1])))
                 for piece in path.pieces
             ),
         )

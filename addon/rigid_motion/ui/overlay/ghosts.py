@@ -6,19 +6,15 @@ octahedron. No window and no graphics card is needed here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
-from ...animation.baking.motions import shown
-from ...animation.evaluation.components import MODE_NUMBERS
-from ...animation.evaluation.sources import KeyedTransform
 from ...animation.transforms import Transform
 from ...animation.transforms.sizes import drawn_size
 from ...blender import existing
 from ...motion.affine import AffineMaps
-from .parents import Parents
 
 MOST_GHOSTS = 2000
 """About the most ghosts of one path: where it has more, they are further apart."""
@@ -78,44 +74,11 @@ def ghost_frames(first: int, last: int, step: int, keys: np.ndarray) -> np.ndarr
     return np.arange(-(-first // step), last // step + 1.0) * step
 
 
-def ghosts_of(
-    transform: Transform,
-    source: KeyedTransform,
-    mode: str | None,
-    step: int,
-    turn: np.ndarray | None,
-    parents: Parents | None,
-) -> Ghosts:
-    """Return where something is on `ghost_frames` in a mode.
-
-    `turn` is what stands between the rotation of a bone and that space, where there are no `parents`. ValueError where
-    its numbers make no motion.
-    """
-    frames = ghost_frames(*source.seen_range, step, source.keyed_frames)
-    if mode is not None:
-        source = replace(source, mode=MODE_NUMBERS[mode])
-    maps = shown(transform, source, frames)[1]
-    if parents is None:
-        maps = in_space_of_path(transform, maps, turn)
-    else:
-        spaces, turns = parents.spaces(frames)
-        maps = spaces @ in_space_of_path(transform, maps, turns)
-    return Ghosts(frames, matrices_of(maps))
-
-
 def matrices_of(maps: AffineMaps) -> np.ndarray:
     """Return the matrices (n, 4, 4) of maps (n,)."""
     matrices = np.tile(np.eye(4), (len(maps.origins), 1, 1))
     matrices[:, :3, :3], matrices[:, :3, 3] = maps.axes, maps.origins
     return matrices
-
-
-def in_space_of_path(transform: Transform, maps: AffineMaps, turn: np.ndarray | None) -> AffineMaps:
-    """Return where channels that say these maps (n,) put something in the space of its path."""
-    origins = maps.origins
-    if transform.is_part and transform.pose_bone.bone.use_connect and transform.pose_bone.parent:
-        origins = np.zeros_like(origins)
-    return AffineMaps(maps.axes if turn is None else turn @ maps.axes, origins)
 
 
 def shape_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> Shape:

@@ -1,58 +1,49 @@
-"""The path of something that is held: in the world, run by run in the space of what holds it, and over what it passes.
+"""The motion of something that is held: in the world, run by run in what holds it, and from one to the next.
 
 Holders that move by keys alone are worked out from these; others are where they were seen, see `records`.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import bpy
 import numpy as np
 
-from ...animation.baking.motions import shown
-from ...animation.evaluation.components import MODE_NUMBERS
 from ...animation.evaluation.sources import HoldRun, KeyedTransform
 from ...animation.holds.holders import Holder, holders_of
 from ...animation.transforms import Transform, transform_of
+from ...blender import existing
 from ...motion.affine import AffineMaps
 from .blends import blended, smoothstep
-from .ghosts import Ghosts, ghost_frames, in_space_of_path, matrices_of
-from .kinds import space_of
-from .parents import CarriedTargets, Parents, followed_parents, identity, maps_of
-from .points import PASSING_HOLDER, DrawnPath, Piece, axis_frames, sample_frames, tick_frames
+from .kinds import Space, space_of
+from .parents import CarriedTargets, Parents, identity, maps_of
+from .points import PASSING_HOLDER, Piece
 from .records import PlaceRecord, record_of
+from .seen import SeenMotion
 
 
-class HolderMotion:
-    """What holds something, and where that carries it.
+class HeldMotion(SeenMotion):
+    """Something that is held at times, what holds it, and where that carries it. Its path is in the world."""
 
-    Parameters
-    ----------
-    target : Transform
-    source : Source
-    carried : Carried
-        That of all targets that are looked at together.
-    """
-
-    def __init__(self, target: Transform, source: KeyedTransform, carried: CarriedTargets) -> None:
-        self.target, self.source = target, source
+    def __init__(self, target: Transform, source: KeyedTransform, carried: CarriedTargets, space: Space) -> None:
+        super().__init__(target, source, carried, space)
         context: Any = bpy.context
         self._scene, self._depsgraph = context.scene, context.view_layer.depsgraph
-        self._parents = Parents(target, carried)
-        self._space, self._turn = space_of(target, self._depsgraph)
+        self._free, self.in_world, self.space = maps_of(space.matrix), True, identity()
         self._holders = {
             holder.number: (self._read(holder, carried), maps_of(holder.offset))
             for holder in holders_of(target)
             if holder.target is not None
         }
-        ids = set(self._parents.ids)
-        for holder, _ in self._holders.values():
-            ids |= holder.ids if isinstance(holder, Parents) else set()
-        self.ids = frozenset(ids)
-        """Session ids of the data-blocks that decide on it."""
+        by_keys = [holder for holder, _ in self._holders.values() if isinstance(holder, Parents)]
+        self.carriers = self._parents.carriers.union(*(holder.carriers for holder in by_keys))
+        self.ids = frozenset(self._parents.ids).union(*(holder.ids for holder in by_keys))
+        seen = [holder for holder, _ in self._holders.values() if isinstance(holder, PlaceRecord)]
+        self.records = tuple((record, record.version) for record in seen)
+        # A thing that passes at once is in both places next to each other.
+        self.jumps = tuple(moment for switch in source.switches for moment in (switch.begin, switch.frame - 1e-3))
 
     def _read(self, holder: Holder, carried: CarriedTargets) -> Parents | PlaceRecord:
         target: Any = holder.target
@@ -63,15 +54,9 @@ class HolderMotion:
         return record_of(transform, self._scene.frame_current_final, self._depsgraph)
 
     @property
-    def carriers(self) -> frozenset[Transform]:
-        """All that carries it at any time, as far as that moves by keys."""
-        holders = (holder.carriers for holder, _ in self._holders.values() if isinstance(holder, Parents))
-        return self._parents.carriers.union(*holders)
-
-    @property
-    def records(self) -> tuple[tuple[PlaceRecord, int], ...]:
-        """What is known as it was seen alone, and how often that has changed."""
-        return tuple((one, one.version) for one, _ in self._holders.values() if isinstance(one, PlaceRecord))
+    def has_path(self) -> bool:
+        """Return whether it is seen as its keys have it: in a strip that is entered it has no path."""
+        return not existing(self.target.animated.animation_data).use_tweak_mode
 
     @property
     def range(self) -> tuple[int, int]:
@@ -85,12 +70,10 @@ class HolderMotion:
 
     @property
     def digest(self) -> tuple:
-        """Differs wherever anything differs that decides where it is carried."""
-        space = b"" if self._parents.known else np.array(self._space).tobytes()
+        space = b"" if self._parents.known else self._free.axes.tobytes() + self._free.origins.tobytes()
         return (
             self._parents.digest,
             space,
-            tuple(self.target.motion.lead),
             *(
                 (number, getattr(one, "digest", None), offset.axes.tobytes(), offset.origins.tobytes())
                 for number, (one, offset) in sorted(self._holders.items())
@@ -98,10 +81,8 @@ class HolderMotion:
             *((record.transform.identity if record.transform else (), version) for record, version in self.records),
         )
 
-    def maps(self, frames: np.ndarray, mode: str | None) -> AffineMaps:
-        """Return where it is in the world on rising frames (n,), with a mode in place of those of its segments."""
-        result = identity(len(frames))
-        source = self.source
+    def places(self, frames: np.ndarray, mode: str | None = None) -> AffineMaps:
+        result, source = identity(len(frames)), self.source
         for run in source.runs:
             first = -np.inf if run is source.runs[0] else run.stretch.first
             self._place(result, run, frames, (frames >= first) & (frames < run.stretch.until), mode)
@@ -118,14 +99,9 @@ class HolderMotion:
         self, result: AffineMaps, run: HoldRun, frames: np.ndarray, chosen: np.ndarray, mode: str | None
     ) -> None:
         """Put where a run has it on the chosen ones of frames (n,) into a result (n,)."""
-        if not chosen.any():
-            return
-        at, source = frames[chosen], run.source
-        if mode is not None:
-            source = replace(source, mode=MODE_NUMBERS[mode])
-        maps = shown(self.target, source, run.moments(at))[1]
-        spaces, turn = self._space_of(self.source.hold_at(run.stretch.first)[0], at)
-        result[chosen] = spaces @ in_space_of_path(self.target, maps, turn)
+        if chosen.any():
+            spaces = self._space_of(self.source.hold_at(run.stretch.first)[0], frames[chosen])
+            result[chosen] = self._placed(run.source, run.moments(frames[chosen]), mode, *spaces)
 
     def _space_of(self, number: int, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
         """Return what `Parents.spaces` does for frames (n,) of keys in the holder of a number."""
@@ -135,12 +111,9 @@ class HolderMotion:
             return (holder.places(frames) if isinstance(holder, Parents) else holder.maps(frames)) @ offset, None
         if self._parents.known:
             return self._parents.spaces(frames)
-        return identity(len(frames)) @ maps_of(self._space), self._turn
+        return identity(len(frames)) @ self._free, self._turn
 
     def spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray]:
-        """Return the maps (n,) into the world, and the turns (n, 3, 3), of the spaces that keys on frames (n,) are in,
-        see `Parents.spaces`.
-        """
         maps, numbers = identity(len(frames)), np.array([self.source.hold_at(frame)[0] for frame in frames.tolist()])
         turns = maps.axes.copy()
         for number in np.unique(numbers).tolist():
@@ -150,7 +123,7 @@ class HolderMotion:
         return maps, turns
 
     def holders_at(self, frames: np.ndarray) -> np.ndarray:
-        """Return the numbers of what holds it on frames (n,), PASSING where it passes."""
+        """Return the numbers of what holds it on frames (n,), PASSING_HOLDER where it passes."""
         numbers = np.zeros(len(frames), dtype=int)
         for run in self.source.runs:
             at = frames >= run.stretch.first if run is not self.source.runs[0] else np.ones(len(frames), dtype=bool)
@@ -159,58 +132,21 @@ class HolderMotion:
             numbers[(frames >= switch.begin) & (frames < switch.frame)] = PASSING_HOLDER
         return numbers
 
-    def trace(self, mode: str | None, tick_step: int, axis_length: float, selected: np.ndarray) -> DrawnPath | None:
-        """Return its path in the world, see `points.trace`; None where it is one point."""
-        keys = self.source.keyed_frames
-        first, last = self.range
-        if first == last:
-            return None
-        ticks = tick_frames(first, last, tick_step)
-        # A thing that passes at once is in both places next to each other.
-        jumps = [moment for switch in self.source.switches for moment in (switch.begin, switch.frame - 1e-3)]
-        samples = np.unique(np.concatenate((sample_frames(first, last), keys, jumps)))
-        frames = np.union1d(samples, ticks)
-        on_samples, on_keys, on_ticks = (np.searchsorted(frames, some) for some in (samples, keys, ticks))
-        native = self.maps(frames, "BLENDER")
-        desired = native if mode == "BLENDER" else self.maps(frames, mode)
-        lead = np.array(self.target.motion.lead)
-        native, desired = (AffineMaps(maps.axes, maps.at(lead)) for maps in (native, desired))
-        with_axes = axis_frames(ticks)
-        axes = desired[np.searchsorted(frames, with_axes)]
-        ends = axes.origins[:, None] + axis_length * np.moveaxis(axes.axes, -1, 1)
-        return DrawnPath(
-            frames=samples,
-            native=native.origins[on_samples],
-            desired=None if mode == "BLENDER" else desired.origins[on_samples],
-            key_frames=keys,
-            keys=desired.origins[on_keys],
-            selected=np.isin(keys, selected),
-            tick_frames=ticks,
-            native_ticks=native.origins[on_ticks],
-            desired_ticks=None if mode == "BLENDER" else desired.origins[on_ticks],
-            axis_frames=with_axes,
-            axes=np.stack((np.broadcast_to(axes.origins[:, None], ends.shape), ends), axis=2),
-            in_world=True,
-            pieces=pieces_of(self.holders_at(samples)),
-        )
-
-    def ghosts(self, step: int, mode: str | None) -> Ghosts:
-        """Return where it is every few frames."""
-        frames = ghost_frames(*self.range, step, self.source.keyed_frames)
-        return Ghosts(frames, matrices_of(self.maps(frames, mode)), self.holders_at(frames))
+    def pieces(self, frames: np.ndarray) -> tuple[Piece, ...]:
+        """Return the pieces of a path of points on frames (n,); each goes on to the beginning of the next."""
+        holders = self.holders_at(frames)
+        bounds = [0, *(np.flatnonzero(np.diff(holders)) + 1).tolist(), len(holders) - 1]
+        return tuple(Piece(first, last, int(holders[first])) for first, last in pairwise(bounds) if last > first)
 
 
-def is_held(source: KeyedTransform) -> bool:
-    """Return whether anything holds what has these keys at any time."""
-    return source.held is not None and any(source.hold_at(run.stretch.first)[0] for run in source.runs)
+def motion_of(target: Transform, source: KeyedTransform, carried: CarriedTargets, space: Space) -> SeenMotion:
+    """Return how something with keys is seen: carried by its parents, or by what holds it at any time."""
+    is_held = source.held is not None and any(source.hold_at(run.stretch.first)[0] for run in source.runs)
+    return (HeldMotion if is_held else SeenMotion)(target, source, carried, space)
 
 
-def carrier_of(target: Transform, source: KeyedTransform, carried: CarriedTargets) -> HolderMotion | Parents | None:
-    """Return what holds something with keys, or the parents that carry it if these move by keys; None for neither."""
-    return HolderMotion(target, source, carried) if is_held(source) else followed_parents(target, carried)
-
-
-def pieces_of(holders: np.ndarray) -> tuple[Piece, ...]:
-    """Return the pieces of a path whose points (n,) have these holders; each goes on to the beginning of the next."""
-    bounds = [0, *(np.flatnonzero(np.diff(holders)) + 1).tolist(), len(holders) - 1]
-    return tuple(Piece(first, last, int(holders[first])) for first, last in pairwise(bounds) if last > first)
+def motion_now(target: Transform, depsgraph: bpy.types.Depsgraph) -> SeenMotion:
+    """Return how a target that has a path is seen, read anew."""
+    carried = CarriedTargets()
+    source = existing(carried.read([target])[target][1])
+    return motion_of(target, source, carried, space_of(target, depsgraph))

@@ -1,4 +1,4 @@
-"""What the paths of each kind of transform are drawn by, and which point of it is followed.
+"""What the paths of each kind of transform are in, and how large its axes are drawn.
 
 The path of a bone is that of its head, in the space of its channels, placed by its parent as it is posed on the current
 frame. The head of a bone that only turns stays where it is: there it is the path of the tail.
@@ -6,31 +6,39 @@ frame. The head of a bone that only turns stays where it is: there it is the pat
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...animation.evaluation.components import LOCATION
-from ...animation.evaluation.sources import KeyedTransform
 from ...animation.transforms import Transform, transform_of
+from ...animation.transforms.sizes import drawn_size
 from ...blender import pose_bones
 from .parents import unless_same
-from .points import Followed, axis_length_of_object, space_of_object
 
 
-def space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, np.ndarray | None]:
-    """Return the map from the space of a bone's location channels into the world,
-    as its parent is posed on the current frame.
+class Space(NamedTuple):
+    """What the channels of something are in on the current frame."""
 
-    Returns
-    -------
-    space : Matrix
-    turned : array, shape (3, 3), or None
-        What stands between its rotation and that space where these are not the same: where a bone does not inherit the
-        rotation or scale of its parent, or is not moved along its own axes. None where they are.
-    """
+    matrix: Matrix
+    """The map from the space of its location into the world."""
+
+    turn: np.ndarray | None = None
+    """What stands between its rotation and that space, (3, 3), where these are not the same: where a bone does not
+    inherit the rotation or scale of its parent, or is not moved along its own axes. None where they are."""
+
+
+def space_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> Space:
+    """Return what the channels of something are in, as what carries it is on the current frame."""
+    if not transform.is_part:
+        return Space(_space_of_object(transform.animated, depsgraph))
+    if (base := transform.motion.base) is not None:
+        return Space(base.evaluated_get(depsgraph).matrix_world.copy())
+    return _space_of_bone(transform.pose_bone, depsgraph)
+
+
+def _space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> Space:
     rig = transform_of(bone).animated.evaluated_get(depsgraph)
     evaluated = pose_bones(rig)[bone.name]
     rest, parent = evaluated.bone, evaluated.parent
@@ -49,42 +57,26 @@ def space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> t
         for row in range(3):
             space[row][column] = along[row]
     turned = space.to_3x3().inverted_safe() @ stands.to_3x3()
-    return rig.matrix_world @ space, unless_same(np.array(turned))
+    return Space(rig.matrix_world @ space, unless_same(np.array(turned)))
 
 
-def followed(transform: Transform, source: KeyedTransform, turned: np.ndarray | None) -> Followed | None:
-    """Return the point that a path is of: that which leads, or else one of a bone; None for the origin of an object."""
-    lead, obj = np.array(transform.motion.lead), transform.animated
-    if not transform.is_part:
-        scale = np.ones(3) if source.uniform_scale else np.array(obj.scale) * np.array(obj.delta_scale)
-        return Followed(True, np.zeros(3), lead * scale, None) if lead.any() else None
-    bone = transform.pose_bone
-    moves = LOCATION in source.keyed and not bone.bone.use_connect
-    stays = np.zeros(3) if moves or bone.bone.use_connect else np.array(bone.location)
-    tip = lead if moves or lead.any() else np.array((0.0, bone.bone.length, 0.0))
-    scale = np.ones(3) if source.uniform_scale else np.array(bone.scale)
-    return Followed(moves, stays, tip * scale, turned)
+def _space_of_object(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
+    """Return the matrix from the space of an object's channels into the world, as its parent is on the current frame.
 
-
-def axis_length_of_bone(bone: bpy.types.PoseBone, source: KeyedTransform) -> float:
-    """Return how long to draw its local axes: half as long as it is. At scale 1, where the source has a scale."""
-    size = 0.5 * bone.bone.length
-    return float(size if source.uniform_scale else size * np.abs(np.array(bone.scale)).max()) or 1.0
-
-
-def space_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, np.ndarray | None]:
-    """Return where a path leads in the world, and what stands between rotation and location in it, None where nothing
-    does.
+    For a parent that is an object: that one's evaluated matrix, and the inverse at parenting. For a bone, vertices or a
+    lattice: what takes the object's evaluated location, rotation and scale to where it is seen, constraints included.
     """
-    if transform.is_part and (base := transform.motion.base) is not None:
-        return base.evaluated_get(depsgraph).matrix_world.copy(), None
-    if transform.is_part:
-        return space_of_bone(transform.pose_bone, depsgraph)
-    return space_of_object(transform.animated, depsgraph), None
+    if obj.parent is None:
+        return Matrix.Identity(4)
+    if obj.parent_type == "OBJECT":
+        return obj.parent.evaluated_get(depsgraph).matrix_world @ obj.matrix_parent_inverse
+    evaluated = obj.evaluated_get(depsgraph)
+    return evaluated.matrix_world @ evaluated.matrix_basis.inverted_safe()
 
 
-def axis_length_of(transform: Transform, source: KeyedTransform) -> float:
-    """Return how long its local axes are."""
+def axis_length_of(transform: Transform) -> float:
+    """Return how long its local axes are at scale 1: half as long as it is."""
     if transform.is_part:
-        return axis_length_of_bone(transform.pose_bone, source)
-    return axis_length_of_object(transform.animated, source)
+        return 0.5 * transform.pose_bone.bone.length or 1.0
+    obj = transform.animated
+    return drawn_size(obj) or 0.5 * float(np.ptp(np.array(obj.bound_box), axis=0).max()) or 1.0

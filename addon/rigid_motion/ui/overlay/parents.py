@@ -146,7 +146,7 @@ class Parents:
         -------
         maps : AffineMaps, shape (n,)
         turned : array, shape (n, 3, 3), or None
-            What stands between the target's rotation and that space, see `space_of_bone`. None where nothing does.
+            What stands between the target's rotation and that space, see `kinds.Space`. None where nothing does.
         """
         key = self.target.identity, self.digest, frames.tobytes()
         if key not in _spaces:
@@ -191,17 +191,15 @@ class Parents:
         return carried @ maps_of(obj.matrix_parent_inverse)
 
 
-def followed_parents(target: Transform, carried: CarriedTargets) -> Parents | None:
-    """Return what carries a target as its keys are edited, where that moves by keys alone.
+def follows_keys(target: Transform, parents: Parents) -> bool:
+    """Return whether the keys of its parents, and nothing else, carry a target along as its own keys are edited.
 
     Strips may be elsewhere in time: what hangs on something is seen on the current frame as long as they are edited,
     but for those of layers.
     """
     obj = target.animated
-    if existing(obj.animation_data).use_tweak_mode and not (target.motion.base and is_plain(obj)):
-        return None
-    parents = Parents(target, carried)
-    return parents if parents.move_by_keys else None
+    is_in_strip = existing(obj.animation_data).use_tweak_mode and not (target.motion.base and is_plain(obj))
+    return parents.move_by_keys and not is_in_strip
 
 
 def unless_same(turned: np.ndarray) -> np.ndarray | None:
@@ -261,9 +259,9 @@ def _hung(transform: Transform) -> tuple:
     return (*settings, bone.length, tuple(row[:] for row in bone.matrix_local[:]))
 
 
-def identity(count: int) -> AffineMaps:
-    """Return maps (count,) that leave all where it is."""
-    return AffineMaps(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)))
+def identity(*shape: int) -> AffineMaps:
+    """Return maps of this shape that leave all where it is."""
+    return AffineMaps(np.tile(np.eye(3), (*shape, 1, 1)), np.zeros((*shape, 3)))
 
 
 def maps_of(matrix: Matrix) -> AffineMaps:

@@ -1,7 +1,7 @@
 """The points of a path: where an object comes through, natively and in a mode, as arrays for the overlay to draw.
 
-Points are (n, 3), in the space of the object's channels, its own delta transforms included; `space_of_object` leads
-from there into the world. Frames are those of the Action. No window and no graphics card is needed here.
+Points are (n, 3), in the world or in the space of the object's channels, its own delta transforms included. Frames are
+those of the Action. No window and no graphics card is needed here.
 
 On a short path, or one that is looked at from afar, ticks would be a solid bar. They stay evenly timed: of a path that
 moves too little from tick to tick, only every second, fifth, tenth... is left. Where the object nearly rests even those
@@ -14,18 +14,9 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import bpy
 import numpy as np
-from mathutils import Matrix
 
-from ...animation.evaluation.differences import in_betweens
-from ...animation.evaluation.sources import KeyedTransform
-from ...animation.transforms.sizes import drawn_size
-from ...motion import Poses
-from ...motion.affine import AffineMaps, turned
-from ...motion.quaternions import rotate
 from .ghosts import Ghosts
-from .parents import Parents
 
 MIN_PATH_SAMPLES = 256
 """A path gets this many samples, or one on every frame where those are more: bends look round then."""
@@ -70,37 +61,6 @@ class Piece(NamedTuple):
 
     holder: int
     """The number of what holds it there, 0 for the world, or PASSING_HOLDER."""
-
-
-class Followed(NamedTuple):
-    """Which point of something a path is of, where it is not the origin."""
-
-    moves: bool
-    """True if its location counts."""
-
-    stays: np.ndarray
-    """The part of its place that does not move, shape (3,)."""
-
-    tip: np.ndarray
-    """The point on its own axes, shape (3,)."""
-
-    turned: np.ndarray | None
-    """The turn of its rotation, and of the axes with it, in the space of its location: (3, 3), or (n, 3, 3)."""
-
-    def points(self, poses: Poses) -> np.ndarray:
-        """Return where the point is at these poses, shape (n, 3)."""
-        arms = rotate(poses.quaternions, self.tip)
-        if poses.scales is not None:
-            arms = poses.scales[:, None] * arms
-        return poses.positions * self.moves + self.stays + self.strokes(arms)
-
-    def strokes(self, vectors: np.ndarray) -> np.ndarray:
-        """Return what vectors (n, 3) that turn with it are in the space of its location."""
-        return vectors if self.turned is None else turned(self.turned, vectors)
-
-    def at(self, indices: np.ndarray) -> Followed:
-        """Return the point as it is followed at some of the poses."""
-        return self if self.turned is None or self.turned.ndim == 2 else self._replace(turned=self.turned[indices])
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +109,11 @@ class DrawnPath:
     pieces: tuple[Piece, ...] = ()
     """What holds it where, in the order of its points; empty for what nothing ever holds."""
 
+    @property
+    def line(self) -> np.ndarray:
+        """The places of the mode, or else of Blender, shape (m, 3)."""
+        return self.native if self.desired is None else self.desired
+
     def at(self, frame: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Return where it is at a frame, natively and in the mode, each of shape (3,). The path holds its ends."""
 
@@ -156,85 +121,6 @@ class DrawnPath:
             return np.array([np.interp(frame, self.frames, column) for column in line.T])
 
         return point(self.native), None if self.desired is None else point(self.desired)
-
-
-def trace(
-    source: KeyedTransform,
-    mode: str | None = None,
-    tick_step: int = 0,
-    axis_length: float = 1.0,
-    selected: np.ndarray | None = None,
-    followed: Followed | None = None,
-    parents: Parents | None = None,
-) -> DrawnPath | None:
-    """Return the path of a source, None where it has fewer than two keys.
-
-    Parameters
-    ----------
-    source : Source
-    mode : str, optional
-        One of `MODE_IDS`, to see what it would do. None for the modes that the segments have.
-    tick_step : int
-        Frames from tick to tick, which are on multiples of it. 0 for as many as can be read.
-    axis_length : float
-        Of the axes at the ticks, in the unit of the channels, at scale 1.
-    selected : array, shape (n,), optional
-        The frames of the keys that are selected.
-    followed : Followed, optional
-        The point that the path is of, where it is not the origin.
-    parents : Parents, optional
-        What carries it, for a path in the space of the world.
-
-    Raises
-    ------
-    ValueError
-        Where the keys make no motion.
-    """
-    if len(source.key_frames) < 2 and source.carried is None:
-        return None
-    first, last = source.seen_range
-    keys = source.keyed_frames
-    ticks = tick_frames(first, last, tick_step)
-    with_axes = axis_frames(ticks)
-    samples = np.unique(np.concatenate((sample_frames(first, last), keys)))
-    frames = np.union1d(samples, ticks)
-    motion = in_betweens(source, frames, mode)
-    on_samples, on_keys, on_ticks, on_axes = (
-        np.searchsorted(frames, desired_frames) for desired_frames in (samples, keys, ticks, with_axes)
-    )
-    is_native = not source.is_live if mode is None else mode == "BLENDER"
-    shown = motion.native if is_native else motion.desired
-    spaces = None
-    if parents is not None:
-        spaces, turns = parents.spaces(frames)
-        followed = None if followed is None else followed._replace(turned=turns)
-    native, desired = (_points(poses, followed, spaces) for poses in (motion.native, motion.desired))
-    return DrawnPath(
-        frames=samples,
-        native=native[on_samples],
-        desired=None if is_native else desired[on_samples],
-        key_frames=keys,
-        keys=native[on_keys],
-        selected=np.isin(keys, () if selected is None else selected),
-        tick_frames=ticks,
-        native_ticks=native[on_ticks],
-        desired_ticks=None if is_native else desired[on_ticks],
-        axis_frames=with_axes,
-        axes=_axes(
-            (native if is_native else desired)[on_axes],
-            shown[on_axes],
-            axis_length,
-            None if followed is None else followed.at(on_axes),
-            None if spaces is None else spaces[on_axes],
-        ),
-        in_world=spaces is not None,
-    )
-
-
-def _points(poses: Poses, followed: Followed | None, spaces: AffineMaps | None) -> np.ndarray:
-    """Return where the point that a path is of is at poses (n,), in these spaces."""
-    points = poses.positions if followed is None else followed.points(poses)
-    return points if spaces is None else spaces.at(points)
 
 
 def sample_frames(first: int, last: int) -> np.ndarray:
@@ -269,21 +155,6 @@ def _round_step(length: int, most: int) -> int:
     return next(step for step in TICK_STEPS_FRAMES if length <= most * step)
 
 
-def _axes(
-    points: np.ndarray, poses: Poses, length: float, followed: Followed | None, spaces: AffineMaps | None
-) -> np.ndarray:
-    """Return both ends of the local axes at each pose, from these points on, shape (n, 3, 2, 3)."""
-    lengths = np.full(len(poses), length) if poses.scales is None else length * poses.scales
-    strokes = lengths[:, None, None] * rotate(poses.quaternions[:, None], np.eye(3))
-    for axis in range(3):
-        if followed is not None:
-            strokes[:, axis] = followed.strokes(strokes[:, axis])
-        if spaces is not None:
-            strokes[:, axis] = turned(spaces.axes, strokes[:, axis])
-    starts = np.broadcast_to(points[:, None], strokes.shape)
-    return np.stack((starts, starts + strokes), axis=2)
-
-
 def thinned(line: np.ndarray) -> np.ndarray:
     """Return the points of a line without those that make no visible difference, shape (fewer, 3).
 
@@ -304,31 +175,6 @@ def thinned(line: np.ndarray) -> np.ndarray:
         if stays.all():
             return line
         line = line[stays]
-
-
-def axis_length_of_object(obj: bpy.types.Object, source: KeyedTransform) -> float:
-    """Return how long to draw an object's local axes: half as long as it is. At scale 1,
-    where the source has a scale.
-    """
-    drawn = drawn_size(obj)
-    size: np.ndarray = np.full(3, drawn) if drawn else 0.5 * np.ptp(np.array(obj.bound_box), axis=0)
-    if not source.uniform_scale:
-        size *= np.abs(np.array(obj.scale) * np.array(obj.delta_scale))
-    return float(size.max()) or 1.0
-
-
-def space_of_object(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
-    """Return the matrix from the space of an object's channels into the world, as its parent is on the current frame.
-
-    For a parent that is an object: that one's evaluated matrix, and the inverse at parenting. For a bone, vertices or a
-    lattice: what takes the object's evaluated location, rotation and scale to where it is seen, constraints included.
-    """
-    if obj.parent is None:
-        return Matrix.Identity(4)
-    if obj.parent_type == "OBJECT":
-        return obj.parent.evaluated_get(depsgraph).matrix_world @ obj.matrix_parent_inverse
-    evaluated = obj.evaluated_get(depsgraph)
-    return evaluated.matrix_world @ evaluated.matrix_basis.inverted_safe()
 
 
 @dataclass(frozen=True, eq=False)

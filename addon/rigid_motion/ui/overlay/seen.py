@@ -1,85 +1,175 @@
-"""Where something is seen on any frames, in the world, once for all that draws more of it than its path."""
+"""Where something with keys is seen on any frames: for its path, its ghosts, and all else that is drawn of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
-import bpy
 import numpy as np
 
 from ...animation.baking.motions import shown
-from ...animation.evaluation.components import MODE_NUMBERS
+from ...animation.evaluation.components import LOCATION, MODE_NUMBERS
 from ...animation.evaluation.sources import KeyedTransform
 from ...animation.transforms import Transform
-from ...blender import existing
 from ...motion.affine import AffineMaps
-from .cache import paths_of
-from .ghosts import in_space_of_path
-from .held import HolderMotion, carrier_of
-from .kinds import axis_length_of, followed, space_of
-from .parents import CarriedTargets, Parents, maps_of
-from .points import DrawnPath
+from .ghosts import Ghosts, ghost_frames, matrices_of
+from .kinds import Space, axis_length_of
+from .parents import CarriedTargets, Parents, follows_keys, identity, maps_of
+from .points import DrawnPath, Piece, axis_frames, sample_frames, tick_frames
+from .records import PlaceRecord
 
 MAX_FRAMES = 4096
 """The most frames that it is looked at on, in even steps."""
 
 
-def seen_paths(targets: Sequence[Transform], context: Any) -> list[DrawnPath | None]:
-    """Return the paths of targets as the viewports draw them; None where one has none, or is refused."""
-    turned = {target: space_of(target, context.view_layer.depsgraph)[1] for target in targets}
-    return paths_of(targets, context.scene, turned)
-
-
-@dataclass(frozen=True, eq=False)
 class SeenMotion:
-    """Something with keys in its Action, and what carries it."""
+    """Something with keys in its Action, where these and what carries it have it.
 
-    target: Transform
-    source: KeyedTransform
-    carrier: HolderMotion | Parents | None
-    """What holds it or carries it, where that moves."""
+    Places are in the space of its path: the world, where it is carried by what moves by keys alone; or else that of its
+    channels, which is as it is on the current frame.
 
-    space: tuple[AffineMaps, np.ndarray | None]
-    """The map from the space of its channels into the world, and what is between its rotation and that."""
+    Parameters
+    ----------
+    target : Transform
+    source : Source
+    carried : Carried
+        That of all targets that are looked at together.
+    space : Space
+        What its channels are in on the current frame.
+    """
 
-    @classmethod
-    def of(cls, target: Transform, depsgraph: bpy.types.Depsgraph) -> SeenMotion:
-        """Return the motion of a target that has a path."""
-        carried = CarriedTargets()
-        source = existing(carried.read([target])[target][1])
-        space, turn = space_of(target, depsgraph)
-        return cls(target, source, carrier_of(target, source, carried), (maps_of(space), turn))
+    records: tuple[tuple[PlaceRecord, int], ...] = ()
+    """What is known as it was seen alone, and how often that has changed."""
+
+    jumps: tuple[float, ...] = ()
+    """Frames on which it may be in another place than on those next to them."""
+
+    def __init__(self, target: Transform, source: KeyedTransform, carried: CarriedTargets, space: Space) -> None:
+        self.target, self.source, self._parents = target, source, Parents(target, carried)
+        self.in_world = follows_keys(target, self._parents)
+        self.space = identity() if self.in_world else maps_of(space.matrix)
+        """The map from the space of its path into the world."""
+        self._turn = space.turn
+        self.carriers = self._parents.carriers
+        """All that carries it at any time, as far as that moves by keys."""
+        self.ids = frozenset(self._parents.ids if self.in_world else ())
+        """Session ids of the data-blocks that decide on where it is carried."""
+        self.point = np.array(target.motion.lead)
+        """The point on its own axes that its path is of, shape (3,)."""
+        if target.is_part and not self.point.any():
+            bone = target.pose_bone.bone
+            self.point[1] = bone.length * (LOCATION not in source.keyed or bone.use_connect)
+
+    @property
+    def has_path(self) -> bool:
+        """Return whether it has the two keys that a path needs, or is carried along as it rests."""
+        return len(self.source.key_frames) > 1 or self.source.carried is not None
 
     @property
     def range(self) -> tuple[int, int]:
-        return self.carrier.range if isinstance(self.carrier, HolderMotion) else self.source.seen_range
+        """The first and last whole frame of its path."""
+        return self.source.seen_range
 
     @property
-    def size(self) -> float:
-        """About how far it reaches from its origin."""
-        return axis_length_of(self.target, self.source)
+    def digest(self) -> tuple:
+        """Differs wherever anything differs that decides where it is carried."""
+        return self._parents.digest if self.in_world else ()
 
     def frames(self, per_frame: int = 1) -> np.ndarray:
         """Return frames from the first to the last, so many in each where these are not too many."""
         first, last = self.range
         return np.linspace(first, last, min(per_frame * (last - first), MAX_FRAMES) + 1)
 
-    def maps(self, frames: np.ndarray, mode: str | None = None) -> AffineMaps:
-        """Return where it is in the world on rising frames (n,). ValueError where its numbers make no motion.
+    def spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
+        """Return what `Parents.spaces` does, into the space of the path."""
+        if self.in_world:
+            return self._parents.spaces(frames)
+        turn = None if self._turn is None else np.broadcast_to(self._turn, (len(frames), 3, 3))
+        return identity(len(frames)), turn
 
-        `mode` is in place of those of its segments. Its origin is the point that its path is of.
+    def places(self, frames: np.ndarray, mode: str | None = None) -> AffineMaps:
+        """Return where it is on rising frames (n,). ValueError where its numbers make no motion.
+
+        `mode` is in place of those of its segments.
         """
-        if isinstance(self.carrier, HolderMotion):
-            return self.carrier.maps(frames, mode)
-        source = self.source if mode is None else replace(self.source, mode=MODE_NUMBERS[mode])
-        maps, (spaces, turn) = shown(self.target, source, frames)[1], self.space
-        if self.carrier is not None:
-            spaces, turn = self.carrier.spaces(frames)
-        result = spaces @ in_space_of_path(self.target, maps, turn)
-        point = np.array(self.target.motion.lead)
-        followed_point = followed(self.target, self.source, None)
-        if self.target.is_part and not existing(followed_point).moves and not point.any():
-            point[1] = self.target.pose_bone.bone.length
-        return AffineMaps(result.axes, result.at(point))
+        return self._placed(self.source, frames, mode, *self.spaces(frames))
+
+    def _placed(
+        self,
+        source: KeyedTransform,
+        frames: np.ndarray,
+        mode: str | None,
+        spaces: AffineMaps,
+        turns: np.ndarray | None,
+    ) -> AffineMaps:
+        """Return where the channels of a source put it on frames (n,) in these spaces, see `Parents.spaces`."""
+        if mode is not None:
+            source = replace(source, mode=MODE_NUMBERS[mode])
+        maps = shown(self.target, source, frames)[1]
+        origins = maps.origins
+        if self.target.is_part and self.target.pose_bone.bone.use_connect and self.target.pose_bone.parent:
+            origins = np.zeros_like(origins)
+        return spaces @ AffineMaps(maps.axes if turns is None else turns @ maps.axes, origins)
+
+    def at_point(self, frames: np.ndarray, mode: str | None = None) -> AffineMaps:
+        """Return what `places` does, with the point that its path is of for an origin."""
+        maps = self.places(frames, mode)
+        return AffineMaps(maps.axes, maps.at(self.point))
+
+    def holders_at(self, _frames: np.ndarray) -> np.ndarray | None:
+        """Return the numbers of what holds it on frames (n,), see `points.Piece`; None for what nothing ever holds."""
+        return None
+
+    def pieces(self, _frames: np.ndarray) -> tuple[Piece, ...]:
+        """Return the pieces of a path of points on frames (n,)."""
+        return ()
+
+    def trace(
+        self, mode: str | None = None, tick_step: int = 0, axes_size: float = 1.0, selected: np.ndarray | None = None
+    ) -> DrawnPath | None:
+        """Return its path, None where it is a single point. ValueError where its numbers make no motion.
+
+        Parameters
+        ----------
+        mode : str, optional
+            One of `MODE_IDS`, to see what it would do. None for the modes that the segments have.
+        tick_step : int
+            Frames from tick to tick, which are on multiples of it. 0 for as many as can be read.
+        axes_size : float
+            Of the axes at the ticks. At 1 they are half as long as it is.
+        selected : array, shape (n,), optional
+            The frames of the keys that are selected.
+        """
+        first, last = self.range
+        if first == last:
+            return None
+        keys, ticks = self.source.keyed_frames, tick_frames(first, last, tick_step)
+        samples = np.unique(np.concatenate((sample_frames(first, last), keys, self.jumps)))
+        frames = np.union1d(samples, ticks)
+        on_samples, on_keys, on_ticks, on_axes = (
+            np.searchsorted(frames, some) for some in (samples, keys, ticks, axis_frames(ticks))
+        )
+        is_native = not self.source.is_live if mode is None else mode == "BLENDER"
+        native = self.at_point(frames, "BLENDER")
+        desired = native if is_native else self.at_point(frames, mode)
+        axes, length = desired[on_axes], axes_size * axis_length_of(self.target)
+        ends = axes.origins[:, None] + length * np.moveaxis(axes.axes, -1, 1)
+        return DrawnPath(
+            frames=samples,
+            native=native.origins[on_samples],
+            desired=None if is_native else desired.origins[on_samples],
+            key_frames=keys,
+            keys=desired.origins[on_keys],
+            selected=np.isin(keys, () if selected is None else selected),
+            tick_frames=ticks,
+            native_ticks=native.origins[on_ticks],
+            desired_ticks=None if is_native else desired.origins[on_ticks],
+            axis_frames=frames[on_axes],
+            axes=np.stack((np.broadcast_to(axes.origins[:, None], ends.shape), ends), axis=2),
+            in_world=self.in_world,
+            pieces=self.pieces(samples),
+        )
+
+    def ghosts(self, step: int, mode: str | None) -> Ghosts:
+        """Return where it is on `ghost_frames`. ValueError where its numbers make no motion."""
+        frames = ghost_frames(*self.range, step, self.source.keyed_frames)
+        return Ghosts(frames, matrices_of(self.places(frames, mode)), self.holders_at(frames))

@@ -30,12 +30,11 @@ def arms_of(path: DrawnPath) -> tuple[np.ndarray, np.ndarray]:
     By a frame, from the samples beside keys; and the ways to the nearest samples, which have a direction also where the
     body comes to rest; each (k, 2, 3). They are NaN where there is no path.
     """
-    line = path.native if path.desired is None else path.desired
     at = np.searchsorted(path.frames, path.key_frames)
     steps = at[:, None, None] + np.array((-1, 1))[:, None] * SAMPLES_BESIDE_KEY
-    within = np.clip(steps, 0, len(line) - 1)
+    within = np.clip(steps, 0, len(path.line) - 1)
     times = np.abs(path.frames[within] - path.key_frames[:, None, None])
-    ways = np.where((steps == within)[..., None], line[within] - line[at][:, None, None], np.nan)
+    ways = np.where((steps == within)[..., None], path.line[within] - path.line[at][:, None, None], np.nan)
     # The slope of the cubic through the key and three samples.
     apart = times[..., None] - times[..., None, :] + np.eye(len(SAMPLES_BESIDE_KEY))
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import bpy
 import numpy as np
@@ -19,12 +19,12 @@ from ...animation import Refused
 from ...animation.edits.path_keys import KeySpaces, select_keys
 from ...animation.evaluation.marks import near
 from ...animation.transforms import Transform
-from ...blender import Operator, Returned, existing
+from ...blender import Operator, Returned, existing, view_layer
 from ..overlay import cache
 from ..overlay.drawing import redraw
-from ..overlay.held import HolderMotion, is_held
+from ..overlay.held import motion_of
 from ..overlay.kinds import space_of
-from ..overlay.parents import CarriedTargets, Parents, identity, maps_of
+from ..overlay.parents import CarriedTargets, maps_of
 from ..overlay.points import DrawnPath, on_screen
 from ..overlay.settings import is_shown, overlay_settings
 from .proportional import falloff
@@ -61,7 +61,7 @@ class Handles:
     def nearest_moment(self, context: Any, place: np.ndarray) -> tuple[float, float]:
         """Return how far from a place on the screen its path is, in pixels, and the frame where it is so near."""
         path = self.path
-        line = _on_screen(context, self.in_world(path.native if path.desired is None else path.desired))
+        line = _on_screen(context, self.in_world(path.line))
         chords, away = np.diff(line, axis=0), place - line[:-1]
         lengths = np.einsum("ij,ij->i", chords, chords)
         shares = np.clip(np.einsum("ij,ij->i", away, chords) / np.where(lengths > 0.0, lengths, 1.0), 0.0, 1.0)
@@ -129,29 +129,20 @@ def spaces(
     """Return what the channels of keys are in, from their frames and weights, (n,) each; without those, if these are
     to be left, whose parent or holder has one on the same frame, which carries them along.
     """
-    carried, depsgraph = CarriedTargets(), existing(bpy.context.view_layer).depsgraph
+    carried, depsgraph = CarriedTargets(), existing(view_layer().depsgraph)
     frames = {one.target: at for one, (at, _) in keys.items()}
     result = {}
     for one, (at, weights) in keys.items():
         target = one.target
-        _, source = carried.read((target,))[target]
-        held = HolderMotion(target, source, carried) if source is not None and is_held(source) else None
-        above = Parents(target, carried) if held is None else held
-        for carrier in above.carriers & frames.keys() if leave_carried else ():
+        source = existing(carried.read((target,))[target][1])
+        motion = motion_of(target, source, carried, space_of(target, depsgraph))
+        for carrier in motion.carriers & frames.keys() if leave_carried else ():
             stays = ~near(at, frames[carrier])
             at, weights = at[stays], weights[stays]
-        if not len(at):
-            continue
-        turns: np.ndarray | None
-        if held is not None:
-            maps, turns = held.spaces(at)
-        elif one.path.in_world:
-            maps, turns = cast(Parents, above).spaces(at)
-        else:
-            space, turn = space_of(target, existing(depsgraph))
-            maps, turns = identity(len(at)) @ maps_of(space), None if turn is None else turn[None].repeat(len(at), 0)
-        points = one.in_world(one.path.keys)[near(one.path.key_frames, at)]
-        result[target] = KeySpaces(at, maps, turns, points, weights)
+        if len(at):
+            maps, turns = motion.spaces(at)
+            points = one.in_world(one.path.keys)[near(one.path.key_frames, at)]
+            result[target] = KeySpaces(at, motion.space @ maps, turns, points, weights)
     return result
 
 

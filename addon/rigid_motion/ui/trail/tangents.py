@@ -63,10 +63,9 @@ NO_ROOM = n_("{name} has no frame between the keys for one that bends the path: 
 def draw(pen: Pen, _: Transform, path: DrawnPath, _frame: float, overlay: RigidMotionOverlay) -> None:
     """Draw the handles of a path, and while keys are dragged the range of Proportional Editing, in its space."""
     if Dragging.shown_reach and path.selected.any():
-        line = path.native if path.desired is None else path.desired
         away = np.abs(path.frames[:, None] - path.key_frames[path.selected]).min(axis=1)
         within = (away[:-1] <= Dragging.shown_reach) & (away[1:] <= Dragging.shown_reach)
-        pieces = np.stack((line[:-1][within], line[1:][within]), axis=1).reshape(-1, 3)
+        pieces = np.stack((path.line[:-1][within], path.line[1:][within]), axis=1).reshape(-1, 3)
         pen.line(batch_of("LINES", pieces), RANGE_COLOUR, RANGE_WIDTH_PX)
     if not is_shown(path, overlay):
         return
