@@ -16,7 +16,6 @@ from bpy.app.translations import contexts
 import rigid_motion
 from rigid_motion import ui
 from rigid_motion.animation import properties
-from rigid_motion.ui.overlay.settings import RigidMotionOverlay
 from rigid_motion.ui.wording import LABELS, OWN_WORDS
 
 PACKAGE = Path(rigid_motion.__file__).parent
@@ -41,7 +40,7 @@ DRAWN = {
 }
 """Functions that translate a literal they are given: under which name, and its context."""
 
-CLASSES = (*ui.CLASSES, *properties.CLASSES, RigidMotionOverlay)
+CLASSES = (*ui.CLASSES, *properties.CLASSES)
 
 
 def messages() -> set[Message]:

@@ -37,48 +37,25 @@ from . import (
     trail,
 )
 
-CLASSES: tuple[type[Any], ...] = (
-    *preferences.CLASSES,
-    *operators.CLASSES,
-    *breakdown.CLASSES,
-    *reducing.CLASSES,
-    *cleaning.CLASSES,
-    *holding.CLASSES,
-    *speed.CLASSES,
-    *deviations.CLASSES,
-    *overlay.CLASSES,
-    *trail.CLASSES,
-    *gltf_export.CLASSES,
-    *menus.CLASSES,
-    *panels.CLASSES,
-    *live.CLASSES,
+MODULES = (
+    *(overlay, preferences, operators, breakdown, reducing, cleaning, holding, speed, deviations, trail, gltf_export),
+    *(menus, panels, live, keymap, manual),
 )
+CLASSES: tuple[type[Any], ...] = tuple(cls for module in MODULES for cls in getattr(module, "CLASSES", ()))
 
 
 def register() -> None:
-    overlay.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    holding.register()
-    speed.register()
-    deviations.register()
-    live.register()
-    trail.register()
-    menus.register()
-    keymap.register()
-    manual.register()
+    for module in MODULES:
+        if hasattr(module, "register"):
+            module.register()
     preferences.apply()
 
 
 def unregister() -> None:
-    manual.unregister()
-    keymap.unregister()
-    menus.unregister()
-    trail.unregister()
-    live.unregister()
-    deviations.unregister()
-    speed.unregister()
-    holding.unregister()
+    for module in reversed(MODULES):
+        if hasattr(module, "unregister"):
+            module.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
-    overlay.unregister()

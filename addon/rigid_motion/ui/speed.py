@@ -22,6 +22,7 @@ from ..animation.queries.polls import with_more_keys_than
 from ..animation.queries.segments import frame_in_action
 from ..animation.transforms import OWN_WORDS, Transform
 from ..blender import BoolProperty, EnumProperty, Returned, existing, with_properties
+from ..handlers import append_drawing, remove_drawing
 from ..motion.speeds import ways_and_turns
 from .overlay import overlay_settings
 from .overlay.cache import path_of
@@ -220,15 +221,10 @@ class RIGID_MOTION_OT_equalise_speed(OnTargets):
 
 CLASSES = (RIGID_MOTION_OT_equalise_speed,)
 
-_handle: object = None
-
 
 def register() -> None:
-    global _handle
-    if not bpy.app.background:
-        _handle = bpy.types.SpaceGraphEditor.draw_handler_add(draw, (), "WINDOW", "POST_PIXEL")
+    append_drawing(bpy.types.SpaceGraphEditor, draw, "POST_PIXEL")
 
 
 def unregister() -> None:
-    if not bpy.app.background:
-        bpy.types.SpaceGraphEditor.draw_handler_remove(_handle, "WINDOW")
+    remove_drawing(bpy.types.SpaceGraphEditor, draw)

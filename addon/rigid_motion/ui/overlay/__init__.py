@@ -21,28 +21,21 @@ from . import cache, cleaned, drawing, ghost_bodies, ghost_drawing
 from .settings import RIGID_MOTION_OT_update_path, RigidMotionOverlay, draw_settings, draw_toggle, overlay_settings
 
 POPOVER = "VIEW3D_PT_overlay_object"
-CLASSES = (RIGID_MOTION_OT_update_path,)
+CLASSES = (RigidMotionOverlay, RIGID_MOTION_OT_update_path)
+MODULES = (cache, drawing, ghost_bodies, ghost_drawing, cleaned)
 
 __all__ = ["CLASSES", "draw_settings", "overlay_settings", "register", "unregister"]
 
 
 def register() -> None:
-    bpy.utils.register_class(RigidMotionOverlay)
     setattr(bpy.types.Scene, cache.OVERLAY, PointerProperty(type=RigidMotionOverlay))
     getattr(bpy.types, POPOVER).append(draw_toggle)
-    cache.register()
-    drawing.register()
-    ghost_bodies.register()
-    ghost_drawing.register()
-    cleaned.register()
+    for module in MODULES:
+        module.register()
 
 
 def unregister() -> None:
-    cleaned.unregister()
-    ghost_drawing.unregister()
-    ghost_bodies.unregister()
-    drawing.unregister()
-    cache.unregister()
+    for module in reversed(MODULES):
+        module.unregister()
     getattr(bpy.types, POPOVER).remove(draw_toggle)
     delattr(bpy.types.Scene, cache.OVERLAY)
-    bpy.utils.unregister_class(RigidMotionOverlay)

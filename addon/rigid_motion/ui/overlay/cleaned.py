@@ -13,15 +13,13 @@ import numpy as np
 
 from ...animation import Cleaning
 from ...blender import persistent
-from ...handlers import append_handlers, remove_handlers
+from ...handlers import append_drawing, append_handlers, remove_drawing, remove_handlers
 from .drawing import TICK_DIAMETER_PX, Pen, batch_of
 
 OPERATOR = "RIGID_MOTION_OT_clean_motion"
 
 _cleanings: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
 """Paths before and after (t, m, 3), and which of their places were bridged (t, m)."""
-
-_handle: object = None
 
 
 def show(cleanings: Iterable[Cleaning]) -> None:
@@ -58,14 +56,11 @@ HANDLERS = {"undo_post": _forget, "load_post": _forget}
 
 
 def register() -> None:
-    global _handle
     append_handlers(HANDLERS)
-    if not bpy.app.background:
-        _handle = bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", "POST_VIEW")
+    append_drawing(bpy.types.SpaceView3D, draw)
 
 
 def unregister() -> None:
-    if not bpy.app.background:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
+    remove_drawing(bpy.types.SpaceView3D, draw)
     remove_handlers(HANDLERS)
     _cleanings.clear()

@@ -23,6 +23,7 @@ from mathutils import Vector
 from ...animation.queries.segments import frame_in_action
 from ...animation.transforms import Transform
 from ...blender import existing
+from ...handlers import append_drawing, remove_drawing
 from ..holding import hue_of
 from ..preferences import DEFAULT_LOOK, Color, preferences
 from ..targets import selected_in_view
@@ -323,22 +324,17 @@ DRAWN_SPACES = (
 )
 """The editors, what is called when one is drawn, and when."""
 
-_handles: list[tuple[type[bpy.types.Space], object]] = []
-"""Handles that Blender knows those by."""
-
 _complaint = ""
 """The last problem."""
 
 
 def register() -> None:
-    if not bpy.app.background:
-        for space, draw, moment in DRAWN_SPACES:
-            _handles.append((space, space.draw_handler_add(draw, (), "WINDOW", moment)))
+    for drawing in DRAWN_SPACES:
+        append_drawing(*drawing)
 
 
 def unregister() -> None:
-    for space, handle in _handles:
-        space.draw_handler_remove(handle, "WINDOW")
-    _handles.clear()
+    for space, draw, _ in DRAWN_SPACES:
+        remove_drawing(space, draw)
     _batches.clear()
     _dot_shader.cache_clear()

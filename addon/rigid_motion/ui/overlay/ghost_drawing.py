@@ -16,7 +16,7 @@ from mathutils import Matrix
 
 from ...animation.transforms import Transform
 from ...blender import existing, original_uid, persistent, view_layer
-from ...handlers import append_handlers, remove_handlers
+from ...handlers import append_drawing, append_handlers, remove_drawing, remove_handlers
 from ..preferences import Color
 from .drawing import Batch, Pen, batch_of, beside, complain, own_space
 from .ghost_bodies import SeenBody, seen_bodies
@@ -76,20 +76,14 @@ HANDLERS: dict[str, Callable] = {
 }
 
 
-_handle: object = None
-
-
 def register() -> None:
-    global _handle
     append_handlers(HANDLERS)
     beside.append(draw_ghosts)
-    if not bpy.app.background:
-        _handle = bpy.types.SpaceView3D.draw_handler_add(draw_bodies, (), "WINDOW", "POST_VIEW")
+    append_drawing(bpy.types.SpaceView3D, draw_bodies)
 
 
 def unregister() -> None:
-    if not bpy.app.background:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
+    remove_drawing(bpy.types.SpaceView3D, draw_bodies)
     beside.remove(draw_ghosts)
     remove_handlers(HANDLERS)
     forget()
