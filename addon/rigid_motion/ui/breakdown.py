@@ -1,21 +1,17 @@
 """Breakdown, Push and Relax along the mode: Blender's own three for poses, which follow the path of the body.
 
-A factor is dragged with the mouse, as by Blender's Breakdowner: a slider in the header, and its keys. Moving the mouse
-changes the factor, Shift does so finely, Ctrl in steps of a tenth, E lets it go beyond its ends, and digits set it in
-per cent.
+A factor is dragged with the mouse, by the keys of Blender's Breakdowner; the header shows it. Moving the mouse changes
+the factor, Shift does so finely, Ctrl in steps of a tenth, E lets it go beyond its ends, and digits set it in per cent.
 """
 
 from __future__ import annotations
 
 from typing import ClassVar
 
-import blf
 import bpy
-import gpu
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
-from gpu_extras.batch import batch_for_shader
 
 from .. import animation
 from ..animation import Refused
@@ -30,9 +26,6 @@ MOUSE_TRAVEL_PX = 300.0
 
 SHIFT_RATIO, CTRL_STEP = 0.1, 0.1
 """The part of a movement that Shift leaves, and the steps of Ctrl."""
-
-LINE_COLOUR, HANDLE_COLOUR, TEXT_COLOUR = (0.8, 0.8, 0.8, 0.7), (0.28, 0.45, 0.7, 1.0), (0.95, 0.95, 0.95, 1.0)
-"""Colours, red, green, blue, alpha."""
 
 CONFIRM, CANCEL = {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}, {"RIGHTMOUSE", "ESC"}
 
@@ -80,9 +73,6 @@ class Slider(TypedNumber):
         self.overshoots = False
         """True if the factor may be below 0 and above 1."""
         self._dragged, self._x, self._scale, self._snaps = factor, x, scale, False
-        self._label = ""
-        self._region: bpy.types.Region | None = None
-        self._handler: tuple[type[bpy.types.Space], object, str] | None = None
 
     @property
     def factor(self) -> float:
@@ -112,73 +102,24 @@ class Slider(TypedNumber):
             return self.type(event)
         return True
 
-    def show(self, context: bpy.types.Context, label: str) -> None:
-        """Draw it into a header of the area until it is hidden; the keys are in the status bar."""
-        self._label = label
-        existing(context.area).header_text_set(" ")
-        # Blender takes the texts of a header out where it shows another: the tool header, if there is one.
-        shown = (region for region in existing(context.area).regions if region.height > 1)
-        regions: dict[str, bpy.types.Region] = {region.type: region for region in shown}
-        kind = "TOOL_HEADER" if "TOOL_HEADER" in regions else "HEADER"
-        self._region, space = regions.get(kind), type(existing(context.space_data))
-        self._handler = space, space.draw_handler_add(self._draw, (), kind, "POST_PIXEL"), kind
-        self.tell(context)
-
-    def tell(self, context: bpy.types.Context) -> None:
-        """Bring the status bar and the header up to date."""
+    def tell(self, context: bpy.types.Context, label: str) -> None:
+        """Show it in the header of the area, and the keys in the status bar."""
         overshoot = iface_("On") if self.overshoots else iface_("Off")
         keys = iface_(
             "LMB, Enter: Confirm | Esc, RMB: Cancel | E: Overshoot ({overshoot}) | Ctrl: Steps of 10 % | "
             "Shift: Precision | 0-9: Per Cent"
         ).format(overshoot=overshoot)
-        existing(context.workspace).status_text_set(f"{self._label} {self._number} | {keys}")
-        existing(context.area).tag_redraw()
+        existing(context.area).header_text_set(f"{label} {self._number}")
+        existing(context.workspace).status_text_set(keys)
 
     def hide(self, context: bpy.types.Context) -> None:
         """Give header and status bar back."""
-        if self._handler is not None:
-            space, handle, kind = self._handler
-            space.draw_handler_remove(handle, kind)
-            self._handler = None
         existing(context.workspace).status_text_set(None)
         existing(context.area).header_text_set(None)
 
     @property
     def _number(self) -> str:
         return f"{self.typed} %" if self.typed else f"{100.0 * self.factor:.0f} %"
-
-    def _draw(self) -> None:
-        region, scale = bpy.context.region, self._scale
-        if region is None or region != self._region:
-            return
-        low, high = (-0.25, 1.25) if self.overshoots else (0.0, 1.0)
-        way, y = MOUSE_TRAVEL_PX * scale, 0.5 * region.height
-        left = 0.5 * (region.width - way)
-        gpu.state.blend_set("ALPHA")
-        _draw_box(left + low * way, y - scale, left + high * way, y + scale, LINE_COLOUR)
-        for tick in range(11):
-            x, size = left + 0.1 * tick * way, (6.0 if tick % 5 == 0 else 3.0) * scale
-            _draw_box(x - 0.5 * scale, y - size, x + 0.5 * scale, y + size, LINE_COLOUR)
-        at = left + min(max(self.factor, low), high) * way
-        _draw_box(at - 2.0 * scale, y - 9.0 * scale, at + 2.0 * scale, y + 9.0 * scale, HANDLE_COLOUR)
-        blf.size(0, 11.0 * scale)
-        blf.color(0, *TEXT_COLOUR)
-        beside = 0.25 * way + 12.0 * scale
-        for text, x in (
-            (self._label, left - beside - blf.dimensions(0, self._label)[0]),
-            (self._number, left + way + beside),
-        ):
-            blf.position(0, x, y - 4.0 * scale, 0)
-            blf.draw(0, text)
-        gpu.state.blend_set("NONE")
-
-
-def _draw_box(left: float, bottom: float, right: float, top: float, colour: tuple[float, ...]) -> None:
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    corners = [(left, bottom), (right, bottom), (left, top), (right, top)]
-    batch = batch_for_shader(shader, "TRI_STRIP", {"pos": corners})
-    shader.uniform_float("color", colour)
-    batch.draw(shader)
 
 
 @with_properties
@@ -219,7 +160,7 @@ class _Breakdown(OnTargets):
             return self._finish()
         self._slider = Slider(self.factor, event.mouse_x, existing(context.preferences).system.ui_scale)
         self._breakdowns.apply(self.factor)
-        self._slider.show(context, iface_(self.short, OWN_WORDS))
+        self._slider.tell(context, iface_(self.short, OWN_WORDS))
         existing(context.window_manager).modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -233,7 +174,7 @@ class _Breakdown(OnTargets):
         if self._slider.handle(event) and self._slider.factor != self.factor:
             self.factor = self._slider.factor
             self._breakdowns.apply(self.factor)
-        self._slider.tell(context)
+        self._slider.tell(context, iface_(self.short, OWN_WORDS))
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:

@@ -88,7 +88,7 @@ def typed_beyond(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
-    """By F3, for the bones whose channels are shown; the slider is in its header. A right click cancels."""
+    """By F3, for the bones whose channels are shown; the factor is in its header. A right click cancels."""
     before = snapshot(hand_bone())
     yield from hand.hover(places.centre(places.region(sheet)))
     for ending in ("RET", "RIGHTMOUSE"):

@@ -16,11 +16,13 @@ from ...animation.evaluation.marks import near
 from ...animation.holds.placing import world_matrix
 from ...animation.transforms import Transform, transform_of
 from ...blender import BoolProperty, EnumProperty, FloatProperty, Returned, StringProperty, existing, with_properties
-from ..breakdown import CANCEL, LINE_COLOUR
+from ..breakdown import CANCEL
 from ..overlay.drawing import batch_of
 from ..targets import selected
 from .arms import tangent_under
 from .handles import REACH_PX, Handles, OnPath, handles_of, key_under, select
+
+BOX_COLOUR = (0.8, 0.8, 0.8, 0.7)
 
 KEY_THERE = n_("{name} already has a key on frame {frame:g}")
 
@@ -130,7 +132,7 @@ class RIGID_MOTION_OT_box_path_keys(_Selecting):
         (left, bottom), (right, top) = self._first, self._last
         corners = [(left, bottom, 0), (right, bottom, 0), (right, top, 0), (left, top, 0), (left, bottom, 0)]
         shader: Any = gpu.shader.from_builtin("UNIFORM_COLOR")
-        shader.uniform_float("color", LINE_COLOUR)
+        shader.uniform_float("color", BOX_COLOUR)
         existing(batch_of("LINE_STRIP", np.array(corners))).draw(shader)
 
 
