@@ -9,7 +9,7 @@ wording      labels, texts and lines of a panel           preferences  of the ex
 gltf_export  glTF files with few keys                     live         bodies over a network
 manual       where the documentation is                   cleaning     keys that tremble less
 trail        paths edited in the viewport               speed        how fast things move, and evenly
-deviations   pops and kinks on paths
+deviations   pops and kinks on paths                  mouse_input  what is dragged, and by how much
 """
 
 from __future__ import annotations

@@ -19,43 +19,17 @@ from ..animation.edits.breakdowns import BREAKDOWN, PUSH, RELAX
 from ..animation.queries.polls import with_modes
 from ..animation.transforms import OWN_WORDS, Transform
 from ..blender import FloatProperty, Returned, existing, with_properties
+from .mouse_input import CANCEL, CONFIRM, MouseInput
 from .targets import OnTargets, targets_of
 
 MOUSE_TRAVEL_PX = 300.0
 """Pixels, at a resolution scale of 1, that the mouse goes from 0 to 1."""
 
-SHIFT_RATIO, CTRL_STEP = 0.1, 0.1
-"""The part of a movement that Shift leaves, and the steps of Ctrl."""
-
-CONFIRM, CANCEL = {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}, {"RIGHTMOUSE", "ESC"}
+CTRL_STEP = 0.1
+"""The steps of Ctrl."""
 
 
-def typed_number(text: str) -> float:
-    """Return the number that is being typed."""
-    try:
-        return float(text)
-    except ValueError:  # so far it is a sign or a point alone
-        return 0.0
-
-
-class TypedNumber:
-    """A number that is typed while the mouse moves, which has no say until it is deleted."""
-
-    def __init__(self) -> None:
-        self.typed = ""
-
-    def type(self, event: bpy.types.Event) -> bool:
-        """Take a key that was pressed, and say whether it was one of the number's."""
-        if event.type == "BACK_SPACE":
-            self.typed = self.typed[:-1]
-            return True
-        if event.unicode and event.unicode in "0123456789.,-":
-            self.typed += event.unicode.replace(",", ".")
-            return True
-        return False
-
-
-class Slider(TypedNumber):
+class Slider(MouseInput):
     """A factor, and how mouse and keyboard change it: numbers are per cent.
 
     Parameters
@@ -72,35 +46,26 @@ class Slider(TypedNumber):
         super().__init__()
         self.overshoots = False
         """True if the factor may be below 0 and above 1."""
-        self._dragged, self._x, self._scale, self._snaps = factor, x, scale, False
+        self._dragged, self._x, self._travel = factor, x, MOUSE_TRAVEL_PX * scale
 
     @property
     def factor(self) -> float:
-        if self.typed:
-            return typed_number(self.typed) / 100.0
-        factor = self._dragged if self.overshoots else min(max(self._dragged, 0.0), 1.0)
-        return round(factor / CTRL_STEP) * CTRL_STEP if self._snaps else factor
+        if self.number is not None:
+            return self.number / 100.0
+        factor = self._within(self._dragged)
+        return round(factor / CTRL_STEP) * CTRL_STEP if self.is_stepped else factor
 
-    def handle(self, event: bpy.types.Event) -> bool:
-        """Take an event, and say whether it was for the slider."""
-        self._snaps = event.ctrl
-        if event.type == "MOUSEMOVE":
-            self._dragged += (
-                (event.mouse_x - self._x) / (MOUSE_TRAVEL_PX * self._scale) * (SHIFT_RATIO if event.shift else 1.0)
-            )
-            self._x = event.mouse_x
-            if not self.overshoots:
-                # A mouse that comes back from beyond the end moves the factor at once.
-                self._dragged = min(max(self._dragged, 0.0), 1.0)
-        elif event.type in ("LEFT_CTRL", "RIGHT_CTRL", "LEFT_SHIFT", "RIGHT_SHIFT"):
-            pass
-        elif event.value != "PRESS":
-            return False
-        elif event.type == "E":
-            self.overshoots = not self.overshoots
-        else:
-            return self.type(event)
-        return True
+    def _within(self, factor: float) -> float:
+        return factor if self.overshoots else min(max(factor, 0.0), 1.0)
+
+    def move(self, event: bpy.types.Event, ratio: float) -> None:
+        # A mouse that comes back from beyond the end moves the factor at once.
+        self._dragged = self._within(self._dragged + ratio * (event.mouse_x - self._x) / self._travel)
+        self._x = event.mouse_x
+
+    def press(self, key: str) -> bool:
+        self.overshoots ^= key == "E"
+        return key == "E"
 
     def tell(self, context: bpy.types.Context, label: str) -> None:
         """Show it in the header of the area, and the keys in the status bar."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Quaternion, Vector
 
-from rigid_motion.ui.breakdown import SHIFT_RATIO
+from rigid_motion.ui.mouse_input import SHIFT_RATIO
 from rigid_motion.ui.trail import dragging
 from rigid_motion.ui.trail.dragging import DragInput
 

@@ -25,7 +25,7 @@ from mathutils.geometry import intersect_line_line
 from ...animation import Refused
 from ...animation.edits.path_keys import KeyEdits
 from ...blender import FloatProperty, FloatVectorProperty, Returned, existing, with_properties
-from ..breakdown import CANCEL, CONFIRM, SHIFT_RATIO, TypedNumber, typed_number
+from ..mouse_input import CANCEL, CONFIRM, MouseInput
 from . import proportional
 from .handles import Handles, OnPath, handles_of, key_under, select, selected_spaces
 from .picking import RIGID_MOTION_OT_select_path_keys, mouse_of, pressed_at
@@ -42,7 +42,7 @@ FINE_STEP_RATIO = 0.1
 AXES = "XYZ"
 
 
-class DragInput(TypedNumber):
+class DragInput(MouseInput):
     """What mouse and keyboard say while keys are dragged. `place` is where the mouse is, in pixels of the region."""
 
     def __init__(self, place: np.ndarray) -> None:
@@ -50,29 +50,17 @@ class DragInput(TypedNumber):
         self.first, self.place, self._mouse = place.copy(), place.copy(), place.copy()
         self.axis: int | None = None
         """The axis of the world that is locked, 0 to 2."""
-        self.is_stepped = self.is_fine = False
 
-    @property
-    def number(self) -> float | None:
-        """The number that was typed; None where the mouse has its say."""
-        return typed_number(self.typed) if self.typed else None
+    def move(self, event: bpy.types.Event, ratio: float) -> None:
+        mouse = mouse_of(event)
+        self.place += ratio * (mouse - self._mouse)
+        self._mouse = mouse
 
-    def handle(self, event: bpy.types.Event) -> bool:
-        """Take an event, and say whether it may have changed anything."""
-        self.is_stepped, self.is_fine = event.ctrl, event.shift
-        if event.type == "MOUSEMOVE":
-            mouse = mouse_of(event)
-            self.place += (mouse - self._mouse) * (SHIFT_RATIO if event.shift else 1.0)
-            self._mouse = mouse
-        elif event.type in ("LEFT_CTRL", "RIGHT_CTRL", "LEFT_SHIFT", "RIGHT_SHIFT"):
-            pass
-        elif event.value != "PRESS":
+    def press(self, key: str) -> bool:
+        if key not in AXES:
             return False
-        elif event.type in AXES:
-            axis = AXES.index(event.type)
-            self.axis = None if self.axis == axis else axis
-        else:
-            return self.type(event)
+        axis = AXES.index(key)
+        self.axis = None if self.axis == axis else axis
         return True
 
 

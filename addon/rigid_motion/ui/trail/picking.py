@@ -16,7 +16,7 @@ from ...animation.evaluation.marks import near
 from ...animation.holds.placing import world_matrix
 from ...animation.transforms import Transform, transform_of
 from ...blender import BoolProperty, EnumProperty, FloatProperty, Returned, StringProperty, existing, with_properties
-from ..breakdown import CANCEL
+from ..mouse_input import CANCEL
 from ..overlay.drawing import batch_of
 from ..targets import selected
 from .arms import tangent_under
