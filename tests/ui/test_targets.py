@@ -67,7 +67,7 @@ def test_a_rig_in_object_mode_is_reduced_and_restored_in_every_editor(extension,
         (count,) = {len(key_frames(bone)) for bone in bones}
         said = capfd.readouterr().out
         assert f"7 bones: 630 keys became {7 * count}, largest error " in said
-        assert f", keys on {count} frames" in said
+        assert f"; Frames: {count} with keys" in said
         assert keys.restore_keys() == {"FINISHED"}
         assert not any(map(is_reduced, bones))
 

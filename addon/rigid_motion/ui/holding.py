@@ -6,7 +6,7 @@ objects that are not posed are meant before bones, as by Blender's Ctrl P. All a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any, ClassVar
 
@@ -22,7 +22,7 @@ from ..animation.evaluation.runs import MOST_FRAMES
 from ..animation.holds.holders import Holder, is_ours
 from ..animation.transforms import OWN_WORDS, Transform, transform_of
 from ..blender import BoolProperty, IntProperty, Menu, StringProperty, with_properties
-from .targets import OnTargets, is_posing
+from .targets import OnTargets, each_done, is_posing
 
 Node = bpy.types.Object | bpy.types.PoseBone
 """Something that holds or is held."""
@@ -155,7 +155,7 @@ class _Hold(OnTargets):
     def do(self, context: Any, targets: list[Transform], refused: list[Refused]) -> str:
         frames = self.frames if self.properties.is_property_set("frames") else None
         target, bone = self.holder(context)
-        done = _each(targets, refused, lambda item: animation.hold_in(item, target, bone, frames=frames))
+        done = each_done(targets, refused, lambda item: animation.hold_in(item, target, bone, frames=frames))
         facts = facts_or_none(next(iter(done), None))
         if frames is None and facts is not None:
             # So the redo panel has what was chosen.
@@ -266,7 +266,7 @@ class RIGID_MOTION_OT_match_grip(_OfHeld):
     )
 
     def do(self, context: Any, targets: list[Transform], refused: list[Refused]) -> str:
-        _each(targets, refused, animation.match_grip)
+        each_done(targets, refused, animation.match_grip)
         return rpt_("the grip as before on frame {frame:g}").format(frame=context.scene.frame_current_final)
 
 
@@ -296,21 +296,8 @@ class RIGID_MOTION_OT_pass_frames(_OfHeld):
         return context.window_manager.invoke_props_dialog(self, confirm_text="Pass Over")
 
     def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
-        _each(targets, refused, lambda item: animation.pass_frames(item, self.frames))
+        each_done(targets, refused, lambda item: animation.pass_frames(item, self.frames))
         return rpt_("passed over {frames} frames").format(frames=self.frames)
-
-
-def _each(targets: list[Transform], refused: list[Refused], verb: Callable[[Transform], None]) -> list[Transform]:
-    """Do something to each target, and return those that did not refuse."""
-    done = []
-    for target in targets:
-        try:
-            verb(target)
-        except Refused as refusal:
-            refused.append(refusal)
-        else:
-            done.append(target)
-    return done
 
 
 def _node(node: Node) -> tuple[Any, str]:

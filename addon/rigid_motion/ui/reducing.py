@@ -22,7 +22,7 @@ from ..animation.queries.polls import with_more_keys_than
 from ..animation.transforms import OWN_WORDS, Transform, transform_of
 from ..animation.transforms.sizes import first_tolerance
 from ..blender import BoolProperty, EnumProperty, FloatProperty, IntProperty, Returned, StringProperty, with_properties
-from .targets import OnChanged, OnTargets, each_target, is_posing, selected_in_view, with_bones_of_rigs
+from .targets import OnChanged, OnTargets, each_done, each_target, is_posing, selected_in_view, with_bones_of_rigs
 from .wording import NATIVE_LABEL, hold_lines, labelled, reduction_rows, reduction_summary, split
 
 
@@ -257,13 +257,8 @@ class RIGID_MOTION_OT_reduce_into_holds(OnTargets):
 
     def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
         _, holders = props_and_holders(context)
-        done = []
-        for target in targets:
-            try:
-                animation.reduce_into_holds(target, holders, self.tolerance, self.radius or None, least=self.least)
-                done.append(target)
-            except Refused as refusal:
-                refused.append(refusal)
+        settings: Any = {"tolerance": self.tolerance, "radius": self.radius or None, "least": self.least}
+        done = each_done(targets, refused, lambda item: animation.reduce_into_holds(item, holders, **settings))
         return "; ".join(hold_lines(animation.reduction_of(done))) if done else ""
 
 

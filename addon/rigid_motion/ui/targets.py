@@ -153,6 +153,21 @@ def frames_meant(context: bpy.types.Context, target: Transform, scope: str) -> F
     return (segment.key,)
 
 
+def each_done(
+    targets: Iterable[Transform], refused: list[Refused], verb: Callable[[Transform], object]
+) -> list[Transform]:
+    """Do something to each target, and return those that did not refuse."""
+    done = []
+    for target in targets:
+        try:
+            verb(target)
+        except Refused as refusal:
+            refused.append(refusal)
+        else:
+            done.append(target)
+    return done
+
+
 def grouped_by_frames(
     context: bpy.types.Context, targets: Iterable[Transform], scope: str, refused: list[Refused]
 ) -> dict[Frames, list[Transform]]:
@@ -160,11 +175,11 @@ def grouped_by_frames(
     `refused` takes why others have none.
     """
     groups: dict[Frames, list[Transform]] = {}
-    for target in targets:
-        try:
-            groups.setdefault(frames_meant(context, target, scope), []).append(target)
-        except Refused as refusal:
-            refused.append(refusal)
+    each_done(
+        targets,
+        refused,
+        lambda target: groups.setdefault(frames_meant(context, target, scope), []).append(target),
+    )
     return groups
 
 

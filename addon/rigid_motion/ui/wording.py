@@ -16,7 +16,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..animation import Reduction, WholeRig
+from ..animation import Reduction
 from ..animation.evaluation.components import LOCATION, ROTATION
 from ..animation.properties import MODE_ITEMS
 from ..animation.queries.segments import NEAR_HALF_TURN, SegmentFacts
@@ -120,26 +120,10 @@ def length(scene: bpy.types.Scene, units: float, precision: int = 4) -> str:
 def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
     """Return what became of the keys of a target."""
     error = length(scene, reduction.largest_error, precision=3)
-    summary = rpt_("{before} keys became {after}, largest error {error}").format(
-        before=reduction.before, after=reduction.after, error=error
-    )
-    if reduction.between:
-        summary += rpt_(" on frames, {between} between them").format(
-            between=length(scene, reduction.between, precision=3)
-        )
-    if others := _others(reduction):
-        summary += rpt_("; it takes {others}").format(others=others)
-    before, after = reduction.channel_keys
-    if after > before:
-        summary += rpt_(", but channels have {after} keys in total, before {before}").format(before=before, after=after)
-    if reduction.rig is not None:
-        summary += rpt_(", keys on {frames} frames").format(frames=reduction.rig.frames)
-        if (feet := _slides(scene, reduction.rig)) is not None:
-            summary += rpt_(", feet that stand slide {distance}").format(distance=feet)
-        if bones := reduction.rig.not_promised:
-            text = rpt_("; not guaranteed for bones that follow constraints or drivers, or their children: {bones}")
-            summary += text.format(bones=listed(bones))
-    return summary
+    text = rpt_("{before} keys became {after}, largest error {error}")
+    _, _, *rows = reduction_rows(scene, reduction)
+    more = (f"{label}: {text}" for label, text in rows)
+    return "; ".join((text.format(before=reduction.before, after=reduction.after, error=error), *more))
 
 
 def reduced_to(scene: bpy.types.Scene, reduction: Reduction) -> str:
@@ -170,38 +154,30 @@ def reduction_rows(scene: bpy.types.Scene, reduction: Reduction | None) -> list[
     ]
     if reduction.between:
         rows.append((iface_("Between", OWN_WORDS), iface_("{error} at most").format(error=between)))
-    if others := _others(reduction):
-        rows.append((iface_("Instead", OWN_WORDS), others))
+    text = iface_("{count} keys with {mode}")
+    others = [
+        text.format(count=count, mode=iface_(LABELS.get(mode, NATIVE_LABEL), OWN_WORDS))
+        for mode, count in reduction.needed.items()
+        if mode != reduction.mode
+    ]
+    if others:
+        rows.append((iface_("Instead", OWN_WORDS), ", ".join(others)))
     before, after = reduction.channel_keys
     if after > before:
         rows.append(
             (iface_("Channels", OWN_WORDS), iface_("{before} to {after} keys").format(before=before, after=after))
         )
     if reduction.rig is not None:
-        rows.insert(1, (iface_("Frames", OWN_WORDS), iface_("{frames} with keys").format(frames=reduction.rig.frames)))
-        if (feet := _slides(scene, reduction.rig)) is not None:
-            rows.append((iface_("Feet", OWN_WORDS), iface_("slide {distance}").format(distance=feet)))
+        rows.append((iface_("Frames", OWN_WORDS), iface_("{frames} with keys").format(frames=reduction.rig.frames)))
+        if reduction.rig.slide_before > 0.0:
+            slides = reduction.rig.slide_before, reduction.rig.slide_after
+            before_slide, after_slide = (length(scene, slide, precision=2) for slide in slides)
+            text = iface_("slide {after}, recorded {before}")
+            rows.append((iface_("Feet", OWN_WORDS), text.format(after=after_slide, before=before_slide)))
         if bones := reduction.rig.not_promised:
             # What follows constraints or drivers is somewhere else than its keys say.
             rows.append((iface_("Not Promised", OWN_WORDS), listed(bones)))
     return rows
-
-
-def _others(reduction: Reduction) -> str:
-    """Return how many keys it would have with what else was tried; nothing where nothing was."""
-    text = iface_("{count} keys with {mode}")
-    others = ((mode, count) for mode, count in reduction.needed.items() if mode != reduction.mode)
-    return ", ".join(
-        text.format(count=count, mode=iface_(LABELS.get(mode, NATIVE_LABEL), OWN_WORDS)) for mode, count in others
-    )
-
-
-def _slides(scene: bpy.types.Scene, rig: WholeRig) -> str | None:
-    """Return how far feet slide while they stand; None where none does."""
-    if rig.slide_before <= 0.0:
-        return None
-    before, after = (length(scene, slide, precision=2) for slide in (rig.slide_before, rig.slide_after))
-    return iface_("{after}, recorded {before}").format(after=after, before=before)
 
 
 def listed(items: Sequence[str], most: int = 3) -> str:

@@ -85,8 +85,9 @@ def drawn_paths(targets: Sequence[Transform], context: Any) -> list[tuple[Matrix
     """Return the paths of several targets, with the maps from their spaces into the world."""
     scene, is_playing = context.scene, _plays()
     overlay: Any = getattr(scene, OVERLAY)
+    ghost_step = overlay.frames_between_ghosts if overlay.show_ghosts else 0
     settings = (
-        *(overlay.mode, overlay.tick_step, overlay.axes_size, _ghost_step(overlay)),
+        *(overlay.mode, overlay.tick_step, overlay.axes_size, ghost_step),
         *(scene.frame_start, scene.frame_end),
     )
     spaces = {target: space_of(target, context.view_layer.depsgraph) for target in targets}
@@ -121,12 +122,6 @@ def shown_paths(context: Any) -> list[tuple[Transform, Matrix, DrawnPath]]:
     paths = drawn_paths(targets, context)
     keep_only(len(targets))
     return [(target, *path) for target, path in zip(targets, paths, strict=True) if path is not None]
-
-
-def _ghost_step(overlay: Any) -> int:
-    """Return the frames from ghost to ghost, 0 without any, -1 for those of keys."""
-    step = overlay.ghost_step if overlay.ghosts_on == "STEP" else -1
-    return step if overlay.show_ghosts else 0
 
 
 def _bytes(turn: np.ndarray | None) -> bytes:

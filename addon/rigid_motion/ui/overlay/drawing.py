@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from typing import Any, Literal, cast
+from typing import Any, Literal, NamedTuple, cast
 from weakref import WeakKeyDictionary
 
 import bpy
@@ -28,7 +28,7 @@ from ..holding import hue_of
 from ..preferences import DEFAULT_LOOK, Color, preferences
 from ..targets import selected_in_view
 from . import cache
-from .points import MAX_TICKS, PASSING_HOLDER, DrawnPath, Readable, readable, thinned
+from .points import MAX_TICKS, PASSING_HOLDER, DrawnPath, readable, thinned
 from .settings import RigidMotionOverlay, is_shown, overlay_settings
 
 log = logging.getLogger(__package__)
@@ -48,7 +48,7 @@ MIN_BRIGHTNESS = 0.2
 """A colour of the theme that is darker is meant to be dark."""
 
 MOST_VIEWS = 24
-"""Choices of ticks or axes that stay on the graphics card for each path, while it is looked at from here and there."""
+"""Views whose ticks and axes stay on the graphics card for each path, while it is looked at from here and there."""
 
 
 @functools.cache
@@ -101,6 +101,14 @@ Batch = gpu.types.GPUBatch | None
 """Something on the graphics card; None where there is nothing of the kind."""
 
 
+class _Marks(NamedTuple):
+    """The ticks and axes of a path that can be told apart in a view, on the graphics card."""
+
+    native_ticks: Batch
+    desired_ticks: Batch
+    axes: tuple[Batch, ...]
+
+
 @dataclass(frozen=True)
 class _Batches:
     """A path on the graphics card."""
@@ -114,11 +122,8 @@ class _Batches:
     pieces: tuple[tuple[int, Batch], ...]
     """The pieces of the mode's path, or else of Blender's, by what holds it."""
 
-    views: dict[tuple, Readable] = field(default_factory=dict)
-    """The parts that can be told apart in the views that the path was last seen in."""
-
-    chosen: dict[tuple[str, bytes], tuple[Batch, ...]] = field(default_factory=dict)
-    """Ticks and axes: their name, and which of them can be told apart in a view."""
+    views: dict[tuple, _Marks] = field(default_factory=dict)
+    """The marks in the views that the path was last seen in."""
 
     @classmethod
     def of(cls, path: DrawnPath) -> _Batches:
@@ -134,27 +139,21 @@ class _Batches:
             ),
         )
 
-    def readable(self, pen: Pen, *, every_tick: bool) -> Readable:
+    def marks(self, pen: Pen, *, every_tick: bool) -> _Marks:
         """Return what of the path can be told apart in the view that is being drawn."""
-        projection = np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
+        path, projection = self.path, np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
         view = projection.tobytes(), pen.size, pen.scale, every_tick
         if view not in self.views:
             if len(self.views) >= MOST_VIEWS:
                 self.views.clear()
-            self.views[view] = readable(self.path, projection, pen.size, pen.scale, every_tick=every_tick)
+            chosen = readable(path, projection, pen.size, pen.scale, every_tick=every_tick)
+            desired = None if path.desired_ticks is None else path.desired_ticks[existing(chosen.desired_ticks)]
+            self.views[view] = _Marks(
+                batch_of("POINTS", path.native_ticks[chosen.native_ticks]),
+                None if desired is None else batch_of("POINTS", desired),
+                tuple(batch_of("LINES", path.axes[chosen.axes, axis].reshape(-1, 3)) for axis in range(3)),
+            )
         return self.views[view]
-
-    def some(self, name: str, chosen: np.ndarray) -> tuple[Batch, ...]:
-        """Return some of the ticks that the path has by this name, or of its axes: x, y, z."""
-        key = name, chosen.tobytes()
-        if key not in self.chosen:
-            if len(self.chosen) >= MOST_VIEWS:
-                self.chosen.clear()
-            rows = getattr(self.path, name)[chosen]
-            is_axes = rows.ndim > 2
-            parts = [rows[:, axis].reshape(-1, 3) for axis in range(3)] if is_axes else [rows]
-            self.chosen[key] = tuple(batch_of("LINES" if is_axes else "POINTS", part) for part in parts)
-        return self.chosen[key]
 
 
 Primitive = Literal["POINTS", "LINES", "LINE_STRIP", "TRIS"]
@@ -298,20 +297,18 @@ def _draw_path(pen: Pen, path: DrawnPath, settings: RigidMotionOverlay) -> None:
     if batches is None:
         batches = _batches[path] = _Batches.of(path)
     look = pen.look
-    chosen = batches.readable(pen, every_tick=settings.tick_step > 0)
+    marks = batches.marks(pen, every_tick=settings.tick_step > 0)
     if settings.show_axes:
-        for batch, color in zip(batches.some("axes", chosen.axes), pen.axis_colors, strict=True):
+        for batch, color in zip(marks.axes, pen.axis_colors, strict=True):
             pen.line(batch, color, 0.75 * look.line_width)
     if settings.show_native or batches.desired is None:
         pen.outlined_line(batches.native, look.native_color, 0.6 * look.line_width)
-        (ticks,) = batches.some("native_ticks", chosen.native_ticks)
-        pen.dot(ticks, OUTLINE_COLOUR, TICK_DIAMETER_PX, look.native_color, 1.25)
+        pen.dot(marks.native_ticks, OUTLINE_COLOUR, TICK_DIAMETER_PX, look.native_color, 1.25)
     if batches.desired is not None:
         pen.line(batches.desired, OUTLINE_COLOUR, look.line_width + 2.0)
         for holder, piece in batches.pieces or ((0, batches.desired),):
             pen.line(piece, pen.held_color(holder, look.mode_color), look.line_width)
-        (ticks,) = batches.some("desired_ticks", existing(chosen.desired_ticks))
-        pen.dot(ticks, look.tick_color, TICK_DIAMETER_PX)
+        pen.dot(marks.desired_ticks, look.tick_color, TICK_DIAMETER_PX)
     diameter = KEY_DIAMETER_PX if len(path.keys) <= MAX_TICKS else TICK_DIAMETER_PX
     pen.dot(batches.keys, KEY_COLOUR, diameter)
     pen.dot(batches.selected, look.key_color, diameter)

@@ -95,8 +95,7 @@ def _keys(rig: bpy.types.Object) -> tuple[bytes, np.ndarray]:
 
 def _frames(rig: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
     """Return the frames of the scene that have ghosts."""
-    settings = overlay_settings(scene)
-    step = settings.ghost_step if settings.ghosts_on == "STEP" else -1
+    step = overlay_settings(scene).frames_between_ghosts
     return ghost_frames(scene.frame_start, scene.frame_end, step, _keys(rig)[1])
 
 

@@ -145,6 +145,11 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
         options=set(),
     )
 
+    @property
+    def frames_between_ghosts(self) -> int:
+        """Frames from ghost to ghost, -1 for those of keys."""
+        return self.ghost_step if self.ghosts_on == "STEP" else -1
+
 
 def overlay_settings(scene: bpy.types.Scene | None) -> RigidMotionOverlay:
     return getattr(scene, cache.OVERLAY)
