@@ -6,10 +6,9 @@ import bpy
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import modes_of, set_mode
+from rigid_motion.animation import modes_of
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.animation.transforms.sizes import first_tolerance
-from rigid_motion.ui import menus
 from rigid_motion.ui.targets import (
     KEY_EDITORS,
     SELECTED,
@@ -19,11 +18,9 @@ from rigid_motion.ui.targets import (
     targets_of,
 )
 from tests.animation.scenes import editor
-from tests.rigs.recorded import FRAMES as RECORDED
 from tests.rigs.recorded import recorded_rig
 from tests.ui.conftest import select_keys
 from tests.ui.rigs import FRAMES, keyed_rig, new_rig
-from tests.ui.test_menus import drawn
 
 operators = bpy.ops.rigid_motion
 SCREW = "dq_sclerp"
@@ -97,12 +94,11 @@ def test_a_key_editor_means_the_bones_and_objects_whose_channels_it_shows(rig, k
         assert scope_for(bpy.context) == SELECTED
 
 
-@pytest.mark.parametrize("kind", KEY_EDITORS)
-def test_each_bone_gets_the_mode_from_its_own_selected_keys_on(rig, kind):
+def test_each_bone_gets_the_mode_from_its_own_selected_keys_on(rig):
     select_keys(bone(rig, "Arm"), 1.0)
     select_keys(bone(rig, "Hand"), 11.0, 21.0)
     select_keys(bone(rig, "Hip"), 1.0)
-    with editor(kind) as space:
+    with editor("DOPESHEET_EDITOR") as space:
         space.dopesheet.show_only_selected = True
         operators.set_mode(mode=SCREW)
     assert modes(rig, "Arm") == [SCREW, "BLENDER", "BLENDER"]
@@ -110,41 +106,14 @@ def test_each_bone_gets_the_mode_from_its_own_selected_keys_on(rig, kind):
     assert modes(rig, "Hip") == ["BLENDER"] * 3
 
 
-@pytest.fixture
-def body(extension) -> bpy.types.Object:
-    """A recorded body that is selected as an object, as an import leaves it."""
-    body = recorded_rig()
+def test_key_poses_begin_with_a_larger_tolerance_for_as_long_as_nobody_sets_one(extension, monkeypatch):
+    body, asked = recorded_rig(), []
     body.select_set(True)
-    return body
-
-
-def test_the_tolerance_to_begin_with_is_one_of_the_rigs_size(body):
-    body.scale = (100.0, 100.0, 100.0)
-    bpy.context.view_layer.update()
-    operators.reduce_keys(mode=SCREW)
-    largest = animation.reduction_of(list(body.pose.bones)).largest_error
-    assert 0.001 * max(body.dimensions) < largest < 0.0031 * max(body.dimensions)
-
-
-def test_key_poses_begin_with_a_larger_tolerance_for_as_long_as_nobody_sets_one(body):
-    operators.reduce_keys(mode="motor_spline", shared=True)
-    few = len(animation.key_frames(body.pose.bones["Root"]))
-    assert few < 0.3 * len(RECORDED)
-    operators.restore_keys()
-    offered = first_tolerance(bpy.context.scene, list(map(transform_of, body.pose.bones)), shared=True)
-    operators.reduce_keys(mode="motor_spline", shared=True, tolerance=0.5 * offered)
-    assert len(animation.key_frames(body.pose.bones["Root"])) > few
-    operators.restore_keys()
-    # The redo panel, after Key Poses was switched on: the tolerance stands that own keys were offered.
-    own = first_tolerance(bpy.context.scene, list(map(transform_of, body.pose.bones)))
-    operators.reduce_keys(mode="motor_spline", shared=True, tolerance=own, offered=own)
-    assert len(animation.key_frames(body.pose.bones["Root"])) == few
-
-
-def test_the_menu_of_poses_ticks_the_mode_of_the_active_bone_and_has_a_pie(rig):
-    set_mode(bone(rig, "Arm"), "pga_lerp")
-    set_mode(bone(rig), SCREW)
-    entries = drawn(menus.RIGID_MOTION_MT_view)
-    assert [p.mode for name, icon, p in entries if name == "rigid_motion.set_mode" and icon == "CHECKMARK"] == [SCREW]
-    assert "rigid_motion.copy_mode" in [name for name, *_ in entries]
-    assert [p.name for name, _, p in entries if name == "wm.call_menu_pie"] == ["RIGID_MOTION_MT_pie_view"]
+    monkeypatch.setattr(animation, "reduce_keys_of", lambda *args, **_: asked.append(args[2]))
+    bones = list(map(transform_of, body.pose.bones))
+    own, offered = (first_tolerance(bpy.context.scene, bones, shared=shared) for shared in (False, True))
+    # The last is the redo panel, after Key Poses was switched on: the tolerance stands that own keys were offered.
+    for tolerances in ({}, {"tolerance": 0.5 * offered}, {"tolerance": own, "offered": own}):
+        with pytest.raises(RuntimeError):
+            operators.reduce_keys(shared=True, **tolerances)
+    assert asked == pytest.approx([offered, 0.5 * offered, offered])

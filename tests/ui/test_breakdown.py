@@ -11,7 +11,6 @@ import pytest
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.ui.breakdown import CLASSES, MOUSE_TRAVEL_PX, Slider
-from tests.animation.keyed import curves_of
 from tests.ui.conftest import FRAMES
 
 operators = bpy.ops.rigid_motion
@@ -32,16 +31,6 @@ def test_a_breakdown_is_keyed_by_its_factor(tool):
     expected = interpolate((0.0, 1.0), keys, np.array([0.25]), "dq_sclerp")
     np.testing.assert_allclose(tool.location, expected.positions[0], atol=1e-5)
     assert animation.key_frames(tool).tolist() == sorted([*FRAMES.tolist(), 14.0])
-
-
-def test_a_new_key_has_the_type_that_the_scene_is_set_to(tool):
-    animation.set_mode(tool, "dq_sclerp")
-    bpy.context.scene.frame_set(14)
-    bpy.context.scene.tool_settings.keyframe_type = "BREAKDOWN"
-    operators.breakdown(factor=0.25)
-    for fcurve in curves_of(tool).values():
-        types = [key.type for key in fcurve.keyframe_points]
-        assert types == ["KEYFRAME", "KEYFRAME", "BREAKDOWN", "KEYFRAME", "KEYFRAME"]
 
 
 @pytest.mark.parametrize("cls", CLASSES)

@@ -9,10 +9,8 @@ import pytest
 from rigid_motion.animation import bake_poses, set_mode
 from rigid_motion.motion import Poses
 from rigid_motion.ui.deviations import frames_of
-from rigid_motion.ui.overlay.cache import path_of
 from tests.animation.bones.rigs import select_only
 from tests.animation.scenes import key, new_object, write
-from tests.complaints import complaints
 
 operators = bpy.ops.rigid_motion
 FRAMES = np.arange(1.0, 81.0)
@@ -74,24 +72,3 @@ def test_it_goes_from_one_to_the_next_and_says_where_there_is_none(extension, ca
     assert operators.go_to_deviation(step=-1) == {"CANCELLED"}
     assert "No more deviations in this direction" in capfd.readouterr().out
     assert scene.frame_current == 21
-
-
-def test_they_are_looked_for_anew_after_an_edit_alone(extension, monkeypatch, caplog):
-    from rigid_motion.ui import deviations
-
-    looked = []
-    real = deviations.jumps
-    monkeypatch.setattr(deviations, "jumps", lambda *args: looked.append(1) or real(*args))
-    obj = circling(0.1)
-    frames_of(bpy.context)
-    path = path_of(obj, bpy.context)
-    frames_of(bpy.context)
-    assert len(looked) == 1
-    curve = obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves[0]
-    curve.keyframe_points[29].co.y -= 0.1
-    curve.update()
-    bpy.context.view_layer.update()
-    frames_of(bpy.context)
-    assert len(looked) == 2
-    assert path_of(obj, bpy.context) is not path
-    assert complaints(caplog) == []

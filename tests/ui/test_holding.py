@@ -155,13 +155,6 @@ def test_a_bone_is_held_in_the_active_bone_of_another_rig(extension):
     assert curves_of(blade)['constraints["Held In Hand"].influence', 0].group.name == "Hip"
 
 
-def test_what_follows_it_cannot_hold_it(stage):
-    mug, left, _ = stage
-    left.parent = mug
-    with pytest.raises(RuntimeError, match="Mug cannot be held in Left, which follows it"):
-        operators.hold_in()
-
-
 @pytest.mark.parametrize("name", ["hold_in", "let_go", "match_grip", "pass_frames"])
 def test_one_alone_is_neither_held_nor_let_go(stage, name):
     mug, *_ = stage
@@ -172,7 +165,7 @@ def test_one_alone_is_neither_held_nor_let_go(stage, name):
         getattr(operators, name)()
 
 
-def test_where_it_passes_the_panel_says_how_far_hands_are_apart(stage):
+def test_where_it_passes_the_panel_says_how_far_hands_are_apart_and_sets_over_how_many_frames(stage):
     mug, _, right = stage
     operators.hold_in()
     at(21)
@@ -180,38 +173,30 @@ def test_where_it_passes_the_panel_says_how_far_hands_are_apart(stage):
     operators.hold_in()
     scene = bpy.context.scene
     assert held_in.apart_text(scene, hold_facts(mug)) == "Hands 0 m, 0.0° apart at 21"
+    assert scene.rigid_motion_pass == 4
+    scene.rigid_motion_pass = 9
+    assert hold_facts(mug).frames == scene.rigid_motion_pass == 9
     curves_of(mug)["location", 0].keyframe_points[-1].co.y += 0.032
     bpy.context.view_layer.update()
-    at(20)
+    at(5)
     assert held_in.apart_text(scene, hold_facts(mug)) == ""
     at(21)
     assert held_in.apart_text(scene, hold_facts(mug)) == "Hands 3.2 cm, 0.0° apart at 21"
 
 
-def test_the_number_in_the_panel_is_that_at_the_key(stage):
-    mug, _, right = stage
-    scene = bpy.context.scene
-    operators.hold_in()
-    at(21)
-    hold_in(mug, right)
-    select(active=mug)
-    assert scene.rigid_motion_pass == 4
-    scene.rigid_motion_pass = 9
-    assert hold_facts(mug).frames == scene.rigid_motion_pass == 9
-
-
-def test_that_uneven_scale_shears_what_passes_is_said(stage):
+def test_that_uneven_scale_shears_what_passes_and_far_turns_are_said(stage):
     mug, left, right = stage
     right.scale = (1.0, 2.0, 1.0)
     hold_in(mug, left)
     at(21)
     hold_in(mug, right, frames=4)
-    assert [text[:31] for text in held_in.cautions(transform_of(mug), hold_facts(mug))] == [
-        "Right is scaled unevenly: what "
-    ]
+    prop, facts = transform_of(mug), hold_facts(mug)
+    assert [text[:31] for text in held_in.cautions(prop, facts)] == ["Right is scaled unevenly: what "]
+    text, _ = held_in.cautions(prop, replace(facts, turned=2.2))
+    assert text.startswith("It rotates by 126.1° while it passes")
     left.scale = (3.0, 3.0, 3.0)
     pass_frames(mug, 0)
-    assert list(held_in.cautions(transform_of(mug), hold_facts(mug))) == []
+    assert list(held_in.cautions(prop, hold_facts(mug))) == []
 
 
 def test_what_may_go_wrong_is_said(stage):
@@ -227,15 +212,3 @@ def test_what_may_go_wrong_is_said(stage):
     grows, cycle = sorted(held_in.cautions(prop, hold_facts(mug)), key=len)
     assert grows == "Left has keys of its scale: what it holds grows and shrinks with it"
     assert cycle.startswith("Left now follows Mug, which it holds: a cycle")
-
-
-def test_what_was_turned_far_is_said(stage):
-    mug, _, right = stage
-    operators.hold_in()
-    at(21)
-    hold_in(mug, right, frames=4)
-    facts = hold_facts(mug)
-    prop = transform_of(mug)
-    assert list(held_in.cautions(prop, facts)) == []
-    (text,) = held_in.cautions(prop, replace(facts, turned=2.2))
-    assert text.startswith("It rotates by 126.1° while it passes")

@@ -28,21 +28,6 @@ def test_every_operator_has_a_page(cls, extension):
 
 
 @pytest.mark.parametrize(
-    ("doc_id", "anchor"),
-    [
-        ("RIGID_MOTION_OT_hold_in.frames", "hold-in"),
-        ("rigid_motion.hold_in_known", "hold-in"),
-        ("rigid_motion.let_go", "let-go"),
-        ("rigid_motion.match_grip", "match-grip"),
-        ("RIGID_MOTION_OT_pass_frames.frames", "pass"),
-        ("Scene.rigid_motion_pass", "pass"),
-    ],
-)
-def test_what_holds_things_has_its_own_page(doc_id, anchor, extension):
-    assert page(doc_id) == f"{manual.DOCS}holding.md#{anchor}"
-
-
-@pytest.mark.parametrize(
     "cls",
     [RigidMotion, RigidMotionOverlay, RigidMotionPreferences],
     ids=lambda cls: cls.__name__,

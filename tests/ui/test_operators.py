@@ -14,13 +14,13 @@ from rigid_motion.animation import (
     set_mode,
 )
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion.motion import Poses, interpolate, shell_error
+from rigid_motion.animation.transforms.sizes import first_tolerance
+from rigid_motion.motion import Poses, interpolate
 from rigid_motion.ui import CLASSES, gltf_export, live
 from rigid_motion.ui.operators import axis_of_turns
 from tests.animation.keyed import curves_of, snapshot
 from tests.animation.scenes import new_object
 from tests.ui.conftest import FRAMES, keyed, select_keys
-from tests.world_poses import read_poses
 
 operators = bpy.ops.rigid_motion
 
@@ -102,12 +102,6 @@ def test_without_any_object_an_operator_says_why_not(extension, name):
         operator()
 
 
-def test_what_is_baked_has_keys_on_every_step_and_those_that_there_were(tool):
-    operators.set_mode(mode="dq_sclerp")
-    operators.bake(step=8.0)
-    assert key_frames(tool).tolist() == [1, 9, 11, 17, 21, 25, 33, 41]
-
-
 def refusal_of(name: str) -> str:
     """Why an operator is greyed out; "" where it is not."""
     operator = getattr(operators, name)
@@ -170,70 +164,36 @@ def test_what_has_no_keys_yet_waits_for_them_with_the_mode_that_is_copied(extens
     assert waiting.rigid_motion.mode == "dq_sclerp"
 
 
-@pytest.mark.parametrize("kind", ["REPEAT", "MIRROR"])
-def test_cycles_are_on_all_channels_and_in_front(tool, kind):
+def test_cycles_are_on_all_channels_and_in_front(tool):
     operators.set_mode(mode="dq_sclerp")
-    assert operators.add_cycles(mode=kind) == {"FINISHED"}
+    assert operators.add_cycles(mode="MIRROR") == {"FINISHED"}
     for fcurve in curves_of(tool).values():
         first = fcurve.modifiers[0]
-        assert (first.type, first.mode_before, first.mode_after) == ("CYCLES", kind, kind)
+        assert (first.type, first.mode_before, first.mode_after) == ("CYCLES", "MIRROR", "MIRROR")
     curves_of(tool)["location", 0].modifiers[0].mode_after = "NONE"
     bpy.context.view_layer.update()
     assert "repeats, but its channels differ" in problem_of(tool)
-    assert operators.add_cycles(mode=kind) == {"FINISHED"}
+    assert operators.add_cycles(mode="MIRROR") == {"FINISHED"}
     assert problem_of(tool) == ""
     curves_of(tool)["location", 0].keyframe_points.insert(50.0, 3.0)
     with pytest.raises(RuntimeError, match="first and last keys on the same frames"):
-        operators.add_cycles(mode=kind)
+        operators.add_cycles(mode="MIRROR")
 
 
-RECORDED = np.arange(1.0, 62.0)
-
-
-def recorded(name: str = "Tool", size: float = 1.0) -> bpy.types.Object:
-    """A selected, active object with a key on every frame of a wild motion about a metre wide, times a size."""
-    random = np.random.default_rng(3)
-    keys = Poses(size * random.normal(size=(3, 3)), random.normal(size=(3, 4)))
-    obj = new_object(name)
-    bake_poses(obj, RECORDED, interpolate(RECORDED[[0, 30, 60]], keys, RECORDED, "motor_spline"))
+def recorded() -> bpy.types.Object:
+    """A selected, active object with a key on every frame of a wild motion about a metre wide."""
+    random, frames = np.random.default_rng(3), np.arange(1.0, 62.0)
+    keys = Poses(random.normal(size=(3, 3)), random.normal(size=(3, 4)))
+    obj = new_object("Tool")
+    bake_poses(obj, frames, interpolate(frames[[0, 30, 60]], keys, frames, "motor_spline"))
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
     return obj
 
 
-def test_a_reduction_is_one_step_to_undo(extension):
-    obj = recorded()
-    before = snapshot(obj)
-    bpy.ops.ed.undo_push(message="recording")
-    assert operators.reduce_keys(mode="lerp_slerp", tolerance=0.1, radius=0.5) == {"FINISHED"}
-    bpy.ops.ed.undo_push(message="reduction")
-    assert snapshot(obj) != before
-    bpy.ops.ed.undo()
-    assert snapshot(bpy.data.objects["Tool"]) == before
-
-
-def test_the_tolerance_is_a_millimetre_in_any_unit(extension):
+def test_the_tolerance_to_begin_with_is_a_millimetre_in_any_unit(tool):
     bpy.context.scene.unit_settings.scale_length = 0.01
-    obj = recorded(size=10.0)
-    frames = key_frames(obj)
-    truth = read_poses(obj, frames)
-    operators.reduce_keys(radius=1.0)
-    error = shell_error(read_poses(obj, frames), truth, 1.0).max()
-    assert 0.02 < error < 0.1 * 1.001
-
-
-def test_each_object_has_the_radius_of_its_own_size(extension):
-    sizes = {"Small": 0.01, "Large": 3.0}
-    truths = {}
-    for name, size in sizes.items():
-        obj = recorded(name)
-        obj.empty_display_size = size
-        truths[name] = read_poses(obj, RECORDED)
-    operators.reduce_keys(mode="dq_sclerp", tolerance=0.002)
-    for name, size in sizes.items():
-        obj = bpy.data.objects[name]
-        assert shell_error(read_poses(obj, RECORDED), truths[name], size).max() <= 0.002001
-    assert len(key_frames(bpy.data.objects["Large"])) > len(key_frames(bpy.data.objects["Small"]))
+    assert first_tolerance(bpy.context.scene, [transform_of(tool)]) == pytest.approx(0.1)
 
 
 def test_reduced_keys_are_restored_or_the_others_discarded(extension):

@@ -7,10 +7,8 @@ import logging
 import bpy
 
 from rigid_motion.ui.overlay import drawing
-from tests.animation.bones.rigs import select_bones
 from tests.animation.scenes import key, new_object
 from tests.complaints import complaints
-from tests.ui.rigs import keyed_rig
 
 
 def test_nothing_is_drawn_until_someone_asks_for_it(scene, monkeypatch):
@@ -39,10 +37,3 @@ def test_what_is_wrong_is_told_once_and_never_raised(scene, caplog):
         drawing.draw_paths()
     assert complaints(caplog) == ["The paths could not be drawn"]
     caplog.clear()
-
-
-def test_the_overlay_is_for_the_selected_bones_and_not_for_the_rig(scene):
-    rig = keyed_rig()
-    rig.keyframe_insert("location", frame=1)
-    select_bones(rig, "Hand")
-    assert [bone.name for bone in drawing.selected_in_view(bpy.context)] == ["Hand"]

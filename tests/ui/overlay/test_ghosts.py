@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import bpy
 import numpy as np
 import pytest
@@ -19,18 +21,23 @@ from rigid_motion.ui.overlay.ghosts import (
     octahedron,
     shape_of,
 )
-from tests.animation.bones.rigs import select_bones
+from tests.animation.bones.rigs import in_turn, select_bones
 from tests.animation.scenes import key, new_object
+from tests.ui.overlay.seen import assert_where_it_is_seen
 from tests.ui.rigs import FRAMES, key_bone, new_rig
 
 KEYS = np.array((1.0, 7.5, 41.0))
-from tests.ui.overlay.seen import assert_where_it_is_seen
 
 
-@pytest.mark.parametrize("under", ["nothing", "a table that stands", "a table that moves"])
-@pytest.mark.parametrize("scale", [None, "even", "uneven"])
-@pytest.mark.parametrize("order", ["QUATERNION", "XZY"])
-def test_an_object_is_where_it_is_shown(scene, under, scale, order):
+@pytest.mark.parametrize(
+    ("under", "how"),
+    in_turn(
+        ("nothing", "a table that stands", "a table that moves"),
+        tuple(product((None, "even", "uneven"), ("QUATERNION", "XZY"))),
+    ),
+)
+def test_an_object_is_where_it_is_shown(scene, under, how):
+    scale, order = how
     obj = key(new_object(rotation_mode=order), FRAMES, scale=scale)
     obj.delta_location = (0.3, 0.2, 0.1)
     if scale is None:
@@ -46,13 +53,15 @@ def test_an_object_is_where_it_is_shown(scene, under, scale, order):
     assert path.ghosts.frames.tolist() == list(range(4, 41, 4))
 
 
-OTHERWISE = {"use_local_location": False, "use_inherit_rotation": False, "inherit_scale": "NONE", "use_connect": True}
+SETTINGS = (
+    *({}, {"use_local_location": False}, {"use_inherit_rotation": False}),
+    *({"inherit_scale": "NONE"}, {"use_connect": True}),
+)
 
 
-@pytest.mark.parametrize("setting", [{}, *({name: value} for name, value in OTHERWISE.items())], ids=str)
-@pytest.mark.parametrize("under", ["stands", "moves"])
-@pytest.mark.parametrize("moved", [False, True])
-def test_a_bone_is_where_it_is_shown_by_its_tail_if_nothing_moves_it(scene, setting, under, moved):
+@pytest.mark.parametrize(("setting", "how"), in_turn(SETTINGS, [*product(("stands", "moves"), (False, True))]))
+def test_a_bone_is_where_it_is_shown_by_its_tail_if_nothing_moves_it(scene, setting, how):
+    under, moved = how
     rig = new_rig(**setting)
     rig.pose.bones["Arm"].rotation_quaternion = (0.8, 0.0, 0.0, 0.6)
     for name in ("Hip", "Arm") if under == "moves" else ():

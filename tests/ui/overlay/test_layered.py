@@ -9,6 +9,7 @@ import pytest
 from rigid_motion.animation import add_layer
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.ui.overlay import cache
+from tests.animation.bones.rigs import in_turn
 from tests.animation.layered import key_base, key_influence, key_offset, new
 
 FRAMES = np.arange(1, 41)
@@ -26,8 +27,12 @@ def world_points(carrier) -> np.ndarray:
     return np.array(result)
 
 
-@pytest.mark.parametrize("kind", ["object", "child", "on a bone", "root", "bone"])
-@pytest.mark.parametrize("modes", [("dq_sclerp", "motor_spline"), ("motor_spline", "BLENDER")])
+@pytest.mark.parametrize(
+    ("kind", "modes"),
+    in_turn(
+        ("object", "child", "on a bone", "root", "bone"), (("dq_sclerp", "motor_spline"), ("motor_spline", "BLENDER"))
+    ),
+)
 def test_a_path_is_where_it_is_seen_from_the_first_to_the_last_key_of_the_base(extension, kind, modes):
     carrier = key_base(new(kind, "XYZ"), modes[0])
     bpy.context.scene.frame_set(1)

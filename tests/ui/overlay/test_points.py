@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import cycle
 
 import bpy
 import numpy as np
@@ -14,14 +15,12 @@ from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion.ui.overlay.cache import path_of
 from rigid_motion.ui.overlay.points import (
-    MAX_AXES,
     MAX_PATH_SAMPLES,
     MAX_SAMPLES_PER_FRAME,
     MAX_TICKS,
     MIN_PATH_SAMPLES,
     SMOOTH_EXTENT_WIDTHS,
     DrawnPath,
-    axis_frames,
     sample_frames,
     thinned,
     tick_frames,
@@ -33,7 +32,7 @@ from tests.ui.overlay.seen import assert_where_it_is_seen
 from tests.ui.rigs import new_rig
 
 WHOLE = np.arange(FRAMES[0], FRAMES[-1] + 1)
-ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 
 def on(path: DrawnPath, line: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -55,10 +54,7 @@ def mesh() -> bpy.types.Object:
     return obj
 
 
-@pytest.mark.parametrize(
-    ("mode", "order"),
-    [*((mode, "QUATERNION") for mode in KEYFRAME_MODES), *(("dq_sclerp", order) for order in ORDERS)],
-)
+@pytest.mark.parametrize(("mode", "order"), [*zip(KEYFRAME_MODES, cycle(ORDERS), strict=False)])
 def test_a_modes_path_shows_beforehand_where_the_object_will_be(scene, mode, order):
     obj = key(new_object(rotation_mode=order), scale="even")
     scene.rigid_motion_overlay.mode = mode
@@ -107,30 +103,6 @@ def test_keys_off_whole_frames_are_on_the_path(scene):
         native, expected = path.at(frame)
         assert native == pytest.approx(place, abs=1e-6)
         assert expected == pytest.approx(place, abs=1e-6)
-
-
-def test_selected_keys_are_told_apart(scene):
-    obj = key(new_object())
-    for fcurve in obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
-        for number, point in enumerate(fcurve.keyframe_points):
-            point.select_control_point = number == 2
-    assert path_of(obj, bpy.context).selected.tolist() == [False, False, True, False]
-
-
-@pytest.mark.parametrize("mode", ["CHOSEN", "dq_sclerp"])
-def test_axes_point_where_the_object_is_turned(scene, mode):
-    obj = key(new_object())
-    obj.empty_display_size = 0.5
-    scene.rigid_motion_overlay.mode, scene.rigid_motion_overlay.axes_size = mode, 3.0
-    path = path_of(obj, bpy.context)
-    if mode != "CHOSEN":
-        set_mode(obj, mode)
-    frames = axis_frames(tick_frames(int(FRAMES[0]), int(FRAMES[-1])))
-    shown = shown_worlds([obj], frames)[0]
-    assert 3 < len(frames) == len(path.axes) <= MAX_AXES + 1
-    for axis in range(3):
-        assert path.axes[:, axis, 0] == pytest.approx(shown[:, :3, 3], abs=1e-5)
-        assert path.axes[:, axis, 1] - path.axes[:, axis, 0] == pytest.approx(1.5 * shown[:, :3, axis], abs=2e-5)
 
 
 def test_ticks_are_on_the_same_frames_in_all_paths(scene):
@@ -188,10 +160,10 @@ def test_a_line_that_leads_back_is_not_thinned_to_a_point():
 
 
 def test_a_thinned_line_looks_the_same():
-    turns = np.linspace(0, 3 * math.pi, 4001)
+    turns = np.linspace(0, 3 * math.pi, 1001)
     line = np.stack((np.cos(turns), np.sin(turns), 0.1 * turns), axis=1)
     thin = thinned(line)
-    assert len(thin) < 600
+    assert len(thin) < 300
     assert (thin[[0, -1]] == line[[0, -1]]).all()
     start, chord = thin[:-1], np.diff(thin, axis=0)
     offset = line[:, None] - start

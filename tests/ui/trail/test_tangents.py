@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from types import FunctionType, MethodType, SimpleNamespace
 
 import bpy
@@ -13,6 +14,7 @@ from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.ui.trail.arms import arms_of, frame_rate
 from rigid_motion.ui.trail.handles import handles_of
 from rigid_motion.ui.trail.tangents import RIGID_MOTION_OT_drag_path_tangent
+from tests.animation.bones.rigs import in_turn
 from tests.animation.held import worlds
 from tests.animation.keyed import Carrier, curves_of, snapshot
 from tests.animation.scenes import FRAMES, new_object, write
@@ -61,10 +63,15 @@ def outside(ends: tuple[float, float], frames: np.ndarray = DENSE) -> np.ndarray
     return frames[(frames <= ends[0]) | (frames >= ends[1])]
 
 
-@pytest.mark.parametrize("after", SIDES)
-@pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp", "lerp_slerp"])
-@pytest.mark.parametrize("kind", ["QUATERNION", "XYZ", "with deltas", "parented", "bone"])
-def test_the_path_stays_and_so_does_all_else(scene, kind, mode, after):
+MODES = ("motor_spline", "dq_sclerp", "lerp_slerp")
+
+
+@pytest.mark.parametrize(
+    ("kind", "how"),
+    in_turn(("QUATERNION", "XYZ", "with deltas", "parented", "bone"), tuple(product(MODES, SIDES))),
+)
+def test_the_path_stays_and_so_does_all_else(scene, kind, how):
+    mode, after = how
     carrier = choose(CARRIERS[kind](), MIDDLE)
     stop_parents(carrier)
     set_mode(carrier, mode)
@@ -94,9 +101,10 @@ def handle():
     return one
 
 
-@pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp"])
-@pytest.mark.parametrize("after", SIDES)
-@pytest.mark.parametrize("speed", [0.0, 3.0, 9.0, 12.0])
+@pytest.mark.parametrize(
+    ("mode", "after", "speed"),
+    [("motor_spline", True, 0.0), ("dq_sclerp", False, 3.0), ("motor_spline", False, 9.0), ("dq_sclerp", True, 12.0)],
+)
 def test_a_body_is_as_fast_as_was_asked_for_on_one_side(scene, mode, after, speed):
     tool = arc(mode)
     other, others = velocity(tool, not after), worlds(tool, outside(SIDES[after]))
@@ -125,8 +133,7 @@ def test_a_linear_segment_gets_handles_and_keeps_its_other_speed(scene):
     assert np.diff(worlds(tool, [FRAMES[2] - INSTANT, FRAMES[2]])[:, :3, 3], axis=0) == pytest.approx(before, rel=0.02)
 
 
-@pytest.mark.parametrize("number", range(4))
-@pytest.mark.parametrize("after", SIDES)
+@pytest.mark.parametrize(("number", "after"), [(0, True), (1, False), (2, True), (3, False)])
 def test_what_is_held_is_faster_in_its_hand_alone(scene, number, after):
     prop = held_prop("free")
     keys = key_frames(prop)
@@ -152,8 +159,7 @@ def begun(tool: Carrier, after: bool) -> SimpleNamespace:
     return operator
 
 
-@pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp", "lerp_slerp"])
-@pytest.mark.parametrize("after", SIDES)
+@pytest.mark.parametrize(("mode", "after"), [*zip(MODES, (True, False, True), strict=True)])
 def test_a_path_leaves_its_key_where_the_tangent_is_bent_to(scene, mode, after):
     tool = arc(mode)
     before, keys, others = snapshot(tool), worlds(tool, FRAMES), worlds(tool, outside(SIDES[after]))
