@@ -19,9 +19,9 @@ from rigid_motion.streams import Sender, StreamBody
 from tests.live.performing import BODY, JOINTS, dance, in_world, new_rig
 from tests.rigs.human import human
 
-pytestmark = pytest.mark.network
+pytestmark = [pytest.mark.network, pytest.mark.any_blender]
 
-TIMES = np.arange(270) / 60.0
+TIMES = np.arange(180) / 60.0
 FIRST, BEGINS = 10, 30
 """The frame that a recording begins on, and the sample that is shown then."""
 
@@ -30,8 +30,11 @@ RADIUS = 0.1
 """Of the ball of the tool, whose points are off by the tolerance at most."""
 
 GRIP = Poses([0.1, 0.05, 0.0], [0.6, 0.0, 0.8, 0.0])
-HANDS, TAKES = ("LeftHand", "Head"), (90, 150, 210)
+HANDS, TAKES = ("LeftHand", "Head"), (60, 100, 140)
 """The joints that hold the sword, and the samples from which on these do, and nothing does again."""
+
+PLAYED = np.arange(40, 160)
+"""Samples that a recording surely has."""
 
 SLIP = 2e-6
 """Metres that holding itself may cost."""
@@ -90,7 +93,7 @@ def perform(
 
 
 def frame_of(row: float) -> float:
-    return FIRST + (row / 60.0 - TIMES[BEGINS] + DELAY) * 30
+    return round(FIRST + (row / 60.0 - TIMES[BEGINS] + DELAY) * 30, 9)
 
 
 def seen_sword() -> Poses:
@@ -130,7 +133,7 @@ def influences(obj: bpy.types.Object) -> dict[str, list[tuple[float, float]]]:
     return {one.data_path.split('"')[1]: [tuple(key.co) for key in one.keyframe_points] for one in curves}
 
 
-@pytest.mark.parametrize("mode", ["BLENDER", "lerp_slerp", "motor_spline"])
+@pytest.mark.parametrize("mode", ["BLENDER", "motor_spline"])
 def test_what_was_held_has_keys_in_the_hands_and_stays_in_them_when_they_are_edited(live, sent, clock, mode):
     live.armature, live.mode = (rig := new_rig()), mode
     perform(sent, clock)
@@ -141,14 +144,16 @@ def test_what_was_held_has_keys_in_the_hands_and_stays_in_them_when_they_are_edi
         "Held In LeftHand": [(FIRST, 0.0), (takes[0], 1.0), (takes[1], 0.0)],
         "Held In Head": [(FIRST, 0.0), (takes[1], 1.0), (takes[2], 0.0)],
     }
+    frames = np.array([key.co.x for key in channelbag_of(sword).fcurves[0].keyframe_points])
+    assert np.diff(frames).min() > 0.01, "keys are apart for Blender"
     assert modes_of(transform_of(sword), takes) == [mode] * 3
     held = [np.arange(first, last, 0.5) for first, last in itertools.pairwise(TAKES)]
     before = [play(rows)[1][number] for number, rows in enumerate(held)]
     for poses, hand in zip(before, HANDS, strict=True):
         assert off_by(poses, grip_in(rig, hand)) < 1.02 * TOLERANCE
-    loose = np.array([*range(40, 90), *range(211, 250)])
+    loose = PLAYED[(TAKES[0] > PLAYED) | (TAKES[2] < PLAYED)]
     assert off_by(play(loose)[0], swords()[loose]) < 1.02 * TOLERANCE
-    moved = play(np.array([100, 160]))[0]
+    moved = play(np.array(TAKES[:2]) + 10)[0]
     for hand in ("LeftUpperArm", "Neck"):
         rig.pose.bones[hand].rotation_mode = "XYZ"
         for fcurve in channelbag_of(rig).fcurves:
@@ -156,7 +161,7 @@ def test_what_was_held_has_keys_in_the_hands_and_stays_in_them_when_they_are_edi
         rig.pose.bones[hand].rotation_euler = (0.3, 0.5, -0.8)
     for number, rows in enumerate(held):
         assert off_by(play(rows)[1][number], before[number]) < SLIP
-    assert np.linalg.norm(play(np.array([100, 160]))[0].positions - moved.positions, axis=1).min() > 0.05
+    assert np.linalg.norm(play(np.array(TAKES[:2]) + 10)[0].positions - moved.positions, axis=1).min() > 0.05
 
 
 def test_it_does_not_slip_whatever_is_lost(live, sent, clock):
@@ -168,18 +173,8 @@ def test_it_does_not_slip_whatever_is_lost(live, sent, clock):
         assert off_by(grips, grip_in(rig, HANDS[number])) < 1.02 * TOLERANCE
 
 
-def test_a_steady_grip_is_one_key_and_keys_are_apart_for_blender(live, sent, clock):
-    live.armature = new_rig()
-    perform(sent, clock)
-    curve = channelbag_of(bpy.data.objects["sword"]).fcurves[0]
-    frames = np.array([key.co.x for key in curve.keyframe_points])
-    assert frames[:2].tolist() == [FIRST, frame_of(TAKES[0])]
-    assert np.diff(frames).min() > 0.01
-
-
-@pytest.mark.parametrize("larger", [1.0, 1.3])
-def test_it_is_shown_in_the_hand_of_a_rig_of_another_size_and_place_and_is_recorded_there(live, sent, clock, larger):
-    live.armature, slips = (rig := new_rig(larger=larger)), []
+def test_it_is_shown_in_the_hand_of_a_rig_of_another_size_and_place_and_is_recorded_there(live, sent, clock):
+    live.armature, slips = (rig := new_rig(larger=1.3)), []
     rig.location.x = 2.0
 
     def look(row: int) -> None:
@@ -189,43 +184,28 @@ def test_it_is_shown_in_the_hand_of_a_rig_of_another_size_and_place_and_is_recor
             slips.append(off_by(listed([grip]), grip_in(rig, "LeftHand")))
 
     perform(sent, clock, on_row=look)
-    assert len(slips) > 40
+    assert len(slips) > 20
     assert max(slips) < 1.02 * TOLERANCE
     receiving.stop()
     rows = np.arange(*TAKES[:2], 0.5)
     assert off_by(play(rows)[1][0], grip_in(rig, "LeftHand")) < 1.02 * TOLERANCE
 
 
-def test_what_comes_is_shown_where_it_is_on_frames_on_which_keys_hold_it(live, sent, clock):
+def test_what_is_not_held_any_more_is_shown_and_recorded_in_the_world_over_keys_that_hold_it(live, sent, clock):
     live.armature = new_rig()
     perform(sent, clock)
-    bpy.context.scene.frame_set(round(frame_of(TAKES[0] + 20)))
-    there, poses = swords(), dance(TIMES)
-    sender = Sender([StreamBody.rigid("sword", radius=RADIUS), BODY], TOLERANCE, DELAY, rate=60.0)
-    for row, moment in enumerate(TIMES[:60].tolist()):
-        datagrams = sender.add(moment + 900.0, {"sword": there[row : row + 1], "dancer": poses[:, row]})
-        sent.send((sender.describe() if row < 2 else []) + datagrams, clock[0] + row / 60.0)
-    bpy.context.view_layer.update()
-    assert off_by(listed([seen_sword()]), there[0]) < 1.02 * TOLERANCE
 
+    def look(row: int) -> None:
+        if row == BEGINS - 5:
+            bpy.context.scene.frame_set(round(frame_of(TAKES[0] + 20)))
+            bpy.context.view_layer.update()
+            assert off_by(listed([seen_sword()]), swords()[0]) < 1.02 * TOLERANCE
+            bpy.context.scene.frame_set(FIRST)
 
-def test_a_recording_of_what_is_not_held_behind_one_that_was_is_in_the_world(live, sent, clock):
-    live.armature = new_rig()
-    perform(sent, clock)
-    perform(sent, clock, holds=False)
+    perform(sent, clock, holds=False, on_row=look)
     receiving.stop()
     assert {value for keys in influences(bpy.data.objects["sword"]).values() for _, value in keys} == {0.0}
-    rows = np.arange(40, 250)
-    assert off_by(play(rows)[0], swords()[rows]) < 1.02 * TOLERANCE
-
-
-def test_a_recording_is_one_step_of_undo(live, sent, clock):
-    live.armature = new_rig()
-    bpy.ops.ed.undo_push(message="Rig")
-    perform(sent, clock)
-    assert len(bpy.data.objects["sword"].constraints) == 2
-    bpy.ops.ed.undo()
-    assert not any(obj.constraints or obj.animation_data for obj in bpy.data.objects)
+    assert off_by(play(PLAYED)[0], swords()[PLAYED]) < 1.02 * TOLERANCE
 
 
 def test_what_held_it_and_is_gone_leaves_it_in_the_world(live, sent, clock):
@@ -236,12 +216,10 @@ def test_what_held_it_and_is_gone_leaves_it_in_the_world(live, sent, clock):
     perform(sent, clock, on_row=remove)
     receiving.stop()
     assert not bpy.data.objects["sword"].constraints
-    rows = np.arange(40, TAKES[1])
-    sword = bpy.data.objects["sword"]
-    for row in rows.tolist():
+    for row in range(40, TAKES[1]):
         frame = frame_of(row)
         bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
-        assert off_by(listed([seen_sword()]), swords()[row]) < 2.0 * TOLERANCE, (row, sword.location)
+        assert off_by(listed([seen_sword()]), swords()[row]) < 2.0 * TOLERANCE, row
 
 
 def test_what_follows_the_sword_cannot_hold_it_and_that_is_said(live, sent, clock):
@@ -257,8 +235,7 @@ def test_what_follows_the_sword_cannot_hold_it_and_that_is_said(live, sent, cloc
     )
     assert not bpy.data.objects["sword"].constraints
     receiving.stop()
-    rows = np.arange(40, 250)
-    assert off_by(play(rows)[0], swords()[rows]) < 2.0 * TOLERANCE
+    assert off_by(play(PLAYED)[0], swords()[PLAYED]) < 2.0 * TOLERANCE
 
 
 def test_bodies_hold_one_another_and_skeletons_that_are_held_have_keys_in_the_world(live, sent, clock):
