@@ -152,7 +152,9 @@ class SeenMotion:
         native = self.at_point(frames, "BLENDER")
         desired = native if is_native else self.at_point(frames, mode)
         axes, length = desired[on_axes], axes_size * axis_length_of(self.target)
-        ends = axes.origins[:, None] + length * np.moveaxis(axes.axes, -1, 1)
+        scales = np.linalg.norm(axes.axes, axis=1, keepdims=True)
+        directions = axes.axes * scales.max(axis=-1, keepdims=True) / np.where(scales > 0.0, scales, 1.0)
+        ends = axes.origins[:, None] + length * np.moveaxis(directions, -1, 1)
         return DrawnPath(
             frames=samples,
             native=native.origins[on_samples],
