@@ -8,7 +8,7 @@ import pytest
 
 import rigid_motion
 from rigid_motion.animation import set_mode
-from rigid_motion.ui.preferences import DEFAULT_LOOK, EXTENSION, default_mode, preferences
+from rigid_motion.ui.preferences import EXTENSION, UNCHANGED, preferences
 from tests.animation.keyed import curves_of
 from tests.ui.conftest import keyed
 
@@ -24,20 +24,15 @@ def chosen(empty_file):
     bpy.context.preferences.addons.remove(entry)
 
 
-def test_without_preferences_there_are_defaults(extension):
-    assert preferences() is None
-    assert default_mode() == "motor_spline"
-
-
-def test_the_colors_and_widths_are_those_of_the_overlay_at_first(chosen):
-    for name, value in DEFAULT_LOOK._asdict().items():
-        assert np.allclose(np.array(getattr(chosen, name)), value), name
+def test_where_it_is_no_extension_all_is_as_before_anybody_has_changed_it(chosen):
+    for name, value in vars(UNCHANGED).items():
+        is_number = isinstance(value, tuple | float)
+        assert np.allclose(getattr(chosen, name), value) if is_number else getattr(chosen, name) == value, name
 
 
 def test_the_mode_where_none_is_named_is_the_default_one(chosen):
-    assert default_mode() == "motor_spline"
+    assert chosen.default_mode == "motor_spline"
     chosen.default_mode = "pga_lerp"
-    assert default_mode() == "pga_lerp"
     obj = keyed("Tool")
     bpy.ops.rigid_motion.set_mode()
     assert obj.rigid_motion.mode == "pga_lerp"

@@ -32,7 +32,7 @@ from ..blender import (
     existing,
     with_properties,
 )
-from .preferences import DEFAULT_MODE, default_mode
+from .preferences import DEFAULT_MODE, preferences
 from .reducing import radius_property, tolerance_property
 from .targets import (
     CURRENT,
@@ -207,7 +207,7 @@ class RIGID_MOTION_OT_set_mode(OnTargets):
 
     def execute(self, context: bpy.types.Context) -> Returned:
         if not self.properties.is_property_set("mode"):
-            self.mode = default_mode()
+            self.mode = preferences().default_mode
         if not self.properties.is_property_set("on"):
             self.on = scope_for(context)
         targets = targets_of(context)

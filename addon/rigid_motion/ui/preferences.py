@@ -6,7 +6,8 @@ at a resolution scale of 1.
 
 from __future__ import annotations
 
-from typing import NamedTuple, cast
+from types import SimpleNamespace
+from typing import cast
 
 import bpy
 
@@ -25,39 +26,17 @@ EXTENSION = __package__.rpartition(".")[0]
 DEFAULT_MODE = "motor_spline"
 
 
-class Look(NamedTuple):
-    """The preferences of the overlay. Those of the extension have the same names."""
-
-    native_color: Color = (0.80, 0.80, 0.80, 1.0)
-    mode_color: Color = (0.20, 0.72, 1.0, 1.0)
-    key_color: Color = (1.0, 0.75, 0.20, 1.0)
-    tick_color: Color = (1.0, 1.0, 1.0, 1.0)
-    past_color: Color = (1.0, 0.42, 0.42, 1.0)
-    future_color: Color = (0.25, 0.85, 0.62, 1.0)
-    line_width: float = 2.0
-
-
-DEFAULT_LOOK = Look()
-
-
-def preferences() -> RigidMotionPreferences | None:
-    """Return the preferences, None while the package is registered without being an extension,
-    as in tests of a checkout.
+def preferences() -> RigidMotionPreferences:
+    """Return the preferences; while the package is registered without being an extension, as in tests of a checkout,
+    as they are before anybody has changed them.
     """
     addon = existing(bpy.context.preferences).addons.get(EXTENSION)
-    return cast(RigidMotionPreferences, addon.preferences) if addon is not None else None
-
-
-def default_mode() -> str:
-    """Return the mode to take where none is named."""
-    chosen = preferences()
-    return chosen.default_mode if chosen is not None else DEFAULT_MODE
+    return cast(RigidMotionPreferences, UNCHANGED if addon is None else addon.preferences)
 
 
 def apply() -> None:
     """Act upon the preferences as they were read from Blender's."""
-    chosen = preferences()
-    animation.set_enabled(chosen is None or chosen.live_update)
+    animation.set_enabled(preferences().live_update)
 
 
 def _on_live_update(chosen: RigidMotionPreferences, _context: bpy.types.Context) -> None:
@@ -97,19 +76,19 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
         update=_on_live_update,
     )
     native_color: Color = _color(
-        "Blender's Path", "Color of the path by Blender's own in-betweens", DEFAULT_LOOK.native_color
+        "Blender's Path", "Color of the path by Blender's own in-betweens", (0.80, 0.80, 0.80, 1.0)
     )
-    mode_color: Color = _color("Mode's Path", "Color of the path by the mode", DEFAULT_LOOK.mode_color)
+    mode_color: Color = _color("Mode's Path", "Color of the path by the mode", (0.20, 0.72, 1.0, 1.0))
     key_color: Color = _color(
-        "Selected Keys", "Color of the selected keys on a path. The others are white", DEFAULT_LOOK.key_color
+        "Selected Keys", "Color of the selected keys on a path. The others are white", (1.0, 0.75, 0.20, 1.0)
     )
-    tick_color: Color = _color("Ticks", "Color of the evenly timed marks along a path", DEFAULT_LOOK.tick_color)
-    past_color: Color = _color("Past", "Color of ghosts before the current frame", DEFAULT_LOOK.past_color)
-    future_color: Color = _color("Future", "Color of ghosts after the current frame", DEFAULT_LOOK.future_color)
+    tick_color: Color = _color("Ticks", "Color of the evenly timed marks along a path", (1.0, 1.0, 1.0, 1.0))
+    past_color: Color = _color("Past", "Color of ghosts before the current frame", (1.0, 0.42, 0.42, 1.0))
+    future_color: Color = _color("Future", "Color of ghosts after the current frame", (0.25, 0.85, 0.62, 1.0))
     line_width: float = FloatProperty(
         name="Line Width",
         description="Width of the paths",
-        default=DEFAULT_LOOK.line_width,
+        default=2.0,
         min=1.0,
         max=10.0,
         precision=1,
@@ -139,5 +118,9 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
         layout.label(text="Pie Menu")
         keymap.draw(context, layout)
 
+
+UNCHANGED = SimpleNamespace(
+    **{name: prop.keywords["default"] for name, prop in RigidMotionPreferences.__annotations__.items()}
+)
 
 CLASSES = (RigidMotionPreferences,)

@@ -49,6 +49,19 @@ DENSE_TEXT = n_(
     "{count} modifiers on a channel: with so many segments Blender plays slower. Reduce the keys, or clear the modes"
 )
 
+LONG_WAY_TEXT = n_(
+    "Blender turns this segment by more than half a turn; the mode takes the short way. "
+    "With Turns set to -1 it takes the long one"
+)
+TWO_AXES_TEXT = n_(
+    "Two angles change by more than half a turn here; whole turns are about the axis of the larger one."
+    " For both, set a key in between"
+)
+NEAR_HALF_TEXT = n_(
+    "{angle} is nearly half a turn: a small change of a key can reverse its direction. To be sure, set a key in between"
+)
+UNEVEN_TEXT = n_("The scale is not uniform, and is left to Blender")
+
 LABEL_WIDTH_RATIO = 0.28
 """The part of the width that labels have."""
 
@@ -60,33 +73,15 @@ def cautions(segment: SegmentFacts) -> list[str]:
     """Return what an animator may not expect of a segment, and what to do about it.
     Nothing where it is Blender's own.
     """
-    if segment.mode == "BLENDER":
-        return []
-    texts = []
-    if segment.long_way and not segment.turns:
-        texts.append(
-            iface_(
-                "Blender turns this segment by more than half a turn; the mode takes the short way. "
-                "With Turns set to -1 it takes the long one"
-            )
-        )
-    if segment.two_axes:
-        texts.append(
-            iface_(
-                "Two angles change by more than half a turn here; whole turns are about the axis of the larger one."
-                " For both, set a key in between"
-            )
-        )
-    if segment.turn > NEAR_HALF_TURN and not (segment.turns or segment.is_sure):
-        texts.append(
-            iface_(
-                "{angle} is nearly half a turn: a small change of a key can reverse its direction. To be sure, set "
-                "a key in between"
-            ).format(angle=degrees(segment.turn))
-        )
-    if segment.scales_unevenly:
-        texts.append(iface_("The scale is not uniform, and is left to Blender"))
-    return texts
+    is_near_half = segment.turn > NEAR_HALF_TURN and not (segment.turns or segment.is_sure)
+    texts = {
+        LONG_WAY_TEXT: segment.long_way and not segment.turns,
+        TWO_AXES_TEXT: segment.two_axes,
+        NEAR_HALF_TEXT: is_near_half,
+        UNEVEN_TEXT: segment.scales_unevenly,
+    }
+    said = [text for text, is_so in texts.items() if is_so and segment.mode != "BLENDER"]
+    return [iface_(text).format(angle=degrees(segment.turn)) for text in said]
 
 
 def twin_of(mode: str, *, grows: bool) -> str:

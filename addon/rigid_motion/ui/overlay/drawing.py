@@ -25,7 +25,7 @@ from ...animation.transforms import Transform
 from ...blender import existing
 from ...handlers import append_drawing, remove_drawing
 from ..holding import hue_of
-from ..preferences import DEFAULT_LOOK, Color, preferences
+from ..preferences import Color, preferences
 from ..targets import selected_in_view
 from . import cache
 from .points import MAX_TICKS, PASSING_HOLDER, DrawnPath, readable, thinned
@@ -178,7 +178,7 @@ class Pen:
     def __init__(self, context: Any) -> None:
         self.lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
         self.dots = _dot_shader()
-        self.look = preferences() or DEFAULT_LOOK
+        self.look = preferences()
         theme = context.preferences.themes[0].user_interface
         self.hues = [brightened(item.color) for item in context.preferences.themes[0].strip_color]
         self.axis_colors = [(*color, AXIS_OPACITY) for color in (theme.axis_x, theme.axis_y, theme.axis_z)]

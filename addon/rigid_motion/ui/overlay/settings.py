@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import bpy
@@ -29,106 +30,96 @@ MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MO
 HIDDEN_LABEL = n_("Hidden by Viewport Overlays")
 
 
+_bool, _int, _float = (partial(kind, options=set()) for kind in (BoolProperty, IntProperty, FloatProperty))
+_enum = partial(EnumProperty, options=set(), translation_context=OWN_WORDS)
+"""Properties of the scene that cannot be animated."""
+
+
 @with_properties
 class RigidMotionOverlay(bpy.types.PropertyGroup):
-    show_paths: bool = BoolProperty(
+    show_paths: bool = _bool(
         name="Rigid Motion Paths",
         description="Draw the paths of the selected objects or bones: Blender's own, and beside it that of a "
         "rigid-motion mode. Of a bone it is the path of its head, or of its tail where the bone only turns. "
         "Parents that move by keys are followed; by constraints they are taken as they are on the current frame, "
         "and what holds something as it was when its frames were last played",
-        options=set(),
     )
-    mode: str = EnumProperty(
+    mode: str = _enum(
         name="Mode",
         description="The mode to draw. A mode other than the keyed one is a preview, and changes nothing",
         items=MODE_CHOICES,
-        translation_context=OWN_WORDS,
-        options=set(),
     )
-    show_native: bool = BoolProperty(
+    show_native: bool = _bool(
         name="Blender's Path",
         description="Also draw Blender's own path, in its own color",
         default=True,
-        options=set(),
     )
-    show_axes: bool = BoolProperty(
+    show_axes: bool = _bool(
         name="Axes",
         description="Draw its orientation along the path, by its local axes at some of the ticks",
         default=True,
-        options=set(),
     )
-    axes_size: float = FloatProperty(
+    axes_size: float = _float(
         name="Size",
         description="Length of the axes. At 1 they are half as long as the object or bone",
         default=1.0,
         min=0.01,
         soft_max=5.0,
-        options=set(),
     )
-    tick_step: int = IntProperty(
+    tick_step: int = _int(
         name="Frame Step",
         description="Frames between ticks. At 0, as many as are distinguishable on the screen",
         min=0,
         soft_max=100,
-        options=set(),
     )
-    show_ghosts: bool = BoolProperty(
+    show_ghosts: bool = _bool(
         name="Ghosts",
         description="Draw the selected objects or bones on frames before and after the current one, in the mode of "
         "the path",
-        options=set(),
     )
-    ghosts_on: str = EnumProperty(
+    ghosts_on: str = _enum(
         name="Ghosts on",
         description="The frames that have ghosts",
         items=[
             ("STEP", "Frames", "On every so many frames"),
             ("KEYS", "Keys", "On keys alone"),
         ],
-        translation_context=OWN_WORDS,
-        options=set(),
     )
-    ghosts_before: int = IntProperty(
+    ghosts_before: int = _int(
         name="Before",
         description="The most ghosts before the current frame. Those that would cover the view are left out",
         default=5,
         min=0,
         soft_max=20,
         max=200,
-        options=set(),
     )
-    ghosts_after: int = IntProperty(
+    ghosts_after: int = _int(
         name="After",
         description="The most ghosts after the current frame. Those that would cover the view are left out",
         default=5,
         min=0,
         soft_max=20,
         max=200,
-        options=set(),
     )
-    show_bodies: bool = BoolProperty(
+    show_bodies: bool = _bool(
         name="Skinned Meshes",
         description="For armatures and bones show the meshes that they deform, on frames shown since the last edit:"
         " play them, or press Update Ghosts",
         default=True,
-        options=set(),
     )
-    ghost_step: int = IntProperty(
+    ghost_step: int = _int(
         name="Ghost Step",
         description="Frames between ghosts",
         default=5,
         min=1,
         soft_max=50,
-        options=set(),
     )
-    show_deviations: bool = BoolProperty(
+    show_deviations: bool = _bool(
         name="Deviations",
         description="Mark frames on the path where the motion has a pop or a kink: its velocity jumps there, many "
         "times as much as it changes around them",
-        options=set(),
     )
-    deviation_threshold: float = FloatProperty(
+    deviation_threshold: float = _float(
         name="Threshold",
         description="How many times more than around it the velocity must change to be marked",
         default=8.0,
@@ -136,13 +127,11 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
         soft_max=50.0,
         step=50,
         precision=1,
-        options=set(),
     )
-    show_speed: bool = BoolProperty(
+    show_speed: bool = _bool(
         name="Speed in Graph Editor",
         description="Draw the speed and the rotation speed of the active object or bone below its F-curves, each "
         "with its own scale: the largest value is on the right",
-        options=set(),
     )
 
     @property
