@@ -9,20 +9,20 @@ from __future__ import annotations
 import itertools
 import time
 from collections import deque
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import cast
+from typing import Any, cast
 
 import bpy
 import numpy as np
 
-from ..blender import existing, persistent, scene, view_layer
+from ..blender import armature, existing, persistent, scene, view_layer
 from ..motion import Poses
 from ..motion.poses import placed
 from ..streams import ReceivedKeys, Receiver, StreamBody
 from ..streams.playing import HeldPoses, Stream
 from ..streams.vmc import VMC
-from .driving import Driver, Hand, RigDriver, object_of, seen_hand
+from .driving import Driver, Hand, RigDriver, matched, object_of, seen_hand
 from .recording import Take
 from .sockets import Address, Port, check_access
 from .ticking import Ticking, log
@@ -36,25 +36,35 @@ InHands = tuple[list[tuple[str, str] | None], Poses]
 MOST_AHEAD = 64
 """Messages of a body whose keys wait to be shown."""
 
-Pairs = Callable[[StreamBody, bpy.types.Object], Mapping[str, str]]
-"""The bone of a rig that each joint of a body moves."""
+LIVE = "rigid_motion_live"
+"""The name of the settings on scenes, see `ui.live.LiveSettings`."""
+
+is_matching = False
+"""True while the program fills the table of joints and bones, and not a user."""
 
 
-@dataclass(frozen=True)
-class ReceivingSettings:
-    """What is asked for."""
+def match_bones(joints: Sequence[str], rig: bpy.types.Object) -> None:
+    """Fill the table of which bone of a rig each joint moves, by their names."""
+    global is_matching
+    table, pairs = _settings().bones, matched(joints, [bone.name for bone in armature(rig).bones])
+    table.clear()
+    _settings().bones_of = rig.name
+    is_matching = True
+    for joint in joints:
+        item = table.add()
+        item.name, item.bone = joint, pairs.get(joint, "")
+    is_matching = False
 
-    delay: float
-    """Seconds, of VMC. The codec's streams have their own."""
 
-    armature: str
-    """The name of a rig that a skeleton drives, "" for none."""
+def _pairs(body: StreamBody, rig: bpy.types.Object) -> Mapping[str, str]:
+    """Return what the table says; it is filled in by names where it is for other joints or for another rig."""
+    if [item.name for item in _settings().bones] != list(body.joints) or _settings().bones_of != rig.name:
+        match_bones(body.joints, rig)
+    return {item.name: item.bone for item in _settings().bones if item.bone}
 
-    body: str
-    """The label of that skeleton, "" for the first that comes."""
 
-    steady: bool = False
-    """Whether what is shown is to be without its trembling."""
+def _settings() -> Any:
+    return getattr(scene(), LIVE)
 
 
 @dataclass(eq=False)
@@ -104,11 +114,10 @@ class _Recording:
 class Listening:
     """A port that is listened to. Raises OSError where it is taken, and NotAllowed."""
 
-    def __init__(self, host: str, port: int, settings: Callable[[], ReceivingSettings], pairs: Pairs) -> None:
-        self._settings, self._pairs = settings, pairs
+    def __init__(self, host: str, port: int) -> None:
         check_access(host)
         self._port = Port(host, port)
-        self._receiver = Receiver(settings().delay)
+        self._receiver = Receiver(_settings().delay)
         self._heard: dict[Which, _Heard] = {}
         self._recording: _Recording | None = None
         self.complaint = ""
@@ -132,7 +141,7 @@ class Listening:
             log.warning(line)
         for sender, answer in self._receiver.answers():
             self._port.send(answer, cast(Address, sender))
-        self._receiver.steady = self._settings().steady
+        self._receiver.steady = _settings().steady
         # They take up room until they are asked for.
         came = self._receiver.keys()
         shown = {
@@ -214,11 +223,10 @@ class Listening:
     def _driver_of(self, heard: _Heard) -> Driver | None:
         """Return what shows a body; None for as long as nothing can."""
         if len(heard.body.joints) > 1:
-            settings = self._settings()
-            rig = bpy.data.objects.get((settings.armature, None))
-            is_taken = any(it.driver is not None and it.driver.name == settings.armature for it in self._heard.values())
-            if rig is not None and (settings.body or heard.label) == heard.label and not is_taken:
-                return RigDriver(rig, heard.body, self._pairs(heard.body, rig))
+            rig, chosen = _settings().armature, _settings().body or heard.label
+            is_free = not any(it.driver is not None and it.driver.object == rig for it in self._heard.values())
+            if rig is not None and rig.library is None and chosen == heard.label and is_free:
+                return RigDriver(rig, heard.body, _pairs(heard.body, rig))
         obj = object_of(heard.label, heard.body)
         if obj is None:
             return None
@@ -325,9 +333,9 @@ def listening() -> Listening | None:
     return running.thing
 
 
-def start(host: str, port: int, settings: Callable[[], ReceivingSettings], pairs: Pairs) -> Listening:
+def start(host: str, port: int) -> Listening:
     """Listen to a port, and to nothing else any more. Raises OSError where it is taken, and NotAllowed."""
-    return running.start(lambda: Listening(host, port, settings, pairs))
+    return running.start(lambda: Listening(host, port))
 
 
 def stop() -> None:

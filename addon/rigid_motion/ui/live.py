@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import bpy
@@ -22,15 +21,12 @@ from ..blender import (
     PointerProperty,
     Returned,
     StringProperty,
-    armature,
     existing,
     scene,
     with_properties,
 )
 from ..live import receiving, sending
-from ..live.driving import matched
 from ..live.sockets import NotAllowed
-from ..streams import StreamBody
 from ..streams.vmc import VMC_PORT
 from .panels import Folded
 from .wording import draw_text, labelled
@@ -38,12 +34,8 @@ from .wording import draw_text, labelled
 HOST = "127.0.0.1"
 
 
-_is_matching = False
-"""True if it is the program that fills the table."""
-
-
 def _on_bones(_settings: LiveSettings | LiveBone, _context: bpy.types.Context) -> None:
-    if (listening := receiving.listening()) is not None and not _is_matching:
+    if (listening := receiving.listening()) is not None and not receiving.is_matching:
         listening.choose_drivers()
 
 
@@ -119,37 +111,8 @@ class LiveSettings(bpy.types.PropertyGroup):
     )
 
 
-LIVE = "rigid_motion_live"
-"""The name of the settings on scenes."""
-
-
 def live_settings(scene: bpy.types.Scene | None) -> LiveSettings:
-    return getattr(scene, LIVE)
-
-
-def _settings() -> receiving.ReceivingSettings:
-    live = live_settings(scene())
-    return receiving.ReceivingSettings(live.delay, live.armature.name if live.armature else "", live.body, live.steady)
-
-
-def _pairs(body: StreamBody, rig: bpy.types.Object) -> Mapping[str, str]:
-    """Return what the table says; it is filled in by names where it is for other joints or for another rig."""
-    live = live_settings(scene())
-    if [item.name for item in live.bones] != list(body.joints) or live.bones_of != rig.name:
-        _match(live, body.joints, rig)
-    return {item.name: item.bone for item in live.bones if item.bone}
-
-
-def _match(live: LiveSettings, joints: tuple[str, ...], rig: bpy.types.Object) -> None:
-    global _is_matching
-    result = matched(joints, [bone.name for bone in armature(rig).bones])
-    live.bones.clear()
-    live.bones_of = rig.name
-    _is_matching = True
-    for joint in joints:
-        item = live.bones.add()
-        item.name, item.bone = joint, result.get(joint, "")
-    _is_matching = False
+    return getattr(scene, receiving.LIVE)
 
 
 class _Registered(Operator):
@@ -174,7 +137,7 @@ class RIGID_MOTION_OT_live_listen(_Registered):
     def execute(self, context: bpy.types.Context) -> Returned:
         live = live_settings(context.scene)
         try:
-            receiving.start(live.host, live.port, _settings, _pairs)
+            receiving.start(live.host, live.port)
         except (NotAllowed, OSError) as error:
             text = rpt_(
                 "Cannot listen to port {port} of {host}; another program may be using it: choose another ({why})"
@@ -239,7 +202,7 @@ class RIGID_MOTION_OT_live_match(_WhileListening, Operator):
         if live.armature is None:
             self.report({"ERROR"}, rpt_("Choose a rig first"))
             return {"CANCELLED"}
-        _match(live, tuple(item.name for item in live.bones), live.armature)
+        receiving.match_bones([item.name for item in live.bones], live.armature)
         existing(receiving.listening()).choose_drivers()
         return {"FINISHED"}
 
@@ -397,10 +360,10 @@ CLASSES = (
 
 
 def register() -> None:
-    setattr(bpy.types.Scene, LIVE, PointerProperty(type=LiveSettings))
+    setattr(bpy.types.Scene, receiving.LIVE, PointerProperty(type=LiveSettings))
 
 
 def unregister() -> None:
     receiving.stop()
     sending.stop()
-    delattr(bpy.types.Scene, LIVE)
+    delattr(bpy.types.Scene, receiving.LIVE)
