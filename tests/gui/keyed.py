@@ -13,6 +13,11 @@ from tests.gui.driver import Hand, Steps
 FRAMES = (1, 20, 40)
 
 
+def extension() -> bpy.types.Addon:
+    """The extension, as Blender's preferences list it."""
+    return next(entry for entry in bpy.context.preferences.addons if entry.module.endswith(".rigid_motion"))
+
+
 def cube() -> bpy.types.Object:
     return bpy.data.objects["Cube"]
 

@@ -90,10 +90,3 @@ def test_what_is_deleted_or_has_no_known_bones_is_not_sent(listener):
 
 def test_nothing_selected_is_nothing_to_send(extension):
     assert not bpy.ops.rigid_motion.live_send.poll()
-
-
-def test_a_new_file_ends_it(listener):
-    bpy.ops.object.empty_add()
-    bpy.ops.rigid_motion.live_send()
-    bpy.ops.wm.read_homefile(use_empty=True)
-    assert sending.sending() is None

@@ -6,7 +6,6 @@ import bpy
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import modes_of
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.animation.transforms.sizes import first_tolerance
 from rigid_motion.ui.targets import (
@@ -19,8 +18,7 @@ from rigid_motion.ui.targets import (
 )
 from tests.animation.scenes import editor
 from tests.rigs.recorded import recorded_rig
-from tests.ui.conftest import select_keys
-from tests.ui.rigs import FRAMES, keyed_rig, new_rig
+from tests.ui.rigs import keyed_rig, new_rig
 
 operators = bpy.ops.rigid_motion
 SCREW = "dq_sclerp"
@@ -39,10 +37,6 @@ def names(targets):
     return [target.name for target in targets]
 
 
-def modes(rig, name):
-    return modes_of(bone(rig, name), FRAMES[:-1])
-
-
 def test_in_pose_mode_the_selected_bones_are_meant_and_not_the_rig(rig):
     with editor("VIEW_3D"):
         assert names(targets_of(bpy.context)) == ["Rig/Arm", "Rig/Hand"]
@@ -57,7 +51,7 @@ def test_the_bones_of_all_rigs_in_pose_mode_are_meant(rig):
     bpy.ops.object.mode_set(mode="POSE")
     assert sorted(names(targets_of(bpy.context))) == ["Other/Arm", "Other/Hand", "Rig/Arm", "Rig/Hand"]
     operators.set_mode(mode=SCREW)
-    assert modes(rig, "Arm") == modes(other, "Hand") == [SCREW] * 3
+    assert bone(rig, "Arm").rigid_motion.mode == bone(other).rigid_motion.mode == SCREW
 
 
 def test_while_weights_are_painted_for_a_posed_rig_its_bones_are_meant(rig):
@@ -92,18 +86,6 @@ def test_a_key_editor_means_the_bones_and_objects_whose_channels_it_shows(rig, k
         space.dopesheet.show_only_selected = True
         assert {"Rig/Arm", "Rig/Hand"} <= set(names(targets_of(bpy.context))) <= {"Rig", "Rig/Arm", "Rig/Hand"}
         assert scope_for(bpy.context) == SELECTED
-
-
-def test_each_bone_gets_the_mode_from_its_own_selected_keys_on(rig):
-    select_keys(bone(rig, "Arm"), 1.0)
-    select_keys(bone(rig, "Hand"), 11.0, 21.0)
-    select_keys(bone(rig, "Hip"), 1.0)
-    with editor("DOPESHEET_EDITOR") as space:
-        space.dopesheet.show_only_selected = True
-        operators.set_mode(mode=SCREW)
-    assert modes(rig, "Arm") == [SCREW, "BLENDER", "BLENDER"]
-    assert modes(rig, "Hand") == ["BLENDER", SCREW, SCREW]
-    assert modes(rig, "Hip") == ["BLENDER"] * 3
 
 
 def test_key_poses_begin_with_a_larger_tolerance_for_as_long_as_nobody_sets_one(extension, monkeypatch):

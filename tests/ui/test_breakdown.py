@@ -10,7 +10,7 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate
-from rigid_motion.ui.breakdown import CLASSES, MOUSE_TRAVEL_PX, Slider
+from rigid_motion.ui.breakdown import MOUSE_TRAVEL_PX, Slider
 from tests.ui.conftest import FRAMES
 
 operators = bpy.ops.rigid_motion
@@ -31,13 +31,6 @@ def test_a_breakdown_is_keyed_by_its_factor(tool):
     expected = interpolate((0.0, 1.0), keys, np.array([0.25]), "dq_sclerp")
     np.testing.assert_allclose(tool.location, expected.positions[0], atol=1e-5)
     assert animation.key_frames(tool).tolist() == sorted([*FRAMES.tolist(), 14.0])
-
-
-@pytest.mark.parametrize("cls", CLASSES)
-def test_without_a_mode_it_is_greyed_out(tool, cls):
-    assert not cls.poll(bpy.context)
-    animation.set_mode(tool, "dq_sclerp")
-    assert cls.poll(bpy.context)
 
 
 def test_the_mouse_moves_the_factor_and_stops_at_the_ends(extension):

@@ -86,12 +86,6 @@ def test_one_that_refuses_is_named_and_the_others_are_done(tool, capfd):
     assert "Stubborn: Location Y has an Envelope" in said
 
 
-def test_without_a_selection_the_active_object_is_meant(tool):
-    tool.select_set(False)
-    operators.set_mode(mode="dq_sclerp")
-    assert tool.rigid_motion.mode == "dq_sclerp"
-
-
 @pytest.mark.parametrize(
     "name", ["set_mode", "clear", "bake", "unbake", "reduce_keys", "restore_keys", "discard_dense_keys", "add_cycles"]
 )
@@ -127,14 +121,6 @@ def test_buttons_with_nothing_to_do_are_greyed_out_with_the_reason(tool):
     assert refusal_of("bake") == ""
     operators.clear()
     assert "All keys already have Blender's own in-betweens" in refusal_of("clear")
-
-
-def test_a_mode_that_waits_for_keys_can_be_cleared_and_has_nothing_to_bake(extension):
-    obj = new_object()
-    obj.select_set(True)
-    operators.set_mode(mode="dq_sclerp")
-    assert refusal_of("clear") == ""
-    assert "choose a mode" in refusal_of("bake")
 
 
 def test_keys_get_the_modes_that_the_active_one_has_on_their_frames(extension):

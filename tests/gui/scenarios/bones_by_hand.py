@@ -1,4 +1,4 @@
-"""Two bones in Pose Mode, by hand: pies, keys, Auto Key between keys, poses copied and pasted, undo."""
+"""Two bones in Pose Mode, by hand: a pie, Auto Key between keys, undo, and the tool."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import math
 import bpy
 import numpy as np
 
-from rigid_motion.animation import modes_of
+from rigid_motion import animation
 from tests.animation.bones.poses import assert_posed, seen
 from tests.animation.keyed import key_frames
-from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.keyed import FRAMES, hand_bone, now, only_the_hand, pose_the_rig, rig
+from tests.gui.keyed import FRAMES, hand_bone, only_the_hand, pose_the_rig, rig
+from tests.gui.scenarios.trail import take_the_tool
 
 WHOLE = range(1, 46, 2)
 SCREW = "dq_sclerp"
@@ -34,10 +34,11 @@ def scenario(hand: Hand) -> Steps[None]:
     """An animator has an arm and a hand move by screws, and works on."""
     view = yield from pose_the_rig(hand)
     yield from chosen(hand)
-    yield from key_by_key(hand, view, hand.area("DOPESHEET_EDITOR"))
     yield from only_the_hand(hand, view)
     yield from turned(hand)
-    yield from pasted(hand)
+    yield from take_the_tool(hand, view)
+    yield from hand.press("A")
+    assert animation.key_frames(hand_bone(), selected=True).tolist() == [*FRAMES], "on the path of the bone"
 
 
 def chosen(hand: Hand) -> Steps[None]:
@@ -51,23 +52,6 @@ def chosen(hand: Hand) -> Steps[None]:
     np.testing.assert_allclose(seen(rig(), "Hand"), native, atol=ALIKE)
     yield from hand.press("Z", ctrl=True, shift=True)
     assert_as_keyed(*FRAMES)
-
-
-def key_by_key(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[None]:
-    """The keys of one frame get another mode in the Dope Sheet, and are moved; undone."""
-    yield from hand.click(places.key(sheet, 20))
-    yield from hand.hover(places.centre(places.region(sheet)))
-    yield from hand.pie("T", "NW", alt=True)
-    for bone in rig().pose.bones:
-        assert modes_of(bone, FRAMES[:-1]) == [SCREW, "lerp_slerp"], modes_of(bone, FRAMES[:-1])
-    assert_as_keyed(*FRAMES)
-    yield from hand.click(places.key(sheet, 20))
-    yield from hand.press("G")
-    yield from hand.glide(places.key(sheet, 28))
-    yield from hand.click()
-    assert_as_keyed(1, 28, 40)
-    yield from undo_until_keyed(hand, *FRAMES)
-    yield from hand.hover(places.centre(places.region(view)))
 
 
 def turned(hand: Hand) -> Steps[None]:
@@ -89,25 +73,6 @@ def turned(hand: Hand) -> Steps[None]:
     np.testing.assert_allclose(seen(rig(), "Hand"), stood, atol=ALIKE)
     yield from hand.picture("turned")
     yield from undo_until_keyed(hand, *FRAMES)
-
-
-def pasted(hand: Hand) -> Steps[None]:
-    """A pose that Blender's own Ctrl C copies between keys is pasted as it was seen, keyed by Auto Key and by I."""
-    for auto in (True, False):
-        bpy.context.scene.tool_settings.use_keyframe_insert_auto = auto
-        bpy.context.scene.frame_set(10)
-        yield
-        copied = now()
-        yield from hand.press("C", ctrl=True)
-        bpy.context.scene.frame_set(30)
-        yield
-        yield from hand.press("V", ctrl=True)
-        if not auto:
-            assert 30.0 not in key_frames(hand_bone())
-            yield from hand.press("I")
-        yield from hand.wait_until(lambda: 30.0 in key_frames(hand_bone()), "the pasted pose is keyed")
-        np.testing.assert_allclose(now(), copied, atol=ALIKE)
-        yield from undo_until_keyed(hand, *FRAMES)
 
 
 def undo_until_keyed(hand: Hand, *frames: float) -> Steps[None]:

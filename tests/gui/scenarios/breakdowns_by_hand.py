@@ -22,7 +22,6 @@ def scenario(hand: Hand) -> Steps[None]:
     bpy.ops.ed.undo_push(message="Screw")
     yield from dragged_and_cancelled(hand, view)
     yield from dragged_and_confirmed(hand, view)
-    yield from typed_beyond(hand, view)
     yield from in_the_dope_sheet(hand, hand.area("DOPESHEET_EDITOR"))
 
 
@@ -72,19 +71,6 @@ def dragged_and_confirmed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert undo_steps() == steps + 1
     yield from hand.press("Z", ctrl=True)
     assert snapshot(hand_bone()) == before, "one step back"
-
-
-def typed_beyond(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    yield from start(hand, view)
-    yield from hand.press("E")
-    yield from hand.type("125")
-    yield from hand.press("RET")
-    assert_on_the_screw(1.25)
-    yield from hand.press("F9")
-    yield from hand.picture("adjust-last-operation")
-    yield from hand.press("ESC")
-    yield from hand.hover(places.centre(places.region(view)))
-    yield from hand.press("Z", ctrl=True)
 
 
 def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:

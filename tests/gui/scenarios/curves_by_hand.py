@@ -1,4 +1,4 @@
-"""Curves that are what is seen: keys and handles dragged in the Graph Editor, and Blender's own commands in between.
+"""Curves that are what is seen: keys dragged, inserted and typed, and cycles.
 
 While anything is dragged the pose on the screen is held against `tests.animation.oracle` after every redraw.
 """
@@ -9,15 +9,15 @@ import bpy
 import numpy as np
 
 from tests.animation.keyed import curves_of, key_frames, snapshot
-from tests.animation.oracle import assert_shown, expected_worlds
+from tests.animation.oracle import assert_shown, expected_worlds, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.keyed import FRAMES, cube, key_the_cube, on_screen
 
+WHOLE = range(1, 61)
+
 ALIKE = 2e-5
 """What poses may differ by that are the same, in metres and in parts of a rotation matrix."""
-
-CURSOR = (1.0, 2.0, 0.5)
 
 
 def assert_place_on_the_screw() -> None:
@@ -27,7 +27,7 @@ def assert_place_on_the_screw() -> None:
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """An animator chooses the screw, works on its curves, and uses Blender's commands between the keys."""
+    """An animator chooses the screw, and works on its curves."""
     yield from hand.open_animation_workspace()
     view, sheet = hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR")
     key_the_cube()
@@ -39,12 +39,11 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.press("HOME")
     yield from hand.picture("curves")
     yield from dragged(hand, sheet)
-    yield from duplicated(hand, sheet)
     yield from cycled(hand, sheet)
     sheet.type = "DOPESHEET_EDITOR"
     yield 0.3
-    yield from commands(hand, view)
-    yield from copied(hand, view, sheet)
+    yield from inserted(hand, view, sheet)
+    yield from typed(hand, sheet)
 
 
 def dragged(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
@@ -65,29 +64,14 @@ def dragged(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
             assert_place_on_the_screw()
         yield from (hand.click() if confirm else hand.press("ESC"))
         yield
-        assert_shown([cube()], range(1, 61))
+        assert_shown([cube()], WHOLE)
         if not confirm:
             assert snapshot(cube()) == before
             np.testing.assert_allclose(on_screen("Cube"), there, atol=ALIKE)
     yield from hand.picture("dragged")
     for _ in range(2):
         yield from hand.press("Z", ctrl=True)
-    assert_shown([cube()], range(1, 61))
-
-
-def duplicated(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
-    """Shift D: keys are there twice, and dragged at once."""
-    middle = places.centre(places.region(graph))
-    yield from hand.hover(middle)
-    yield from hand.press("D", shift=True)
-    for step in range(1, 9):
-        yield from hand.hover((middle[0] + 12 * step, middle[1]))
-        yield
-    yield from hand.click()
-    yield
-    assert len(key_frames(cube())) > len(FRAMES), key_frames(cube())
-    assert_shown([cube()], range(1, 61))
-    yield from hand.press("Z", ctrl=True)
+    assert_shown([cube()], WHOLE)
 
 
 def cycled(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
@@ -107,94 +91,35 @@ def cycled(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
     with bpy.context.temp_override(window=hand.window, area=graph, region=region):
         bpy.ops.graph.extrapolation_type(type="CLEAR_CYCLIC")
     yield
-    assert_shown([cube()], range(1, 61))
+    assert_shown([cube()], WHOLE)
 
 
-def commands(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Rows 1 to 3 of what Blender's commands do between keys, with Auto Key and without."""
-    bpy.context.scene.cursor.location = CURSOR
-    for auto in (True, False):
-        bpy.context.scene.tool_settings.use_keyframe_insert_auto = auto
-        for number, act in enumerate((snapped, turned_back, put_back, grabbed)):
-            bpy.context.scene.frame_set(10)
-            yield from hand.hover(places.centre(places.region(view)))
-            keys, before = snapshot(cube()), on_screen("Cube")
-            expected = yield from act(hand, before)
-            yield
-            np.testing.assert_allclose(
-                on_screen("Cube"), expected, atol=ALIKE, err_msg=f"{act.__name__}, Auto Key {auto}"
-            )
-            yield from hand.picture(f"{act.__name__}{'-keyed' * auto}")
-            bpy.context.scene.frame_set(12)
-            bpy.context.scene.frame_set(10)
-            np.testing.assert_allclose(
-                on_screen("Cube"), expected if auto else before, atol=ALIKE, err_msg=act.__name__
-            )
-            assert (snapshot(cube()) == keys) is not auto
-            if auto:
-                yield from hand.press("Z", ctrl=True)
-                yield
-                assert snapshot(cube()) == keys, f"{act.__name__} {number}"
-    bpy.context.scene.tool_settings.use_keyframe_insert_auto = False
+def inserted(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[None]:
+    """A key at the playhead keeps the pose on the screen; undone, the keys around it are as they were."""
+    keys, before = snapshot(cube()), shown_worlds([cube()], WHOLE)[0]
+    yield from hand.click(places.playhead(sheet, 15))
+    assert bpy.context.scene.frame_current == 15, bpy.context.scene.frame_current
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.press("I")
+    assert key_frames(cube()).tolist() == [1, 15, 20, 40]
+    assert_shown([cube()], WHOLE)
+    np.testing.assert_allclose(shown_worlds([cube()], WHOLE)[0][14], before[14], atol=ALIKE)
+    np.testing.assert_allclose(shown_worlds([cube()], WHOLE)[0], before, atol=1e-3)
+    stored = [curves_of(cube())["location", axis].evaluate(15) for axis in range(3)]
+    np.testing.assert_allclose(stored, before[14, :3, 3], atol=ALIKE)
+    yield from hand.press("Z", ctrl=True)
+    assert snapshot(cube()) == keys
 
 
-def snapped(hand: Hand, before: np.ndarray) -> Steps[np.ndarray]:
-    """Shift S, Selection to Cursor."""
-    yield from hand.pie("S", "N", shift=True)
-    expected = before.copy()
-    expected[:3, 3] = CURSOR
-    return expected
-
-
-def turned_back(hand: Hand, before: np.ndarray) -> Steps[np.ndarray]:
-    """Alt R."""
-    yield from hand.press("R", alt=True)
-    expected = np.eye(4)
-    expected[:3, 3] = before[:3, 3]
-    return expected
-
-
-def put_back(hand: Hand, before: np.ndarray) -> Steps[np.ndarray]:
-    """Alt G."""
-    yield from hand.press("G", alt=True)
-    expected = before.copy()
-    expected[:3, 3] = 0.0
-    return expected
-
-
-def grabbed(hand: Hand, before: np.ndarray) -> Steps[np.ndarray]:
-    """G, and a value that is typed."""
-    yield from hand.press("G")
-    yield from hand.press("X")
-    yield from hand.type("2")
-    yield from hand.press("RET")
-    expected = before.copy()
-    expected[0, 3] += 2.0
-    return expected
-
-
-def copied(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[None]:
-    """Row 4: keys that are copied in the Dope Sheet to another object move it as the first."""
-    other = bpy.data.objects.new("Other", None)
-    other.rotation_mode = "QUATERNION"
-    bpy.context.scene.collection.objects.link(other)
-    for path in ("location", "rotation_quaternion"):
-        other.keyframe_insert(path, frame=1)
-    bpy.context.scene.frame_set(1)
-    yield
-    yield from hand.hover(places.centre(places.region(sheet)))
-    yield from hand.press("A")
-    yield from hand.press("C", ctrl=True)
-    cube().select_set(False)
-    other.select_set(True)
-    bpy.context.view_layer.objects.active = other
-    yield 0.3
-    yield from hand.hover(places.centre(places.region(sheet)))
-    yield from hand.press("A")
-    yield from hand.press("V", ctrl=True)
-    yield 0.3
-    assert bpy.data.objects["Other"].rigid_motion.mode == "dq_sclerp"
-    for frame in range(1, 41):
-        bpy.context.scene.frame_set(frame)
-        np.testing.assert_allclose(on_screen("Other"), on_screen("Cube"), atol=ALIKE, err_msg=f"frame {frame}")
-    yield from hand.picture("copied")
+def typed(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
+    """With Auto Key a value that is typed into the Properties editor is the value of the key."""
+    bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
+    cube().select_set(True)
+    bpy.context.view_layer.objects.active = cube()
+    yield from hand.click(places.playhead(sheet, 35))
+    field = yield from hand.find_button(hand.area("PROPERTIES"), "WINDOW", "location")
+    yield from hand.enter("5", field)
+    yield from hand.wait_until(lambda: 35.0 in key_frames(cube()), "the typed value is keyed")
+    assert curves_of(cube())["location", 0].evaluate(35) == 5.0
+    assert abs(on_screen("Cube")[0, 3] - 5.0) < ALIKE
+    yield from hand.picture("typed")

@@ -5,19 +5,35 @@ Blender's module for Python knows no languages, so this is where the dictionary 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 
+import addon_utils
 import bpy
 from bpy.app.translations import pgettext_iface, pgettext_rpt, pgettext_tip
 
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.keyed import cube
-from tests.gui.scenarios.panel_notes import SCREW, extension, key, preferences
+from tests.gui.keyed import cube, extension
+
+SCREW = "dq_sclerp"
 
 NOTHING_REDUCED = "The keys here are neither reduced nor cleaned"
+
+
+def key(turns: dict[int, float]) -> None:
+    """Key the cube on these frames, moved along x and turned about z by degrees; from nothing."""
+    obj = cube()
+    obj.animation_data_clear()
+    obj.rotation_mode = "QUATERNION"
+    for frame, turn in turns.items():
+        obj.location = (frame / 10 - 2, 0, 0)
+        angle = math.radians(turn)
+        obj.rotation_quaternion = (math.cos(angle / 2), 0, 0, math.sin(angle / 2))
+        obj.keyframe_insert("location", frame=frame)
+        obj.keyframe_insert("rotation_quaternion", frame=frame)
 
 
 def speak(language: str) -> None:
@@ -59,6 +75,7 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from reported()
     yield from in_the_panel(hand, view)
     yield from in_menus(hand, view)
+    yield from of_others(hand, view)
     yield from preferences(hand)
     yield from other_languages()
 
@@ -99,6 +116,26 @@ def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.press("ESC")
 
 
+def of_others(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """What is refused, what has no keys, and nothing at all; and the Item tab beside it.
+
+    What is told of which object, `tests/ui/test_panels.py` asks without a window.
+    """
+    sidebar, seen = places.region(view, "UI"), set[bytes]()
+    for number, act in enumerate(
+        (
+            lambda: None,
+            lambda: setattr(cube(), "rotation_mode", "AXIS_ANGLE"),
+            lambda: cube().animation_data_clear(),
+            lambda: setattr(bpy.context.view_layer.objects, "active", None),
+        )
+    ):
+        act()
+        pixels = yield from hand.picture(f"others-{number}", places.box(sidebar))
+        seen.add(pixels.tobytes())
+        assert len(seen) == number + 1, "nothing new in the sidebar"
+
+
 def in_menus(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """The pie, and the menu that is behind a right click."""
     centre = places.centre(places.region(view))
@@ -110,6 +147,18 @@ def in_menus(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.picture("menu")
     yield from hand.press("ESC")
     yield from hand.press("ESC")
+
+
+def preferences(hand: Hand) -> Steps[None]:
+    """The preferences of the extension, in the window that Blender opens for its own."""
+    module = next(module for module in addon_utils.modules() if module.__name__ == extension().module)
+    addon_utils.module_bl_info(module)["show_expanded"] = True
+    bpy.context.window_manager.addon_search = "Rigid Motion"
+    bpy.ops.screen.userpref_show()
+    yield from hand.wait_until(lambda: len(bpy.context.window_manager.windows) == 2, "the preferences open")
+    bpy.context.preferences.active_section = "ADDONS"
+    yield 1.0
+    yield from hand.picture("preferences")
 
 
 def other_languages() -> Steps[None]:

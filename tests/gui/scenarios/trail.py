@@ -10,10 +10,10 @@ import numpy as np
 from mathutils import Vector
 
 from rigid_motion.animation import key_frames
-from tests.animation.keyed import Carrier, snapshot
+from tests.animation.keyed import snapshot
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
-from tests.gui.keyed import FRAMES, cube, key_the_cube
+from tests.gui.keyed import FRAMES, cube, key_the_cube, on_screen
 from tests.gui.places import Place
 
 NEAR_PX = 3
@@ -27,9 +27,9 @@ def scenario(hand: Hand) -> Steps[None]:
     view.spaces.active.region_3d.view_distance = 14
     bpy.ops.rigid_motion.set_mode(mode="motor_spline")
     yield from take_the_tool(hand, view)
-    yield from selected(hand, view, cube)
+    yield from selected(hand, view)
     for edit in (moved, dragged, turned, retimed, inserted, deleted):
-        yield from edit(hand, view, cube)
+        yield from edit(hand, view)
 
 
 def take_the_tool(hand: Hand, view: bpy.types.Area) -> Steps[None]:
@@ -44,16 +44,11 @@ def take_the_tool(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.picture(f"tool-{mode.lower()}", places.box(places.region(view)))
 
 
-def at(view: bpy.types.Area, carrier: Carrier, frame: float) -> Place:
-    """Where something is on a frame, on the screen."""
+def at(view: bpy.types.Area, frame: float) -> Place:
+    """Where the cube is on a frame, on the screen."""
     scene = bpy.context.scene
     before = scene.frame_current
-    scene.frame_set(int(frame))
-    obj = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    where = obj.matrix_world.translation
-    if isinstance(carrier, bpy.types.PoseBone):
-        where = obj.matrix_world @ obj.pose.bones[carrier.name].matrix.translation
-    where = where.copy()
+    where = world_of(frame)
     scene.frame_set(before)
     return places.point(view, where)
 
@@ -76,153 +71,147 @@ def drag(hand: Hand, first: Place, last: Place, steps: int = 6, **modifiers: boo
     yield
 
 
-def assert_at(view: bpy.types.Area, carrier: Carrier, frame: float, place: Place) -> None:
-    """On a frame something is at a place on the screen."""
-    off = np.subtract(at(view, carrier, frame), place)
+def assert_at(view: bpy.types.Area, frame: float, place: Place) -> None:
+    """On a frame the cube is at a place on the screen."""
+    off = np.subtract(at(view, frame), place)
     assert np.abs(off).max() <= NEAR_PX, (frame, off)
 
 
-def back_and_forth(hand: Hand, which, before: dict) -> Steps[None]:
+def back_and_forth(hand: Hand, before: dict) -> Steps[None]:
     """What was edited is one step back, and forth again."""
-    after = snapshot(which())
+    after = snapshot(cube())
     assert after != before
     yield from hand.press("Z", ctrl=True)
-    assert snapshot(which()) == before, "one step back"
+    assert snapshot(cube()) == before, "one step back"
     yield from hand.press("Z", ctrl=True, shift=True)
-    assert snapshot(which()) == after, "and forth"
+    assert snapshot(cube()) == after, "and forth"
     yield from hand.press("Z", ctrl=True)
-    assert snapshot(which()) == before
+    assert snapshot(cube()) == before
 
 
-def frames_selected(which) -> list[float]:
-    return key_frames(which(), selected=True).tolist()
+def frames_selected() -> list[float]:
+    return key_frames(cube(), selected=True).tolist()
 
 
-def selected(hand: Hand, view: bpy.types.Area, which) -> Steps[None]:
+def selected(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.press("A", alt=True)
-    assert frames_selected(which) == []
-    yield from hand.click(at(view, which(), FRAMES[1]))
-    assert frames_selected(which) == [FRAMES[1]]
-    yield from hand.click(at(view, which(), FRAMES[0]), shift=True)
-    assert frames_selected(which) == [*FRAMES[:2]]
+    assert frames_selected() == []
+    yield from hand.click(at(view, FRAMES[1]))
+    assert frames_selected() == [FRAMES[1]]
+    yield from hand.click(at(view, FRAMES[0]), shift=True)
+    assert frames_selected() == [*FRAMES[:2]]
     yield from hand.press("A")
-    assert frames_selected(which) == [*FRAMES]
-    keys = [at(view, which(), frame) for frame in FRAMES[1:]]
+    assert frames_selected() == [*FRAMES]
+    keys = [at(view, frame) for frame in FRAMES[1:]]
     low, high = np.min(keys, axis=0) - 30, np.max(keys, axis=0) + 30
     yield from drag(hand, (int(low[0]), int(high[1])), (int(high[0]), int(low[1])))
-    assert frames_selected(which) == [*FRAMES[1:]], "a box from where no key is"
+    assert frames_selected() == [*FRAMES[1:]], "a box from where no key is"
     yield from hand.press("B")
-    first = at(view, which(), FRAMES[0])
+    first = at(view, FRAMES[0])
     yield from drag(hand, (first[0] - 30, first[1] - 30), (first[0] + 30, first[1] + 30))
-    assert frames_selected(which) == [FRAMES[0]]
+    assert frames_selected() == [FRAMES[0]]
     yield from hand.picture("selected", places.box(places.region(view)))
 
 
-def moved(hand: Hand, view: bpy.types.Area, which) -> Steps[None]:
+def moved(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """By G: given up, along an axis with a number, and where the mouse is."""
-    name = which().name.lower()
-    yield from hand.click(at(view, which(), FRAMES[1]))
-    before, (x, y) = snapshot(which()), at(view, which(), FRAMES[1])
+    yield from hand.click(at(view, FRAMES[1]))
+    before, (x, y) = snapshot(cube()), at(view, FRAMES[1])
     yield from hand.press("G")
     yield from hand.glide((x + 60, y + 40))
-    assert_at(view, which(), FRAMES[1], (x + 60, y + 40))
-    yield from hand.picture(f"moving-{name}", places.box(view))
-    yield from hand.picture(f"path-of-{name}", places.box_around((x, y), 700, 420))
+    assert_at(view, FRAMES[1], (x + 60, y + 40))
+    yield from hand.picture("moving-cube", places.box(view))
+    yield from hand.picture("path-of-cube", places.box_around((x, y), 700, 420))
     yield from hand.press("ESC")
-    assert snapshot(which()) == before, "Esc brings all back"
+    assert snapshot(cube()) == before, "Esc brings all back"
     yield from hand.press("G")
     yield from hand.glide((x - 50, y + 30))
     yield from hand.press("RIGHTMOUSE")
-    assert snapshot(which()) == before, "and so does a right click"
+    assert snapshot(cube()) == before, "and so does a right click"
 
-    place = world_of(which(), FRAMES[1])
+    place = world_of(FRAMES[1])
     yield from hand.press("G")
     yield from hand.press("Z")
     yield from hand.type("0.5")
     yield from hand.press("RET")
-    assert (world_of(which(), FRAMES[1]) - place - Vector((0, 0, 0.5))).length < 1e-5
-    yield from back_and_forth(hand, which, before)
+    assert (world_of(FRAMES[1]) - place - Vector((0, 0, 0.5))).length < 1e-5
+    yield from back_and_forth(hand, before)
     yield from hand.hover((x, y))
     yield from hand.press("G")
     yield from hand.glide((x + 30, y + 50))
     yield from hand.click()
-    assert_at(view, which(), FRAMES[1], (x + 30, y + 50))
-    yield from back_and_forth(hand, which, before)
+    assert_at(view, FRAMES[1], (x + 30, y + 50))
+    yield from back_and_forth(hand, before)
 
 
-def world_of(carrier: Carrier, frame: float) -> Vector:
+def world_of(frame: float) -> Vector:
+    """Where the cube is on a frame."""
     bpy.context.scene.frame_set(int(frame))
-    obj = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    return (
-        obj.matrix_world.translation.copy()
-        if carrier == carrier.id_data
-        else (obj.matrix_world @ obj.pose.bones[carrier.name].matrix.translation)
-    )
+    return Vector(on_screen("Cube")[:3, 3])
 
 
-def dragged(hand: Hand, view: bpy.types.Area, which) -> Steps[None]:
+def dragged(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """With the left button on the key, which is selected by that."""
-    before, (x, y) = snapshot(which()), at(view, which(), FRAMES[0])
+    before, (x, y) = snapshot(cube()), at(view, FRAMES[0])
     yield from drag(hand, (x, y), (x + 40, y - 50))
-    assert frames_selected(which) == [FRAMES[0]]
-    assert_at(view, which(), FRAMES[0], (x + 40, y - 50))
+    assert frames_selected() == [FRAMES[0]]
+    assert_at(view, FRAMES[0], (x + 40, y - 50))
     yield from hand.press("Z", ctrl=True)
-    assert snapshot(which()) == before
+    assert snapshot(cube()) == before
 
 
-def turned(hand: Hand, view: bpy.types.Area, which) -> Steps[None]:
+def turned(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """By R: with the mouse, and by degrees about Z."""
-    name = which().name.lower()
-    yield from hand.click(at(view, which(), FRAMES[1]))
-    before, (x, y) = snapshot(which()), at(view, which(), FRAMES[1])
+    yield from hand.click(at(view, FRAMES[1]))
+    before, (x, y) = snapshot(cube()), at(view, FRAMES[1])
     yield from hand.hover((x + 120, y))
     yield from hand.press("R")
     yield from hand.glide((x, y + 120))
-    assert_at(view, which(), FRAMES[1], (x, y))
-    yield from hand.picture(f"turning-{name}", places.box(view))
+    assert_at(view, FRAMES[1], (x, y))
+    yield from hand.picture("turning-cube", places.box(view))
     yield from hand.press("ESC")
-    assert snapshot(which()) == before
+    assert snapshot(cube()) == before
     yield from hand.press("R")
     yield from hand.press("Z")
     yield from hand.type("90")
     yield from hand.press("RET")
-    yield from back_and_forth(hand, which, before)
+    yield from back_and_forth(hand, before)
 
 
-def retimed(hand: Hand, view: bpy.types.Area, which) -> Steps[None]:
+def retimed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """By dragging a key with Alt along the path to where it is five frames later."""
     bpy.context.scene.frame_set(FRAMES[1])
-    before, pose = snapshot(which()), which().matrix_basis.copy()
-    later = at(view, which(), FRAMES[1] + 5)
-    yield from drag(hand, at(view, which(), FRAMES[1]), later, alt=True)
-    frames = key_frames(which()).tolist()
+    before, pose = snapshot(cube()), cube().matrix_basis.copy()
+    later = at(view, FRAMES[1] + 5)
+    yield from drag(hand, at(view, FRAMES[1]), later, alt=True)
+    frames = key_frames(cube()).tolist()
     assert frames[::2] == [FRAMES[0], FRAMES[2]]
     assert abs(frames[1] - FRAMES[1] - 5) <= 1, frames
     bpy.context.scene.frame_set(int(frames[1]))
-    np.testing.assert_allclose(which().matrix_basis, pose, atol=1e-5, err_msg="the pose of the key stays")
-    yield from hand.picture(f"retimed-{which().name.lower()}", places.box(places.region(view)))
-    yield from back_and_forth(hand, which, before)
+    np.testing.assert_allclose(cube().matrix_basis, pose, atol=1e-5, err_msg="the pose of the key stays")
+    yield from hand.picture("retimed-cube", places.box(places.region(view)))
+    yield from back_and_forth(hand, before)
 
 
-def inserted(hand: Hand, view: bpy.types.Area, which) -> Steps[None]:
+def inserted(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """By clicking on the path with Ctrl: the motion stays as it is."""
-    before, frame = snapshot(which()), 30
-    places_before = [world_of(which(), frame) for frame in range(1, 41, 3)]
-    yield from hand.click(at(view, which(), frame), ctrl=True)
-    frames = key_frames(which()).tolist()
+    before, frame = snapshot(cube()), 30
+    places_before = [world_of(frame) for frame in range(1, 41, 3)]
+    yield from hand.click(at(view, frame), ctrl=True)
+    frames = key_frames(cube()).tolist()
     assert len(frames) == 4
     assert abs(frames[2] - frame) <= 1, frames
-    assert frames_selected(which) == [frames[2]]
+    assert frames_selected() == [frames[2]]
     for number, place in zip(range(1, 41, 3), places_before, strict=True):
-        assert (world_of(which(), number) - place).length < 1e-4, number
-    yield from hand.picture(f"inserted-{which().name.lower()}", places.box(places.region(view)))
-    yield from back_and_forth(hand, which, before)
+        assert (world_of(number) - place).length < 1e-4, number
+    yield from hand.picture("inserted-cube", places.box(places.region(view)))
+    yield from back_and_forth(hand, before)
 
 
-def deleted(hand: Hand, view: bpy.types.Area, which) -> Steps[None]:
-    before = snapshot(which())
-    yield from hand.click(at(view, which(), FRAMES[1]))
+def deleted(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    before = snapshot(cube())
+    yield from hand.click(at(view, FRAMES[1]))
     yield from hand.press("X")
-    assert key_frames(which()).tolist() == [FRAMES[0], FRAMES[2]]
-    assert which(), "the thing itself is still there"
-    yield from back_and_forth(hand, which, before)
+    assert key_frames(cube()).tolist() == [FRAMES[0], FRAMES[2]]
+    assert cube(), "the thing itself is still there"
+    yield from back_and_forth(hand, before)

@@ -28,11 +28,9 @@ def scenario(hand: Hand) -> Steps[None]:
     overlay.show_native = overlay.show_axes = False
     yield from take_the_tool(hand, view)
     yield from hand.press("A", alt=True)
-    yield from hand.click(at(view, cube(), MIDDLE))
-    yield from hand.picture("tangents", places.box_around(at(view, cube(), MIDDLE), 760, 480))
+    yield from hand.click(at(view, MIDDLE))
+    yield from hand.picture("tangents", places.box_around(at(view, MIDDLE), 760, 480))
     yield from faster(hand, view)
-    yield from given_up(hand, view)
-    yield from typed(hand, view)
     yield from bent(hand, view)
     yield from followed(hand, view)
 
@@ -63,7 +61,7 @@ def velocity(side: int) -> Vector:
 
 def handle(view: bpy.types.Area, side: int) -> Place:
     """Where the handle is, on the screen."""
-    return places.point(view, world_of(cube(), MIDDLE) + velocity(side) / 3.0)
+    return places.point(view, world_of(MIDDLE) + velocity(side) / 3.0)
 
 
 def towards(first: Place, last: Place, factor: float) -> Place:
@@ -72,8 +70,8 @@ def towards(first: Place, last: Place, factor: float) -> Place:
 
 def faster(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """Faster by six tenths behind the key: there alone, and on the path as it was."""
-    before, key = snapshot(cube()), at(view, cube(), MIDDLE)
-    stays = [world_of(cube(), frame) for frame in (*range(1, MIDDLE + 1), FRAMES[2])]
+    before, key = snapshot(cube()), at(view, MIDDLE)
+    stays = [world_of(frame) for frame in (*range(1, MIDDLE + 1), FRAMES[2])]
     speeds, end = [velocity(side).length for side in (-1, 1)], handle(view, 1)
     yield from held_down(hand, end)
     yield from hand.glide(towards(key, end, 1.6))
@@ -83,22 +81,9 @@ def faster(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     now = [velocity(side).length for side in (-1, 1)]
     np.testing.assert_allclose(now, np.multiply(speeds, (1.0, 1.6)), rtol=0.1)
     for frame, place in zip((*range(1, MIDDLE + 1), FRAMES[2]), stays, strict=True):
-        assert (world_of(cube(), frame) - place).length < 1e-4, frame
+        assert (world_of(frame) - place).length < 1e-4, frame
     yield from hand.picture("faster", places.box(view))
-    yield from back_and_forth(hand, cube, before)
-
-
-def given_up(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Aside nothing happens, and Esc brings all back."""
-    before, key, end = snapshot(cube()), at(view, cube(), MIDDLE), handle(view, 1)
-    yield from held_down(hand, end)
-    yield from hand.glide(towards(key, end, 0.4))
-    assert snapshot(cube()) != before
-    yield from hand.picture("slower", places.box_around(key, 700, 420))
-    yield from hand.press("ESC")
-    hand._event("LEFTMOUSE", "RELEASE")
-    yield
-    assert snapshot(cube()) == before
+    yield from back_and_forth(hand, before)
 
 
 def held_down(hand: Hand, place: Place) -> Steps[None]:
@@ -109,21 +94,9 @@ def held_down(hand: Hand, place: Place) -> Steps[None]:
     yield from hand.glide((place[0] + 8, place[1]), 2)
 
 
-def typed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """A speed in units a second."""
-    before = snapshot(cube())
-    yield from held_down(hand, handle(view, -1))
-    yield from hand.type("4")
-    yield from hand.press("RET")
-    hand._event("LEFTMOUSE", "RELEASE")
-    yield
-    assert abs(velocity(-1).length - 4.0) < 0.1, velocity(-1).length
-    yield from back_and_forth(hand, cube, before)
-
-
 def bent(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """With B the path leaves the key where the handle is dragged."""
-    before, key, end = snapshot(cube()), at(view, cube(), MIDDLE), handle(view, 1)
+    before, key, end = snapshot(cube()), at(view, MIDDLE), handle(view, 1)
     aside = end[0] - 20, end[1] + 90
     yield from held_down(hand, end)
     yield from hand.press("B")
@@ -133,10 +106,10 @@ def bent(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     hand._event("LEFTMOUSE", "RELEASE")
     yield
     assert len(key_frames(cube())) == len(FRAMES) + 1
-    assert frames_selected(cube) == [MIDDLE]
+    assert frames_selected() == [MIDDLE]
     wanted, now = np.subtract(aside, key), np.subtract(handle(view, 1), key)
     assert wanted @ now > 0.99 * np.linalg.norm(wanted) * np.linalg.norm(now), (wanted, now)
-    yield from back_and_forth(hand, cube, before)
+    yield from back_and_forth(hand, before)
 
 
 def followed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
@@ -144,9 +117,9 @@ def followed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     for frame in (10, 15, 25, 30):
         bpy.ops.rigid_motion.insert_path_key(frame=frame)
     yield from hand.press("A", alt=True)
-    yield from hand.click(at(view, cube(), MIDDLE))
-    before, (x, y) = snapshot(cube()), at(view, cube(), MIDDLE)
-    stands = {frame: world_of(cube(), frame) for frame in (1, 10, 15, 20, 25, 30, 40)}
+    yield from hand.click(at(view, MIDDLE))
+    before, (x, y) = snapshot(cube()), at(view, MIDDLE)
+    stands = {frame: world_of(frame) for frame in (1, 10, 15, 20, 25, 30, 40)}
     tools = bpy.context.scene.tool_settings
     yield from hand.press("G")
     yield from hand.press("O")
@@ -157,10 +130,10 @@ def followed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.picture("proportional", places.box(view))
     yield from hand.picture("following", places.box_around((x, y), 700, 500))
     yield from hand.click()
-    moved = {frame: (world_of(cube(), frame) - place).length for frame, place in stands.items()}
+    moved = {frame: (world_of(frame) - place).length for frame, place in stands.items()}
     assert all(moved[frame] < 1e-5 for frame in (1, 10, 30, 40)), moved
     assert moved[20] > moved[15] > 0.2 < moved[25] < moved[20], moved
-    yield from back_and_forth(hand, cube, before)
+    yield from back_and_forth(hand, before)
     is_on = bpy.context.scene.tool_settings.use_proportional_action
     yield from hand.press("O")
     assert bpy.context.scene.tool_settings.use_proportional_action != is_on, "O is a key of the tool, too"

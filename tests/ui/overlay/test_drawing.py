@@ -11,16 +11,6 @@ from tests.animation.scenes import key, new_object
 from tests.complaints import complaints
 
 
-def test_nothing_is_drawn_until_someone_asks_for_it(scene, monkeypatch):
-    drawn = []
-    monkeypatch.setattr(drawing, "_draw", drawn.append)
-    drawing.draw_paths()
-    assert drawn == []
-    scene.rigid_motion_overlay.show_paths = True
-    drawing.draw_paths()
-    assert drawn == [bpy.context]
-
-
 def test_without_a_path_no_graphics_card_is_needed(scene, caplog):
     scene.rigid_motion_overlay.show_paths = True
     new_object().select_set(True)

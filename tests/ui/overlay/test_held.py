@@ -30,12 +30,14 @@ def hands(scene):
 
 
 @pytest.mark.parametrize("parented", [False, True])
-def test_an_object_in_hands_that_move_by_keys(scene, hands, parented):
-    prop = new_object("Prop")
+def test_an_object_in_a_bone_and_in_a_hand_that_move_by_keys(scene, hands, parented):
+    prop, rig = new_object("Prop"), new_rig()
+    for name in ("Hip", "Hand"):
+        key_bone(rig.pose.bones[name])
     prop.location = (0.3, 0.2, 0.1)
     if parented:
         prop.parent = key(new_object("Floor"), FRAMES, seed=7)
-    passed_around(prop, hands)
+    passed_around(prop, (rig.pose.bones["Hand"], hands[1]))
     path = assert_where_it_is_seen(prop, scene)
     assert [piece.holder for piece in path.pieces] == [0, 1, PASSING_HOLDER, 2, PASSING_HOLDER, 1, PASSING_HOLDER]
     assert [piece.last for piece in path.pieces[:-1]] == [piece.first for piece in path.pieces[1:]]
@@ -48,15 +50,6 @@ def test_what_is_held_last_goes_on_to_the_end_of_the_scene(scene, hands):
     hold_in(prop, hands[0])
     path = assert_where_it_is_seen(prop, scene)
     assert path.frames[[0, -1]].tolist() == [7.0, 41.0]
-
-
-def test_an_object_in_bones(scene, hands):
-    rig = new_rig()
-    for name in ("Hip", "Hand"):
-        key_bone(rig.pose.bones[name])
-    prop = new_object("Prop")
-    passed_around(prop, (rig.pose.bones["Hand"], hands[0]))
-    assert_where_it_is_seen(prop, scene)
 
 
 def test_a_bone_in_hands(scene, hands):

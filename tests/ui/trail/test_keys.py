@@ -10,10 +10,10 @@ from mathutils import Matrix
 from rigid_motion.animation import key_frames, set_mode, write_channel
 from rigid_motion.animation.edits.path_keys import KeyEdits
 from rigid_motion.ui.trail.handles import handles_of, selected_spaces
-from tests.animation.bones.rigs import in_turn, select_bones
+from tests.animation.bones.rigs import in_turn
 from tests.animation.held import handled, in_holder, new_hands, new_prop, worlds
 from tests.animation.keyed import curves_of, mode_at, snapshot
-from tests.animation.scenes import FRAMES, key, new_object
+from tests.animation.scenes import FRAMES, new_object
 from tests.ui.conftest import select_keys
 from tests.ui.trail.conftest import CARRIERS, MIDDLE, MOVE, choose, held_prop
 
@@ -60,12 +60,6 @@ def test_what_is_tried_first_has_no_say_in_what_comes_next(scene):
     assert snapshot(carrier) == before
 
 
-def test_all_keys_may_be_retimed_as_far_as_one_likes(scene):
-    carrier = choose(CARRIERS["bone"](), *FRAMES)
-    operators.retime_path_keys(frames=-70.0)
-    assert key_frames(carrier).tolist() == [frame - 70.0 for frame in FRAMES]
-
-
 @pytest.mark.parametrize(("kind", "mode"), in_turn(KINDS, ("BLENDER", "dq_sclerp", "lerp_slerp", "motor_spline")))
 def test_the_motion_stays_where_a_key_is_inserted(scene, kind, mode):
     carrier = choose(CARRIERS[kind]())
@@ -89,24 +83,6 @@ def test_what_is_held_is_so_as_before_on_the_frame_that_its_key_comes_to(scene, 
     assert operators.retime_path_keys(frames=2.0) == {"FINISHED"}
     assert in_holder(prop, holder, [frame + 2.0]) == pytest.approx(before, abs=2e-5)
     assert worlds(prop, others) == pytest.approx(stay, abs=2e-5)
-
-
-def test_bones_are_retimed_together(scene):
-    rig = CARRIERS["bone"]().id_data
-    names = ("Hip", "Arm", "Hand")
-    for name in names:
-        key(rig.pose.bones[name])
-        choose(rig.pose.bones[name], MIDDLE)
-    select_bones(rig, *names)
-    operators.retime_path_keys(frames=3.0)
-    assert {key_frames(rig.pose.bones[name])[1] for name in names} == {MIDDLE + 3.0}
-
-
-def test_a_key_of_what_is_held_is_deleted(scene):
-    prop = held_prop("bone", 28.0)
-    stay = worlds(prop, [9.0, 20.0, 40.0, 70.0])
-    assert operators.delete_path_keys() == {"FINISHED"}
-    assert worlds(prop, [9.0, 20.0, 40.0, 70.0]) == pytest.approx(stay, abs=2e-5)
 
 
 def test_no_key_is_inserted_on_another(scene):
