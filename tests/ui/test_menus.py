@@ -45,8 +45,8 @@ def drawn(menu):
     return layout.drawn
 
 
-PIES = [menu for menu in menus.CLASSES if "_pie_" in menu.__name__]
-MODE_MENUS = [menu for menu in menus.CLASSES if menu not in (*PIES, menus.RIGID_MOTION_MT_other_keys)]
+PIES = [menus.RIGID_MOTION_MT_pie_view, menus.RIGID_MOTION_MT_pie_keys]
+MODE_MENUS = [getattr(menus, f"RIGID_MOTION_MT_{name}") for name in ("view", "keys", "current", "whole")]
 
 
 def offered(menu):

@@ -14,7 +14,8 @@ deviations   pops and kinks on paths                  mouse_input  what is dragg
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from types import ModuleType
 
 import bpy
 
@@ -29,19 +30,31 @@ from . import (
     manual,
     menus,
     operators,
-    overlay,
     panels,
     preferences,
     reducing,
     speed,
-    trail,
 )
+from .overlay import cache, cleaned, drawing, ghost_bodies, ghost_drawing, settings
+from .trail import dragging, picking, tangents, tool
 
 MODULES = (
-    *(overlay, preferences, operators, breakdown, reducing, cleaning, holding, speed, deviations, trail, gltf_export),
-    *(menus, panels, live, keymap, manual),
+    *(settings, cache, drawing, ghost_bodies, ghost_drawing, cleaned),
+    *(preferences, operators, breakdown, reducing, cleaning, holding, speed, deviations),
+    *(picking, dragging, tangents, tool, gltf_export, menus, panels, live, keymap, manual),
 )
-CLASSES: tuple[type[Any], ...] = tuple(cls for module in MODULES for cls in getattr(module, "CLASSES", ()))
+
+
+def _classes_of(module: ModuleType) -> Iterator[type]:
+    """Yield the classes of a module that Blender is to know: those with its kind of names, and groups of properties."""
+    for cls in (*vars(module).values(), *getattr(module, "PANELS", ())):
+        if isinstance(cls, type) and cls.__module__ == module.__name__:
+            groups = bpy.types.PropertyGroup, bpy.types.AddonPreferences
+            if cls.__name__.startswith("RIGID_MOTION_") or issubclass(cls, groups):
+                yield cls
+
+
+CLASSES = tuple(cls for module in MODULES for cls in _classes_of(module))
 
 
 def register() -> None:

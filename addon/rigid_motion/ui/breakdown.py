@@ -185,6 +185,3 @@ class RIGID_MOTION_OT_relax(_Breakdown):
     bl_description = "Key a pose on the current frame that is more like its neighbours: closer to the mode's in-between"
     kind = RELAX
     short = n_("Relax", OWN_WORDS)
-
-
-CLASSES = (RIGID_MOTION_OT_breakdown, RIGID_MOTION_OT_push, RIGID_MOTION_OT_relax)

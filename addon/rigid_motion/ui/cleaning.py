@@ -131,6 +131,3 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
             )
             parts.append(text.format(percent=100.0 * alone))
         return "; ".join(parts)
-
-
-CLASSES = (RIGID_MOTION_OT_clean_motion,)

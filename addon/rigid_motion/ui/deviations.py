@@ -16,13 +16,12 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..animation.transforms import Transform
 from ..blender import IntProperty, Operator, Returned, existing, view_layer, with_properties
 from ..motion.speeds import jumps
-from .overlay import overlay_settings
 from .overlay.cache import drawn_paths
 from .overlay.drawing import Pen, batch_of, beside
 from .overlay.held import motion_now
 from .overlay.kinds import axis_length_of
 from .overlay.points import DrawnPath
-from .overlay.settings import RigidMotionOverlay
+from .overlay.settings import RigidMotionOverlay, overlay_settings
 from .targets import targets_of
 from .wording import labelled
 
@@ -111,8 +110,6 @@ class RIGID_MOTION_OT_go_to_deviation(Operator):
 
 
 NO_MORE = n_("No more deviations in this direction")
-
-CLASSES = (RIGID_MOTION_OT_go_to_deviation,)
 
 
 def register() -> None:

@@ -120,6 +120,3 @@ def _summary(report: Report, output: Path) -> str:
         full=sum(item.size for item in before) / 1000.0,
         error=1000.0 * max(clip.error for clip in report.clips),
     )
-
-
-CLASSES = (RIGID_MOTION_OT_export_gltf,)

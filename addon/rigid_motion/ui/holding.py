@@ -361,17 +361,6 @@ class RIGID_MOTION_MT_hold(Menu):
         layout.operator("rigid_motion.pass_frames", text="Pass...")
 
 
-CLASSES = (
-    RIGID_MOTION_OT_hold_in,
-    RIGID_MOTION_OT_hold_in_known,
-    RIGID_MOTION_OT_let_go,
-    RIGID_MOTION_OT_match_grip,
-    RIGID_MOTION_OT_pass_frames,
-    RIGID_MOTION_MT_holders,
-    RIGID_MOTION_MT_hold,
-)
-
-
 def _get_frames(_scene: bpy.types.Scene) -> int:
     facts = facts_or_none(shown_prop(bpy.context))
     return 0 if facts is None else facts.frames

@@ -342,23 +342,6 @@ class RIGID_MOTION_PT_live_send(Folded):
             self.layout.operator("rigid_motion.live_stop_sending", icon="PAUSE")
 
 
-CLASSES = (
-    LiveBone,
-    LiveSettings,
-    RIGID_MOTION_OT_live_listen,
-    RIGID_MOTION_OT_live_stop,
-    RIGID_MOTION_OT_live_record,
-    RIGID_MOTION_OT_live_finish,
-    RIGID_MOTION_OT_live_match,
-    RIGID_MOTION_OT_live_send,
-    RIGID_MOTION_OT_live_stop_sending,
-    RIGID_MOTION_UL_live_bones,
-    RIGID_MOTION_PT_live,
-    RIGID_MOTION_PT_live_bones,
-    RIGID_MOTION_PT_live_send,
-)
-
-
 def register() -> None:
     setattr(bpy.types.Scene, receiving.LIVE, PointerProperty(type=LiveSettings))
 

@@ -174,17 +174,6 @@ class RIGID_MOTION_MT_pie_keys(_Pie):
     scope, menu = SELECTED, RIGID_MOTION_MT_keys.__name__
 
 
-CLASSES = (
-    RIGID_MOTION_MT_view,
-    RIGID_MOTION_MT_keys,
-    RIGID_MOTION_MT_current,
-    RIGID_MOTION_MT_whole,
-    RIGID_MOTION_MT_other_keys,
-    RIGID_MOTION_MT_pie_view,
-    RIGID_MOTION_MT_pie_keys,
-)
-
-
 def _draw_in_view(self: Menu, _context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.menu(RIGID_MOTION_MT_view.__name__)

@@ -358,17 +358,3 @@ class RIGID_MOTION_OT_refresh(Operator):
         count = animation.refresh()
         self.report({"INFO"}, rpt_("In-betweens refreshed: {count}").format(count=count))
         return {"FINISHED"}
-
-
-CLASSES = (
-    RIGID_MOTION_OT_set_mode,
-    RIGID_MOTION_OT_copy_mode,
-    RIGID_MOTION_OT_add_cycles,
-    RIGID_MOTION_OT_clear,
-    RIGID_MOTION_OT_set_turns,
-    RIGID_MOTION_OT_bake,
-    RIGID_MOTION_OT_unbake,
-    RIGID_MOTION_OT_refresh,
-    RIGID_MOTION_OT_add_layer,
-    RIGID_MOTION_OT_merge_layer,
-)

@@ -18,9 +18,10 @@ from ..animation.queries.keyed import active_binding, source_of
 from ..animation.queries.segments import SegmentFacts, frame_in_action, is_up_to_date, segment_at
 from ..animation.transforms import OWN_WORDS, Transform, transform_of
 from ..blender import Panel, existing
-from . import deviations, held_in, overlay, speed
+from . import deviations, held_in, speed
 from .holding import facts_or_none, name_of, shown_prop
 from .operators import axis_of_turns
+from .overlay.settings import draw_settings, overlay_settings
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_key_editor, modes_meant, with_keyed_bones
 from .wording import (
     BAKED_TEXT,
@@ -197,10 +198,10 @@ class _Path(Folded):
     bl_label = "Path"
 
     def draw_header(self, context: bpy.types.Context) -> None:
-        self.layout.prop(overlay.overlay_settings(context.scene), "show_paths", text="")
+        self.layout.prop(overlay_settings(context.scene), "show_paths", text="")
 
     def draw(self, context: bpy.types.Context) -> None:
-        overlay.draw_settings(self.layout, context)
+        draw_settings(self.layout, context)
         deviations.draw_settings(context, self.layout)
 
 
@@ -208,7 +209,7 @@ class _Speed(Folded):
     bl_label = "Speed"
 
     def draw_header(self, context: bpy.types.Context) -> None:
-        self.layout.prop(overlay.overlay_settings(context.scene), "show_speed", text="")
+        self.layout.prop(overlay_settings(context.scene), "show_speed", text="")
 
     def draw(self, context: bpy.types.Context) -> None:
         speed.draw_panel(context, self.layout)
@@ -293,4 +294,4 @@ def _panels() -> Iterator[type[Panel]]:
         yield _in_space(_Layer, space, main)
 
 
-CLASSES = tuple(_panels())
+PANELS = tuple(_panels())

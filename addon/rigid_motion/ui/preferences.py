@@ -122,5 +122,3 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
 UNCHANGED = SimpleNamespace(
     **{name: prop.keywords["default"] for name, prop in RigidMotionPreferences.__annotations__.items()}
 )
-
-CLASSES = (RigidMotionPreferences,)

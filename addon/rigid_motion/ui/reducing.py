@@ -283,11 +283,3 @@ class RIGID_MOTION_OT_discard_dense_keys(OfRigsToo, OnChanged):
     nothing_to_do = n_("The keys here are neither reduced nor cleaned")
     verb = staticmethod(animation.discard_dense_keys)
     summary = n_("previous keys removed from the file")
-
-
-CLASSES = (
-    RIGID_MOTION_OT_reduce_keys,
-    RIGID_MOTION_OT_reduce_into_holds,
-    RIGID_MOTION_OT_restore_keys,
-    RIGID_MOTION_OT_discard_dense_keys,
-)

@@ -24,11 +24,11 @@ from ..animation.transforms import OWN_WORDS, Transform
 from ..blender import BoolProperty, EnumProperty, Returned, existing, with_properties
 from ..handlers import append_drawing, remove_drawing
 from ..motion.speeds import ways_and_turns
-from .overlay import overlay_settings
 from .overlay.cache import path_of
 from .overlay.drawing import KEY_COLOUR, Pen, batch_of, complain
 from .overlay.held import motion_now
 from .overlay.points import DrawnPath
+from .overlay.settings import overlay_settings
 from .targets import SELECTED, WHOLE, OnTargets, active_target, grouped_by_frames, is_key_editor
 from .wording import degrees, labelled, length
 
@@ -217,9 +217,6 @@ class RIGID_MOTION_OT_equalise_speed(OnTargets):
         if bent.bend > MIN_BEND_RATIO * bent.speed * (bent.last - bent.first):
             text = rpt_("the path of Smooth Screw, which depends on the frames of its keys, is up to {length} off")
             yield text.format(length=length(context.scene, bent.bend, precision=3))
-
-
-CLASSES = (RIGID_MOTION_OT_equalise_speed,)
 
 
 def register() -> None:

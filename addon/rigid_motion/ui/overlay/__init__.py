@@ -11,31 +11,3 @@ ghost_drawing  ghosts on the screen, around the current frame
 ghost_bodies   skinned meshes, as they were seen on other frames
 cleaned  what was cleaned, before and after
 """
-
-from __future__ import annotations
-
-import bpy
-
-from ...blender import PointerProperty
-from . import cache, cleaned, drawing, ghost_bodies, ghost_drawing
-from .settings import RIGID_MOTION_OT_update_path, RigidMotionOverlay, draw_settings, draw_toggle, overlay_settings
-
-POPOVER = "VIEW3D_PT_overlay_object"
-CLASSES = (RigidMotionOverlay, RIGID_MOTION_OT_update_path)
-MODULES = (cache, drawing, ghost_bodies, ghost_drawing, cleaned)
-
-__all__ = ["CLASSES", "draw_settings", "overlay_settings", "register", "unregister"]
-
-
-def register() -> None:
-    setattr(bpy.types.Scene, cache.OVERLAY, PointerProperty(type=RigidMotionOverlay))
-    getattr(bpy.types, POPOVER).append(draw_toggle)
-    for module in MODULES:
-        module.register()
-
-
-def unregister() -> None:
-    for module in reversed(MODULES):
-        module.unregister()
-    getattr(bpy.types, POPOVER).remove(draw_toggle)
-    delattr(bpy.types.Scene, cache.OVERLAY)

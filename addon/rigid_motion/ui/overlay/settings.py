@@ -17,6 +17,7 @@ from ...blender import (
     FloatProperty,
     IntProperty,
     Operator,
+    PointerProperty,
     Returned,
     existing,
     with_properties,
@@ -217,3 +218,16 @@ def is_shown(context: Any) -> bool:
     overlay, settings = getattr(context.space_data, "overlay", None), overlay_settings(context.scene)
     in_view = not isinstance(overlay, bpy.types.View3DOverlay) or (overlay.show_overlays and overlay.show_motion_paths)
     return in_view and (settings.show_paths or settings.show_ghosts)
+
+
+POPOVER = "VIEW3D_PT_overlay_object"
+
+
+def register() -> None:
+    setattr(bpy.types.Scene, cache.OVERLAY, PointerProperty(type=RigidMotionOverlay))
+    getattr(bpy.types, POPOVER).append(draw_toggle)
+
+
+def unregister() -> None:
+    getattr(bpy.types, POPOVER).remove(draw_toggle)
+    delattr(bpy.types.Scene, cache.OVERLAY)

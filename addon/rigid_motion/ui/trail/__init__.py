@@ -11,21 +11,3 @@ tangents  handles by which their speed is set, and paths are bent
 
 proportional  keys around those that are dragged, which follow
 """
-
-from __future__ import annotations
-
-from . import dragging, picking, tangents, tool
-
-CLASSES = (*picking.CLASSES, *dragging.CLASSES, *tangents.CLASSES, *tool.CLASSES)
-
-__all__ = ["CLASSES", "register", "unregister"]
-
-
-def register() -> None:
-    tool.register()
-    tangents.register()
-
-
-def unregister() -> None:
-    tangents.unregister()
-    tool.unregister()

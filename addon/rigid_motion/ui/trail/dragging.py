@@ -292,6 +292,3 @@ class RIGID_MOTION_OT_retime_path_keys(Dragging):
 
     def apply(self) -> None:
         self.frames = self._edits.retime(self.frames)
-
-
-CLASSES = (RIGID_MOTION_OT_move_path_keys, RIGID_MOTION_OT_rotate_path_keys, RIGID_MOTION_OT_retime_path_keys)

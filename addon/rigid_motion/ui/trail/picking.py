@@ -219,13 +219,3 @@ class RIGID_MOTION_OT_set_path_point(OnPath):
             return sum(chosen, Vector()) / max(len(chosen), 1)
         is_tail = self.point == "TAIL" and target.is_part
         return Vector((0.0, target.pose_bone.length if is_tail else 0.0, 0.0))
-
-
-CLASSES = (
-    RIGID_MOTION_OT_set_path_point,
-    RIGID_MOTION_OT_select_path_keys,
-    RIGID_MOTION_OT_select_all_path_keys,
-    RIGID_MOTION_OT_box_path_keys,
-    RIGID_MOTION_OT_insert_path_key,
-    RIGID_MOTION_OT_delete_path_keys,
-)

@@ -232,9 +232,6 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         return np.asarray(np.clip(along @ stays / (along @ along), MIN_LENGTH_RATIO * length, length) * along - stays)
 
 
-CLASSES = (RIGID_MOTION_OT_drag_path_tangent,)
-
-
 def register() -> None:
     beside.append(draw)
 

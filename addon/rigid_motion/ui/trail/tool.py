@@ -92,9 +92,6 @@ class RIGID_MOTION_OT_edit_path(Operator):
         return {"FINISHED"}
 
 
-CLASSES = (RIGID_MOTION_OT_edit_path,)
-
-
 def register() -> None:
     for tool in TOOLS:
         bpy.utils.register_tool(tool, after={"builtin.transform"}, separator=True)
