@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import bake, hold_in, pass_frames, set_enabled, set_mode, unbake, write_channel
-from rigid_motion.ui.panels import MANY_MODIFIERS, facts_and_notes
-from rigid_motion.ui.wording import BAKED_TEXT, OUT_OF_DATE, PASSING_TEXT, RESTING_TEXT, STRIPS_TEXT
+from rigid_motion.ui import notes
+from rigid_motion.ui.notes import facts_and_notes
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import new_object
 from tests.ui.conftest import keyed
@@ -48,16 +48,16 @@ def test_between_keys_in_different_hands_there_is_no_segment(tool):
     bpy.context.scene.frame_set(21)
     hold_in(tool, hand)
     assert notes_on(tool, 15.0) == ([], "motor_spline")
-    assert notes_on(tool, 20.5) == ([RESTING_TEXT.format(frame=21)], None)
-    assert notes_on(tool, 25.0) == ([RESTING_TEXT.format(frame=41)], None)
+    assert notes_on(tool, 20.5) == ([notes.RESTING_TEXT.format(frame=21)], None)
+    assert notes_on(tool, 25.0) == ([notes.RESTING_TEXT.format(frame=41)], None)
     pass_frames(tool, 4)
-    assert notes_on(tool, 38.0) == ([PASSING_TEXT.format(frame=41)], None)
+    assert notes_on(tool, 38.0) == ([notes.PASSING_TEXT.format(frame=41)], None)
 
 
 def test_what_is_baked_can_be_un_baked(tool):
     set_mode(tool, "dq_sclerp")
     bake(tool)
-    assert notes_on(tool) == ([BAKED_TEXT], "BLENDER")
+    assert notes_on(tool) == ([notes.BAKED_TEXT], "BLENDER")
     unbake(tool)
     assert notes_on(tool) == ([], "dq_sclerp")
 
@@ -66,7 +66,7 @@ def test_an_edit_that_nobody_follows_is_noted_until_it_is_refreshed(tool):
     set_mode(tool, "dq_sclerp")
     set_enabled(False)
     curves_of(tool)["location", 0].keyframe_points[1].co.y += 1.0
-    assert notes_on(tool) == ([OUT_OF_DATE], "dq_sclerp")
+    assert notes_on(tool) == ([notes.OUT_OF_DATE], "dq_sclerp")
     bpy.ops.rigid_motion.refresh()
     assert notes_on(tool) == ([], "dq_sclerp")
 
@@ -75,7 +75,7 @@ def test_an_object_that_strips_move_has_its_keys_in_there(tool):
     action = tool.animation_data.action
     tool.animation_data.action = None
     tool.animation_data.nla_tracks.new().strips.new("Strip", 1, action)
-    assert notes_on(tool) == ([STRIPS_TEXT], None)
+    assert notes_on(tool) == ([notes.STRIPS_TEXT], None)
 
 
 def test_where_a_component_is_keyed_alone_its_frames_are_noted(tool):
@@ -95,7 +95,7 @@ def test_where_modifiers_are_many_their_number_is_noted(extension):
     write_channel(obj, "rotation_quaternion", frames, np.random.default_rng(6).normal(size=(len(frames), 4)))
     set_mode(obj, "dq_sclerp")
     texts, _ = notes_on(obj)
-    assert int(texts[-1].partition(" modifiers on a channel")[0]) > MANY_MODIFIERS
+    assert int(texts[-1].partition(" modifiers on a channel")[0]) > notes.MANY_MODIFIERS
 
 
 def test_a_second_user_of_a_slot_that_differs_has_a_note_until_the_two_are_alike(tool):

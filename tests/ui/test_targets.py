@@ -7,7 +7,7 @@ import pytest
 
 from rigid_motion.animation import is_reduced, key_frames, modes_of
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion.ui.panels import facts_and_notes
+from rigid_motion.ui.notes import KEYED_BONES, facts_and_notes
 from rigid_motion.ui.targets import (
     CURRENT,
     KEY_EDITORS,
@@ -17,7 +17,6 @@ from rigid_motion.ui.targets import (
     scope_for,
     targets_of,
 )
-from rigid_motion.ui.wording import KEYED_BONES
 from tests.animation.bones.rigs import select_bones
 from tests.animation.scenes import editor
 from tests.rigs.recorded import recorded_rig

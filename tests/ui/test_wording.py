@@ -10,7 +10,8 @@ import pytest
 
 from rigid_motion.animation import Reduction
 from rigid_motion.animation.queries.segments import SegmentFacts
-from rigid_motion.ui.wording import cautions, reduction_summary, wrapped
+from rigid_motion.ui.notes import cautions
+from rigid_motion.ui.wording import reduction_summary, wrapped
 
 PLAIN = SegmentFacts(
     first=1.0,

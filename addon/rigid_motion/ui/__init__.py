@@ -4,7 +4,8 @@ targets      what an editor means, and operators on it    operators    what can 
 reducing     fewer keys, and all of them again            breakdown    operators that key poses by a slider
 holding      operators by which things are held           held_in      what a panel shows of that
 menus        entries in Blender's menus, and the pies     keymap       shortcuts
-panels       the sidebar, with its notes                  overlay      paths in the viewport
+panels       the sidebar                                  notes        what it says of a segment
+overlay      paths in the viewport
 wording      labels, texts and lines of a panel           preferences  of the extension
 gltf_export  glTF files with few keys                     live         bodies over a network
 manual       where the documentation is                   cleaning     keys that tremble less

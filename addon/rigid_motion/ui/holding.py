@@ -14,7 +14,6 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.app.translations import pgettext_tip as tip_
 
 from .. import animation
 from ..animation import HoldFacts, Refused, hold_facts
@@ -175,6 +174,7 @@ class RIGID_MOTION_OT_hold_in(_Hold):
         "of an active rig its active bone. They stay where they are, and follow all later edits of it"
     )
     summary = n_("held in {holder} from frame {frame:g}")
+    nothing_meant = FIRST_AND_LAST
 
     use_bone: bool = BoolProperty(
         name="Active Bone",
@@ -186,10 +186,6 @@ class RIGID_MOTION_OT_hold_in(_Hold):
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
         return iter(props_for(context, active_holder(context)))
-
-    @classmethod
-    def reason(cls, _targets: list[Transform], _context: bpy.types.Context) -> str:
-        return tip_(FIRST_AND_LAST)
 
     def holder(self, context: bpy.types.Context) -> tuple[bpy.types.Object | None, str]:
         node = active_holder(context, use_bone=self.use_bone)
@@ -237,15 +233,11 @@ def known_props(context: bpy.types.Context) -> list[Transform]:
 class _OfHeld(OnTargets):
     """Operators on what has been held."""
 
-    nothing_to_do = NOTHING_HELD
+    nothing_meant = NOTHING_HELD
 
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
         return iter(held(context))
-
-    @classmethod
-    def reason(cls, _targets: list[Transform], _context: bpy.types.Context) -> str:
-        return tip_(cls.nothing_to_do)
 
 
 @with_properties

@@ -237,16 +237,12 @@ class RIGID_MOTION_OT_copy_mode(OnTargets):
         "Copy the modes of the active one to the rest of the selection: each key gets the mode of the active one on"
         " its frame"
     )
-    nothing_to_do = n_("Select the ones to receive the mode, and last the one that has it")
+    nothing_meant = n_("Select the ones to receive the mode, and last the one that has it")
 
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
         active = active_target(context)
         return (target for target in each_target(context) if active not in (None, target))
-
-    @classmethod
-    def reason(cls, _targets: list[Transform], _context: bpy.types.Context) -> str:
-        return tip_(cls.nothing_to_do)
 
     def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
         model = existing(active_target(context))

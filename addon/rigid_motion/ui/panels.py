@@ -7,133 +7,26 @@ from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
 
 from .. import animation
-from ..animation.actions.reading import planned_from
 from ..animation.baking.layers import is_plain, strips_of
-from ..animation.evaluation.components import LOCATION, PART_OF, ROTATION
-from ..animation.evaluation.sources import KeyedTransform
 from ..animation.properties import TURN_AXIS_ITEMS
-from ..animation.queries.keyed import active_binding, source_of
-from ..animation.queries.segments import SegmentFacts, frame_in_action, is_up_to_date, segment_at
-from ..animation.transforms import OWN_WORDS, Transform, transform_of
+from ..animation.queries.segments import SegmentFacts
+from ..animation.transforms import OWN_WORDS, Transform
 from ..blender import Panel, existing
 from . import deviations, held_in, speed
 from .holding import facts_or_none, name_of, shown_prop
+from .notes import MANY_MODIFIERS, OUT_OF_DATE, facts_and_notes, most_modifiers
 from .operators import axis_of_turns
 from .overlay.settings import draw_settings, overlay_settings
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_key_editor, modes_meant, with_keyed_bones
-from .wording import (
-    BAKED_TEXT,
-    DENSE_TEXT,
-    KEYED_BONES,
-    LABELS,
-    MOVED_ALONE,
-    NO_BONE,
-    NO_KEYS,
-    NO_PATH,
-    NO_SEGMENT,
-    OUT_OF_DATE,
-    PART_NAMES,
-    PASSING_TEXT,
-    RESTING_TEXT,
-    STRIPS_TEXT,
-    cautions,
-    draw_text,
-    labelled,
-    length,
-    listed,
-    reduced_to,
-    turn_text,
-)
-
-Notes = list[tuple[str, str]]
-"""Texts, each behind its icon."""
+from .wording import LABELS, draw_text, labelled, length, reduced_to, turn_text
 
 SPACES = ("VIEW_3D", "DOPESHEET_EDITOR", "GRAPH_EDITOR")
 
-MANY_MODIFIERS = 64
-"""With more modifiers on a channel Blender plays noticeably slower where many channels have as many."""
-
-
-def facts_and_notes(
-    target: bpy.types.Object | bpy.types.PoseBone | Transform, frame: float
-) -> tuple[SegmentFacts | None, Notes]:
-    """Return the segment that a frame of the scene is in, and notes on it."""
-    target = transform_of(target)
-    source, problem = _read(target)
-    segment = None
-    notes = []
-    if problem:
-        notes.append(("ERROR", problem))
-    elif source is None:
-        data = target.animated.animation_data
-        in_strips = data is not None and any(track.strips for track in data.nla_tracks)
-        of_bones = with_keyed_bones(target) != [target]
-        notes.append(("INFO", KEYED_BONES if of_bones else STRIPS_TEXT if in_strips else NO_KEYS))
-    else:
-        frame = frame_in_action(target.animated, frame)
-        # From a key in one holder to a key in another one there is no motion: it goes on as before, or rests.
-        segment = segment_at(source.run_at(frame).source if source.switches else source, frame)
-        notes += (
-            [("ERROR", caution) for caution in cautions(segment)] if segment else [("INFO", _between(source, frame))]
-        )
-        notes += [("INFO", text) for text in _moved_alone(source)] if source.is_live else []
-        if not animation.is_enabled() and not is_up_to_date(target, source):
-            notes.append(("ERROR", OUT_OF_DATE))
-    if (count := _most_modifiers(target)) > MANY_MODIFIERS:
-        notes.append(("INFO", iface_(DENSE_TEXT).format(count=count)))
-    if animation.is_baked(target):
-        notes.append(("INFO", BAKED_TEXT))
-    return segment, notes
-
-
-_problem: tuple[tuple, str] = ((), "")
-"""The last answer of `problem_of`, which looks at all users; and before it, all that it depends on."""
-
-
-def _read(target: Transform) -> tuple[KeyedTransform | None, str]:
-    """Return what is keyed, or why rigid motion cannot act on it."""
-    global _problem
-    try:
-        source = source_of(target)
-    except ValueError as refusal:
-        return None, str(refusal)
-    if source is None:
-        return None, animation.problem_of(target)
-    binding = active_binding(target)
-    depends_on = (*target.identity, source.digest, binding and planned_from(binding))
-    if _problem[0] != depends_on:
-        _problem = depends_on, animation.problem_of(target)
-    return (None if _problem[1] else source), _problem[1]
-
-
-def _between(source: KeyedTransform, frame: float) -> str:
-    """Return what there is to say of a frame of the Action on which there is no segment."""
-    switch = next((one for one in source.switches if one.frame > frame), None)
-    if switch is None:
-        return NO_SEGMENT
-    return iface_(PASSING_TEXT if switch.begin < frame else RESTING_TEXT).format(frame=switch.frame)
-
-
-def _moved_alone(source: KeyedTransform) -> Iterator[str]:
-    """Yield what there is to say of location and rotation where some of their components alone have keys."""
-    for part in (LOCATION, ROTATION):
-        frames = [
-            set(keys.times.round(2).tolist())
-            for rows, keys in source.channels
-            if len(keys.times) > 1 and any(PART_OF[row] == part for row in rows)
-        ]
-        if alone := sorted(set().union(*frames) - set.intersection(*frames)) if frames else ():
-            yield iface_(MOVED_ALONE).format(
-                frames=listed([f"{frame:g}" for frame in alone]), part=iface_(PART_NAMES[part])
-            )
-
-
-def _most_modifiers(target: Transform) -> int:
-    """Return the largest number of modifiers that a channel of a target has."""
-    binding = active_binding(target)
-    return 0 if binding is None else max((len(fcurve.modifiers) for fcurve in binding.curves.values()), default=0)
+NO_PATH = n_("Its path is known while its strip is edited, with an influence of 1")
+NO_BONE = n_("No Bone Active")
 
 
 class InSidebar(Panel):
@@ -172,7 +65,7 @@ class _Main(InSidebar):
             draw_text(context, layout, text, icon)
         if ("ERROR", OUT_OF_DATE) in notes:
             layout.operator("rigid_motion.refresh")
-        if _most_modifiers(target) > MANY_MODIFIERS:
+        if most_modifiers(target) > MANY_MODIFIERS:
             row = layout.row(align=True)
             row.operator("rigid_motion.clear")
             row.operator("rigid_motion.reduce_keys", text="Reduce Keys", text_ctxt=OWN_WORDS)

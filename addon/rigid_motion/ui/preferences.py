@@ -104,15 +104,7 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
 
         layout.label(text="Path Overlay")
         column = layout.column()
-        for name in (
-            "native_color",
-            "mode_color",
-            "key_color",
-            "tick_color",
-            "past_color",
-            "future_color",
-            "line_width",
-        ):
+        for name in (*filter(lambda name: name.endswith("_color"), vars(UNCHANGED)), "line_width"):
             column.prop(self, name)
 
         layout.label(text="Pie Menu")

@@ -226,6 +226,9 @@ class OnTargets(Operator):
     nothing_to_do: ClassVar[str] = ""
     """The reason why the operator is greyed out where it has nothing to do on any target."""
 
+    nothing_meant: ClassVar[str] = ""
+    """The reason where there are no targets; "" for that of the editor."""
+
     with_work: Any = staticmethod(iter)
     """A function of targets that returns those on which there is something to do."""
 
@@ -260,9 +263,8 @@ class OnTargets(Operator):
     @classmethod
     def reason(cls, targets: list[Transform], context: bpy.types.Context) -> str:
         """Return why the operator is greyed out, in the user's language."""
-        if targets:
-            return tip_(cls.nothing_to_do)
-        return tip_(NOTHING_SHOWN if is_key_editor(context) else NO_TARGETS)
+        nothing_meant = cls.nothing_meant or (NOTHING_SHOWN if is_key_editor(context) else NO_TARGETS)
+        return tip_(cls.nothing_to_do if targets else nothing_meant)
 
     def execute(self, context: bpy.types.Context) -> Returned:
         targets = self.meant(context)

@@ -17,9 +17,8 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..animation import Reduction
-from ..animation.evaluation.components import LOCATION, ROTATION
 from ..animation.properties import MODE_ITEMS
-from ..animation.queries.segments import NEAR_HALF_TURN, SegmentFacts
+from ..animation.queries.segments import SegmentFacts
 from ..animation.transforms import OWN_WORDS, Transform
 from ..blender import existing
 from ..motion import KEYFRAME_MODES
@@ -33,55 +32,11 @@ NATIVE_LABEL = "Native Curves"
 DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 """The effect of each mode on the motion, in one sentence without a full stop."""
 
-NO_KEYS = n_("No keys of location, rotation or scale yet")
-KEYED_BONES = n_("Its bones have keys. Choose their modes in Pose Mode")
-NO_SEGMENT = n_("No segment on this frame")
-RESTING_TEXT = n_("At rest until the key on frame {frame:g}, which is in another space")
-PASSING_TEXT = n_("Passing over to the key on frame {frame:g}, which is in another space")
-NO_PATH = n_("Its path is known while its strip is edited, with an influence of 1")
-STRIPS_TEXT = n_("Moved by strips: enter one to see its segments (NLA Editor, Tab)")
-BAKED_TEXT = n_("Baked to keys. Un-Bake restores the original keys")
-OUT_OF_DATE = n_("The keys have changed since: Live Update is off, in the preferences")
-NO_BONE = n_("No Bone Active")
-PART_NAMES = {LOCATION: n_("Location"), ROTATION: n_("Rotation")}
-MOVED_ALONE = n_("Key all of {part} (I) at {frames}: only a part of it has a key there, so the motion is not rigid")
-DENSE_TEXT = n_(
-    "{count} modifiers on a channel: with so many segments Blender plays slower. Reduce the keys, or clear the modes"
-)
-
-LONG_WAY_TEXT = n_(
-    "Blender turns this segment by more than half a turn; the mode takes the short way. "
-    "With Turns set to -1 it takes the long one"
-)
-TWO_AXES_TEXT = n_(
-    "Two angles change by more than half a turn here; whole turns are about the axis of the larger one."
-    " For both, set a key in between"
-)
-NEAR_HALF_TEXT = n_(
-    "{angle} is nearly half a turn: a small change of a key can reverse its direction. To be sure, set a key in between"
-)
-UNEVEN_TEXT = n_("The scale is not uniform, and is left to Blender")
-
 LABEL_WIDTH_RATIO = 0.28
 """The part of the width that labels have."""
 
 SIDEBAR_MARGIN_PX = 84
 """Pixels of a sidebar that text cannot have, at a resolution scale of 1: tabs, an icon, and the panel's edges."""
-
-
-def cautions(segment: SegmentFacts) -> list[str]:
-    """Return what an animator may not expect of a segment, and what to do about it.
-    Nothing where it is Blender's own.
-    """
-    is_near_half = segment.turn > NEAR_HALF_TURN and not (segment.turns or segment.is_sure)
-    texts = {
-        LONG_WAY_TEXT: segment.long_way and not segment.turns,
-        TWO_AXES_TEXT: segment.two_axes,
-        NEAR_HALF_TEXT: is_near_half,
-        UNEVEN_TEXT: segment.scales_unevenly,
-    }
-    said = [text for text, is_so in texts.items() if is_so and segment.mode != "BLENDER"]
-    return [iface_(text).format(angle=degrees(segment.turn)) for text in said]
 
 
 def twin_of(mode: str, *, grows: bool) -> str:
