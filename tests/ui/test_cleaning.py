@@ -14,6 +14,8 @@ from tests.animation.keyed import snapshot
 from tests.animation.scenes import new_object
 from tests.rigs.recorded import recorded_rig
 
+pytestmark = pytest.mark.any_blender
+
 operators = bpy.ops.rigid_motion
 FRAMES = np.arange(1.0, 201.0)
 
@@ -75,11 +77,3 @@ def test_of_a_rig_in_object_mode_all_keyed_bones_are_cleaned(said):
     assert text.endswith("; no foot clearly stands: none is held")
     ((before, after, _),) = cleaned._cleanings
     assert before.shape == after.shape == (3, 90, 3), "the head and the hands, on which nothing hangs"
-
-
-def test_it_is_greyed_out_with_the_reason(extension):
-    tool = new_object()
-    select_only(tool)
-    assert not operators.clean_motion.poll()
-    with pytest.raises(RuntimeError, match="Nothing here has a key on every frame"):
-        operators.clean_motion()

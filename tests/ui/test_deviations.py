@@ -12,6 +12,8 @@ from rigid_motion.ui.deviations import frames_of
 from tests.animation.bones.rigs import select_only
 from tests.animation.scenes import key, new_object, write
 
+pytestmark = pytest.mark.any_blender
+
 operators = bpy.ops.rigid_motion
 FRAMES = np.arange(1.0, 81.0)
 

@@ -1,4 +1,4 @@
-"""The shortcut: that it is there, and that Blender has nothing else on it."""
+"""The shortcuts: Blender has nothing else on them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from pathlib import Path
 
 import bpy
 import pytest
-
-from rigid_motion.ui import keymap
 
 SHARED = {"Window", "Screen", "Screen Editing", "Frames", "Animation", "Markers", "View2D", "Animation Channels"}
 """Keymaps that are asked in all of the editors, or in parts of them."""
@@ -36,18 +34,3 @@ def test_the_shortcut_is_free(name):
             taken = [event for _, event in items if event["type"] == "T" and (event.get("alt") or event.get("any"))]
             assert not [event for event in taken if not event.get("ctrl")], keymap_name
     assert looked_through == SHARED | OF_EDITORS
-
-
-def test_the_shortcut_is_in_both_modes_of_the_viewport_and_in_both_key_editors(extension):
-    keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
-    assert len(keymap.SHORTCUTS) == 6
-    for shortcut in keymap.SHORTCUTS:
-        items = keymaps.find(shortcut.keymap, space_type=shortcut.space).keymap_items
-        operators = (keymap.PIE_OPERATOR, keymap.TOOL_OPERATOR)
-        result = [
-            item for item in items if item.idname in operators and getattr(item.properties, "name", "") == shortcut.menu
-        ]
-        assert [(item.type, bool(item.alt), bool(item.ctrl), bool(item.shift)) for item in result] == [
-            ("T", True, False, not shortcut.menu)
-        ]
-        assert hasattr(bpy.types, shortcut.menu or "RIGID_MOTION_OT_edit_path")

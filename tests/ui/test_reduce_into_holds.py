@@ -15,6 +15,8 @@ from tests.animation.held import worlds
 from tests.animation.scenes import new_object
 from tests.rigs.recorded import FRAMES, recorded_rig
 
+pytestmark = pytest.mark.any_blender
+
 operators = bpy.ops.rigid_motion
 
 

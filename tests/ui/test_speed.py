@@ -13,6 +13,8 @@ from tests.animation.bones.rigs import select_only
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object, write
 
+pytestmark = pytest.mark.any_blender
+
 operators = bpy.ops.rigid_motion
 FRAMES = np.array((1.0, 11.0, 21.0, 41.0))
 

@@ -13,6 +13,8 @@ from rigid_motion.animation.queries.segments import SegmentFacts
 from rigid_motion.ui.notes import cautions
 from rigid_motion.ui.wording import reduction_summary, wrapped
 
+pytestmark = pytest.mark.any_blender
+
 PLAIN = SegmentFacts(
     first=1.0,
     last=20.0,

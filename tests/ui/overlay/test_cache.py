@@ -11,6 +11,8 @@ from rigid_motion.ui.overlay.cache import MAX_SPARE_PATHS, keep_only, notice_sel
 from tests.animation.keyed import curves_of
 from tests.animation.scenes import key, new_object
 
+pytestmark = pytest.mark.any_blender
+
 
 @pytest.fixture
 def obj(scene) -> bpy.types.Object:

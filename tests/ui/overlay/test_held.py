@@ -14,6 +14,8 @@ from tests.animation.scenes import key, new_object
 from tests.ui.overlay.seen import assert_where_it_is_seen
 from tests.ui.rigs import FRAMES, key_bone, new_rig
 
+pytestmark = pytest.mark.any_blender
+
 
 def passed_around(prop, holders):
     """Hold something in one after the other, from frame 8 on; over some frames, too; and let go."""

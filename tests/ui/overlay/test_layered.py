@@ -12,6 +12,8 @@ from rigid_motion.ui.overlay import cache
 from tests.animation.bones.rigs import in_turn
 from tests.animation.layered import key_base, key_influence, key_offset, new
 
+pytestmark = pytest.mark.any_blender
+
 FRAMES = np.arange(1, 41)
 
 

@@ -12,6 +12,8 @@ from rigid_motion.ui.mouse_input import SHIFT_RATIO
 from rigid_motion.ui.trail import dragging
 from rigid_motion.ui.trail.dragging import DragInput
 
+pytestmark = pytest.mark.any_blender
+
 
 def event(kind: str, x: float = 0.0, y: float = 0.0, value: str = "PRESS", unicode: str = "", **held: bool):
     given = {"ctrl": False, "shift": False} | held
@@ -29,13 +31,6 @@ def test_the_mouse_moves_and_shift_makes_that_fine(given):
     given.handle(event("MOUSEMOVE", 140.0, 60.0, "NOTHING", shift=True))
     assert given.place.tolist() == [130.0 + 10.0 * SHIFT_RATIO, 60.0]
     assert given.first.tolist() == [100.0, 50.0]
-
-
-def test_ctrl_is_for_steps_as_long_as_it_is_held(given):
-    given.handle(event("LEFT_CTRL", ctrl=True))
-    assert given.is_stepped
-    given.handle(event("LEFT_CTRL", value="RELEASE"))
-    assert not given.is_stepped
 
 
 def test_an_axis_is_locked_and_free_again(given):

@@ -20,6 +20,8 @@ from tests.animation.keyed import Carrier, curves_of, snapshot
 from tests.animation.scenes import FRAMES, new_object, write
 from tests.ui.trail.conftest import CARRIERS, MIDDLE, choose, held_prop
 
+pytestmark = pytest.mark.any_blender
+
 operators = bpy.ops.rigid_motion
 
 DENSE = np.arange(FRAMES[0], FRAMES[-1] + 0.125, 0.25)
