@@ -11,8 +11,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.app.translations import pgettext_tip as tip_
 from bpy_extras.io_utils import ExportHelper
 
-from ..blender import BoolProperty, FloatProperty, Operator, Returned, StringProperty, existing, with_properties
+from ..blender import BoolProperty, Operator, Returned, StringProperty, existing, with_properties
 from ..gltf import GltfError, Options, Report, reduce_file
+from .reducing import tolerance_property
 
 EXPORTER = "export_scene.gltf"
 
@@ -43,16 +44,8 @@ class RIGID_MOTION_OT_export_gltf(Operator, ExportHelper):
         name="File Filter", description="Files that the dialog shows", default="*.glb", options={"HIDDEN"}
     )
 
-    tolerance: float = FloatProperty(
-        name="Tolerance",
-        description="The largest error of any vertex, and of any point close to a joint, in the world, at any time",
-        default=0.001,
-        min=1e-6,
-        soft_max=0.1,
-        step=0.1,
-        precision=4,
-        subtype="DISTANCE",
-        unit="LENGTH",
+    tolerance: float = tolerance_property(
+        "The largest error of any vertex, and of any point close to a joint, in the world, at any time"
     )
     use_selection: bool = BoolProperty(
         name="Selected Objects", description="Export selected objects only", default=False

@@ -131,17 +131,19 @@ def candidates(context: bpy.types.Context, prop: Transform) -> Iterator[Node]:
     yield from (node for node in nodes if node not in (prop.carrier, prop.animated))
 
 
+def _frames_property(description: str, **more: Any) -> Any:
+    """Return the property of over how many frames something passes."""
+    return IntProperty(description=description, min=0, max=MOST_FRAMES, soft_max=12, **more)
+
+
 @with_properties
 class _Hold(OnTargets):
     """Operators that key what is selected in the space of something."""
 
-    frames: int = IntProperty(
+    frames: int = _frames_property(
+        "Frames before this one in which it passes from its previous holder: 0 at once, to pick up and put down; 1 to "
+        "throw; 3 to catch; 4 from hand to hand",
         name="Pass",
-        description="Frames before this one in which it passes from its previous holder: 0 at once, to pick up and "
-        "put down; 1 to throw; 3 to catch; 4 from hand to hand",
-        min=0,
-        max=MOST_FRAMES,
-        soft_max=12,
         options={"SKIP_SAVE"},
         translation_context=OWN_WORDS,
     )
@@ -271,13 +273,10 @@ class RIGID_MOTION_OT_pass_frames(_OfHeld):
         "frame, or before the next one with another holder"
     )
 
-    frames: int = IntProperty(
+    frames: int = _frames_property(
+        "0: at once, to pick up and put down. 1: to throw. 3: to catch. 4: from hand to hand",
         name="Frames",
-        description="0: at once, to pick up and put down. 1: to throw. 3: to catch. 4: from hand to hand",
         default=4,
-        min=0,
-        max=MOST_FRAMES,
-        soft_max=12,
         options={"SKIP_SAVE"},
     )
 
@@ -368,17 +367,9 @@ def _set_frames(_scene: bpy.types.Scene, frames: int) -> None:
 
 def register() -> None:
     # Nothing of it is kept: it is the number at the key of what a panel shows.
-    frames = IntProperty(
-        name="Pass",
-        description=RIGID_MOTION_OT_pass_frames.bl_description,
-        min=0,
-        max=MOST_FRAMES,
-        soft_max=12,
-        options=set(),
-        get=_get_frames,
-        set=_set_frames,
-        translation_context=OWN_WORDS,
-    )
+    described: Any = {"name": "Pass", "translation_context": OWN_WORDS, "options": set()}
+    description = RIGID_MOTION_OT_pass_frames.bl_description
+    frames = _frames_property(description, get=_get_frames, set=_set_frames, **described)
     setattr(bpy.types.Scene, PASS_PROPERTY, frames)
 
 

@@ -29,6 +29,7 @@ from ..live import receiving, sending
 from ..live.sockets import NotAllowed
 from ..streams.vmc import VMC_PORT
 from .panels import Folded
+from .reducing import tolerance_property
 from .wording import draw_text, labelled
 
 HOST = "127.0.0.1"
@@ -95,15 +96,8 @@ class LiveSettings(bpy.types.PropertyGroup):
         translation_context=OWN_WORDS,
         default="lerp_slerp",
     )
-    tolerance: float = FloatProperty(
-        name="Tolerance",
-        description="The largest error of any bone when a recording of VMC, which has all frames, is reduced",
-        default=0.002,
-        min=1e-5,
-        soft_max=0.1,
-        step=0.1,
-        precision=4,
-        subtype="DISTANCE",
+    tolerance: float = tolerance_property(
+        "The largest error of any bone when a recording of VMC, which has all frames, is reduced", 0.002
     )
     to_host: str = StringProperty(name="Address", description="The machine to send VMC to", default=HOST)
     to_port: int = IntProperty(
