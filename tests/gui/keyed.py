@@ -7,6 +7,7 @@ import math
 import bpy
 import numpy as np
 
+from tests.animation.bones.rigs import Rest, new_rig
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 
@@ -55,15 +56,7 @@ def now() -> np.ndarray:
 def make_the_rig() -> None:
     """An arm and a hand that stands off it, each moved and turned from key to key, and nothing else."""
     bpy.data.batch_remove(bpy.data.objects)
-    obj = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    bpy.context.scene.collection.objects.link(obj)
-    bpy.context.view_layer.objects.active = obj
-    obj.select_set(True)
-    bpy.ops.object.mode_set(mode="EDIT")
-    arm, hand = (obj.data.edit_bones.new(name) for name in ("Arm", "Hand"))
-    arm.head, arm.tail = (0, 0, 0), (0, 0.2, 1.5)
-    hand.head, hand.tail, hand.parent = (0, 0.3, 1.7), (0.4, 0.3, 2.6), arm
-    bpy.ops.object.mode_set(mode="OBJECT")
+    obj = new_rig("Rig", (Rest("Arm", (0, 0, 0), (0, 0.2, 1.5)), Rest("Hand", (0, 0.3, 1.7), (0.4, 0.3, 2.6), "Arm")))
     for number, bone in enumerate(obj.pose.bones):
         for frame, x, angle in zip(FRAMES, (-1, 0, 1), (0, 1.6, 3.0), strict=True):
             _key(bone, frame, (x, 0.3 * number * x, 0.4 * abs(x)), angle * (0.5 + number) / 1.5)

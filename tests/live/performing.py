@@ -14,6 +14,8 @@ from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.motion.quaternions import turned
 from rigid_motion.streams import StreamBody
 from rigid_motion.streams.vmc import Performer, write
+from tests.animation.bones import rigs
+from tests.animation.bones.rigs import Rest
 
 JOINTS = ("Hips", "Spine", "Neck", "Head", "LeftUpperArm", "LeftLowerArm", "LeftHand", "LeftUpperLeg", "LeftLowerLeg")
 JOINTS += ("LeftFoot",)
@@ -75,19 +77,12 @@ class Sent:
 
 def new_rig(prefix: str = "", larger: float = 1.0, turned_by: float = 0.3) -> bpy.types.Object:
     """An armature of the dancer, as large and with other names, its bones rolled anyhow."""
-    obj = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
-    bpy.context.scene.collection.objects.link(obj)
-    bpy.context.view_layer.objects.active = obj
-    bpy.ops.object.mode_set(mode="EDIT")
-    heads = in_world(REST[:, None])[:, 0].positions * larger
-    bones = [obj.data.edit_bones.new(prefix + name) for name in JOINTS]
-    for bone, head, parent in zip(bones, heads, PARENTS.tolist(), strict=True):
-        children = heads[JOINTS.index(bone.name.removeprefix(prefix)) == PARENTS]
-        tail = children.mean(axis=0) if len(children) else head + np.array((0.0, 0.05, 0.1))
-        bone.head, bone.tail, bone.roll = head, tail, turned_by
-        bone.parent = bones[parent] if parent >= 0 else None
-    bpy.ops.object.mode_set(mode="OBJECT")
-    return obj
+    heads, bones = in_world(REST[:, None])[:, 0].positions * larger, []
+    for joint, (name, parent) in enumerate(zip(JOINTS, PARENTS.tolist(), strict=True)):
+        children = heads[joint == PARENTS]
+        tail = children.mean(axis=0) if len(children) else heads[joint] + np.array((0.0, 0.05, 0.1))
+        bones.append(Rest(prefix + name, heads[joint], tail, prefix + JOINTS[parent] if parent >= 0 else "", turned_by))
+    return rigs.new_rig("Rig", bones)
 
 
 def heads_of(rig: bpy.types.Object) -> np.ndarray:

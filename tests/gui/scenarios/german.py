@@ -6,8 +6,6 @@ Blender's module for Python knows no languages, so this is where the dictionary 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import import_module
 
 import addon_utils
@@ -42,21 +40,10 @@ def speak(language: str) -> None:
     view.use_translate_interface = view.use_translate_reports = view.use_translate_tooltips = True
 
 
-@contextmanager
-def panel_texts() -> Iterator[list[str]]:
-    """The notes of the panel as they are broken into lines, in the language that they are drawn in."""
-    wording = import_module(f"{extension().module}.ui.wording")
-    wrapped, seen = wording.wrapped, []
-
-    def noted(text, fits):
-        seen.append(text)
-        return wrapped(text, fits)
-
-    wording.wrapped = noted
-    try:
-        yield seen
-    finally:
-        wording.wrapped = wrapped
+def notes(frame: int) -> list[str]:
+    """What the panel says of the cube on a frame."""
+    bpy.context.scene.frame_set(frame)
+    return [text for _, text in import_module(f"{extension().module}.ui.notes").facts_and_notes(cube(), frame)[1]]
 
 
 def refusal() -> str:
@@ -96,17 +83,14 @@ def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """Where words are short of room, and where notes are long."""
     yield from hand.open_sidebar(view, "Animation")
     sidebar = places.region(view, "UI")
-    with panel_texts() as texts:
-        key({1: 0, 20: 90, 40: 269})
-        bpy.ops.rigid_motion.set_mode(mode=SCREW)
-        bpy.context.scene.frame_set(10)
-        bpy.context.scene.rigid_motion_overlay.show_paths = True
-        yield from hand.picture("panel", places.box(sidebar))
-        assert texts == [], texts
-        bpy.context.scene.frame_set(30)
-        yield from hand.picture("panel-with-a-note", places.box(sidebar))
-        assert any(text.startswith("179.0° sind fast eine halbe Umdrehung") for text in texts), texts
+    key({1: 0, 20: 90, 40: 269})
     bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    bpy.context.scene.rigid_motion_overlay.show_paths = True
+    assert notes(10) == []
+    yield from hand.picture("panel", places.box(sidebar))
+    (note,) = notes(30)
+    assert note.startswith("179.0° sind fast eine halbe Umdrehung"), note
+    yield from hand.picture("panel-with-a-note", places.box(sidebar))
     bpy.ops.rigid_motion.reduce_keys("EXEC_DEFAULT", tolerance=10.0)
     yield from hand.picture("panel-reduced", places.box(sidebar))
     bpy.ops.rigid_motion.restore_keys()
