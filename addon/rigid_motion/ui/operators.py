@@ -162,11 +162,6 @@ class RIGID_MOTION_OT_set_turns(OnTargets):
             self.turns, self.axis = active.motion.turns or 1, axis_of_turns(active)
         return existing(context.window_manager).invoke_props_dialog(self, confirm_text="Set Turns")
 
-    def draw(self, _context: bpy.types.Context) -> None:
-        layout = split(self.layout)
-        for name in ("turns", "axis", "on"):
-            layout.prop(self, name)
-
     def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
         axis = self.axis if self.properties.is_property_set("axis") else None
         for frames, group in grouped_by_frames(context, targets, self.on, refused).items():
