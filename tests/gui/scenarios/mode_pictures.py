@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Quaternion, Vector
 
+from tests.animation.bones.rigs import select_only
 from tests.animation.keyed import curves_of
 from tests.animation.oracle import assert_shown, shown_worlds
 from tests.gui import places
@@ -225,10 +226,7 @@ def run_evenly(obj: bpy.types.Object) -> None:
 
 def choose(obj: bpy.types.Object, mode: str) -> None:
     """Give an object a mode, as the animator does, and compare it with Blender's own path."""
-    for other in bpy.context.selected_objects:
-        other.select_set(False)
-    obj.select_set(True)
-    bpy.context.view_layer.objects.active = obj
+    select_only(obj)
     bpy.ops.rigid_motion.set_mode(mode=mode)
     bpy.context.scene.rigid_motion_overlay.show_native = True
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from itertools import product
 
 import bpy
@@ -13,7 +14,7 @@ from rigid_motion.animation import add_layer, key_frames, set_mode
 from rigid_motion.ui.trail.handles import handles_of
 from tests.animation.bones.rigs import in_turn
 from tests.animation.held import worlds
-from tests.animation.keyed import curves_of, snapshot
+from tests.animation.keyed import Carrier, curves_of, snapshot
 from tests.animation.layered import key_offset
 from tests.animation.scenes import FRAMES, key, new_object
 from tests.ui.conftest import select_keys
@@ -36,10 +37,13 @@ def turned() -> set[str]:
 EDITS = moved, turned
 
 
-def expected(before: np.ndarray, edit, frames: int = 1) -> np.ndarray:
-    """Where keys (n, 4, 4) are to be after an edit of them."""
+def assert_edited(carrier: Carrier, edit: Callable[[], set[str]], frames: Sequence[float], near: float = NEAR) -> None:
+    """The keys of something that are selected, on these frames, go where an edit has them go."""
+    before = worlds(carrier, frames)
     middle = before[:, :3, 3].mean(axis=0)
-    return (np.array(MOVE) if edit is moved else about(middle, TURN)) @ before
+    assert edit() == {"FINISHED"}
+    expected = (np.array(MOVE) if edit is moved else about(middle, TURN)) @ before
+    assert worlds(carrier, frames) == pytest.approx(expected, abs=near)
 
 
 @pytest.mark.parametrize(
@@ -50,9 +54,8 @@ def test_a_key_goes_where_it_is_moved_to_and_the_others_stay(scene, kind, how):
     carrier = choose(CARRIERS[kind](), MIDDLE)
     set_mode(carrier, mode)
     others = [frame for frame in FRAMES if frame != MIDDLE]
-    before, stay = worlds(carrier, [MIDDLE]), worlds(carrier, others)
-    assert edit() == {"FINISHED"}
-    assert worlds(carrier, [MIDDLE]) == pytest.approx(expected(before, edit), abs=NEAR)
+    stay = worlds(carrier, others)
+    assert_edited(carrier, edit, [MIDDLE])
     assert worlds(carrier, others) == pytest.approx(stay, abs=NEAR)
     assert key_frames(carrier).tolist() == list(FRAMES)
 
@@ -63,18 +66,12 @@ def test_a_key_of_a_layer_goes_where_it_is_moved_to_whatever_the_base_does(scene
     add_layer(carrier)
     key_offset(carrier, frames=FRAMES)
     bpy.context.view_layer.update()
-    choose(carrier, MIDDLE)
-    before = worlds(carrier, [MIDDLE])
-    assert edit() == {"FINISHED"}
-    assert worlds(carrier, [MIDDLE]) == pytest.approx(expected(before, edit), abs=50 * NEAR)
+    assert_edited(choose(carrier, MIDDLE), edit, [MIDDLE], 50 * NEAR)
 
 
 @pytest.mark.parametrize("kind", ["XYZ", "parented", "bone"])
 def test_several_keys_turn_about_their_middle(scene, kind):
-    carrier = choose(CARRIERS[kind](), *FRAMES)
-    before = worlds(carrier, FRAMES)
-    turned()
-    assert worlds(carrier, FRAMES) == pytest.approx(expected(before, turned), abs=NEAR)
+    assert_edited(choose(CARRIERS[kind](), *FRAMES), turned, FRAMES)
 
 
 @pytest.mark.parametrize(
@@ -82,10 +79,7 @@ def test_several_keys_turn_about_their_middle(scene, kind):
 )
 def test_keys_of_what_is_held_go_where_they_are_moved_to(scene, frame, how):
     kind, edit = how
-    prop = held_prop(kind, frame)
-    before = worlds(prop, [frame])
-    assert edit() == {"FINISHED"}
-    assert worlds(prop, [frame]) == pytest.approx(expected(before, edit), abs=5 * NEAR)
+    assert_edited(held_prop(kind, frame), edit, [frame], 5 * NEAR)
 
 
 def test_a_bone_that_only_turns_points_where_its_tail_is_dragged(scene):
@@ -128,7 +122,7 @@ def test_the_path_is_that_of_the_point_that_leads_and_bodies_turn_about_it(scene
     scene.cursor.location = (now @ POINT)[:3]
     assert operators.set_path_point(point="CURSOR") == {"FINISHED"}
     (one,) = handles_of(bpy.context)
-    line = one.in_world(one.path.native if one.path.desired is None else one.path.desired)
+    line = one.in_world(one.path.line)
     frames = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
     expected_line = (worlds(carrier, frames) @ POINT)[:, :3]
     assert line[np.searchsorted(one.path.frames, frames)] == pytest.approx(expected_line, abs=5e-5)
@@ -179,9 +173,8 @@ def test_what_has_no_key_of_its_own_there_goes_along(scene, part, mode, edit):
     set_mode(carrier, mode)
     choose(carrier, MIDDLE)
     others = [frame for frame in FRAMES if frame != MIDDLE]
-    before, stay = worlds(carrier, [MIDDLE]), worlds(carrier, others)
-    assert edit() == {"FINISHED"}
-    assert worlds(carrier, [MIDDLE]) == pytest.approx(expected(before, edit), abs=NEAR)
+    stay = worlds(carrier, others)
+    assert_edited(carrier, edit, [MIDDLE])
     assert worlds(carrier, others) == pytest.approx(stay, abs=NEAR)
 
 
