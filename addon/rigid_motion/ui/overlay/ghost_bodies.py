@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import gpu
@@ -26,6 +26,16 @@ from .settings import overlay_settings
 
 MAX_SEEN_BODIES = 16
 """The number of meshes that are kept."""
+
+
+class OnCard(NamedTuple):
+    """What a ghost looks like, on the graphics card."""
+
+    triangles: gpu.types.GPUBatch | None
+    edges: gpu.types.GPUBatch | None
+
+    corners: np.ndarray
+    """Of its bounding box, shape (8, 4)."""
 
 
 @dataclass(eq=False)
@@ -50,8 +60,8 @@ class SeenBody:
     places: dict[float, np.ndarray] = field(default_factory=dict)
     """Where they were in the world, (v, 3), by the frames of the scene."""
 
-    batches: dict[float, tuple[gpu.types.GPUBatch, np.ndarray]] = field(default_factory=dict)
-    """What is on the graphics card of that, and the corners of the boxes around it, (8, 4)."""
+    batches: dict[float, OnCard] = field(default_factory=dict)
+    """What is on the graphics card of that."""
 
 
 _seen: dict[int, SeenBody] = {}

@@ -6,21 +6,21 @@ Where they cover more of a view than it has, only every second, third, ... is le
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any
 
 import bpy
 import gpu
 import numpy as np
-from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 
 from ...animation.transforms import Transform
 from ...blender import existing, original_uid, persistent, view_layer
 from ...handlers import append_drawing, append_handlers, remove_drawing, remove_handlers
 from ..preferences import Color
-from .drawing import Batch, Pen, batch_of, beside, complain, own_space
-from .ghost_bodies import SeenBody, seen_bodies
-from .ghosts import shape_of
+from .drawing import Pen, batch_of, beside, complain, own_space
+from .ghost_bodies import OnCard, SeenBody, seen_bodies
+from .ghosts import Ghosts, shape_of
 from .points import DrawnPath
 from .settings import RigidMotionOverlay, is_shown, overlay_settings
 
@@ -40,17 +40,7 @@ MAX_COVERED_RATIO, FULL_CONTRAST_RATIO = 1.5, 0.4
 """How many times ghosts may cover a view in all, and up to where they have their full contrast."""
 
 
-class _OnCard(NamedTuple):
-    """What a ghost looks like, on the graphics card."""
-
-    triangles: Batch
-    edges: Batch
-
-    corners: np.ndarray
-    """Of its bounding box, shape (8, 4)."""
-
-
-_shapes: dict[tuple[int, str], _OnCard] = {}
+_shapes: dict[tuple[int, str], OnCard] = {}
 """By the identity of what is moved."""
 
 _with_bodies: set[int] = set()
@@ -148,35 +138,8 @@ def draw_ghosts(pen: Pen, transform: Transform, path: DrawnPath, now: float, set
     if identity not in _shapes:
         shape = shape_of(transform, existing(view_layer().depsgraph))
         corners = box_of(np.concatenate((shape.triangles, shape.lines)))
-        _shapes[identity] = _OnCard(batch_of("TRIS", shape.triangles), batch_of("LINES", shape.lines), corners)
-    look = _shapes[identity]
-    fade = _left(fades(ghosts.frames, now, settings), ghosts.matrices, look.corners)
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    gpu.state.depth_test_set("LESS_EQUAL")
-    gpu.state.face_culling_set("BACK")
-    try:
-        # From afar, so that what is nearer in time lies over it.
-        for number in sorted(np.flatnonzero(fade).tolist(), key=lambda number: fade[number]):
-            holder = 0 if ghosts.holders is None else int(ghosts.holders[number])
-            *rgb, alpha = tint(pen, float(ghosts.frames[number]), now, holder)
-            red, green, blue = rgb
-            with own_space():
-                gpu.matrix.multiply_matrix(Matrix(ghosts.matrices[number]))
-                if look.triangles:
-                    shader.uniform_float("color", (red, green, blue, SOLID_OPACITY * alpha * fade[number]))
-                    look.triangles.draw(shader)
-                pen.line(look.edges, (red, green, blue, EDGE_OPACITY * alpha * fade[number]), EDGE_WIDTH)
-    finally:
-        gpu.state.face_culling_set("NONE")
-        gpu.state.depth_test_set("NONE")
-
-
-def _left(fade: np.ndarray, matrices: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return `thinned_out` in the view that is being drawn, for one box (8, 4), or one each, with these matrices."""
-    shown, covered = np.flatnonzero(fade), np.zeros(len(fade))
-    view = np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
-    covered[shown] = covered_by(corners if corners.ndim == 2 else corners[shown], view @ matrices[shown])
-    return thinned_out(fade, covered)
+        _shapes[identity] = OnCard(batch_of("TRIS", shape.triangles), batch_of("LINES", shape.lines), corners)
+    _draw(pen, ghosts, now, settings, lambda _: _shapes[identity])
 
 
 def draw_bodies() -> None:
@@ -189,31 +152,53 @@ def draw_bodies() -> None:
             return
         pen, now = Pen(context), float(context.scene.frame_current_final)
         gpu.state.blend_set("ALPHA")
-        gpu.state.depth_test_set("LESS_EQUAL")
-        gpu.state.face_culling_set("BACK")
         for rig, seen, frames in seen_bodies(context):
             _with_bodies.add(rig.session_uid)
-            _draw_body(pen, seen, frames, now, settings)
+            is_near = (frame for frame in seen.places if np.abs(frames - frame).min(initial=np.inf) < 1e-3)
+            known = np.array(sorted(is_near))
+            ghosts = Ghosts(known, np.tile(np.eye(4), (len(known), 1, 1)))
+            _draw(pen, ghosts, now, settings, partial(_look_of_body, seen, known))
     except Exception as problem:
         complain(problem)
     finally:
-        gpu.state.face_culling_set("NONE")
-        gpu.state.depth_test_set("NONE")
         gpu.state.blend_set("NONE")
 
 
-def _draw_body(pen: Pen, seen: SeenBody, frames: np.ndarray, now: float, settings: RigidMotionOverlay) -> None:
-    known = np.array(sorted(frame for frame in seen.places if np.abs(frames - frame).min(initial=np.inf) < 1e-3))
-    fade, boxes = fades(known, now, settings), np.zeros((len(known), 8, 4))
+def _look_of_body(seen: SeenBody, frames: np.ndarray, number: int) -> OnCard:
+    """Return what a mesh looks like on one of the frames (n,) on which it was seen."""
+    frame = float(frames[number])
+    if frame not in seen.batches:
+        places = seen.places[frame]
+        seen.batches[frame] = OnCard(batch_of("TRIS", places[seen.triangles.ravel()]), None, box_of(places))
+    return seen.batches[frame]
+
+
+def _draw(pen: Pen, ghosts: Ghosts, now: float, settings: RigidMotionOverlay, look_of: Callable[[int], OnCard]) -> None:
+    """Draw what looks like that, by its number, around a frame, as far as the view has room for it."""
+    fade = fades(ghosts.frames, now, settings)
+    looks = {number: look_of(number) for number in np.flatnonzero(fade).tolist()}
+    if not looks:
+        return
+    view = np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
+    corners = np.stack([look.corners for look in looks.values()])
+    covered = np.zeros(len(fade))
+    covered[[*looks]] = covered_by(corners, view @ ghosts.matrices[[*looks]])
+    fade = thinned_out(fade, covered)
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    for number in np.flatnonzero(fade).tolist():
-        frame = float(known[number])
-        if frame not in seen.batches:
-            content: dict[str, Any] = {"content": {"pos": seen.places[frame]}, "indices": seen.triangles}
-            seen.batches[frame] = batch_for_shader(shader, "TRIS", **content), box_of(seen.places[frame])
-        boxes[number] = seen.batches[frame][1]
-    fade = _left(fade, np.tile(np.eye(4), (len(known), 1, 1)), boxes)
-    for number in sorted(np.flatnonzero(fade).tolist(), key=lambda number: fade[number]):
-        frame = float(known[number])
-        shader.uniform_float("color", (*tint(pen, frame, now)[:3], SOLID_OPACITY * fade[number]))
-        seen.batches[frame][0].draw(shader)
+    gpu.state.depth_test_set("LESS_EQUAL")
+    gpu.state.face_culling_set("BACK")
+    try:
+        # From afar, so that what is nearer in time lies over it.
+        for number in sorted(np.flatnonzero(fade).tolist(), key=lambda number: fade[number]):
+            holder = 0 if ghosts.holders is None else int(ghosts.holders[number])
+            *rgb, alpha = tint(pen, float(ghosts.frames[number]), now, holder)
+            red, green, blue = rgb
+            with own_space():
+                gpu.matrix.multiply_matrix(Matrix(ghosts.matrices[number]))
+                if triangles := looks[number].triangles:
+                    shader.uniform_float("color", (red, green, blue, SOLID_OPACITY * alpha * fade[number]))
+                    triangles.draw(shader)
+                pen.line(looks[number].edges, (red, green, blue, EDGE_OPACITY * alpha * fade[number]), EDGE_WIDTH)
+    finally:
+        gpu.state.face_culling_set("NONE")
+        gpu.state.depth_test_set("NONE")
