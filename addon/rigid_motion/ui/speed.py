@@ -25,7 +25,7 @@ from ..blender import BoolProperty, EnumProperty, Returned, existing, with_prope
 from ..handlers import append_drawing, remove_drawing
 from ..motion.speeds import ways_and_turns
 from .overlay.cache import path_of
-from .overlay.drawing import KEY_COLOUR, Pen, batch_of, complain
+from .overlay.drawing import KEY_COLOUR, Pen, batch_of, blended, drawn
 from .overlay.held import motion_now
 from .overlay.points import DrawnPath
 from .overlay.settings import overlay_settings
@@ -103,18 +103,15 @@ def draw_panel(context: Any, layout: bpy.types.UILayout) -> None:
     layout.operator(RIGID_MOTION_OT_equalise_speed.bl_idname)
 
 
+@drawn
 def draw() -> None:
-    """Draw the speeds of the active object or bone in the Graph Editor that is being drawn. It never raises."""
+    """Draw the speeds of the active object or bone in the Graph Editor that is being drawn."""
     context: Any = bpy.context
-    try:
-        target = active_target(context) if overlay_settings(context.scene).show_speed else None
-        if target is None or context.space_data.mode != "FCURVES":
-            return
-        speeds = speeds_of(target, context)
-        if speeds is not None:
+    target = active_target(context) if overlay_settings(context.scene).show_speed else None
+    speeds = speeds_of(target, context) if target is not None and context.space_data.mode == "FCURVES" else None
+    if target is not None and speeds is not None:
+        with blended():
             _draw(context, target, speeds)
-    except Exception as problem:
-        complain(problem)
 
 
 def _draw(context: Any, target: Transform, speeds: Speeds) -> None:
@@ -126,8 +123,6 @@ def _draw(context: Any, target: Transform, speeds: Speeds) -> None:
     right = min(region.width, *beside, region.width) - MARGIN_PX * pen.scale
     spent = (bottom - MARGIN_PX, top + 2.0 * TEXT_SIZE_PX * pen.scale)
     corners = [(0, spent[0], 0), (region.width, spent[0], 0), (0, spent[1], 0), (region.width, spent[1], 0)]
-    gpu.state.blend_set("ALPHA")
-    gpu.state.program_point_size_set(True)
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     shader.uniform_float("color", BAND_COLOR)
     existing(batch_of("TRIS", np.array(corners)[[0, 1, 2, 1, 3, 2]])).draw(shader)
@@ -153,8 +148,6 @@ def _draw(context: Any, target: Transform, speeds: Speeds) -> None:
         blf.position(0, right, top + 0.7 * TEXT_SIZE_PX * pen.scale, 0)
         blf.draw(0, text)
         right -= 2.0 * MARGIN_PX * pen.scale
-    gpu.state.program_point_size_set(False)
-    gpu.state.blend_set("NONE")
 
 
 @with_properties

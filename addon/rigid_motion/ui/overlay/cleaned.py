@@ -8,13 +8,12 @@ from collections.abc import Iterable
 from typing import Any, cast
 
 import bpy
-import gpu
 import numpy as np
 
 from ...animation import Cleaning
 from ...blender import persistent
 from ...handlers import append_drawing, append_handlers, remove_drawing, remove_handlers
-from .drawing import TICK_DIAMETER_PX, Pen, batch_of
+from .drawing import TICK_DIAMETER_PX, Pen, batch_of, blended, drawn
 
 OPERATOR = "RIGID_MOTION_OT_clean_motion"
 
@@ -31,20 +30,18 @@ def show(cleanings: Iterable[Cleaning]) -> None:
         _cleanings.append((one.before[ends], one.after[ends], one.bridged[ends]))
 
 
+@drawn
 def draw() -> None:
     operators = cast(Any, bpy.context.window_manager).operators
     if not _cleanings or not operators or operators[-1].bl_idname != OPERATOR:
         return
     pen = Pen(bpy.context)
-    gpu.state.blend_set("ALPHA")
-    gpu.state.program_point_size_set(True)
-    for before, after, bridged in _cleanings:
-        for lines, color in ((before, pen.look.native_color), (after, pen.look.mode_color)):
-            for line in lines:
-                pen.line(batch_of("LINE_STRIP", line), color, 0.6 * pen.look.line_width)
-        pen.dot(batch_of("POINTS", before[bridged]), pen.look.key_color, TICK_DIAMETER_PX)
-    gpu.state.program_point_size_set(False)
-    gpu.state.blend_set("NONE")
+    with blended():
+        for before, after, bridged in _cleanings:
+            for lines, color in ((before, pen.look.native_color), (after, pen.look.mode_color)):
+                for line in lines:
+                    pen.line(batch_of("LINE_STRIP", line), color, 0.6 * pen.look.line_width)
+            pen.dot(batch_of("POINTS", before[bridged]), pen.look.key_color, TICK_DIAMETER_PX)
 
 
 @persistent

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import functools
 import logging
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, cast
 from weakref import WeakKeyDictionary
@@ -222,26 +222,51 @@ beside: list[Callable[[Pen, Transform, DrawnPath, float, RigidMotionOverlay], No
 """What else is drawn of each path, below it and in its space, on a frame of its Action."""
 
 
+def drawn(draw: Callable[[], None]) -> Callable[[], None]:
+    """Return what Blender may call while it draws an editor: it never raises, and a problem is logged."""
+
+    @functools.wraps(draw)
+    def draw_or_complain() -> None:
+        global _complaint
+        try:
+            draw()
+        except Exception as problem:
+            # Once: the next redraw is a moment away.
+            if repr(problem) != _complaint:
+                _complaint = repr(problem)
+                log.exception("The paths could not be drawn")
+
+    return draw_or_complain
+
+
+@contextmanager
+def blended() -> Iterator[None]:
+    """Have what is drawn be blended with what is there, and dots have sizes of their own."""
+    gpu.state.blend_set("ALPHA")
+    gpu.state.program_point_size_set(True)
+    try:
+        yield
+    finally:
+        gpu.state.program_point_size_set(False)
+        gpu.state.blend_set("NONE")
+
+
+@drawn
 def draw_paths() -> None:
-    """Draw paths of the selected objects or bones, and what is beside them, in a viewport. It never raises."""
-    try:
-        if is_shown(bpy.context):
-            _draw(bpy.context)
-    except Exception as problem:
-        complain(problem)
+    """Draw paths of the selected objects or bones, and what is beside them, in a viewport."""
+    if is_shown(bpy.context):
+        _draw(bpy.context)
 
 
+@drawn
 def follow_selection() -> None:
-    """Have the viewports drawn anew if keys were selected in the editor that is being drawn. It never raises."""
+    """Have the viewports drawn anew if keys were selected in the editor that is being drawn."""
     context = bpy.context
-    try:
-        # While it plays the viewports are drawn anyway, as fast as they can be.
-        if not is_shown(context) or existing(context.screen).is_animation_playing:
-            return
-        if cache.notice_selection(selected_in_view(context)):
-            redraw(context, "VIEW_3D")
-    except Exception as problem:
-        complain(problem)
+    # While it plays the viewports are drawn anyway, as fast as they can be.
+    if not is_shown(context) or existing(context.screen).is_animation_playing:
+        return
+    if cache.notice_selection(selected_in_view(context)):
+        redraw(context, "VIEW_3D")
 
 
 def redraw(context: bpy.types.Context, *kinds: str) -> None:
@@ -252,25 +277,14 @@ def redraw(context: bpy.types.Context, *kinds: str) -> None:
                 area.tag_redraw()
 
 
-def complain(problem: Exception) -> None:
-    """Log a problem of drawing."""
-    global _complaint
-    # Once: the next redraw is a moment away.
-    if repr(problem) != _complaint:
-        _complaint = repr(problem)
-        log.exception("The paths could not be drawn")
-
-
 def _draw(context: Any) -> None:
     scene, settings, paths = context.scene, overlay_settings(context.scene), cache.shown_paths(context)
     if not paths:
         return
     pen = Pen(context)
     native_now, desired_now = [], []
-    gpu.state.blend_set("ALPHA")
     gpu.state.depth_test_set("NONE")
-    gpu.state.program_point_size_set(True)
-    try:
+    with blended():
         for target, space, path in paths:
             frame = frame_in_action(target.animated, scene.frame_current_final)
             with own_space():
@@ -287,9 +301,6 @@ def _draw(context: Any) -> None:
                 desired_now.append(space @ Vector(desired.tolist()))
         pen.dot(batch_of("POINTS", native_now), pen.look.native_color, NOW_DIAMETER_PX)
         pen.dot(batch_of("POINTS", desired_now), pen.look.mode_color, NOW_DIAMETER_PX)
-    finally:
-        gpu.state.program_point_size_set(False)
-        gpu.state.blend_set("NONE")
 
 
 def _draw_path(pen: Pen, path: DrawnPath, settings: RigidMotionOverlay) -> None:

@@ -18,7 +18,7 @@ from ...animation.transforms import Transform
 from ...blender import existing, original_uid, persistent, view_layer
 from ...handlers import append_drawing, append_handlers, remove_drawing, remove_handlers
 from ..preferences import Color
-from .drawing import Pen, batch_of, beside, complain, own_space
+from .drawing import Pen, batch_of, beside, blended, drawn, own_space
 from .ghost_bodies import OnCard, SeenBody, seen_bodies
 from .ghosts import Ghosts, shape_of
 from .points import DrawnPath
@@ -142,26 +142,22 @@ def draw_ghosts(pen: Pen, transform: Transform, path: DrawnPath, now: float, set
     _draw(pen, ghosts, now, settings, lambda _: _shapes[identity])
 
 
+@drawn
 def draw_bodies() -> None:
-    """Draw the meshes of the selected armatures in the viewport that is being drawn. It never raises."""
+    """Draw the meshes of the selected armatures in the viewport that is being drawn."""
     context: Any = bpy.context
     _with_bodies.clear()
-    try:
-        settings = overlay_settings(context.scene)
-        if not (settings.show_ghosts and settings.show_bodies and is_shown(context)):
-            return
-        pen, now = Pen(context), float(context.scene.frame_current_final)
-        gpu.state.blend_set("ALPHA")
+    settings = overlay_settings(context.scene)
+    if not (settings.show_ghosts and settings.show_bodies and is_shown(context)):
+        return
+    pen, now = Pen(context), float(context.scene.frame_current_final)
+    with blended():
         for rig, seen, frames in seen_bodies(context):
             _with_bodies.add(rig.session_uid)
             is_near = (frame for frame in seen.places if np.abs(frames - frame).min(initial=np.inf) < 1e-3)
             known = np.array(sorted(is_near))
             ghosts = Ghosts(known, np.tile(np.eye(4), (len(known), 1, 1)))
             _draw(pen, ghosts, now, settings, partial(_look_of_body, seen, known))
-    except Exception as problem:
-        complain(problem)
-    finally:
-        gpu.state.blend_set("NONE")
 
 
 def _look_of_body(seen: SeenBody, frames: np.ndarray, number: int) -> OnCard:
