@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -112,9 +113,16 @@ def live_settings(scene: bpy.types.Scene | None) -> LiveSettings:
 class _Registered(Operator):
     bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
 
-    def refuse(self, error: OSError | NotAllowed, text: str, **facts: object) -> Returned:
-        """Report why a port cannot be opened, and cancel."""
-        why = text.format(**facts, why=error.strerror or error) if isinstance(error, OSError) else str(error)
+    def open(self, start: Callable[[], object], text: str, **facts: object) -> Returned:
+        """Open a port, or report why it cannot be opened, and cancel."""
+        try:
+            start()
+        except NotAllowed as error:
+            why = str(error)
+        except OSError as error:
+            why = text.format(**facts, why=error.strerror or error)
+        else:
+            return {"FINISHED"}
         self.report({"ERROR"}, why)
         return {"CANCELLED"}
 
@@ -130,14 +138,8 @@ class RIGID_MOTION_OT_live_listen(_Registered):
 
     def execute(self, context: bpy.types.Context) -> Returned:
         live = live_settings(context.scene)
-        try:
-            receiving.start(live.host, live.port)
-        except (NotAllowed, OSError) as error:
-            text = rpt_(
-                "Cannot listen to port {port} of {host}; another program may be using it: choose another ({why})"
-            )
-            return self.refuse(error, text, port=live.port, host=live.host)
-        return {"FINISHED"}
+        text = rpt_("Cannot listen to port {port} of {host}; another program may be using it: choose another ({why})")
+        return self.open(lambda: receiving.start(live.host, live.port), text, port=live.port, host=live.host)
 
 
 class _WhileListening:
@@ -216,11 +218,8 @@ class RIGID_MOTION_OT_live_send(_Registered):
 
     def execute(self, context: bpy.types.Context) -> Returned:
         live = live_settings(context.scene)
-        try:
-            sending.start(live.to_host, live.to_port, context.selected_objects)
-        except (NotAllowed, OSError) as error:
-            return self.refuse(error, rpt_("{host} is not an address to send to ({why})"), host=live.to_host)
-        return {"FINISHED"}
+        text, objects = rpt_("{host} is not an address to send to ({why})"), context.selected_objects
+        return self.open(lambda: sending.start(live.to_host, live.to_port, objects), text, host=live.to_host)
 
 
 class RIGID_MOTION_OT_live_stop_sending(_Registered):
