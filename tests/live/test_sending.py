@@ -77,9 +77,9 @@ def test_other_objects_are_trackers_with_their_constraints(listener):
 
 
 def test_what_is_deleted_or_has_no_known_bones_is_not_sent(listener):
+    new_rig("Tentacle")
     bpy.ops.object.empty_add()
-    rig = new_rig("Tentacle")
-    rig.select_set(True)
+    bpy.data.objects["Rig"].select_set(True)
     assert bpy.ops.rigid_motion.live_send() == {"FINISHED"}
     bpy.data.objects.remove(bpy.data.objects["Empty"])
     sending.running.look()

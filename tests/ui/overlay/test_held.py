@@ -88,3 +88,18 @@ def test_a_hand_that_follows_is_known_where_it_was_seen(scene, hands):
         point.co.y += 1.0
     bpy.context.view_layer.update()
     assert_where_it_is_seen(prop, scene)
+
+
+def test_after_an_undo_all_is_looked_at_anew(scene, hands):
+    follower = new_object("Follower")
+    follower.constraints.new("COPY_TRANSFORMS").target = hands[0]
+    passed_around(new_object("Prop"), (follower, hands[1]))
+    bpy.ops.rigid_motion.update_path()
+    bpy.ops.ed.undo_push(message="Held")
+    before = path_of(bpy.data.objects["Prop"], bpy.context)
+    hands[0].location.z += 1.0
+    bpy.ops.ed.undo_push(message="Moved")
+    bpy.ops.ed.undo()
+    path = path_of(bpy.data.objects["Prop"], bpy.context)
+    assert path is not before
+    assert path.desired == pytest.approx(before.desired, abs=1e-5)
