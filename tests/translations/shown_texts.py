@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 import bpy
@@ -43,6 +44,7 @@ DRAWN = {
 CLASSES = (*ui.CLASSES, *properties.CLASSES)
 
 
+@cache
 def messages() -> set[Message]:
     """All of them. The extension has to be registered."""
     result = {message for path in sources() for message in marked_or_drawn(parsed(path))}
@@ -58,6 +60,7 @@ def sources() -> list[Path]:
     return [path for floor in FLOORS for path in sorted((PACKAGE / floor).rglob("*.py"))]
 
 
+@cache
 def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 

@@ -73,17 +73,14 @@ def beginning(text: str) -> str:
     return text[: len(text) - len(text.lstrip(" .:;,"))]
 
 
-@pytest.mark.parametrize(
-    ("english", "translation"),
-    sorted((text, translation) for texts in LANGUAGES.values() for (_, text), translation in texts.items()),
-)
-def test_a_translation_fits_its_text(english, translation):
-    assert translation.strip()
-    assert fields(translation) == fields(english)
-    assert ending(translation) == ending(english)
-    assert beginning(translation) == beginning(english)
-    assert translation.count("„") == translation.count("“")
-    assert "  " not in translation
+def test_translations_fit_their_texts():
+    for (_, english), translation in (item for texts in LANGUAGES.values() for item in texts.items()):
+        assert translation.strip(), english
+        assert fields(translation) == fields(english)
+        assert ending(translation) == ending(english)
+        assert beginning(translation) == beginning(english)
+        assert translation.count("„") == translation.count("“")
+        assert "  " not in translation
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
