@@ -37,19 +37,14 @@ def names(targets):
     return [target.name for target in targets]
 
 
-def test_in_pose_mode_the_selected_bones_are_meant_and_not_the_rig(rig):
-    with editor("VIEW_3D"):
-        assert names(targets_of(bpy.context)) == ["Rig/Arm", "Rig/Hand"]
-        assert active_target(bpy.context) == transform_of(bone(rig))
-        assert scope_for(bpy.context) == WHOLE
-
-
 def test_the_bones_of_all_rigs_in_pose_mode_are_meant(rig):
     other = keyed_rig("Other")
     bpy.ops.object.mode_set(mode="OBJECT")
     rig.select_set(True)
     bpy.ops.object.mode_set(mode="POSE")
     assert sorted(names(targets_of(bpy.context))) == ["Other/Arm", "Other/Hand", "Rig/Arm", "Rig/Hand"]
+    assert active_target(bpy.context) == transform_of(bone(other))
+    assert scope_for(bpy.context) == WHOLE
     operators.set_mode(mode=SCREW)
     assert bone(rig, "Arm").rigid_motion.mode == bone(other).rigid_motion.mode == SCREW
 

@@ -24,8 +24,6 @@ from tests.ui.conftest import FRAMES, keyed, select_keys
 
 operators = bpy.ops.rigid_motion
 
-OPERATORS = [cls for cls in CLASSES if issubclass(cls, bpy.types.Operator)]
-
 
 def modes(obj):
     """The modes of the three segments."""
@@ -198,17 +196,17 @@ def test_reduced_keys_are_restored_or_the_others_discarded(extension):
     assert [action.name for action in bpy.data.actions] == ["ToolAction"]
 
 
-@pytest.mark.parametrize("operator", OPERATORS, ids=lambda operator: operator.bl_idname)
-def test_every_operator_and_property_says_what_it_is_for(extension, operator):
-    assert operator.bl_idname.startswith("rigid_motion.")
-    assert operator.bl_description
-    assert not operator.bl_description.endswith(".")
-    # An export and a port change nothing.
-    without_undo = operator.__module__ in (gltf_export.__name__, live.__name__)
-    assert {"REGISTER", "UNDO"} - operator.bl_options <= ({"UNDO"} if without_undo else set())
-    kind = getattr(bpy.ops.rigid_motion, operator.bl_idname.partition(".")[2]).get_rna_type()
-    for prop in kind.properties:
-        if prop.identifier != "rna_type":
-            assert prop.name, prop.identifier
-            assert prop.description, prop.identifier
-            assert all(item.description for item in getattr(prop, "enum_items", ())), prop.identifier
+def test_every_operator_and_property_says_what_it_is_for(extension):
+    for operator in (cls for cls in CLASSES if issubclass(cls, bpy.types.Operator)):
+        assert operator.bl_idname.startswith("rigid_motion.")
+        assert operator.bl_description, operator
+        assert not operator.bl_description.endswith("."), operator
+        # An export and a port change nothing.
+        without_undo = operator.__module__ in (gltf_export.__name__, live.__name__)
+        assert {"REGISTER", "UNDO"} - operator.bl_options <= ({"UNDO"} if without_undo else set()), operator
+        kind = getattr(bpy.ops.rigid_motion, operator.bl_idname.partition(".")[2]).get_rna_type()
+        for prop in kind.properties:
+            if prop.identifier != "rna_type":
+                assert prop.name, (operator, prop.identifier)
+                assert prop.description, (operator, prop.identifier)
+                assert all(item.description for item in getattr(prop, "enum_items", ())), prop.identifier

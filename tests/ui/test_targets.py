@@ -14,26 +14,11 @@ from rigid_motion.ui.targets import (
     SELECTED,
     WHOLE,
     modes_meant,
-    scope_for,
-    targets_of,
 )
 from tests.animation.bones.rigs import select_bones
 from tests.animation.scenes import editor
 from tests.rigs.recorded import recorded_rig
 from tests.ui.conftest import FRAMES, keyed, select_keys
-
-
-@pytest.mark.parametrize("kind", KEY_EDITORS)
-def test_a_key_editor_means_the_objects_that_it_shows(tool, kind):
-    other = keyed("Other")
-    other.select_set(False)
-    keyed("Unkeyed", "AXIS_ANGLE").animation_data_clear()
-    with editor(kind) as space:
-        assert scope_for(bpy.context) == SELECTED
-        space.dopesheet.show_only_selected = True
-        assert targets_of(bpy.context) == [transform_of(tool)]
-        space.dopesheet.show_only_selected = False
-        assert set(targets_of(bpy.context)) == {transform_of(tool), transform_of(other)}
 
 
 @pytest.mark.parametrize("kind", KEY_EDITORS)
