@@ -23,48 +23,44 @@ LIVE = "live.md"
 HOLDING = "holding.md"
 ON_THE_PATH = "on_the_path.md"
 
-PAGES = (
-    ("bpy.ops.rigid_motion.set_mode", MODES),
-    *((f"bpy.ops.rigid_motion.{name}", EDIT) for name in ("set_turns", "copy_mode", "add_cycles")),
-    *(
-        (f"bpy.ops.rigid_motion.{name}", f"{ANIMATORS}#breakdown-push-and-relax")
-        for name in ("breakdown", "push", "relax")
-    ),
-    *(
-        (f"bpy.ops.rigid_motion.{name}", f"{HOLDING}#{anchor}")
-        for name, anchor in (
-            ("hold_in*", "hold-in"),
-            ("let_go", "let-go"),
-            ("match_grip", "match-grip"),
-            ("pass_frames", "pass"),
-        )
-    ),
-    ("bpy.types.scene.rigid_motion_pass", f"{HOLDING}#pass"),
-    ("bpy.ops.rigid_motion.go_to_deviation", f"{ON_THE_PATH}#deviations"),
-    ("bpy.types.rigidmotionoverlay.*deviation*", f"{ON_THE_PATH}#deviations"),
-    ("bpy.ops.rigid_motion.*_layer", f"{ON_THE_PATH}#layers"),
-    ("bpy.ops.rigid_motion.equalise_speed", f"{ON_THE_PATH}#speed"),
-    *((f"bpy.types.rigidmotionoverlay.{name}", f"{ON_THE_PATH}#ghosts") for name in ("*ghost*", "show_bodies")),
-    ("bpy.types.rigidmotionoverlay.*speed*", f"{ON_THE_PATH}#speed"),
-    ("bpy.ops.rigid_motion.update_path", f"{ANIMATORS}#see-the-motion"),
-    *(
-        (f"bpy.ops.rigid_motion.{name}", EDIT_PATH)
-        for name in ("edit_path", "*_path_key*", "set_path_point", "drag_path_tangent")
-    ),
-    ("bpy.ops.rigid_motion.*bake", f"{ANIMATORS}#bake"),
-    ("bpy.ops.rigid_motion.reduce_keys", "reduction.md"),
-    ("bpy.ops.rigid_motion.clean_motion", f"{ANIMATORS}#clean-motion"),
-    ("bpy.ops.rigid_motion.*_keys", f"{ANIMATORS}#reduce-keys"),
-    ("bpy.ops.rigid_motion.refresh", LIMITS),
-    ("bpy.ops.rigid_motion.live_*", LIVE),
-    ("bpy.ops.rigid_motion.*", f"{ANIMATORS}#choose-a-mode"),
-    ("bpy.types.livesettings.*", LIVE),
-    ("bpy.types.livebone.*", LIVE),
-    ("bpy.types.rigidmotion.mode", MODES),
-    ("bpy.types.rigidmotion.lead", EDIT_PATH),
-    ("bpy.types.rigidmotion.*", EDIT),
-    ("bpy.types.rigidmotionoverlay.*", f"{ANIMATORS}#see-the-motion"),
-    ("bpy.types.rigidmotionpreferences.*", f"{ANIMATORS}#install"),
+OF_OPERATORS = (
+    (MODES, "set_mode"),
+    (EDIT, "set_turns", "copy_mode", "add_cycles"),
+    (BREAKDOWN, "breakdown", "push", "relax"),
+    (f"{HOLDING}#hold-in", "hold_in*"),
+    (f"{HOLDING}#let-go", "let_go"),
+    (f"{HOLDING}#match-grip", "match_grip"),
+    (f"{HOLDING}#pass", "pass_frames"),
+    (f"{ON_THE_PATH}#deviations", "go_to_deviation"),
+    (f"{ON_THE_PATH}#layers", "*_layer"),
+    (f"{ON_THE_PATH}#speed", "equalise_speed"),
+    (f"{ANIMATORS}#see-the-motion", "update_path"),
+    (EDIT_PATH, "edit_path", "*_path_key*", "set_path_point", "drag_path_tangent"),
+    (f"{ANIMATORS}#bake", "*bake"),
+    ("reduction.md", "reduce_keys"),
+    (f"{ANIMATORS}#clean-motion", "clean_motion"),
+    (f"{ANIMATORS}#reduce-keys", "*_keys"),
+    (LIMITS, "refresh"),
+    (LIVE, "live_*"),
+    (f"{ANIMATORS}#choose-a-mode", "*"),
+)
+OF_PROPERTIES = (
+    (f"{HOLDING}#pass", "scene.rigid_motion_pass"),
+    (f"{ON_THE_PATH}#deviations", "rigidmotionoverlay.*deviation*"),
+    (f"{ON_THE_PATH}#ghosts", "rigidmotionoverlay.*ghost*", "rigidmotionoverlay.show_bodies"),
+    (f"{ON_THE_PATH}#speed", "rigidmotionoverlay.*speed*"),
+    (f"{ANIMATORS}#see-the-motion", "rigidmotionoverlay.*"),
+    (LIVE, "livesettings.*", "livebone.*"),
+    (MODES, "rigidmotion.mode"),
+    (EDIT_PATH, "rigidmotion.lead"),
+    (EDIT, "rigidmotion.*"),
+    (f"{ANIMATORS}#install", "rigidmotionpreferences.*"),
+)
+PAGES = tuple(
+    (f"{kind}.{name}", page)
+    for kind, table in (("bpy.ops.rigid_motion", OF_OPERATORS), ("bpy.types", OF_PROPERTIES))
+    for page, *names in table
+    for name in names
 )
 """Operators and properties, in lower case as Blender asks for them, and the page of each: the first that fits."""
 
