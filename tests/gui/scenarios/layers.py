@@ -6,22 +6,17 @@ import bpy
 import numpy as np
 
 from rigid_motion.animation import key_frames
+from tests.animation.oracle import shown_worlds
 from tests.gui import places
 from tests.gui.driver import FOLDED_PANEL, Hand, Steps
-from tests.gui.keyed import FRAMES, cube, key_the_cube, on_screen
+from tests.gui.keyed import FRAMES, cube, key_the_cube
 
 EVERY = range(FRAMES[0], FRAMES[-1] + 1)
 
 
 def worlds() -> np.ndarray:
     """Where the cube is on all frames, (m, 4, 4)."""
-    scene, result = bpy.context.scene, []
-    frame = scene.frame_current
-    for number in EVERY:
-        scene.frame_set(number)
-        result.append(on_screen("Cube"))
-    scene.frame_set(frame)
-    return np.array(result)
+    return shown_worlds([cube()], EVERY)[0]
 
 
 def scenario(hand: Hand) -> Steps[None]:

@@ -9,24 +9,14 @@ import pytest
 from rigid_motion.animation import add_layer
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.ui.overlay import cache
+from rigid_motion.ui.overlay.parents import maps_of
 from tests.animation.bones.rigs import in_turn
+from tests.animation.held import worlds
 from tests.animation.layered import key_base, key_influence, key_offset, new
 
 pytestmark = pytest.mark.any_blender
 
 FRAMES = np.arange(1, 41)
-
-
-def world_points(carrier) -> np.ndarray:
-    """Where the origin of something is on all frames, (m, 3)."""
-    result = []
-    for frame in FRAMES.tolist():
-        bpy.context.scene.frame_set(frame)
-        obj = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        bone = isinstance(carrier, bpy.types.PoseBone)
-        world = obj.matrix_world @ obj.pose.bones[carrier.name].matrix if bone else obj.matrix_world
-        result.append(world.translation[:])
-    return np.array(result)
 
 
 @pytest.mark.parametrize(
@@ -41,14 +31,12 @@ def test_a_path_is_where_it_is_seen_from_the_first_to_the_last_key_of_the_base(e
     add_layer(carrier)
     key_offset(carrier, modes[1], frames=(1.0, 15.0, 33.0))
     bpy.context.view_layer.update()
-    seen = world_points(carrier)
-    path = cache.path_of(carrier, bpy.context)
+    seen = worlds(carrier, FRAMES)[:, :3, 3]
+    ((space, path),) = cache.drawn_paths([transform_of(carrier)], bpy.context)
     assert path.in_world or kind == "object"
     assert (path.frames[0], path.frames[-1]) == (1.0, 40.0)
-    line = path.native if path.desired is None else path.desired
-    space = np.eye(4) if path.in_world else np.array(carrier.parent.matrix_world)
-    drawn = np.stack([np.interp(FRAMES, path.frames, column) for column in line.T], axis=1) @ space[:3, :3].T
-    assert np.abs(drawn + space[:3, 3] - seen).max() < 2e-3
+    drawn = np.stack([np.interp(FRAMES, path.frames, column) for column in path.line.T], axis=1)
+    assert np.abs(maps_of(space).at(drawn) - seen).max() < 2e-3
 
 
 def test_where_the_influence_is_not_one_or_the_strip_is_left_there_is_no_path(extension):
