@@ -13,7 +13,6 @@
     python scripts/bootstrap.py reduce walk.glb             keep few keys, in glTF and .blend files and recordings
     python scripts/bootstrap.py stream --help               send a recording over a network, in real time
     python scripts/bootstrap.py tasks list renders/hand     list the tasks of a comparison, and which are done
-    python scripts/bootstrap.py dask scheduler              use many machines, with Dask's own commands
     python scripts/bootstrap.py bundle hand.csv             write a comparison as a job for render farms
     python scripts/bootstrap.py openjd run template.json    run such a job on this machine
     python scripts/bootstrap.py examples lid                make small complete cases to start with: examples/README.md
@@ -57,7 +56,6 @@ COMMANDS = {
     "reduce": ([ROOT / "scripts" / "reduce.py"], ()),
     "stream": ([ROOT / "scripts" / "stream.py"], ("stream",)),
     "tasks": (["-m", "rigid_motion_batch", "tasks"], ()),
-    "dask": (["-m", "dask"], ("farm",)),
     "bundle": ([ROOT / "scripts" / "job_bundle.py"], ()),
     "openjd": (["-m", "openjd"], ("farm",)),
     "examples": ([ROOT / "examples" / "make_examples.py"], ()),
@@ -71,7 +69,7 @@ COMMANDS = {
 ENVIRONMENT = "environment"
 """Sets up all but Blender, and prints the folder."""
 
-WITHOUT_BLENDER = ("inspect", "clean", "stream", "tasks", "dask", "openjd", "completion", "types")
+WITHOUT_BLENDER = ("inspect", "clean", "stream", "tasks", "openjd", "completion", "types")
 """Need no Blender."""
 
 IN_ROOT = ("test", "types")

@@ -73,7 +73,7 @@ def main(arguments: list[str]) -> int:
                 return _explain(plan, store, options)
             with (
                 Progress(quiet=options.quiet, program=PROGRAM) as progress,
-                _executor(options, store, progress) as executor,
+                _executor(options.jobs) as executor,
             ):
                 return _Comparing(options, plan, executor, progress).run()
     except (SubjectError, RunError) as error:
@@ -173,15 +173,9 @@ def _suffix(source: str) -> str:
     return next((end for end in IN_BLENDER if lower.endswith(end) or f"{end}:" in lower), "")
 
 
-def _executor(options: argparse.Namespace, store: Store, progress: Progress) -> Executor:
-    """Return the executor of the tasks. Raises RunError where that cannot be."""
-    if options.scheduler is None:
-        return Executor() if options.jobs == 0 else ProcessExecutor(options.jobs or processors())
-    try:
-        from rigid_motion_batch.pipeline.dask import DaskExecutor
-    except ImportError as error:
-        raise RunError(f"--scheduler: {error}; {brings('farm', 'dask')} installs it") from None
-    return DaskExecutor(options.scheduler, store.output, progress.error)
+def _executor(jobs: int | None) -> Executor:
+    """Return the executor of the tasks, with so many processes: 0 for this one, None for one a processor."""
+    return Executor() if jobs == 0 else ProcessExecutor(jobs or processors())
 
 
 # -- doing it ---------------------------------------------------------------------------------------------------------

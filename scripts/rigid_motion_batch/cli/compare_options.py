@@ -134,14 +134,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     add_reading_options(parser)
     add_clean_option(parser)
-    workers = parser.add_mutually_exclusive_group()
-    workers.add_argument(
+    parser.add_argument(
         "--jobs",
         type=whole("number of processes", 0, 999),
         metavar="N",
         help="worker processes; 0 to work in this one (one for each processor)",
     )
-    workers.add_argument("--scheduler", metavar="ADDRESS", help="use the workers of a Dask scheduler: tcp://HOST:8786")
     parser.add_argument(
         "--overwrite",
         action="store_true",

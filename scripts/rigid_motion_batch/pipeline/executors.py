@@ -18,7 +18,7 @@ import sys
 import threading
 import time
 import traceback
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import Future
 from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from functools import partial
@@ -105,8 +105,6 @@ def processors() -> int:
 
 def loss(error: BaseException, job: StepJob) -> str:
     """Return how it came that a job has no result, and no error of its own: it may be tried again."""
-    if isinstance(error, CancelledError):
-        return "its worker is gone"
     code = getattr(error, "exitcode", None) or getattr(error, "returncode", None)
     how = f"died ({death(code)})" if code else f"failed: {type(error).__name__}: {error}"
     log = job.place / "log"

@@ -10,10 +10,9 @@ from __future__ import annotations
 import itertools
 import json
 import shutil
-import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -143,9 +142,8 @@ class Run:
     def _work(self, rest: Iterator[Task]) -> None:
         """Do tasks, each when those before it are settled. Raises RunError where nothing more can be done."""
         while True:
-            capacity = self.executor.capacity
             ready = [task for task in self._waiting if self._open.isdisjoint(task.after)]
-            while len(ready) < max(1, capacity) and (task := next(rest, None)):
+            while len(ready) < self.executor.capacity and (task := next(rest, None)):
                 if task.name in self._left:
                     ready += [task] if self._open.isdisjoint(task.after) else []
                     self._open.add(task.key)
@@ -154,13 +152,10 @@ class Run:
                     self._settled[task.key] = task.key
             if not (self._waiting or self._at_work):
                 break
-            for task in ready[: max(0, capacity - len(self._at_work))]:
+            for task in ready[: self.executor.capacity - len(self._at_work)]:
                 self._waiting.remove(task)
                 self._begin(task)
-            if not capacity:
-                time.sleep(LOOK_INTERVAL_S)
-            wait(self._at_work, LOOK_INTERVAL_S, FIRST_COMPLETED)
-            ended = [future for future in self._at_work if future.done()]  # Also those that an executor cancels.
+            ended = wait(self._at_work, LOOK_INTERVAL_S, FIRST_COMPLETED).done
             for future in ended:
                 self._end(future, *self._at_work.pop(future))
             if self._at_work and not ended:
@@ -196,7 +191,7 @@ class Run:
             # An error that nobody foresaw does not say by itself what it is about.
             said = f"{task.name}: {error}" if error.details else str(error)
             self._fail(task, said, error.details, fatal=error.fatal)
-        except (CancelledError, Exception) as error:
+        except Exception as error:
             self._losses[task.key] += 1
             said = f"{task.name}: {loss(error, job)}"
             if self._losses[task.key] < MAX_ATTEMPTS:
