@@ -21,7 +21,6 @@
     python scripts/bootstrap.py docs                        build the documentation as a site, dist/site
     python scripts/bootstrap.py types                       check types, with Python 3.12 or later as NumPy asks for
     python scripts/bootstrap.py environment [DIR]           set up all but Blender, for compare.py inside a Blender
-    python scripts/bootstrap.py completion bash             print the completion of `rigid-motion` for a shell
 
 The packages go into .venv/ of this checkout; the first run downloads about 500 MB, of which Blender is 400. Where there
 is no Blender for a Python, the commands run that need none: compare --no-video, inspect, clean, stream, tasks. No
@@ -62,14 +61,13 @@ COMMANDS = {
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
     "docs": ([ROOT / "scripts" / "build_site.py"], ("benchmark", "docs")),
     "types": (["-m", "mypy"], ("types",)),
-    "completion": (["-m", "rigid_motion_batch", "completion"], ()),
 }
 """Command to what Python runs for it, and the dependency groups of pyproject.toml that it needs."""
 
 ENVIRONMENT = "environment"
 """Sets up all but Blender, and prints the folder."""
 
-WITHOUT_BLENDER = ("inspect", "clean", "stream", "tasks", "openjd", "completion", "types")
+WITHOUT_BLENDER = ("inspect", "clean", "stream", "tasks", "openjd", "types")
 """Need no Blender."""
 
 IN_ROOT = ("test", "types")

@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 BESIDES = (
     *("bpy", "filelock", "jinja2", "markdown-it-py", "markupsafe", "mdurl", "numpy", "pebble", "pygments", "rich"),
-    *("shtab", "vl-convert-python"),
+    "vl-convert-python",
 )
 """What the extra `blender` brings along, and the dependencies. The environment of these tests lends it."""
 

@@ -42,7 +42,6 @@ COMMANDS = {
     "bundle": ("job_bundle", "write a comparison as a job for render farms"),
     "tasks": ("tasks", "list what a comparison did, and what failed"),
     "build": ("build_extension", "build the zip that Blender installs"),
-    "completion": ("completion", "complete commands and options in a shell"),
 }
 """The module of each in this package, with `main(arguments)`, which returns the exit code, and what it is about. Its
 script has the same name."""
