@@ -20,7 +20,7 @@
     python scripts/bootstrap.py build                       build the extension, dist/rigid_motion-VERSION.zip
     python scripts/bootstrap.py docs                        build the documentation as a site, dist/site
     python scripts/bootstrap.py types                       check types, with Python 3.12 or later as NumPy asks for
-    python scripts/bootstrap.py environment [DIR]           set up all but Blender, for compare.py inside a Blender
+    python scripts/bootstrap.py environment [DIR]           set up all but Blender, for compare --blender PATH
 
 The packages go into .venv/ of this checkout; the first run downloads about 500 MB, of which Blender is 400. Where there
 is no Blender for a Python, the commands run that need none: compare --no-video, inspect, clean, stream, tasks. No

@@ -75,8 +75,9 @@ def way_out(error: str, script: str = "compare.py") -> str:
         )
     module = re.search(r"No module named '([\w.]+)'", error)
     if module and module[1] != "bpy":
-        way = "python scripts/bootstrap.py, as in the README, brings it."
-        return f"{way} A Blender that lacks it can run compare.py, which looks for it elsewhere."
+        return (
+            "python scripts/bootstrap.py, as in the README, brings it; compare --blender PROGRAM films with a Blender."
+        )
     here = ".".join(map(str, sys.version_info[:2]))
     fitting = f"Python {' or '.join(BLENDER_PYTHONS)}"
     lines = [f"Blender has no wheel for Python {here}: use {fitting}."] if here not in BLENDER_PYTHONS else []

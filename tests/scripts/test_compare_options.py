@@ -29,11 +29,7 @@ def test_the_help_names_every_mode_there_is(capsys):
     assert [mode for mode in (*MODES, "all", "best_of") if mode not in said] == []
 
 
-EXAMPLE = re.compile(
-    r"^ +(?:blender --background --python scripts/compare\.py --"
-    r"|python scripts/(?:compare\.py|bootstrap\.py compare))(?P<arguments>.*)$",
-    re.MULTILINE,
-)
+EXAMPLE = re.compile(r"^ +python scripts/(?:compare\.py|bootstrap\.py compare)(?P<arguments>.*)$", re.MULTILINE)
 """A line of a page, or of the help, that calls the program."""
 
 

@@ -12,10 +12,8 @@ from typing import cast
 from rigid_motion_batch import standard_streams
 from rigid_motion_batch.command_line import INSTALLED, did_you_mean, own_arguments, printable, program_of
 from rigid_motion_batch.places import EXTENSION, PACKAGE, manifest
-from rigid_motion_batch.supervising import begin_child, blender_program, ended_at_once, stop_signals, supervise
+from rigid_motion_batch.supervising import begin_child, ended_at_once, stop_signals, supervise
 from rigid_motion_batch.system_libraries import problem_of
-
-from .in_blender import NoEnvironment, become, elsewhere
 
 RESEARCH = {
     "paper": "paper.parts",
@@ -47,10 +45,6 @@ COMMANDS = {
 script has the same name."""
 
 
-ON_LIBRARIES = ("compare.py", "job_bundle.py")
-"""Scripts that need packages which Blender's own Python has not."""
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `rigid-motion COMMAND ...`, and return the exit code.
 
@@ -66,15 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def launch(script: str) -> None:
     """Run the command of a script, given its `__file__`, and end with its exit code."""
-    name, arguments = Path(script).name, own_arguments(script)
-    if name in ON_LIBRARIES and blender_program():
-        try:
-            if command := elsewhere(script, arguments):
-                sys.exit(become(command))
-        except NoEnvironment as error:
-            print(f"{name}: {error}", file=sys.stderr)
-            sys.exit(2)
-    sys.exit(_as_program(program_of(name), lambda: _run(f".{Path(script).stem}", arguments)))
+    program, arguments = program_of(Path(script).name), own_arguments(script)
+    sys.exit(_as_program(program, lambda: _run(program, f".{Path(script).stem}", arguments)))
 
 
 def launch_research(arguments: Sequence[str]) -> None:
@@ -87,7 +74,8 @@ def launch_research(arguments: Sequence[str]) -> None:
         near = did_you_mean(name, RESEARCH) or "; there are " + ", ".join(RESEARCH)
         print(f"research: there is no {name!r}{near}", file=sys.stderr)
         sys.exit(2)
-    sys.exit(_as_program(f"research {name}", lambda: _run(f"research.{RESEARCH[name]}", rest)))
+    program = f"research {name}"
+    sys.exit(_as_program(program, lambda: _run(program, f"research.{RESEARCH[name]}", rest)))
 
 
 def _main(arguments: list[str]) -> int:
@@ -103,13 +91,7 @@ def _main(arguments: list[str]) -> int:
         print(f"{INSTALLED}: there is no command {printable(repr(name))}{near}", file=sys.stderr)
         return 2
     sys.argv = [f"{INSTALLED} {name}", *rest]
-    try:
-        return _run(f".{COMMANDS[name][0]}", rest)
-    except ModuleNotFoundError as error:
-        if not error.name or error.name.partition(".")[0] in (EXTENSION.name, PACKAGE.name, "research"):
-            raise
-        print(f"{sys.argv[0]}: {problem_of(error)}", file=sys.stderr)
-        return 2
+    return _run(sys.argv[0], f".{COMMANDS[name][0]}", rest)
 
 
 def _as_program(program: str, do: Callable[[], int], *, alone: bool = False) -> int:
@@ -122,7 +104,8 @@ def _as_program(program: str, do: Callable[[], int], *, alone: bool = False) -> 
     return standard_streams.finish(program, code)
 
 
-def _run(module: str, arguments: Sequence[str]) -> int:
+def _run(program: str, module: str, arguments: Sequence[str]) -> int:
+    """Run a command; what it needs and is not here, such as in a Blender's own Python, is said in its name."""
     received: list[int] = []
 
     def interrupt(number: int, _: object) -> None:
@@ -135,6 +118,11 @@ def _run(module: str, arguments: Sequence[str]) -> int:
         for item in stop_signals():
             signal.signal(item, interrupt)
         return command(list(arguments))
+    except ModuleNotFoundError as error:
+        if not error.name or error.name.partition(".")[0] in (EXTENSION.name, PACKAGE.name, "research"):
+            raise
+        print(f"{program}: {problem_of(error)}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         return 128 + (received or [signal.SIGINT])[0]
 

@@ -67,7 +67,6 @@ examples:
   python scripts/compare.py take.csv --budget 5,10 --rates 10 --modes all,best_of
   python scripts/compare.py take.csv --against mine.csv
   python scripts/compare.py take.csv --against lerp_slerp
-  blender --background --python scripts/compare.py -- hand_left.csv --axes unity
 
 keys:
   By default, --rates keys a second are kept, evenly spaced in time and the same for every mode. --tolerance and
