@@ -86,19 +86,6 @@ def test_the_same_recordings_and_more_of_them_go_on(folder: Path, arguments: tup
     assert run(*arguments, "--output", "out") == 0
 
 
-def test_what_would_be_done_is_explained_and_nothing_is_done(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    before = files(folder)
-    assert run("toss.csv", "--output", "out", "--explain", "--radius", "0.2") == 0
-    said = capsys.readouterr().out.splitlines()
-    assert "measure toss/5: parameters changed" in said
-    assert said[-1].startswith("report.html: ")
-    assert files(folder) == before
-    assert run("toss.csv", "--output", "out") == 0
-    capsys.readouterr()
-    assert run("toss.csv", "--output", "out", "--explain") == 0
-    assert capsys.readouterr().out.splitlines() == ["nothing to do"]
-
-
 @pytest.fixture
 def free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder to work in, with a recording, and nothing else."""

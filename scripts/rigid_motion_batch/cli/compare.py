@@ -26,7 +26,7 @@ from rigid_motion_batch.command_line import as_typed, complain, path_line, progr
 from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline.comparison import IN_BLENDER, TABLES, ComparisonPlan
 from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor, processors
-from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, explain, share_of, survey
+from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, share_of, survey
 from rigid_motion_batch.pipeline.steps import VERSION_VARIABLE, RunError, version_here
 from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.pipeline.studies import Comparison
@@ -43,7 +43,7 @@ from . import terminal
 
 PROGRAM = program_of(SCRIPT)
 
-TEXT_OPTIONS = ("--explain", "--json", "--open", "--quiet")
+TEXT_OPTIONS = ("--json", "--open", "--quiet")
 """Options that are about what is printed, and are no part of the command that a report names."""
 
 DRAWING_STAGES = steps.STAGES[steps.STAGES.index("build") :]
@@ -69,8 +69,6 @@ def main(arguments: list[str]) -> int:
             require_same_comparison(output, options.inputs)
         with Store(output, alone=not options.only, overwrite=options.overwrite) as store:
             plan = ComparisonPlan(comparison, store)
-            if options.explain:
-                return _explain(plan, store, options)
             with (
                 Progress(quiet=options.quiet, program=PROGRAM) as progress,
                 _executor(options.jobs) as executor,
@@ -137,7 +135,7 @@ def _blender(options: argparse.Namespace) -> str:
             raise RunError(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))
         return ""
     # Another program has libraries of its own.
-    on_screen = options.stage and options.engine != "cycles" and not (options.explain or options.blender)
+    on_screen = options.stage and options.engine != "cycles" and not options.blender
     if on_screen and (missing := missing_for_rendering()):
         raise RunError(f"{way_out(missing)}\nOr go without videos: --no-video")
     if options.blender:
@@ -334,24 +332,3 @@ class _Comparing:
             "failures": self.work.failures,
             "tasks": {state: counts[state] for state in STATES if counts.get(state)},
         }
-
-
-def _explain(plan: ComparisonPlan, store: Store, options: argparse.Namespace) -> int:
-    """Print what a run would do, and why."""
-
-    def reasons(tasks: Plan) -> list[str]:
-        chosen = {task.name for task in share_of(tasks, options.only or "", *options.part)}
-        return [f"{task.name}: {why}" for task, why in explain(tasks, store) if task.name in chosen]
-
-    lines = reasons(plan.reading)
-    if any(not store.index_of(task.key) for task in plan.reading()):
-        if options.only != "read":
-            lines.append("The following tasks are known once these recordings have been read.")
-    elif options.only != "read":
-        plan.inspect_clips()
-        plan.conclude()
-        lines += reasons(plan.tasks)
-        if plan.comparison.stage and any(not store.index_of(task.key) for task in plan.measuring()):
-            lines.append("Which keys the films show is known when all is measured.")
-    print(*(lines or ["nothing to do"]), sep="\n")
-    return 0

@@ -144,7 +144,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         action="store_true",
         help="replace another comparison in that folder, and files that were edited or come from other programs",
     )
-    parser.add_argument("--explain", action="store_true", help="print what would be done and why, and do nothing")
     output = parser.add_argument_group("output")
     output.add_argument("--open", action="store_true", help="open the report in the browser")
     output.add_argument("--quiet", action="store_true", help="print only the path of the report, and failures")

@@ -56,8 +56,8 @@ def main(arguments: list[str]) -> int:
     """Write a bundle, and return the exit code."""
     own, rest = _parse(arguments)
     options = parse_comparison(rest)
-    if options.only or options.explain:
-        complain(PROGRAM, "--only and --explain are for a run of compare.py itself; leave them out")
+    if options.only:
+        complain(PROGRAM, "--only is for a run of compare.py itself; leave it out")
         return 2
     output = (options.output or output_folder("comparison")).absolute()
     stages = [stage for stage in STAGES if options.stage or stage not in FILM_STAGES]

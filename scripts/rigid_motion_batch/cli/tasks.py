@@ -15,8 +15,7 @@ examples:
   rigid-motion tasks list renders/hand
   rigid-motion tasks list renders/hand --failed
 
-To do a part of a comparison, as the workers of a farm do, give its command --only STAGE and --part K/N. --explain says
-what it would do and why.
+To do a part of a comparison, as the workers of a farm do, give its command --only STAGE and --part K/N.
 Exit code: 0 all tasks are done, 1 some failed, 2 there is no comparison.
 """
 

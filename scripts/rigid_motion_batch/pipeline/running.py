@@ -1,4 +1,4 @@
-"""Running plans: what is missing is given to an executor, in order, kept, and published; or only why it would be.
+"""Running plans: what is missing is given to an executor, in order, kept, and published.
 
 A plan is a function that returns its tasks one by one, each after those that it reads from. So of ten thousand clips
 only those are in memory that are at work. Where a task fails those that need it are skipped, and all others are done.
@@ -8,22 +8,18 @@ What ends a run is Ctrl-C, and a disk that is full or must not be written. Nothi
 from __future__ import annotations
 
 import itertools
-import json
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
 
-from rigid_motion_batch.command_line import listed
 from rigid_motion_batch.progress import Progress
 
 from .executors import FULL_OR_FORBIDDEN, Executor, Made, loss
 from .steps import LOOK_INTERVAL_S, RunError, StepJob, Task, TaskError
 from .store import Store
-from .values import plain
 
 Plan = Callable[[], Iterable[Task]]
 
@@ -63,27 +59,6 @@ def survey(plan: Plan, store: Store) -> tuple[dict[str, float], int]:
             left[task.name] = task.seconds
             store.refuse(unpublished)
     return left, done
-
-
-def explain(plan: Plan, store: Store) -> Iterator[tuple[Task, str]]:
-    """Yield the tasks of a plan that a run would do, and why. Nothing is written."""
-    latest = store.latest()
-    for task in plan():
-        if index := store.index_of(task.key):
-            if missing := store.unpublished(task, index):
-                yield task, f"{listed((path for _, path in missing), 3)} missing, edited or of something else"
-        elif (store.results / task.key).exists():
-            yield task, "its result is damaged"
-        else:
-            earlier = store.index_of(latest.get(task.name, ""))
-            yield task, _difference(earlier["made_of"], task) if earlier else "never done"
-
-
-def _difference(before: Mapping[str, Any], task: Task) -> str:
-    """Return in what a task differs from what its last result was made of."""
-    now = json.loads(json.dumps(task.made_of, default=plain))
-    changed = [part for part in now if before.get(part) != now[part]]
-    return f"{', '.join(changed)} changed" if changed else "an earlier task failed the last time"
 
 
 @dataclass(eq=False)

@@ -91,13 +91,6 @@ class Task:
     publish: Mapping[str, str] = field(default_factory=dict)
     seconds: float = 1.0
 
-    @property
-    def made_of(self) -> dict[str, Any]:
-        """What its result depends on, under words for people; `explain` compares it."""
-        kind: Any = type(self.step)
-        parts = {"program": versions_of(kind), "parameters": self.step}
-        return {**parts, "inputs": dict(self.inputs), "earlier tasks": list(self.after)}
-
     @cached_property
     def key(self) -> str:
         """The digest of what its result depends on, wherever its inputs are."""
@@ -105,8 +98,9 @@ class Task:
 
     def key_after(self, after: Iterable[str | None]) -> str:
         """Return its key where the tasks before it had these keys; None for one that failed."""
+        kind: Any = type(self.step)
         # 128 bits, and short enough for the paths of Windows.
-        return _digest({**self.made_of, "inputs": [*self.inputs.values()], "earlier tasks": list(after)})[:32]
+        return _digest([versions_of(kind), self.step, [*self.inputs.values()], list(after)])[:32]
 
 
 @dataclass

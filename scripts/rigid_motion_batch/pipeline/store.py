@@ -33,10 +33,9 @@ from rigid_motion_batch.files import append_lines, lines_of, write_text
 
 from .executors import Made
 from .steps import OWN_FOLDER, RunError, Task, sha256_in, sha256_of
-from .values import plain
 
 INDEX = ".index.json"
-"""Index of a result: its files with size, time of change and digest; what it was made of, and in how long."""
+"""Index of a result: its files with size, time of change and digest; of which task it is, and in how long."""
 
 KEPT_S = 7 * 86400.0
 """Seconds that a result is kept that the last plan did not ask for, and what a process was making that was killed."""
@@ -147,9 +146,8 @@ class Store:
 
     def keep(self, task: Task, key: str, made: Made) -> None:
         """Take what was made as the result of a task. Raises OSError where that cannot be."""
-        folder, index = made["folder"], {name: made[name] for name in ("files", "seconds")}
-        content = json.dumps({**index, "name": task.name, "made_of": task.made_of}, default=plain)
-        (folder / INDEX).write_text(content, encoding="utf-8")
+        folder, index = made["folder"], {"name": task.name, "files": made["files"], "seconds": made["seconds"]}
+        (folder / INDEX).write_text(json.dumps(index), encoding="utf-8")
         try:
             folder.rename(self.results / key)
         except OSError:
