@@ -239,9 +239,7 @@ def _best_of(paths: Sequence[Path], modes: str) -> dict[str, dict[str, float]]:
 
 def _best_of_adaptive(paths: Sequence[Path]) -> dict[str, float]:
     """Return the relative errors of `best_of` with adaptive keys, by average number of keys per second."""
-    with _compared(
-        paths, "--decimate", "adaptive", "--budget", ",".join(BUDGETS), "--modes", ",".join((*COUNTED, BEST_OF))
-    ) as folder:
+    with _compared(paths, "--budget", ",".join(BUDGETS), "--modes", ",".join((*COUNTED, BEST_OF))) as folder:
         return _adaptive_gains(_Metrics(folder))
 
 

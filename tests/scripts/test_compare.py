@@ -22,7 +22,7 @@ from tests.scripts.comparing import COLUMNS, ROOT, SMALL, outputs, poses_of, row
 
 pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
-ADAPTIVE = ("--no-video", "--decimate", "adaptive", "--tolerance", "5mm, 0.02", "--rates", "10")
+ADAPTIVE = ("--no-video", "--tolerance", "5mm, 0.02", "--rates", "10")
 
 
 @pytest.fixture(scope="module")
@@ -101,15 +101,6 @@ def test_every_number_can_be_had_again_from_the_tables_and_the_recording(measure
         }
         for name, value in expected.items():
             assert float(row[name]) == pytest.approx(value, rel=1e-6, abs=1e-9), (row["clip"], row["mode"], name)
-
-
-def test_budgets_are_the_rates_where_neither_a_tolerance_nor_a_budget_is_given(short_clip, tmp_path):
-    asked = ("--no-video", "--output", tmp_path, "--modes", "lerp_slerp")
-    assert run(short_clip, *asked, "--decimate", "adaptive", "--rates", "10") == 0
-    assert sorted(path.name for path in (tmp_path / "toss").iterdir()) == ["10", "budget-10"]
-    evenly, adaptive = rows_of(tmp_path / "metrics.csv")
-    assert (evenly["keys"], evenly["rate_hz"]) == (adaptive["keys"], adaptive["rate_hz"]) == ("11", "10")
-    assert float(adaptive["rms_shell_m"]) < float(evenly["rms_shell_m"])
 
 
 def test_all_numbers_are_in_the_report_before_the_first_frame_is_rendered(short_clip, tmp_path, capsys, monkeypatch):
@@ -272,7 +263,7 @@ def test_an_output_folder_that_cannot_be_made_is_said(short_clip, tmp_path, caps
 
 
 def test_the_best_of_each_segment_is_compared_with_the_modes_it_is_made_of(short_clip, tmp_path):
-    asked = ("--decimate", "adaptive", "--tolerance", "5mm", "--rates", "8", "--modes", "best_of, all")
+    asked = ("--tolerance", "5mm", "--rates", "8", "--modes", "best_of, all")
     assert run(short_clip, "--no-video", "--output", tmp_path, *asked) == 0
     rows = rows_of(tmp_path / "metrics.csv")
     assert [row["mode"] for row in rows] == [*COMPARED, "best_of"] * 2

@@ -17,7 +17,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A body, and what is written of it, beside a single rigid one."""
     folder = tmp_path_factory.mktemp("bodies")
     walk, toss, output = write_body(folder / "walk.bvh"), write_toss(folder / "toss.csv"), folder / "output"
-    options = ("--decimate", "adaptive", "--tolerance", "1cm", "--shared", "--rates", "5,10", "--radius", "5cm")
+    options = ("--tolerance", "1cm", "--shared", "--rates", "5,10", "--radius", "5cm")
     assert run(walk, toss, *QUICK, *options, "--output", output) == 0
     return walk, output
 

@@ -14,8 +14,8 @@ from tests.scripts.comparing import ROOT, run
     ("arguments", "folders"),
     [
         (["--rates", "5,7.5,5.0,05"], ["5", "7.5"]),
-        (["--decimate", "adaptive", "--budget", "10.0,10"], ["budget-10.0"]),
-        (["--decimate", "adaptive", "--tolerance", "5mm,0.5cm,0.005m,0.005"], ["tolerance-5mm", "tolerance-0.005"]),
+        (["--budget", "10.0,10"], ["budget-10.0"]),
+        (["--tolerance", "5mm,0.5cm,0.005m,0.005"], ["tolerance-5mm", "tolerance-0.005"]),
     ],
 )
 def test_the_same_amount_written_in_two_ways_is_one_choice(arguments, folders):

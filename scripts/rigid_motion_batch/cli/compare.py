@@ -100,7 +100,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         radii=options.radius,
         shared=options.shared,
         form=options.format,
-        count_keys=options.decimate == "adaptive",
+        count_keys=bool(options.tolerance or options.budget),
         fit=options.fit,
         stage=stage,
         every_film=options.films == ALL,

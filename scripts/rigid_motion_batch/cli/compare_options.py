@@ -158,19 +158,14 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     farm.add_argument("--only", choices=STAGES, metavar="STAGE", help=f"do this part alone: {', '.join(STAGES)}")
     farm.add_argument("--part", type=_part, default=(1, 1), metavar="K/N", help="and of it the K-th of N shares")
     keys = parser.add_argument_group("choosing keys")
-    keys.add_argument(
-        "--decimate",
-        choices=("uniform", "adaptive"),
-        help="keep keys evenly spaced in time, or where each mode needs them (uniform; adaptive with --tolerance or "
-        "--budget)",
-    )
-    keys.add_argument(
+    by_motion = keys.add_mutually_exclusive_group()
+    by_motion.add_argument(
         "--tolerance",
         type=_amounts(Tolerance),
         metavar="LENGTH,...",
         help="largest shell error of adaptive keys: 5mm, 0.5cm, 0.005m; a plain number is in the recording's unit",
     )
-    keys.add_argument(
+    by_motion.add_argument(
         "--budget", type=_amounts(Budget), metavar="HZ,...", help="adaptive keys a second, on average over the clip"
     )
     keys.add_argument(
@@ -273,26 +268,12 @@ def own_recordings() -> list[str]:
 
 def _choices(options: argparse.Namespace) -> list[Choice]:
     """Return all choices of keys of the run. Raises ValueError for options that do not go together."""
-    rates, tolerance, budget, shared = options.rates, options.tolerance, options.budget, options.shared
-    options.decimate = options.decimate or ("adaptive" if tolerance or budget else "uniform")
-    if options.decimate == "uniform":
-        for option, given in (("--tolerance", tolerance), ("--budget", budget)):
-            if given:
-                raise ValueError(f"{option} is for keys that are chosen by the motion: leave out --decimate uniform")
-        for option, given in (("--fit", options.fit), ("--shared", shared)):
-            if given:
-                raise ValueError(
-                    f"{option} is for keys that are chosen by the motion: add --tolerance, --budget or --decimate "
-                    "adaptive"
-                )
-        return rates or _amounts(Uniform)(RATES)
-    if tolerance and budget:
-        raise ValueError(
-            "--tolerance and --budget exclude one another: a tolerance determines the number of keys, a budget the "
-            "error; give one of them"
-        )
-    by_motion = tolerance or budget or [Budget(rate.written) for rate in rates or _amounts(Uniform)(RATES)]
-    return [*(rates or []), *by_motion]
+    by_motion = options.tolerance or options.budget or []
+    for option, given in (("--fit", options.fit), ("--shared", options.shared)):
+        if given and not by_motion:
+            raise ValueError(f"{option} is for keys that are chosen by the motion: add --tolerance or --budget")
+    rates = options.rates or ([] if by_motion else _amounts(Uniform)(RATES))
+    return [*rates, *by_motion]
 
 
 def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
