@@ -32,9 +32,6 @@ MAX_ROUNDING_M = 1e-9
 BLOCK_ROWS = 10_000
 """Rows of a table that are made at a time."""
 
-FORMS = ("csv", "tum")
-"""Formats of the tables of poses."""
-
 BYTES_PER_MODE = 1
 """What a key has in addition where every segment has a mode of its own."""
 
@@ -207,9 +204,6 @@ def geometric_mean(values: np.ndarray) -> np.ndarray:
 def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = ()) -> None:
     """Write a table of poses: `t,x,y,z,qw,qx,qy,qz`, and `s` where the poses have scales.
 
-    Under a name that ends in `.tum` the table is as evo and others read it, `t x y z qx qy qz qw`, without scales and
-    modes.
-
     Parameters
     ----------
     path : Path
@@ -218,9 +212,6 @@ def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str
     modes : sequence of str, n - 1 of them, optional
         Of the segments that the poses begin, for a last column, `mode`. The last pose begins none.
     """
-    if path.suffix == ".tum":
-        _write_tum(path, times, poses)
-        return
     columns = [times, *poses.positions.T, *poses.quaternions.T]
     header = "t,x,y,z,qw,qx,qy,qz"
     if poses.scales is not None:
@@ -236,14 +227,6 @@ def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str
             stream.write("\n".join([*lines, ""]))
 
 
-def _write_tum(path: Path, times: np.ndarray, poses: Poses) -> None:
-    columns = [times, *poses.positions.T, *poses.quaternions.T[[1, 2, 3, 0]]]
-    with replacing(path) as stream:
-        stream.write("# timestamp tx ty tz qx qy qz qw\n")
-        for _, lines in lines_of_poses(columns):
-            stream.writelines(line.replace(",", " ") + "\n" for line in lines)
-
-
 def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[str]]]:
     """Yield the rows of a table of numbers, columns of shape (n,), some at a time with the number of the first.
 
@@ -254,34 +237,31 @@ def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[st
         yield first, [",".join(map(repr, row)) for row in rows]
 
 
-def table_names(
-    choice: Choice, modes: Iterable[str], form: str = "csv", other: str = "", *, body: bool = False
-) -> list[str]:
+def table_names(choice: Choice, modes: Iterable[str], other: str = "", *, body: bool = False) -> list[str]:
     """Return the files that `write_tables` writes for a choice; `other` is a motion whose keys are unknown.
 
     Of a whole body those are its keys: one for all modes where they have the same.
     """
-    modes, form = tuple(modes), "csv" if body else form
-    keyed = [f"{mode}.keys.{form}" for mode in single_modes(modes)]
-    keys = [f"keys.{form}"] if choice.decimation == "uniform" else keyed
+    modes = tuple(modes)
+    keyed = [f"{mode}.keys.csv" for mode in single_modes(modes)]
+    keys = ["keys.csv"] if choice.decimation == "uniform" else keyed
     best = [f"{BEST_OF}.keys.csv"] if BEST_OF in modes else []
-    return keys if body else [*(f"{mode}.{form}" for mode in (*modes, other) if mode), *keys, *best]
+    return keys if body else [*(f"{mode}.csv" for mode in (*modes, other) if mode), *keys, *best]
 
 
-def write_tables(folder: Path, made: Reconstruction, form: str = "csv") -> None:
-    """Write the keys, and of a rigid body a `MODE.csv`, or another of `FORMS`, for every mode into `folder`.
+def write_tables(folder: Path, made: Reconstruction) -> None:
+    """Write the keys, and of a rigid body a `MODE.csv` for every mode, into `folder`.
 
     Keys that were chosen evenly are those of all modes, in `keys.csv`; others are in a `MODE.keys.csv` for each. Those
     of `best_of` are in a table of their own in any case, with the mode of each segment. Of a whole body a row is a
     joint's pose in its parent's space, in the unit of the recording: `joint,t,x,y,z,qw,qx,qy,qz`.
     """
     clip, times, body = made.clip, made.times, made.clip.rest_body is not None
-    form = "csv" if body else form
     for mode in () if body else made.keys:
-        write_poses(folder / f"{mode}.{form}", times, made.filled_in(mode, times))
-    tables = {f"{mode}.keys.{form}": made.keys[mode] for mode in single_modes(made.keys) if len(made.keys[mode][0])}
+        write_poses(folder / f"{mode}.csv", times, made.filled_in(mode, times))
+    tables = {f"{mode}.keys.csv": made.keys[mode] for mode in single_modes(made.keys) if len(made.keys[mode][0])}
     if made.choice.decimation == "uniform":
-        tables = {f"keys.{form}": next(iter(tables.values()))}
+        tables = {"keys.csv": next(iter(tables.values()))}
     for name, keys in tables.items():
         if body:
             _write_key_poses(folder / name, clip, keys)

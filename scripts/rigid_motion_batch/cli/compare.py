@@ -99,7 +99,6 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         reading=options.reading,
         radii=options.radius,
         shared=options.shared,
-        form=options.format,
         count_keys=bool(options.tolerance or options.budget),
         fit=options.fit,
         stage=stage,

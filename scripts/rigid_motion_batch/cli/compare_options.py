@@ -19,7 +19,6 @@ from rigid_motion_batch.analysis.choices import (
     distinct,
     read_radii,
 )
-from rigid_motion_batch.analysis.metrics import FORMS
 from rigid_motion_batch.analysis.modes import BEST_OF, COMPARED, REFERENCE, single_modes
 from rigid_motion_batch.command_line import bounded, did_you_mean, folder_path, not_empty, parser_of, whole
 from rigid_motion_batch.palette import THEMES
@@ -147,12 +146,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     output = parser.add_argument_group("output")
     output.add_argument("--open", action="store_true", help="open the report in the browser")
     output.add_argument("--quiet", action="store_true", help="print only the path of the report, and failures")
-    output.add_argument(
-        "--format",
-        choices=FORMS,
-        default="csv",
-        help="format of each mode's poses and of the keys: csv, or tum for evo (%(default)s)",
-    )
     output.add_argument("--json", action="store_true", help="print verdict, table, notes and failures as JSON")
     farm = parser.add_argument_group("farms", "One of many machines that share the folder; docs/farm.md has more.")
     farm.add_argument("--only", choices=STAGES, metavar="STAGE", help=f"do this part alone: {', '.join(STAGES)}")

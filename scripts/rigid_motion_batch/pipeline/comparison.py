@@ -202,10 +202,10 @@ class ComparisonPlan:
         modes = single_modes(comparison.modes) if joints else comparison.modes
         for choice in study.choices:
             folder = f"{name}/{choice.name}"
-            names = table_names(choice, modes, comparison.form, study.facts.against, body=bool(joints))
+            names = table_names(choice, modes, study.facts.against, body=bool(joints))
             publish = {table: f"{folder}/{table}" for table in names}
             seconds = 0.02 + 6e-6 * size * len(modes) * (1.0 if choice.decimation == "uniform" else 45.0)
-            step = steps.Measure(clip, choice, tuple(modes), comparison.radii, comparison.shared, comparison.form)
+            step = steps.Measure(clip, choice, tuple(modes), comparison.radii, comparison.shared)
             yield (
                 Part("measure", clip, choice.name),
                 Task(step, f"measure {folder}", after, publish=publish, seconds=seconds),

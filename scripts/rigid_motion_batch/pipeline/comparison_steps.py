@@ -119,8 +119,6 @@ class Measure(Step, rooms=ANALYSIS, stage="measure"):
     modes: tuple[str, ...]
     radii: Radii
     shared: bool = False
-    form: str = "csv"
-    """The form of the tables of poses."""
 
     def make(self, job: StepJob) -> None:
         from rigid_motion_batch.analysis import metrics, results
@@ -132,7 +130,7 @@ class Measure(Step, rooms=ANALYSIS, stage="measure"):
         if made is None:
             raise TaskError(f"{clip.name}: too short for two keys {self.choice.phrase}")
         result = results.measured(made)
-        metrics.write_tables(job.folder, made, self.form)
+        metrics.write_tables(job.folder, made)
         write_rows(job.folder / ROWS, metrics.Metrics, result.rows)
         if result.joints:
             write_rows(job.folder / JOINT_ROWS, metrics.JointMetrics, result.joints)

@@ -54,9 +54,6 @@ class Comparison:
 
     reading: ReadingOptions = AS_THE_FILE_SAYS
     radii: Radii = EVERYWHERE
-    form: str = "csv"
-    """The form of the tables of poses of rigid bodies, of `metrics.FORMS`."""
-
     shared: bool = False
     """True if the joints of a body have their keys at the same samples where the motion chooses them."""
 

@@ -5,12 +5,11 @@ import pytest
 
 from rigid_motion.motion import shell_error
 from rigid_motion_batch.analysis.choices import Radii, Uniform
-from rigid_motion_batch.analysis.metrics import table_names, write_tables
+from rigid_motion_batch.analysis.metrics import write_tables
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
 from rigid_motion_batch.analysis.results import clip_result, measured
 from rigid_motion_batch.places import ASSETS
-from rigid_motion_batch.recordings import read_trajectories
 from rigid_motion_batch.recordings.clip_reading import read_source
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import compare_clip, reconstruct, swinging_clip
@@ -37,17 +36,6 @@ def test_a_mode_for_every_segment_costs_a_byte_a_key_and_is_a_column_of_the_keys
         for own, row in zip(filled[mode], filled[BEST_OF], strict=True):
             if first < float(row["t"]) < last:
                 assert [float(word) for word in row.values()] == pytest.approx([float(word) for word in own.values()])
-
-
-def test_in_the_format_of_tum_poses_are_read_back_as_they_were(tmp_path: Path) -> None:
-    made = reconstruct(swinging_clip())
-    write_tables(tmp_path, made, "tum")
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(table_names(made.choice, made.keys, "tum"))
-    for mode in made.keys:
-        (read,) = read_trajectories(f"{tmp_path / mode}.tum").trajectories
-        assert np.array_equal(read.times, made.times)
-        assert np.array_equal(read.poses.positions, made.filled_in(mode, made.times).positions)
-        assert np.array_equal(read.poses.quaternions, made.filled_in(mode, made.times).quaternions)
 
 
 @pytest.mark.parametrize("body", [False, True])
