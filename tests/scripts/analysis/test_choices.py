@@ -6,11 +6,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import KEYFRAME_MODES, interpolate
-from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform, radius_in_metres
+from rigid_motion_batch.analysis.choices import Budget, Choice, Radii, Tolerance, Uniform, radius_in_metres, read_radii
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.recordings.clips import Clip
 from tests.balls import largest_displacements
+from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
 
 
@@ -100,3 +101,16 @@ def test_the_best_of_each_segment_has_the_keys_of_the_best_mode_and_keeps_to_wha
 )
 def test_a_tolerance_larger_than_the_motion_is_refused_with_the_way_out(written: str, said: str) -> None:
     assert re.search(said, Tolerance(written).problem_with(swinging_clip(), 0.1))
+
+
+@pytest.mark.parametrize("text", ["", "0", "-1", "nan", "inf", "10km", "-3cm", "radii.csv", "a\0b", "x" * 5000])
+def test_what_is_no_radius_is_refused_with_the_way_out(text: str) -> None:
+    with pytest.raises(ValueError, match=r"is not a length above 0, such as 3cm or 0\.03"):
+        read_radii(text)
+
+
+def test_joints_have_another_radius_than_rigid_bodies_unless_one_is_given() -> None:
+    body, rigid = swinging_body(), swinging_clip()
+    for radii, joint, of_rigid in ((Radii(0.1, 0.03), 0.03, 0.1), (read_radii(" 5e-2 "), 0.05, 0.05)):
+        assert radii.of(body).tolist() == [joint] * len(body.whole_body.joints)
+        assert radii.of(rigid).tolist() == [of_rigid]

@@ -51,16 +51,6 @@ def by_matrices(hand: Poses, tool: Poses) -> np.ndarray:
 # -- slips ------------------------------------------------------------------------------------------------------------
 
 
-def test_screws_with_shared_keys_let_nothing_slip_and_curves_and_lines_do():
-    rows = slip_of(HAND, held_by(HAND))
-    assert list(rows) == list(MODES)
-    for mode in ("dq_sclerp", "motor_spline", "pga_lerp"):
-        assert rows[mode].max_slip_m < 1e-9
-    for mode in ("bezier", "lerp_slerp"):
-        assert 0.01 < rows[mode].rms_slip_m < rows[mode].max_slip_m
-    assert all(row.recorded_slip_m < 1e-9 for row in rows.values())
-
-
 @pytest.mark.parametrize("mode", ["bezier", "lerp_slerp"])
 def test_a_slip_is_the_largest_distance_of_any_point_of_the_ball(mode: str):
     tool = held_by(HAND)

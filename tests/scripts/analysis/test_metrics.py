@@ -12,13 +12,8 @@ from rigid_motion_batch.analysis.results import clip_result, measured
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_source
 from tests.scripts.clips.bodies import swinging_body
-from tests.scripts.clips.recordings import compare_clip, reconstruct, swinging_clip
+from tests.scripts.clips.recordings import compare_clip, swinging_clip
 from tests.scripts.comparing import rows_of
-
-
-def test_bytes_are_counted_for_the_keys_that_were_there_and_not_for_the_rate_that_was_asked_for() -> None:
-    row = measured(reconstruct(swinging_clip(rate=30.0), "120")).rows[0]
-    assert row.bytes_per_s == pytest.approx(30 * 56)
 
 
 def test_a_mode_for_every_segment_costs_a_byte_a_key_and_is_a_column_of_the_keys(tmp_path: Path) -> None:

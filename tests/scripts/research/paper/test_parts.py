@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from research.paper import parts, sending
+from research.paper import parts, sending, table
 from research.paper.table import UPDATES
 from rigid_motion_batch.streaming.measuring import HEADER_BYTES
 from tests.scripts.research.paper.clips import circling
@@ -16,14 +16,11 @@ pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 CLIP = circling(turns=0.7, rate=90.0, seconds=3.0)
 
 
-@pytest.fixture
-def small(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_part_writes_its_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    modes = table.REFERENCE, "motor_spline"
     monkeypatch.setattr(parts.motions, "assets", lambda: {CLIP.name: CLIP})
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("small")
-def test_a_part_writes_its_figures(tmp_path: Path) -> None:
+    monkeypatch.setattr(table, "MODES", modes)
+    monkeypatch.setattr(table, "ROW_CHOICES", {mode: (mode, table.DECIMATIONS[0]) for mode in modes})
     assert parts.main(["--only", "table", "--root", str(tmp_path)]) == 0
     (path,) = (tmp_path / "docs" / "figures").iterdir()
     assert path.name == "paper_table.json"

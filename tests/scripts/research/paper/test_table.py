@@ -11,17 +11,18 @@ from tests.scripts.research.paper.clips import circling
 pytestmark = pytest.mark.once
 
 
-@pytest.mark.slow
-def test_on_a_pivot_a_screw_needs_no_more_updates_than_tell_which_way_it_turns():
-    # 1.6 turns: with four segments each is less than half a turn.
-    clip = circling("pivot", turns=1.0)
-    for rate, share in zip(UPDATES, table.needed(clip)["dq_sclerp"], strict=True):
-        assert share * (rate * clip.times[-1] + 1.0) == pytest.approx(5.0)
-
-
-@pytest.mark.slow
-def test_on_a_circle_without_turning_the_screw_is_the_straight_line():
-    assert table.needed(circling(turns=0.0))["dq_sclerp"] == pytest.approx([1.0] * 4, rel=0.01)
+@pytest.mark.parametrize("turns", [0.0, 1.0], ids=["along a circle", "about a pivot"])
+def test_a_screw_is_the_straight_line_or_tells_which_way_it_turns(turns: float, monkeypatch: pytest.MonkeyPatch):
+    straight, screw = modes = table.REFERENCE, table.SCREW
+    monkeypatch.setattr(table, "MODES", modes)
+    monkeypatch.setattr(table, "ROW_CHOICES", {mode: (mode, table.DECIMATIONS[0]) for mode in modes})
+    clip = circling(turns=turns)
+    needed = table.needed(clip)
+    assert needed[straight] == pytest.approx([1.0] * 4)
+    for rate, share in zip(UPDATES, needed[screw], strict=True):
+        # 1.6 turns of a pivot: with four segments each is less than half a turn.
+        keys = rate * clip.times[-1] + 1.0
+        assert share * keys == pytest.approx(5.0 if turns else keys, rel=0.01)
 
 
 def test_means_are_geometric_and_over_the_clips_that_got_there():
