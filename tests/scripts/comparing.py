@@ -1,11 +1,9 @@
 """Runs of compare.py in tests: a recording that is done in no time, and what two output folders must have in common."""
 
 import csv
-import json
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.cli import compare
@@ -20,11 +18,6 @@ COLUMNS = (
     "still_point_m"
 )
 SMALL = ["--resolution", "160x90", "--fps", "6"]
-
-
-def tasks_of(capsys: pytest.CaptureFixture) -> dict[str, int]:
-    """What became of the tasks of a run with --json."""
-    return json.loads(capsys.readouterr().out)["tasks"]
 
 
 def run(*arguments: object) -> int:

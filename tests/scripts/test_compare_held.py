@@ -1,6 +1,5 @@
 """compare on bodies that hold one another: the table, the terminal, the page, and pairs that the user names."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -58,13 +57,6 @@ def test_the_terminal_and_the_page_say_it(
         assert f"{1e3 * float(row['max_slip_m']):.3g} " in page
     assert "".join(line.split()) in "".join(page.split())
     assert "hold-tool in hold-hand: largest slip, mm" in page
-
-
-def test_json_has_the_rows(rows: list[dict[str, str]], output: Path, capsys: pytest.CaptureFixture) -> None:
-    assert run(f"{HOLD}:*", *FAST, "--json", "--output", output) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert [float(row["max_slip_m"]) for row in rows] == [row["max_slip_m"] for row in said["slips"]]
-    assert said["tasks"] == {"up to date": len(said["tasks"]) and sum(said["tasks"].values())}
 
 
 def test_bodies_that_are_named_one_by_one_are_a_pair_in_that_order(tmp_path: Path) -> None:

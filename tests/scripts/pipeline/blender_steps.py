@@ -7,7 +7,7 @@ import signal
 import time
 from pathlib import Path
 
-from rigid_motion_batch.pipeline.steps import Step, StepJob, TaskError
+from rigid_motion_batch.pipeline.steps import Step, StepJob
 
 
 class Save(Step, blender=True):
@@ -23,8 +23,6 @@ class Save(Step, blender=True):
         print("Fra:1 Mem:1M")
         job.progress(1, 2)
         match self.fate:
-            case "foreseen":
-                raise TaskError("no such scene; make another")
             case "full":
                 raise OSError(28, "No space left on device", str(job.folder / "scene.blend"))
             case "killed":

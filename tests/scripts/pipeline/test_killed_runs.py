@@ -30,7 +30,7 @@ if __name__ == "__main__":
     run_in(Path(sys.argv[1]), *tasks, joining("all", *tasks), executor=ProcessExecutor(2))
 """
 
-MOMENTS = int(os.environ.get("RIGID_MOTION_KILLS", "20" if THOROUGH else "5"))
+MOMENTS = int(os.environ.get("RIGID_MOTION_KILLS", "10" if THOROUGH else "5"))
 
 
 @contextmanager
