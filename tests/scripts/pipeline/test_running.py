@@ -52,43 +52,6 @@ def log(tmp_path: Path) -> Log:
     return Log(tmp_path / "log")
 
 
-def three(log: object = "", text: str = "1") -> tuple[Task, Task, Task]:
-    """Two tasks, and one that reads them."""
-    first, second = writing("a", text, log), writing("b", "2", log)
-    return first, second, joining("c", first, second, log=log)
-
-
-@pytest.mark.parametrize("executor", EXECUTORS)
-def test_tasks_are_done_and_their_files_are_in_place(output: Path, executor: str) -> None:
-    outcome = run_in(output, *three(), executor=EXECUTORS[executor]())
-    assert states(outcome) == {"done": 3}
-    assert contents(output) == {"a.txt": "1", "b.txt": "2", "c.txt": "12"}
-
-
-def test_a_second_run_does_nothing(output: Path, log: Log) -> None:
-    run_in(output, *three(log))
-    assert log.new() == ["1", "2", "join"]
-    assert states(run_in(output, *three(log))) == {"up to date": 3}
-    assert log.new() == []
-
-
-def test_a_changed_parameter_redoes_its_task_and_those_that_read_it(output: Path, log: Log) -> None:
-    run_in(output, *three(log))
-    log.new()
-    assert states(run_in(output, *three(log, "3"))) == {"done": 2, "up to date": 1}
-    assert log.new() == ["3", "join"]
-    assert contents(output)["c.txt"] == "32"
-
-
-def test_going_back_to_earlier_parameters_does_nothing_but_publish(output: Path, log: Log) -> None:
-    run_in(output, *three(log))
-    run_in(output, *three(log, "3"))
-    log.new()
-    run_in(output, *three(log))
-    assert log.new() == []
-    assert contents(output) == {"a.txt": "1", "b.txt": "2", "c.txt": "12"}
-
-
 def test_a_changed_input_redoes_its_task_and_those_that_read_it(output: Path, log: Log, tmp_path: Path) -> None:
     source = tmp_path / "in.csv"
     source.write_text("1")
@@ -108,12 +71,11 @@ def test_a_changed_input_redoes_its_task_and_those_that_read_it(output: Path, lo
     assert contents(output)["c.txt"] == "2"
 
 
-@pytest.mark.parametrize("executor", EXECUTORS)
-def test_a_failure_is_said_and_the_others_go_on(output: Path, executor: str) -> None:
+def test_a_failure_in_a_process_is_said_and_the_others_go_on(output: Path) -> None:
     bad, good = task("bad", Fail()), writing("a")
     needs_bad = joining("c", bad, good)
     tasks = good, bad, joining("b", good), needs_bad, joining("d", needs_bad)
-    outcome = run_in(output, *tasks, executor=EXECUTORS[executor]())
+    outcome = run_in(output, *tasks, executor=ProcessExecutor(2))
     assert states(outcome) == {"done": 2, "failed": 1, "skipped": 2}
     assert outcome.failures == {"bad": "it cannot be made; make another"}
     assert sorted(contents(output)) == ["a.txt", "b.txt"]
@@ -140,21 +102,6 @@ def test_a_task_that_does_not_make_what_it_publishes_has_failed(output: Path) ->
     assert outcome.failures["a"] == f"{output / 'a.txt'}: this was to be made, and was not"
 
 
-def test_a_task_that_failed_is_tried_again_the_next_time(output: Path, tmp_path: Path) -> None:
-    source = tmp_path / "in.csv"
-
-    def attempt() -> Run:
-        with Store(output) as store, Executor() as executor:
-            first = task("a", steps.Copy(), inputs=store.inputs(source))
-            return run(lambda: (first, joining("b", first), writing("c")), store, executor)
-
-    outcome = attempt()
-    assert states(outcome) == {"failed": 1, "skipped": 1, "done": 1}
-    assert outcome.failures["a"] == f"{source}: no such file"
-    source.write_text("back")
-    assert states(attempt()) == {"done": 2, "up to date": 1}
-
-
 def test_an_input_that_vanishes_while_it_is_read_is_said_and_nothing_comes_of_it(output: Path, tmp_path: Path) -> None:
     source = tmp_path / "in.csv"
     source.write_text("1")
@@ -171,13 +118,6 @@ def test_what_was_published_of_something_else_does_not_pass_for_the_result_of_a_
     assert os.listdir(output) == [OWN_FOLDER]
 
 
-def test_tasks_that_are_the_same_are_done_once(output: Path, log: Log) -> None:
-    first, second = writing("a", "1", log), writing("b", "1", log)
-    run_in(output, first, second, joining("c", first, second))
-    assert log.new() == ["1"]
-    assert contents(output) == {"a.txt": "1", "b.txt": "1", "c.txt": "11"}
-
-
 def test_a_plan_is_taken_task_by_task(output: Path) -> None:
     """Of ten thousand clips only a few are in memory."""
     ahead: list[int] = []
@@ -190,29 +130,6 @@ def test_a_plan_is_taken_task_by_task(output: Path) -> None:
     with Store(output) as store:
         run(plan, store, Executor())
     assert max(ahead[40:]) <= 1
-
-
-def test_a_partial_task_makes_the_best_of_what_there_is(output: Path, tmp_path: Path) -> None:
-    source = tmp_path / "in.csv"
-
-    def attempt() -> dict[str, int]:
-        with Store(output) as store, Executor() as executor:
-            tasks = [writing("a", "1"), task("b", steps.Copy(), inputs=store.inputs(source))]
-            tasks.append(task("report", steps.Report(), *tasks))
-            tasks.append(task("overview", steps.Report(), tasks[-1]))
-            return states(run(lambda: tasks, store, executor))
-
-    assert attempt() == {"done": 3, "failed": 1}
-    assert contents(output)["overview.txt"] == "1"
-    assert attempt() == {"up to date": 3, "failed": 1}
-    source.write_text("2")
-    assert attempt() == {"done": 3, "up to date": 1}
-    assert contents(output)["overview.txt"] == "12"
-
-
-def test_a_partial_task_with_nothing_to_go_by_is_skipped(output: Path) -> None:
-    bad = task("bad", Fail())
-    assert states(run_in(output, bad, task("report", steps.Report(), bad))) == {"failed": 1, "skipped": 1}
 
 
 def film(output: Path, log: object, piece: str = "1", step: Step | None = None, **options: object) -> Run:

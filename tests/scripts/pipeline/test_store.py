@@ -32,46 +32,6 @@ def copying(output: Path, source: Path, name: str = "a", **options: object) -> d
         return states(run(lambda: [task(name, steps.Copy(), inputs=store.inputs(source))], store, executor))
 
 
-def test_a_file_of_another_program_is_named_and_replaced_when_told_only(output: Path) -> None:
-    output.mkdir()
-    (output / "c.txt").write_text("mine")
-    with pytest.raises(RunError, match=r"c\.txt was not written by this program.*--output.*--overwrite"):
-        run_in(output, *whole())
-    assert contents(output) == {"c.txt": "mine"}  # Nothing was begun.
-    assert os.listdir(output) == ["c.txt"]
-    assert states(run_in(output, *whole(), overwrite=True)) == {"done": 3}
-    assert states(run_in(output, *whole())) == {"up to date": 3}
-
-
-@pytest.mark.parametrize("in_place", [True, False])
-def test_a_file_that_was_edited_is_not_replaced(output: Path, in_place: bool) -> None:
-    run_in(output, *whole())
-    if not in_place:
-        (output / "c.txt").unlink()
-    (output / "c.txt").write_text("my notes")
-    with pytest.raises(RunError, match=r"c\.txt was not written by this program, or edited since"):
-        run_in(output, *whole())
-    assert contents(output)["c.txt"] == "my notes"
-    run_in(output, *whole(), overwrite=True)
-    assert contents(output)["c.txt"] == "12"
-
-
-def test_a_file_that_was_touched_or_copied_is_still_ours(output: Path) -> None:
-    run_in(output, *whole())
-    (output / "c.txt").unlink()
-    (output / "c.txt").write_text("12")
-    first, second = writing("a", "1"), writing("b", "3")
-    assert states(run_in(output, first, second, joining("c", first, second)))["done"] == 2
-    assert contents(output)["c.txt"] == "13"
-
-
-def test_a_file_that_is_missing_is_put_back(output: Path) -> None:
-    run_in(output, *whole())
-    (output / "c.txt").unlink()
-    assert states(run_in(output, *whole())) == {"up to date": 2, "done": 1}
-    assert contents(output)["c.txt"] == "12"
-
-
 @pytest.mark.parametrize("overwrite", [True, False])
 def test_folders_where_files_go_and_files_where_folders_go_stay(output: Path, overwrite: bool) -> None:
     (output / "c.txt").mkdir(parents=True)
