@@ -105,7 +105,7 @@ class Browser:
 
     def settle(self) -> None:
         """Wait until what was asked for is on the screen."""
-        self.run("new Promise((done) => setTimeout(() => [requestAnimationFrame(done), setTimeout(done, 3000)], 450))")
+        self.run("new Promise((done) => setTimeout(() => [requestAnimationFrame(done), setTimeout(done, 300)], 450))")
 
     def mouse(self, *moves: tuple[str, float, float]) -> None:
         """Moves of the left button: ("pressed" | "moved" | "released", x, y), in pixels of the page."""

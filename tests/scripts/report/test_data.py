@@ -60,9 +60,8 @@ def test_the_view_has_a_body_where_its_mode_puts_it() -> None:
     sample = 137
     moment = float(clip.times[result.first + sample] - clip.times[0])
     point, middle = np.array((0.03, -0.02, 0.1)), middle_of(clip)
-    for place, motion in enumerate(result.motions):
-        given = f"poseAt(recording, choice, {moment!r}, choice.motions[{place}], 1)"
-        seen = read(clip, f"moved(matrixOf({given}), {point.tolist()})")
+    at = f"moved(matrixOf(poseAt(recording, choice, {moment!r}, motion, 1)), {point.tolist()})"
+    for motion, seen in zip(result.motions, read(clip, f"choice.motions.map((motion) => {at})"), strict=True):
         pose = motion.poses[sample]
         np.testing.assert_allclose(seen, pose.positions - middle + rotate(pose.quaternions, point), atol=2e-4)
 
