@@ -52,7 +52,7 @@ def assert_same(frames: np.ndarray, keys: Poses) -> None:
         assert np.abs(found.scales - expected.scales).max() < 1e-6 * keys.scales.max()
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_random_keys(seed):
     random = np.random.default_rng(seed)
     count = int(random.integers(2, 24))

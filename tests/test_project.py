@@ -4,7 +4,6 @@ import ast
 import itertools
 import re
 import runpy
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -12,7 +11,6 @@ from collections import defaultdict
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-import bpy
 import pytest
 from hatchling.metadata.core import ProjectMetadata
 from hatchling.plugin.manager import PluginManager
@@ -62,18 +60,6 @@ def test_commits_are_checked_with_the_ruff_that_is_tested():
     (pinned,) = (group for group in groups["test"] if group.startswith("ruff=="))
     hooks = (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
     assert re.findall(r"ruff==[\d.]+", hooks) == [pinned] * 2
-
-
-def test_the_extension_is_valid_for_blender(tmp_path):
-    package = tmp_path / "rigid_motion"
-    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(ROOT / "blender_manifest.toml", package)
-    scripts = Path(bpy.utils.system_resource("SCRIPTS"))
-    tool = scripts / "addons_core/bl_pkg/cli/blender_ext.py"
-    tags = scripts / "modules/_bpy_internal/extensions/tags.py"
-    command = [sys.executable, str(tool), "validate", str(package), f"--valid-tags={tags}"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_one_version_everywhere():

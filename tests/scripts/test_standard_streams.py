@@ -36,7 +36,6 @@ def shell(line: str, folder: Path, **variables: str) -> subprocess.CompletedProc
     ("line", "codes"),
     [
         ("reduce hand.csv | true", "0 0"),
-        ("program stream --help | true", "0 0"),
         ("reduce --tolerance no 2>&1 | true", "2 0"),
         ("compare hand.csv --no-video --rates 5 --modes lerp_slerp --output made --jobs 0 | true", "0 0"),
     ],
@@ -58,7 +57,7 @@ def test_a_full_disk_is_told_of(tmp_path, line):
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>/dev/full", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", ["2>/dev/full", "<&- >&- 2>&-"])
 def test_closed_streams_keep_nothing_from_being_done(tmp_path, closed):
     write_csv(tmp_path / "hand.csv")
     done = shell(f"reduce hand.csv --blend {closed}", tmp_path)
@@ -67,10 +66,9 @@ def test_closed_streams_keep_nothing_from_being_done(tmp_path, closed):
     assert done.stdout == ("" if ">&-" in closed.replace("2>&-", "") else "hand-keys.csv\nhand-keys.blend\n")
 
 
-@pytest.mark.parametrize("encoding", [{"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C"}])
-def test_every_name_is_told_in_a_line_whatever_the_encoding(tmp_path, encoding):
+def test_every_name_is_told_in_a_line_whatever_the_encoding(tmp_path):
     write_csv(tmp_path / ODD)
-    done = shell("reduce *.csv && cp -- *keys.csv found", tmp_path, **encoding)
+    done = shell("reduce *.csv && cp -- *keys.csv found", tmp_path, PYTHONIOENCODING="ascii")
     assert done.returncode == 0, done.stderr
     (line,) = done.stdout.splitlines()
     assert (tmp_path / json.loads(line)).read_bytes() == (tmp_path / "found").read_bytes()

@@ -33,13 +33,12 @@ COMPARE = ("compare.py", "slow.csv", "--no-video", "--output", "made", "--jobs")
 @pytest.mark.parametrize(
     ("command", "done", "last", "by"),
     [
-        (("reduce.py", "hand.csv", "slow.csv", "hand.csv", "--jobs", 0), ["hand-keys.csv"], STOPPED, signal.SIGINT),
         (("reduce.py", "hand.csv", "slow.csv", "--jobs", 1), ["hand-keys.csv"], STOPPED, signal.SIGTERM),
         ((*COMPARE, 0), [], "Stopped. ", signal.SIGTERM),
         ((*COMPARE, 2), [], "Stopped. ", signal.SIGINT),
         (("stream.py", "send", "slow.csv", "--room", "r"), [], "Stopped. ", signal.SIGTERM),
     ],
-    ids=["reduce", "workers of reduce", "compare", "workers of compare", "sender"],
+    ids=["workers of reduce", "compare", "workers of compare", "sender"],
 )
 def test_a_reader_at_work_does_not_keep_a_command_from_its_end(tmp_path, command, done, last, by):
     for name in ("hand.csv", "slow.csv"):
@@ -132,7 +131,7 @@ def test_ctrl_c_within_an_importer_or_exporter_is_no_fault_of_the_file(tmp_path)
         importing.run_operator(tmp_path / "walk.fbx", "import", importer)
 
 
-@pytest.mark.parametrize("moment", [0.0, 0.1, 0.4])
+@pytest.mark.parametrize("moment", [0.0, 0.3])
 def test_ctrl_c_at_the_very_beginning_is_no_traceback(tmp_path, moment):
     write_csv(tmp_path / "slow.csv")
     run = start(tmp_path, "reduce.py", "slow.csv", where="slow.csv")

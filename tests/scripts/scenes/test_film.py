@@ -22,33 +22,25 @@ def handlers() -> dict[str, list]:
     return {name: list(kind) for name, kind in lists if isinstance(kind, list)}
 
 
-def test_the_film_has_every_frame_at_the_size_asked_for(scene, tmp_path):
-    film = tmp_path / "clip" / "10" / "comparison.mp4"
-    seen = []
+def test_the_film_has_every_frame_and_is_what_browsers_play_and_nothing_else_is_left_or_said(scene, tmp_path, capfd):
+    film, seen, before = tmp_path / "clip" / "10" / "comparison.mp4", [], handlers()
     render_film(scene, film, lambda done, total: seen.append((done, total)))
-    movie = bpy.data.movieclips.load(str(film))
-    assert movie.frame_duration == scene.frame_end == 9
-    assert tuple(movie.size) == (160, 90)
-    assert seen == [(done, 9) for done in range(1, 10)]
-    assert [path.name for path in film.parent.iterdir()] == ["comparison.mp4"]
-
-
-def test_the_film_is_what_browsers_play(scene, tmp_path):
-    render_film(scene, tmp_path / "comparison.mp4")
-    data = (tmp_path / "comparison.mp4").read_bytes()
-    assert data[4:8] == b"ftyp"
-    avc = data.index(b"avcC")
-    profile = data[avc + 5]
-    assert profile in (66, 77, 100)  # Baseline, Main, High: all of 8 bits and 4:2:0.
-
-
-def test_nothing_is_left_behind_nothing_is_said_and_nothing_told_of_the_machine(scene, tmp_path, capfd):
-    before = handlers()
-    render_film(scene, tmp_path / "comparison.mp4", lambda done, total: None)
-    save_blend(tmp_path / "comparison.blend")
     assert capfd.readouterr().out == ""
     assert handlers() == before
     assert scene.render.filepath == "//comparison.mp4"
+    assert [path.name for path in film.parent.iterdir()] == ["comparison.mp4"]
+    assert seen == [(done, 9) for done in range(1, 10)]
+    data = film.read_bytes()
+    assert data[4:8] == b"ftyp"
+    profile = data[data.index(b"avcC") + 5]
+    assert profile in (66, 77, 100)  # Baseline, Main, High: all of 8 bits and 4:2:0.
+    movie = bpy.data.movieclips.load(str(film))
+    assert movie.frame_duration == scene.frame_end == 9
+    assert tuple(movie.size) == (160, 90)
+
+
+def test_a_saved_stage_tells_nothing_of_the_machine(scene, tmp_path):
+    save_blend(tmp_path / "comparison.blend")
     assert bpy.utils.blend_paths(absolute=False) == []
 
 

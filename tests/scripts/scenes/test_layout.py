@@ -3,6 +3,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.scenes import layout
 
@@ -35,3 +36,16 @@ def test_the_broad_side_of_the_motion_faces_the_camera():
     seen = rotate(layout.yaw_quaternion(layout.heading(turned)), turned)
     assert np.std(seen[:, 0]) == pytest.approx(np.std(points[:, 0]), rel=0.01)
     assert np.allclose(seen[:, 2], points[:, 2])
+
+
+@pytest.mark.parametrize(
+    ("deviation", "factor"), [(0.0, 1.0), (1e-5, 2000.0), (1e-3, 20.0), (0.004, 5.0), (0.021, 1.0), (3.0, 1.0)]
+)
+def test_the_factor_is_a_round_number(deviation, factor):
+    assert layout.magnification(deviation, 0.1) == factor
+
+
+def test_the_largest_deviation_is_that_of_the_farthest_point():
+    still = Poses(np.zeros((2, 3)), np.eye(4)[[0, 0]])
+    turned = Poses(np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 0.3]]), np.eye(4)[[0, 3]])
+    assert layout.largest_deviation(turned, still, np.eye(3)) == pytest.approx(np.hypot(2.0, 0.3))

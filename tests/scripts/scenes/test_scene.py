@@ -26,7 +26,6 @@ from rigid_motion_batch.scenes.settings import SceneSettings
 from rigid_motion_batch.scenes.subject import vertices_of
 from rigid_motion_batch.scenes.timeline import Timeline
 from tests.scripts.clips.recordings import reconstruct, swinging_clip
-from tests.thoroughness import sample
 from tests.world_poses import read_poses
 
 SETTINGS = SceneSettings(resolution=(160, 90), fps=12)
@@ -98,28 +97,19 @@ def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
             assert_same_poses(at_home, expected)
 
 
-CLIPS = {
-    "as recorded": (1.0, 0.0),
-    "a millimetre": (1e-3, 0.0),
-    "a kilometre": (1e3, 0.0),
-    "far away": (1.0, 1e4),
-    "flat on the floor": ((1.0, 1.0, 0.0), 0.0),
-    "up and down": ((0.0, 0.0, 3.0), 0.0),
-    "on the spot": (0.0, 5.0),
-}
-
-
 @pytest.mark.parametrize(
-    ("clip", "modes"), [*((clip, TWO) for clip in CLIPS), ("as recorded", KEYFRAME_MODES), ("far away", KEYFRAME_MODES)]
+    ("size", "offset", "modes"),
+    [(1e3, 0.0, TWO), ((0.0, 0.0, 3.0), 0.0, TWO), (0.0, 5.0, TWO), (1.0, 1e4, tuple(KEYFRAME_MODES))],
+    ids=["a kilometre", "up and down", "on the spot", "far away"],
 )
-def test_everything_that_moves_stays_within_its_own_card(clip, modes):
-    scene = build_scene(reconstruct(changed(swinging_clip(seconds=1.0), *CLIPS[clip]), "5", tuple(modes)), SETTINGS)
+def test_everything_that_moves_stays_within_its_own_card(size, offset, modes):
+    scene = build_scene(reconstruct(changed(swinging_clip(seconds=1.0), size, offset), "5", modes), SETTINGS)
     aspect = SETTINGS.resolution[0] / SETTINGS.resolution[1]
     deviating = {mode: f"{mode} deviating" for mode in modes if f"{mode} deviating" in bpy.data.objects}
     moving = {mode: (deviating.get(mode, mode), f"{mode} recording") for mode in modes}
     meshes = {bpy.data.objects[name].data for names in moving.values() for name in names}
     outermost = {mesh: layout.outermost(vertices_of(mesh)) for mesh in meshes}
-    for frame in sample(range(1, scene.frame_end + 1, 2)):
+    for frame in range(1, scene.frame_end + 1, 4):
         scene.frame_set(frame)
         for mode in modes:
             card = bpy.data.objects[f"{mode} card"]

@@ -4,8 +4,8 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion_batch.scenes.settings import MODELS, SubjectError
-from rigid_motion_batch.scenes.subject import load_subject, tinted_slots, vertices_of
+from rigid_motion_batch.scenes.settings import SubjectError
+from rigid_motion_batch.scenes.subject import load_subject, vertices_of
 
 
 def painted(picture: Path) -> bpy.types.Material:
@@ -42,13 +42,6 @@ def user_file(tmp_path, empty_file):
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     return path
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_our_models_are_as_large_as_a_hand_holds_and_take_the_colour_of_a_mode(model, empty_file):
-    mesh = load_subject(model)
-    assert 0.1 < np.ptp(vertices_of(mesh), axis=0).max() < 0.4
-    assert [mesh.materials[slot].name for slot in tinted_slots(mesh)] == ["Mode"]
 
 
 def test_a_users_object_comes_with_its_modifiers_and_its_size(user_file):
