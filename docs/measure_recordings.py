@@ -18,7 +18,6 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from unittest import mock
 
@@ -31,11 +30,10 @@ from research.pages import ROOT, write_figures
 from research.paper.motions import read_all, read_motion
 from research.paper.table import SHELL_RADIUS_M, has_samples_for
 from research.studies import files_in
-from rigid_motion.motion import KEYFRAME_MODES, curves, decimate, key_splines
+from rigid_motion.motion import curves, decimate, key_splines
 from rigid_motion.motion.segments import Curves, Segments
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.metrics import geometric_mean
-from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.modes import REFERENCE as BLENDERS
 from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART as REFERENCE
 from rigid_motion_batch.analysis.needed import TABLE_RATES, KeysNeeded, Ways, keys_needed, overall
@@ -53,15 +51,6 @@ STREAMED = (REFERENCE, BLENDERS, "dq_sclerp", "motor_spline_causal", "motor_spli
 
 COUNTED = (REFERENCE, "dq_sclerp", "pga_lerp", "motor_spline")
 """Modes for which the keys needed are counted."""
-
-CHOICES = {
-    "all": "lerp_slerp,dq_sclerp,pga_lerp,motor_spline,best_of",
-    "without_spline": "lerp_slerp,dq_sclerp,pga_lerp,best_of",
-}
-"""Modes that `best_of` chooses from, one for each distinct motion, and `best_of` itself."""
-
-BUDGETS = ("5", "10", "20")
-"""Adaptive keys per second, for which `best_of` also chooses the modes."""
 
 
 def parabola(before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -115,9 +104,7 @@ def main(arguments: list[str] | None = None) -> int:
         "causal_errors": {name: _errors_of_clips(clips, part) for name, part in PARTS.items()},
         "keys_needed": _needed(clips, COUNTED, fit=True),
         "rules": {name: _by_rule(clips, name) for name in RULES},
-        "best_of": {name: _best_of(paths, modes) for name, modes in CHOICES.items()},
-        "best_of_adaptive": _best_of_adaptive(paths),
-        "assets": _assets(),
+        "assets": {"smooth_mm": _smooth_errors()},
     }
     write_figures("recordings", figures, "python docs/measure_recordings.py --recordings FOLDER", options.root)
     return 0
@@ -129,21 +116,11 @@ def _counting(paths: Sequence[Path]) -> Iterator[tuple[Path, Clip]]:
             yield path, clip
 
 
-def _assets() -> dict[str, object]:
-    """Return the errors in smooth.png, in mm, and how much closer `best_of` is on `throw` than the best single mode."""
-    gains = {}
-    for rate in ("5", "10"):
-        errors = _asset_errors("throw", rate, (*KEYFRAME_MODES, BEST_OF))
-        best = errors.pop(BEST_OF)
-        gains[rate] = 1.0 - best / min(errors.values())
-    smooth = _asset_errors("reach", "8", ("lerp_slerp", "dq_sclerp", "motor_spline"))
-    return {"smooth_mm": [1e3 * error for error in smooth.values()], "throw_gains": gains}
-
-
-def _asset_errors(asset: str, rate: str, modes: Sequence[str]) -> dict[str, float]:
-    """Return the RMS shell error by mode of an asset reconstructed from `rate` keys per second, in metres."""
-    (clip,), _ = read_clips([str(ASSETS / f"{asset}.csv")], "blender")
-    return {row.mode: row.rms_shell_m for row in measured(reconstruct(clip, Uniform(rate), modes, SHELL_RADIUS_M)).rows}
+def _smooth_errors() -> list[float]:
+    """Return the RMS shell errors in smooth.png, in mm, mode by mode."""
+    (clip,), _ = read_clips([str(ASSETS / "reach.csv")], "blender")
+    made = reconstruct(clip, Uniform("8"), ("lerp_slerp", "dq_sclerp", "motor_spline"), SHELL_RADIUS_M)
+    return [1e3 * row.rms_shell_m for row in measured(made).rows]
 
 
 # -- errors of evenly spaced keys --------------------------------------------------------------------------------------
@@ -227,54 +204,6 @@ def _by_rule(clips: Sequence[Clip], name: str) -> dict[str, dict[str, float]]:
         return _needed(clips, ("motor_spline",), fit=name in ("parabola", "1, none up to 1/16"))["motor_spline"]
 
 
-# -- the best mode of each segment -------------------------------------------------------------------------------------
-
-
-def _best_of(paths: Sequence[Path], modes: str) -> dict[str, dict[str, float]]:
-    """Return by rate the errors of `best_of` relative to the best single mode of each clip, and its changes of mode."""
-    with _compared(paths, "--rates", ",".join(RATES), "--modes", modes) as folder:
-        table = _Metrics(folder)
-        return {rate: _best_at(table, folder, rate) for rate in RATES}
-
-
-def _best_of_adaptive(paths: Sequence[Path]) -> dict[str, float]:
-    """Return the relative errors of `best_of` with adaptive keys, by average number of keys per second."""
-    with _compared(paths, "--budget", ",".join(BUDGETS), "--modes", ",".join((*COUNTED, BEST_OF))) as folder:
-        return _adaptive_gains(_Metrics(folder))
-
-
-def _adaptive_gains(table: _Metrics) -> dict[str, float]:
-    def ratio(clip: str, rate: str) -> float:
-        return table.value(clip, rate, BEST_OF) / table.value(clip, rate, table.best(clip, rate))
-
-    return {rate: table.mean(partial(ratio, rate=rate)) for rate in BUDGETS}
-
-
-def _best_at(table: _Metrics, folder: Path, rate: str) -> dict[str, float]:
-    def ratio(column: str) -> Callable[[str], float]:
-        def of_clip(clip: str) -> float:
-            best = table.best(clip, rate)
-            return table.value(clip, rate, BEST_OF, column) / table.value(clip, rate, best, column)
-
-        return of_clip
-
-    shell = [ratio("rms_shell_m")(clip) for clip in table.clips]
-    splines, changes = [], []
-    for clip in table.clips:
-        chosen = [row["mode"] for row in _rows(folder / clip / rate / "best_of.keys.csv") if row["mode"]]
-        splines.append(np.mean([mode == "motor_spline" for mode in chosen]))
-        changes.append(np.mean([mode != after for mode, after in pairwise(chosen)]))
-    return {
-        "rms_shell": table.mean(ratio("rms_shell_m")),
-        "rms_shell_least": min(shell),
-        "rms_shell_most": max(shell),
-        "rms_velocity": table.mean(ratio("rms_velocity_m_s")),
-        "largest_shell": table.mean(ratio("max_shell_m")),
-        "with_spline": float(np.mean(splines)),
-        "changes": float(np.mean(changes)),
-    }
-
-
 # -- runs of compare.py ------------------------------------------------------------------------------------------------
 
 
@@ -284,17 +213,12 @@ class _Metrics:
     def __init__(self, folder: Path) -> None:
         self._at = {(row["clip"], row["rate_hz"], row["mode"]): row for row in _rows(folder / "metrics.csv")}
         self.clips = list(dict.fromkeys(clip for clip, _, _ in self._at))
-        self._single = [mode for mode in dict.fromkeys(mode for _, _, mode in self._at) if mode != BEST_OF]
 
-    def value(self, clip: str, rate: str, mode: str, column: str = "rms_shell_m") -> float:
-        return float(self._at[clip, rate, mode][column])
+    def value(self, clip: str, rate: str, mode: str) -> float:
+        return float(self._at[clip, rate, mode]["rms_shell_m"])
 
     def ratio(self, rate: str, mode: str, clip: str) -> float:
         return self.value(clip, rate, mode) / self.value(clip, rate, REFERENCE)
-
-    def best(self, clip: str, rate: str) -> str:
-        """Return the single mode with the smallest error."""
-        return min(self._single, key=lambda mode: self.value(clip, rate, mode))
 
     def mean(self, of_clip: Callable[[str], float]) -> float:
         return float(geometric_mean(np.array([of_clip(clip) for clip in self.clips])))

@@ -26,7 +26,6 @@ MODE_COLOURS: dict[str, str] = {
     "cga_slerp": "#4C72E0",
     "motor_spline": "#88BB66",
     "motor_spline_causal": "#F0E442",
-    "best_of": "#963CFF",
 }
 """Mode id to colour."""
 

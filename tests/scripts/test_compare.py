@@ -249,18 +249,6 @@ def test_an_output_folder_that_cannot_be_made_is_said(short_clip, tmp_path, caps
     assert f"compare.py: {tmp_path / 'file'}" in capsys.readouterr().err
 
 
-def test_the_best_of_each_segment_is_compared_with_the_modes_it_is_made_of(short_clip, tmp_path):
-    asked = ("--tolerance", "5mm", "--rates", "8", "--modes", "best_of, lerp_slerp,motor_spline")
-    assert run(short_clip, "--no-video", "--output", tmp_path, *asked) == 0
-    rows, modes = rows_of(tmp_path / "metrics.csv"), ("lerp_slerp", "motor_spline")
-    assert [row["mode"] for row in rows] == [*modes, "best_of"] * 2
-    keys = rows_of(tmp_path / "toss" / "8" / "best_of.keys.csv")
-    assert {row["mode"] for row in keys[:-1]} <= {*modes}
-    assert keys[-1]["mode"] == ""
-    # Which keys a mode needs is a question to single modes.
-    assert "best_of" not in {row["mode"] for row in rows_of(tmp_path / "keys_needed.csv")}
-
-
 def test_an_object_that_the_viewer_cannot_have_leaves_the_report(tmp_path, capsys):
     toss = write_toss(tmp_path / "toss.csv")
     how = ("--no-video", "--rates", "10", "--object", tmp_path / "none.blend:Box", "--output", tmp_path / "output")

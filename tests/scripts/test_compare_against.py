@@ -55,7 +55,7 @@ def compared(toss: Path, mine: Path, tmp_path_factory: pytest.TempPathFactory) -
             "--tolerance",
             "1cm",
             "--modes",
-            "lerp_slerp,motor_spline,best_of",
+            "lerp_slerp,motor_spline",
         )
         == 0
     )

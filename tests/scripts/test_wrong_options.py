@@ -19,7 +19,6 @@ REFUSED = {
         (["--tolerance", "5mm", "--budget", "10"], "--budget: not allowed with argument --tolerance"),
         (["--tolerance", "5 inches"], "give a length such as 5mm"),
         (["--budget", "5mm"], "give numbers such as 5,7.5,10"),
-        (["--modes", "best_of"], "best_of chooses among the other modes that are named"),
     ],
     "reduce": [
         ([], "INPUT"),

@@ -20,7 +20,6 @@ from rigid_motion_batch.files import line_of, replacing
 from rigid_motion_batch.recordings.clips import Clip
 
 from .choices import Choice, Keys
-from .modes import BEST_OF, single_modes
 from .reconstructions import Ground, MotionErrors, Reconstruction
 
 BYTES_PER_KEY = 7 * 8
@@ -31,9 +30,6 @@ MAX_ROUNDING_M = 1e-9
 
 BLOCK_ROWS = 10_000
 """Rows of a table that are made at a time."""
-
-BYTES_PER_MODE = 1
-"""What a key has in addition where every segment has a mode of its own."""
 
 
 @dataclass(frozen=True)
@@ -145,10 +141,10 @@ def row_of(made: Reconstruction, mode: str, errors: MotionErrors, ground: Ground
 
     Notes
     -----
-    `bytes_per_s` is (keys - 1) / duration times 56 bytes, or 57 under `best_of`, whose keys say the mode. A recording
-    that is thinned to 10 keys a second keeps fewer where it has gaps or is slow itself, and it is what would be sent
-    that counts. The first key is not counted, since a stretch of the motion costs the key at its end: keys exactly a
-    tenth of a second apart are 560 bytes a second for any length of the clip.
+    `bytes_per_s` is (keys - 1) / duration times 56 bytes. A recording that is thinned to 10 keys a second keeps fewer
+    where it has gaps or is slow itself, and it is what would be sent that counts. The first key is not counted, since a
+    stretch of the motion costs the key at its end: keys exactly a tenth of a second apart are 560 bytes a second for
+    any length of the clip.
     """
     clip, keys = made.clip, made.keys[mode]
     duration = float(made.times[-1] - made.times[0])
@@ -161,7 +157,7 @@ def row_of(made: Reconstruction, mode: str, errors: MotionErrors, ground: Ground
         mode=mode,
         keys=count or None,
         duration_s=duration,
-        bytes_per_s=sent / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)) if count else None,
+        bytes_per_s=sent / duration * BYTES_PER_KEY if count else None,
         keys_per_s=sent / max(moving_joints, 1) / duration if count else None,
         joints=len(keys) if whole else None,
         key_frames=len(key_samples(keys)) or None if whole else None,
@@ -201,40 +197,27 @@ def geometric_mean(values: np.ndarray) -> np.ndarray:
     return np.exp(np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0))
 
 
-def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = ()) -> None:
-    """Write a table of poses: `t,x,y,z,qw,qx,qy,qz`, and `s` where the poses have scales.
-
-    Parameters
-    ----------
-    path : Path
-    times : array, shape (n,)
-    poses : Poses, shape (n,)
-    modes : sequence of str, n - 1 of them, optional
-        Of the segments that the poses begin, for a last column, `mode`. The last pose begins none.
-    """
+def write_poses(path: Path, times: np.ndarray, poses: Poses) -> None:
+    """Write a table of poses (n,) at times (n,): `t,x,y,z,qw,qx,qy,qz`, and `s` where the poses have scales."""
     columns = [times, *poses.positions.T, *poses.quaternions.T]
     header = "t,x,y,z,qw,qx,qy,qz"
     if poses.scales is not None:
         columns.append(poses.scales)
         header += ",s"
     with replacing(path) as stream:
-        stream.write(f"{header},mode\n" if modes else f"{header}\n")
-        for first, lines in lines_of_poses(columns):
-            if modes:
-                lines = [
-                    f"{line},{mode}" for line, mode in zip(lines, (*modes, "")[first : first + BLOCK_ROWS], strict=True)
-                ]
-            stream.write("\n".join([*lines, ""]))
+        stream.write(f"{header}\n")
+        for lines in lines_of_poses(columns):
+            stream.writelines(f"{line}\n" for line in lines)
 
 
-def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[str]]]:
-    """Yield the rows of a table of numbers, columns of shape (n,), some at a time with the number of the first.
+def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[list[str]]:
+    """Yield the rows of a table of numbers, columns of shape (n,), some at a time.
 
     Numbers take many times their memory as text, and a recording may have hours of them.
     """
     for first in range(0, len(columns[0]), BLOCK_ROWS):
         rows = np.stack([column[first : first + BLOCK_ROWS] for column in columns], axis=-1).tolist()
-        yield first, [",".join(map(repr, row)) for row in rows]
+        yield [",".join(map(repr, row)) for row in rows]
 
 
 def table_names(choice: Choice, modes: Iterable[str], other: str = "", *, body: bool = False) -> list[str]:
@@ -243,23 +226,20 @@ def table_names(choice: Choice, modes: Iterable[str], other: str = "", *, body: 
     Of a whole body those are its keys: one for all modes where they have the same.
     """
     modes = tuple(modes)
-    keyed = [f"{mode}.keys.csv" for mode in single_modes(modes)]
-    keys = ["keys.csv"] if choice.decimation == "uniform" else keyed
-    best = [f"{BEST_OF}.keys.csv"] if BEST_OF in modes else []
-    return keys if body else [*(f"{mode}.csv" for mode in (*modes, other) if mode), *keys, *best]
+    keys = ["keys.csv"] if choice.decimation == "uniform" else [f"{mode}.keys.csv" for mode in modes]
+    return keys if body else [*(f"{mode}.csv" for mode in (*modes, other) if mode), *keys]
 
 
 def write_tables(folder: Path, made: Reconstruction) -> None:
     """Write the keys, and of a rigid body a `MODE.csv` for every mode, into `folder`.
 
-    Keys that were chosen evenly are those of all modes, in `keys.csv`; others are in a `MODE.keys.csv` for each. Those
-    of `best_of` are in a table of their own in any case, with the mode of each segment. Of a whole body a row is a
-    joint's pose in its parent's space, in the unit of the recording: `joint,t,x,y,z,qw,qx,qy,qz`.
+    Keys that were chosen evenly are those of all modes, in `keys.csv`; others are in a `MODE.keys.csv` for each. Of a
+    whole body a row is a joint's pose in its parent's space, in the unit of the recording: `joint,t,x,y,z,qw,qx,qy,qz`.
     """
     clip, times, body = made.clip, made.times, made.clip.rest_body is not None
     for mode in () if body else made.keys:
         write_poses(folder / f"{mode}.csv", times, made.filled_in(mode, times))
-    tables = {f"{mode}.keys.csv": made.keys[mode] for mode in single_modes(made.keys) if len(made.keys[mode][0])}
+    tables = {f"{mode}.keys.csv": made.keys[mode] for mode in made.keys if len(made.keys[mode][0])}
     if made.choice.decimation == "uniform":
         tables = {"keys.csv": next(iter(tables.values()))}
     for name, keys in tables.items():
@@ -267,9 +247,6 @@ def write_tables(folder: Path, made: Reconstruction) -> None:
             _write_key_poses(folder / name, clip, keys)
         else:
             write_poses(folder / name, clip.times[keys[0]], clip.poses[keys[0]])
-    if BEST_OF in made.keys:
-        (best,) = made.keys[BEST_OF]
-        write_poses(folder / f"{BEST_OF}.keys.csv", clip.times[best], clip.poses[best], made.segment_modes)
 
 
 def _write_key_poses(path: Path, clip: Clip, keys: Keys) -> None:
@@ -278,7 +255,7 @@ def _write_key_poses(path: Path, clip: Clip, keys: Keys) -> None:
         for joint, own in enumerate(keys):
             name = line_of([clip.whole_body.joints[joint]])[:-1]
             poses = clip.poses[joint][own]
-            for _, lines in lines_of_poses([clip.times[own], *poses.positions.T, *poses.quaternions.T]):
+            for lines in lines_of_poses([clip.times[own], *poses.positions.T, *poses.quaternions.T]):
                 stream.writelines(f"{name},{line}\n" for line in lines)
 
 

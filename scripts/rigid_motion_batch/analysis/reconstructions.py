@@ -16,11 +16,8 @@ import numpy as np
 from rigid_motion.motion import (
     Poses,
     Skeleton,
-    best_modes,
     interpolate,
-    interpolate_by_segments,
     measure,
-    rms,
     shell_error,
 )
 from rigid_motion.motion.contacts import slide, standing
@@ -29,7 +26,6 @@ from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
 
 from .choices import RIGID_RADIUS_M, Choice, Keys, Uniform
-from .modes import BEST_OF, single_modes
 
 Groups = tuple[tuple[str, ...], ...]
 """Modes, those together that are one motion."""
@@ -74,9 +70,6 @@ class Reconstruction:
     shared: bool = False
     """Whether the keys are key poses: the same samples for all joints that move."""
 
-    segment_modes: tuple[str, ...] = ()
-    """The mode of each segment under `best_of`; none where the run does without."""
-
     @cached_property
     def samples(self) -> slice:
         """The samples of the clip between the first and the last key, both included."""
@@ -93,13 +86,6 @@ class Reconstruction:
     def skeleton(self) -> Skeleton:
         return self.clip.rest_body.skeleton if self.clip.rest_body else Skeleton([-1])
 
-    @property
-    def best_mode(self) -> str:
-        """The best single mode: with the fewest keys, and of those with the least RMS shell error."""
-        counts = {mode: count for mode in single_modes(self.keys) if (count := sum(map(len, self.keys[mode])))}
-        fewest = [mode for mode, count in counts.items() if count == min(counts.values())]
-        return min(fewest, key=lambda mode: rms(self.shell(mode)))
-
     def filled_in(self, mode: str, times: np.ndarray) -> Poses:
         """Return what a mode makes of its keys at any times (m,), as the poses of the clip are.
 
@@ -110,10 +96,7 @@ class Reconstruction:
             assert clip.against is not None  # it alone has no keys
             return clip.against.at(times)
         if clip.rest_body is None:
-            key_times, poses = clip.times[keys[0]], clip.poses[keys[0]]
-            if mode == BEST_OF:
-                return interpolate_by_segments(key_times, poses, times, self.segment_modes)
-            return interpolate(key_times, poses, times, mode)
+            return interpolate(clip.times[keys[0]], clip.poses[keys[0]], times, mode)
         alike: dict[bytes, tuple[list[int], np.ndarray]] = {}
         for joint, own in enumerate(keys):
             alike.setdefault(own.tobytes(), ([], own))[0].append(joint)
@@ -156,7 +139,7 @@ def reconstruct(
         What the user compares with it comes after the modes.
     choice : Choice
     modes : sequence of str
-        Of `rigid_motion.motion.MODES`, and of a rigid body `BEST_OF` of them.
+        Of `rigid_motion.motion.MODES`.
     radius : float or array, shape (joints,)
         Of the shell, or of the balls at the joints, in metres.
     shared : bool
@@ -174,27 +157,15 @@ def reconstruct(
     """
     if choice.ends(clip.times) is None:
         return None
-    single, uniform, still = single_modes(modes), choice.decimation == "uniform", ~moving(clip)
+    uniform, still = choice.decimation == "uniform", ~moving(clip)
     radii = np.broadcast_to(np.asarray(radius, dtype=float), still.shape)
     keys: dict[str, Keys] = {}
-    for group in [single] if uniform else same_motions(clip, single):
+    for group in [modes] if uniform else same_motions(clip, modes):
         chosen = choice.keys(clip, group[0], radii, shared=shared)
         result = tuple(own[:1] if rests else own for own, rests in zip(chosen, still, strict=True))
         keys |= dict.fromkeys(group, result)
-    made = Reconstruction(clip, choice, {mode: keys[mode] for mode in single}, radii, shared or uniform)
-    if BEST_OF in modes and clip.rest_body is None:
-        made = with_best_of(made)
     other = {clip.against.name: (NO_KEYS,) * len(still)} if clip.against else {}
-    return replace(made, keys=made.keys | other)
-
-
-def with_best_of(made: Reconstruction) -> Reconstruction:
-    """Return the same of a rigid body with `BEST_OF` its modes, which has the keys of the best single one."""
-    clip, kept = made.clip, made.keys[made.best_mode]
-    tolerance, unit = made.choice.tolerance(clip), clip.metres_per_unit
-    within = None if tolerance is None else tolerance / unit
-    chosen = best_modes(clip.times, clip.poses, kept[0], made.keys, float(made.radii[0]) / unit, within)
-    return replace(made, keys=made.keys | {BEST_OF: kept}, segment_modes=chosen)
+    return Reconstruction(clip, choice, {mode: keys[mode] for mode in modes} | other, radii, shared or uniform)
 
 
 def moving(clip: Clip) -> np.ndarray:

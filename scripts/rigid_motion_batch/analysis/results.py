@@ -69,9 +69,6 @@ class ChoiceResult:
     keys: Mapping[str, Keys]
     """The keys of every mode."""
 
-    mode_of_segments: tuple[str, ...] = ()
-    """The mode of each segment under `best_of`; none where the run does without."""
-
     joints: tuple[JointMetrics, ...] = ()
     """A row of each joint of a body under each mode."""
 
@@ -109,8 +106,7 @@ class ClipResult:
 
 def made_again(clip: Clip, result: ChoiceResult, radii: Radii, *, shared: bool) -> Reconstruction:
     """Return the same by the keys that were chosen before."""
-    keys, modes = dict(result.keys), result.mode_of_segments
-    return Reconstruction(clip, result.choice, keys, radii.of(clip), shared, modes)
+    return Reconstruction(clip, result.choice, dict(result.keys), radii.of(clip), shared)
 
 
 def measured(made: Reconstruction) -> ChoiceResult:
@@ -139,7 +135,7 @@ def measured(made: Reconstruction) -> ChoiceResult:
                 errors.shell if clip.rest_body else None,
             )
         )
-    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, made.segment_modes, tuple(joints))
+    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, tuple(joints))
 
 
 def clip_result(clip: Clip, choices: Sequence[ChoiceResult], needed: KeysNeeded | None = None) -> ClipResult:

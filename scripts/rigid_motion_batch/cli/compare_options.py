@@ -19,7 +19,7 @@ from rigid_motion_batch.analysis.choices import (
     distinct,
     read_radii,
 )
-from rigid_motion_batch.analysis.modes import BEST_OF, COMPARED, REFERENCE, single_modes
+from rigid_motion_batch.analysis.modes import COMPARED, REFERENCE
 from rigid_motion_batch.command_line import bounded, did_you_mean, folder_path, not_empty, parser_of, whole
 from rigid_motion_batch.palette import THEMES
 from rigid_motion_batch.pipeline.comparison_steps import STAGES
@@ -63,7 +63,7 @@ examples:
   python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
   python scripts/compare.py dance.bvh walk.fbx fox.glb shot.blend:Rig
   python scripts/compare.py dances/ --tolerance 1cm --shared --no-video
-  python scripts/compare.py take.csv --budget 5,10 --rates 10 --modes all,best_of
+  python scripts/compare.py take.csv --budget 5,10 --rates 10
   python scripts/compare.py take.csv --against mine.csv
   python scripts/compare.py take.csv --against lerp_slerp
 
@@ -97,8 +97,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         metavar="MODE,...",
         help=f"modes to compare: {DISTINCT} for {', '.join(COMPARED)}, with one lane in the film for those that "
         f"give the same motion (the default); {ALL} for the same modes, each in a lane of its own; or names of these, "
-        f"and of {', '.join(STREAM_MODES)} for streams, which know no later keys, and {BEST_OF} for the best mode of "
-        "each segment",
+        f"and of {', '.join(STREAM_MODES)} for streams, which know no later keys",
     )
     parser.add_argument(
         "-o",
@@ -281,21 +280,12 @@ def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
 def _modes(text: str) -> tuple[tuple[str, ...], bool]:
     """Return the modes of a run, and whether those that are one motion share a lane."""
     written = [part.strip() for part in text.split(",") if part.strip()]
-    named = list(dict.fromkeys(m for part in written for m in (COMPARED if part in (ALL, DISTINCT) else (part,))))
-    modes = single_modes(named)
-    wrong = [mode for mode in modes if mode not in MODES]
-    if wrong or not named:
-        known, name = (*MODES, DISTINCT, ALL, BEST_OF), wrong[0] if wrong else text
-        near = did_you_mean(name, known) or f"; there are {', '.join(known)}"
-        raise ValueError(f"there is no mode {name!r}{near}")
-    share = DISTINCT in written
-    if BEST_OF not in named:
-        return tuple(modes), share
-    if len(modes) < 2:
-        raise ValueError(
-            f"{BEST_OF} chooses among the other modes that are named: name two or more, or {ALL},{BEST_OF}"
-        )
-    return (*modes, BEST_OF), share
+    modes = tuple(dict.fromkeys(m for part in written for m in (COMPARED if part in (ALL, DISTINCT) else (part,))))
+    if wrong := next((mode for mode in modes if mode not in MODES), "" if modes else text):
+        known = (*MODES, DISTINCT, ALL)
+        near = did_you_mean(wrong, known) or f"; there are {', '.join(known)}"
+        raise ValueError(f"there is no mode {wrong!r}{near}")
+    return modes, DISTINCT in written
 
 
 def _part(text: str) -> tuple[int, int]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from rigid_motion_batch.analysis.choices import Choice, fewest_keys
 from rigid_motion_batch.analysis.metrics import table_names
-from rigid_motion_batch.analysis.modes import name_of_other, single_modes
+from rigid_motion_batch.analysis.modes import name_of_other
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import clip_names
 from rigid_motion_batch.recordings.clips import Clip, ClipFacts
@@ -199,13 +199,13 @@ class ComparisonPlan:
         """Yield the tasks of a clip's numbers, and what they are to pages."""
         comparison, clip, name, after = self.comparison, study.clip, study.name, (study.reader,)
         joints, size = study.facts.joints, study.facts.samples * max(study.facts.joints, 1)
-        modes = single_modes(comparison.modes) if joints else comparison.modes
+        modes = comparison.modes
         for choice in study.choices:
             folder = f"{name}/{choice.name}"
             names = table_names(choice, modes, study.facts.against, body=bool(joints))
             publish = {table: f"{folder}/{table}" for table in names}
             seconds = 0.02 + 6e-6 * size * len(modes) * (1.0 if choice.decimation == "uniform" else 45.0)
-            step = steps.Measure(clip, choice, tuple(modes), comparison.radii, comparison.shared)
+            step = steps.Measure(clip, choice, modes, comparison.radii, comparison.shared)
             yield (
                 Part("measure", clip, choice.name),
                 Task(step, f"measure {folder}", after, publish=publish, seconds=seconds),

@@ -150,15 +150,13 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
 
     def make(self, job: StepJob) -> None:
         from rigid_motion_batch.analysis import needed
-        from rigid_motion_batch.analysis.modes import single_modes
         from rigid_motion_batch.files import write_rows
 
         done = iter(range(1, len(needed.RATES) + 1))
         clip = self.clip.read(job.results[0])
         ways = needed.Ways(clip, self.radii.of(clip), self.fit)
-        modes = single_modes(self.modes)
         result = needed.keys_needed(
-            ways, modes, self.reference, advance=lambda: job.progress(next(done), len(needed.RATES))
+            ways, self.modes, self.reference, advance=lambda: job.progress(next(done), len(needed.RATES))
         )
         write_rows(job.folder / ROWS, needed.NeededRow, needed.rows_of(result))
         values.write(job.folder / "needed", result)

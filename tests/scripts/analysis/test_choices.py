@@ -1,5 +1,4 @@
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,7 +6,6 @@ from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import KEYFRAME_MODES, interpolate
 from rigid_motion_batch.analysis.choices import Budget, Choice, Radii, Tolerance, Uniform, radius_in_metres, read_radii
-from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.recordings.clips import Clip
 from tests.balls import largest_displacements
@@ -72,24 +70,6 @@ def test_a_length_may_be_written_as_people_do_for_tolerances_and_radii(written: 
 def test_what_is_no_rate_is_refused_with_the_way_out(kind: type[Choice], written: str) -> None:
     with pytest.raises(ValueError, match=r"is not a rate; give numbers such as 5,7\.5,10"):
         kind(written)
-
-
-@pytest.mark.parametrize("choice", [Uniform("3"), Budget("3"), Tolerance("10mm"), Tolerance("0.4")], ids=str)
-def test_the_best_of_each_segment_has_the_keys_of_the_best_mode_and_keeps_to_what_they_were_chosen_for(choice) -> None:
-    clip = replace(swinging_clip(seed=19), metres_per_unit=0.1)
-    modes = ("lerp_slerp", "dq_sclerp", "motor_spline")
-    made = reconstruct(clip, choice, (*modes, BEST_OF), 0.1)
-    errors = {mode: np.sqrt(np.mean(made.shell(mode) ** 2)) for mode in made.keys}
-    best = min(modes, key=lambda mode: (len(made.keys[mode][0]), errors[mode]))
-    assert tuple(made.keys) == (*modes, BEST_OF)
-    assert np.array_equal(made.keys[BEST_OF][0], made.keys[best][0])
-    assert len(made.segment_modes) == len(made.keys[best][0]) - 1
-    assert errors[BEST_OF] <= errors[best] * (1.0 + 1e-6)
-    if choice.decimation == "uniform":
-        assert len(set(made.segment_modes)) > 1
-        assert errors[BEST_OF] < errors[best]
-    elif isinstance(choice, Tolerance):
-        assert made.shell(BEST_OF).max() <= choice.tolerance(clip) * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize(

@@ -92,9 +92,9 @@ def test_an_error_that_nobody_foresaw_names_its_task_and_a_file_says_where(outpu
 
 
 def test_an_error_of_the_system_names_the_file_where_it_would_have_been(output: Path) -> None:
-    names = {"x/keys.csv": "keys.csv", "x/best_of.keys.csv": "a/best_of.keys.csv"}
-    outcome = run_in(output, task("c", steps.Stumble("x/best_of.keys.csv"), publish=names))
-    assert outcome.failures["c"].startswith(f"c: {output}/a/best_of.keys.csv: ")
+    names = {"x/keys.csv": "keys.csv", "x/bezier.keys.csv": "a/bezier.keys.csv"}
+    outcome = run_in(output, task("c", steps.Stumble("x/bezier.keys.csv"), publish=names))
+    assert outcome.failures["c"].startswith(f"c: {output}/a/bezier.keys.csv: ")
 
 
 def test_a_task_that_does_not_make_what_it_publishes_has_failed(output: Path) -> None:

@@ -105,10 +105,6 @@ CASES = {
         "7.07 keys a second on average of Smooth Screw are as good as 10 of Blender's Curves: "
         "29 % fewer for the same error.",
     ),
-    "the best of each segment does not win, since it is chosen for it": (
-        numbers((TEN,), {REF: (4,), SMOOTH: (2,), "best_of": (1,)}),
-        "Smooth Screw has 50 % less error than Blender's Curves with the same 10 keys a second.",
-    ),
     "somebody else's motion is not a mode that wins": (
         numbers((TEN,), {REF: (4,), SMOOTH: (2,), "mine": (0.1,)}),
         "Smooth Screw has 50 % less error than Blender's Curves with the same 10 keys a second.",
