@@ -12,7 +12,6 @@
     python scripts/bootstrap.py bake shot.blend             bake in-betweens of .blend files to real keys, or back
     python scripts/bootstrap.py reduce walk.glb             keep few keys, in glTF and .blend files and recordings
     python scripts/bootstrap.py stream --help               send a recording over a network, in real time
-    python scripts/bootstrap.py tasks list renders/hand     list the tasks of a comparison, and which are done
     python scripts/bootstrap.py bundle hand.csv             write a comparison as a job for render farms
     python scripts/bootstrap.py openjd run template.json    run such a job on this machine
     python scripts/bootstrap.py examples lid                make small complete cases to start with: examples/README.md
@@ -23,7 +22,7 @@
     python scripts/bootstrap.py environment [DIR]           set up all but Blender, for compare --blender PATH
 
 The packages go into .venv/ of this checkout; the first run downloads about 500 MB, of which Blender is 400. Where there
-is no Blender for a Python, the commands run that need none: compare --no-video, inspect, clean, stream, tasks. No
+is no Blender for a Python, the commands run that need none: compare --no-video, inspect, clean, stream. No
 --help needs it, nor does reduce for glTF files. All arguments after the command are passed on to it: `python
 scripts/bootstrap.py compare --help` shows the options of compare.
 """
@@ -54,7 +53,6 @@ COMMANDS = {
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
     "reduce": ([ROOT / "scripts" / "reduce.py"], ()),
     "stream": ([ROOT / "scripts" / "stream.py"], ("stream",)),
-    "tasks": (["-m", "rigid_motion_batch", "tasks"], ()),
     "bundle": ([ROOT / "scripts" / "job_bundle.py"], ()),
     "openjd": (["-m", "openjd"], ("farm",)),
     "examples": ([ROOT / "examples" / "make_examples.py"], ()),
@@ -67,7 +65,7 @@ COMMANDS = {
 ENVIRONMENT = "environment"
 """Sets up all but Blender, and prints the folder."""
 
-WITHOUT_BLENDER = ("inspect", "clean", "stream", "tasks", "openjd", "types")
+WITHOUT_BLENDER = ("inspect", "clean", "stream", "openjd", "types")
 """Need no Blender."""
 
 IN_ROOT = ("test", "types")

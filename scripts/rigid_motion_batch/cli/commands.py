@@ -38,7 +38,6 @@ COMMANDS = {
     "bake": ("bake", "bake the in-betweens of .blend files to real keys, or back"),
     "stream": ("stream", "send a motion over a network in real time, or show what arrives"),
     "bundle": ("job_bundle", "write a comparison as a job for render farms"),
-    "tasks": ("tasks", "list what a comparison did, and what failed"),
     "build": ("build_extension", "build the zip that Blender installs"),
 }
 """The module of each in this package, with `main(arguments)`, which returns the exit code, and what it is about. Its

@@ -16,7 +16,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 import traceback
 from concurrent.futures import Future
 from contextlib import AbstractContextManager, suppress
@@ -31,8 +30,8 @@ from rigid_motion_batch.supervising import death, end_with_parent, held_back, jo
 from .steps import StepJob, TaskError, sha256_in, sha256_of
 
 Made = dict[str, Any]
-"""The `folder` that a job has made, its `files` with size, time of change and digest, the `seconds` that it took, and
-`facts` that its step has returned."""
+"""The `folder` that a job has made, its `files` with size, time of change and digest, and `facts` that its step has
+returned."""
 
 FULL_OR_FORBIDDEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM})
 """Errors at writing that the next task will have as well."""
@@ -128,7 +127,7 @@ def perform(job: StepJob) -> Made:
 
 def _make(job: StepJob) -> Made:
     """Have the files of a job written."""
-    started, task = time.perf_counter(), job.task
+    task = job.task
     job.folder.mkdir(parents=True)
     facts = task.step.make(job)
     for path, digest in task.inputs.items():
@@ -142,7 +141,7 @@ def _make(job: StepJob) -> Made:
     for name, place in task.publish.items():
         if not name.endswith("/") and name not in files:
             raise TaskError(f"{job.output / place}: this was to be made, and was not")
-    return {"folder": job.folder, "files": files, "seconds": time.perf_counter() - started, "facts": facts or {}}
+    return {"folder": job.folder, "files": files, "facts": facts or {}}
 
 
 def _problem(error: Exception, job: StepJob) -> TaskError:

@@ -15,13 +15,12 @@ number may write at the same time.
 from __future__ import annotations
 
 import json
-import math
 import os
 import shutil
 import stat
 import time
 import uuid
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
@@ -146,7 +145,7 @@ class Store:
 
     def keep(self, task: Task, key: str, made: Made) -> None:
         """Take what was made as the result of a task. Raises OSError where that cannot be."""
-        folder, index = made["folder"], {"name": task.name, "files": made["files"], "seconds": made["seconds"]}
+        folder, index = made["folder"], {"name": task.name, "files": made["files"]}
         (folder / INDEX).write_text(json.dumps(index), encoding="utf-8")
         try:
             folder.rename(self.results / key)
@@ -164,11 +163,6 @@ class Store:
         for folder in _old(self.results):
             if folder.name not in requested:
                 self.discard(folder.name)
-
-    def latest(self) -> dict[str, str]:
-        """Return the key of the last result of each task, by the task's name, of all that are kept."""
-        keys = [folder.name for folder in sorted(self.results.glob("*"), key=_changed_at)]
-        return {index["name"]: key for key in keys if (index := self.index_of(key))}
 
     # -- published files ----------------------------------------------------------------------------------------------
 
@@ -257,12 +251,9 @@ def _seen(path: str) -> list[int]:
     return [-1]
 
 
-def _old(folder: Path) -> list[Path]:
-    """Return what was made in a folder before so long a time that it is kept no more."""
-    return [path for path in folder.glob("*") if time.time() - _changed_at(path) > KEPT_S]
-
-
-def _changed_at(path: Path) -> float:
-    with suppress(FileNotFoundError):  # Another process has ended.
-        return path.lstat().st_mtime
-    return math.inf
+def _old(folder: Path) -> Iterator[Path]:
+    """Yield what was made in a folder before so long a time that it is kept no more."""
+    for path in folder.glob("*"):
+        with suppress(FileNotFoundError):  # Another process has ended.
+            if time.time() - path.lstat().st_mtime > KEPT_S:
+                yield path
