@@ -76,26 +76,6 @@ def test_a_pair_that_is_named_is_measured_and_not_found_twice(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("rate", "said"),
-    [
-        ("5", "Screw lets hold-tool slip least in hold-hand: up to 1.37 mm at 5 keys/s, 29.9 mm by Blender's Curves."),
-        ("20", "Nothing lets hold-tool slip less in hold-hand than Blender's Curves: up to 1.94 mm at 20 keys/s; Screw "
-         "is as good."),
-    ],
-)  # fmt: skip
-def test_where_it_is_asked_for_the_verdict_begins_with_the_slip(
-    tmp_path: Path, capsys: pytest.CaptureFixture, rate: str, said: str
-) -> None:
-    asked = "--held", "hold-tool", "hold-hand", "--no-video", "--modes", "bezier,lerp_slerp,dq_sclerp", "--rates", rate
-    assert run(f"{HOLD}:*", *asked, "--output", tmp_path) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[-2].startswith(said)
-    assert lines[-2].removeprefix(said).startswith(" Nothing comes closer than Blender's Curves: ")
-    page = "".join(all_text(Page(tmp_path / "report.html")).split())
-    assert "".join(said.split()) in page
-
-
-@pytest.mark.parametrize(
     ("named", "said"),
     [
         (("hold-hand", "hold-tol"), "there is no clip 'hold-tol': did you mean hold-tool?"),

@@ -154,8 +154,7 @@ class ComparisonPlan:
     def conclude(self) -> None:
         """See what the measured numbers come to: which choices of keys films are to show."""
         reference, alone = self.comparison.reference, self._has_overview
-        asked = bool(self.comparison.held)
-        self.found = Findings.of(self.store, self.measuring(), reference, alone=alone, slip_asked=asked)
+        self.found = Findings.of(self.store, self.measuring(), reference, alone=alone)
 
     @property
     def _has_overview(self) -> bool:

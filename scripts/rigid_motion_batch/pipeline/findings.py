@@ -14,7 +14,6 @@ from rigid_motion_batch.analysis.choices import Choice
 from rigid_motion_batch.analysis.held import PairSlips
 from rigid_motion_batch.analysis.needed import KeysNeeded
 from rigid_motion_batch.analysis.results import ChoiceNumbers
-from rigid_motion_batch.report.held import asked_first
 from rigid_motion_batch.report.numbers import Gathering, Numbers
 from rigid_motion_batch.report.verdict import Verdict, verdict
 
@@ -37,14 +36,8 @@ class Findings:
     """Clip name to the choice of keys that the verdict of its page speaks of."""
 
     @classmethod
-    def of(
-        cls, store: Store, tasks: Iterable[Task], reference: str, *, alone: bool, slip_asked: bool = False
-    ) -> Findings:
-        """Read what these tasks have found.
-
-        Where clips are `alone` each has a page, and so a verdict, of its own. Where it is asked how far a body slips,
-        the verdict is about the first pair.
-        """
+    def of(cls, store: Store, tasks: Iterable[Task], reference: str, *, alone: bool) -> Findings:
+        """Read what these tasks have found. Where clips are `alone` each has a page, and so a verdict, of its own."""
         everything, needed, slips = Gathering(reference), list[KeysNeeded](), list[PairSlips]()
         spoken_of: dict[str, Choice | None] = {}
         measuring = (
@@ -70,7 +63,6 @@ class Findings:
         except ValueError:
             return cls(slips=tuple(slips))
         said = verdict(numbers, needed)
-        said = asked_first(said, slips, numbers) if slip_asked else said
         return cls(numbers, said, tuple(slips), spoken_of if alone else dict.fromkeys(spoken_of, said.choice))
 
 

@@ -5,8 +5,7 @@ A table for each pair, and sentences.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from rigid_motion_batch.analysis.modes import STATE_OF_THE_ART
 
 from .numbers import STILL_AT, Numbers, digits, listed
 from .tables import Grid, grid_rows
-from .verdict import Verdict
 
 MOST_SAID = 5
 """Pairs, or clips, that a sentence is said of; more pairs are counted."""
@@ -70,28 +68,6 @@ def slip_sentences(pairs: Sequence[PairSlips], numbers: Numbers, spoken_of: Choi
     return result
 
 
-def asked_first(said: Verdict, pairs: Sequence[PairSlips], numbers: Numbers) -> Verdict:
-    """Return a verdict on the first pair, whose slip was asked for, with what is said of errors beside it."""
-    for pair in pairs[:1]:
-        values = slips_in_mm(pair, numbers)
-        known = np.isfinite(values).any(axis=1)
-        if not known.any():
-            continue
-        at = _shown(numbers, known, said.choice)
-        shown = _shown_in_mm(values[at], numbers)
-        best, phrase, where = _best(shown), numbers.choices[at].phrase, f"in {pair.holder}"
-        reference = next((mode for group in numbers.groups() if numbers.reference in group for mode in group[:1]), "")
-        equal = [numbers.label(mode) for mode in best if mode != reference]
-        if reference in best:
-            as_good = f"; {listed(equal)} {'are' if len(equal) > 1 else 'is'} as good" if equal else ""
-            least = f"Nothing lets {pair.held} slip less {where} than {numbers.label(reference)}: up to"
-            return replace(said, sentence=f"{least} {shown[reference]} mm {phrase}{as_good}.", beside=said.sentence)
-        least = f"{listed(equal)} {'let' if len(equal) > 1 else 'lets'} {pair.held} slip least {where}: up to"
-        rival = f", {shown[reference]} mm by {numbers.label(reference)}" if reference in shown else ""
-        return replace(said, sentence=f"{least} {shown[best[0]]} mm {phrase}{rival}.", beside=said.sentence)
-    return said
-
-
 def still_sentences(numbers: Numbers, spoken_of: Choice | None) -> list[str]:
     """Return the same of the first clips that have a point which stays, such as a pivot."""
     result: list[str] = []
@@ -110,23 +86,13 @@ def _shown(numbers: Numbers, known: np.ndarray, spoken_of: Choice | None) -> int
     return asked if known[asked] else int(np.argmax(known))
 
 
-def _shown_in_mm(values: np.ndarray, numbers: Numbers) -> dict[str, str]:
-    """Return the first mode of each motion to its number as it is shown, of values (modes,)."""
-    groups = [group[0] for group in numbers.groups() if np.isfinite(values[numbers.modes.index(group[0])])]
-    return {mode: digits(values[numbers.modes.index(mode)]) for mode in groups}
-
-
 def _listed(values: np.ndarray, numbers: Numbers) -> str:
     """Return the numbers, in mm, of the reference, of straight lines and of the best mode, of values (modes,)."""
-    shown = _shown_in_mm(values, numbers)
+    at = {group[0]: values[numbers.modes.index(group[0])] for group in numbers.groups()}
+    shown = {mode: digits(value) for mode, value in at.items() if np.isfinite(value)}
+    least = min(shown.values(), key=float)
     named = dict.fromkeys(mode for mode in (numbers.reference, STATE_OF_THE_ART) if mode in shown)
-    best = [mode for mode in _best(shown) if mode not in named]
+    best = [mode for mode in shown if shown[mode] == least and mode not in named]
     parts = [f"{shown[mode]} mm by {numbers.label(mode)}" for mode in named]
     parts += [f"{shown[best[0]]} mm by {listed(map(numbers.label, best))}"] if best else []
     return listed(parts)
-
-
-def _best(shown: Mapping[str, str]) -> list[str]:
-    """Return the modes with the least number, as it is shown."""
-    least = min(shown.values(), key=float)
-    return [mode for mode in shown if shown[mode] == least]

@@ -31,7 +31,7 @@ from rigid_motion_batch.recordings.clips import ClipFacts
 
 from . import charts, tables
 from .data import Mesh, clip_data, drill, json_in_page, mesh_data
-from .held import MOST_SAID, asked_first, slip_grids, slip_sentences, still_sentences
+from .held import MOST_SAID, slip_grids, slip_sentences, still_sentences
 from .numbers import LARGEST_AT, MEASURES, MINUS, RMS_IS, Gathering, Numbers, digits, error_is, percent, who_else
 from .rendering import SCRIPTS, address, script_of, shaders, style, write_page
 from .settings import PageSettings
@@ -305,7 +305,6 @@ def _context(
     slips: Sequence[PairSlips],
 ) -> dict[str, Any]:
     said = verdict(numbers, needed)
-    said = asked_first(said, slips, numbers) if settings.slip_asked else said
     bodies = [bool(clip.joints) for clip in facts]
     rigid, joint = None if all(bodies) else settings.radius, settings.joint_radius if any(bodies) else None
     return {

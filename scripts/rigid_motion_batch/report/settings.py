@@ -25,9 +25,6 @@ class PageSettings:
     reference: str = REFERENCE
     """The mode that the others are held against."""
 
-    slip_asked: bool = False
-    """True if it was asked how far one body slips in another, which is answered first."""
-
     joint_radius: float = JOINT_RADIUS_M
     """Of the shell of a joint, in metres."""
 

@@ -42,13 +42,11 @@ class Verdict:
     """The choice of keys that it speaks of, or the nearest to it in the run; None where no mode is off."""
     wins: str = ""
     """In how many cases the best mode was; empty of a single case."""
-    beside: str = ""
-    """What is said of errors where something else was asked."""
 
     @property
     def text(self) -> str:
         """All of it."""
-        return " ".join(filter(None, (self.sentence, self.beside, self.wins and f"{self.wins}.")))
+        return " ".join(filter(None, (self.sentence, self.wins and f"{self.wins}.")))
 
 
 @dataclass(frozen=True, eq=False)
