@@ -59,7 +59,7 @@ def compared(
 
 @pytest.fixture
 def toss(tmp_path: Path) -> Path:
-    return write_toss(tmp_path / "clips" / "toss.csv")
+    return write_toss(tmp_path / "clips" / "toss.csv", 40)
 
 
 def test_tables_are_published_and_their_numbers_are_those_of_the_analysis(output: Path, toss: Path) -> None:

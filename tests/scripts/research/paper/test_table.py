@@ -16,7 +16,7 @@ def test_a_screw_is_the_straight_line_or_tells_which_way_it_turns(turns: float, 
     straight, screw = modes = table.REFERENCE, table.SCREW
     monkeypatch.setattr(table, "MODES", modes)
     monkeypatch.setattr(table, "ROW_CHOICES", {mode: (mode, table.DECIMATIONS[0]) for mode in modes})
-    clip = circling(turns=turns)
+    clip = circling(turns=turns, rate=120.0)
     needed = table.needed(clip)
     assert needed[straight] == pytest.approx([1.0] * 4)
     for rate, share in zip(UPDATES, needed[screw], strict=True):
