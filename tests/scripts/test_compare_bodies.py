@@ -14,7 +14,11 @@ QUICK = ("--no-video", "--modes", ",".join(MODES))
 def rows(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, str]]:
     """The table of a body and a single rigid one."""
     folder = tmp_path_factory.mktemp("bodies")
-    walk, toss, output = write_body(folder / "walk.bvh", TIMES[:31]), write_toss(folder / "toss.csv"), folder / "output"
+    walk, toss, output = (
+        write_body(folder / "walk.bvh", TIMES[:21]),
+        write_toss(folder / "toss.csv", 30),
+        folder / "output",
+    )
     options = ("--tolerance", "1cm", "--shared", "--rates", "5,10", "--radius", "5cm")
     assert run(walk, toss, *QUICK, *options, "--output", output) == 0
     assert (output / "metrics.csv").read_text().splitlines()[0] == COLUMNS
