@@ -11,24 +11,25 @@ Source: Meredith and Maddock, Motion capture file formats explained, Sheffield 2
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 
-from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import align_signs
 
 from .clips import ClipWarning
 from .euler import quaternions_from_intrinsic_eulers
-from .recordings import Cells, Selection, Trajectory, TrajectoryError, shown, unique
-from .rest_bodies import LOOKED_AT, RestBody
+from .recordings import Cells, Selection, Trajectory, TrajectoryError, refuse_too_many, shown, unique
+from .rest_bodies import RestBody
 from .rewriting import eulers_near, write_text
 from .sizing import sized
-from .tables import HeaderLine, lines_of, parse_rows
+from .tables import HeaderLine, lines_of
 
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
 
@@ -40,9 +41,6 @@ MOST_JOINTS = 3000
 
 MAX_JOINT_DEPTH = 500
 """Joints that hang on one another: five times what the longest tails have."""
-
-MOST_POSES = 50_000_000
-"""Poses of all joints together: a file may hold any number of joints and frames in little space."""
 
 ADDED_OFFSET_RATIO = 0.5
 """Times its distance from the OFFSET that a position is from 0, where it is meant to be added to that."""
@@ -73,10 +71,8 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     names = [joint.name for joint in joints]
     as_body = selection.requested is None and len(joints) > 1
     taken = names if as_body else selection.of(names)
-    values, frame_time, warnings, first = _read_motion(path, motion, joints)
-    if len(taken) * len(values) > MOST_POSES:
-        problem = f"{len(taken)} joints in {len(values)} frames are more than {MOST_POSES} poses"
-        raise TrajectoryError(path, problem, f"name one joint with {path}:NAME, or split the recording")
+    header, frame_time, values, warnings = _read_motion(path, motion, joints)
+    refuse_too_many(path, len(joints), len(values))
     # What is not finite in the file is not in the poses either, and no news.
     with np.errstate(invalid="ignore", over="ignore"):
         times, as_read = np.arange(len(values)) * frame_time, values[0].copy()
@@ -86,23 +82,18 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
             )
             text += "read as added to these, where Blender would put such joints into one another"
             warnings += (ClipWarning(text),)
-        rest_body, every = rest_body_of(joints), range(len(joints))
+        rest_body, poses = _rest_body(joints), _poses(joints, values)
+        body = Trajectory(path.stem, times, poses, rest_body=rest_body, warnings=warnings)
         if as_body:
-            local = _local_poses(joints, values, every)
-            cells = _cells(path, first, joints, values, values[0] - as_read)
-            return [Trajectory(path.stem, times, local, rest_body=rest_body, warnings=warnings, cells=cells)]
-        poses = world_poses(joints, values, taken)
-        some = slice(LOOKED_AT)
-        body = Trajectory(path.stem, times[some], _local_poses(joints, values[some], every), rest_body=rest_body)
-        body = sized(path, replace(body, warnings=warnings), AXES, unit_given=False)
-    taken_first, *others = (Trajectory(name, times, poses[name], body.metres_per_unit) for name in taken)
-    return [replace(taken_first, remark=body.remark, warnings=body.warnings), *others]
+            return [replace(body, cells=_cells(header, joints, values, values[0] - as_read))]
+        body = sized(path, body, AXES, unit_given=False)
+        world = rest_body.skeleton.in_root_space(poses)
+    first, *others = (Trajectory(name, times, world[names.index(name)], body.metres_per_unit) for name in taken)
+    return [replace(first, remark=body.remark, warnings=body.warnings), *others]
 
 
-def _cells(path: Path, line: int, joints: list[Joint], values: np.ndarray, added: np.ndarray) -> Cells:
-    """Return where the numbers of a body are, behind a line; to values (n, channels) so much was added."""
-    labels = [f"{joint.name} {axis}{kind}" for joint in joints for axis, kind in joint.channels]
-    header = HeaderLine(path, line, None, labels)
+def _cells(header: HeaderLine, joints: list[Joint], values: np.ndarray, added: np.ndarray) -> Cells:
+    """Return where the numbers of a body are, below a header; to values (n, channels) so much was added."""
 
     def numbers(poses: Poses) -> dict[int, np.ndarray]:
         result, column = {}, 0
@@ -120,12 +111,10 @@ def _cells(path: Path, line: int, joints: list[Joint], values: np.ndarray, added
                 result |= zip(columns, np.degrees(angles).T, strict=True)
         return result
 
-    return Cells(
-        np.arange(len(values)), values.shape, numbers, lambda target, numbers: write_text(header, target, numbers)
-    )
+    return Cells(np.arange(len(values)), values.shape, numbers, partial(write_text, header))
 
 
-def rest_body_of(joints: list[Joint]) -> RestBody:
+def _rest_body(joints: list[Joint]) -> RestBody:
     """Return the body of a hierarchy at rest, no joint being turned: every bone ends in the middle of its children."""
     parents = np.array([-1 if joint.parent is None else joint.parent for joint in joints])
     offsets = np.array([joint.offset for joint in joints])
@@ -142,34 +131,6 @@ def rest_body_of(joints: list[Joint]) -> RestBody:
     ends = np.linalg.norm([joint.end or (0.0, 0.0, 0.0) for joint in joints], axis=1)
     unturned = np.tile((1.0, 0.0, 0.0, 0.0), (len(joints), 1))
     return RestBody(tuple(joint.name for joint in joints), parents, Poses(places, unturned), tails, ends=ends)
-
-
-def world_poses(joints: list[Joint], values: np.ndarray, requested: Iterable[str]) -> dict[str, Poses]:
-    """Return the world poses of some joints, by forward kinematics of what they hang on.
-
-    Parameters
-    ----------
-    joints : list of Joint
-        Parents before their children, names unique.
-    values : array, shape (n, channels of all joints)
-    requested : iterable of str
-        Names of joints.
-
-    Returns
-    -------
-    dict of Poses, each of shape (n,)
-        By name, in the order of `joints`.
-    """
-    names = set(requested)
-    kept = {index for index, joint in enumerate(joints) if joint.name in names}
-    for index in reversed(range(len(joints))):
-        if index in kept and (parent := joints[index].parent) is not None:
-            kept.add(parent)
-    chain = sorted(kept)
-    numbers: dict[int | None, int] = {index: number for number, index in enumerate(chain)}
-    skeleton = Skeleton([numbers.get(joints[index].parent, -1) for index in chain])
-    world = skeleton.in_root_space(_local_poses(joints, values, chain))
-    return {joint.name: world[numbers[index]] for index, joint in enumerate(joints) if joint.name in names}
 
 
 def _add_offsets(joints: list[Joint], values: np.ndarray) -> int:
@@ -198,15 +159,15 @@ def _add_offsets(joints: list[Joint], values: np.ndarray) -> int:
     return len(near)
 
 
-def _local_poses(joints: list[Joint], values: np.ndarray, chosen: Sequence[int]) -> Poses:
-    """Return chosen joints in their parents' space, shape (joints, n), from values (n, channels of all joints).
+def _poses(joints: list[Joint], values: np.ndarray) -> Poses:
+    """Return all joints in their parents' space, shape (joints, n), from values (n, channels of all joints).
 
     The signs of quaternions that Euler angles give say nothing, and are aligned.
     """
     begins = np.cumsum([0, *(len(joint.channels) for joint in joints)]).tolist()
-    poses = Poses(np.empty((len(chosen), len(values), 3)), np.empty((len(chosen), len(values), 4)))
-    for number, index in enumerate(chosen):
-        poses[number] = _local(joints[index], values[:, begins[index] : begins[index + 1]])
+    poses = Poses(np.empty((len(joints), len(values), 3)), np.empty((len(joints), len(values), 4)))
+    for number, joint in enumerate(joints):
+        poses[number] = _local(joint, values[:, begins[number] : begins[number + 1]])
     return Poses(poses.positions, align_signs(poses.quaternions))
 
 
@@ -326,18 +287,18 @@ def _read_channels(words: _Words) -> list[tuple[str, str]]:
 
 def _read_motion(
     path: Path, motion: int, joints: list[Joint]
-) -> tuple[np.ndarray, float, tuple[ClipWarning, ...], int]:
+) -> tuple[HeaderLine, float, np.ndarray, tuple[ClipWarning, ...]]:
     """Read what is behind the line `motion`.
 
     Returns
     -------
-    values : array, shape (frames, channels)
+    header : HeaderLine
+        The last line before the frames, with a name for each channel.
     frame_time : float
         Seconds between frames.
+    values : array, shape (frames, channels)
     warnings : tuple of ClipWarning
         Where there are more or fewer frames than the file says.
-    line : int
-        The last one before the frames.
     """
     rows = ((number, text) for number, line in lines_of(path, after=motion) if (text := line.strip()))
     settings = list(islice(rows, 2))
@@ -346,14 +307,14 @@ def _read_motion(
     labels = [f"{joint.name} {axis}{kind}" for joint in joints for axis, kind in joint.channels]
     if not labels:
         raise TrajectoryError(path, "no joint has CHANNELS", "export the BVH again", motion)
-    columns = {label: index for index, label in enumerate(labels)}
-    values = parse_rows(path, rows, None, columns, len(columns))
+    header = HeaderLine(path, settings[1][0], None, labels)
+    values = header.numbers_below({label: index for index, label in enumerate(labels)})
     warnings: tuple[ClipWarning, ...] = ()
     if count != len(values):
         text = f"Frames: says {count:g} and {len(values)} whole rows follow, which are read"
         way_out = "export the BVH again if that is not all"
         warnings = (ClipWarning(f"{path.name}:{settings[0][0]}: {text}", way_out),)
-    return values, frame_time, warnings, settings[1][0]
+    return header, frame_time, values, warnings
 
 
 def _read_setting(path: Path, row: list[tuple[int, str]], name: str, motion: int) -> float:

@@ -16,7 +16,7 @@ from rigid_motion_batch.command_line import listed
 from .columns import RowLayout, require_time_unit
 from .options import TICKS_PER_S_BY_UNIT, ReadingOptions
 from .recordings import TrajectoryError, shown
-from .tables import HeaderLine, Table
+from .tables import HeaderLine
 from .times import kind_of_times, seconds_of, seconds_of_dates, unit_by_rate, whole_ticks
 
 NEARLY_ALL = 0.99
@@ -100,15 +100,14 @@ def _clock(
     header: HeaderLine, column: int, layout: RowLayout, options: ReadingOptions, body: np.ndarray | slice
 ) -> Clock:
     """Return the times of one column."""
-    table, name = Table(header, {"t": column}), header.cells[column]
-    kind = kind_of_times(table)
+    name, kind = header.cells[column], kind_of_times(header, column)
     if kind and (options.time_unit or options.frame_rate):
         given = f"--time-unit {options.time_unit}" if options.time_unit else f"--frame-rate {options.frame_rate:g}"
         problem = f"{given} is for times that are numbers, and these have {kind}"
         raise header.error(problem, "leave it out")
     if kind:
-        return Clock(name, seconds_of_dates(table, kind), dated=True)
-    ticks = whole_ticks(table, table.parse(["t"])[:, 0])
+        return Clock(name, seconds_of_dates(header, column, kind), dated=True)
+    ticks = whole_ticks(header, column)
     if options.frame_rate:
         return Clock(name, (ticks if ticks.dtype == float else ticks - ticks.min()) / options.frame_rate)
     unit, remark = options.time_unit or layout.units.get(column, ""), ""

@@ -31,7 +31,7 @@ from .gltf_skins import skin_of
 from .key_moments import MAX_SAME_VALUE_RATIO
 from .matrices import filled, rigid_of, scales_of
 from .options import AS_THE_FILE_SAYS, ReadingOptions
-from .recordings import Selection, Trajectory, TrajectoryError, unique
+from .recordings import Selection, Trajectory, TrajectoryError, refuse_too_many, unique
 from .rest_bodies import RestBody, likely_metres, tails_of
 from .sampling import (
     JUMP_STEPS,
@@ -41,7 +41,6 @@ from .sampling import (
     moments_between,
     on_frames,
     rate_of,
-    refuse_too_many,
     sampled,
 )
 from .scene_bodies import MAX_LISTED_NAMES, SceneBodies, parents_among, parents_first, refuse_too_large, with_above

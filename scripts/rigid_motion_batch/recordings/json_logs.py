@@ -95,7 +95,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     lists = {".".join(way[: len(way) - last]): poses for way, poses in found.items()}
     rows = cache(partial(_rows, header, keys, layout_of(header, said), lists))
     write = partial(_write, content, lists, keys)
-    header = replace(header, rows=lambda _: rows(), write=write)
+    header = replace(header, rows_of=lambda _: rows(), write=write)
     if len(lists) > 1:
         said = replace(said, columns=(("device", "device"), *(pair for pair in said.columns if pair[0] != "device")))
     return read_below(selection, said, header, "write a list for each")

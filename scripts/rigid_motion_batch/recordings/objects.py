@@ -16,9 +16,9 @@ from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import joined
 
 from .matrices import filled, rigid, scales_of
-from .recordings import Trajectory, TrajectoryError, shown
+from .recordings import Trajectory, TrajectoryError, refuse_too_many, shown
 from .rest_bodies import RestBody, likely_metres, tails_of
-from .sampling import OF_JOINTS, OF_OBJECTS, Moments, refuse_too_many, sampled
+from .sampling import OF_JOINTS, OF_OBJECTS, Moments, sampled
 
 if TYPE_CHECKING:
     import bpy

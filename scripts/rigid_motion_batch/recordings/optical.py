@@ -30,7 +30,7 @@ from .column_names import ColumnName, column_name
 from .euler import quaternions_from_intrinsic_eulers
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
-from .tables import HeaderLine, Table, cells_of, lines_of
+from .tables import HeaderLine, cells_of, lines_of
 from .tracks import read_below
 
 METRES = {"meters": "m", "centimeters": "cm", "millimeters": "mm", "inches": "in", "feet": "ft"}
@@ -156,7 +156,7 @@ def read_vicon(path: Path, selection: Selection, options: ReadingOptions) -> lis
         names.append(name and replace(name, body=label if place > 1 else ""))
     if not options.frame_rate and not options.time_unit:
         options = replace(options, frame_rate=_rate(path, rate.strip(EMPTY_CHARACTERS), rate_line))
-    return read_below(selection, options, replace(header, names=names, rows=_until_blank), EXPORT_ALONE)
+    return read_below(selection, options, replace(header, names=names, rows_of=_until_blank), EXPORT_ALONE)
 
 
 def _until_blank(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
@@ -216,7 +216,7 @@ def _turned(header: HeaderLine, names: Sequence[ColumnName | None]) -> HeaderLin
     sure = not {*ROT} <= {*axes}
     if {*wanted} <= {*axes}:
         columns = {axis: axes.index(axis) for axis in wanted}
-        numbers = Table(header, columns).parse(wanted)
+        numbers = header.numbers_below(columns)
         turns = matrices(quaternions_from_intrinsic_eulers(np.radians(numbers[:, :3]), "XYZ"))
         by_rows, by_columns = (
             np.count_nonzero(np.abs(one.reshape(9, -1).T - numbers[:, 3:]).max(axis=1) < AS_ANGLES) > len(numbers) / 2

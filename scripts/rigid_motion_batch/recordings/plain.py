@@ -39,7 +39,7 @@ from .column_names import ColumnName
 from .columns import columns_found, known_in, layout_of
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError
-from .tables import HeaderLine, Table, header_lines, is_number, lines_of, lines_of_words
+from .tables import HeaderLine, header_lines, is_number, lines_of, lines_of_words
 from .tracks import read_below
 
 MIN_ROW_NUMBERS = 3
@@ -193,7 +193,7 @@ def _numbers(header: HeaderLine) -> np.ndarray:
     """Return the numbers of the first rows, NaN where there is none."""
     width = len(header.cells)
     table = np.full((LOOKED_AT, width), np.nan)
-    for row, (_, line) in enumerate(islice(Table(header, {}).rows(), LOOKED_AT)):
+    for row, (_, line) in enumerate(islice(header.rows(), LOOKED_AT)):
         cells = _cells(line)[:width]
         table[row, : len(cells)] = [float(cell) if is_number(cell) else np.nan for cell in cells]
     return table
@@ -250,7 +250,7 @@ def recognises_images(head: list[str]) -> bool:
 def read_images(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """Read the cameras of COLMAP's images.txt. Of images in folders, each folder is a body."""
     remark = "poses of the world were turned into those of the camera; COLMAP's unit of length may be any (--scale)"
-    header = HeaderLine(path, 0, "\t", COLMAP, rows=_images, inverted=True, axes="opencv", remark=remark, shift=1)
+    header = HeaderLine(path, 0, "\t", COLMAP, rows_of=_images, inverted=True, axes="opencv", remark=remark, shift=1)
     return read_below(selection, options, header, "name the folder of each camera's images in front of their names")
 
 
@@ -290,7 +290,7 @@ def recognises_graph(head: list[str]) -> bool:
 
 def read_graph(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """Read the vertices of a graph, as they are numbered."""
-    header = HeaderLine(path, 0, None, G2O, rows=_vertices, advice="export the vertices, too")
+    header = HeaderLine(path, 0, None, G2O, rows_of=_vertices, advice="export the vertices, too")
     return read_below(selection, options, header, "write a file for each")
 
 

@@ -20,6 +20,9 @@ from .rest_bodies import RestBody
 ALL = "*"
 """Name that asks for every body of a file."""
 
+MOST_POSES = 50_000_000
+"""Poses of all joints together: a file may hold any number of joints and frames in little space."""
+
 
 @dataclass(frozen=True, eq=False)
 class Cells:
@@ -122,6 +125,13 @@ class TrajectoryError(ValueError):
 
 class NoMotion(TrajectoryError):
     """Error of a file without a recording, which need not be wrong: a table of other things, or a body at rest."""
+
+
+def refuse_too_many(path: Path, joints: int, frames: float) -> None:
+    """Raise TrajectoryError for more poses than can be kept."""
+    if joints * frames > MOST_POSES:
+        problem = f"{joints} joints in {frames:.0f} frames are more than {MOST_POSES} poses"
+        raise TrajectoryError(path, problem, "export fewer joints, or split the recording")
 
 
 class Selection:

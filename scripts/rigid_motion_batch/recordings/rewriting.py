@@ -10,7 +10,7 @@ import numpy as np
 
 from rigid_motion.motion.eulers import extrinsic_eulers_from_quaternions
 
-from .tables import CELL, HeaderLine, Table
+from .tables import CELL, HeaderLine
 
 WRITTEN_DECIMALS = 9
 """Of numbers that are written: nanometres where lengths are metres."""
@@ -38,7 +38,7 @@ def eulers_near(quaternions: np.ndarray, order: str, near: np.ndarray) -> np.nda
 def write_text(header: HeaderLine, target: Path, numbers: np.ndarray) -> None:
     """Write the file of a header to a path, with other numbers (rows, columns) in it but for those that are NaN."""
     changed = np.isfinite(numbers).any(axis=1)
-    rows = {line: numbers[row] for row, (line, _) in enumerate(Table(header, {}).rows()) if changed[row]}
+    rows = {line: numbers[row] for row, (line, _) in enumerate(header.rows()) if changed[row]}
     with header.path.open("rb") as head:
         encoding = ENCODINGS.get(head.read(2), "utf-8")
     separator = None if header.shift else header.separator

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -19,10 +18,9 @@ from rigid_motion.motion.decimation import nearest
 from rigid_motion.motion.poses import reshaped
 from rigid_motion.motion.quaternions import align_signs, angle_between
 
-from .bvh import MOST_POSES
 from .clips import ClipWarning
 from .matrices import filled, growing
-from .recordings import Trajectory, TrajectoryError
+from .recordings import MOST_POSES, Trajectory
 from .rest_bodies import RestBody, in_parents
 
 MAX_GAP_ERROR_M = 1e-3
@@ -150,13 +148,6 @@ def rate_of(keys: Iterable[np.ndarray], fps: float) -> float | None:
             )
     of_recordings = [[rate for rate in some if MIN_KEYS_PER_S <= rate <= MAX_KEYS_PER_S] for some in rates.values()]
     return max(of_recordings[0] or of_recordings[1], default=None)
-
-
-def refuse_too_many(path: Path, joints: int, frames: float) -> None:
-    """Raise TrajectoryError for more poses than can be kept."""
-    if joints * frames > MOST_POSES:
-        problem = f"{joints} joints in {frames:.0f} frames are more than {MOST_POSES} poses"
-        raise TrajectoryError(path, problem, f"name one joint with {path}:NAME, or split the recording")
 
 
 def away(frames: np.ndarray, others: np.ndarray) -> np.ndarray:

@@ -63,38 +63,6 @@ MOST_METADATA = 50
 """Lines. Among so many a header is looked for that has others before it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Table:
-    """The rows of a file, unparsed, and where its columns are."""
-
-    header: HeaderLine
-    """The line before the first row."""
-
-    columns: dict[str, int]
-    """Meaning of a column to its index."""
-
-    def parse(self, columns: Sequence[str]) -> np.ndarray:
-        """Return the numbers in these columns, shape (rows, columns). Empty cells are NaN."""
-        chosen = {name: self.columns[name] for name in columns}
-        needed, header = max(self.columns.values()) + 1, self.header
-        return parse_rows(header.path, self.rows(), header.separator, chosen, len(header.cells), needed=needed)
-
-    def cells(self, column: str) -> Iterator[tuple[int, str]]:
-        """Yield the cells of a column, without quotes, with their lines; empty where a row is too short."""
-        index = self.columns[column]
-        for number, line in self.rows():
-            cells = split_row(line, self.header.separator)
-            yield number, cells[index].strip() if index < len(cells) else ""
-
-    def rows(self) -> Iterator[tuple[int, str]]:
-        """Yield the lines of the rows with their numbers, without blank ones and comments."""
-        lines = lines_of(self.header.path, after=self.header.number)
-        for number, line in self.header.rows(lines) if self.header.rows else lines:
-            line = line.strip(" ")
-            if line.strip(BLANK_CHARACTERS) and line[0] != "#":
-                yield number, flattened(line, self.header.separator) if self.header.vectors else line
-
-
 def encoding_of(head: bytes) -> str:
     """Return UTF-8 or, where the byte order mark says so, UTF-16."""
     return "utf-16" if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
@@ -189,7 +157,7 @@ class HeaderLine:
     names: Sequence[ColumnName | None] | None = None
     """What the columns mean, where the format says so and not the cells."""
 
-    rows: Callable[[Iterator[tuple[int, str]]], Iterable[tuple[int, str]]] | None = None
+    rows_of: Callable[[Iterator[tuple[int, str]]], Iterable[tuple[int, str]]] | None = None
     """A function that makes rows of the lines below, where not every line is one."""
 
     inverted: bool = False
@@ -222,6 +190,59 @@ class HeaderLine:
     def error(self, problem: str, way_out: str) -> TrajectoryError:
         """Return an error of this line."""
         return TrajectoryError(self.path, problem, way_out, self.number)
+
+    def rows(self) -> Iterator[tuple[int, str]]:
+        """Yield the lines of the rows below with their numbers, without blank ones and comments."""
+        lines = lines_of(self.path, after=self.number)
+        for number, line in self.rows_of(lines) if self.rows_of else lines:
+            line = line.strip(" ")
+            if line.strip(BLANK_CHARACTERS) and line[0] != "#":
+                yield number, flattened(line, self.separator) if self.vectors else line
+
+    def cells_below(self, column: int) -> Iterator[tuple[int, str]]:
+        """Yield the cells of a column, without quotes, with their lines; empty where a row is too short."""
+        for number, line in self.rows():
+            cells = split_row(line, self.separator)
+            yield number, cells[column].strip() if column < len(cells) else ""
+
+    def numbers_below(self, columns: Mapping[str, int]) -> np.ndarray:
+        """Return the numbers of some columns, by names for the errors, shape (rows, columns). Empty cells are NaN.
+
+        Where cells are not separated by commas, a comma is taken as the decimal sign. Empty cells beyond those of the
+        header are no matter; too few matter where a requested one is missing. Raises TrajectoryError with the line.
+        """
+        path, separator, width = self.path, self.separator, len(self.cells)
+        indices = [*columns.values()]
+        needed = max(indices) + 1
+        pick = itemgetter(*indices) if len(indices) > 1 else lambda cells: [cells[indices[0]]]
+        rows, count = self.rows(), 0
+        blocks: list[np.ndarray] = [np.empty((0, len(columns)))]
+        while block := list(islice(rows, BLOCK_ROWS)):
+            count += len(block)
+            if count > MOST_ROWS:
+                problem = f"more than {MOST_ROWS} rows"
+                raise TrajectoryError(path, problem, "split the recording, or export it at a lower rate", block[-1][0])
+            numbers = []
+            for number, line in block:
+                if separator != "," and "," in line:
+                    line = line.replace(",", ".")
+                cells = split_row(line, separator)
+                if len(cells) > width and any(cell.strip() for cell in cells[width:]):
+                    problem = f"{len(cells)} columns where {width} have a name"
+                    way_out = "give all columns a name, or delete this line where it alone has more"
+                    raise TrajectoryError(path, problem, way_out, number)
+                if len(cells) < needed:
+                    problem = f"{len(cells)} columns where {needed} are needed"
+                    raise TrajectoryError(path, problem, DAMAGED_ADVICE, number)
+                try:
+                    if "_" in line:
+                        raise ValueError("Python's own way of writing numbers")
+                    numbers.append([*map(float, pick(cells))])
+                except ValueError:
+                    named = zip(columns, pick(cells), strict=True)
+                    numbers.append([_number(path, number, name, cell) for name, cell in named])
+            blocks.append(np.array(numbers))
+        return np.concatenate(blocks)
 
     def of_rows(self) -> HeaderLine:
         """Return the header as the first row below it has it, or with the units of a row that holds nothing else."""
@@ -268,74 +289,6 @@ def split_row(line: str, separator: str | None) -> list[str]:
         with suppress(csv.Error):  # a cell that is larger than any number
             return next(csv.reader([line], delimiter=separator, skipinitialspace=True))
     return line.replace('"', "").split(separator)
-
-
-def parse_rows(
-    path: Path,
-    rows: Iterable[tuple[int, str]],
-    separator: str | None,
-    columns: Mapping[str, int],
-    width: int,
-    *,
-    needed: int = 0,
-) -> np.ndarray:
-    """Return the numbers of some columns.
-
-    Parameters
-    ----------
-    path : Path
-        For the errors.
-    rows : iterable of (line number, line)
-    separator : str or None
-        None means white space. Where it is not a comma, a comma is taken as the decimal sign.
-    columns : mapping from name to index
-        Which columns, in which order.
-    width : int
-        How many cells a row may have. Empty ones beyond are no matter; too few matter where a requested one is missing.
-    needed : int
-        How many cells a row has to have; all up to the last requested one in any case.
-
-    Returns
-    -------
-    array, shape (rows, columns)
-        Empty cells are NaN.
-
-    Raises
-    ------
-    TrajectoryError
-        With the number of the line.
-    """
-    needed = max(needed, *(index + 1 for index in columns.values()))
-    indices = [*columns.values()]
-    pick = itemgetter(*indices) if len(indices) > 1 else lambda cells: [cells[indices[0]]]
-    rows, count = iter(rows), 0
-    blocks: list[np.ndarray] = [np.empty((0, len(columns)))]
-    while block := list(islice(rows, BLOCK_ROWS)):
-        count += len(block)
-        if count > MOST_ROWS:
-            problem = f"more than {MOST_ROWS} rows"
-            raise TrajectoryError(path, problem, "split the recording, or export it at a lower rate", block[-1][0])
-        numbers = []
-        for number, line in block:
-            if separator != "," and "," in line:
-                line = line.replace(",", ".")
-            cells = split_row(line, separator)
-            if len(cells) > width and any(cell.strip() for cell in cells[width:]):
-                problem = f"{len(cells)} columns where {width} have a name"
-                way_out = "give all columns a name, or delete this line where it alone has more"
-                raise TrajectoryError(path, problem, way_out, number)
-            if len(cells) < needed:
-                problem = f"{len(cells)} columns where {needed} are needed"
-                raise TrajectoryError(path, problem, DAMAGED_ADVICE, number)
-            try:
-                if "_" in line:
-                    raise ValueError("Python's own way of writing numbers")
-                numbers.append([*map(float, pick(cells))])
-            except ValueError:
-                named = zip(columns, pick(cells), strict=True)
-                numbers.append([_number(path, number, name, cell) for name, cell in named])
-        blocks.append(np.array(numbers))
-    return np.concatenate(blocks)
 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:

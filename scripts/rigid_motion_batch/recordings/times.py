@@ -20,7 +20,7 @@ from rigid_motion.motion.repair import MAX_MEASURE
 
 from .options import TICKS_PER_S_BY_UNIT
 from .recordings import TrajectoryError, shown
-from .tables import DAMAGED_ADVICE, HeaderLine, Table, is_number
+from .tables import DAMAGED_ADVICE, HeaderLine, is_number
 
 MIN_SAMPLES_PER_S = 5.0
 """Samples a second. Of poses there are hardly ever fewer: the slowest recordings of people that are known have 15."""
@@ -63,12 +63,13 @@ def _steps_forward(times: np.ndarray) -> np.ndarray:
     return steps[steps > 0.0]
 
 
-def whole_ticks(table: Table, ticks: np.ndarray) -> np.ndarray:
-    """Return the column t of a table as whole numbers where a float64 cannot hold it, and as it is otherwise."""
+def whole_ticks(header: HeaderLine, column: int) -> np.ndarray:
+    """Return the numbers in a column of times, whole ones where a float64 cannot hold them, shape (rows,)."""
+    ticks = header.numbers_below({"t": column})[:, 0]
     if MAX_EXACT_INTEGER < np.nanmax(np.abs(ticks), initial=0.0) < LARGEST_WHOLE:
         # With fractions, or without a number in some row, they are not whole, and as near as floats are.
         with suppress(ValueError, OverflowError):
-            return np.fromiter((int(cell) for _, cell in table.cells("t")), np.int64)
+            return np.fromiter((int(cell) for _, cell in header.cells_below(column)), np.int64)
     return ticks
 
 
@@ -157,31 +158,34 @@ LONGEST_SHOWN = 40
 """Characters of a time in an error: as long as any is."""
 
 
-def kind_of_times(table: Table) -> str | None:
-    """Return what the times in column t of a table are, by the first that there is; None for numbers.
+def kind_of_times(header: HeaderLine, column: int) -> str | None:
+    """Return what the times in a column are, by the first that there is; None for numbers.
 
     Raises
     ------
     TrajectoryError
         Where it is a date in a way of writing that is not known.
     """
-    number, cell = next(((number, cell) for number, cell in table.cells("t") if not _is_missing(cell)), (0, ""))
+    number, cell = next(
+        ((number, cell) for number, cell in header.cells_below(column) if not _is_missing(cell)), (0, "")
+    )
     if match := MOMENT.fullmatch(cell):
         return _kind(match)
     if LIKE_A_DATE.search(cell) and not is_number(cell):
         problem = f"t is {shown(cell, LONGEST_SHOWN)}, neither a number nor a date that can be read"
         way_out = "write 2026-11-22T10:00:00.123, 10:00:00.123 or seconds"
-        raise TrajectoryError(table.header.path, problem, way_out, number)
+        raise TrajectoryError(header.path, problem, way_out, number)
     return None
 
 
-def seconds_of_dates(table: Table, kind: str) -> np.ndarray:
-    """Return the times in column t of a table.
+def seconds_of_dates(header: HeaderLine, column: int, kind: str) -> np.ndarray:
+    """Return the times in a column of dates or clock times.
 
     Parameters
     ----------
-    table : Table
-        With rows that are long enough.
+    header : HeaderLine
+        Above rows that are long enough.
+    column : int
     kind : str
         Of all its times.
 
@@ -196,7 +200,7 @@ def seconds_of_dates(table: Table, kind: str) -> np.ndarray:
     TrajectoryError
         With the number of the line, for what is no such time.
     """
-    moments = np.fromiter(_moments(table, kind), np.dtype((np.int64, 2)))
+    moments = np.fromiter(_moments(header, column, kind), np.dtype((np.int64, 2)))
     known = moments[:, 1] != MISSING_TIME_NS
     seconds, nanoseconds = moments[known].T
     if kind.startswith(CLOCK_TIME):
@@ -209,9 +213,9 @@ def seconds_of_dates(table: Table, kind: str) -> np.ndarray:
     return times
 
 
-def _moments(table: Table, kind: str) -> Iterator[tuple[int, int]]:
+def _moments(header: HeaderLine, column: int, kind: str) -> Iterator[tuple[int, int]]:
     """Yield the seconds of every row since some midnight in UTC, and the nanoseconds besides."""
-    for number, cell in table.cells("t"):
+    for number, cell in header.cells_below(column):
         match = MOMENT.fullmatch(cell)
         if match is None and _is_missing(cell):
             yield 0, MISSING_TIME_NS
@@ -225,10 +229,10 @@ def _moments(table: Table, kind: str) -> Iterator[tuple[int, int]]:
                 raise ValueError(second)
         except ValueError:
             problem = f"t is {shown(cell, LONGEST_SHOWN)}, not {kind.partition(' with')[0]}"
-            raise TrajectoryError(table.header.path, problem, DAMAGED_ADVICE, number) from None
+            raise TrajectoryError(header.path, problem, DAMAGED_ADVICE, number) from None
         if _kind(match) != kind:
             problem = f"t is {shown(cell, LONGEST_SHOWN)}, not {kind} as before"
-            raise TrajectoryError(table.header.path, problem, DAMAGED_ADVICE, number)
+            raise TrajectoryError(header.path, problem, DAMAGED_ADVICE, number)
         yield seconds, int((fraction or "").ljust(9, "0"))
 
 

@@ -6,7 +6,7 @@ angles need their order from the user. A matrix may be transposed, and a positio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import takewhile
@@ -25,7 +25,7 @@ from .options import ReadingOptions
 from .plausibility import require_one_body
 from .recordings import Cells, Selection, Trajectory, unique
 from .rewriting import eulers_near, write_text
-from .tables import HeaderLine, Table
+from .tables import HeaderLine
 
 WXYZ = ("qw", *QUATERNION[:3])
 
@@ -150,7 +150,7 @@ def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine
     taken = set(selection.of([body.name for body in bodies]))
     requested = [body for body in bodies if body.name in taken]
     columns = {body.label(one): index for body in requested for one, index in body.columns.items() if one != "t"}
-    numbers = dict(zip(columns, Table(header, columns).parse([*columns]).T, strict=True))
+    numbers = dict(zip(columns, header.numbers_below(columns).T, strict=True))
     count = len(next(iter(numbers.values())))
     clocks, trajectories = {}, []
     for body in requested:
@@ -180,8 +180,7 @@ def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine
 
 def _bodies(header: HeaderLine, layout: RowLayout, options: ReadingOptions) -> list[_TrackedBody]:
     """Return all bodies in the order of columns and rows."""
-    columns = {f"device {index}": index for index in layout.devices}
-    groups = _devices(Table(header, columns), "device" in dict(options.columns))
+    groups = _devices(header, layout.devices, "device" in dict(options.columns))
     bodies = [
         (f"{device} {prefix}".strip() or header.path.stem, prefix, columns, rows)
         for device, rows in groups.items()
@@ -194,14 +193,14 @@ def _bodies(header: HeaderLine, layout: RowLayout, options: ReadingOptions) -> l
     ]
 
 
-def _devices(table: Table, named: bool) -> dict[str, np.ndarray | slice]:
+def _devices(header: HeaderLine, columns: Sequence[int], named: bool) -> dict[str, np.ndarray | slice]:
     """Return the rows of each device, by the first column that tells several apart, or else that tells one."""
     only = ""
-    for column in table.columns:
-        codes, of_rows = _codes(table.cells(column))
+    for column in columns:
+        codes, of_rows = _codes(header.cells_below(column))
         if len(codes) > MOST_DEVICES and named:
             problem = f"more than {MOST_DEVICES} different values in the column of devices"
-            raise table.header.error(problem, "name another with --columns device=NAME")
+            raise header.error(problem, "name another with --columns device=NAME")
         if len(codes) > min(max(MOST_LABELS * len(of_rows), 1), MOST_DEVICES) and not named:
             continue
         if len(codes) > 1:

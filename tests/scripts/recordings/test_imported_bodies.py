@@ -14,7 +14,7 @@ import pytest
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import rotate
-from rigid_motion_batch.recordings import Trajectory, read_trajectories, sampling, scene_bodies
+from rigid_motion_batch.recordings import Trajectory, read_trajectories, recordings, scene_bodies
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.fbx import FIRST_RECORD_BYTE, MAGIC
 from rigid_motion_batch.scenes.armature import RestFigure
@@ -233,8 +233,8 @@ def test_too_much_is_refused(exported, refusal, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(scene_bodies, "LARGEST_FILE", beside.stat().st_size)
     assert "that are read; export the skeleton without its meshes" in refusal(str(beside))[1]
     monkeypatch.undo()
-    monkeypatch.setattr(sampling, "MOST_POSES", 99)
-    assert refusal(str(path))[1].startswith("5 joints in 20 frames are more than 99 poses; name one joint with ")
+    monkeypatch.setattr(recordings, "MOST_POSES", 99)
+    assert refusal(str(path))[1].startswith("5 joints in 20 frames are more than 99 poses; export fewer joints, or ")
     assert len(read_trajectories(f"{path}:Hand").trajectories) == 1
 
 
