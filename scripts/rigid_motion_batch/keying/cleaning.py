@@ -16,7 +16,6 @@ from rigid_motion_batch.recordings import ReadingOptions, Recording, Trajectory,
 from rigid_motion_batch.recordings.cleaning import cleaned_clip, described, fill_in, rows_of
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.recordings import NoMotion
 
 from .planning import ALL
 from .records import FileProblem, is_made
@@ -62,46 +61,43 @@ def do_cleaning(doing: RunningJob, how: Cleaning) -> None:
     if job.file.stem.endswith(SUFFIX) and is_made(job.file):
         doing.leave_alone("this was cleaned before")
         return
-    with doing.failing():
+    recording: Recording | None = None
+    with doing.failing(), doing.reading():
+        recording = read_trajectories(job.source, how.reading)
+        if recording.others and not recording.body and recording.trajectories[0].rest_body is None:
+            recording = read_trajectories(f"{job.file}{ALL}", how.reading)
+    if recording is not None:
+        with doing.failing():
+            _clean(doing, how, recording)
+
+
+def _clean(doing: RunningJob, how: Cleaning, recording: Recording) -> None:
+    job = doing.job
+    doing.require_free(job.output)
+    done: list[CleanedBody] = []
+    for number, trajectory in enumerate(recording.trajectories):
+        axes = how.axes or recording.axes
         try:
-            recording = read_trajectories(job.source, how.reading)
-            if recording.others and not recording.body and recording.trajectories[0].rest_body is None:
-                recording = read_trajectories(f"{job.file}{ALL}", how.reading)
+            clip = make_clip(trajectory, job.source, trajectory.name, axes, how.reading, measured=recording.measured)
         except TrajectoryError as error:
-            if job.is_found and isinstance(error, NoMotion):
-                doing.leave_alone(error.problem)
-                return
-            doing.outcome.failed = doing.outcome.unreadable = True
-            doing.outcome.reason = str(error).removeprefix(f"{job.source}: ")
-            doing.note(str(error))
-            return
-        doing.require_free(job.output)
-        done: list[CleanedBody] = []
-        for number, trajectory in enumerate(recording.trajectories):
-            try:
-                axes = how.axes or recording.axes
-                clip = make_clip(
-                    trajectory, job.source, trajectory.name, axes, how.reading, measured=recording.measured
-                )
-            except TrajectoryError as error:
-                doing.say(f"{trajectory.name} is unchanged: {error.problem}")
-                continue
-            tolerance = how.tolerance.tolerance(clip) if how.tolerance else None
-            _, found = cleaned_clip(clip, tolerance, how.radius)
-            rows = rows_of(clip, trajectory)
-            body = f"{trajectory.name}: " if len(recording.trajectories) > 1 else ""
-            said = "; ".join(described(clip, found, rows))
-            written = trajectory.cells is None or trajectory.cells.times is not None
-            stays = "; its times stay as stamped" if "clock" in said and not written else ""
-            doing.say(f"{body}{said}{stays}")
-            done.append(CleanedBody(clip, found, trajectory, rows, number))
-        if not done:
-            raise FileProblem("no body of it has two poses that can be used: record at least 2")
-        if not doing.work.dry_run:
-            with doing.record.writing(job.output) as beside:
-                _write(beside, recording, done, how, job.output)
-        doing.outcome.objects += len(done)
-        doing.tell_written(job.output)
+            doing.say(f"{trajectory.name} is unchanged: {error.problem}")
+            continue
+        tolerance = how.tolerance.tolerance(clip) if how.tolerance else None
+        _, found = cleaned_clip(clip, tolerance, how.radius)
+        rows = rows_of(clip, trajectory)
+        body = f"{trajectory.name}: " if len(recording.trajectories) > 1 else ""
+        said = "; ".join(described(clip, found, rows))
+        written = trajectory.cells is None or trajectory.cells.times is not None
+        stays = "; its times stay as stamped" if "clock" in said and not written else ""
+        doing.say(f"{body}{said}{stays}")
+        done.append(CleanedBody(clip, found, trajectory, rows, number))
+    if not done:
+        raise FileProblem("no body of it has two poses that can be used: record at least 2")
+    if not doing.work.dry_run:
+        with doing.record.writing(job.output) as beside:
+            _write(beside, recording, done, how, job.output)
+    doing.outcome.objects += len(done)
+    doing.tell_written(job.output)
 
 
 def _write(beside: Path, recording: Recording, done: list[CleanedBody], how: Cleaning, output: Path) -> None:

@@ -22,27 +22,16 @@ from rigid_motion_batch.keying.records import FileProblem, Unreadable
 from rigid_motion_batch.keying.reductions import GLB_SUFFIX, SUFFIX, TOLERANCE, Reductions, name_of, off
 from rigid_motion_batch.keying.sessions import counted
 from rigid_motion_batch.keying.work import ClipNumbers, RunningJob
-from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names, read_source
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.recordings import NoMotion
 
 
 def do_recording(doing: RunningJob, how: Reductions) -> None:
     """Read a recording, and write the keys of each of its bodies."""
-    job, outcome = doing.job, doing.outcome
+    job = doing.job
     clips: list[Clip] = []
-    with doing.failing():
-        try:
-            clips, note = read_source(job.source, how.axes, how.reading)
-        except TrajectoryError as error:
-            if job.is_found and isinstance(error, NoMotion):
-                doing.leave_alone(error.problem)
-                return
-            outcome.failed = outcome.unreadable = True
-            outcome.reason = str(error).removeprefix(f"{job.source}: ")
-            doing.note(str(error))
-            return
+    with doing.failing(), doing.reading():
+        clips, note = read_source(job.source, how.axes, how.reading)
         if note:
             doing.note(note)
     for clip, name in zip(clips, _names(job.file, clips), strict=True):

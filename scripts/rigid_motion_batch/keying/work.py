@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
+from rigid_motion_batch.recordings.recordings import NoMotion, TrajectoryError
 from rigid_motion_batch.supervising import report
 
 from .planning import InputJob
@@ -181,6 +182,19 @@ class RunningJob:
             self.say(f"not written, for {self.outcome.reason}:")
             for line in "".join(traceback.format_exception(error)).splitlines():
                 self.note(line)
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Say why the block cannot read a recording, where it cannot; what was found in a folder may hold no motion."""
+        try:
+            yield
+        except TrajectoryError as error:
+            if self.job.is_found and isinstance(error, NoMotion):
+                self.leave_alone(error.problem)
+                return
+            self.outcome.failed = self.outcome.unreadable = True
+            self.outcome.reason = str(error).removeprefix(f"{self.job.source}: ")
+            self.note(str(error))
 
     def leave_alone(self, reason: str) -> None:
         """Say that nothing is written, and why."""
