@@ -8,7 +8,7 @@ import pytest
 
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.clip_reading import DEVICES, NOT_FOLDERS, folder_names
-from tests.scripts.recordings.seeds import SEEDS
+from tests.scripts.recordings.written_layouts import PLAIN
 
 FORMULAS = "=+-@\t\r"
 """What spreadsheets take for the beginning of a formula."""
@@ -55,11 +55,11 @@ def test_a_good_name_stays_as_it_is() -> None:
 def test_a_file_of_any_name_is_read_or_refused_in_one_line(tmp_path: Path, name: str) -> None:
     path = tmp_path / f"{name}.csv"
     try:
-        path.write_text(SEEDS[".csv"][0].replace("0.02", "zero", 1), encoding="utf-8")
+        path.write_text(PLAIN.replace("\n0.0,", "\nzero,", 1), encoding="utf-8")
     except (OSError, ValueError):
         pytest.xfail("this system has no files of that name")
     with pytest.raises(TrajectoryError, match="t is 'zero', not a number; delete this line if it is damaged") as caught:
         read_trajectories(str(path))
     assert str(caught.value).isprintable()
-    path.write_text(SEEDS[".csv"][0], encoding="utf-8")
+    path.write_text(PLAIN, encoding="utf-8")
     assert len(read_trajectories(str(path)).trajectories) == 1

@@ -126,6 +126,7 @@ RAW: dict[str, Layout] = {
         "take.txt",
         "# timestamp(s) q1 q2 q3 q4 px py pz vx vy vz\n" + rows(SECONDS, quaternions(), *[LEFT.positions] * 2),
     ),
+    "TUM with frames": Layout("take.tum", rows(NUMBERS, *POSE), COUNTED),
     "poses without times": Layout("take.csv", rows(*POSE), COUNTED),
     "numbers with decimal commas": Layout("take.csv", rows(SECONDS, *POSE, separator=";").replace(".", ",")),
     "Nuke": Layout(
@@ -337,6 +338,16 @@ OTHERS: dict[str, Layout] = {
                 timestamp=lambda place: int(MICROSECONDS[place]) + 1532402927612460,
                 rotation=lambda place: quaternions("wxyz")[place].tolist(),
                 translation=lambda place: LEFT.positions[place].tolist(),
+            )
+        ),
+    ),
+    "A-Frame of 2017": Layout(
+        "take.json",
+        json.dumps(
+            objects(
+                timestamp=lambda place: float(MICROSECONDS[place] / 1e3),
+                position=lambda place: LEFT.positions[place].tolist(),
+                rotation=lambda place: quaternions()[place].tolist(),
             )
         ),
     ),

@@ -7,9 +7,9 @@ import pytest
 
 from rigid_motion.motion.quaternions import angle_between
 from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError, read_trajectories
-from tests.scripts.recordings import seeds
+from tests.scripts.recordings.seeds import ARM as JOINTS
 
-ARM = f"""{seeds.ARM}Frames: 2
+ARM = f"""{JOINTS}Frames: 2
 Frame Time: 0.04
 0 0 0  0 0 0  0 0 0
 1 5 0  90 0 0  -90 0 0

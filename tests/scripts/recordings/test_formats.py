@@ -1,53 +1,18 @@
-"""Recordings of A-Frame's motion-capture components, Motive's CSV exports, and what is said of wrong files."""
+"""Motive's CSV exports, and what is said of wrong files of any text format."""
 
 import json
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from rigid_motion_batch.recordings import read_trajectories
-from tests.scripts.recordings import seeds
-
-
-@pytest.mark.parametrize("ending", seeds.SEEDS)
-def test_every_format_holds_the_motion(write, ending: str) -> None:
-    for seed in seeds.SEEDS[ending]:
-        path = write(f"take{ending}", seed)
-        recording = read_trajectories(f"{path}:*" if "left_px" in seed or ending in (".bvh", ".json") else path)
-        one = recording.trajectories[0]
-        np.testing.assert_allclose(one.times - one.times[0], seeds.TIMES, atol=1e-6)
-        positions = one.poses.positions * (one.metres_per_unit if ending != ".bvh" else 1.0)
-        np.testing.assert_allclose(positions, seeds.POSITIONS, atol=1e-4)
-        turns = Rotation.from_quat(one.poses.quaternions, scalar_first=True)
-        assert (turns.inv() * seeds.TURNS).magnitude().max() < 1e-3
-
-
-def aframe(offset: float = 0.0, **extra: object) -> dict:
-    """A device's recording, as the components write it since 2017."""
-    poses = [
-        {
-            "position": {"x": offset + frame, "y": 1.5, "z": -0.25},
-            "rotation": {"x": 10.0, "y": 120.0 + frame, "z": -60.0},
-            "timestamp": 306686.13 + 11.0 * frame,
-        }
-        for frame in range(3)
-    ]
-    return {"poses": poses, "events": [], **extra}
-
-
-def test_a_recording_of_a_headset_and_controllers_holds_them_by_name(write) -> None:
-    content = {"camera": aframe(), "left": aframe(5.0, gamepad={"hand": "left"}), "right": aframe(7.0)}
-    recording = read_trajectories(write("play.json", json.dumps(content)))
-    assert [trajectory.name for trajectory in recording.trajectories] == ["camera"]
-    assert recording.others == ("left", "right")
-    (left,) = read_trajectories(write("play.json", json.dumps(content)) + ":left").trajectories
-    np.testing.assert_array_equal(left.poses.positions[:, 0], [5.0, 6.0, 7.0])
+from tests.scripts.recordings.layouts import OTHERS, RAW
 
 
 def broken(**changes: object) -> str:
-    content = aframe()
-    content["poses"][2].update(changes)
+    """A recording of A-Frame, of which the third pose of the first device is another."""
+    content = json.loads(OTHERS["A-Frame"].text)
+    content["left"]["poses"][2].update(changes)
     return json.dumps(content)
 
 
@@ -119,8 +84,8 @@ WRONG = {
         ('{"poses":\n[}', 2, "this is not JSON"),
         ('{"poses": [%s]}' % ("9" * 5000), None, "this JSON cannot be a recording"),
         ('{"camera": 1, "left": {"events": []}}', None, "this JSON holds no poses"),
-        (broken(position={"x": 1, "y": 2}), None, "pose 2 of 'hand' has no number position.z"),
-        (broken(timestamp=10**400), None, "pose 2 of 'hand' has no number timestamp"),
+        (broken(position={"x": 1, "y": 2}), None, "pose 2 of 'left' has no number position.z"),
+        (broken(timestamp=10**400), None, "pose 2 of 'left' has no number timestamp"),
     ],
     "take.csv": [
         (MOTIVE_SETTINGS, 1, "the rows that say what the columns are end too early"),
@@ -138,6 +103,12 @@ WRONG = {
         ),
         (motive() + "3,0.025" + ",1" * 99 + "\n", 11, "101 columns where 31 have a name"),
         (motive().replace("Head, left", "x" * 200_000), 4, "this line is not a header"),
+        (motive().replace("Rigid Body", "").replace("Marker", "").replace("Bone", ""), 7, "no rigid body in this take"),
+        (
+            "Time,Position,Rotation\n0,(0, 0, 0),(0, 0, 0, 1)\n.1,(0, 0),(0, 0, 0, 1)\n",
+            3,
+            "6 columns where 8 are needed",
+        ),
     ],
     "vicon.csv": [
         (
@@ -164,6 +135,9 @@ WRONG = {
             None,
             "this JSON holds no poses; it takes a list",
         ),
+    ],
+    "kitti.txt": [
+        (str(RAW["KITTI"].text), None, "poses without times; say how many frames a second it has: --frame-rate 90"),
     ],
     "images.txt": [("#   POINTS2D[] as (X, Y)\n", None, "no column of time, only one that counts frames")],
     "walk.tum": [

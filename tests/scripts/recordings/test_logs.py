@@ -26,28 +26,6 @@ def test_columns_may_be_named_one_by_one(write) -> None:
     assert_is_the_motion(read_one(source, columns=tuple(named)), MOTIONS["left"])
 
 
-@pytest.mark.parametrize("name", ["take.csv", "take.tum"])
-@pytest.mark.parametrize("unit", logs.TIMES)
-@pytest.mark.parametrize("start", [0, logs.EPOCH], ids=["from 0", "from 1970"])
-def test_a_unit_of_time_may_be_said(write, name: str, unit: str, start: int) -> None:
-    text = log(names("t [min]" if name.endswith("csv") else "t", "{}", "q{}"), unit, start=start)
-    text = text if name.endswith("csv") else "#" + text.replace(",", " ")
-    assert_is_the_motion(read_one(write(name, text), time_unit=unit), MOTIONS["left"], start=start, unit=unit)
-
-
-@pytest.mark.parametrize("time", ["frame", "Frame Number", "t", "sample", "t [ms]"])
-@pytest.mark.parametrize("name", ["take.csv", "take.tum"])
-def test_frames_are_counted_by_their_rate(write, name: str, time: str) -> None:
-    header = names("t" if name.endswith("tum") else time, "{}", "q{}")
-    rows = log(header).splitlines()[1:]
-    frames = [0, *range(5, 5 + len(rows) - 1)]
-    text = "\n".join(
-        [",".join(header), *(f"{frame},{row.partition(',')[2]}" for frame, row in zip(frames, rows, strict=True))]
-    )
-    text = text if name.endswith("csv") else "#" + text.replace(",", " ")
-    np.testing.assert_allclose(read_one(write(name, text), frame_rate=90.0).times, np.array(frames) / 90.0, rtol=1e-15)
-
-
 def euler_log(header: Sequence[str], order: str, degrees: bool) -> str:
     motion = MOTIONS["left"]
     angles = motion.turns.as_euler(order, degrees=degrees)
@@ -111,6 +89,7 @@ def test_a_column_that_is_named_for_devices_and_is_none_is_refused(write, refusa
         ("frame,x,y,z,qx,qy,qz,qw", {}, "no column of time, only one that counts frames ('frame'); say how many frame"),
         ("t,left_x,left_y,left_z,button", {}, "positions only, and rotations are needed (found t, left_x, left_y, lef"),
         ("t,x,x,y,z,qx,qy,qz,qw", {}, "two columns mean x ('x'); say which with --columns x=NAME, or rename or"),
+        ("t,Position,Rotation", {}, "rotations are Euler angles here (Rotation.x, Rotation.y, Rotation.z), and their"),
         ("t,x,y,z,rx,ry,rz", {}, "rotations are Euler angles here (rx, ry, rz), and their order is not said; say it:"),
         ("t,x,y,z,qx,qy,qz,qw", {"euler": "XYZ"}, "no column named rx, ry, rz (found t, x, y, z, qx, qy, qz, qw); kn"),
         ("t,x,y,z,qx,qy,qz,qw", {"columns": [("t", "when")]}, "no column is named 'when'; --columns t=NAME takes one "),
@@ -119,7 +98,7 @@ def test_a_column_that_is_named_for_devices_and_is_none_is_refused(write, refusa
     ],
 )
 def test_a_refusal_says_what_was_found_what_is_known_and_what_helps(write, refusal, header, options, told):
-    row = ",".join("0" for _ in header.split(","))
+    row = "0,(0, 0, 0),(30, 0, 0)" if "Position" in header else ",".join("0" for _ in header.split(","))
     line, message = refusal(write("take.csv", f"{header}\n{row}\n"), **options)
     assert message.startswith(told)
     assert line == 1
@@ -159,24 +138,17 @@ def test_clocks_that_run_at_different_speeds_are_asked_for(write, refusal) -> No
     np.testing.assert_allclose(read_one(source, columns=[("t", "clock")]).times, np.arange(9) / 45.0)
 
 
-@pytest.mark.parametrize("stuck", ["-1", "", "0.5"])
-def test_a_clock_that_stands_still_is_not_taken(write, stuck: str) -> None:
-    rows = "".join(f"{stuck},{row / 90},0,0,0,0,0,0,1\n" for row in range(9))
-    one = read_one(write("take.csv", f"utc_ns,t,x,y,z,qx,qy,qz,qw\n{rows}"))
-    np.testing.assert_allclose(one.times, np.arange(9) / 90.0)
-    assert one.remark == "times are those of 't' and not of 'utc_ns': of 9 rows the time changes in 8, and not in 0"
-
-
-def test_a_steady_clock_is_taken_before_one_that_trembles(write) -> None:
-    rows = "".join(f"{row / 90 + 0.003 * (row % 3 == 1)},{row / 90},0,0,0,0,0,0,1\n" for row in range(30))
-    one = read_one(write("take.csv", f"receive_time,stamp,x,y,z,qx,qy,qz,qw\n{rows}".replace("receive_", "host ")))
-    np.testing.assert_allclose(one.times, np.arange(30) / 90.0)
-
-
-def test_a_body_whose_rotations_are_angles_is_named(write) -> None:
-    header = "t,x,y,z,qx,qy,qz,qw,left_x,left_y,left_z,left_rx,left_ry,left_rz"
+@pytest.mark.parametrize(
+    ("rotation", "why"),
+    [
+        ("left_y,left_rx,left_ry,left_rz", "its rotations are Euler angles, for --euler"),
+        ("left_qx,left_qy,left_qz,left_qw", "it has no column y"),
+    ],
+)
+def test_a_body_that_lacks_something_is_named(write, rotation: str, why: str) -> None:
+    header = f"t,x,y,z,qx,qy,qz,qw,left_x,left_z,{rotation}"
     one = read_one(write("take.csv", header + "\n0,0,0,0,0,0,0,1,0,0,0,0,0,0\n.1,0,0,0,0,0,0,1,0,0,0,0,0,0\n"))
-    assert one.remark == "'left' is left out, as its rotations are Euler angles, for --euler"
+    assert one.remark == f"'left' is left out, as {why}"
 
 
 def test_bodies_that_share_no_rows_have_their_own_and_nothing_is_lost(write) -> None:
