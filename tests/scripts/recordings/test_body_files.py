@@ -19,13 +19,6 @@ def whole(name: str) -> tuple[Trajectory, np.ndarray]:
     return body, body.rest_body.skeleton.in_root_space(body.poses).positions
 
 
-def test_a_rigid_prop_without_a_skin_is_a_body() -> None:
-    (content,) = inspect(str(FILES / "rigid_prop.gltf")).contents
-    assert (content.name, content.joints, content.timing.samples, content.timing.rate) == ("Prop", (), 40, 20.0)
-    assert content.size.extent == pytest.approx((0.506, 0.25, 0.4), abs=1e-3)
-    assert content.unit.name == "metres"
-
-
 def test_a_root_that_stands_still_is_not_what_is_measured() -> None:
     (content,) = inspect(str(FILES / "static_root.bvh")).contents
     assert content.up == "y"
@@ -123,29 +116,6 @@ def test_positions_that_are_meant_to_be_added_to_offsets_are() -> None:
     assert inspect(str(FILES / "positions_additive.bvh")).contents[0].up == "y"
 
 
-def with_positions(text: str, rows: np.ndarray) -> str:
-    """The file of three joints with six channels each with other positions below the root (frames, 3 joints, 3)."""
-    head, _, frames = text.partition("Frame Time:")
-    first, *lines = frames.strip().splitlines()
-    values = np.array([line.split() for line in lines], dtype=float)
-    for joint in range(rows.shape[1]):
-        values[:, 6 * joint + 6 : 6 * joint + 9] = rows[:, joint]
-    return "\n".join([f"{head}Frame Time: {first}", *(" ".join(f"{value:.4f}" for value in row) for row in values), ""])
-
-
-@pytest.mark.parametrize("added", [True, False])
-def test_positions_are_read_either_way_by_where_most_of_them_are(write, added: bool) -> None:
-    text, (_, before) = (FILES / "zero_positions.bvh").read_text(), whole("zero_positions.bvh")
-    offsets = np.array([[0, 40, 0], [0, 35, 0], [9, -45, 0]])
-    stretched = np.random.default_rng(1).uniform(-3, 3, (40, 3, 3))
-    rows = stretched + (0 if added else offsets)
-    (body,) = read_trajectories(write("some.bvh", with_positions(text, rows))).trajectories
-    places = body.poses.positions[1:]
-    np.testing.assert_allclose(places, (stretched + offsets).swapaxes(0, 1), atol=1e-4)
-    assert bool(body.warnings) == added
-    assert before.shape == (4, 40, 3)
-
-
 def test_a_name_with_spaces_finds_its_joint_and_is_written_as_it_is(tmp_path: Path) -> None:
     source = str(FILES / "names_with_spaces.bvh")
     for name in ("Bip01 Neck", "bip01 neck", "Bip01_Neck"):
@@ -158,8 +128,3 @@ def test_a_name_with_spaces_finds_its_joint_and_is_written_as_it_is(tmp_path: Pa
     assert again.rest_body.joints == clip.rest_body.joints == ("Bip01 Pelvis", "Bip01 Neck")
     np.testing.assert_allclose(again.poses.positions, clip.poses.positions, atol=1e-5)
     np.testing.assert_allclose(again.poses.quaternions, clip.poses.quaternions, atol=1e-7)
-
-
-def test_a_body_begins_where_it_branches() -> None:
-    parents = np.array([-1, 0, 1, 1, -1, 4])
-    assert part_of_body(parents).tolist() == [False, True, True, True, True, True], "a chain is a body as it is"

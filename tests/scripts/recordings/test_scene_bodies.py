@@ -3,7 +3,6 @@
 import itertools
 import json
 import shutil
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -180,8 +179,7 @@ def test_each_object_has_its_own_animation_of_those_that_blender_exports(scene, 
     )
 
 
-def test_a_prop_of_a_text_needs_no_blender(tmp_path: Path) -> None:
-    """The file that was made for this: its translation is the swing that it was made from."""
+def test_a_prop_needs_no_blender(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made, times = Making(), np.arange(40) / 20
     made.json["nodes"] = [{"name": "Prop"}]
     places = np.column_stack((0.25 * np.sin(times), 1.4 - 0.4 * np.cos(times), np.sin(3 * times)))
@@ -190,19 +188,14 @@ def test_a_prop_of_a_text_needs_no_blender(tmp_path: Path) -> None:
     made.channel(0, "translation", own, places)
     made.channel(0, "rotation", own, turns)
     path = made.write(tmp_path / "prop.gltf")
-    code = f"""
-import sys
-sys.modules["bpy"] = None
-from rigid_motion_batch.recordings import read_trajectories
-(prop,) = read_trajectories({str(path)!r}).trajectories
-print(len(prop.times), prop.rate, prop.poses.positions[10].tolist(), prop.poses.quaternions[10].tolist())
-"""
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    x, y, z, w = turns[10]
-    assert said[:2] == ["40", "20.0"]
-    numbers = [float(number.strip("[],")) for number in said[2:]]
-    np.testing.assert_allclose(numbers[:3], (places[10, 0], -places[10, 2], places[10, 1]), atol=1e-6)
-    np.testing.assert_allclose(numbers[3:], (w, x, -z, y), atol=1e-6)
+    monkeypatch.setitem(sys.modules, "bpy", None)
+    (single,) = read_trajectories(str(path)).trajectories
+    x, y, z, w = turns.T
+    assert (len(single.times), single.rate) == (40, 20.0)
+    np.testing.assert_allclose(
+        single.poses.positions, np.column_stack((places[:, 0], -places[:, 2], places[:, 1])), atol=1e-6
+    )
+    np.testing.assert_allclose(single.poses.quaternions, np.column_stack((w, x, -z, y)), atol=1e-6)
 
 
 def test_a_vrma_names_its_joints_itself(tmp_path: Path) -> None:
