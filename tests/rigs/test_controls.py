@@ -7,11 +7,10 @@ import numpy as np
 from rigid_motion.animation import bake, problem_of, set_mode, unbake
 from tests.rigs.human import controls
 from tests.rigs.poses import ends_of_bones, key_at_random
-from tests.thoroughness import sample
 
 
 def test_all_of_its_controls_take_a_mode_and_everything_that_hangs_on_them_follows_as_it_follows_real_keys(rig):
-    posed = sample(controls(rig))
+    posed = controls(rig)[::4]
     key_at_random(posed)
     set_mode(posed, "dq_sclerp")
     assert {problem_of(control) for control in posed[::20]} == {""}

@@ -38,7 +38,7 @@ def test_joints_keyed_by_quaternions_need_no_screw(rig):
     assert screw < NOTHING
 
 
-@pytest.mark.parametrize(("order", "centimetres"), [("XYZ", 24.5), ("ZXY", 11.7), ("YXZ", 6.8), ("ZYX", 28.4)])
+@pytest.mark.parametrize(("order", "centimetres"), [("YXZ", 6.8), ("ZYX", 28.4)])
 def test_joints_keyed_by_euler_angles_gain_much(rig, order, centimetres):
     native, screw = strays_of(scenes.cut_by_joints(rig, order))
     assert 100.0 * native == pytest.approx(centimetres, abs=0.1)

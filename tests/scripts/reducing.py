@@ -22,7 +22,7 @@ from tests.scripts.recordings.blends import rig
 WALK = RECORDINGS.parent / "rigs" / "pab_walk.fbx"
 """Other people's."""
 
-FRAMES = np.arange(1.0, 91.0)
+FRAMES = np.arange(1.0, 62.0)
 """Of the dense keys in the scenes."""
 
 RADIUS = 0.1
@@ -40,11 +40,11 @@ def run(*arguments: object) -> int:
     return reduce.main([*map(str, arguments), "--jobs", "0"])
 
 
-def swing(count: int, seed: int = 0) -> Poses:
-    """A smooth motion through half a metre and a turn, faster and slower by turns, of so many poses."""
-    random = np.random.default_rng(seed)
-    phases = np.linspace(0.0, 5.0, count)[:, None] * random.uniform(0.5, 1.5, 3) + random.uniform(0.0, 6.0, 3)
-    angles = np.linspace(0.0, 3.0, count) + 0.2 * np.sin(np.linspace(0.0, 12.0, count))
+def swing(count: int, seed: int = 0, whole: float = 90.0) -> Poses:
+    """A smooth motion, of which the whole goes through half a metre and a turn, faster and slower by turns."""
+    random, parts = np.random.default_rng(seed), np.arange(count) / whole
+    phases = 5.0 * parts[:, None] * random.uniform(0.5, 1.5, 3) + random.uniform(0.0, 6.0, 3)
+    angles = 3.0 * parts + 0.2 * np.sin(12.0 * parts)
     axis = normalise(random.normal(size=3))
     turns = np.column_stack((np.cos(angles), np.sin(angles)[:, None] * axis))
     return Poses(0.5 * np.sin(phases), turns)
@@ -110,10 +110,10 @@ def count_keys(carrier: bpy.types.Object | bpy.types.PoseBone) -> int:
     return len(curves_of(carrier)["location", 0].keyframe_points)
 
 
-def write_csv(path: Path, seconds: float = 2.0, rate: float = 90.0) -> tuple[np.ndarray, Poses]:
+def write_csv(path: Path, seconds: float = 1.0, rate: float = 90.0) -> tuple[np.ndarray, Poses]:
     """A recording in Blender's axes and metres, and what it is of."""
     times = np.arange(round(seconds * rate) + 1) / rate
-    poses = swing(len(times), 3)
+    poses = swing(len(times), 3, 2.0 * rate)
     rows = np.column_stack((times, poses.positions, poses.quaternions)).tolist()
     lines = ["t,x,y,z,qw,qx,qy,qz", *(",".join(map(repr, row)) for row in rows)]
     path.write_text("\n".join([*lines, ""]), encoding="utf-8")

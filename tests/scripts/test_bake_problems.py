@@ -70,12 +70,14 @@ def test_a_file_that_cannot_be_read_is_named_and_the_others_go_on(tmp_path, capf
     assert not baked_name(bad).exists()
 
 
+@pytest.mark.any_blender
 def test_a_pipe_is_not_waited_for(tmp_path, capsys):
     os.mkfifo(tmp_path / "pipe.blend")
     assert run(tmp_path / "pipe.blend") == 2
     assert "this is not a file on a disk" in capsys.readouterr().err
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize(("dry", "below"), [((), "new/folders"), (("--dry-run",), "")])
 def test_a_read_only_folder_is_named_by_its_own_name_and_before_the_work(tmp_path, dry, below):
     path, folder = one_object_file(tmp_path / "shot.blend"), tmp_path / "read-only"
@@ -136,6 +138,7 @@ def test_a_link_is_saved_through_in_place(tmp_path):
 # Stopped half-way
 
 
+@pytest.mark.any_blender
 def test_ctrl_c_while_blender_is_loaded_ends_it_at_once(tmp_path):
     path = one_object_file(tmp_path / "shot.blend")
     beside = tmp_path / "modules"
@@ -148,6 +151,7 @@ def test_ctrl_c_while_blender_is_loaded_ends_it_at_once(tmp_path):
     assert (done.returncode, done.stdout, done.stderr) == (130, "", f"{supervising.STOPPED_TEXT}\n")
 
 
+@pytest.mark.any_blender
 def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
     path = one_object_file(tmp_path / "shot.blend")
     (tmp_path / "file").touch()
@@ -158,6 +162,7 @@ def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
     assert listed(tmp_path) == ["file", "shot.blend"]
 
 
+@pytest.mark.any_blender
 def test_a_folder_of_the_name_of_the_output_is_left_alone(tmp_path, capsys):
     path = one_object_file(tmp_path / "shot.blend")
     baked_name(path).mkdir()

@@ -14,6 +14,8 @@ import pytest
 
 from rigid_motion_batch.places import MANIFEST
 
+pytestmark = pytest.mark.any_blender
+
 LARGEST = 1_000_000
 """Bytes: it is code, and no more."""
 

@@ -126,15 +126,19 @@ def test_without_a_tolerance_a_rig_of_any_size_begins_with_one_that_fits_it(tmp_
     assert sum(count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones) < 3 * len(FRAMES) / 2
 
 
-def test_what_became_of_rigs_and_recordings_is_printed_as_json(tmp_path, capsys):
+def test_a_dry_run_says_all_also_as_json_and_writes_nothing(tmp_path, capsys):
     shot, hand, body = rig_file(tmp_path / "shot.blend"), tmp_path / "hand.csv", hand_made(tmp_path)
     write_csv(hand)
+    before = listed(tmp_path)
     capsys.readouterr()
     assert run(shot, hand, body, "--json", "--dry-run", "--tolerance", "5mm") == 0
+    assert listed(tmp_path) == before
     said = capsys.readouterr()
+    assert said.err.count("would be reduced, ") == 3
     told = json.loads(said.out)
     made = ["shot-reduced.blend", "hand-keys.csv", "body-keys.blend"]
     assert [entry["written"] for entry in told] == [[str(tmp_path / name)] for name in made]
+    assert all(f"would be written to {tmp_path / name}" in said.err for name in made)
     clips = [clip for entry in told for clip in entry["clips"]]
     assert [clip["name"] for clip in clips] == ["Rig: 3 bones", "hand", "body"]
     assert all(clip["keys_after"] < clip["keys_before"] and 0.0 < clip["error"] <= 0.005 for clip in clips)
@@ -145,33 +149,7 @@ def test_what_became_of_rigs_and_recordings_is_printed_as_json(tmp_path, capsys)
 # What is left alone, and how it ends
 
 
-def test_a_dry_run_says_all_and_writes_nothing(tmp_path, capsys):
-    shot, hand, body = object_file(tmp_path / "shot.blend"), tmp_path / "hand.csv", hand_made(tmp_path)
-    write_csv(hand)
-    before = listed(tmp_path)
-    capsys.readouterr()
-    assert run(shot, hand, body, "--blend", "--dry-run") == 0
-    assert listed(tmp_path) == before
-    said = capsys.readouterr()
-    assert said.out == ""
-    for path in ("shot-reduced.blend", "hand-keys.csv", "hand-keys.blend", "body-keys.blend"):
-        assert f"would be written to {tmp_path / path}" in said.err
-    assert said.err.count("would be reduced, ") == 3
-
-
-def test_nothing_is_written_over_unless_asked(tmp_path, capsys):
-    shot, hand = object_file(tmp_path / "shot.blend"), tmp_path / "hand.csv"
-    write_csv(hand)
-    there = [reduced_name(shot), tmp_path / "hand-keys.csv"]
-    for path in there:
-        path.write_text("mine")
-    assert run(shot, hand) == 1
-    assert [path.read_text() for path in there] == ["mine", "mine"]
-    assert capsys.readouterr().err.count("is there already: add --overwrite") == 2
-    assert run(shot, hand, "--overwrite") == 0
-    assert all(path.read_bytes() != b"mine" for path in there)
-
-
+@pytest.mark.any_blender
 def test_what_cannot_be_read_is_named_and_the_others_are_done(tmp_path, capsys):
     good = tmp_path / "hand.csv"
     write_csv(good)
@@ -187,6 +165,7 @@ def test_what_cannot_be_read_is_named_and_the_others_are_done(tmp_path, capsys):
     assert run(tmp_path / "gone.csv", damaged, f"{body}:Nose") == 2
 
 
+@pytest.mark.any_blender
 def test_two_recordings_that_would_be_one_file_are_not(tmp_path, capsys):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
@@ -195,6 +174,7 @@ def test_two_recordings_that_would_be_one_file_are_not(tmp_path, capsys):
     assert f"{tmp_path / 'a' / 'hand.csv'} is written to {tmp_path / 'hand-keys.csv'} too" in capsys.readouterr().err
 
 
+@pytest.mark.any_blender
 def test_a_recording_is_not_written_over_one_that_is_to_be_read(tmp_path, capsys):
     for name in ("hand", "hand-keys"):
         write_csv(tmp_path / f"{name}.csv")
@@ -204,6 +184,7 @@ def test_a_recording_is_not_written_over_one_that_is_to_be_read(tmp_path, capsys
     assert (tmp_path / "hand-keys.csv").read_bytes() == before
 
 
+@pytest.mark.any_blender
 def test_a_recording_that_is_named_twice_is_done_once(tmp_path, capsys, monkeypatch):
     write_csv(tmp_path / "hand.csv")
     (tmp_path / "link.csv").symlink_to("hand.csv")
@@ -212,16 +193,16 @@ def test_a_recording_that_is_named_twice_is_done_once(tmp_path, capsys, monkeypa
     assert capsys.readouterr().out == "hand-keys.csv\n"
 
 
-@pytest.mark.parametrize("kind", ["blend", "body", "table"])
+@pytest.mark.any_blender
+@pytest.mark.parametrize("kind", ["blend", "table"])
 def test_what_another_run_has_written_meanwhile_stays(tmp_path, capsys, monkeypatch, kind):
     if kind == "table":
         write_csv(tmp_path / "hand.csv")
         source, result = tmp_path / "hand.csv", tmp_path / "hand-keys.csv"
         place, step = recordings, "Reconstruction"
     else:
-        source = object_file(tmp_path / "shot.blend") if kind == "blend" else hand_made(tmp_path)
-        result = reduced_name(source) if kind == "blend" else tmp_path / "body-keys.blend"
-        place, step = blend_files, "save_copy"
+        source = object_file(tmp_path / "shot.blend")
+        result, place, step = reduced_name(source), blend_files, "save_copy"
     real = getattr(place, step)
 
     def write_first(*arguments: object, **options: object) -> object:
@@ -242,6 +223,7 @@ def test_what_another_run_has_written_meanwhile_stays(tmp_path, capsys, monkeypa
     assert result.stat().st_size > 1000
 
 
+@pytest.mark.any_blender
 def test_a_file_that_was_saved_meanwhile_is_not_replaced_in_place(tmp_path, capsys, monkeypatch):
     path, real = object_file(tmp_path / "shot.blend"), blend_files.save_copy
 

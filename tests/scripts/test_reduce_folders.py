@@ -238,7 +238,7 @@ def test_a_killed_worker_costs_its_file_alone(tmp_path):
 
 
 def test_a_gltf_is_done_again_where_one_of_its_files_has_changed(tmp_path, capsys):
-    made = walk()
+    made = walk(joints=2, seconds=1.0)
     made.json["images"] = [{"uri": "skin.png"}]
     (tmp_path / "skin.png").write_bytes(b"some")
     for name in ("a", "b"):

@@ -29,6 +29,7 @@ def imported(room: str) -> tuple[set[str], set[str]]:
 
 
 @pytest.mark.blender
+@pytest.mark.any_blender
 @pytest.mark.parametrize("room", ["recordings", "analysis", "scenes"])
 def test_a_worker_needs_numpy_and_blender_alone(room: str) -> None:
     packages, parts = imported(room)

@@ -49,9 +49,8 @@ def test_a_single_body_with_loss(tmp_path: Path, capfd: pytest.CaptureFixture[st
 HOLD = ["measure", str(Path(__file__).parents[2] / "assets/hold.csv") + ":*", "--radius", "10cm"]
 
 
-@pytest.mark.parametrize("loss", ["0", "0.01", "0.05"])
-def test_a_tool_slips_least_in_the_space_of_the_hand(loss: str, capfd: pytest.CaptureFixture[str]) -> None:
-    assert main([*HOLD, "--held", "hold-tool", "hold-hand", "--loss", loss, "--json"]) == 0
+def test_a_tool_slips_least_in_the_space_of_the_hand(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main([*HOLD, "--held", "hold-tool", "hold-hand", "--loss", "0.05", "--json"]) == 0
     result = json.loads(capfd.readouterr().out)
     apart, in_world, in_hand, alone = (result[way] for way in list(result)[2:])
     assert max(in_hand["slip_mm"], 6.0) < min(apart["slip_mm"], in_world["slip_mm"])
