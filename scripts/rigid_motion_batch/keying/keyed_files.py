@@ -18,7 +18,7 @@ from rigid_motion_batch.keying.records import FileProblem
 from rigid_motion_batch.keying.reducing import reduced
 from rigid_motion_batch.keying.reductions import FRAME_RATE_RANGE, Reductions
 from rigid_motion_batch.recordings.clips import Clip
-from rigid_motion_batch.recordings.objects import LAST_FRAME
+from rigid_motion_batch.recordings.looks import LAST_FRAME
 from rigid_motion_batch.scenes.armature import RestFigure, Rig
 from rigid_motion_batch.silencing import silenced
 

@@ -21,8 +21,8 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.command_line import listed
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, moments_of
+from .looks import LAST_FRAME, looking
 from .matrices import filled, growing
-from .objects import LAST_FRAME, matrix_of, poses_on, probe
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import ALL, Selection, Trajectory, TrajectoryError, shown
 from .rigs import armature_of, in_blender, whole_body
@@ -141,13 +141,7 @@ def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object
 
 def _sample(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
     moments, metres = _moments(path, body, scenes)
-    with probe() as obj:
-        follow = cast("bpy.types.CopyTransformsConstraint", obj.constraints.new("COPY_TRANSFORMS"))
-        follow.target, follow.subtarget = body.obj, body.bone or ""
-
-        def look(frames: np.ndarray) -> Poses:
-            return poses_on(path, body.name, 1, frames, lambda seen: matrix_of(obj.evaluated_get(seen))[None])
-
+    with looking(path, [body.obj], body.obj, [body.bone] if body.bone else []) as look:
         seen = sampled(moments, look, np.array([-1]), OF_OBJECTS, scale or metres)
     poses = filled(seen.poses)[0]
     if np.allclose(poses.scales, 1.0, atol=1e-6):

@@ -22,10 +22,10 @@ from rigid_motion_batch.command_line import listed
 from rigid_motion_batch.silencing import silenced
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, keys_of, moments_of, with_parents
-from .objects import body_of_objects, refuse_far_frames, single_object
+from .looks import refuse_far_frames, single_motions
 from .recordings import Selection, Trajectory, TrajectoryError
-from .rigs import armature_of, in_blender, joints_of, single_joints, whole_body
-from .sampling import JUMP_STEPS, Moments, moments_between, rate_of
+from .rigs import armature_of, body_of_objects, in_blender, joints_of, likely_unit, whole_body
+from .sampling import JUMP_STEPS, OF_JOINTS, OF_OBJECTS, Moments, moments_between, rate_of
 from .scene_bodies import MAX_LISTED_NAMES, SceneBodies, parents_among
 
 if TYPE_CHECKING:
@@ -108,13 +108,13 @@ class _Scene:
         obj, bone = self.nodes[chosen[0]]
         if bone is None:
             return [self.alone(node) for node in chosen]
-        bones = [self.names[node] for node in chosen]
-        first, *others = single_joints(self.path, obj, bones, self._moments(own), self.scale)
+        bones, metres = [self.names[node] for node in chosen], self.scale or likely_unit(obj)
+        first, *others = single_motions(self.path, obj, bones, bones, self._moments(own), OF_JOINTS, metres)
         return [self._with_remarks(first, own), *others]
 
     def alone(self, node: int) -> Trajectory:
-        obj = self.nodes[node][0]
-        result = single_object(self.path, obj, self.names[node], self._moments([node]), self.scale)
+        obj, moments, metres = self.nodes[node][0], self._moments([node]), self.scale or 1.0
+        (result,) = single_motions(self.path, obj, (), [self.names[node]], moments, OF_OBJECTS, metres)
         return self._with_remarks(result, [node])
 
     def _moments(self, own: Sequence[int]) -> Moments:

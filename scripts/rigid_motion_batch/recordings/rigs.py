@@ -1,4 +1,4 @@
-"""Armatures of the open Blender: their bones as the joints of a body, where Blender shows them.
+"""Whole bodies of the open Blender, where it shows them: the bones of armatures, or objects that hang on one another.
 
 The surface that an armature carries is that of all of its meshes together, where its bones are at rest.
 """
@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -17,10 +16,10 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import conjugate, rotate
 
+from .looks import looking, matrix_of, unscaled
 from .matrices import filled, rigid
-from .objects import matrix_of, poses_on, probe
 from .recordings import Trajectory, TrajectoryError, shown
-from .rest_bodies import MAX_JOINTS_PER_VERTEX, MOST_VERTICES, RestBody, Skin, likely_metres
+from .rest_bodies import MAX_JOINTS_PER_VERTEX, MOST_VERTICES, RestBody, Skin, likely_metres, tails_of
 from .sampling import OF_JOINTS, Moments, sampled
 
 if TYPE_CHECKING:
@@ -121,101 +120,43 @@ def whole_body(
     joints = joints_of(rig)
     if not joints.names:
         raise TrajectoryError(path, f"{shown(rig.name)} has no bones at all", "export it again with its skeleton")
-    meshes, metres = carried_by(rig), scale or _metres(rig, metres_per_unit)
-    with looking(path, rig, joints.names, meshes) as look:
-        seen = sampled(moments, look, joints.parents, OF_JOINTS, metres)
+    meshes, metres = carried_by(rig), scale or likely_unit(rig, metres_per_unit)
+    with looking(path, meshes, rig, joints.names) as look:
+        seen = sampled(moments, lambda frames: unscaled(look(frames)), joints.parents, OF_JOINTS, metres)
     # What a damaged file has beyond all measure is for the repair to say.
     with np.errstate(invalid="ignore", over="ignore"):
         rest_body = _rest_body(rig, joints, look.first, meshes, made_up=made_up)
     return seen.as_body(name, moments, metres, rest_body, metres_per_unit, joints.remark)
 
 
-def single_joints(
-    path: Path, rig: bpy.types.Object, bones: Sequence[str], moments: Moments, scale: float | None = None
-) -> list[Trajectory]:
-    """Return the motions of some bones in the world, a trajectory each; otherwise as `whole_body`."""
-    metres = scale or _metres(rig, 1.0)
-    with looking(path, rig, bones) as look:
-        seen = sampled(moments, look, np.full(len(bones), -1), OF_JOINTS, metres)
-    return seen.as_singles(bones, moments, metres)
+def body_of_objects(
+    path: Path,
+    objects: Sequence[bpy.types.Object],
+    parents: np.ndarray,
+    names: Sequence[str],
+    title: str,
+    moments: Moments,
+    scale: float | None,
+) -> Trajectory:
+    """Return objects as the joints of a whole body, which rests where they are at first.
+
+    `parents` has the number of what each hangs on among them, -1 for nothing, shape (objects,).
+    """
+    with looking(path, objects) as look:
+        first = look(moments.frames[:1])
+        rest = filled(Poses(first.positions, first.quaternions))[:, 0]
+        metres = scale or likely_metres(parents, rest.positions)
+        seen = sampled(moments, lambda frames: unscaled(look(frames)), parents, OF_JOINTS, metres)
+    rest_body = RestBody(tuple(names), parents, rest, tails_of(rest, parents))
+    return seen.as_body(title, moments, metres, rest_body)
 
 
-def _metres(rig: bpy.types.Object, metres_per_unit: float) -> float:
+def likely_unit(rig: bpy.types.Object, metres_per_unit: float = 1.0) -> float:
     """Return the length of the unit that a rig is likely to be in, from where its joints rest."""
     joints, there = joints_of(rig), matrix_of(rig)
     with np.errstate(invalid="ignore", over="ignore"):
         heads = np.array([armature_of(rig).bones[name].head_local for name in joints.names]) @ there[:3, :3].T
     return likely_metres(joints.parents, heads, metres_per_unit)
-
-
-@contextmanager
-def looking(
-    path: Path, rig: bpy.types.Object, bones: Sequence[str], followed: Sequence[bpy.types.Object] = ()
-) -> Iterator[_Look]:
-    """Look at bones in the world, with everything that moves them; `followed` are evaluated as well."""
-    with probe() as obj:
-        # The bones are evaluated that something depends on.
-        held = cast("bpy.types.ArmatureConstraint", obj.constraints.new("ARMATURE"))
-        for bone in bones:
-            target = held.targets.new()
-            target.target, target.subtarget = rig, bone
-        for other in followed:
-            copying = cast("bpy.types.CopyTransformsConstraint", obj.constraints.new("COPY_TRANSFORMS"))
-            copying.target = other
-        yield _Look(path, rig, bones, followed)
-
-
-@dataclass(eq=False)
-class _Look:
-    """Look at the bones of an armature."""
-
-    path: Path
-    rig: bpy.types.Object
-    bones: Sequence[str]
-    followed: Sequence[bpy.types.Object]
-    first: dict[bpy.types.Object, np.ndarray] = field(default_factory=dict)
-    """Matrices of the armature and of what else is followed, as they were at first, shape (4, 4) each."""
-
-    @cached_property
-    def rows(self) -> np.ndarray:
-        """Where the bones are in the list of the pose, which has an order of its own."""
-        import bpy
-
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        for item in (self.rig, *self.followed):
-            self.first[item] = matrix_of(item.evaluated_get(depsgraph))
-        return _rows(self.path, self.rig.evaluated_get(depsgraph), self.bones)
-
-    def __call__(self, frames: np.ndarray) -> Poses:
-        """Return the bones on some frames (n,), shape (bones, n): NaN is the quaternion of one that has no direction.
-
-        Raises
-        ------
-        TrajectoryError
-            Where that is too much, or beyond where Blender goes, or where the pose of the armature lacks a bone.
-        """
-        poses = poses_on(self.path, self.rig.name, len(self.bones), frames, self._matrices)
-        return Poses(poses.positions, poses.quaternions)
-
-    def _matrices(self, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-        """Return where Blender has the bones now, shape (bones, 4, 4)."""
-        seen, rows = self.rig.evaluated_get(depsgraph), self.rows
-        pose = cast("bpy.types.Pose", seen.pose)  # Where there is none, `_rows` says so.
-        raw = np.empty(16 * len(pose.bones), dtype=np.float32)
-        pose.bones.foreach_get("matrix", raw)
-        # They come column by column.
-        columns = raw.reshape(-1, 4, 4)[rows].astype(np.float64)
-        with np.errstate(invalid="ignore", over="ignore"):
-            return matrix_of(seen) @ columns.transpose(0, 2, 1)
-
-
-def _rows(path: Path, seen: bpy.types.Object, bones: Sequence[str]) -> np.ndarray:
-    """Return where these bones are in the list of the pose."""
-    places = {bone.name: row for row, bone in enumerate(seen.pose.bones)} if seen.pose else {}
-    if missing := [bone for bone in bones if bone not in places]:
-        problem = f"the pose of {shown(seen.name)} lacks the bone {shown(missing[0])}"
-        raise TrajectoryError(path, problem, "save the file again from Blender")
-    return np.array([places[bone] for bone in bones])
 
 
 def _rest_body(
