@@ -19,7 +19,7 @@ def motive(kind: str, turns: np.ndarray, axes: str, units: str = "Meters", asset
         *(kind, units, ";".join([asset] * count), ";".join(["Tool"] * count), ";".join("1" * count)),
         *(";".join(["Rotation"] * len(axes) + ["Position"] * 3), ";".join([*axes, *"XYZ"])),
     )
-    metres = {"Meters": 1.0, "Millimeters": 1e-3}[units]
+    metres = {"Meters": 1.0, "Millimeters": 1e-3, "Inches": 0.0254}[units]
     return header + rows(NUMBERS, SECONDS, turns, LEFT.positions / metres, [""] * COUNT, separator=";")
 
 
@@ -62,6 +62,16 @@ OPTICAL: dict[str, Layout] = {
         "take.tsv", motive("Quaternion", quaternions(), "XYZW").replace(";", "\t"), bodies=("Tool",)
     ),
     "Motive's bones": Layout("take.csv", motive("Quaternion", quaternions(), "XYZW", asset="Bone"), bodies=("Tool",)),
+    "Motive with parents, without names of rows, in inches": Layout(
+        "take.csv",
+        motive("Quaternion", quaternions(), "XYZW", "Inches")
+        .replace(";Type;", ";;")
+        .replace(";Name;", ";;")
+        .replace(";ID;", ";;")
+        .replace("\n;;;Rot", "\n;Parent" + ";" * 8 + "\n;;;Rot")
+        .replace("Time (Seconds)", "Time"),
+        bodies=("Tool",),
+    ),
     "Motive's angles": Layout(
         "take.csv", motive("YXZ", LEFT.turns.as_euler("YXZ", degrees=True), "YXZ"), bodies=("Tool",)
     ),

@@ -7,6 +7,23 @@ import pytest
 
 from rigid_motion_batch.recordings import read_trajectories
 from tests.scripts.recordings.layouts import OTHERS, RAW
+from tests.scripts.recordings.optical_layouts import OPTICAL
+
+MOTIVE = str(OPTICAL["Motive"].text)
+
+
+def test_of_motive_bones_are_taken_by_name_and_poses_in_the_space_of_a_parent_are_told(write) -> None:
+    both = MOTIVE.replace("Meters\n", "Meters,Coordinate Space,Local\n").splitlines()
+    rows = {2: "Bone", 3: "Hip", 4: "7", 5: None, 6: None}
+    for row, name in rows.items():
+        cells = both[row].split(",")
+        both[row] += "," + ",".join(cells[2:9] if name is None else [name] * 7)
+    both[7:] = [line + "," + ",".join(line.split(",")[2:9]) for line in both[7:]]
+    source = write("take.csv", "\n".join(both))
+    (hip,), (tool,) = (read_trajectories(f"{source}{body}").trajectories for body in (":Hip", ""))
+    assert (hip.name, tool.name) == ("Hip", "Tool")
+    np.testing.assert_array_equal(hip.poses.positions, tool.poses.positions)
+    assert "Coordinate Space: Global" in str(tool.warnings)
 
 
 def broken(**changes: object) -> str:
@@ -14,64 +31,6 @@ def broken(**changes: object) -> str:
     content = json.loads(OTHERS["A-Frame"].text)
     content["left"]["poses"][2].update(changes)
     return json.dumps(content)
-
-
-MOTIVE_SETTINGS = (
-    "Format Version,1.23,Take Name,Take 3,Capture Frame Rate,120.000000,Export Frame Rate,120.000000,"
-    "Total Exported Frames,3,Rotation Type,Quaternion,Length Units,Millimeters,Coordinate Space,Global"
-)
-BODY = ["Rotation"] * 4 + ["Position"] * 3 + ["Mean Marker Error"]
-AXES = ["X", "Y", "Z", "W", "X", "Y", "Z", ""]
-
-
-def motive(settings: str = MOTIVE_SETTINGS, labels: bool = True, parents: bool = False) -> str:
-    """A take with a marker, two rigid bodies and a bone; the second body is lost in the middle frame."""
-
-    def header(label: str, *cells: str) -> str:
-        return ",".join(["", label if labels else "", *cells])
-
-    rows = [
-        settings,
-        "",
-        header("Type", *["Marker"] * 3, *["Rigid Body"] * 16, *["Rigid Body Marker"] * 3, *["Bone"] * 7),
-        header("Name", *["Drill:1"] * 3, *["Drill"] * 8, *['"Head, left"'] * 8, *["Drill:1"] * 3, *["Hip"] * 7),
-        header("ID", *["A1"] * 3, *["B1"] * 8, *["B2"] * 8, *["B1"] * 3, *["C1"] * 7),
-        *([header("Parent", *[""] * 29)] if parents else []),
-        header("", *["Position"] * 3, *BODY, *BODY, *["Position"] * 3, *BODY[:7]),
-        ",".join(["Frame", "Time (Seconds)" if labels else "Time", *"XYZ", *AXES, *AXES, *"XYZ", *AXES[:7]]),
-    ]
-    for frame in range(3):
-        marker = ["7", "7", "7"]
-        drill = [f"0.{frame}", "0.2", "0.3", "0.9", f"{frame}", "20", "30", "0.001"]
-        head = [""] * 8 if frame == 1 else ["0.5", "0.5", "0.5", "-0.5", "1", "2", f"{frame}", "0.001"]
-        rows.append(",".join([f"{frame}", f"{frame / 120:.6f}", *marker, *drill, *head, "", "", "", *["8"] * 7]))
-    return "\n".join(rows) + "\n"
-
-
-@pytest.mark.parametrize("labels", [True, False])
-@pytest.mark.parametrize("parents", [True, False])
-def test_the_rigid_bodies_are_found_among_markers_and_bones(write, labels: bool, parents: bool) -> None:
-    recording = read_trajectories(write("take.csv", motive(labels=labels, parents=parents)) + ":*")
-    drill, head = recording.trajectories
-    assert (drill.name, head.name) == ("Drill", "Head, left")
-    assert drill.metres_per_unit == 0.001
-    inches = motive(MOTIVE_SETTINGS.replace("Millimeters", "Inches"))
-    assert read_trajectories(write("take.csv", inches)).trajectories[0].metres_per_unit == 0.0254
-    np.testing.assert_array_equal(drill.times, [0.0, 0.008333, 0.016667])
-    np.testing.assert_array_equal(drill.poses.positions, [[0, 20, 30], [1, 20, 30], [2, 20, 30]])
-    np.testing.assert_array_equal(drill.poses.quaternions[:, 1], [0.0, 0.1, 0.2])
-    np.testing.assert_array_equal(drill.poses.quaternions[0], [0.9, 0.0, 0.2, 0.3])
-    np.testing.assert_array_equal(head.poses.quaternions[2], [-0.5, 0.5, 0.5, 0.5])
-
-
-def test_bones_are_taken_by_name_beside_rigid_bodies_and_where_there_are_no_others(write) -> None:
-    path = write("take.csv", motive())
-    (hip,) = read_trajectories(f"{path}:Hip").trajectories
-    np.testing.assert_array_equal(hip.poses.positions, np.full((3, 3), 8.0))
-    bones = read_trajectories(write("take.csv", motive().replace("Rigid Body", "Marker"))).trajectories
-    assert [bone.name for bone in bones] == ["Hip"]
-    local = motive().replace("Space,Global", "Space,Local")
-    assert "Coordinate Space: Global" in str(read_trajectories(write("take.csv", local)).trajectories[0].warnings)
 
 
 TUM_COMMENTS = "# ground truth trajectory\n# file: 'dataset.bag'\n# timestamp tx ty tz qx qy qz qw\n"
@@ -88,22 +47,14 @@ WRONG = {
         (broken(timestamp=10**400), None, "pose 2 of 'left' has no number timestamp"),
     ],
     "take.csv": [
-        (MOTIVE_SETTINGS, 1, "the rows that say what the columns are end too early"),
-        (
-            motive().replace("Rigid Body Marker", "Marker").replace("Rigid Body", "Marker").replace("Bone", "Marker"),
-            None,
-            "no rigid body, only Marker",
-        ),
-        (motive(MOTIVE_SETTINGS.replace("Millimeters", "Cubits")), 1, "Length Units is 'Cubits'"),
-        (motive(MOTIVE_SETTINGS.replace("Quaternion", "Matrix")), 1, "Rotation Type is 'Matrix'"),
-        (
-            motive(MOTIVE_SETTINGS.replace("Quaternion", "XYZ")).replace("X,Y,Z,W", "X,Y,Q,W"),
-            7,
-            "no column named rx, ry, rz for 'Drill'",
-        ),
-        (motive() + "3,0.025" + ",1" * 99 + "\n", 11, "101 columns where 31 have a name"),
-        (motive().replace("Head, left", "x" * 200_000), 4, "this line is not a header"),
-        (motive().replace("Rigid Body", "").replace("Marker", "").replace("Bone", ""), 7, "no rigid body in this take"),
+        (MOTIVE.splitlines()[0], 1, "the rows that say what the columns are end too early"),
+        (MOTIVE.replace("Rigid Body", "Marker"), None, "no rigid body, only Marker"),
+        (MOTIVE.replace("Meters", "Cubits"), 1, "Length Units is 'Cubits'"),
+        (MOTIVE.replace("Quaternion", "Matrix"), 1, "Rotation Type is 'Matrix'"),
+        (MOTIVE.replace("Quaternion", "XYZ").replace("X,Y,Z,W", "X,Y,Q,W"), 7, "no column named rx, ry, rz for 'Tool'"),
+        (MOTIVE + "3,0.025" + ",1" * 99 + "\n", 32, "101 columns where 10 have a name"),
+        (MOTIVE.replace(",Tool", ',"Tool', 1).replace("Tool", "x" * 200_000, 1), 4, "this line is not a header"),
+        (MOTIVE.replace("Rigid Body", "").replace("Marker", ""), 7, "no rigid body in this take"),
         (
             "Time,Position,Rotation\n0,(0, 0, 0),(0, 0, 0, 1)\n.1,(0, 0),(0, 0, 0, 1)\n",
             3,
