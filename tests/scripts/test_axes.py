@@ -51,15 +51,6 @@ def test_unknown_axes_are_answered_with_the_known_ones(poses: Poses) -> None:
         to_blender(poses, "maya")
 
 
-def test_cameras_of_nerf_face_what_they_film(poses: Poses) -> None:
-    """In a world with z up: a camera looks along its -z, and its y is above it."""
-    there = matrices(poses)
-    here = matrices(to_blender(poses, NERF))
-    np.testing.assert_allclose(here[..., 1], -there[..., 2], atol=1e-14)
-    np.testing.assert_allclose(here[..., 2], there[..., 1], atol=1e-14)
-    np.testing.assert_array_equal(to_blender(poses, NERF).positions, poses.positions)
-
-
 @pytest.mark.parametrize("axes", DESCRIBED)
 def test_there_and_back(poses: Poses, axes: str) -> None:
     back = from_blender(to_blender(poses, axes), axes)

@@ -157,17 +157,19 @@ def test_un_baking_gives_back_exactly_the_keys_and_the_motion(shot, baked, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("options", "expected"),
+    ("options", "frames", "interpolation"),
     [
-        (("--step", "0.5"), sorted({*np.arange(1.0, 40.5, 0.5)})),
-        (("--step", "7"), sorted({*np.arange(1.0, 40.5, 7.0), *FRAMES})),
+        (("--step", "0.5"), sorted({*np.arange(1.0, 40.5, 0.5)}), "LINEAR"),
+        (("--step", "7", "--hold"), sorted({*np.arange(1.0, 40.5, 7.0), *FRAMES}), "CONSTANT"),
     ],
 )
-def test_steps(tmp_path, options, expected):
+def test_steps_that_may_be_held(tmp_path, options, frames, interpolation):
     path = one_object_file(tmp_path / "shot.blend")
     assert run(path, *options) == 0
     open_again(baked_name(path))
-    assert frames_of_keys(bpy.data.objects["Tool"]) == expected
+    curves = curves_of(bpy.data.objects["Tool"])
+    assert frames_of_keys(bpy.data.objects["Tool"]) == frames
+    assert {key.interpolation for curve in curves.values() for key in curve.keyframe_points[:-1]} == {interpolation}
 
 
 def test_a_name_that_nothing_has_is_said(shot, tmp_path, capsys):
@@ -226,18 +228,6 @@ def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, cap
 
 
 # What is left alone, and what is kept
-
-
-def test_in_place_the_file_is_saved_and_the_one_before_kept_by_blender(tmp_path, capsys):
-    path = one_object_file(tmp_path / "shot.blend")
-    before = path.read_bytes()
-    capsys.readouterr()
-    assert run(path, "--in-place") == 0
-    assert capsys.readouterr().out == f"{path}\n"
-    assert listed(tmp_path) == ["shot.blend", "shot.blend1"]
-    assert (tmp_path / "shot.blend1").read_bytes() == before
-    open_again(path)
-    assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
 
 
 def test_textures_and_libraries_are_found_from_another_folder(tmp_path):
@@ -351,15 +341,6 @@ def test_keys_count_as_they_are_where_live_update_was_off(tmp_path):
     assert run(path) == 0
     open_again(baked_name(path))
     assert_same(shown_worlds([bpy.data.objects["Tool"]], PLAYED[:43]), [expected])
-
-
-@pytest.mark.parametrize(("options", "expected"), [((), "LINEAR"), (("--hold",), "CONSTANT")])
-def test_poses_are_held_where_that_is_asked_for(tmp_path, options, expected):
-    path = one_object_file(tmp_path / "shot.blend")
-    assert run(path, "--step", "2", *options) == 0
-    open_again(baked_name(path))
-    curves = curves_of(bpy.data.objects["Tool"])
-    assert {key.interpolation for curve in curves.values() for key in curve.keyframe_points[:-1]} == {expected}
 
 
 @pytest.mark.parametrize("compress", [False, True])

@@ -122,14 +122,16 @@ def test_on_a_full_disk_nothing_is_written_and_what_is_there_stays(tmp_path, cap
     assert {item.name: item.read_bytes() for item in tmp_path.iterdir()} == before
 
 
-def test_a_link_is_saved_through_in_place(tmp_path):
+def test_a_link_is_saved_through_in_place_and_the_file_before_kept(tmp_path, capsys):
     (tmp_path / "real").mkdir()
     real, link = one_object_file(tmp_path / "real" / "shot.blend"), tmp_path / "link.blend"
     before = real.read_bytes()
     link.symlink_to(real)
+    capsys.readouterr()
     assert run(link, "--in-place") == 0
+    assert capsys.readouterr().out == f"{link}\n"
     assert link.is_symlink()
-    assert os.listdir(tmp_path / "real").count("shot.blend") == 1
+    assert listed(tmp_path / "real") == ["shot.blend", "shot.blend1"]
     assert (tmp_path / "real" / "shot.blend1").read_bytes() == before
     open_again(real)
     assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40

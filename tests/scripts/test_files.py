@@ -20,15 +20,6 @@ def test_a_failure_leaves_the_old_file_and_nothing_beside_it(tmp_path: Path) -> 
     assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [("report.html", "old")]
 
 
-def test_a_file_is_seen_under_its_name_only_once_it_is_whole(tmp_path: Path) -> None:
-    path = tmp_path / "metrics.csv"
-    with replacing(path) as stream:
-        stream.write("whole")
-        stream.flush()
-        assert not path.exists()
-    assert path.read_text() == "whole"
-
-
 def test_an_error_names_the_file_that_was_asked_for_and_a_folder_of_its_name_stays(tmp_path: Path) -> None:
     (tmp_path / "report.html").mkdir()
     with pytest.raises(OSError, match=r"report\.html") as raised:
