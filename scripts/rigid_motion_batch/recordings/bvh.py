@@ -26,7 +26,7 @@ from rigid_motion.motion.quaternions import align_signs
 from .clips import ClipWarning
 from .euler import quaternions_from_intrinsic_eulers
 from .recordings import Cells, Selection, Trajectory, TrajectoryError, refuse_too_many, shown, unique
-from .rest_bodies import RestBody
+from .rest_bodies import RestBody, tails_of
 from .rewriting import eulers_near, write_text
 from .sizing import sized
 from .tables import HeaderLine, lines_of
@@ -115,22 +115,16 @@ def _cells(header: HeaderLine, joints: list[Joint], values: np.ndarray, added: n
 
 
 def _rest_body(joints: list[Joint]) -> RestBody:
-    """Return the body of a hierarchy at rest, no joint being turned: every bone ends in the middle of its children."""
+    """Return the body of a hierarchy at rest, no joint being turned: bones end at end sites or amid their children."""
     parents = np.array([-1 if joint.parent is None else joint.parent for joint in joints])
-    offsets = np.array([joint.offset for joint in joints])
-    places, tails, counts = offsets.copy(), np.zeros_like(offsets), np.zeros(len(joints))
-    for index, joint in enumerate(joints):
-        if joint.parent is not None:
-            places[index] += places[joint.parent]
-            tails[joint.parent] += offsets[index]
-            counts[joint.parent] += 1
-        if joint.end is not None:
-            tails[index] += joint.end
-            counts[index] += 1
-    tails /= np.maximum(counts, 1.0)[:, None]
-    ends = np.linalg.norm([joint.end or (0.0, 0.0, 0.0) for joint in joints], axis=1)
-    unturned = np.tile((1.0, 0.0, 0.0, 0.0), (len(joints), 1))
-    return RestBody(tuple(joint.name for joint in joints), parents, Poses(places, unturned), tails, ends=ends)
+    places = np.array([joint.offset for joint in joints])
+    for index in np.flatnonzero(parents >= 0).tolist():
+        places[index] += places[parents[index]]
+    rest = Poses(places, np.tile((1.0, 0.0, 0.0, 0.0), (len(joints), 1)))
+    sites = np.array([joint.end or (0.0, 0.0, 0.0) for joint in joints])
+    ends = np.linalg.norm(sites, axis=1)
+    tails = np.where((ends > 0.0)[:, None], sites, tails_of(rest, parents))
+    return RestBody(tuple(joint.name for joint in joints), parents, rest, tails, ends=ends)
 
 
 def _add_offsets(joints: list[Joint], values: np.ndarray) -> int:
