@@ -16,6 +16,7 @@ from rigid_motion_batch.recordings import ReadingOptions, Recording, Trajectory,
 from rigid_motion_batch.recordings.cleaning import cleaned_clip, described, fill_in, rows_of
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.reading import read_all_singles
 
 from .planning import ALL
 from .records import FileProblem, is_made
@@ -63,9 +64,7 @@ def do_cleaning(doing: RunningJob, how: Cleaning) -> None:
         return
     recording: Recording | None = None
     with doing.failing(), doing.reading():
-        recording = read_trajectories(job.source, how.reading)
-        if recording.others and not recording.body and recording.trajectories[0].rest_body is None:
-            recording = read_trajectories(f"{job.file}{ALL}", how.reading)
+        recording = read_all_singles(job.source, how.reading)
     if recording is not None:
         with doing.failing():
             _clean(doing, how, recording)

@@ -20,8 +20,8 @@ from .clip_reading import make_clip
 from .clips import Clip, ClipWarning
 from .column_names import METRES
 from .options import AS_THE_FILE_SAYS, ReadingOptions
-from .reading import Format, format_of, read_trajectories, split_source
-from .recordings import ALL, Recording, Trajectory, TrajectoryError
+from .reading import Format, format_of, read_all_singles
+from .recordings import Recording, Trajectory, TrajectoryError
 from .rest_bodies import carrying
 from .sizing import axis_up, leading
 
@@ -186,11 +186,8 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
     TrajectoryError
         Where it cannot be read, or no body of it has two poses.
     """
-    recording = read_trajectories(source, options)
-    path, body = split_source(source)
-    if body is None and recording.others and all(item.rest_body is None for item in recording.trajectories):
-        recording = read_trajectories(f"{path}:{ALL}", options)
-    result = format_of(path)
+    recording = read_all_singles(source, options)
+    path, result = recording.path, format_of(recording.path)
     contents, unreadable = [], []
     for trajectory in recording.trajectories:
         try:

@@ -14,7 +14,7 @@ from rigid_motion_batch.command_line import did_you_mean
 from . import blend, bvh, fbx, gltf, json_logs, optical, plain
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .plausibility import implausibilities
-from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
+from .recordings import ALL, Recording, Selection, Trajectory, TrajectoryError, shown
 from .sizing import sized
 from .tables import encoding_of
 
@@ -139,6 +139,14 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
     own = trajectories[0].axes
     recording = replace(selection.recording(trajectories), measured=result.measured)
     return replace(recording, axes=own or result.axes, axes_known=bool(own))
+
+
+def read_all_singles(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> Recording:
+    """Read all bodies of a file, where none is named and the first is no whole body; otherwise the same."""
+    recording = read_trajectories(source, options)
+    if recording.others and not recording.body and recording.trajectories[0].rest_body is None:
+        return read_trajectories(f"{recording.path}:{ALL}", options)
+    return recording
 
 
 def _read(result: Format, path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
