@@ -3,26 +3,20 @@
 import os
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import astuple
 from pathlib import Path
 from random import Random
 
-import numpy as np
 import pytest
 
-from rigid_motion_batch.analysis.choices import Radii, Uniform
-from rigid_motion_batch.analysis.results import clip_result
-from rigid_motion_batch.recordings.clips import Clip
 from tests.blank import blank
-from tests.scripts.clips.recordings import compare_clip
 from tests.scripts.recordings.mutations import in_place, mutated
 from tests.scripts.recordings.skeletons import body, export, skinned
-from tests.scripts.recordings.test_fuzz import Reader, clips_or_refusal
+from tests.scripts.recordings.test_fuzz import Reader, read_and_fill_in
 from tests.thoroughness import THOROUGH
 
 bpy = pytest.importorskip("bpy")
 
-CASES = int(os.environ.get("RIGID_MOTION_FUZZ", "1000" if THOROUGH else "40"))
+CASES = int(os.environ.get("RIGID_MOTION_FUZZ", "400" if THOROUGH else "40"))
 FIRST = int(os.environ.get("RIGID_MOTION_FUZZ_FROM", "0"))
 
 
@@ -47,38 +41,18 @@ FBX: tuple[Damage, ...] = (in_place, in_place, in_place, zero_run, change_a_leng
 GLB: tuple[Damage, ...] = (in_place, zero_run, change_a_length, mutated)
 
 
-def assert_can_be_shown(clip: Clip) -> None:
-    """Measured by the program, with numbers that are some, in tables and in all that a page shows."""
-    result = compare_clip(clip, Uniform("5"), ("lerp_slerp",), Radii())
-    if result is not None:
-        for row in (*result.rows, *result.joints):
-            assert all(np.isfinite(cell) for cell in astuple(row) if isinstance(cell, float)), row
-        assert np.isfinite(clip_result(clip, [result]).truth.positions).all()
-        for motion in result.motions:
-            assert np.isfinite(motion.poses.positions).all()
-            assert np.isfinite(motion.errors).all()
-
-
 @pytest.fixture
 def reader() -> Iterator[Reader]:
-    one = Reader("test_damaged_bodies", "read_and_place")
+    one = Reader("test_damaged_bodies", "read_alone")
     yield one
     one.close()
 
 
-def read_and_place(source: str, _: int) -> bool:
-    """Whether there is a recording, all of whose joints are somewhere; else there has to be a refusal in one line."""
-    clips = clips_or_refusal(source)
-    if clips is None:
-        return False
+def read_alone(source: str, number: int) -> bool:
+    """Whether there is a recording that every mode can fill in, of which nothing is left behind."""
+    readable = read_and_fill_in(source, number)
     assert not [block for block in bpy.data.user_map() if block.name.startswith(("Body", "Skin", "Importing"))]
-    for clip in clips:
-        poses = clip.poses if clip.rest_body is None else clip.rest_body.skeleton.in_root_space(clip.poses)
-        assert np.isfinite(poses.positions).all()
-        assert np.allclose(np.linalg.norm(poses.quaternions, axis=-1), 1.0)
-        if clip.rest_body is not None:
-            assert_can_be_shown(clip)
-    return True
+    return readable
 
 
 @pytest.mark.parametrize(("ending", "kinds"), [(".fbx", FBX), (".glb", GLB)])

@@ -23,7 +23,6 @@ from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.analysis.results import measured
 from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.clip_reading import make_clip
-from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS
 from tests.scripts.recordings.layouts import LAYOUTS
 from tests.scripts.recordings.mutations import in_place, mutated
@@ -55,9 +54,13 @@ ROOT = Path(__file__).parents[3]
 
 def read_and_fill_in(source: str, number: int, options: ReadingOptions = AS_THE_FILE_SAYS) -> bool:
     """Whether there is a recording; anything but that and a refusal in one line is an error."""
-    clips = clips_or_refusal(source, options)
-    if clips is None:
+    try:
+        recording = read_trajectories(source, options)
+        clips = [make_clip(trajectory, source, trajectory.name, "blender") for trajectory in recording.trajectories]
+    except TrajectoryError as error:
+        assert_is_one_line(str(error), source)
         return False
+    assert recording.note.isprintable()
     if number % FILLED_IN:
         return True
     mode = list(MODES)[number // FILLED_IN % len(MODES)]
@@ -76,18 +79,6 @@ def read_and_fill_in(source: str, number: int, options: ReadingOptions = AS_THE_
         elif len(clip.times) < 50:
             assert len(reduce_keys(clip.times, clip.poses, mode, tolerance=0.01)) >= 2
     return True
-
-
-def clips_or_refusal(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Clip] | None:
-    """What is in a file; None where that is refused, in one line. Anything else is an error."""
-    try:
-        recording = read_trajectories(source, options)
-        clips = [make_clip(trajectory, source, trajectory.name, "blender") for trajectory in recording.trajectories]
-    except TrajectoryError as error:
-        assert_is_one_line(str(error), source)
-        return None
-    assert recording.note.isprintable()
-    return clips
 
 
 def assert_is_one_line(message: str, source: str) -> None:
