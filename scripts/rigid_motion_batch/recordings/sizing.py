@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion import Poses
 from rigid_motion.motion.humanoid import humanoid_bones
 from rigid_motion.motion.repair import MAX_MEASURE
 from rigid_motion_batch.axes import AXES
@@ -35,9 +35,9 @@ def sized(path: Path, trajectory: Trajectory, axes: str, *, unit_given: bool) ->
     `axes` are those of the file: a name in `axes.AXES`.
     """
     body = trajectory.rest_body
-    if body is None or (places := _first_whole(body.skeleton, trajectory.poses)) is None:
+    if body is None or (places := whole_places(body, trajectory.poses)) is None:
         return trajectory
-    places = places[part_of_body(body.parents, whole_places(body, trajectory.poses))] * trajectory.metres_per_unit
+    places = places[part_of_body(body.parents, places), 0] * trajectory.metres_per_unit
     size, heights = float(np.ptp(places, axis=0).max()), places @ AXES[axes][2]
     unit, length, why = unit_above_floor(size, float(heights.min()), float(heights.max()))
     metres = size * length
@@ -63,18 +63,6 @@ def whole_places(body: RestBody, poses: Poses) -> np.ndarray | None:
         places = body.skeleton.in_root_space(poses[:, ::every]).positions
     whole = (np.abs(places) < MAX_MEASURE).all(axis=(0, 2))
     return places[:, whole] if whole.any() else None
-
-
-def _first_whole(skeleton: Skeleton, poses: Poses) -> np.ndarray | None:
-    """Return where the joints of a body (joints, n) are in the first sample without damage, shape (joints, 3)."""
-    for first in range(0, poses.shape[1], LOOKED_AT):
-        # What is not finite, or far beyond all measure, is for the repair to say.
-        with np.errstate(invalid="ignore", over="ignore"):
-            places = skeleton.in_root_space(poses[:, first : first + LOOKED_AT]).positions
-        whole = np.flatnonzero((np.abs(places) < MAX_MEASURE).all(axis=(0, 2)))
-        if len(whole):
-            return places[:, whole[0]]
-    return None
 
 
 def axis_up(body: RestBody, poses: Poses) -> str:
