@@ -11,14 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from difflib import SequenceMatcher
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.command_line import listed
 
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, moments_of
 from .looks import LAST_FRAME, looking
@@ -77,12 +75,18 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
         if not scenes:
             raise TrajectoryError(path, "no scene in this file", "save the file from Blender itself")
         bodies = {name: BlendBody(obj) for name, obj in objects.items()}
+        bones = {
+            f"{name}/{bone}": BlendBody(obj, bone)
+            for name, obj in objects.items()
+            if obj.type == "ARMATURE"
+            for bone in armature_of(obj).bones.keys()  # noqa: SIM118 - it runs over bones
+        }
         animated = [name for name, body in bodies.items() if body.frames_of_keys() is not None]
-        selection.match([*objects, *_bones_of(objects)])
+        selection.match([*bodies, *bones])
         requested = selection.requested or ""
-        if requested not in bodies and (body := _bone_called(path, requested, objects)):
+        if requested in bones and requested not in bodies:
             selection.of(animated, unlisted=[requested])
-            return [_sample(path, body, scenes, options.scale)]
+            return [_sample(path, bones[requested], scenes, options.scale)]
         with_keys = {name: _bones_with_keys(obj) for name, obj in objects.items()}
         # Of all objects those that are animated, and of one any whose bones are as well.
         every = selection.requested == ALL
@@ -94,49 +98,6 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
         if not every and (with_keys[taken[0]] or _bones_are_moved(objects[taken[0]])):
             return [_sample_whole(path, objects[taken[0]], scenes, options.scale)]
         return [_sample(path, bodies[name], scenes, options.scale) for name in taken]
-
-
-def _bones_of(objects: dict[str, bpy.types.Object]) -> Iterator[str]:
-    """Yield the bones of all armatures, as OBJECT/BONE."""
-    for name, obj in objects.items():
-        if obj.type == "ARMATURE":
-            yield from (f"{name}/{bone}" for bone in armature_of(obj).bones.keys())  # noqa: SIM118 - it runs over bones
-
-
-def _bone_called(path: Path, requested: str, objects: dict[str, bpy.types.Object]) -> BlendBody | None:
-    """Return the bone called OBJECT/BONE, either of which may have slashes. None if there is no such object.
-
-    Raises
-    ------
-    TrajectoryError
-        Where there is the object and not the bone, or the bone alone was named.
-    """
-    ends = [index for index, character in enumerate(requested) if character == "/"]
-    split = [
-        BlendBody(objects[requested[:end]], requested[end + 1 :])
-        for end in reversed(ends)
-        if requested[:end] in objects
-    ]
-    rigs = [body for body in split if body.obj.type == "ARMATURE"]
-    for body in rigs:
-        if body.bone and body.bone in armature_of(body.obj).bones:
-            return body
-    if rigs:
-        rig, missing = rigs[0].obj, rigs[0].bone or ""
-        problem, bones = f"{shown(rig.name)} has no bone {shown(missing)}", armature_of(rig).bones.keys()
-        wanted = missing.casefold()
-        near = sorted(bones, key=lambda bone: -SequenceMatcher(None, bone.casefold(), wanted, False).ratio())[
-            :MAX_LISTED_BONES
-        ]
-        way_out = f"of its {len(bones)} bones the nearest by name: {listed(near)}"
-        raise TrajectoryError(path, problem, way_out if bones else "it has none at all")
-    if split and (obj := split[0].obj).is_missing:
-        problem = f"{shown(obj.name)} is missing from {cast('bpy.types.Library', obj.library).filepath}"
-        raise TrajectoryError(path, problem, "bring that file back, or tell Blender where it is now")
-    if alone := [rig for rig, obj in objects.items() if obj.type == "ARMATURE" and requested in armature_of(obj).bones]:
-        problem = f"no body named {shown(requested)}, only a bone of {listed(alone, MAX_LISTED_BONES)}"
-        raise TrajectoryError(path, problem, f"name it with {path}:{alone[0]}/{requested}")
-    return None
 
 
 def _sample(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:

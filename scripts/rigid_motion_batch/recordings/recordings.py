@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.command_line import listed, printable
+from rigid_motion_batch.command_line import did_you_mean, listed, printable
 
 from .clips import ClipWarning
 from .rest_bodies import RestBody
@@ -141,6 +141,8 @@ class Selection:
         self.path = path
         self.requested = requested
         self.names: tuple[str, ...] = ()
+        self._near = ""
+        """What may have been meant by a name that the file has not."""
 
     def of(self, names: Sequence[str], unlisted: Sequence[str] = (), more: int = 0) -> list[str]:
         """Return the requested ones among the bodies of the file.
@@ -172,7 +174,7 @@ class Selection:
         self.match([*names, *unlisted])
         if self.requested not in names and self.requested not in unlisted:
             way_out = f"it holds {listed([*names, *unlisted], more=more)}"
-            raise TrajectoryError(self.path, f"no body named {shown(self.requested)}", way_out)
+            raise TrajectoryError(self.path, f"no body named {shown(self.requested)}{self._near}", way_out)
         return [self.requested]
 
     def match(self, names: Iterable[str]) -> None:
@@ -191,6 +193,7 @@ class Selection:
             problem = f"no body named {shown(requested)}, and {len(alike)} that differ from it in their case alone"
             raise TrajectoryError(self.path, problem, f"name one of {listed(alike)}")
         self.requested = alike[0] if alike else requested
+        self._near = self._near or ("" if alike else did_you_mean(requested, names))
 
     def recording(self, trajectories: Sequence[Trajectory]) -> Recording:
         """Return the result, with what there is to say about the bodies that were taken, and those that were not."""
