@@ -156,6 +156,7 @@ def test_un_baking_gives_back_exactly_the_keys_and_the_motion(shot, baked, tmp_p
     assert_same(result[1][2], result[0][2])
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize(
     ("options", "frames", "interpolation"),
     [
@@ -172,6 +173,7 @@ def test_steps_that_may_be_held(tmp_path, options, frames, interpolation):
     assert {key.interpolation for curve in curves.values() for key in curve.keyframe_points[:-1]} == {interpolation}
 
 
+@pytest.mark.any_blender
 def test_a_name_that_nothing_has_is_said(shot, tmp_path, capsys):
     assert run(shot, "--output", tmp_path, "--objects", "Camera,Camra") == 1
     assert "--objects Camra: no object or bone of that name" in capsys.readouterr().err
@@ -193,6 +195,7 @@ def test_what_cannot_be_baked_is_named_with_the_way_out_and_the_others_go_on(sho
     assert not any("Plain" in line or "Still" in line for line in lines)
 
 
+@pytest.mark.any_blender
 def test_a_file_without_modes_is_left_alone(tmp_path, capsys):
     new_file()
     key(new_object("Plain"))
@@ -210,6 +213,7 @@ def test_a_file_of_an_older_blender_is_said_to_be_of_this_one_afterwards(tmp_pat
     assert "was saved by Blender 4.5; what is written is of Blender 9.0" in capsys.readouterr().err
 
 
+@pytest.mark.any_blender
 def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, capsys, monkeypatch):
     paths = [one_object_file(tmp_path / f"{name}.blend") for name in ("a", "b")]
     real = animation.bake
@@ -325,6 +329,7 @@ def test_an_installed_extension_steps_aside_and_is_there_again_afterwards(extens
     assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
 
 
+@pytest.mark.any_blender
 def test_keys_count_as_they_are_where_live_update_was_off(tmp_path):
     def edit(obj: bpy.types.Object) -> None:
         animation.set_enabled(False)

@@ -78,6 +78,7 @@ def test_a_baked_rig_plays_in_any_blender_as_the_live_one_does_with_the_extensio
     np.testing.assert_allclose(played, expected, atol=1e-4)
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize(
     ("asked", "bones", "itself"),
     [
@@ -94,6 +95,7 @@ def test_bones_can_be_chosen_by_rig_and_by_names_and_patterns(shot, tmp_path, as
         assert (baked_bones(rig), is_baked(rig)) == (bones, itself)
 
 
+@pytest.mark.any_blender
 def test_what_cannot_be_baked_of_a_rig_is_named_by_bone_and_the_others_go_on(tmp_path, capsys):
     def edit(rig: bpy.types.Object) -> None:
         index = rig.pose.bones["Index"].path_from_id("location")

@@ -44,6 +44,7 @@ def test_an_object_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_p
         assert set(modes_of(tool, key_frames(tool)[:-1])) == {mode}
 
 
+@pytest.mark.any_blender
 def test_a_tolerance_in_metres_is_that_in_a_scene_of_centimetres(tmp_path):
     path = object_file(tmp_path / "shot.blend")
     bpy.context.scene.unit_settings.scale_length = 0.01
@@ -67,6 +68,7 @@ def test_a_rig_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path,
     assert f"Rig: 3 bones reduced, {3 * len(FRAMES)} -> {sum(counts)} keys" in capsys.readouterr().err
 
 
+@pytest.mark.any_blender
 def test_bones_that_follow_constraints_are_named_and_what_hangs_on_them(tmp_path, capsys):
     path = rig_file(tmp_path / "shot.blend")
     bpy.data.objects["Rig"].pose.bones["Arm"].constraints.new("COPY_ROTATION").target = new_object("Target")
@@ -76,6 +78,7 @@ def test_bones_that_follow_constraints_are_named_and_what_hangs_on_them(tmp_path
     assert "; not guaranteed for bones that follow constraints or drivers, or their children: Arm, Hand\n" in said
 
 
+@pytest.mark.any_blender
 def test_key_poses_are_few_and_on_the_same_frames_for_all_bones(tmp_path, capsys):
     path = rig_file(tmp_path / "shot.blend")
     assert run(path, "--shared") == 0
@@ -89,6 +92,7 @@ def test_key_poses_are_few_and_on_the_same_frames_for_all_bones(tmp_path, capsys
     assert len(frames[0]) < len(FRAMES)
 
 
+@pytest.mark.any_blender
 def test_the_dense_keys_are_left_out_where_that_is_asked_for(tmp_path):
     path = object_file(tmp_path / "shot.blend")
     assert run(path, "--discard") == 0
@@ -98,6 +102,7 @@ def test_the_dense_keys_are_left_out_where_that_is_asked_for(tmp_path):
         assert [action.name for action in bpy.data.actions] == [bpy.data.objects["Tool"].animation_data.action.name]
 
 
+@pytest.mark.any_blender
 def test_what_needs_its_keys_is_left_alone_and_nothing_is_wrong(tmp_path, capsys):
     path = object_file(tmp_path / "shot.blend")
     assert run(path, "--tolerance", "0.00001mm") == 0
@@ -107,6 +112,7 @@ def test_what_needs_its_keys_is_left_alone_and_nothing_is_wrong(tmp_path, capsys
     assert listed(tmp_path) == ["shot.blend"]
 
 
+@pytest.mark.any_blender
 def test_what_is_asked_for_by_name_and_has_no_keys_is_told_why(tmp_path, capsys):
     path = object_file(tmp_path / "shot.blend")
     still = new_object("Still")
@@ -117,6 +123,7 @@ def test_what_is_asked_for_by_name_and_has_no_keys_is_told_why(tmp_path, capsys)
     assert not reduced_name(path).exists()
 
 
+@pytest.mark.any_blender
 def test_without_a_tolerance_a_rig_of_any_size_begins_with_one_that_fits_it(tmp_path):
     path = rig_file(tmp_path / "shot.blend")
     bpy.data.objects["Rig"].scale = (200.0,) * 3
@@ -126,6 +133,7 @@ def test_without_a_tolerance_a_rig_of_any_size_begins_with_one_that_fits_it(tmp_
     assert sum(count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones) < 3 * len(FRAMES) / 2
 
 
+@pytest.mark.any_blender
 def test_a_dry_run_says_all_also_as_json_and_writes_nothing(tmp_path, capsys):
     shot, hand, body = rig_file(tmp_path / "shot.blend"), tmp_path / "hand.csv", hand_made(tmp_path)
     write_csv(hand)

@@ -47,6 +47,7 @@ def test_the_keys_of_a_recording_tell_its_motion_within_the_tolerance(tmp_path, 
     assert said.out == f"{tmp_path / 'hand-keys.csv'}\n"
 
 
+@pytest.mark.any_blender
 def test_so_many_keys_of_a_recording_and_key_poses_of_a_body(tmp_path, capsys):
     path, body = tmp_path / "hand.csv", hand_made(tmp_path)
     times, poses = write_csv(path)
@@ -79,6 +80,7 @@ def test_as_a_blend_file_it_plays_like_the_recording_in_any_blender(tmp_path, fp
         assert set(modes_of(obj, key_frames(obj)[:-1])) == {"motor_spline"}
 
 
+@pytest.mark.any_blender
 def test_frames_are_the_samples_of_a_recording_whose_rate_is_no_whole_number(tmp_path):
     path = tmp_path / "hand.csv"
     write_csv(path, rate=29.97)
@@ -115,6 +117,7 @@ def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, 
     assert told == (options == ()), "which needed fewer keys is said where neither was asked for"
 
 
+@pytest.mark.any_blender
 def test_a_rigid_motion_becomes_curves_in_a_file_alone(tmp_path, capsys):
     hand = tmp_path / "hand.csv"
     write_csv(hand)
@@ -125,6 +128,7 @@ def test_a_rigid_motion_becomes_curves_in_a_file_alone(tmp_path, capsys):
     assert "what has curves becomes a .blend file: name that with --output" in capsys.readouterr().err
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("body", [mixed_rates(1.0), curved()], ids=["mixed rates", "curved"])
 def test_the_tolerance_holds_at_every_key_of_every_curve_and_between_them(tmp_path, capsys, body):
     source = body.write(tmp_path / "walk.glb")
@@ -141,6 +145,7 @@ def test_the_tolerance_holds_at_every_key_of_every_curve_and_between_them(tmp_pa
         assert off <= 1e-3 * float(told[1]) + more + ROUNDING
 
 
+@pytest.mark.any_blender
 def test_a_body_that_does_not_move_is_left_alone_and_nothing_is_wrong(tmp_path, capsys):
     write_body(tmp_path / "body.bvh", moves=False)
     assert run(tmp_path / "body.bvh") == 0
@@ -148,6 +153,7 @@ def test_a_body_that_does_not_move_is_left_alone_and_nothing_is_wrong(tmp_path, 
     assert listed(tmp_path) == ["body.bvh"]
 
 
+@pytest.mark.any_blender
 def test_a_body_that_grows_has_its_size_in_the_table_and_in_the_file(tmp_path):
     path = tmp_path / "balloon.csv"
     times, poses = write_csv(path)
