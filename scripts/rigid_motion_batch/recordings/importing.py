@@ -236,18 +236,12 @@ def run_operator(path: Path, what: str, do: Callable[[], object]) -> None:
 
 
 def _reason(path: Path, error: Exception) -> str:
-    """Return what an importer says: in its own words, or the last line of a traceback."""
+    """Return what an importer says: the last line of it, or of a traceback, where Blender adds what called it."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    if not lines:
-        return type(error).__name__
-    if any("Traceback (most recent call last)" in line for line in lines):
-        # Blender adds where it was called from.
-        lines = [line for line in lines if not line.startswith("Location:")]
-        said = lines[-1]
-    else:
-        said = " ".join(lines).removeprefix("Error: ").strip()
-        if not isinstance(error, RuntimeError):
-            said = f"{type(error).__name__}: {said}"
+    lines = [line for line in lines if not line.startswith("Location:")]
+    said = lines[-1].removeprefix("Error: ") if lines else ""
+    if not isinstance(error, RuntimeError):
+        said = f"{type(error).__name__}: {said}"
     said = said.replace(repr(str(path)), "it").replace(str(path), "it")
     return said if len(said) <= LONGEST_REASON else f"{said[:LONGEST_REASON]}..."
 
