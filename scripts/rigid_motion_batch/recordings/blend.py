@@ -102,7 +102,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
 
 def _sample(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
     moments, metres = _moments(path, body, scenes)
-    with looking(path, [body.obj], body.obj, [body.bone] if body.bone else []) as look:
+    with looking(path, [body.obj], body.obj, [body.bone] if body.bone else ()) as look:
         seen = sampled(moments, look, np.array([-1]), OF_OBJECTS, scale or metres)
     poses = filled(seen.poses)[0]
     if np.allclose(poses.scales, 1.0, atol=1e-6):

@@ -41,7 +41,7 @@ def single_motions(
 
     `radius` is that of the balls in which all points count, in metres; `metres` is the length of the unit.
     """
-    with looking(path, [] if bones else [rig], rig, bones) as look:
+    with looking(path, [rig], rig, bones) as look:
         seen = sampled(moments, look, np.full(len(names), -1), radius, metres)
     return seen.as_singles(names, moments, metres)
 
@@ -53,7 +53,10 @@ def looking(
     rig: bpy.types.Object | None = None,
     bones: Sequence[str] = (),
 ) -> Iterator[Look]:
-    """Look at bones of a rig in the world, or without any at objects, with everything that moves them."""
+    """Look at bones of a rig in the world, or without any at objects, with everything that moves them.
+
+    Objects are evaluated beside bones, too.
+    """
     with probe() as obj:
         if rig and bones:
             # The bones are evaluated that something depends on.
