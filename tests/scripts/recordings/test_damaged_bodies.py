@@ -16,7 +16,7 @@ from tests.thoroughness import THOROUGH
 
 bpy = pytest.importorskip("bpy")
 
-CASES = int(os.environ.get("RIGID_MOTION_FUZZ", "400" if THOROUGH else "40"))
+CASES = int(os.environ.get("RIGID_MOTION_FUZZ", "200" if THOROUGH else "40"))
 FIRST = int(os.environ.get("RIGID_MOTION_FUZZ_FROM", "0"))
 
 
@@ -55,7 +55,7 @@ def read_alone(source: str, number: int) -> bool:
     return readable
 
 
-@pytest.mark.parametrize(("ending", "kinds"), [(".fbx", FBX), (".glb", GLB)])
+@pytest.mark.parametrize(("ending", "kinds"), [(".fbx", FBX), pytest.param(".glb", GLB, marks=pytest.mark.any_blender)])
 def test_a_damaged_file_is_refused_or_read_or_the_end_of_a_process_but_never_an_error_of_ours(
     tmp_path: Path, reader: Reader, ending: str, kinds: tuple[Damage, ...]
 ) -> None:
