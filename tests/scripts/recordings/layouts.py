@@ -86,12 +86,7 @@ DOWN = flat(matrices().transpose(0, 2, 1))
 
 RAW: dict[str, Layout] = {
     "KITTI": Layout("take.txt", rows(flat(matrices(height=3))), COUNTED),
-    "KITTI with commas": Layout("take.csv", rows(flat(matrices(height=3)), separator=","), COUNTED),
     "matrices behind times": Layout("take.txt", rows(SECONDS, flat(matrices(height=3)))),
-    "matrices behind frames": Layout("take.txt", rows(NUMBERS, flat(matrices(height=3))), COUNTED),
-    "matrices before an error": Layout(
-        "take.csv", rows(MICROSECONDS / 1e3, flat(matrices(height=3)), 0.1 + 0.0 * SECONDS, separator=",")
-    ),
     "whole matrices": Layout("take.txt", rows(flat(matrices())), COUNTED),
     "whole matrices by columns": Layout("take.txt", rows(DOWN), COUNTED),
     "whole matrices behind times": Layout("take.txt", rows(SECONDS, flat(matrices()), separator="\t")),
@@ -105,11 +100,6 @@ RAW: dict[str, Layout] = {
     "TUM in nanoseconds": Layout("take.txt", rows(NANOSECONDS, *POSE)),
     "VINS": Layout(
         "take.csv", rows(NANOSECONDS, LEFT.positions, quaternions("wxyz"), separator=",", end=","), warned=True
-    ),
-    "VINS with velocities": Layout(
-        "take.csv",
-        rows(NANOSECONDS, LEFT.positions, quaternions("wxyz"), LEFT.positions, separator=",", end=","),
-        warned=True,
     ),
     "EuRoC without names": Layout(
         "take.csv",
@@ -150,14 +140,10 @@ _bag = (
 
 NAMED: dict[str, Layout] = {
     "named matrices": Layout("take.csv", csv("time," + places("m{}{}", 4), SECONDS, flat(matrices()))),
-    "named matrices from 1": Layout("take.csv", csv("time," + places("M{}{}", 4, 1), SECONDS, flat(matrices()))),
     "named matrices by columns": Layout("take.csv", csv("time," + places("m{}{}", 4), SECONDS, DOWN)),
     "T[0][3]": Layout("take.csv", csv("t," + places("T[{}][{}]", 3), SECONDS, flat(matrices(height=3)))),
     "HmdMatrix34": Layout(
         "take.csv", csv("t," + places("hmd_m[{}][{}]", 3), SECONDS, flat(matrices(height=3))), bodies=("hmd",)
-    ),
-    "pose_0 to pose_11": Layout(
-        "take.csv", csv("t," + ",".join(f"pose_{place}" for place in range(12)), SECONDS, flat(matrices(height=3)))
     ),
     "matrix[0] to matrix[15]": Layout(
         "take.csv", csv("t," + ",".join(f"matrix[{place}]" for place in range(16)), SECONDS, flat(matrices()))
@@ -179,7 +165,6 @@ NAMED: dict[str, Layout] = {
         ),
     ),
     "EuRoC": Layout("take.csv", csv(EUROC, *_euroc)),
-    "EuRoC in text": Layout("take.txt", csv(EUROC, *_euroc)),
     "EuRoC without units": Layout("take.csv", csv(EUROC.replace(" [ns]", "").replace(" []", ""), *_euroc)),
     "rostopic": Layout(
         "take.csv",

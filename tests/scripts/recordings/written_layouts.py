@@ -8,7 +8,6 @@ import numpy as np
 from tests.scripts.recordings.layouts import (
     BOTH,
     COUNTED,
-    EUROC,
     LEFT,
     NANOSECONDS,
     NUMBERS,
@@ -17,12 +16,10 @@ from tests.scripts.recordings.layouts import (
     SECONDS,
     Layout,
     csv,
-    names,
     quaternions,
     rows,
 )
 from tests.scripts.recordings.logs import COUNT, MICROSECONDS
-from tests.scripts.recordings.optical_layouts import OPTICAL
 
 HEADER = "t,x,y,z,qx,qy,qz,qw"
 UNITS = '"t [ms]","x [mm]","y [mm]","z [mm]","qx","qy","qz","qw"'
@@ -51,7 +48,6 @@ ENCODED: dict[str, Layout] = {
     "tabs and decimal commas": Layout("take.tsv", GERMAN.replace(";", "\t")),
     "blanks": Layout("take.txt", PLAIN.replace(",", "   ")),
     "quoted names": Layout("take.csv", PLAIN.replace(HEADER, each_cell(HEADER, '"{}"'.format).strip())),
-    "quoted cells": Layout("take.csv", each_cell(PLAIN, '"{}"'.format)),
     "quoted names with units and decimal commas": Layout("take.csv", IN_UNITS.replace(".", ",")),
     "UTF-8 with a mark": Layout("take.csv", b"\xef\xbb\xbf" + PLAIN.encode()),
     "UTF-16, little end first": Layout("take.csv", b"\xff\xfe" + PLAIN.encode("utf-16-le")),
@@ -76,19 +72,8 @@ ENCODED: dict[str, Layout] = {
         HEADER
         + each_cell("\n" + rows(SECONDS, *POSE, separator=","), lambda cell: f"{float(cell):+.17E}" if cell else ""),
     ),
-    "no zero before the point": Layout(
-        "take.csv", each_cell(PLAIN, lambda cell: cell.replace("0.", ".", 1) if "0." in cell[:3] else cell)
-    ),
     "TUM in UTF-8 with a mark": Layout("take.tum", b"\xef\xbb\xbf" + TUM.encode()),
-    "TUM in UTF-16": Layout("take.txt", TUM.encode("utf-16")),
-    "EuRoC in text with CRLF": Layout(
-        "take.txt", ended(csv(EUROC, NANOSECONDS, LEFT.positions, quaternions("wxyz"), np.ones((COUNT, 6))))
-    ),
     "g2o backwards": Layout("take.txt", reversed_lines(str(OTHERS["g2o"].text)), COUNTED),
-    "Motive with CRLF and a mark": Layout(
-        "take.csv", b"\xef\xbb\xbf" + ended(str(OPTICAL["Motive"].text)), bodies=("Tool",)
-    ),
-    "Vicon with CRLF": Layout("take.csv", ended(str(OPTICAL["Vicon"].text)), {}, ("Tool:Tool", "Cup:Cup"), True),
 }
 
 
@@ -174,14 +159,6 @@ MEANT: dict[str, Layout] = {
             vectors('"X={} Y={} Z={}"', LEFT.positions),
             vectors('"X={} Y={} Z={} W={}"', quaternions()),
         ),
-    ),
-    "rostopic in quotes": Layout(
-        "take.csv",
-        csv('"%time",' + names('"field.pose.position.{}"', '"field.pose.orientation.{}"'), NANOSECONDS, *POSE),
-    ),
-    "PX4 with dots": Layout(
-        "take.csv",
-        csv("timestamp,q.0,q.1,q.2,q.3,x,y,z,vx", MICROSECONDS + 10**8, quaternions("wxyz"), LEFT.positions, SECONDS),
     ),
     "a unit of time that is said": Layout(
         "take.csv", csv("t [min]" + HEADER[1:], MICROSECONDS / 1e3, *POSE), {"time_unit": "ms"}
