@@ -10,21 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from rigid_motion.motion import Poses
-
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, moments_of
-from .looks import LAST_FRAME, looking
-from .matrices import filled, growing
+from .looks import LAST_FRAME, single_motions
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import ALL, Selection, Trajectory, TrajectoryError, shown
 from .rigs import armature_of, in_blender, whole_body
-from .sampling import JUMP_STEPS, OF_OBJECTS, Moments, merged, sampled
+from .sampling import JUMP_STEPS, OF_OBJECTS, Moments, merged
 
 if TYPE_CHECKING:
     import bpy
@@ -102,13 +99,9 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
 
 def _sample(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
     moments, metres = _moments(path, body, scenes)
-    with looking(path, [body.obj], body.obj, [body.bone] if body.bone else ()) as look:
-        seen = sampled(moments, look, np.array([-1]), OF_OBJECTS, scale or metres)
-    poses = filled(seen.poses)[0]
-    if np.allclose(poses.scales, 1.0, atol=1e-6):
-        poses = Poses(poses.positions, poses.quaternions)
-    trajectory = Trajectory(body.name, moments.times(seen.frames), poses, metres, _remark(body, poses))
-    return seen.described(trajectory, moments, scale or metres)
+    bones = [body.bone] if body.bone else []
+    (result,) = single_motions(path, body.obj, bones, [body.name], moments, OF_OBJECTS, scale or metres)
+    return replace(result, metres_per_unit=metres)
 
 
 def _sample_whole(path: Path, rig: bpy.types.Object, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
@@ -136,14 +129,6 @@ def _moments(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], name: s
     return Moments(
         merged(whole, keys, 1.0), rate / base, straight=straight
     ), 1.0 if units.system == "NONE" else units.scale_length
-
-
-def _remark(body: BlendBody, poses: Poses) -> str:
-    """Return what the size of its rig does to a bone."""
-    if body.bone is None or poses.scales is None or growing(poses).scales is not None:
-        return ""
-    size = f"{poses.scales[0]:.4g} times its own size"
-    return f"{body.name} is {size} all along, and so are the shell of its errors (--radius) and what a video shows"
 
 
 def _bones_are_moved(obj: bpy.types.Object) -> bool:
