@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigid_motion.motion import Poses, shell_error
+from rigid_motion.motion.poses import joined
 from rigid_motion.motion.quaternions import turned
-from rigid_motion.streams import Receiver, Sender, StreamBody
+from rigid_motion.streams import Receiver, Sender, Shown, StreamBody
 from rigid_motion.streams.bodies import Forest
 from rigid_motion.streams.coding import BASES_TABLE, Coder
 from rigid_motion.streams.paths import KnotPath
-from rigid_motion.streams.wire import EncodedMotion, read
+from rigid_motion.streams.wire import Description, EncodedMotion, read
 
 AHEAD = 1000.0
 """By how many seconds the receiver's clock is ahead."""
 
 
-def body(joints: int = 8, radius: float = 0.03) -> StreamBody:
+def body(joints: int = 5, radius: float = 0.03) -> StreamBody:
     """A chain of joints with two branches, a quarter of a metre from each to the next."""
     parents = np.array([-1, *(max(joint - 1 - (joint == joints - 2), 0) for joint in range(1, joints))])
     rest = Poses(np.tile((0.0, 0.0, 0.25), (joints, 1)), np.tile((1.0, 0.0, 0.0, 0.0), (joints, 1)))
@@ -56,6 +57,8 @@ class Outcome:
     receiver: Receiver
     datagrams: list[tuple[float, bytes]] = field(default_factory=list)
     """When they were sent."""
+    shown: Sequence[Shown] = ()
+    """What was drawn, from when the motion had begun."""
     now: np.ndarray | None = None
     """When it was drawn, by the sender's clock, shape (n,)."""
     moments: np.ndarray | None = None
@@ -67,26 +70,44 @@ class Outcome:
     turned_back: np.ndarray | None = None
     """How far any joint went against its step before, where the motion itself did not, metres, shape (n - 2,)."""
 
+    @property
+    def size(self) -> float:
+        """The bytes a second, with headers, of all that was sent but descriptions."""
+        sizes = [len(datagram) + 28 for _, datagram in self.datagrams if not isinstance(read(datagram), Description)]
+        return sum(sizes) / (self.datagrams[-1][0] - self.datagrams[0][0])
+
     def between(self, first: float, last: float) -> np.ndarray:
         """The errors of what was drawn from one time to another."""
         return self.errors[(self.now >= first) & (self.now < last)]
 
 
+def talk(sender: Sender, receiver: Receiver, now: float, sample: Poses, *, answers: bool = True) -> list[bytes]:
+    """Say a sample, and hear the answers, where nothing is lost and it takes no time; what is said."""
+    said = sender.add(now, sample)
+    for datagram in said:
+        receiver.take(datagram, now, "sender")
+    for _, answer in receiver.answers() if answers else ():
+        sender.take_answer(answer, now)
+    return said
+
+
 def run(
-    own: StreamBody,
+    bodies: list[StreamBody],
     times: np.ndarray,
     poses: Poses,
     *,
+    says: Mapping[int, tuple] | None = None,
     delay: float = 0.1,
     tolerance: float = 0.005,
     latency: float | Callable[[float], float] = 0.02,
     jitter: float = 0.0,
+    loss: float = 0.0,
     lost: Callable[[float, int], bool] = lambda now, number: False,
     answers: bool = True,
     clock: Callable[[float], float] = lambda now: now + AHEAD,
     set_by: Callable[[float], float] = lambda now: 0.0,
     drained: Callable[[float], float] = lambda now: now,
-    fps: float = 144.0,
+    fps: float = 100.0,
     copies: int = 1,
     rate: float | None = None,
     heard_from: float = 0.0,
@@ -95,12 +116,12 @@ def run(
 ) -> Outcome:
     """Play samples (n,) of poses (joints, n), and draw what is shown.
 
-    `lost` says of the time and the number of a datagram whether it is lost; `set_by` is what somebody added to the
-    sender's clock; `drained` says when what came is taken out of the receiver's socket; `heard_from` is when the
-    receiver begins. With a `lag`, what is shown is compared with what was so long ago, and not with what was at the
-    moment that is said to be shown.
+    At some samples it is said who holds what from then on. Of datagrams `loss` is lost, and what `lost` says by the
+    time and the number of a datagram; `set_by` is what somebody added to the sender's clock; `drained` says when what
+    came is taken out of the receiver's socket; `heard_from` is when the receiver begins. With a `lag`, what is shown is
+    compared with what was so long ago, and not with what was at the moment that is said to be shown.
     """
-    rng, sender, receiver = np.random.default_rng(seed), Sender([own], tolerance, delay, rate), Receiver()
+    rng, sender, receiver = np.random.default_rng(seed), Sender(bodies, tolerance, delay, rate), Receiver()
     outcome, pending, count = Outcome(sender, receiver), [], 0
 
     def post(datagrams: list[bytes], now: float, back: bool = False) -> None:
@@ -109,7 +130,7 @@ def run(
             if not back:
                 outcome.datagrams.append((now, datagram))
             count += 1
-            if lost(now, count):
+            if lost(now, count) or (loss and rng.random() < loss):
                 continue
             for _ in range(copies):
                 takes = (latency(now) if callable(latency) else latency) + jitter * rng.random()
@@ -131,31 +152,34 @@ def run(
     before = -np.inf
     for now, frame, row in events:
         set_now = set_by(now)
-        while not frame and row and sender.next - set_now < now:
+        overdue = bool(not frame and row)
+        while overdue and sender.next - set_now < now:
             due = max(sender.next - set_now, before)
             come(due)
-            post(sender.poll(due + set_now), due)
+            said = sender.poll(due + set_now)
+            post(said, due)
+            # Where its clock was set there is nothing to say, as the sample is going to tell.
+            overdue = bool(said)
         come(now)
         if frame:
-            drawn += [(now, shown.moment, shown.poses[own.name]) for shown in receiver.show(clock(now)).values()]
+            drawn += [(now, shown) for shown in receiver.show(clock(now)).values() if shown.moment >= times[0]]
         else:
+            if says and row in says:
+                sender.hold(*says[row])
             post(sender.add(float(now + set_now), poses[:, row]), now)
             come(now)
             before = now
     if drawn:
-        compare(outcome, own, KnotPath(times, poses), drawn, lag)
+        moments, outcome.shown = zip(*drawn, strict=True)
+        outcome.now = np.array(moments)
+        compare(outcome, Forest(bodies), KnotPath(times, poses), lag)
     return outcome
 
 
-def compare(outcome: Outcome, own: StreamBody, truth: KnotPath, drawn: list, lag: float | None = None) -> None:
-    """Note how far off was what was drawn, from when the motion had begun."""
-    drawn = [frame for frame in drawn if frame[1] >= truth.moments[0]]
-    outcome.now, outcome.moments = (np.array([frame[number] for frame in drawn]) for number in (0, 1))
-    shown = Poses(
-        np.stack([frame[2].positions for frame in drawn], axis=1),
-        np.stack([frame[2].quaternions for frame in drawn], axis=1),
-    )
-    forest = Forest([own])
+def compare(outcome: Outcome, forest: Forest, truth: KnotPath, lag: float | None) -> None:
+    """Note how far off was what was drawn."""
+    outcome.moments = np.array([shown.moment for shown in outcome.shown])
+    shown = joined([forest.joined(shown.poses)[:, None] for shown in outcome.shown], axis=1)
     there = forest.skeleton.in_root_space(shown)
     true = forest.skeleton.in_root_space(truth.at(outcome.moments if lag is None else outcome.now - lag))
     outcome.errors = shell_error(there, true, forest.radii[:, None]).max(axis=0)

@@ -13,7 +13,8 @@ import zlib
 import numpy as np
 import pytest
 
-from rigid_motion.streams import Receiver, Sender, StreamBody
+from rigid_motion.motion.poses import joined
+from rigid_motion.streams import Receiver, Sender, StreamBody, vmc
 from rigid_motion.streams.coding import Coder
 from rigid_motion.streams.messages import Codec
 from rigid_motion.streams.receiver import MOST_ALL_JOINTS, MOST_STREAMS
@@ -35,9 +36,15 @@ RENEWED = 200
 
 @pytest.fixture(scope="module")
 def genuine() -> list[bytes]:
-    own = body()
-    outcome = run(own, *dance(own, 3.0), answers=False)
-    return [datagram for _, datagram in outcome.datagrams]
+    """Of a performer who takes a tool, and of a program that sends VMC."""
+    own, tool = body(), StreamBody.rigid("tool")
+    times, poses = dance(own, 3.0)
+    both = joined((poses, poses[-1:]))
+    outcome = run([own, tool], times, both, says={60: ("tool", own.name, own.joints[-1])}, answers=False)
+    frames = [dict.fromkeys(vmc.JOINTS, poses[0, row]) for row in range(5)]
+    return [datagram for _, datagram in outcome.datagrams] + [
+        datagram for row, frame in enumerate(frames) for datagram in vmc.write(times[row], frame)
+    ]
 
 
 def damaged(rng: np.random.Generator, genuine: list[bytes]) -> bytes:

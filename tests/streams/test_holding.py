@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import heapq
-import tracemalloc
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.motion import Poses, shell_error
@@ -16,12 +15,10 @@ from rigid_motion.streams import Receiver, Sender, Shown, StreamBody
 from rigid_motion.streams.bodies import LEVER_LEVELS, Forest
 from rigid_motion.streams.coding import BASES_TABLE, HANDS_TABLE, Coder
 from rigid_motion.streams.messages import Codec
-from rigid_motion.streams.paths import KnotPath
-from rigid_motion.streams.sender import MAX_SEQUENCE_NUMBER
-from rigid_motion.streams.wire import WIRE_VERSION, Description, EncodedMotion, Terms, read, write
+from rigid_motion.streams.wire import WIRE_VERSION, Terms
 from tests.thoroughness import combined, tried
 
-from .links import body, dance
+from .links import body, dance, run, talk
 
 SLACK, SLIP = 1.02, 0.003
 TURNED = np.array((0.8, 0.3, -0.4, 0.3316624790355400))
@@ -30,8 +27,6 @@ IN_HAND = Poses([[0.05, 0.16, 0.24]], [TURNED])
 
 LEFT, RIGHT, TOOL = (StreamBody.rigid(name, radius=0.1) for name in ("left", "right", "tool"))
 SPEED = 3.0
-
-Say = tuple[str, str | None] | tuple[str, str, str]
 
 
 def hands(seconds: float, rate: float = 60.0) -> tuple[np.ndarray, Poses, Poses]:
@@ -47,155 +42,84 @@ def in_hand(hand: Poses) -> Poses:
     return placed(hand, IN_HAND[np.zeros(len(hand), dtype=int)])
 
 
-def play(
-    bodies: list[StreamBody],
-    times: np.ndarray,
-    poses: Poses,
-    says: dict[int, Say],
-    *,
-    loss: float = 0.0,
-    answers: bool = True,
-    latency: float = 0.02,
-    jitter: float = 0.0,
-    seed: int = 1,
-    fps: float = 144.0,
-) -> tuple[list[Shown], float]:
-    """What is drawn of samples (n,) of poses (joints, n), at some of which it is said who holds what from then on; and
-    the bytes a second, with headers, of all but descriptions.
-    """
-    rng, sender, receiver = np.random.default_rng(seed), Sender(bodies, rate=1.0 / times[1]), Receiver()
-    pending: list[tuple[float, int, bool, bytes]] = []
-    size, count = 0, 0
-
-    def post(datagrams: list[bytes], now: float, back: bool = False) -> None:
-        nonlocal size, count
-        for datagram in datagrams:
-            count += 1
-            if not back and not isinstance(read(datagram), Description):
-                size += len(datagram) + 28
-            if rng.random() >= loss:
-                heapq.heappush(pending, (now + latency + jitter * rng.random(), count, back, datagram))
-
-    def come(until: float) -> None:
-        while pending and pending[0][0] <= until:
-            now, _, back, datagram = heapq.heappop(pending)
-            if back:
-                post(sender.take_answer(datagram, now), now)
-                continue
-            receiver.take(datagram, now, "sender")
-            if answers:
-                post([answer for _, answer in receiver.answers()], now, back=True)
-
-    shown: list[Shown] = []
-    frames = np.arange(times[0], times[-1], 1.0 / fps)
-    for now, frame, row in sorted([*((t, 0, row) for row, t in enumerate(times)), *((t, 1, 0) for t in frames)]):
-        come(now)
-        if frame:
-            shown += receiver.show(now).values()
-            continue
-        while row and sender.next < now:
-            post(sender.poll(due := sender.next), due)
-        if row in says:
-            sender.hold(*says[row])
-        post(sender.add(float(now), poses[:, row]), now)
-        come(now)
-    return [what for what in shown if what.moment >= times[0]], size / float(times[-1] - times[0])
-
-
-def places(shown: list[Shown], name: str) -> Poses:
+def places(shown: Sequence[Shown], name: str) -> Poses:
     """Where a rigid body was shown (n,)."""
     return joined([what.poses[name] for what in shown])
 
 
-def slips(shown: list[Shown], hand: str) -> np.ndarray:
+def slips(shown: Sequence[Shown], hand: str) -> np.ndarray:
     """How far the tool was shown from its place in a hand (n,), in metres."""
     own, there = places(shown, "tool"), in_hand(places(shown, hand))
     return shell_error(own, there, 0.1)
 
 
-@pytest.mark.parametrize(("loss", "answers"), combined([0.0, 0.01, 0.05], [True, False]))
+@pytest.mark.parametrize(("loss", "answers"), combined([0.0, 0.05], [True, False]))
 def test_what_is_held_does_not_slip_and_costs_next_to_nothing(loss: float, answers: bool) -> None:
-    times, left, _ = hands(12.0)
-    both, settings = joined((left[None], in_hand(left)[None])), {"loss": loss, "answers": answers}
-    shown, size = play([LEFT, TOOL], times, both, {0: ("tool", "left")}, **settings)
-    assert slips(shown, "left").max() <= SLIP
-    in_world, of_both = play([LEFT, TOOL], times, both, {}, **settings)
-    assert slips(in_world, "left").max() > 2.0 * SLIP
-    assert size < of_both
+    times, left, _ = hands(6.0)
+    both = joined((left[None], in_hand(left)[None]))
+    settings = {"loss": loss, "answers": answers, "rate": 60.0}
+    held = run([LEFT, TOOL], times, both, says={0: ("tool", "left")}, **settings)
+    assert slips(held.shown, "left").max() <= SLIP
+    in_world = run([LEFT, TOOL], times, both, **settings)
+    assert slips(in_world.shown, "left").max() > 2.0 * SLIP
+    assert held.size < in_world.size
     # As much as the hand alone costs, with a ball that the tool is within.
     reach = float(np.linalg.norm(IN_HAND.positions)) + 0.1
-    _, alone = play([StreamBody.rigid("left", radius=reach)], times, left[None], {}, **settings)
-    assert size <= alone + 5.0
-    if not loss:
-        moments = np.array([what.moment for what in shown])
-        there = joined((places(shown, "left")[None], places(shown, "tool")[None]))
-        assert Forest([LEFT, TOOL]).errors(there, KnotPath(times, both).at(moments)).max() <= 0.005 * SLACK
+    alone = run([StreamBody.rigid("left", radius=reach)], times, left[None], **settings)
+    assert held.size <= alone.size + 10.0
+    assert loss or held.errors.max() <= 0.005 * SLACK
 
 
 @pytest.mark.parametrize("seed", range(tried(4)))
-@pytest.mark.parametrize(("loss", "answers"), combined([0.0, 0.05, 0.2], [True, False]))
+@pytest.mark.parametrize(("loss", "answers"), combined([0.0, 0.2], [True, False]))
 def test_at_a_hand_over_it_is_in_the_one_hand_or_the_other(loss: float, answers: bool, seed: int) -> None:
-    times, left, right = hands(6.0)
-    taken = 150 + 7 * seed
+    times, left, right = hands(4.0)
+    taken = 100 + 7 * seed
     tool = joined((in_hand(left)[:taken], in_hand(right)[taken:]))
-    shown, _ = play(
-        [LEFT, RIGHT, TOOL],
-        times,
-        joined((left[None], right[None], tool[None])),
-        {0: ("tool", "left"), taken: ("tool", "right")},
-        loss=loss,
-        answers=answers,
-        jitter=0.03 if loss else 0.0,
-        seed=seed,
+    poses, says = joined((left[None], right[None], tool[None])), {0: ("tool", "left"), taken: ("tool", "right")}
+    jitter = 0.03 if loss else 0.0
+    outcome = run(
+        [LEFT, RIGHT, TOOL], times, poses, says=says, loss=loss, answers=answers, jitter=jitter, seed=seed, rate=60.0
     )
-    off = np.stack([slips(shown, hand) for hand in ("left", "right")])
+    off = np.stack([slips(outcome.shown, hand) for hand in ("left", "right")])
     assert off.min(axis=0).max() <= SLIP
-    where, moments = np.argmin(off, axis=0), np.array([what.moment for what in shown])
+    where = np.argmin(off, axis=0)
     assert np.count_nonzero(np.diff(where)) == 1
-    assert [what.held["tool"].body for what in shown] == [("left", "right")[hand] for hand in where]
+    assert [what.held["tool"].body for what in outcome.shown] == [("left", "right")[hand] for hand in where]
     # Never later than the first message that came.
-    late = moments[np.argmax(where)] - times[taken]
-    assert -1e-3 <= late <= (1.0 / 144.0 if not loss else 1.2)
+    late = outcome.moments[np.argmax(where)] - times[taken]
+    assert -1e-3 <= late <= (1.0 / 100.0 if not loss else 1.2)
 
 
-@pytest.mark.parametrize("answers", [True, False])
-@pytest.mark.parametrize("rate", [30.0, 60.0, 90.5])
+@pytest.mark.parametrize(("rate", "answers"), combined([30.0, 60.0, 90.5], [True, False]))
 def test_what_is_taken_up_and_thrown_is_within_the_tolerance(rate: float, answers: bool) -> None:
-    times, left, _ = hands(5.0, rate)
-    taken, thrown = round(1.5 * rate), round(3.2 * rate)
+    times, left, _ = hands(3.0, rate)
+    taken, thrown = round(1.0 * rate), round(2.0 * rate)
     tool = in_hand(left)
     tool.positions[:taken], tool.quaternions[:taken] = tool.positions[taken], tool.quaternions[taken]
     flight = (times[thrown:] - times[thrown])[:, None]
     tool.positions[thrown:] = tool.positions[thrown] + flight * (1.0, -1.5, 2.0) - flight**2 * (0.0, 0.0, 4.9)
     tool.quaternions[thrown:] = tool.quaternions[thrown]
-    poses = joined((left[None], tool[None]))
     says = {taken: ("tool", "left"), thrown: ("tool", None)}
-    shown, _ = play([LEFT, TOOL], times, poses, says, answers=answers, fps=1000.0)
-    moments = np.array([what.moment for what in shown])
-    off = Forest([LEFT, TOOL]).errors(
-        joined((places(shown, "left")[None], places(shown, "tool")[None])), KnotPath(times, poses).at(moments)
-    )
+    poses = joined((left[None], tool[None]))
+    outcome = run([LEFT, TOOL], times, poses, says=says, answers=answers, fps=500.0, rate=rate)
+    moments = outcome.moments
     # Between the two samples around it nobody knows when it was.
     known = ~np.any([(moments > times[row - 1]) & (moments < times[row]) for row in says], axis=0)
-    assert off[:, known].max() <= 0.005 * SLACK
+    assert outcome.errors[known].max() <= 0.005 * SLACK
     held = (moments > times[taken]) & (moments < times[thrown - 1])
-    assert slips(shown, "left")[held].max() <= SLIP
+    assert slips(outcome.shown, "left")[held].max() <= SLIP
 
 
 def test_a_joint_of_a_skeleton_holds_what_comes_before_it() -> None:
-    own = body(6)
-    times, poses = dance(own, 4.0)
+    own = body()
+    times, poses = dance(own, 3.0)
     tool = in_hand(own.skeleton.in_root_space(poses)[4])
-    shown, _ = play([TOOL, own], times, joined((tool[None], poses)), {0: ("tool", "performer", "joint 4")})
-    held = shown[-1].held["tool"]
+    says = {0: ("tool", "performer", "joint 4")}
+    outcome = run([TOOL, own], times, joined((tool[None], poses)), says=says, rate=60.0)
+    held = outcome.shown[-1].held["tool"]
     assert (held.body, held.joint) == ("performer", "joint 4")
-    forest = Forest([TOOL, own])
-    truth = KnotPath(times, joined((tool[None], poses)))
-    off = [
-        forest.errors(joined([what.poses["tool"], what.poses["performer"]])[:, None], truth.at(np.array([what.moment])))
-        for what in shown
-    ]
-    assert np.max(off) <= 0.005 * SLACK
+    assert outcome.errors.max() <= 0.005 * SLACK
 
 
 def test_keys_are_in_the_world_and_do_not_go_between_two_hands() -> None:
@@ -207,10 +131,7 @@ def test_keys_are_in_the_world_and_do_not_go_between_two_hands() -> None:
     for row, now in enumerate(times.tolist()):
         if row in (0, taken):
             sender.hold("tool", "left" if row == 0 else "right")
-        for datagram in sender.add(now, joined((left[row : row + 1], right[row : row + 1], tool[row : row + 1]))):
-            receiver.take(datagram, now)
-        for _, answer in receiver.answers():
-            sender.take_answer(answer, now)
+        talk(sender, receiver, now, joined((left[row : row + 1], right[row : row + 1], tool[row : row + 1])))
         came += receiver.keys()
     moments = np.concatenate([keys.moments for keys in came])
     poses = {name: joined([keys.poses[name][0] for keys in came]) for name in ("left", "right", "tool")}
@@ -256,8 +177,9 @@ def test_what_cannot_be_held_is_refused(tool: str, holder: str, joint: str | Non
 WHO = st.sampled_from([("left", None), ("right", None), ("performer", "joint 2"), (None, None)])
 
 
+@settings(max_examples=tried(60))
 @given(
-    st.lists(st.tuples(st.integers(0, 80), st.sampled_from(["tool", "cup", "right"]), WHO), max_size=8),
+    st.lists(st.tuples(st.integers(0, 50), st.sampled_from(["tool", "cup", "right"]), WHO), max_size=8),
     st.sampled_from([0.0, 0.1, 0.5]),
     st.booleans(),
     st.integers(0, 1 << 30),
@@ -265,11 +187,15 @@ WHO = st.sampled_from([("left", None), ("right", None), ("performer", "joint 2")
 def test_whoever_takes_what_whenever_all_is_shown_where_it_is_in_the_end(
     says: list, loss: float, answers: bool, seed: int
 ) -> None:
-    """Datagrams are lost, come twice and in any order until then."""
+    """Datagrams are lost, come twice and in any order until then.
+
+    Afterwards there is time for a message that builds on nothing, and for what is shown to get there, which is as late
+    as anything came.
+    """
     bodies = [LEFT, RIGHT, TOOL, StreamBody.rigid("cup"), body(4)]
     forest, rng = Forest(bodies), np.random.default_rng(seed)
     sender, receiver, late = Sender(bodies, rate=60.0), Receiver(), []
-    dances = [dance(own, 2.4, 60.0, SPEED, number) for number, own in enumerate(bodies)]
+    dances = [dance(own, 2.7, 60.0, SPEED, number) for number, own in enumerate(bodies)]
     poses = joined([own for _, own in dances])
     for row, now in enumerate(dances[0][0].tolist()):
         for when, tool, holder in says:
@@ -278,8 +204,8 @@ def test_whoever_takes_what_whenever_all_is_shown_where_it_is_in_the_end(
                     sender.hold(tool, *holder)
                 except ValueError as error:
                     assert "hangs on itself" in str(error)  # noqa: PT017
-        lossy = row < 70
-        came = sender.add(now, poses[:, min(row, 70)]) + (sender.poll(sender.next) if lossy and row % 7 == 0 else [])
+        lossy = row < 40
+        came = sender.add(now, poses[:, min(row, 40)]) + (sender.poll(sender.next) if lossy and row % 7 == 0 else [])
         late += [datagram for datagram in came if rng.random() >= loss or not lossy]
         if lossy and loss:
             rng.shuffle(late)
@@ -297,7 +223,7 @@ def test_whoever_takes_what_whenever_all_is_shown_where_it_is_in_the_end(
         for shown in receiver.show(now).values():
             assert all(np.isfinite(own.positions).all() for own in shown.poses.values())
     (shown,) = receiver.show(now).values()
-    truth = forest.skeleton.in_root_space(poses[:, 70:71])
+    truth = forest.skeleton.in_root_space(poses[:, 40:41])
     there = forest.skeleton.in_root_space(joined([shown.poses[own.name] for own in bodies])[:, None])
     assert shell_error(there, truth, forest.radii[:, None]).max() <= 0.0051
     holders = sender._codec.forest.holders
@@ -307,8 +233,8 @@ def test_whoever_takes_what_whenever_all_is_shown_where_it_is_in_the_end(
 # Whatever comes
 
 
-def forged(codec: Codec, rng: np.random.Generator, holds: list[tuple[int, int, int]], noise: int) -> bytes:
-    """A message that builds on nothing, with something held, and anything behind that."""
+def forged(codec: Codec, rng: np.random.Generator, holds: list[tuple[int, int, int]]) -> bytes:
+    """A message that builds on nothing, with something held."""
     coder = Coder()
     coder.symbol(BASES_TABLE, 0)
     coder.digits(48, int(rng.integers(1 << 20)))
@@ -319,7 +245,7 @@ def forged(codec: Codec, rng: np.random.Generator, holds: list[tuple[int, int, i
         coder.flat(len(codec.forest.bodies), owned)
         coder.flat(len(codec.forest), joint)
         coder.flat(LEVER_LEVELS, level)
-    return coder.finish() + rng.bytes(noise)
+    return coder.finish()
 
 
 def test_what_holds_itself_is_no_message() -> None:
@@ -327,7 +253,7 @@ def test_what_holds_itself_is_no_message() -> None:
     codec, rng = Codec(Forest(bodies), Terms(0.005, 360, 60)), np.random.default_rng(1)
 
     def known(holds: list[tuple[int, int, int]]) -> bool:
-        return codec.code(Coder(forged(codec, rng, holds, 0)), lambda _: None) is not None
+        return codec.code(Coder(forged(codec, rng, holds)), lambda _: None) is not None
 
     assert known([(2, 0, 80)])
     assert known([(0, 2, 80), (2, 3, 0)])
@@ -339,32 +265,6 @@ def test_what_holds_itself_is_no_message() -> None:
         [(2, 0, 80), (0, 1, 80)],
     ):
         assert not known(wrong)
-
-
-@pytest.mark.parametrize("seed", range(tried(3)))
-def test_any_hands_do_no_harm(seed: int) -> None:
-    rng, bodies = np.random.default_rng(seed), [LEFT, RIGHT, TOOL, body(40)]
-    sender, receiver = Sender(bodies), Receiver()
-    codec, rest = sender.codec, joined([own.rest for own in bodies])
-    for datagram in [*sender.describe(), *sender.add(0.0, rest)]:
-        receiver.take(datagram, 0.0, "stranger")
-    tracemalloc.start()
-    for number in range(600):
-        holds = sorted(
-            {
-                int(own): (int(own), int(rng.integers(len(codec.forest))), int(rng.integers(LEVER_LEVELS)))
-                for own in rng.integers(4, size=rng.integers(4))
-            }.values()
-        )
-        data = forged(codec, rng, holds, int(rng.integers(60)))
-        sequence = int(rng.integers(MAX_SEQUENCE_NUMBER)) if rng.random() < 0.1 else number
-        receiver.take(write(EncodedMotion(sender.identity, sequence, data)), number / 60.0, "stranger")
-        for shown in receiver.show(number / 60.0).values():
-            assert all(np.isfinite(own.positions).all() for own in shown.poses.values())
-        receiver.keys()
-        receiver.answers()
-    assert tracemalloc.get_traced_memory()[1] < 32 << 20
-    tracemalloc.stop()
 
 
 def test_another_version_is_one_line_with_the_way_out() -> None:
