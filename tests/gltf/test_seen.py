@@ -6,13 +6,14 @@
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rigid_motion.gltf import Options, Report, reduce_file
+from rigid_motion.gltf import Options, Report, errors, reduce_file
 from tests.gltf.player import REST, File, Track, eighths, off, shown
 from tests.gltf.random_files import VENDOR, Choice, choices
 from tests.thoroughness import tried
@@ -27,13 +28,6 @@ NOTE = "rigid_motion"
 
 TURN = np.radians(0.5)
 """The angle that rotations keep within where nothing has a size."""
-
-
-def tried_on(path: Path, tolerance: float | None) -> tuple[File, File, Report]:
-    """A file before and after, and what is said of it."""
-    output = path.with_name("reduced.glb")
-    report = reduce_file(path, output, Options(tolerance))
-    return File(path), File(output), report
 
 
 def clips_of(file: File) -> list[dict[str, Any]]:
@@ -133,13 +127,15 @@ def _numbers(file: File, number: int) -> tuple[str, bytes]:
     return stored.dtype.str, stored.tobytes()
 
 
-def holds(path: Path, tolerance: float | None) -> Report:
-    before, after, report = tried_on(path, tolerance)
+def holds(path: Path, tolerance: float | None, **more: bool) -> Report:
+    output = path.with_name("reduced.glb")
+    report = reduce_file(path, output, Options(tolerance, **more))
+    before, after = File(path), File(output)
     keeps_to(report, before, after)
     turns_within_an_angle(report, before, after)
     channels_stay(before, after)
     all_else_stays(before, after)
-    assert path.with_name("reduced.glb").stat().st_size <= path.stat().st_size
+    assert output.stat().st_size <= path.stat().st_size
     return report
 
 
@@ -159,14 +155,17 @@ GROWS_BETWEEN_KEYS = Choice(
 
 
 @settings(max_examples=tried(300), deadline=None)
-@given(choices(), st.none() | st.floats(-4.0, -1.2))
-@example(GROWS_BETWEEN_KEYS, None)
-def test_no_vertex_of_any_file_is_off_by_more_than_the_tolerance(tmp_path_factory, choice: Choice, share):
+@given(choices(), st.none() | st.floats(-4.0, -1.2), st.booleans(), st.sampled_from((12, errors.STRETCH_SAMPLES)))
+@example(GROWS_BETWEEN_KEYS, None, False, errors.STRETCH_SAMPLES)
+def test_no_vertex_of_any_file_is_off_by_more_than_the_tolerance(
+    tmp_path_factory, choice: Choice, share: float | None, shared: bool, stretch: int
+):
     """Tolerances are shares of the size of what is seen, as tens to a power; the default where that is too much."""
     path = choice.made().write(tmp_path_factory.mktemp("random") / "made.glb")
-    report = holds(path, None if share is None else 10.0 ** (share + choice.exponent))
-    if share is not None and not report.clips:
-        holds(path, None)
+    with mock.patch.object(errors, "STRETCH_SAMPLES", stretch):
+        report = holds(path, None if share is None else 10.0 ** (share + choice.exponent), shared=shared)
+        if share is not None and not report.clips:
+            holds(path, None, shared=shared)
 
 
 DEFAULT = ("cubic_weights_blink", "cubic_weights_ease")

@@ -5,13 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from rigid_motion.gltf import Options, errors, read_document, reduce_file, reduced
 from tests.gltf.making import Making, turns, walk
 from tests.gltf.player import File, off
-from tests.thoroughness import tried
 
 RADIUS, TOLERANCE = 0.03, 3e-3
 
@@ -24,38 +21,6 @@ STRETCH = 40
 @pytest.fixture(autouse=True)
 def short_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(errors, "STRETCH_SAMPLES", STRETCH)
-
-
-def trembling(seed: int, seconds: float = 4.0, joints: int = 3) -> Making:
-    """A chain that swings, where every joint turns and moves and is noisy, with steps, splines and scales as well."""
-    made, random = walk(joints, seconds), np.random.default_rng(seed)
-    times = np.arange(round(seconds * 30.0) + 1) / 30.0
-    own = made.times(times)
-    for joint in range(1, joints):
-        swing = 0.02 * np.sin(random.uniform(3.0, 9.0) * times)[:, None] + random.normal(0.0, 4e-4, (len(times), 3))
-        made.channel(joint, "translation", own, np.array([0.0, 0.3, 0.0]) + swing)
-    made.json["nodes"] += [{"translation": [0.0, 0.2, 0.0]}, {"translation": [0.1, 0.2, 0.0]}]
-    made.json["nodes"][joints - 1]["children"] = [joints, joints + 1]
-    splines = np.zeros((len(times), 3, 4))
-    splines[:, 1] = turns(times, seed % 97)
-    splines[:, [0, 2]] = random.normal(0.0, 0.2, (len(times), 2, 4))
-    made.channel(joints, "rotation", own, splines.reshape(-1, 4), "CUBICSPLINE")
-    made.channel(joints, "translation", own, random.normal(0.0, 0.1, (len(times), 3)), "STEP")
-    made.channel(joints + 1, "scale", own, np.repeat(1.0 + 0.3 * np.sin(times)[:, None], 3, axis=1))
-    made.channel(joints + 1, "rotation", own, turns(times, seed % 89))
-    return made
-
-
-@pytest.mark.slow
-@settings(max_examples=tried(12), deadline=None)
-@given(st.integers(0, 10**9), st.booleans())
-def test_no_point_is_off_by_more_anywhere_across_the_borders(tmp_path_factory, seed, shared):
-    folder = tmp_path_factory.mktemp("long")
-    path = trembling(seed).write(folder / "long.glb")
-    report = reduce_file(path, folder / "out.glb", Options(TOLERANCE, RADIUS, shared=shared))
-    assert report.clips[0].tracks is not None or shared
-    error = off(File(path), File(folder / "out.glb"), 0, RADIUS).error
-    assert error <= min(TOLERANCE, report.clips[0].error) + SINGLE
 
 
 def test_all_that_moves_has_keys_where_stretches_meet_and_few_more_elsewhere(tmp_path, monkeypatch):
