@@ -18,26 +18,21 @@ SCREWS = ["dq_sclerp", "pga_slerp", "cga_slerp"]
 BLENDS = ["pga_lerp", "cga_lerp"]
 
 
-def evaluate(mode: str, way: str, first: Poses, second: Poses, u: np.ndarray) -> Poses:
-    """The in-betweens of the pairs, by the fast form that users run or by the reference in the mode's own algebra."""
-    if way == "reference":
-        return MODES[mode].reference(first, second, u)
-    poses = interpolate([0.0, 1.0], as_keys(first, second), u[:, None], mode)
-    return poses[:, 0]
+def between(mode: str, first: Poses, second: Poses, u: np.ndarray) -> Poses:
+    """The in-betweens of the pairs."""
+    return interpolate([0.0, 1.0], as_keys(first, second), u[:, None], mode)[:, 0]
 
 
-ways = pytest.mark.parametrize("way", ["fast", "reference"])
 in_each_corner = pytest.mark.parametrize("corner", CORNERS)
 
 
-@ways
 @in_each_corner
 @pytest.mark.parametrize("mode", SCREWS)
-def test_screws_are_pytransform3ds_sclerp(mode, corner, way):
+def test_screws_are_pytransform3ds_sclerp(mode, corner):
     first, second = corners()[corner]
     keys = [dual_quaternions_from_pqs(np.concatenate((p.positions, p.quaternions), axis=-1)) for p in (first, second)]
     pqs = pqs_from_dual_quaternions(dual_quaternions_sclerp(*keys, shares()))
-    assert_same(evaluate(mode, way, first, second, shares()), Poses(pqs[:, :3], pqs[:, 3:]))
+    assert_same(between(mode, first, second, shares()), Poses(pqs[:, :3], pqs[:, 3:]))
 
 
 PGA = kingdon.Algebra(3, 0, 1)
@@ -79,10 +74,9 @@ def carried_by(versor, points: np.ndarray) -> np.ndarray:
     return coefficients(moved, "e1", "e2", "e3") / weight
 
 
-@ways
 @in_each_corner
 @pytest.mark.parametrize("mode", BLENDS)
-def test_blends_are_plain_multivector_lerps(mode, corner, way):
+def test_blends_are_plain_multivector_lerps(mode, corner):
     first, second = corners()[corner]
     u = shares()
     motor = pga_motor(first) * (1 - u) + pga_motor(second) * u
@@ -91,16 +85,15 @@ def test_blends_are_plain_multivector_lerps(mode, corner, way):
     translator = motor * PGA.multivector(e=w, e12=e12, e13=e13, e23=e23).reverse() * (1 / squared)
     quaternions = np.stack((w, -e23, e13, -e12), axis=-1) / np.sqrt(squared)[:, None]
     expected = Poses(-2.0 * coefficients(translator, "e01", "e02", "e03"), quaternions)
-    assert_same(evaluate(mode, way, first, second, u), expected)
+    assert_same(between(mode, first, second, u), expected)
 
 
-@ways
 @in_each_corner
-def test_blends_with_scale_take_the_origin_where_the_plain_lerp_takes_it(corner, way):
+def test_blends_with_scale_take_the_origin_where_the_plain_lerp_takes_it(corner):
     first, second = corners(scaled=True)[corner]
     u = shares()
     versor = cga_versor(first) * (1 - u) + cga_versor(second) * u
-    poses = evaluate("cga_lerp", way, first, second, u)
+    poses = between("cga_lerp", first, second, u)
     rotor = coefficients(versor, "e", "e12", "e13", "e23")
     dilated = coefficients(versor, "e45", "e1245", "e1345", "e2345")
     w, e12, e13, e23 = (rotor / np.linalg.norm(rotor, axis=-1, keepdims=True)).T
@@ -112,12 +105,11 @@ def test_blends_with_scale_take_the_origin_where_the_plain_lerp_takes_it(corner,
     assert_same(poses, Poses(origin, np.stack((w, -e23, e13, -e12), axis=-1), (1 + k) / (1 - k)), tolerance=1e-11)
 
 
-@ways
 @pytest.mark.parametrize("parts", [2, 3])
 @in_each_corner
-def test_similarities_go_the_same_step_again_and_again(corner, parts, way):
+def test_similarities_go_the_same_step_again_and_again(corner, parts):
     first, second = corners(scaled=True)[corner]
-    third = evaluate("cga_slerp", way, first, second, np.full(PAIRS, 1.0 / parts))
+    third = between("cga_slerp", first, second, np.full(PAIRS, 1.0 / parts))
     start, part, end = (cga_versor(in_units_of(size_of(first, second), p)) for p in (first, third, second))
     step = start.reverse() * part
     arrived = start
@@ -128,11 +120,10 @@ def test_similarities_go_the_same_step_again_and_again(corner, parts, way):
     assert np.abs(coefficients(arrived, *blades) - expected).max() < 1e-12 * np.abs(expected).max()
 
 
-@ways
 @in_each_corner
-def test_rotation_of_lerp_slerp_is_scipys_slerp(corner, way):
+def test_rotation_of_lerp_slerp_is_scipys_slerp(corner):
     first, second = corners()[corner]
-    poses = evaluate("lerp_slerp", way, first, second, shares())
+    poses = between("lerp_slerp", first, second, shares())
     for row in range(0, PAIRS, 20):
         ends = Rotation.from_quat(np.stack((first.quaternions[row], second.quaternions[row])), scalar_first=True)
         expected = Slerp([0, 1], ends)(shares()[row])
@@ -147,4 +138,4 @@ def test_rotation_of_lerp_slerp_is_scipys_slerp(corner, way):
 @pytest.mark.parametrize("mode", MODES)
 def test_fast_form_is_the_reference(mode, corner, scaled):
     first, second = corners(scaled)[corner]
-    assert_same(evaluate(mode, "fast", first, second, shares()), evaluate(mode, "reference", first, second, shares()))
+    assert_same(between(mode, first, second, shares()), MODES[mode].reference(first, second, shares()))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rigid_motion.motion import Poses, Skeleton, clean, shell_error, standing
 from rigid_motion.motion.banded import Banded
 from rigid_motion.motion.contacts import slide, slide_ratios
-from rigid_motion.motion.differences import coefficients, turned_in_world
+from rigid_motion.motion.differences import turned_in_world
 from rigid_motion.motion.quaternions import align_signs, multiply, normalise, rotate
 from rigid_motion.motion.trembling import trembling
 from tests.motion.bodies import random_parents
@@ -55,16 +55,7 @@ def test_the_solver_does_what_dense_matrices_do(count):
         np.testing.assert_allclose(found[: count - apart], np.diagonal(inverse, apart), atol=1e-9)
 
 
-def test_divided_differences_are_derivatives():
-    times = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 30))
-    for order in (1, 3, 6):
-        shares = coefficients(times, order)
-        runs = np.lib.stride_tricks.sliding_window_view(times, order + 1)
-        factorial = float(np.prod(np.arange(1, order + 1)))
-        np.testing.assert_allclose(np.einsum("nk,nk->n", shares, runs**order), factorial, rtol=1e-6)
-
-
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_white_noise_is_measured_and_most_of_it_goes(seed):
     times, truth = hand(seed)
     shaky = shaken(truth, seed)
@@ -79,7 +70,7 @@ def test_white_noise_is_measured_and_most_of_it_goes(seed):
 @pytest.mark.parametrize("count", [60, 100, 200, 600, 4000])
 def test_white_noise_is_measured_as_it_is_however_short_the_recording(count):
     found = []
-    for seed in range(200 if count < 600 else 20):
+    for seed in range(200 if count < 600 else 10):
         times, truth = hand(seed, count)
         found += trembling(times, shaken(truth, seed))[:2]
     parts = np.reshape(found, (-1, 2)) / (NOISE, TURNS)
@@ -157,7 +148,7 @@ def test_a_hit_is_no_further_off_than_it_was_recorded_be_it_on_a_sample_or_betwe
     tilts = turned_in_world(np.tile([1.0, 0, 0, 0], (900, 1)), height[:, None] * (0.0, 1.0, 0.0))
     truth = Poses(np.stack([0.2 * np.sin(times), 0.1 * times, height], axis=1), tilts)
     hits, ratios = np.argsort(-np.abs(np.diff(height, 2)))[:12] + 1, []
-    for seed in range(40, 45):
+    for seed in range(40, 43):
         shaky = shaken(truth, seed)
         cleaned = clean(times, shaky).poses
         assert rms(cleaned, truth) < 0.5 * rms(shaky, truth)
@@ -202,7 +193,7 @@ def test_what_has_been_cleaned_is_not_moved_again(seed):
         assert clean(cleaned.times, cleaned.poses, allowed).moved.max() < 1e-6 * tolerance
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_world_the_clock_and_the_direction_of_time_do_not_matter(seed):
     times, truth = hand(seed)
     shaky, tolerance = shaken(truth, seed), 0.003
@@ -284,7 +275,7 @@ def test_what_stands_slides_no_further_than_it_did_and_nothing_is_moved_by_more(
     assert tolerance is None or cleaned.moved[~out].max(initial=0.0) <= tolerance * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_foot_that_stood_still_stays_so_and_moves_nothing_else_further_than_it_was_to_be(seed):
     """A hip that trembles above a foot that steps, with a leg between them that is as long as it has to be."""
     times, still = np.arange(400) / 60.0, np.tile([1.0, 0, 0, 0], (400, 1))

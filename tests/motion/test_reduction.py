@@ -49,35 +49,31 @@ def test_a_budget_is_spent_and_not_passed(count, seed, budget, rms, mode):
     assert keys[-1] == count - 1
 
 
-def error_of_bisecting(
-    times: np.ndarray, poses: Poses, mode: str, budget: int, error: float, *, rms: bool = False
-) -> float:
+def error_of_bisecting(times: np.ndarray, poses: Poses, mode: str, budget: int, error: float) -> float:
     """The least error of the keys of eight tolerances, about one that is known, that are no more than a budget."""
     low, high, best = np.log(error / 4.0), np.log(2.0 * error), np.inf
     for _ in range(8):
         middle = 0.5 * (low + high)
-        keys = reduce_keys(times, poses, mode, np.exp(middle), rms=rms)
+        keys = reduce_keys(times, poses, mode, np.exp(middle))
         if len(keys) > budget:
             low = middle
         else:
-            high, best = middle, min(best, error_of(times, poses, keys, mode, rms=rms))
+            high, best = middle, min(best, error_of(times, poses, keys, mode))
     return best
 
 
-def error_of(times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str, *, rms: bool = False) -> float:
-    errors = shell_errors(times, poses, keys, mode)
-    return float(np.sqrt(np.mean(errors**2)) if rms else errors.max())
+def error_of(times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str) -> float:
+    return float(shell_errors(times, poses, keys, mode).max())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "budget"),
-    [("lerp_slerp", 12), ("lerp_slerp", 40), ("dq_sclerp", 12), ("motor_spline", 12), ("motor_spline", 40)],
+    [("lerp_slerp", 12), ("lerp_slerp", 40), ("motor_spline", 12), ("motor_spline", 40)],
 )
 def test_a_budget_is_spent_as_well_as_by_trying_tolerances(mode, budget):
-    """All but one of 30 are within a twentieth, and that one within a seventh."""
     ratios = []
-    for seed in (budget, 1, 2, 3, 4, 5):
+    for seed in (budget, 1, 2, 3):
         times, poses = wandering(250, seed)
         error = error_of(times, poses, reduce_keys(times, poses, mode, budget=budget), mode)
         ratios.append(error / error_of_bisecting(times, poses, mode, budget, error))
