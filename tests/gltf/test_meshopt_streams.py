@@ -21,8 +21,8 @@ def elements_of(count: int, stride: int, wide: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("count", [1, 16, 17, 257, 1000])
-@pytest.mark.parametrize("stride", [4, 12, 64, 256])
-@pytest.mark.parametrize("wide", [0, 1, 6, 40, 255])
+@pytest.mark.parametrize("stride", [4, 12, 256])
+@pytest.mark.parametrize("wide", [0, 6, 255])
 def test_elements_come_back_as_they_were(count: int, stride: int, wide: int) -> None:
     elements = elements_of(count, stride, wide)
     stream = encoded(elements)

@@ -154,7 +154,7 @@ GROWS_BETWEEN_KEYS = Choice(
 """What morph targets move grows by a spline between its keys."""
 
 
-@settings(max_examples=tried(300), deadline=None)
+@settings(max_examples=tried(200), deadline=None)
 @given(choices(), st.none() | st.floats(-4.0, -1.2), st.booleans(), st.sampled_from((12, errors.STRETCH_SAMPLES)))
 @example(GROWS_BETWEEN_KEYS, None, False, errors.STRETCH_SAMPLES)
 def test_no_vertex_of_any_file_is_off_by_more_than_the_tolerance(

@@ -1,5 +1,7 @@
 """What every mode promises, whatever the keys."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -47,58 +49,48 @@ def times_between(key_times: np.ndarray, count: int = 37) -> np.ndarray:
     return np.linspace(key_times[0], key_times[-1], count)
 
 
-@every_mode
-@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
-@given(data=st.data())
-def test_keys_are_met(mode, scaled, data):
-    key_times, keys = data.draw(motions(scaled=scaled))
-    poses = interpolate(key_times, keys, key_times, mode)
-    assert_close(poses, keys, 1e-12)
-    if scaled:
-        assert poses.scales == pytest.approx(keys.scales, rel=1e-12)
+@given(motion=motions() | motions(scaled=True))
+def test_keys_are_met_and_end_poses_hold_outside_of_them(motion):
+    key_times, keys = motion
+    outside = [key_times[0] - 5.0, *key_times, key_times[-1] + 5.0]
+    expected = keys[[0, *range(len(keys)), -1]]
+    for mode in MODES:
+        poses = interpolate(key_times, keys, outside, mode)
+        assert_close(poses, expected, 1e-12)
+        assert keys.scales is None or poses.scales == pytest.approx(expected.scales, rel=1e-12), mode
 
 
-@every_mode
 @given(motion=motions(), seed=st.integers(0, 2**32 - 1))
-def test_q_and_minus_q_give_the_same_path(mode, motion, seed):
+def test_q_and_minus_q_give_the_same_path(motion, seed):
     key_times, keys = motion
     assume(no_half_turn(keys))
     signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(len(keys), 1))
-    times = times_between(key_times)
-    flipped = interpolate(key_times, with_rotation(keys, signs * keys.quaternions), times, mode)
-    assert_close(flipped, interpolate(key_times, keys, times, mode), 1e-12)
+    times, flipped = times_between(key_times), with_rotation(keys, signs * keys.quaternions)
+    for mode in MODES:
+        assert_close(interpolate(key_times, flipped, times, mode), interpolate(key_times, keys, times, mode), 1e-12)
 
 
-@every_mode
 @given(motion=motions(scaled=True), shift=arrays(float, 3, elements=numbers))
-def test_the_origin_of_the_world_does_not_matter_even_where_things_grow(mode, motion, shift):
+def test_the_origin_of_the_world_does_not_matter_even_where_things_grow(motion, shift):
     key_times, keys = motion
     assume(no_half_turn(keys))
-    times = times_between(key_times)
-    there = interpolate(key_times, Poses(keys.positions + shift, keys.quaternions, keys.scales), times, mode)
-    here = interpolate(key_times, keys, times, mode)
-    assert_close(there, Poses(here.positions + shift, here.quaternions), 1e-7)
+    times, moved = times_between(key_times), Poses(keys.positions + shift, keys.quaternions, keys.scales)
+    for mode in MODES:
+        there, here = (interpolate(key_times, own, times, mode) for own in (moved, keys))
+        assert_close(there, Poses(here.positions + shift, here.quaternions), 1e-7)
 
 
-@every_mode
-@given(motion=motions())
-def test_end_poses_hold_outside_the_keys(mode, motion):
-    key_times, keys = motion
-    poses = interpolate(key_times, keys, [key_times[0] - 5.0, key_times[-1] + 5.0], mode)
-    assert_close(poses, keys[[0, -1]], 1e-12)
-
-
-@every_mode
 @settings(max_examples=tried(60))
 @given(
     motions(scaled=True),
     st.lists(st.floats(-40.0, 40.0), min_size=2, max_size=6),
     st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=6),
 )
-def test_outside_of_the_keys_scales_stay_positive_and_all_is_finite(mode, motion, logarithms, progress):
+def test_outside_of_the_keys_scales_stay_positive_and_all_is_finite(motion, logarithms, progress):
     key_times, keys = motion
     count = len(key_times)
-    for scales in (keys.scales, np.exp(2.0 * np.resize(logarithms, count))):
+    both = (keys.scales, np.exp(2.0 * np.resize(logarithms, count)))
+    for mode, scales in itertools.product(MODES, both):
         growing = Poses(keys.positions, keys.quaternions, scales)
         times = key_times[0] + np.array(progress) * (key_times[-1] - key_times[0])
         beyond = interpolate(key_times, growing, times, mode, extrapolate=True)

@@ -81,10 +81,9 @@ def test_a_budget_is_spent_as_well_as_by_trying_tolerances(mode, budget):
     assert max(ratios) <= 1.15
 
 
-@pytest.mark.parametrize("seed", [1, 4])
-def test_blenders_curves_need_no_more_keys_within_an_error_than_a_budget_has(seed):
+def test_blenders_curves_need_no_more_keys_within_an_error_than_a_budget_has():
     """Of a camera as a tracker solves it: keys that are put in where its jitter is largest would follow the jitter."""
-    times, random = np.arange(221) / 24.0, np.random.default_rng(seed)
+    times, random = np.arange(221) / 24.0, np.random.default_rng(1)
     eased = (share := times / times[-1]) ** 2 * (3.0 - 2.0 * share)
     angle = np.radians(200.0 * eased)
     turn, _ = twists.exponential(np.concatenate((np.zeros((2, 221)), angle[None] / 2.0, np.zeros((3, 221)))))
@@ -113,7 +112,7 @@ def test_a_body_at_rest_has_two_keys(mode, options):
 
 @pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline", "motor_spline_causal"])
 def test_keys_are_the_same_whatever_is_remembered_or_put_off(mode, monkeypatch):
-    times, poses = wandering(200, 7, 0.001)
+    times, poses = wandering(100, 7, 0.001)
     keys = reduce_keys(times, poses, mode, 0.02, RADIUS).tolist()
     monkeypatch.setattr(key_costs, "MAX_REMEMBERED_SEGMENTS", 10)
     assert reduce_keys(times, poses, mode, 0.02, RADIUS).tolist() == keys
@@ -122,13 +121,13 @@ def test_keys_are_the_same_whatever_is_remembered_or_put_off(mode, monkeypatch):
 
 
 def test_signs_of_quaternions_do_not_matter():
-    times, poses = wandering(300, 6)
-    flipped = Poses(poses.positions, poses.quaternions * np.random.default_rng(1).choice((-1, 1), (300, 1)))
+    times, poses = wandering(150, 6)
+    flipped = Poses(poses.positions, poses.quaternions * np.random.default_rng(1).choice((-1, 1), (150, 1)))
     assert reduce_keys(times, flipped, tolerance=0.01).tolist() == reduce_keys(times, poses, tolerance=0.01).tolist()
 
 
 def test_scale_is_part_of_the_pose():
-    times, poses = wandering(300, 7)
+    times, poses = wandering(150, 7)
     scales = 1.0 + 0.5 * np.sin(7.0 * times)
     growing = Poses(poses.positions, poses.quaternions, scales)
     keys = reduce_keys(times, growing, tolerance=0.002)
