@@ -41,6 +41,12 @@ def test_no_point_around_any_joint_is_off_by_more_than_the_tolerance(tmp_path, t
     assert after.moments(0)[[0, -1]].tolist() == before.moments(0)[[0, -1]].tolist()
 
 
+def test_what_would_be_off_between_its_keys_gets_more_of_them(tmp_path):
+    made, times = walk(5, 4.0, 8.0), np.arange(33) / 8.0
+    made.channel(2, "translation", made.times(times), 0.3 * np.random.default_rng(1).normal(size=(33, 3)))
+    holds(*both(made, tmp_path, 2e-2))
+
+
 def test_everything_else_of_the_file_stays(tmp_path):
     made = walk()
     image = made.view(bytes(range(256)))

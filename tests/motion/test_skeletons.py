@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.motion.poses import inverse, placed
+from rigid_motion.motion.skeletons import AT_ONCE
 from tests.motion.bodies import in_root_space, matrices, random_parents
 from tests.motion.cases import random_quaternions
 from tests.thoroughness import tried
@@ -19,10 +20,11 @@ def some_poses(seed: int, *shape: int, scaled: bool) -> Poses:
 
 
 @settings(max_examples=tried(80))
-@given(st.integers(1, 14), st.integers(0, 2**16), st.booleans())
-def test_joints_get_where_matrices_take_them(joints, seed, scaled):
+@given(st.integers(1, 14), st.integers(0, 2**16), st.booleans(), st.just(7))
+@example(2, 0, False, AT_ONCE)
+def test_joints_get_where_matrices_take_them(joints, seed, scaled, count):
     parents = random_parents(np.random.default_rng(seed), joints)
-    poses = some_poses(seed, joints, 7, scaled=scaled)
+    poses = some_poses(seed, joints, count, scaled=scaled)
     there = matrices(Skeleton(parents).in_root_space(poses))
     expected = in_root_space(poses, parents)
     assert np.abs(there - expected).max() <= 1e-13 * max(1.0, np.abs(expected).max())

@@ -46,6 +46,10 @@ def test_a_message_of_other_types_takes_nothing_else_with_it(argument):
     assert [message.address for message in osc.read(bundle.build().dgram)] == ["/a", "/b"]
 
 
+def test_what_is_no_message_is_none():
+    assert osc.read(b"/a\0\0types\0\0\0") == []
+
+
 def test_bundles_are_read_in_bundles():
     inner, outer = OscBundleBuilder(IMMEDIATELY), OscBundleBuilder(IMMEDIATELY)
     inner.add_content(theirs("/a", 1))
