@@ -1,15 +1,15 @@
 """Rigid Motion: in-betweens that move an object as one rigid body.
 
-`motion` is the mathematics, in NumPy alone, and `streams` bodies over a network; `animation` is Blender's data, and
-`live` what of it moves by streams; `ui` is what an animator sees, and `translations` is that in other languages.
-Imports go down only: each knows those before it, and `motion` none.
+`motion` is the mathematics, in NumPy alone. `streams` sends and receives bodies over a network. `animation` works on
+Blender's data, and `live` moves it by streams. `ui` is the user interface, and `translations` translates it.
+Each package imports only those named before it; `motion` imports none.
 """
 
 __version__ = "0.1.0"
 
 
 def register() -> None:
-    # Not on top: importing `motion` needs no Blender.
+    # Not at the top: importing `motion` needs no Blender.
     from . import animation, translations, ui
 
     translations.register()

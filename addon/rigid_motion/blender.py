@@ -1,4 +1,4 @@
-"""What Blender's types leave open and this program knows: that something is there, and which of many kinds it is."""
+"""Typed access to Blender's API: properties, base classes, and accessors for values that its type stubs leave open."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Class = TypeVar("Class", bound=type)
 Handler = TypeVar("Handler", bound=Callable[..., object])
 
 Returned = set[Literal["RUNNING_MODAL", "CANCELLED", "FINISHED", "PASS_THROUGH", "INTERFACE"]]
-"""What operators return."""
+"""The return value of an operator's `execute`, `invoke` and `modal`."""
 
 BoolProperty: Any = bpy.props.BoolProperty
 CollectionProperty: Any = bpy.props.CollectionProperty
@@ -27,9 +27,9 @@ persistent: Callable[[Handler], Handler] = bpy.app.handlers.persistent
 
 
 def with_properties(cls: Class) -> Class:
-    """Have what Blender takes as properties be typed by what they hold: `count: int = IntProperty()`.
+    """Let a class declare Blender properties with the types of their values: `count: int = IntProperty()`.
 
-    Blender itself takes them from where types stand: `count: IntProperty()`.
+    Blender itself expects properties as annotations: `count: IntProperty()`.
     """
     # Blender does not look for properties in bases that are operators themselves.
     of_bases = [item for base in cls.__mro__[:0:-1] for item in vars(base).get("__annotations__", {}).items()]
@@ -61,12 +61,12 @@ class Menu(bpy.types.Menu):
 
 
 def existing(value: T | None) -> T:
-    """Return what Blender's types say may be None, where it is not.
+    """Return a value that may be None according to Blender's types, but is never None here.
 
     Raises
     ------
     TypeError
-        Where it is None.
+        If the value is None after all.
     """
     if value is None:
         raise TypeError("Blender has none")
@@ -84,12 +84,12 @@ def view_layer() -> bpy.types.ViewLayer:
 
 
 def pose_bones(rig: bpy.types.Object) -> bpy.types.bpy_prop_collection[bpy.types.PoseBone]:
-    """Return the bones of an armature object as they are posed."""
+    """Return the pose bones of an armature object."""
     return existing(rig.pose).bones
 
 
 def armature(rig: bpy.types.Object) -> bpy.types.Armature:
-    """Return what an armature object shows."""
+    """Return the armature data of an armature object."""
     return cast(bpy.types.Armature, rig.data)
 
 
@@ -99,22 +99,22 @@ def action_of(obj: bpy.types.Object) -> bpy.types.Action:
 
 
 def channelbag_in(strip: bpy.types.ActionStrip, slot: bpy.types.ActionSlot) -> bpy.types.ActionChannelbag:
-    """Return the channels of a slot in a strip of keys, made where there are none."""
+    """Return the channelbag of a slot in a keyframe strip; create a missing one."""
     return existing(cast(bpy.types.ActionKeyframeStrip, strip).channelbag(slot, ensure=True))
 
 
 def enum_value(cls: type[bpy.types.bpy_struct], name: str, item: str) -> int:
-    """Return the number that stands for an item of an enumeration, a property of a class."""
+    """Return the integer value of an item of an enum property of a class."""
     return cast(bpy.types.EnumProperty, cls.bl_rna.properties[name]).enum_items[item].value
 
 
 def original_uid(update: bpy.types.DepsgraphUpdate) -> int:
-    """Return the session id of the data-block that was evaluated anew."""
+    """Return the session id of the original data-block of a depsgraph update."""
     return existing(existing(update.id).original).session_uid
 
 
 def assign(obj: bpy.types.Object, action: bpy.types.Action) -> None:
-    """Have an Action's first slot animate an object."""
+    """Assign an Action to an object, with the Action's first slot."""
     data = existing(obj.animation_data_create())
     data.action = action
     data.action_slot = action.slots[0]

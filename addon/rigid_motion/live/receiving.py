@@ -1,7 +1,7 @@
-"""What listens: a port, looked at by a timer, and what becomes of what comes. There is one at most.
+"""Receiving live motion: listens to one port, polled by a timer, and shows and records the bodies that arrive.
 
-It ends where a file is loaded, and where the extension is switched off. An undo takes objects away that were made
-after it, and they are made again; what is deleted stays away until somebody listens anew.
+Listening ends when another file is loaded or the extension is disabled. Objects removed by an undo are created again.
+An object deleted by the user is not created again until listening starts anew.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from .sockets import Address, Port, check_access
 from .ticking import Ticking, log
 
 Which = tuple[Stream, str]
-"""A stream, and the name of one of its bodies."""
+"""Identifies a body: its stream, and its name there."""
 
 InHands = tuple[list[tuple[str, str] | None], Poses]
-"""The body and the joint that hold something at each of some keys (k,), None for none; its poses (joints, k) there."""
+"""The body and the joint that hold an object at each of its keys (k,), None for none; its poses (joints, k) there."""
 
 MOST_AHEAD = 64
-"""Messages of a body whose keys wait to be shown."""
+"""The maximum number of messages of a body whose keys wait to be shown."""
 
 LIVE = "rigid_motion_live"
-"""The name of the settings on scenes, see `ui.live.LiveSettings`."""
+"""The scene property that holds the settings, see `ui.live.LiveSettings`."""
 
 is_matching = False
-"""True while the program fills the table of joints and bones, and not a user."""
+"""True while the program, not a user, fills the table of joints and bones."""
 
 
 def match_bones(joints: Sequence[str], rig: bpy.types.Object) -> None:
-    """Fill the table of which bone of a rig each joint moves, by their names."""
+    """Fill the table of joints and the bones that they move, by matching their names."""
     global is_matching
     table, pairs = _settings().bones, matched(joints, [bone.name for bone in armature(rig).bones])
     table.clear()
@@ -57,7 +57,7 @@ def match_bones(joints: Sequence[str], rig: bpy.types.Object) -> None:
 
 
 def _pairs(body: StreamBody, rig: bpy.types.Object) -> Mapping[str, str]:
-    """Return what the table says; it is filled in by names where it is for other joints or for another rig."""
+    """Return the bone that each joint moves, from the table. A table for other joints or another rig is filled anew."""
     if [item.name for item in _settings().bones] != list(body.joints) or _settings().bones_of != rig.name:
         match_bones(body.joints, rig)
     return {item.name: item.bone for item in _settings().bones if item.bone}
@@ -68,8 +68,8 @@ def _settings() -> Any:
 
 
 @dataclass(eq=False)
-class _Heard:
-    """A body of a stream."""
+class _ReceivedBody:
+    """A received body, its driver and its recording."""
 
     label: str
     body: StreamBody
@@ -79,30 +79,30 @@ class _Heard:
     """True if its object was deleted."""
 
     poses: Poses | None = None
-    """The poses that are shown of it, shape (joints,), and by the sender's clock when that was."""
+    """The poses (joints,) to show, and their timestamp by the sender's clock."""
     moment: float = 0.0
 
     held: HeldPoses | None = None
-    """The joint that holds it, and its pose there."""
+    """The body and the joint that hold it, and its poses in that joint's space."""
     seen: Poses | None = None
-    """Where it is shown (joints,): what is held, in the hand of the rig."""
+    """The poses (joints,) in which it is shown; a held object is shown in the hand of the rig."""
 
     ahead: deque[tuple[np.ndarray, Poses, InHands]] = field(default_factory=lambda: deque(maxlen=MOST_AHEAD))
-    """Moments (k,) and poses (joints, k) of keys that are not shown yet, and what holds it there."""
+    """Keys that are not shown yet: timestamps (k,), poses (joints, k), and its holders there."""
 
     take: Take | None = None
     origin: float | None = None
-    """The moment that is on the first frame of the recording; None where the sender has begun since."""
+    """The timestamp on the first frame of the recording; None if not known yet, as after a restart of the sender."""
 
     @property
     def is_taken(self) -> bool:
-        """Return whether what comes is of the joints that are recorded."""
+        """Return whether the body still has the joints that are being recorded."""
         return self.take is not None and self.take.driver.body.joints == self.body.joints
 
 
 @dataclass
 class _Recording:
-    """What is recorded, and since when."""
+    """The start and the settings of a recording."""
 
     begun: float
     first_frame: float
@@ -112,16 +112,16 @@ class _Recording:
 
 
 class Listening:
-    """A port that is listened to. Raises OSError where it is taken, and NotAllowed."""
+    """An open port and the bodies received there. Raises OSError if the port is taken, and NotAllowed."""
 
     def __init__(self, host: str, port: int) -> None:
         check_access(host)
         self._port = Port(host, port)
         self._receiver = Receiver(_settings().delay)
-        self._heard: dict[Which, _Heard] = {}
+        self._heard: dict[Which, _ReceivedBody] = {}
         self._recording: _Recording | None = None
         self.complaint = ""
-        """Who cannot be understood, and the way out."""
+        """Which sender cannot be understood and how to fix it, or why a held recording failed; "" if neither."""
 
     @property
     def is_recording(self) -> bool:
@@ -129,11 +129,11 @@ class Listening:
 
     @property
     def joints(self) -> dict[str, tuple[str, ...]]:
-        """The joints of each body that is heard, by its label."""
+        """The joints of each received body, by its label."""
         return {heard.label: heard.body.joints for heard in self._heard.values()}
 
     def tick(self, now: float) -> None:
-        """Take what came, and show what is due."""
+        """Read the datagrams that arrived, and show the poses that are due."""
         for datagram, address in self._port.received():
             self._receiver.take(datagram, now, address)
         for line in self._receiver.complaints():
@@ -142,8 +142,8 @@ class Listening:
         for sender, answer in self._receiver.answers():
             self._port.send(answer, cast(Address, sender))
         self._receiver.steady = _settings().steady
-        # They take up room until they are asked for.
-        came = self._receiver.keys()
+        # Keys take up memory until they are fetched.
+        new_keys = self._receiver.keys()
         shown = {
             (stream, body.name): (body, what)
             for stream, what in self._receiver.show(now).items()
@@ -151,19 +151,19 @@ class Listening:
         }
         present = []
         for which, (body, what) in shown.items():
-            present.append(heard := self._heard_of(which, body, shown))
+            present.append(heard := self._entry_of(which, body, shown))
             heard.moment, heard.poses, heard.held = what.moment, what.poses[body.name], what.held.get(body.name)
         self._show(present)
         for heard in present:
             if self._recording and heard.driver is not None:
-                self._follow(heard, now)
-        for keys in came:
-            self._keep(keys)
+                self._start_take(heard, now)
+        for keys in new_keys:
+            self._store_keys(keys)
         self._heard = {which: it for which, it in self._heard.items() if which in shown or it.take}
 
-    def _heard_of(self, which: Which, body: StreamBody, present: Container[Which]) -> _Heard:
-        """Return what is known of a body. It has a label of its own;
-        a sender that begins again goes on with its old one.
+    def _entry_of(self, which: Which, body: StreamBody, present: Container[Which]) -> _ReceivedBody:
+        """Return the entry of a body, and create a missing one with a unique label.
+        A restarted sender keeps its old label.
         """
         heard = self._heard.get(which)
         if heard is None:
@@ -174,54 +174,54 @@ class Listening:
                 if (label := body.name if number == 1 else f"{body.name} {number}") not in labels
             )
             before = next((other for other, it in self._heard.items() if it.label == label), None)
-            heard = _Heard(label, body, which[0]) if before is None else self._heard.pop(before)
+            heard = _ReceivedBody(label, body, which[0]) if before is None else self._heard.pop(before)
             self._heard[which] = heard
             heard.stream, heard.origin = which[0], None
         if heard.body is not body:
             heard.body, heard.driver = body, None
         return heard
 
-    def _show(self, present: list[_Heard]) -> None:
+    def _show(self, present: list[_ReceivedBody]) -> None:
         for heard in present:
             if heard.driver is None and not heard.is_gone:
                 heard.driver = self._driver_of(heard)
-        held = [heard for heard in present if self._grip(heard) is not None]
+        held = [heard for heard in present if self._grip_of(heard) is not None]
         for heard in sorted(present, key=held.__contains__):
             if heard in held[:1]:
                 view_layer().update()
-            heard.seen = self._seen(heard)
+            heard.seen = self._poses_to_show(heard)
             if heard.driver is not None and not heard.driver.show(heard.seen):
                 heard.driver, heard.is_gone = None, True
 
-    def _hand(self, stream: Stream, holder: tuple[str, str]) -> tuple[_Heard, Hand, Poses] | None:
-        """Return the body that holds something by its name and that of a joint, what shows that joint, and its pose ()
-        there; None for as long as nothing does.
+    def _hand_showing(self, stream: Stream, holder: tuple[str, str]) -> tuple[_ReceivedBody, Hand, Poses] | None:
+        """Return the holding body, the hand that shows its joint, and the joint's pose () in that hand, for the names
+        of the body and the joint. None while no object shows that joint.
         """
         holding = self._heard.get((stream, holder[0]))
         if holding is None or holding.driver is None or (hand := holding.driver.hand(holder[1])) is None:
             return None
         return holding, *hand
 
-    def _grip(self, heard: _Heard) -> tuple[_Heard, Hand, Poses] | None:
-        """Return what holds a body, and its poses (1,) there. Skeletons are where they were sent, as their bones have
-        keys in their rig.
+    def _grip_of(self, heard: _ReceivedBody) -> tuple[_ReceivedBody, Hand, Poses] | None:
+        """Return the body and the hand that hold a rigid body, and its poses (1,) there; None if not held. Skeletons
+        stay where they were sent, because their bones have keys in their rig.
         """
         if heard.held is None or len(heard.body.joints) > 1:
             return None
-        if (found := self._hand(heard.stream, heard.held[:2])) is None:
+        if (found := self._hand_showing(heard.stream, heard.held[:2])) is None:
             return None
         holding, hand, joint = found
         return holding, hand, placed(joint, heard.held.poses)
 
-    def _seen(self, heard: _Heard) -> Poses:
-        """Return where a body is to be shown (joints,): what is held, in the hand as Blender has it."""
-        if (found := self._grip(heard)) is None:
+    def _poses_to_show(self, heard: _ReceivedBody) -> Poses:
+        """Return the poses (joints,) in which to show a body; a held body is in the hand as Blender evaluated it."""
+        if (found := self._grip_of(heard)) is None:
             return existing(heard.poses)
         holding, hand, grip = found
-        return placed(seen_hand(hand) if hand[1] else self._seen(holding)[0], grip)
+        return placed(seen_hand(hand) if hand[1] else self._poses_to_show(holding)[0], grip)
 
-    def _driver_of(self, heard: _Heard) -> Driver | None:
-        """Return what shows a body; None for as long as nothing can."""
+    def _driver_of(self, heard: _ReceivedBody) -> Driver | None:
+        """Return the driver that shows a body; None while its object cannot be created."""
         if len(heard.body.joints) > 1:
             rig, chosen = _settings().armature, _settings().body or heard.label
             is_free = not any(it.driver is not None and it.driver.object == rig for it in self._heard.values())
@@ -234,27 +234,27 @@ class Listening:
         return Driver(obj, heard.body) if len(names) == 1 else RigDriver(obj, heard.body, names)
 
     def show_again(self) -> None:
-        """Show what is shown on top of what another frame has keyed."""
+        """Show the same poses again, over the keys that a change of frame has evaluated."""
         for heard in self._heard.values():
             if heard.driver is not None and heard.seen is not None:
                 heard.driver.show(heard.seen)
 
     def choose_drivers(self, for_all: bool = False) -> None:
-        """Choose anew what shows each body, of those whose object is gone as well where asked to."""
+        """Choose the driver of each body anew; with `for_all`, also of bodies whose object is gone."""
         for heard in self._heard.values():
             heard.driver, heard.is_gone = None, heard.is_gone and not for_all
 
     def record(self, mode: str, tolerance: float) -> None:
-        """Keep what comes from now on, from the current frame on."""
+        """Start recording, with the first sample on the current frame."""
         render, frame = scene().render, scene().frame_current_final
         self._recording = _Recording(time.monotonic(), frame, render.fps / render.fps_base, mode, tolerance)
         for heard in self._heard.values():
             heard.origin = None
             if heard.driver is not None and heard.poses is not None:
-                self._follow(heard, self._recording.begun)
+                self._start_take(heard, self._recording.begun)
 
-    def _follow(self, heard: _Heard, now: float) -> None:
-        """Record a body from now on, and go on where its sender began again."""
+    def _start_take(self, heard: _ReceivedBody, now: float) -> None:
+        """Start recording a body, or continue its recording after its sender restarted."""
         recording = existing(self._recording)
         if heard.origin is None:
             heard.origin = heard.moment - (now - recording.begun)
@@ -264,40 +264,40 @@ class Listening:
             )
             self._add_shown(heard)
 
-    def _add_shown(self, heard: _Heard) -> None:
-        """Have the picture itself among what is recorded: where it begins, and where it ends."""
+    def _add_shown(self, heard: _ReceivedBody) -> None:
+        """Add the poses on screen to the recording, as its first and as its last sample."""
         poses = existing(heard.poses)
         holder, inside = (heard.held[:2], heard.held.poses) if heard.held else (None, poses)
-        self._add(heard, np.array([heard.moment]), poses[:, None], ([holder], inside[:, None]))
+        self._add_samples(heard, np.array([heard.moment]), poses[:, None], ([holder], inside[:, None]))
 
-    def _add(self, heard: _Heard, moments: np.ndarray, poses: Poses, in_hands: InHands) -> None:
+    def _add_samples(self, heard: _ReceivedBody, moments: np.ndarray, poses: Poses, in_hands: InHands) -> None:
         recording, take = existing(self._recording), existing(heard.take)
         numbers, grips = np.zeros(len(moments), dtype=int), poses.copy()
         holders, inside = in_hands
         for holder in dict.fromkeys(filter(None, holders)):
-            _, hand, joint = self._hand(heard.stream, holder) or (None, ("", holder[1]), poses[0, 0])
+            _, hand, joint = self._hand_showing(heard.stream, holder) or (None, ("", holder[1]), poses[0, 0])
             at = np.array([one == holder for one in holders])
             numbers[at], grips[:, at] = take.number_of(hand), placed(joint, inside[:, at])
         frames = recording.first_frame + (moments - heard.origin) * recording.frames_a_second
         take.add(frames, poses, numbers, grips)
 
-    def _keep(self, keys: ReceivedKeys) -> None:
-        """Record keys, or have those at hand that are not shown yet: a recording may begin before they are."""
+    def _store_keys(self, keys: ReceivedKeys) -> None:
+        """Record keys. Keep keys that are not shown yet, because a recording may begin before they are shown."""
         for name, poses in keys.poses.items():
             heard = self._heard.get((keys.stream, name))
             if heard is None:
                 continue
-            nobody: InHands = [None] * len(keys.moments), poses
-            heard.ahead.append((keys.moments, poses, keys.held.get(name, nobody)))
+            unheld: InHands = [None] * len(keys.moments), poses
+            heard.ahead.append((keys.moments, poses, keys.held.get(name, unheld)))
             if heard.is_taken and heard.origin is not None:
-                for few in heard.ahead:
-                    self._add(heard, *few)
+                for waiting in heard.ahead:
+                    self._add_samples(heard, *waiting)
                 heard.ahead.clear()
             while heard.ahead and heard.ahead[0][0][-1] <= heard.moment:
                 heard.ahead.popleft()
 
     def finish(self) -> int:
-        """End the recording and make its keys; say how many poses have keys."""
+        """End the recording and create its keys. Return the number of poses with keys."""
         count = 0
         for heard in self._heard.values():
             if heard.take is not None:
@@ -329,15 +329,15 @@ running = Ticking("What came over the network cannot be shown", HANDLERS)
 
 
 def listening() -> Listening | None:
-    """Return what listens, if anything does."""
+    """Return the open port, None if nothing is listening."""
     return running.thing
 
 
 def start(host: str, port: int) -> Listening:
-    """Listen to a port, and to nothing else any more. Raises OSError where it is taken, and NotAllowed."""
+    """Listen to this port only. Raises OSError if the port is taken, and NotAllowed."""
     return running.start(lambda: Listening(host, port))
 
 
 def stop() -> None:
-    """Listen no more. What is recorded and not finished is given up."""
+    """Stop listening. An unfinished recording is discarded."""
     running.stop()

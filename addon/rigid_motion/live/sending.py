@@ -1,4 +1,4 @@
-"""What goes out: rigs as VMC performers, all other objects as VMC trackers, as the screen shows them."""
+"""Sending live motion: rigs as VMC performers and all other objects as VMC trackers, as evaluated on screen."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from .ticking import Ticking
 
 
 class LiveSending:
-    """Objects that are sent to an address. Raises OSError where that is none, and NotAllowed."""
+    """Objects being sent to an address. Raises OSError if the address is invalid, and NotAllowed."""
 
     def __init__(self, host: str, port: int, objects: Iterable[bpy.types.Object]) -> None:
         self._names = [obj.name for obj in objects]
         check_access(host)
         self._outlet = Outlet(host, port)
         self._performers: dict[str, tuple[int, Performer]] = {}
-        """The number of bones that each rig had."""
+        """The performer of each rig, and the number of bones that the rig had."""
         self._begun = time.monotonic()
 
     def tick(self, now: float) -> None:
-        """Send where everything is."""
+        """Send the poses of all objects."""
         depsgraph = bpy.context.evaluated_depsgraph_get()
         trackers: dict[str, Poses] = {}
         for name in self._names:
@@ -60,7 +60,7 @@ class LiveSending:
 
 
 def _bones(obj: bpy.types.Object) -> Poses:
-    """Return where the bones of a rig are in the world, in the order of its armature."""
+    """Return the world poses of a rig's bones, in the order of its armature."""
     matrices = np.array([pose_bones(obj)[bone.name].matrix for bone in armature(obj).bones])
     return unscaled(np.array(obj.matrix_world) @ matrices)
 
@@ -69,15 +69,15 @@ running = Ticking("What is selected cannot be sent")
 
 
 def sending() -> LiveSending | None:
-    """Return what is sent, if anything is."""
+    """Return the objects being sent, None if nothing is sent."""
     return running.thing
 
 
 def start(host: str, port: int, objects: Iterable[bpy.types.Object]) -> LiveSending:
-    """Send objects, and nothing else any more. Raises OSError where the address is none, and NotAllowed."""
+    """Send only these objects. Raises OSError if the address is invalid, and NotAllowed."""
     return running.start(lambda: LiveSending(host, port, objects))
 
 
 def stop() -> None:
-    """Send no more."""
+    """Stop sending."""
     running.stop()

@@ -1,7 +1,7 @@
-"""The only module that opens a socket: UDP, without waiting. In Blender an operator asks for it, nothing else.
+"""UDP sockets, non-blocking: the only module that opens one. In Blender only operators open sockets.
 
-On this machine that is always allowed; to reach others, or to be reached by them, Blender has to be allowed online.
-Commands send and receive by the same ports, without Blender.
+Connections within this machine are always allowed. Other machines need Blender's permission for online access.
+Commands use the same ports, without Blender.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from typing import Self, cast
 
 MAX_DATAGRAM_BYTES = 65535
 MOST_AT_ONCE = 2048
-"""Datagrams that one look at a socket takes out of it: a flood does not stop the viewport."""
+"""The most datagrams read from a socket at once, so a flood of datagrams does not block the viewport."""
 
 PENDING_BYTES = [1 << bits for bits in range(23, 15, -1)]
-"""Bytes that may wait to be looked at, where a viewport is slow: as many as the system allows."""
+"""Sizes of the receive buffer to try, in bytes: the largest that the system allows helps a slow viewport."""
 
 Address = tuple[str, int]
 
 
 class NotAllowed(Exception):
-    """What has to be allowed first, with the way out."""
+    """Raised when online access is needed but not allowed. The message says how to allow it."""
 
 
 def check_access(host: str) -> None:
-    """Raise NotAllowed for an address beyond this machine where Blender is to stay offline."""
+    """Raise NotAllowed for an address on another machine if Blender is offline."""
     import bpy
     from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -48,7 +48,7 @@ def is_loopback(host: str) -> bool:
 
 
 class Port:
-    """A UDP port, as a context that closes it. Raises OSError where it is taken."""
+    """A UDP port, as a context manager that closes it. Raises OSError if the port is taken."""
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
         self._socket = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
@@ -67,7 +67,7 @@ class Port:
         self.close()
 
     def _allow_pending(self) -> None:
-        """Set how many bytes may be pending: Linux takes what is allowed of what is asked for, others refuse it."""
+        """Set the size of the receive buffer. Linux reduces a size that is too large; other systems refuse it."""
         for size in PENDING_BYTES:
             with suppress(OSError):
                 self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, size)
@@ -78,7 +78,7 @@ class Port:
         return self._socket.getsockname()[1]
 
     def received(self, wait: float = 0.0) -> list[tuple[bytes, Address]]:
-        """Return what came since the last look, or comes first within so many seconds, and from where."""
+        """Return the datagrams that have arrived, with their senders. Wait up to `wait` seconds for the first one."""
         if wait:
             select.select([self._socket], [], [], wait)
         result: list[tuple[bytes, Address]] = []
@@ -88,12 +88,12 @@ class Port:
             except BlockingIOError:
                 break
             except OSError:
-                continue  # what Windows says of somebody who is not there any more
+                continue  # Windows raises it when an earlier receiver is gone
             result.append((data, (host, port)))
         return result
 
     def send(self, data: bytes, to: Address) -> None:
-        """Send a datagram; as if it had been lost where that cannot be."""
+        """Send a datagram. One that cannot be sent counts as lost."""
         with suppress(OSError):
             self._socket.sendto(data, to)
 
@@ -102,10 +102,10 @@ class Port:
 
 
 class Outlet(Port):
-    """A port to send from, to one address."""
+    """A port that sends to one address."""
 
     def __init__(self, host: str, port: int) -> None:
-        # Looked up once: a name could take seconds at every datagram.
+        # Looked up once: resolving a name could take seconds for every datagram.
         family, *_, to = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         self.to = cast(Address, to)
         own = ("::" if family == socket.AF_INET6 else "0.0.0.0") if not is_loopback(host) else self.to[0]

@@ -1,4 +1,4 @@
-"""What a timer of Blender's ticks: one thing at most, until it is stopped, it fails, or another file is loaded."""
+"""Timer of live motion: ticks one object at most, until it is stopped, fails, or another file is loaded."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ..handlers import append_handlers, remove_handlers
 log = logging.getLogger(__package__)
 
 TICKS_PER_S = 60
-"""Ticks a second."""
+"""Ticks per second."""
 
 
 class Ticking:
-    """What is ticked, by `tick(now)`, until it is closed, by `close()`. `failure` says what is wrong where it fails;
-    `handlers` are called while there is something.
+    """Calls `tick(now)` of an object by a timer, and `close()` at the end. `failure` is logged if a tick fails.
+    `handlers` are Blender's handlers, active while an object is ticked.
     """
 
     def __init__(self, failure: str, handlers: Mapping[str, Callable] | None = None) -> None:
         self.thing: Any = None
-        """What is ticked, or None."""
+        """The object being ticked, or None."""
         self.trouble = ""
-        """The reason why it ended by itself."""
+        """The error that ended the ticking."""
         self._failure = failure
 
         @persistent
@@ -38,7 +38,7 @@ class Ticking:
         self._timer = self.look
 
     def start(self, make: Callable[[], Any]) -> Any:
-        """Tick what is made, and nothing else any more, and return it."""
+        """Make an object, tick it in place of any earlier one, and return it."""
         self.stop()
         self.thing, self.trouble = make(), ""
         append_handlers(self._handlers)
@@ -46,7 +46,7 @@ class Ticking:
         return self.thing
 
     def stop(self) -> None:
-        """Tick no more, and close it."""
+        """Stop ticking, and close the object."""
         if self.thing is not None:
             self.thing.close()
             self.thing = None
@@ -55,13 +55,13 @@ class Ticking:
                 bpy.app.timers.unregister(self._timer)
 
     def look(self) -> float | None:
-        """Return what the timer calls: one tick, and after how many seconds there is another."""
+        """Tick once, as the callback of the timer. Return the seconds until the next tick, None to end the timer."""
         if self.thing is None:
             return None
         try:
             self.thing.tick(time.monotonic())
         except Exception as error:
-            # Blender would only drop the timer, and leave the port open.
+            # Blender would only remove the timer, and leave the port open.
             log.exception(self._failure)
             self.stop()
             self.trouble = str(error)
