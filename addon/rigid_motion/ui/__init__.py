@@ -1,16 +1,16 @@
-"""What an animator sees: operators, menus, panels, the overlay and the preferences. No mathematics.
+"""The user interface: operators, menus, panels, the overlay and the preferences. No mathematics.
 
-targets      what an editor means, and operators on it    operators    what can be done to that
-reducing     fewer keys, and all of them again            breakdown    operators that key poses by a slider
-holding      operators by which things are held           held_in      what a panel shows of that
-menus        entries in Blender's menus, and the pies     keymap       shortcuts
-panels       the sidebar                                  notes        what it says of a segment
+targets      finds the targets of operators               operators    modes, turns, cycles, layers, baking
+reducing     reduces and restores keys                    breakdown    keys poses by a slider
+holding      operators that hold objects                  held_in      the panel of holders
+menus        entries in Blender's menus, and pie menus    keymap       shortcuts
+panels       the sidebar                                  notes        warnings about a segment
 overlay      paths in the viewport
-wording      labels, texts and lines of a panel           preferences  of the extension
+wording      labels, texts and lines of a panel           preferences  preferences of the extension
 gltf_export  glTF files with few keys                     live         bodies over a network
-manual       where the documentation is                   cleaning     keys that tremble less
-trail        paths edited in the viewport               speed        how fast things move, and evenly
-deviations   pops and kinks on paths                  mouse_input  what is dragged, and by how much
+manual       links to the documentation                   cleaning     removes jitter from keys
+trail        paths edited in the viewport                 speed        shows and equalises speed
+deviations   pops and kinks on paths                      mouse_input  mouse and keyboard during a drag
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ MODULES = (
 
 
 def _classes_of(module: ModuleType) -> Iterator[type]:
-    """Yield the classes of a module that Blender is to know: those with its kind of names, and groups of properties."""
+    """Yield the classes of a module to register: those named RIGID_MOTION_..., property groups and preferences."""
     for cls in (*vars(module).values(), *getattr(module, "PANELS", ())):
         if isinstance(cls, type) and cls.__module__ == module.__name__:
             groups = bpy.types.PropertyGroup, bpy.types.AddonPreferences

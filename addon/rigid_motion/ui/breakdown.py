@@ -1,7 +1,7 @@
-"""Breakdown, Push and Relax along the mode: Blender's own three for poses, which follow the path of the body.
+"""Breakdown, Push and Relax: operators that key poses along the path of the mode, by a slider.
 
-A factor is dragged with the mouse, by the keys of Blender's Breakdowner; the header shows it. Moving the mouse changes
-the factor, Shift does so finely, Ctrl in steps of a tenth, E lets it go beyond its ends, and digits set it in per cent.
+They work like Blender's own operators for poses. Moving the mouse changes the factor, which the header shows. As in
+Blender's Breakdowner, Shift is fine, Ctrl steps by a tenth, E allows overshoot, and digits set the factor in per cent.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from .mouse_input import CANCEL, CONFIRM, MouseInput
 from .targets import OnTargets, targets_of
 
 MOUSE_TRAVEL_PX = 300.0
-"""Pixels, at a resolution scale of 1, that the mouse goes from 0 to 1."""
+"""The distance of the mouse from factor 0 to 1, in pixels at a resolution scale of 1."""
 
 CTRL_STEP = 0.1
-"""The steps of Ctrl."""
+"""The step of the factor while Ctrl is held."""
 
 
 class Slider(MouseInput):
-    """A factor, and how mouse and keyboard change it: numbers are per cent.
+    """A factor that mouse and keyboard change. Typed numbers are per cent.
 
     Parameters
     ----------
     factor : float
-        To begin with.
+        The initial factor.
     x : float
-        Where the mouse is, in pixels.
+        The position of the mouse, in pixels.
     scale : float
         The resolution scale of the interface.
     """
@@ -52,15 +52,15 @@ class Slider(MouseInput):
     def factor(self) -> float:
         if self.number is not None:
             return self.number / 100.0
-        factor = self._within(self._dragged)
+        factor = self._clamped(self._dragged)
         return round(factor / CTRL_STEP) * CTRL_STEP if self.is_stepped else factor
 
-    def _within(self, factor: float) -> float:
+    def _clamped(self, factor: float) -> float:
         return factor if self.overshoots else min(max(factor, 0.0), 1.0)
 
     def move(self, event: bpy.types.Event, ratio: float) -> None:
-        # A mouse that comes back from beyond the end moves the factor at once.
-        self._dragged = self._within(self._dragged + ratio * (event.mouse_x - self._x) / self._travel)
+        # Clamped here, so a mouse that turns back beyond an end changes the factor at once.
+        self._dragged = self._clamped(self._dragged + ratio * (event.mouse_x - self._x) / self._travel)
         self._x = event.mouse_x
 
     def press(self, key: str) -> bool:
@@ -68,22 +68,22 @@ class Slider(MouseInput):
         return key == "E"
 
     def tell(self, context: bpy.types.Context, label: str) -> None:
-        """Show it in the header of the area, and the keys in the status bar."""
+        """Show the factor in the header of the area, and the keys in the status bar."""
         overshoot = iface_("On") if self.overshoots else iface_("Off")
         keys = iface_(
             "LMB, Enter: Confirm | Esc, RMB: Cancel | E: Overshoot ({overshoot}) | Ctrl: Steps of 10 % | "
             "Shift: Precision | 0-9: Per Cent"
         ).format(overshoot=overshoot)
-        existing(context.area).header_text_set(f"{label} {self._number}")
+        existing(context.area).header_text_set(f"{label} {self._factor_text}")
         existing(context.workspace).status_text_set(keys)
 
     def hide(self, context: bpy.types.Context) -> None:
-        """Give header and status bar back."""
+        """Restore the header and the status bar."""
         existing(context.workspace).status_text_set(None)
         existing(context.area).header_text_set(None)
 
     @property
-    def _number(self) -> str:
+    def _factor_text(self) -> str:
         return f"{self.typed} %" if self.typed else f"{100.0 * self.factor:.0f} %"
 
 
@@ -143,7 +143,7 @@ class _Breakdown(OnTargets):
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Undo the breakdowns. Blender calls it, too, where it ends the operator by itself."""
+        """Undo the breakdowns. Blender calls this too when it ends the operator."""
         self._slider.hide(context)
         self._breakdowns.cancel()
 

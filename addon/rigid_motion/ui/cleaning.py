@@ -1,4 +1,4 @@
-"""*Clean Motion*: dense keys without their trembling, by a slider, beside what they were."""
+"""*Clean Motion*: an operator that removes jitter from dense keys, by a slider, and shows the motion from before."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .targets import OnTargets, is_key_editor
 from .wording import length, split
 
 MIN_UNTOUCHED_RATIO = 0.25
-"""The part of the keys that has to stay as it is to be spoken of."""
+"""The report mentions unchanged keys above this fraction of all keys."""
 
 
 @with_properties
@@ -97,7 +97,7 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
         return self.said
 
     def _summary(self, context: bpy.types.Context, cleanings: list[Cleaning]) -> str:
-        """Return what became of all that was cleaned: lengths, or pixels where it is cameras."""
+        """Return a summary of all cleanings, with lengths, or with pixels if all of them are cameras."""
         cameras: list[Any] = [one.transforms[0].carrier for one in cleanings]
         spoken = partial(length, cast(bpy.types.Scene, context.scene), precision=3)
         spans = [(one.trembling, one.moved) for one in cleanings]

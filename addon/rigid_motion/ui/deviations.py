@@ -1,6 +1,6 @@
-"""*Show Deviations*: frames on which a body bends off from how it moves around them, on its path, one after the other.
+"""*Show Deviations*: finds and marks the frames with pops and kinks on paths, and steps from one to the next.
 
-A pop or a kink is a jump of its velocity, however it turns, many times as large as the jumps around it.
+A pop or a kink is a jump of the velocity of any point of a body, many times as large as the jumps around it.
 """
 
 from __future__ import annotations
@@ -26,30 +26,30 @@ from .targets import targets_of
 from .wording import labelled
 
 MARK_COLOR = (1.0, 0.15, 0.75, 1.0)
-"""Of a mark on the path, as of no other thing there."""
+"""The color of a mark on the path; nothing else there has it."""
 
 MARK_DIAMETER_PX, MARK_BORDER_PX = 16.0, 3.0
 
 MAX_NAMED_FRAMES = 6
-"""The most frames that there is room for in a sidebar."""
+"""The most frames listed in the sidebar."""
 
-_known: WeakKeyDictionary[DrawnPath, tuple[float, np.ndarray]] = WeakKeyDictionary()
-"""By paths, which are others after every edit: the threshold, and the frames (d,) that deviate."""
+_deviations_by_path: WeakKeyDictionary[DrawnPath, tuple[float, np.ndarray]] = WeakKeyDictionary()
+"""Cache by path, a new object after every edit: the threshold, and the frames (d,) that deviate."""
 
 
 def deviations_on(path: DrawnPath, target: Transform, settings: RigidMotionOverlay) -> np.ndarray:
-    """Return the whole frames of the Action on which a target deviates, (d,), as its path shows it."""
+    """Return the whole frames (d,) of the Action on which a target deviates, in the mode that its path shows."""
     threshold, mode = settings.deviation_threshold, settings.mode
-    if (known := _known.get(path)) is None or known[0] != threshold:
+    if (known := _deviations_by_path.get(path)) is None or known[0] != threshold:
         motion = motion_now(target, existing(view_layer().depsgraph))
         frames = motion.frames()
         maps = motion.space @ motion.at_point(frames, None if mode == "CHOSEN" else mode)
         measured = jumps(maps, axis_length_of(target) * float(np.linalg.norm(maps.axes[0], axis=0).max()))
-        # Of jumps side by side, which one pop makes, the largest.
+        # One pop makes several adjacent jumps: only the largest counts.
         near = np.pad(measured, 2)
         largest = np.max([near[:-4], near[1:-3], near[3:-1], near[4:]], axis=0)
-        _known[path] = threshold, frames[(measured > threshold) & (measured >= largest)]
-    return _known[path][1]
+        _deviations_by_path[path] = threshold, frames[(measured > threshold) & (measured >= largest)]
+    return _deviations_by_path[path][1]
 
 
 def draw(pen: Pen, target: Transform, path: DrawnPath, _now: float, settings: RigidMotionOverlay) -> None:
@@ -62,7 +62,7 @@ def draw(pen: Pen, target: Transform, path: DrawnPath, _now: float, settings: Ri
 
 
 def frames_of(context: Any) -> np.ndarray:
-    """Return the frames of the scene on which any of the targets deviates, (d,), rising."""
+    """Return the rising frames (d,) of the scene on which any target deviates."""
     targets, settings = targets_of(context), overlay_settings(context.scene)
     found = [np.empty(0)]
     for target, path in zip(targets, drawn_paths(targets, context), strict=True):
@@ -73,7 +73,7 @@ def frames_of(context: Any) -> np.ndarray:
 
 
 def draw_settings(context: Any, layout: bpy.types.UILayout) -> None:
-    """Draw the settings, and buttons to go from one to the next, for a panel."""
+    """Draw the settings, and buttons that step from one deviation to the next, in a panel."""
     settings = overlay_settings(context.scene)
     row = labelled(layout)
     row.active = settings.show_paths
@@ -118,4 +118,4 @@ def register() -> None:
 
 def unregister() -> None:
     beside.remove(draw)
-    _known.clear()
+    _deviations_by_path.clear()

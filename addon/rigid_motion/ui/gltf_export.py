@@ -1,4 +1,4 @@
-"""*File > Export > glTF, Reduced*: Blender's own glTF exporter, and then only the keys that the motion needs."""
+"""*File > Export > glTF, Reduced*: exports by Blender's own glTF exporter, then reduces the keys of the file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NOT_PASSED_ON = {
     "use_selection",
     "will_save_settings",
 }
-"""Options of the exporter that this operator sets itself, or that are for its dialog alone; gltfpack would resample."""
+"""Exporter options that this operator sets itself or that only matter in the dialog. gltfpack would resample."""
 
 
 @with_properties
@@ -87,7 +87,7 @@ class RIGID_MOTION_OT_export_gltf(Operator, ExportHelper):
 
 
 def _last_options(context: bpy.types.Context) -> dict[str, Any]:
-    """Return the settings of Blender's exporter as last set in its dialog, but for what is set here."""
+    """Return the options last set in the dialog of Blender's exporter, except those in `NOT_PASSED_ON`."""
     last = existing(context.window_manager).operator_properties_last(EXPORTER)
     if last is None:
         return {}
@@ -101,7 +101,7 @@ def _last_options(context: bpy.types.Context) -> dict[str, Any]:
 
 
 def _summary(report: Report, output: Path) -> str:
-    """Return one line for the status bar: bytes and keys before and after, and the largest error."""
+    """Return one line for the status bar: keys and bytes before and after, and the largest error."""
     before, after = ([getattr(clip, when) for clip in report.clips] for when in ("before", "after"))
     return rpt_(
         "{name}: {keys} of {all_keys} keys, {size:.0f} of {full:.0f} kB of animation, {error:.2f} mm off at most"

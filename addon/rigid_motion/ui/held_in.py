@@ -1,4 +1,4 @@
-"""What the sidebar shows of how something is held: what holds it, when it passes on, and what may go wrong there."""
+"""The panel *Held In* of the sidebar: the holder of an object, its passes to other holders, and warnings."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from .holding import PASS_PROPERTY, RIGID_MOTION_MT_holders, has_been_held, icon
 from .wording import degrees, draw_text, hold_lines, labelled, length
 
 FAR_TURNED = math.radians(120)
-"""Half a turn is passed either way round; with less than a third of a turn left to it nobody can tell which."""
+"""Radians: a pass that turns by more than this is near a half turn, so its direction is hard to predict."""
 
 MAX_TOUCHING_DISTANCE = 1e-5
-"""Hands that are less apart, in Blender's units, are at one place in single precision."""
+"""Hands closer than this, in Blender's units, are at the same place in single precision."""
 
 MAX_SCALE_ROUNDING = 1e-4
-"""Scales that differ by less are the same."""
+"""Scales that differ by less than this count as equal."""
 
 
 UNEVEN = n_(
@@ -39,7 +39,7 @@ UNEVEN = n_(
 
 
 def draw(context: Any, layout: Any) -> None:
-    """Draw what holds the selection, for a panel."""
+    """Draw the holder of the selection in a panel."""
     prop = shown_prop(context)
     if prop is None:
         return
@@ -75,7 +75,7 @@ def _draw_passing(context: Any, layout: Any, facts: HoldFacts) -> None:
 
 
 def apart_text(scene: bpy.types.Scene, facts: HoldFacts) -> str:
-    """Return how far apart both hands carry it where it passes, "" elsewhere."""
+    """Return how far apart both hands carry the object on the frame of a pass, "" on other frames."""
     if facts.apart is None or facts.turned is None or facts.switch is None:
         return ""
     apart = length(scene, facts.apart if facts.apart > MAX_TOUCHING_DISTANCE else 0.0, precision=2)
@@ -85,7 +85,7 @@ def apart_text(scene: bpy.types.Scene, facts: HoldFacts) -> str:
 
 
 def cautions(prop: Transform, facts: HoldFacts) -> Iterator[str]:
-    """Yield what may go wrong with something that is held, and what to do about it."""
+    """Yield warnings about a held object, each with its remedy."""
     if facts.turned is not None and facts.frames and facts.turned > FAR_TURNED:
         yield iface_("It rotates by {angle} while it passes, in either direction. Rotate a hand, or Match Grip").format(
             angle=degrees(facts.turned)
@@ -97,7 +97,7 @@ def cautions(prop: Transform, facts: HoldFacts) -> Iterator[str]:
             yield iface_("{holder} now follows {name}, which it holds: a cycle. Remove that from {holder}").format(
                 holder=holder.name, name=prop.name
             )
-        if _grows(holder):
+        if _has_scale_animation(holder):
             yield iface_("{holder} has keys of its scale: what it holds grows and shrinks with it").format(
                 holder=holder.name
             )
@@ -105,7 +105,7 @@ def cautions(prop: Transform, facts: HoldFacts) -> Iterator[str]:
             yield iface_(UNEVEN).format(holder=holder.name)
 
 
-def _grows(holder: Holder) -> bool:
+def _has_scale_animation(holder: Holder) -> bool:
     """Return whether keys change the scale of a holder."""
     path = (prefix_of(holder.bone) if holder.bone else "") + SCALE
     curves = [] if holder.target is None else active_fcurves(holder.target)

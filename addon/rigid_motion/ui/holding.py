@@ -1,7 +1,7 @@
-"""Holding things: what is held and what holds it, as an editor means them, and operators on these.
+"""Holding objects: finds held objects and holders in the selection, and operators that hold, pass and let go.
 
-What is held is selected first, what holds it last, so that it is active: an object, or in Pose Mode a bone. Selected
-objects that are not posed are meant before bones, as by Blender's Ctrl P. All acts on the current frame.
+Select the objects to hold first and the holder last, as the active one: an object, or in Pose Mode a bone. Selected
+objects that are not posed take precedence over bones, as in Blender's Ctrl P. All operators act on the current frame.
 """
 
 from __future__ import annotations
@@ -24,53 +24,53 @@ from ..blender import BoolProperty, IntProperty, Menu, StringProperty, with_prop
 from .targets import OnTargets, each_done, is_posing
 
 Node = bpy.types.Object | bpy.types.PoseBone
-"""Something that holds or is held."""
+"""A holder or a held object."""
 
 FIRST_AND_LAST = n_("Select the things to hold, and last their holder: an object, or in Pose Mode a bone")
 NOTHING_HELD = n_("Nothing selected is held yet: use Hold In")
 
 HIDDEN_OPTIONS = {"HIDDEN", "SKIP_SAVE"}
-"""The options of properties that menus set."""
+"""The options of operator properties that menus set."""
 
 STRIP_COLOUR_NUMBERS = (4, 7, 2, 6, 1, 3)
-"""The theme's colours of strips that holders have in menus and along paths, by their numbers."""
+"""Numbers of the theme's strip colours, for holders in menus and along paths."""
 
 
 PASS_PROPERTY = "rigid_motion_pass"
-"""The name of the property of scenes by which panels set over how many frames something passes."""
+"""The name of the scene property by which panels set the number of frames of a pass."""
 
 
 def hue_of(number: int) -> int:
-    """Return the number of the theme's colour of a holder that is not the world."""
+    """Return the number of the theme's strip colour for a holder other than the world."""
     return STRIP_COLOUR_NUMBERS[(number - 1) % len(STRIP_COLOUR_NUMBERS)]
 
 
 def icon_of(holder: Holder | None) -> str:
-    """Return the icon of a holder: the colour that its part of a path has."""
+    """Return the icon of a holder, in the colour of its part of a path."""
     return "WORLD" if holder is None else f"STRIP_COLOR_{hue_of(holder.number):02d}"
 
 
 def name_of(holder: Holder | None) -> str:
-    """Return what menus call a holder, in the user's language."""
+    """Return the name of a holder in menus, in the user's language."""
     if holder is None:
         return iface_("World", OWN_WORDS)
     return title_of(holder.target, holder.bone)
 
 
 def title_of(target: bpy.types.Object | None, bone: str) -> str:
-    """Return what menus call an object, or a bone with its rig."""
+    """Return the name of an object in menus, or of a bone with its rig."""
     if target is None:
         return iface_("None")
     return f"{bone} ({target.name})" if bone else target.name
 
 
 def has_been_held(transform: Transform) -> bool:
-    """Return whether something has any constraint that holds it."""
+    """Return whether a transform has any constraint that holds it."""
     return any(is_ours(constraint) for constraint in transform.carrier.constraints)
 
 
 def active_holder(context: bpy.types.Context, *, use_bone: bool = True) -> Node | None:
-    """Return what is meant to hold: the active bone in Pose Mode and of a rig that is active, or the active object."""
+    """Return the holder: the active bone in Pose Mode or of the active rig, or else the active object."""
     if is_posing(context):
         return context.active_pose_bone
     return _active_bone(context.object) or context.object if use_bone else context.object
@@ -84,14 +84,14 @@ def _active_bone(obj: bpy.types.Object | None) -> bpy.types.PoseBone | None:
 
 
 def chosen(context: bpy.types.Context) -> list[Transform]:
-    """Return all that is selected, what is not posed first."""
+    """Return all selected transforms, objects that are not posed first."""
     objects = [obj for obj in context.selected_objects or () if obj.mode != "POSE"]
     bones = (context.selected_pose_bones or ()) if is_posing(context) else ()
     return [transform_of(item) for item in (*objects, *bones)]
 
 
 def props_for(context: bpy.types.Context, holder: Node | None) -> list[Transform]:
-    """Return what is selected to be held in something: objects that are not posed, or else bones; not itself."""
+    """Return the selected transforms for a holder: objects that are not posed, or else bones; never the holder."""
     if holder is None:
         return []
     objects = [item for item in chosen(context) if not item.is_part and item.carrier not in (holder, holder.id_data)]
@@ -99,23 +99,23 @@ def props_for(context: bpy.types.Context, holder: Node | None) -> list[Transform
 
 
 def held(context: bpy.types.Context) -> list[Transform]:
-    """Return what is selected and has been held in anything, but for what is active and holds another one of it."""
+    """Return the selected transforms that have been held, except the active one if it holds another of them."""
     result = [item for item in chosen(context) if has_been_held(item)]
     active = active_holder(context)
     if active is not None and len(result) > 1 and (own := transform_of(active)) in result:
-        is_holder = any(_points_at(item, active) for item in result if item != own)
+        is_holder = any(_is_held_in(item, active) for item in result if item != own)
         result = [item for item in result if not (is_holder and item == own)]
     return result
 
 
-def _points_at(item: Transform, node: Node) -> bool:
-    """Return whether something has been held in an object or a bone."""
+def _is_held_in(item: Transform, node: Node) -> bool:
+    """Return whether a transform has been held in this object or bone."""
     ours: list[Any] = [one for one in item.carrier.constraints if is_ours(one) and one.type == "CHILD_OF"]
-    return any((one.target, one.subtarget) == _node(node) for one in ours)
+    return any((one.target, one.subtarget) == _target_and_bone(node) for one in ours)
 
 
 def shown_prop(context: bpy.types.Context) -> Transform | None:
-    """Return what a panel on holding is about: what is held already, or what would be."""
+    """Return the transform that panels on holding show: a held one, or else one that could be held."""
     active = active_holder(context, use_bone=False)
     if held_already := held(context):
         own = None if active is None else transform_of(active)
@@ -125,14 +125,14 @@ def shown_prop(context: bpy.types.Context) -> Transform | None:
 
 
 def candidates(context: bpy.types.Context, prop: Transform) -> Iterator[Node]:
-    """Yield what is at hand to hold something: what is active, and active bones of rigs that are selected."""
+    """Yield possible holders: the active object or bone, and the active bones of selected rigs."""
     rigs = (_active_bone(obj) for obj in (context.object, *(context.selected_objects or ())))
     nodes = dict.fromkeys(node for node in (active_holder(context), *rigs, context.object) if node is not None)
     yield from (node for node in nodes if node not in (prop.carrier, prop.animated))
 
 
 def _frames_property(description: str, **more: Any) -> Any:
-    """Return the property of over how many frames something passes."""
+    """Return a property for the number of frames of a pass."""
     return IntProperty(description=description, min=0, max=MOST_FRAMES, soft_max=12, **more)
 
 
@@ -150,7 +150,7 @@ class _Hold(OnTargets):
     summary: ClassVar[str]
 
     def holder(self, _context: bpy.types.Context) -> tuple[bpy.types.Object | None, str]:
-        """Return the object that is to hold, None for the world, and the name of the bone, "" for none."""
+        """Return the holding object, None for the world, and the name of its bone, "" for none."""
         return None, ""
 
     def do(self, context: Any, targets: list[Transform], refused: list[Refused]) -> str:
@@ -159,7 +159,7 @@ class _Hold(OnTargets):
         done = each_done(targets, refused, lambda item: animation.hold_in(item, target, bone, frames=frames))
         facts = facts_or_none(next(iter(done), None))
         if frames is None and facts is not None:
-            # So the redo panel has what was chosen.
+            # The redo panel then shows the number that was used.
             self.frames = facts.frames
         text = rpt_(self.summary).format(holder=title_of(target, bone), frame=context.scene.frame_current_final)
         if facts is None or facts.until is None:
@@ -191,7 +191,7 @@ class RIGID_MOTION_OT_hold_in(_Hold):
 
     def holder(self, context: bpy.types.Context) -> tuple[bpy.types.Object | None, str]:
         node = active_holder(context, use_bone=self.use_bone)
-        return _node(node) if node is not None else (None, "")
+        return _target_and_bone(node) if node is not None else (None, "")
 
     def draw(self, context: bpy.types.Context) -> None:
         layout: Any = self.layout
@@ -227,7 +227,7 @@ class RIGID_MOTION_OT_hold_in_known(_Hold):
 
 
 def known_props(context: bpy.types.Context) -> list[Transform]:
-    """Return what is to be held where what holds it is named."""
+    """Return the transforms to hold in a holder chosen by name."""
     prop = shown_prop(context)
     return held(context) or props_for(context, active_holder(context)) or ([prop] if prop is not None else [])
 
@@ -291,13 +291,13 @@ class RIGID_MOTION_OT_pass_frames(_OfHeld):
         return rpt_("passed over {frames} frames").format(frames=self.frames)
 
 
-def _node(node: Node) -> tuple[Any, str]:
-    """Return the object of what holds, and the name of its bone, "" for none."""
+def _target_and_bone(node: Node) -> tuple[Any, str]:
+    """Return the object of a holder, and the name of its bone, "" for none."""
     return node.id_data, node.name if isinstance(node, bpy.types.PoseBone) else ""
 
 
 def facts_or_none(prop: Transform | None) -> HoldFacts | None:
-    """Return what there is to tell of how something is held; None where its keys are refused, or there is nothing."""
+    """Return the facts on how a transform is held; None if its keys are refused, or for None."""
     try:
         return None if prop is None else hold_facts(prop)
     except ValueError:
@@ -319,15 +319,17 @@ class RIGID_MOTION_MT_holders(Menu):
             _draw_holder(layout, holder.target, holder.bone, icon_of(holder))
         if prop is None:
             return
-        new = [node for node in candidates(context, prop) if not any(_is(holder, node) for holder in known)]
+        new = [node for node in candidates(context, prop) if not any(_is_holder(holder, node) for holder in known)]
         if new:
             layout.separator()
         for node in new:
-            _draw_holder(layout, *_node(node), "BONE_DATA" if isinstance(node, bpy.types.PoseBone) else "OBJECT_DATA")
+            _draw_holder(
+                layout, *_target_and_bone(node), "BONE_DATA" if isinstance(node, bpy.types.PoseBone) else "OBJECT_DATA"
+            )
 
 
-def _is(holder: Holder, node: Node) -> bool:
-    return (holder.target, holder.bone) == _node(node)
+def _is_holder(holder: Holder, node: Node) -> bool:
+    return (holder.target, holder.bone) == _target_and_bone(node)
 
 
 def _draw_holder(layout: Any, target: Any, bone: str, icon: str) -> None:
@@ -359,14 +361,14 @@ def _get_frames(_scene: bpy.types.Scene) -> int:
 
 def _set_frames(_scene: bpy.types.Scene, frames: int) -> None:
     prop = shown_prop(bpy.context)
-    # What refuses says so in the panel.
+    # The panel shows the reason of a refusal.
     with suppress(Refused):
         if prop is not None and frames != _get_frames(_scene):
             animation.pass_frames(prop, frames)
 
 
 def register() -> None:
-    # Nothing of it is kept: it is the number at the key of what a panel shows.
+    # The property stores nothing: it reads and writes the number at the key of the shown transform.
     described: Any = {"name": "Pass", "translation_context": OWN_WORDS, "options": set()}
     description = RIGID_MOTION_OT_pass_frames.bl_description
     frames = _frames_property(description, get=_get_frames, set=_set_frames, **described)

@@ -1,5 +1,6 @@
-"""Shortcuts: Alt T for the pie menus, beside T, by which Blender chooses the interpolation of keys; and Shift Alt T for
-the tool that edits paths.
+"""Keyboard shortcuts: Alt T for the pie menus, and Shift Alt T for the tool *Edit Path*.
+
+In Blender, T alone chooses the interpolation of keys.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ PIE_OPERATOR, TOOL_OPERATOR = "wm.call_menu_pie", "rigid_motion.edit_path"
 class Shortcut(NamedTuple):
     keymap: str
     space: Literal["EMPTY", "DOPESHEET_EDITOR", "GRAPH_EDITOR"]
-    """The space of the keymap."""
+    """The space type of the keymap."""
 
     menu: str = ""
     """The pie menu; "" for *Edit Path*."""
@@ -57,7 +58,7 @@ def unregister() -> None:
 
 
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
-    """Draw the shortcuts as the user has them, to be changed."""
+    """Draw the user's shortcuts, for editing."""
     configuration = existing(existing(context.window_manager).keyconfigs.user)
     for shortcut in SHORTCUTS:
         keymap = configuration.keymaps.find(shortcut.keymap, space_type=shortcut.space)
