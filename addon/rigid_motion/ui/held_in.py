@@ -85,7 +85,7 @@ def apart_text(scene: bpy.types.Scene, facts: HoldFacts) -> str:
 
 
 def cautions(prop: Transform, facts: HoldFacts) -> Iterator[str]:
-    """Yield warnings about a held object, each with its remedy."""
+    """Yield warnings about a held object, and remedies."""
     if facts.turned is not None and facts.frames and facts.turned > FAR_TURNED:
         yield iface_("It rotates by {angle} while it passes, in either direction. Rotate a hand, or Match Grip").format(
             angle=degrees(facts.turned)

@@ -1,4 +1,4 @@
-"""The panel *Live*: bodies that come over a network, on objects and rigs; recorded as keys; and sent."""
+"""The panel *Live*: settings and operators that receive, record and send motion over a network."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from .wording import draw_text, labelled
 HOST = "127.0.0.1"
 
 
-def _on_bones(_settings: LiveSettings | LiveBone, _context: bpy.types.Context) -> None:
+def _on_drivers_changed(_settings: LiveSettings | LiveBone, _context: bpy.types.Context) -> None:
     if (listening := receiving.listening()) is not None and not receiving.is_matching:
         listening.choose_drivers()
 
@@ -46,7 +46,7 @@ class LiveBone(bpy.types.PropertyGroup):
     """A joint of a body, and the bone that it moves. Its name is that of the joint."""
 
     bone: str = StringProperty(
-        name="Bone", description="The bone that this joint moves; none if empty", update=_on_bones
+        name="Bone", description="The bone that this joint moves; none if empty", update=_on_drivers_changed
     )
 
 
@@ -80,12 +80,12 @@ class LiveSettings(bpy.types.PropertyGroup):
         description="The armature that a body drives, by the names of its bones. Without one, it gets a new armature",
         type=bpy.types.Object,
         poll=lambda _, obj: obj.type == "ARMATURE",
-        update=_on_bones,
+        update=_on_drivers_changed,
     )
     body: str = StringProperty(
         name="Body",
         description="Which of several bodies drives the rig. Without a name, the first to arrive",
-        update=_on_bones,
+        update=_on_drivers_changed,
     )
     bones: bpy.types.bpy_prop_collection_idprop[LiveBone] = CollectionProperty(type=LiveBone)
     bones_of: str = StringProperty(description="The rig that the table is for", options={"HIDDEN"})
@@ -110,7 +110,7 @@ def live_settings(scene: bpy.types.Scene | None) -> LiveSettings:
     return getattr(scene, receiving.LIVE)
 
 
-class _Registered(Operator):
+class _WithoutUndo(Operator):
     bl_options = {"REGISTER"}  # noqa: RUF012 - Blender reads it
 
     def open(self, start: Callable[[], object], text: str, **facts: object) -> Returned:
@@ -127,7 +127,7 @@ class _Registered(Operator):
         return {"CANCELLED"}
 
 
-class RIGID_MOTION_OT_live_listen(_Registered):
+class RIGID_MOTION_OT_live_listen(_WithoutUndo):
     bl_idname = "rigid_motion.live_listen"
     bl_label = "Listen"
     bl_description = "Show bodies that other programs send to this port: as new objects, or on the rig below"
@@ -148,7 +148,7 @@ class _WhileListening:
         return receiving.listening() is not None
 
 
-class RIGID_MOTION_OT_live_stop(_WhileListening, _Registered):
+class RIGID_MOTION_OT_live_stop(_WhileListening, _WithoutUndo):
     bl_idname = "rigid_motion.live_stop"
     bl_label = "Stop Listening"
     bl_description = "Close the port. Everything stays as shown; an unfinished recording is discarded"
@@ -158,7 +158,7 @@ class RIGID_MOTION_OT_live_stop(_WhileListening, _Registered):
         return {"FINISHED"}
 
 
-class RIGID_MOTION_OT_live_record(_WhileListening, _Registered):
+class RIGID_MOTION_OT_live_record(_WhileListening, _WithoutUndo):
     bl_idname = "rigid_motion.live_record"
     bl_label = "Record"
     bl_description = "Record incoming motion from now on, as keys from the current frame on"
@@ -203,7 +203,7 @@ class RIGID_MOTION_OT_live_match(_WhileListening, Operator):
         return {"FINISHED"}
 
 
-class RIGID_MOTION_OT_live_send(_Registered):
+class RIGID_MOTION_OT_live_send(_WithoutUndo):
     bl_idname = "rigid_motion.live_send"
     bl_label = "Send Selected"
     bl_description = (
@@ -222,7 +222,7 @@ class RIGID_MOTION_OT_live_send(_Registered):
         return self.open(lambda: sending.start(live.to_host, live.to_port, objects), text, host=live.to_host)
 
 
-class RIGID_MOTION_OT_live_stop_sending(_Registered):
+class RIGID_MOTION_OT_live_stop_sending(_WithoutUndo):
     bl_idname = "rigid_motion.live_stop_sending"
     bl_label = "Stop Sending"
     bl_description = "Stop sending, and close the port"

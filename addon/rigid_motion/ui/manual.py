@@ -1,4 +1,4 @@
-"""Where the documentation is: buttons that open it, and the pages behind *Online Manual* (F1)."""
+"""Links to the documentation: buttons that open it, and the pages behind *Online Manual* (F1)."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 import bpy
 
 WEBSITE = "https://example.org/rigid-motion"
-"""The home of the project, in the manifest too. To be set before a release."""
+"""The project's website, also in the manifest. It must be set before a release."""
 
 DOCS = f"{WEBSITE}/blob/main/docs/"
-"""The pages of the version that is worked on."""
+"""The pages of the version in development."""
 
 ANIMATORS = "animators.md"
 
@@ -62,11 +62,11 @@ PAGES = tuple(
     for page, *names in table
     for name in names
 )
-"""Operators and properties, in lower case as Blender asks for them, and the page of each: the first that fits."""
+"""Patterns of operators and properties, in lower case as Blender requires, and their pages. The first match counts."""
 
 
 def pages() -> tuple[str, tuple[tuple[str, str], ...]]:
-    """Return what Blender asks for: where pages are, and which is whose."""
+    """Return the manual map that Blender asks for: the base URL, and the page of each pattern."""
     return DOCS, PAGES
 
 

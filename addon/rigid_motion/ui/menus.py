@@ -1,7 +1,7 @@
-"""Rigid Motion in Blender's menus, and its pie menus.
+"""Menus: entries of Rigid Motion in Blender's menus, and its own menus and pie menus.
 
-In the Dope Sheet and the Graph Editor modes are for the selected keys, as interpolation is; in the viewport for the
-whole object, or in Pose Mode for the whole bone. The mode that is chosen at present is ticked, for the active one.
+In the Dope Sheet and the Graph Editor, modes apply to the selected keys, like Blender's interpolation. In the viewport
+they apply to the whole object, or in Pose Mode to the whole bone. The mode of the active target is ticked.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from .wording import LABELS, twin_of
 
 
 def _draw_modes(context: bpy.types.Context, layout: Any, scope: str) -> None:
-    """Draw all modes, and behind those that make the same motion as another one what that is."""
+    """Draw all modes. A mode with the same motion as another one also shows the name of that one."""
     active = active_target(context)
-    present, grows = modes_meant(context, active, scope), _grows(active)
+    present, grows = modes_meant(context, active, scope), _has_scale_keys(active)
     for mode, label in LABELS.items():
         text = iface_(label, OWN_WORDS)
         if twin := twin_of(mode, grows=grows):
@@ -33,14 +33,14 @@ def _draw_modes(context: bpy.types.Context, layout: Any, scope: str) -> None:
 
 
 def _draw_mode(layout: Any, mode: str, scope: str, text: str, present: set[str], no_icon: str = "NONE") -> None:
-    # One tick where all is one; dots where modes are mixed.
+    # A tick for a single mode, dots for mixed modes.
     icon = no_icon if mode not in present else "CHECKMARK" if len(present) == 1 else "DOT"
     properties = layout.operator("rigid_motion.set_mode", text=text, icon=icon, translate=False)
     properties.mode, properties.on = mode, scope
 
 
-def _grows(target: Transform | None) -> bool:
-    """Return whether something has keys of its scale."""
+def _has_scale_keys(target: Transform | None) -> bool:
+    """Return whether a target has keys of its scale."""
     path = "" if target is None else target.prefix + SCALE
     return target is not None and any(fcurve.data_path == path for fcurve in active_fcurves(target.animated))
 
@@ -57,7 +57,7 @@ class _Menu(Menu):
     bl_label = "Rigid Motion"
     scope: str
     beside: str
-    """The menu of modes for the other scope."""
+    """The name of the menu of modes for the other scope."""
 
     pie: str
 
@@ -137,7 +137,7 @@ SLICES = (
     "cga_slerp",
     "pga_lerp",
 )
-"""In the order of Blender's pies: west, east, south, north, north-west, north-east, south-west, south-east."""
+"""The slices in the order of Blender's pie menus: W, E, S, N, NW, NE, SW, SE."""
 
 
 class _Pie(Menu):
@@ -152,7 +152,7 @@ class _Pie(Menu):
 
     def draw(self, context: Any) -> None:
         active, pie = active_target(context), self.layout.menu_pie()
-        present, grows = modes_meant(context, active, self.scope), _grows(active)
+        present, grows = modes_meant(context, active, self.scope), _has_scale_keys(active)
         for mode in SLICES:
             if mode == MORE_LABEL:
                 existing(pie.operator("wm.call_menu", text="More...")).name = self.menu
@@ -206,7 +206,7 @@ ENTRIES = {
     "VIEW3D_MT_pose_slide": _draw_breakdowns,
     "TOPBAR_MT_file_export": _draw_export,
 }
-"""Blender's menus, and what is appended to each. That of Object > Animation is the one of Pose > Animation too."""
+"""The function appended to each menu of Blender. Pose > Animation is the same menu as Object > Animation."""
 
 
 def register() -> None:

@@ -1,18 +1,18 @@
-"""What mouse and keyboard say while something is dragged, as Blender's own transforms have it."""
+"""Mouse and keyboard input during a drag, as in Blender's own transforms."""
 
 from __future__ import annotations
 
 import bpy
 
 SHIFT_RATIO = 0.1
-"""The part of a movement that Shift leaves."""
+"""Shift reduces a movement of the mouse to this fraction."""
 
 CONFIRM, CANCEL = {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}, {"RIGHTMOUSE", "ESC"}
 MODIFIERS = {"LEFT_CTRL", "RIGHT_CTRL", "LEFT_SHIFT", "RIGHT_SHIFT"}
 
 
 class MouseInput:
-    """Movements of the mouse, keys, and a number that is typed: then the mouse has no say until it is deleted."""
+    """Movements of the mouse, keys, and a typed number. A typed number overrides the mouse until it is deleted."""
 
     def __init__(self) -> None:
         self.typed = ""
@@ -21,14 +21,14 @@ class MouseInput:
 
     @property
     def number(self) -> float | None:
-        """The number that was typed; None where the mouse has its say."""
+        """The typed number; None if there is none, so the mouse counts."""
         try:
             return float(self.typed) if self.typed else None
-        except ValueError:  # so far it is a sign or a point alone
+        except ValueError:  # only a sign or a point so far
             return 0.0
 
     def handle(self, event: bpy.types.Event) -> bool:
-        """Take an event, and say whether it may have changed anything."""
+        """Handle an event. Return whether it may have changed anything."""
         self.is_stepped, self.is_fine = event.ctrl, event.shift
         if event.type == "MOUSEMOVE":
             self.move(event, SHIFT_RATIO if event.shift else 1.0)
@@ -37,11 +37,11 @@ class MouseInput:
         return True
 
     def move(self, event: bpy.types.Event, ratio: float) -> None:
-        """Go where the mouse is, by this part of the way."""
+        """Follow the mouse by this fraction of its movement."""
         raise NotImplementedError
 
     def press(self, key: str) -> bool:
-        """Take a key that was pressed, and say whether it was for this."""
+        """Handle a pressed key. Return whether the key has a meaning here."""
         raise NotImplementedError
 
     def _type(self, event: bpy.types.Event) -> bool:

@@ -1,4 +1,4 @@
-"""What a panel says of how something moves: the segment under the playhead, and what there is to know about it."""
+"""Notes and warnings in panels about the segment under the playhead of an object or bone."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .targets import with_keyed_bones
 from .wording import degrees, listed
 
 Notes = list[tuple[str, str]]
-"""Texts, each behind its icon."""
+"""Pairs of an icon and a text."""
 
 NO_KEYS = n_("No keys of location, rotation or scale yet")
 KEYED_BONES = n_("Its bones have keys. Choose their modes in Pose Mode")
@@ -49,15 +49,15 @@ NEAR_HALF_TEXT = n_(
 UNEVEN_TEXT = n_("The scale is not uniform, and is left to Blender")
 
 MANY_MODIFIERS = 64
-"""With more modifiers on a channel Blender plays noticeably slower where many channels have as many."""
+"""Blender plays noticeably slower if many channels have more modifiers than this."""
 
 
 def facts_and_notes(
     target: bpy.types.Object | bpy.types.PoseBone | Transform, frame: float
 ) -> tuple[SegmentFacts | None, Notes]:
-    """Return the segment that a frame of the scene is in, and notes on it."""
+    """Return the segment at a frame of the scene, and notes on it."""
     target = transform_of(target)
-    source, problem = _read(target)
+    source, problem = _source_and_problem(target)
     segment = None
     notes = []
     if problem:
@@ -69,12 +69,14 @@ def facts_and_notes(
         notes.append(("INFO", KEYED_BONES if of_bones else STRIPS_TEXT if in_strips else NO_KEYS))
     else:
         frame = frame_in_action(target.animated, frame)
-        # From a key in one holder to a key in another one there is no motion: it goes on as before, or rests.
+        # Between keys in different holders there is no segment: the object keeps its motion, or rests.
         segment = segment_at(source.run_at(frame).source if source.switches else source, frame)
         notes += (
-            [("ERROR", caution) for caution in cautions(segment)] if segment else [("INFO", _between(source, frame))]
+            [("ERROR", caution) for caution in cautions(segment)]
+            if segment
+            else [("INFO", _note_between_segments(source, frame))]
         )
-        notes += [("INFO", text) for text in _moved_alone(source)] if source.is_live else []
+        notes += [("INFO", text) for text in _partial_key_notes(source)] if source.is_live else []
         if not animation.is_enabled() and not is_up_to_date(target, source):
             notes.append(("ERROR", OUT_OF_DATE))
     if (count := most_modifiers(target)) > MANY_MODIFIERS:
@@ -85,11 +87,11 @@ def facts_and_notes(
 
 
 _problem: tuple[tuple, str] = ((), "")
-"""The last answer of `problem_of`, which looks at all users; and before it, all that it depends on."""
+"""Cache of `problem_of`, which is slow because it checks all users: all values it depends on, and its last result."""
 
 
-def _read(target: Transform) -> tuple[KeyedTransform | None, str]:
-    """Return what is keyed, or why rigid motion cannot act on it."""
+def _source_and_problem(target: Transform) -> tuple[KeyedTransform | None, str]:
+    """Return the keyed transform, and the reason why rigid motion cannot act on it, "" if it can."""
     global _problem
     try:
         source = source_of(target)
@@ -104,16 +106,16 @@ def _read(target: Transform) -> tuple[KeyedTransform | None, str]:
     return (None if _problem[1] else source), _problem[1]
 
 
-def _between(source: KeyedTransform, frame: float) -> str:
-    """Return what there is to say of a frame of the Action on which there is no segment."""
+def _note_between_segments(source: KeyedTransform, frame: float) -> str:
+    """Return the note for a frame of the Action without a segment."""
     switch = next((one for one in source.switches if one.frame > frame), None)
     if switch is None:
         return NO_SEGMENT
     return iface_(PASSING_TEXT if switch.begin < frame else RESTING_TEXT).format(frame=switch.frame)
 
 
-def _moved_alone(source: KeyedTransform) -> Iterator[str]:
-    """Yield what there is to say of location and rotation where some of their components alone have keys."""
+def _partial_key_notes(source: KeyedTransform) -> Iterator[str]:
+    """Yield warnings about frames on which only some components of location or rotation have keys."""
     for part in (LOCATION, ROTATION):
         frames = [
             set(keys.times.round(2).tolist())
@@ -127,14 +129,14 @@ def _moved_alone(source: KeyedTransform) -> Iterator[str]:
 
 
 def most_modifiers(target: Transform) -> int:
-    """Return the largest number of modifiers that a channel of a target has."""
+    """Return the largest number of modifiers on any channel of a target."""
     binding = active_binding(target)
     return 0 if binding is None else max((len(fcurve.modifiers) for fcurve in binding.curves.values()), default=0)
 
 
 def cautions(segment: SegmentFacts) -> list[str]:
-    """Return what an animator may not expect of a segment, and what to do about it.
-    Nothing where it is Blender's own.
+    """Return warnings about unexpected motion in a segment, with remedies.
+    There are none for Blender's own in-betweens.
     """
     is_near_half = segment.turn > NEAR_HALF_TURN and not (segment.turns or segment.is_sure)
     texts = {

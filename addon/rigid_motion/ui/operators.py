@@ -1,4 +1,4 @@
-"""What can be done to motions: an operator for each verb of `rigid_motion.animation`."""
+"""Operators on motions: bake, set modes and turns, copy modes, add cycles and layers, clear and refresh."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
 
 
 def with_what_to_bake(targets: Iterable[Transform]) -> Iterator[Transform]:
-    """Yield the targets with in-betweens, and those that are held."""
+    """Yield the targets with in-betweens, then the held ones."""
     targets = list(targets)
     return itertools.chain(with_in_betweens(targets), with_holders(targets))
 
@@ -116,7 +116,7 @@ class RIGID_MOTION_OT_bake(OnTargets):
 
 
 def axis_of_turns(target: Transform) -> str:
-    """Return the one of `TURN_AXES` that the turns of a target are about."""
+    """Return the axis of a target's turns: one of `TURN_AXES`, or `SCREW_AXIS`."""
     binding = active_binding(target)
     fcurve = None if binding is None else binding.curves.get(target.turns_channel)
     mark = 0 if fcurve is None else int(max(read_marks(fcurve)[:1], default=0))
@@ -211,9 +211,9 @@ class RIGID_MOTION_OT_set_mode(OnTargets):
             if not targets:
                 self.report({"ERROR"}, "Select keys of location, rotation or scale first")
                 return {"CANCELLED"}
-        return self.act(targets, lambda refused: self._set(context, targets, refused))
+        return self.act(targets, lambda refused: self._set_modes(context, targets, refused))
 
-    def _set(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+    def _set_modes(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
         groups = grouped_by_frames(context, targets, self.on, refused)
         for frames, group in groups.items():
             animation.set_mode(group, self.mode, frames, refused=refused)

@@ -1,4 +1,4 @@
-"""The sidebar panel of the viewport, the Dope Sheet and the Graph Editor: how the active object or bone moves."""
+"""Sidebar panels of viewport, Dope Sheet and Graph Editor: mode, path, speed, holder, layer of the active target."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NO_BONE = n_("No Bone Active")
 
 class InSidebar(Panel):
     bl_region_type = "UI"
-    bl_category = "Animation"  # in the viewport Blender has its own tools for animation there
+    bl_category = "Animation"  # also the category of Blender's own animation tools in the viewport
 
 
 class Folded(InSidebar):
@@ -131,7 +131,7 @@ def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segmen
 
 
 def _draw_turns(layout: bpy.types.UILayout, target: Transform) -> None:
-    """Draw the turns of the segment, to be set; and what they are about once there are any."""
+    """Draw the number of turns of the segment; and their axis, if there are any."""
     row = labelled(layout, iface_("Turns", OWN_WORDS))
     row.prop(target.motion, "turns", text="")
     if target.motion.turns:
@@ -144,7 +144,7 @@ def _draw_turns(layout: bpy.types.UILayout, target: Transform) -> None:
 
 
 def _draw_mode_menu(layout: bpy.types.UILayout, scope: str, modes: set[str]) -> None:
-    """Draw a button that shows the mode and sets another."""
+    """Draw a menu button that shows the mode and sets another one."""
     layout.enabled = bool(modes)
     text = (
         iface_(LABELS[next(iter(modes))], OWN_WORDS)

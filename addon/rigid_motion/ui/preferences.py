@@ -1,7 +1,7 @@
-"""The preferences of the extension, and how the overlay looks before anybody has changed them.
+"""The preferences of the extension: default mode, live update, and the colors and line width of the overlay.
 
-They go with Blender's own, and not with a file. Colours are red, green, blue, alpha, as on the screen, widths in pixels
-at a resolution scale of 1.
+Blender stores them with its own preferences, not in a file. Colors are RGBA as displayed, widths are in pixels at a
+resolution scale of 1.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from .wording import split
 Color = tuple[float, float, float, float]
 
 EXTENSION = __package__.rpartition(".")[0]
-"""The name that Blender knows the extension by: the package that this one is in."""
+"""The name of the extension in Blender: the parent package."""
 
 DEFAULT_MODE = "motor_spline"
 
 
 def preferences() -> RigidMotionPreferences:
-    """Return the preferences; while the package is registered without being an extension, as in tests of a checkout,
-    as they are before anybody has changed them.
+    """Return the preferences; their defaults if the package is registered without being an extension, as in tests of
+    a checkout.
     """
     addon = existing(bpy.context.preferences).addons.get(EXTENSION)
     return cast(RigidMotionPreferences, UNCHANGED if addon is None else addon.preferences)
 
 
 def apply() -> None:
-    """Act upon the preferences as they were read from Blender's."""
+    """Apply the preferences as loaded by Blender."""
     animation.set_enabled(preferences().live_update)
 
 

@@ -1,6 +1,6 @@
-"""Reducing keys: *Reduce Keys to Poses*, *Restore Keys* and *Discard Dense Keys*, also of rigs in Object Mode.
+"""Operators that reduce and restore keys: *Reduce Keys to Poses*, *Restore Keys*, *Discard Dense Keys*.
 
-And *Reduce into Holds*, of what hands held.
+They also work on rigs in Object Mode. *Reduce into Holds* reduces the keys of objects held in hands.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def radius_property(
     description: str = "At 0 each object has the size of its bounding box, and each bone that of what it moves",
     **more: Any,
 ) -> Any:
-    """Return the property `radius` of operators that change keys: around what errors count."""
+    """Return the property `radius` of operators that change keys: errors count within this radius."""
     return FloatProperty(
         name="Radius",
         description=description,
@@ -58,7 +58,7 @@ def tolerance_property(description: str, default: float = 0.001) -> Any:
 
 
 class OfRigsToo:
-    """Operators that act on all keyed bones of a rig where it is selected outside of Pose Mode: an import is."""
+    """Operators that act on all keyed bones of a rig selected outside of Pose Mode, as rigs are after an import."""
 
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
@@ -155,7 +155,7 @@ class RIGID_MOTION_OT_reduce_keys(OfRigsToo, OnTargets):
             layout.prop(self, "count", text=text, translate=False)
         else:
             layout.prop(self, "tolerance")
-        # So many key poses are shared as it is.
+        # Key poses given by number are always shared.
         of_rigs = ("hold",) if self.by == "NUMBER" else ("shared", "hold")
         for name in ("radius", "mode", *(of_rigs if rigs else ())):
             layout.prop(self, name)
@@ -200,9 +200,10 @@ Holders = Sequence[bpy.types.Object | bpy.types.PoseBone] | None
 
 
 def props_and_holders(context: bpy.types.Context) -> tuple[list[Transform], Holders]:
-    """Return what is selected to be held, and what may hold it: selected rigs, or else what is active among several.
+    """Return the selected transforms to hold, and their possible holders: selected rigs, or else the active object.
 
-    While bones are posed those that are selected hold objects that are not posed. None are all rigs of the scene.
+    In Pose Mode the selected bones hold the selected objects that are not posed; without any, the active bone holds
+    the other bones. None as holders means all rigs of the scene.
     """
     things: Sequence[bpy.types.Object | bpy.types.PoseBone] = selected_in_view(context)
     active: bpy.types.Object | bpy.types.PoseBone | None = context.object

@@ -1,4 +1,4 @@
-"""How fast the active object or bone goes and turns: curves in the Graph Editor, and *Equalise Speed*."""
+"""Speed of the active object or bone: its curves in the Graph Editor, a panel, and *Equalise Speed*."""
 
 from __future__ import annotations
 
@@ -33,79 +33,79 @@ from .targets import SELECTED, WHOLE, OnTargets, active_target, grouped_by_frame
 from .wording import degrees, labelled, length
 
 SAMPLES_PER_FRAME = 2
-"""Of speed, which is measured from each to the next."""
+"""Samples per frame; speed is measured from each sample to the next."""
 
 BAND_RATIOS = 0.09, 0.42
-"""Where curves of speed begin and end, in parts of the editor's height from below."""
+"""The bottom and the top of the speed curves, as fractions of the editor's height from below."""
 
 BAND_COLOR = (0.08, 0.08, 0.08, 0.55)
-"""Behind them, so that they are not taken for F-curves."""
+"""The background of the speed curves, which tells them from F-curves."""
 
 KEY_DIAMETER_PX, TEXT_SIZE_PX, MARGIN_PX = 7.0, 12.0, 8.0
 
 MIN_BEND_RATIO = 1e-4
-"""The part of its way by which a path lies beside what it was to be spoken of."""
+"""The report mentions a deviation of the path above this fraction of its length."""
 
 MIN_SPEED = 1e-6
-"""Units or radians a frame up to which it rests."""
+"""Up to this speed, in units or radians per frame, a target is at rest."""
 
 
 @dataclass(frozen=True, eq=False)
 class Speeds:
-    """How fast something is between frames (n,) and the next ones, in units and radians a frame, (n - 1,) each."""
+    """Speeds between frames (n,) and the next ones: in units and in radians per frame, (n - 1,) each."""
 
     frames: np.ndarray
     going: np.ndarray
     turning: np.ndarray
     keys: np.ndarray
-    """The frames of its keys, shape (k,)."""
+    """The frames of the keys, shape (k,)."""
 
     def at(self, values: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """Return one of the two on frames (m,): behind a key where it jumps there."""
+        """Return `values`, one of the two speeds, on frames (m,). On a key it is the speed after the key."""
         at = np.searchsorted(self.frames, frames + 1e-3, side="right") - 1
         return values[np.clip(at, 0, len(values) - 1)]
 
 
-_known: WeakKeyDictionary[DrawnPath, Speeds] = WeakKeyDictionary()
-"""By paths, which are others after every edit."""
+_speeds_by_path: WeakKeyDictionary[DrawnPath, Speeds] = WeakKeyDictionary()
+"""Cache by path, a new object after every edit."""
 
 
 def speeds_of(target: Transform, context: Any) -> Speeds | None:
-    """Return how fast something moves in the world; None where it has no path."""
+    """Return the speeds of a target in the world; None if it has no path."""
     path = path_of(target, context)
-    if path is None or path in _known:
-        return None if path is None else _known[path]
+    if path is None or path in _speeds_by_path:
+        return None if path is None else _speeds_by_path[path]
     motion = motion_now(target, context.view_layer.depsgraph)
     keys, even = motion.source.keyed_frames, motion.frames(SAMPLES_PER_FRAME)
-    # Between samples that are all but one, rounding would be speed.
+    # Between samples that nearly coincide, rounding errors would look like speed.
     far = np.abs(even[:, None] - keys).min(axis=1) > 0.1 / SAMPLES_PER_FRAME
     frames = np.union1d(even[far], keys)
     going, turning = (part / np.diff(frames) for part in ways_and_turns(motion.space @ motion.at_point(frames)))
-    _known[path] = Speeds(frames, going, turning, keys)
-    return _known[path]
+    _speeds_by_path[path] = Speeds(frames, going, turning, keys)
+    return _speeds_by_path[path]
 
 
-def _read_as(context: Any, going: float, turning: float) -> tuple[str, str]:
-    """Return a speed and a rate of turning, in units and radians a frame, to be read."""
+def _speed_texts(context: Any, going: float, turning: float) -> tuple[str, str]:
+    """Return a speed and a rate of rotation as texts per second, from units and radians per frame."""
     render = context.scene.render
     fps = render.fps / render.fps_base
     return f"{length(context.scene, going * fps, precision=3)}/s", f"{degrees(turning * fps)}/s"
 
 
 def draw_panel(context: Any, layout: bpy.types.UILayout) -> None:
-    """Draw the speed on the current frame, for a panel."""
+    """Draw the speed on the current frame in a panel."""
     target = active_target(context)
     speeds = None if target is None else speeds_of(target, context)
     if target is not None and speeds is not None:
         frame = np.array([frame_in_action(target.animated, context.scene.frame_current_final)])
-        texts = _read_as(context, *(float(speeds.at(part, frame)[0]) for part in (speeds.going, speeds.turning)))
+        texts = _speed_texts(context, *(float(speeds.at(part, frame)[0]) for part in (speeds.going, speeds.turning)))
         labelled(layout, "").label(text=", ".join(texts), translate=False)
     layout.operator(RIGID_MOTION_OT_equalise_speed.bl_idname)
 
 
 @drawn
 def draw() -> None:
-    """Draw the speeds of the active object or bone in the Graph Editor that is being drawn."""
+    """Draw the speeds of the active object or bone in the current Graph Editor."""
     context: Any = bpy.context
     target = active_target(context) if overlay_settings(context.scene).show_speed else None
     speeds = speeds_of(target, context) if target is not None and context.space_data.mode == "FCURVES" else None
@@ -136,13 +136,13 @@ def _draw(context: Any, target: Transform, speeds: Speeds) -> None:
         peak = float(values.max(initial=0.0))
         peaks.insert(0, peak)
         if peak > MIN_SPEED:
-            # Steps, half a frame wide, would be all that is seen of a curve from near.
+            # Drawn at the middles of samples: zoomed in, a curve would look like steps half a frame wide.
             middles = 0.5 * (speeds.frames[1:] + speeds.frames[:-1])
             pen.line(batch_of("LINE_STRIP", placed(middles, values, peak)), color, pen.look.line_width)
             on_keys = placed(speeds.keys, speeds.at(values, speeds.keys), peak)
             pen.dot(batch_of("POINTS", on_keys), KEY_COLOUR, KEY_DIAMETER_PX)
     blf.size(0, TEXT_SIZE_PX * pen.scale)
-    for text, color in list(zip(_read_as(context, *peaks), colors, strict=True))[::-1]:
+    for text, color in list(zip(_speed_texts(context, *peaks), colors, strict=True))[::-1]:
         right -= blf.dimensions(0, text)[0]
         blf.color(0, *color)
         blf.position(0, right, top + 0.7 * TEXT_SIZE_PX * pen.scale, 0)
@@ -201,10 +201,10 @@ class RIGID_MOTION_OT_equalise_speed(OnTargets):
         return "; ".join(self._summary(context, done)) if done else ""
 
     def _summary(self, context: Any, done: dict[Transform, EvenSpeed]) -> Iterator[str]:
-        """Yield what became of the one that is least even, and of the path that bends most."""
+        """Yield a summary of the target with the least even speed, and of the path that changed most."""
         one = max(done.values(), key=lambda one: one.unevenness)
         text = rpt_("{speed} from frame {first:g} to {last:g}, even to {percent:.2g} %")
-        speed = _read_as(context, one.speed, one.speed)[one.is_turning]
+        speed = _speed_texts(context, one.speed, one.speed)[one.is_turning]
         yield text.format(speed=speed, first=one.first, last=one.last, percent=100.0 * one.unevenness)
         bent = max(done.values(), key=lambda one: one.bend)
         if bent.bend > MIN_BEND_RATIO * bent.speed * (bent.last - bent.first):

@@ -1,11 +1,11 @@
-"""From the context to targets, the transforms and keys that an editor means; and what operators on them have in common.
+"""Targets of operators: the transforms and keys that an editor's context selects, and the operators' base classes.
 
-In a Dope Sheet or Graph Editor these are the transforms whose channels are shown. Elsewhere they are the selected
-objects; while bones are posed, the selected bones of all rigs in Pose Mode.
+In a Dope Sheet or Graph Editor the targets are the transforms whose channels are shown. Elsewhere they are the selected
+objects, or in Pose Mode the selected bones of all rigs in Pose Mode.
 
-Each operator does all that it can in one go, and says why not where it cannot. Where there is nothing to do, a button
-is greyed out, and its tooltip has the reason. That is asked on every redraw, so it looks at as little as it can. An
-operator that every target refused has changed nothing: it is cancelled, without an undo step.
+An operator acts on every target that it can, and reports the reasons of all others. If there is nothing to do, its
+button is greyed out, with the reason as the tooltip. Blender polls on every redraw, so polls check as little as they
+can. If every target refuses, nothing has changed: the operator is cancelled, without an undo step.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ SCOPES = [
     (CURRENT, "Current Segment", "The segment under the playhead. The others do not change"),
     (SELECTED, "Selected Keys", "The segments after the selected keys. The others do not change"),
 ]
-"""The parts of a target that get a mode or turns, as the items of an enum property."""
+"""The segments of a target that get a mode or turns, as items of an enum property."""
 
 Frames = tuple[float, ...] | None
-"""Frames of keys, None for all of a target."""
+"""Frames of keys; None means all keys of a target."""
 
 NO_TARGETS = n_("Select objects or bones with keys first")
 
@@ -52,10 +52,10 @@ LATER_CHANGE_PROBLEMS = {
     REDUCED: n_("These keys were reduced since: Restore Keys first"),
     CLEANED: n_("These keys were cleaned since: Restore Keys first"),
 }
-"""The reason why what was done before cannot be taken back yet, by what was done last."""
+"""The reason why an earlier change cannot be undone yet, by the kind of the last change."""
 
 MOST_REFUSALS = 8
-"""Refusals that a report has room for."""
+"""The most refusals listed in a report."""
 
 
 def is_key_editor(context: bpy.types.Context) -> bool:
@@ -63,32 +63,30 @@ def is_key_editor(context: bpy.types.Context) -> bool:
 
 
 def is_posing(context: bpy.types.Context) -> bool:
-    """Return whether bones are selected here, and not objects: in Pose Mode,
-    and while weights are painted for a posed rig.
-    """
+    """Return whether the selection is bones, not objects: in Pose Mode, and in Weight Paint with a posed rig."""
     return context.mode == "POSE" or (context.mode == "PAINT_WEIGHT" and context.pose_object is not None)
 
 
 def active_target(context: bpy.types.Context) -> Transform | None:
-    """Return what panels and ticks in menus are about."""
+    """Return the target that panels and ticks in menus show."""
     active = context.active_pose_bone if is_posing(context) else context.object
     return None if active is None else transform_of(active)
 
 
 def each_target(context: bpy.types.Context) -> Iterator[Transform]:
-    """Return what an operator acts on here, one after the other: polls need no more than the first that fits."""
+    """Return the targets of operators in this context, as an iterator: polls need only the first that fits."""
     return _shown_in_editor(context) if is_key_editor(context) else map(transform_of, selected(context))
 
 
 def targets_of(context: bpy.types.Context) -> list[Transform]:
-    """Return what an operator acts on here."""
+    """Return the list of targets of operators in this context."""
     return list(each_target(context))
 
 
 def with_bones_of_rigs(context: bpy.types.Context, targets: Iterable[Transform]) -> Iterator[Transform]:
-    """Yield the targets, and outside of Pose Mode in place of rigs all that has keys of them and of their bones.
+    """Yield the targets. Outside of Pose Mode a rig is replaced by whichever of the rig and its bones have keys.
 
-    In a key editor these are the selected rigs too: it shows channels of bones only where the bones are selected.
+    In a key editor the selected rigs are added, because it shows channels of bones only if the bones are selected.
     """
     if is_posing(context):
         yield from targets
@@ -104,7 +102,7 @@ def with_bones_of_rigs(context: bpy.types.Context, targets: Iterable[Transform])
 
 
 def with_keyed_bones(target: Transform) -> list[Transform]:
-    """Return what has keys of a rig and its bones, where any of its bones has; otherwise the target alone."""
+    """Return the keyed ones of a rig and its bones, if any bone has keys; otherwise the target alone."""
     if target.is_part or target.animated.type != "ARMATURE":
         return [target]
     keyed = list(with_more_keys_than((target, *map(transform_of, pose_bones(target.animated))), 0))
@@ -112,27 +110,25 @@ def with_keyed_bones(target: Transform) -> list[Transform]:
 
 
 def selected(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:
-    """Return the selected objects, without any the active one; or the selected bones alone,
-    as Blender's operators have it.
-    """
+    """Return the selected bones, or the selected objects or else the active one, as Blender's operators do."""
     result = selected_in_view(context)
     return result if result or is_posing(context) or context.object is None else [context.object]
 
 
 def selected_in_view(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:
-    """Return the selected bones of all rigs in Pose Mode while these are posed, else the selected objects."""
+    """Return the selected bones of all rigs in Pose Mode while bones are posed, else the selected objects."""
     if is_posing(context):
         return list(context.selected_pose_bones or ())
     return list(context.selected_objects or ())
 
 
 def scope_for(context: bpy.types.Context) -> str:
-    """Return what of the targets gets a mode here, unless asked for otherwise."""
+    """Return the default scope of a mode in this context."""
     return SELECTED if is_key_editor(context) else WHOLE
 
 
 def frames_meant(context: bpy.types.Context, target: Transform, scope: str) -> Frames:
-    """Return the keys of a target that begin the segments meant, None for all of it. `Refused` where there are none."""
+    """Return the frames of the keys that begin a target's segments in a scope; None for all. `Refused` if none."""
     if scope == WHOLE:
         return None
     if scope == SELECTED:
@@ -156,7 +152,7 @@ def frames_meant(context: bpy.types.Context, target: Transform, scope: str) -> F
 def each_done(
     targets: Iterable[Transform], refused: list[Refused], verb: Callable[[Transform], object]
 ) -> list[Transform]:
-    """Do something to each target, and return those that did not refuse."""
+    """Call a function with each target, collect refusals, and return the targets that did not refuse."""
     done = []
     for target in targets:
         try:
@@ -171,8 +167,8 @@ def each_done(
 def grouped_by_frames(
     context: bpy.types.Context, targets: Iterable[Transform], scope: str, refused: list[Refused]
 ) -> dict[Frames, list[Transform]]:
-    """Return the targets whose segments meant begin on the same keys, together.
-    `refused` takes why others have none.
+    """Group targets by the frames of the keys that begin their segments in a scope.
+    Targets without any are added to `refused`.
     """
     groups: dict[Frames, list[Transform]] = {}
     each_done(
@@ -200,7 +196,7 @@ def modes_meant(context: bpy.types.Context, target: Transform | None, scope: str
 
 
 def _shown_in_editor(context: bpy.types.Context) -> Iterator[Transform]:
-    """Yield the objects and the bones of which location, rotation, scale or turns are shown in a key editor."""
+    """Yield the objects and bones whose location, rotation, scale or turns are shown in a key editor."""
     shown = {fcurve.as_pointer() for fcurve in context.visible_fcurves or ()}
     for obj in _animated_in_editor(context) if shown else ():
         result = set()
@@ -224,26 +220,26 @@ class OnTargets(Operator):
     """Operators on the selected objects or bones, or on those that the editor shows."""
 
     nothing_to_do: ClassVar[str] = ""
-    """The reason why the operator is greyed out where it has nothing to do on any target."""
+    """The reason for a greyed-out operator if it has nothing to do on any target."""
 
     nothing_meant: ClassVar[str] = ""
-    """The reason where there are no targets; "" for that of the editor."""
+    """The reason if there are no targets; "" for the editor's own reason."""
 
     with_work: Any = staticmethod(iter)
-    """A function of targets that returns those on which there is something to do."""
+    """A function that filters targets: it returns the ones with something to do."""
 
     leaves_others: ClassVar[bool] = False
-    """True if it does nothing to other targets; otherwise these say why nothing could be done."""
+    """True to skip all other targets silently; False to let them report why nothing could be done."""
 
     verb: ClassVar[Callable]
-    """What `do` calls with targets, and with a list for `refused`."""
+    """The function that `do` calls with the targets and with a list for `refused`."""
 
     summary: ClassVar[str]
-    """What was done then."""
+    """The message reported after `verb`."""
 
     @classmethod
     def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
-        """Return what the operator acts on here, one after the other."""
+        """Return an iterator over the operator's targets in this context."""
         return each_target(context)
 
     @classmethod
@@ -271,31 +267,31 @@ class OnTargets(Operator):
         return self.act(targets, lambda refused: self.do(context, targets, refused))
 
     def meant(self, context: bpy.types.Context) -> list[Transform]:
-        """Return the targets that something is to be done to."""
+        """Return the targets that the operator will act on."""
         targets = list(self.each_target(context))
         return list(self.with_work(targets)) if self.leaves_others else targets
 
     def do(self, _context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
-        """Do it to all targets, put refusals into the list, and return in words what was done: a verb of `act`."""
+        """Act on all targets, add refusals to the list, and return a summary. This is a `verb` of `act`."""
         type(self).verb(targets, refused=refused)
         return rpt_(self.summary)
 
     def act(self, targets: Sequence[Transform], verb: Callable[[list[Refused]], str]) -> Returned:
-        """Do something to all targets at once, and report it.
+        """Call a function on all targets at once, and report the result.
 
         Parameters
         ----------
         targets
         verb
-            Does it, puts refusals into the list that it is given, and returns in words what was done. May raise
-            `Refused` where nothing could be.
+            Acts on the targets, adds refusals to the list that it is given, and returns a summary. May raise `Refused`
+            if it could do nothing.
         """
         refused: list[Refused] = []
         try:
             summary = verb(refused)
         except Refused as refusal:
             refused, summary = [refusal], ""
-        # Bones of a rig may all have the same reason.
+        # Bones of a rig may all give the same reason.
         reasons = list(dict.fromkeys(map(str, refused)))
         refusals = reasons[:MOST_REFUSALS]
         if len(reasons) > MOST_REFUSALS:
@@ -319,7 +315,7 @@ class OnChanged(OnTargets):
 
     @classmethod
     def last_changes(cls, targets: Iterable[Transform]) -> dict[Transform, str]:
-        """Return what was done last to the keys of each target that something was done to."""
+        """Return the kind of the last change to the keys of each changed target."""
         result = {}
         for target, notes in notes_of(targets):
             if kind := next((note.kind for note in notes if note.original is not None), None):

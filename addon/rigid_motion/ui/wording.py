@@ -1,7 +1,7 @@
-"""The words of the interface: names of modes, notes on a segment, summaries, and lines of a panel.
+"""Texts of the interface: names of modes, lengths and angles, summaries, and aligned lines of a panel.
 
-Lines are aligned with one another: a narrow label, and to the right of it what belongs to it. Blender's own split gives
-labels two fifths of the width, and cuts the names of modes off in a sidebar as it opens.
+A line has a narrow label on the left and its value on the right. Blender's own split gives labels two fifths of the
+width, and would cut off names of modes in a sidebar of default width.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from ..blender import existing
 from ..motion import KEYFRAME_MODES
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
-"""Each mode as menus show it. Translated as `OWN_WORDS`: Blender has another Screw."""
+"""The label of each mode in menus. Translated in the context `OWN_WORDS`: Blender has another Screw."""
 
 NATIVE_LABEL = "Native Curves"
-"""What is in place of a mode where keys are reduced without any. Translated as these."""
+"""The label used in place of a mode when keys are reduced without one. Same translation context."""
 
 DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 """The effect of each mode on the motion, in one sentence without a full stop."""
 
 LABEL_WIDTH_RATIO = 0.28
-"""The part of the width that labels have."""
+"""The labels' fraction of the width."""
 
 SIDEBAR_MARGIN_PX = 84
-"""Pixels of a sidebar that text cannot have, at a resolution scale of 1: tabs, an icon, and the panel's edges."""
+"""The width of a sidebar that text cannot use, in pixels at a resolution scale of 1: tabs, an icon and margins."""
 
 
 def twin_of(mode: str, *, grows: bool) -> str:
-    """Return the mode that makes the same motion and that lists show in its place, "" for one that is its own."""
+    """Return the mode that gives the same motion and replaces this one in lists, "" if there is none."""
     one = KEYFRAME_MODES.get(mode)
     if one is None or not one.twin or (grows and one.curves is not KEYFRAME_MODES[one.twin].curves):
         return ""
@@ -48,19 +48,19 @@ def twin_of(mode: str, *, grows: bool) -> str:
 
 
 def degrees(angle: float) -> str:
-    """Return an angle in radians, to be read."""
+    """Return an angle in radians as text in degrees."""
     return f"{math.degrees(angle):.1f}°"
 
 
 def turn_text(segment: SegmentFacts) -> str:
-    """Return by how much a segment turns, to be read: in turns where there are whole ones, else in degrees."""
+    """Return the rotation of a segment as text: in turns if it has whole turns, else in degrees."""
     if not segment.turns:
         return degrees(segment.turn)
     return iface_("{turns} turns").format(turns=f"{segment.turn / math.tau:.3g}")
 
 
 def length(scene: bpy.types.Scene, units: float, precision: int = 4) -> str:
-    """Return a length in Blender's units, to be read in those of the scene."""
+    """Return a length in Blender's units as text in the units of the scene."""
     settings = scene.unit_settings
     if settings.system == "NONE":
         return f"{units:.{precision}g}"
@@ -68,7 +68,7 @@ def length(scene: bpy.types.Scene, units: float, precision: int = 4) -> str:
 
 
 def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
-    """Return what became of the keys of a target."""
+    """Return a summary of a reduction."""
     error = length(scene, reduction.largest_error, precision=3)
     text = rpt_("{before} keys became {after}, largest error {error}")
     _, _, *rows = reduction_rows(scene, reduction)
@@ -77,14 +77,14 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
 
 
 def reduced_to(scene: bpy.types.Scene, reduction: Reduction) -> str:
-    """Return how many keys became how many, and how far off the motion is, for a line of a panel."""
+    """Return the number of keys before and after a reduction, and its error, for a line of a panel."""
     became = f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"
     error = length(scene, reduction.largest_error, precision=3)
     return iface_("{keys}, {error} off").format(keys=became, error=error)
 
 
 def hold_lines(reduction: Reduction | None) -> list[str]:
-    """Return in what something is held since its keys were reduced, a line for each time, in the user's language."""
+    """Return a line for each hold found by a reduction, in the user's language."""
     text = iface_("{holder} from {first:g} to {last:g}: {before} keys became 1")
     return [
         text.format(holder=holder, first=first, last=last, before=before)
@@ -93,7 +93,7 @@ def hold_lines(reduction: Reduction | None) -> list[str]:
 
 
 def reduction_rows(scene: bpy.types.Scene, reduction: Reduction | None) -> list[tuple[str, str]]:
-    """Return what became of keys, and of the rig where it is one, as labels and what belongs to them."""
+    """Return the results of a reduction, also those of a rig, as pairs of label and text."""
     if reduction is None:
         return []
     error, between = (length(scene, off, precision=3) for off in (reduction.largest_error, reduction.between))
@@ -125,19 +125,19 @@ def reduction_rows(scene: bpy.types.Scene, reduction: Reduction | None) -> list[
             text = iface_("slide {after}, recorded {before}")
             rows.append((iface_("Feet", OWN_WORDS), text.format(after=after_slide, before=before_slide)))
         if bones := reduction.rig.not_promised:
-            # What follows constraints or drivers is somewhere else than its keys say.
+            # Constraints or drivers move these bones away from their keys.
             rows.append((iface_("Not Promised", OWN_WORDS), listed(bones)))
     return rows
 
 
 def listed(items: Sequence[str], most: int = 3) -> str:
-    """Return a list that fits into a line."""
+    """Join items into a list short enough for one line."""
     rest = len(items) - most
     return ", ".join(items[:most]) + (rpt_(" and {count} more").format(count=rest) if rest > 0 else "")
 
 
 def names_of(targets: Sequence[Transform]) -> str:
-    """Return one target by its name, several by their number."""
+    """Return the name of a single target, or the number of several."""
     if len(targets) == 1:
         return targets[0].name
     are_parts = {target.is_part for target in targets}
@@ -146,7 +146,7 @@ def names_of(targets: Sequence[Transform]) -> str:
 
 
 def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:
-    """Return the lines of a text, broken between words. A word that does not fit gets a line of its own."""
+    """Break a text into lines between words. A word that does not fit gets a line of its own."""
     lines: list[str] = []
     for word in text.split():
         if lines and fits(f"{lines[-1]} {word}"):
@@ -157,14 +157,14 @@ def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:
 
 
 def split(layout: bpy.types.UILayout) -> bpy.types.UILayout:
-    """Return the layout, which then has labels to the left of properties, and no dots to animate them by."""
+    """Give the layout labels to the left of properties and no keyframe buttons, and return it."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     return layout
 
 
 def labelled(layout: bpy.types.UILayout, label: str = "") -> bpy.types.UILayout:
-    """Return the right-hand part of a row, with a label on the left, in the user's language."""
+    """Draw a label, already translated, and return the part of the row to the right of it."""
     split = layout.split(factor=LABEL_WIDTH_RATIO)
     left = split.row()
     left.alignment = "RIGHT"
@@ -173,7 +173,7 @@ def labelled(layout: bpy.types.UILayout, label: str = "") -> bpy.types.UILayout:
 
 
 def draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str, icon: Any) -> None:
-    """Draw a text that is broken into as many lines as the region's width asks for."""
+    """Draw a text, broken into lines that fit the width of the region."""
     system = existing(context.preferences).system
     width = existing(context.region).width - SIDEBAR_MARGIN_PX * system.ui_scale
     blf.size(0, existing(context.preferences).ui_styles[0].widget.points * system.ui_scale)
