@@ -36,7 +36,7 @@ from .wording import draw_text, labelled
 HOST = "127.0.0.1"
 
 
-def _on_drivers_changed(_settings: LiveSettings | LiveBone, _context: bpy.types.Context) -> None:
+def _update_drivers(_settings: LiveSettings | LiveBone, _context: bpy.types.Context) -> None:
     if (listening := receiving.listening()) is not None and not receiving.is_matching:
         listening.choose_drivers()
 
@@ -46,7 +46,7 @@ class LiveBone(bpy.types.PropertyGroup):
     """A joint of a body, and the bone that it moves. Its name is that of the joint."""
 
     bone: str = StringProperty(
-        name="Bone", description="The bone that this joint moves; none if empty", update=_on_drivers_changed
+        name="Bone", description="The bone that this joint moves; none if empty", update=_update_drivers
     )
 
 
@@ -80,12 +80,12 @@ class LiveSettings(bpy.types.PropertyGroup):
         description="The armature that a body drives, by the names of its bones. Without one, it gets a new armature",
         type=bpy.types.Object,
         poll=lambda _, obj: obj.type == "ARMATURE",
-        update=_on_drivers_changed,
+        update=_update_drivers,
     )
     body: str = StringProperty(
         name="Body",
         description="Which of several bodies drives the rig. Without a name, the first to arrive",
-        update=_on_drivers_changed,
+        update=_update_drivers,
     )
     bones: bpy.types.bpy_prop_collection_idprop[LiveBone] = CollectionProperty(type=LiveBone)
     bones_of: str = StringProperty(description="The rig that the table is for", options={"HIDDEN"})

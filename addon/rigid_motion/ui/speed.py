@@ -39,7 +39,7 @@ BAND_RATIOS = 0.09, 0.42
 """The bottom and the top of the speed curves, as fractions of the editor's height from below."""
 
 BAND_COLOR = (0.08, 0.08, 0.08, 0.55)
-"""The background of the speed curves, which tells them from F-curves."""
+"""The background of the speed curves, which distinguishes them from F-curves."""
 
 KEY_DIAMETER_PX, TEXT_SIZE_PX, MARGIN_PX = 7.0, 12.0, 8.0
 

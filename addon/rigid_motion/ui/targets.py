@@ -180,7 +180,7 @@ def grouped_by_frames(
 
 
 def modes_meant(context: bpy.types.Context, target: Transform | None, scope: str) -> set[str]:
-    """Return the modes that what is meant of a target has now."""
+    """Return the current modes of a target's segments in a scope."""
     if target is None:
         return set()
     try:
