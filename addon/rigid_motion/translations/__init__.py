@@ -1,7 +1,7 @@
-"""Translations of the extension's texts, as Blender takes them: by locale, context and English text.
+"""Translations of the extension's texts, registered with Blender by locale, context and English text.
 
-A language is a gettext file here, named after its locale: `de.po`. Code has English texts alone: Blender translates
-labels, tooltips and reports by itself; what is put together of parts is marked by its `pgettext` functions.
+Each language is a gettext file here, named after its locale: `de.po`. The code has English texts alone. Blender
+translates labels, tooltips and reports by itself; texts assembled from parts are marked by its `pgettext` functions.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from importlib.resources import files
 import bpy
 
 OWNER = (__package__ or "").rpartition(".")[0]
-"""Whose translations they are, as Blender keeps them: the extension's."""
+"""The owner of the translations, as registered with Blender: the extension."""
 
 DEFAULT = "*"
-"""Blender's name of the context of texts without one."""
+"""Blender's context for texts without one."""
 
 _STRING = r'"(?:\\.|[^"\\\n])*"'
 _STRINGS = rf"((?:{_STRING}\s*)+)"
@@ -29,13 +29,13 @@ Texts = dict[tuple[str, str], str]
 
 
 def languages() -> dict[str, Texts]:
-    """Return the texts of all languages, by locale."""
+    """Return the translations of all languages, by locale."""
     catalogs = (file for file in files(__package__).iterdir() if file.name.endswith(".po"))
     return {file.name.removesuffix(".po"): read(file.read_text("utf-8")) for file in catalogs}
 
 
 def read(po: str) -> Texts:
-    """Return the texts of a gettext file, without those that have no translation yet or only a fuzzy one."""
+    """Return the translations in a gettext file, without missing and fuzzy ones."""
     texts = {}
     for flags, *parts in _ENTRY.findall(po):
         context, english, translation = map(_joined, parts)
@@ -45,7 +45,7 @@ def read(po: str) -> Texts:
 
 
 def _joined(strings: str) -> str:
-    """Join strings on lines of their own, with their escapes resolved."""
+    """Join the strings of several lines, with their escapes resolved."""
     return "".join(map(json.loads, re.findall(_STRING, strings)))
 
 

@@ -1,8 +1,8 @@
-"""Paths that were worked out already, and which of them an edit may have made wrong.
+"""Cache of computed paths, and which of them an edit may have invalidated.
 
-Blender's handlers name the objects and Actions that were edited. Their paths are looked at again when next drawn, and
-worked out anew where the digest of the source, or something else that they depend on, is another one. So a frame
-that is merely played, or looked at from elsewhere, costs no more than looking paths up.
+Blender's handlers name the objects and Actions that were edited. Their paths are checked when they are next drawn, and
+computed again if the digest of the source or of another dependency has changed. So playing a frame, or looking from
+another angle, costs no more than looking up paths.
 """
 
 from __future__ import annotations
@@ -33,57 +33,57 @@ from .parents import CarriedTargets
 from .points import DrawnPath
 
 MAX_SPARE_PATHS = 64
-"""The number of paths kept that are not drawn any more."""
+"""The number of paths kept that are no longer drawn."""
 
 
 @dataclass
 class _Entry:
     path: DrawnPath | None
     digest: tuple
-    """The digest of all that the path depends on."""
+    """The digest of everything that the path depends on."""
 
     settings: tuple
-    """The part of it that is the scene's, and what stands between a bone's rotation and its location, as bytes."""
+    """The scene's settings of the overlay, and the bytes of `Space.turn` if the parents are not followed."""
 
     action: int
     """Session id of the Action that the path was read from, 0 for none."""
 
     selected: bytes = b""
-    """The selection among the keys of its channels."""
+    """Which keys of its channels are selected."""
 
     above: frozenset[int] = frozenset()
-    """Session ids of what its parents move by, where it follows them."""
+    """Session ids of the data-blocks that its parents move by, if it follows them."""
 
     records: tuple[tuple[records.PlaceRecord, int], ...] = ()
-    """What it depends on that is known as it was seen alone, and how often that had changed."""
+    """Place records that it depends on, with their versions at that time."""
 
     stale: bool = False
 
     @property
     def is_outdated(self) -> bool:
-        """Return whether anything has been seen otherwise since."""
+        """Return whether a place record has changed since, or lost its transform in an undo."""
         return any(record.version != version or record.transform is None for record, version in self.records)
 
 
 OVERLAY = "rigid_motion_overlay"
-"""The name of the overlay's settings on scenes, see `settings`."""
+"""The property of scenes with the overlay's settings, see `settings`."""
 
 _entries: OrderedDict[tuple[int, str], _Entry] = OrderedDict()
-"""By the identity of what is moved; those drawn last come last."""
+"""Entries by the identity of the transform, in the order of drawing: the last drawn come last."""
 
 
 def path_of(target: bpy.types.Object | bpy.types.PoseBone | Transform, context: Any) -> DrawnPath | None:
-    """Return the path of a target, as the overlay of the scene is set.
+    """Return the path of a target, with the scene's settings of the overlay.
 
-    None where it has none: without keys in its Action, with a single one, and where rigid motion is refused.
+    None if it has no path: without keys in its Action, with a single one, or if rigid motion is refused.
     """
     (path,) = drawn_paths([transform_of(target)], context)
     return path and path[1]
 
 
 def drawn_paths(targets: Sequence[Transform], context: Any) -> list[tuple[Matrix, DrawnPath] | None]:
-    """Return the paths of several targets, with the maps from their spaces into the world."""
-    scene, is_playing = context.scene, _plays()
+    """Return the paths of several targets, with the maps from their spaces into the world; None for no path."""
+    scene, is_playing = context.scene, _is_playing()
     overlay: Any = getattr(scene, OVERLAY)
     ghost_step = overlay.frames_between_ghosts if overlay.show_ghosts else 0
     settings = (
@@ -129,21 +129,21 @@ def _bytes(turn: np.ndarray | None) -> bytes:
 
 
 def keep_only(drawn: int) -> None:
-    """Drop paths that were not drawn for long, where this many were drawn just now."""
+    """Drop the paths drawn longest ago, given how many were drawn just now."""
     while len(_entries) > drawn + MAX_SPARE_PATHS:
         _entries.popitem(last=False)
 
 
 def know_from_seeing(targets: Iterable[Transform]) -> bool:
-    """Return whether the path of any of these depends on what is known only where it was seen."""
+    """Return whether the path of any target depends on places recorded while frames were shown."""
     entries = (_entries.get(target.identity) for target in targets)
     return any(entry is not None and entry.records for entry in entries)
 
 
 def notice_selection(targets: Iterable[bpy.types.Object | bpy.types.PoseBone | Transform]) -> bool:
-    """Return whether keys of these are selected otherwise than in their paths; those are looked at again then.
+    """Return whether the key selection of any target has changed; mark the paths of these targets as stale.
 
-    Selecting is no edit, so Blender's handlers are silent about it.
+    Selecting is no edit, so Blender's handlers do not report it.
     """
     entries = {target: entry for target in map(transform_of, targets) if (entry := _entries.get(target.identity))}
     drawn = [target for target, entry in entries.items() if entry.path]
@@ -155,7 +155,7 @@ def notice_selection(targets: Iterable[bpy.types.Object | bpy.types.PoseBone | T
 
 
 def _selection(binding: Binding | None) -> bytes:
-    """Return which keys are selected, channel by channel: quicker to have than their frames."""
+    """Return which keys are selected, channel by channel: quicker to get than their frames."""
     curves = () if binding is None else binding.curves.values()
     return b"".join(selected_keys(fcurve).tobytes() for fcurve in curves)
 
@@ -173,10 +173,10 @@ def _read(
     action = data.action if data else None
     entry = _Entry(None, (), (*settings, _bytes(space.turn)), action.session_uid if action else 0)
     if binding is None or source is None:
-        # Where it was refused, the panel says why.
+        # If it was refused, the panel says why.
         return entry
     if target.motion.base is not None and not is_plain(target.animated):
-        return entry  # keys are not where it is seen
+        return entry  # the keys are not where the bone or object is seen
     motion = motion_of(target, source, carried, space)
     entry.above = motion.ids
     if entry.above:
@@ -185,10 +185,10 @@ def _read(
         return entry
     entry.selected, entry.records = _selection(binding), motion.records
     selected = frames_in(binding, selected=True)
-    # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
-    stands = [getattr(target.carrier, prop)[:] for name, prop in target.properties.items() if name not in source.keyed]
+    # Unkeyed values move the path but not its in-betweens, so the source's digest leaves them out.
+    unkeyed = [getattr(target.carrier, prop)[:] for name, prop in target.properties.items() if name not in source.keyed]
     entry.digest = (
-        *(source.digest, source.original.tobytes(), tuple(source.rest.items()), tuple(stands), motion.digest),
+        *(source.digest, source.original.tobytes(), tuple(source.rest.items()), tuple(unkeyed), motion.digest),
         *(motion.point.tobytes(), axis_length_of(target), selected.tobytes(), entry.settings),
     )
     if before is not None and before.digest == entry.digest:
@@ -216,15 +216,15 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if not _entries:
         return
-    # To Blender, whatever is animated was updated on every frame. Unless it plays, a script may really have edited it.
-    if _plays():
+    # For Blender every frame updates all animated objects. Unless it plays, a script may have edited them.
+    if _is_playing():
         records.note(scene, depsgraph)
     else:
         _on_update(scene, depsgraph)
 
 
-def _plays() -> bool:
-    """Return whether frames pass in any window."""
+def _is_playing() -> bool:
+    """Return whether any window plays or scrubs."""
     windows = existing(bpy.context.window_manager).windows
     return any(window.screen.is_animation_playing or window.screen.is_scrubbing for window in windows)
 

@@ -1,6 +1,4 @@
-"""What *Clean Motion* does, in the viewport for as long as its settings can be changed: where things were, where they
-are now, and where spikes were.
-"""
+"""Result of *Clean Motion* in the viewport: paths before and after, and the spikes, as long as its redo panel is open."""
 
 from __future__ import annotations
 
@@ -18,11 +16,14 @@ from .drawing import TICK_DIAMETER_PX, Pen, batch_of, blended, drawn
 OPERATOR = "RIGID_MOTION_OT_clean_motion"
 
 _cleanings: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-"""Paths before and after (t, m, 3), and which of their places were bridged (t, m)."""
+"""Paths before and after (t, m, 3), and True for their places that were bridged (t, m)."""
 
 
 def show(cleanings: Iterable[Cleaning]) -> None:
-    """Show these from the next redraw on, in place of all others: of a rig the bones that nothing else hangs on."""
+    """Show these results instead of all others from the next redraw on.
+
+    Of a rig, only bones without cleaned children are shown.
+    """
     _cleanings.clear()
     for one in cleanings:
         above = {item.carrier.parent for item in one.transforms if item.is_part}

@@ -1,7 +1,7 @@
-"""Drawing paths in the 3D viewport: what was computed becomes batches on the graphics card, and stays there.
+"""Drawing of paths in the 3D viewport, by batches that stay on the graphics card.
 
-Batches are in the space of the objects' channels; from there into the world it is a matrix at drawing, so a parent that
-moves costs nothing. Colours are as on the screen, widths in pixels at a resolution scale of 1.
+Batches are in the space of the object's channels. The matrix from there into the world is applied when drawing, so a
+moving parent costs nothing. Colours are as on the screen, widths in pixels at a resolution scale of 1.
 """
 
 from __future__ import annotations
@@ -34,33 +34,33 @@ from .settings import RigidMotionOverlay, is_shown, overlay_settings
 log = logging.getLogger(__package__)
 
 OUTLINE_COLOUR: Color = (0.0, 0.0, 0.0, 1.0)
-"""Around lines and dots, so that they stand out from any background."""
+"""Outline of lines and dots, so that they stand out from any background."""
 
 KEY_COLOUR: Color = (1.0, 1.0, 1.0, 1.0)
-"""Keys that are not selected, as in the Dope Sheet."""
+"""Colour of unselected keys, as in the Dope Sheet."""
 
 TICK_DIAMETER_PX, KEY_DIAMETER_PX, NOW_DIAMETER_PX = 6.0, 10.0, 12.0
-"""Diameters of dots, outline included: ticks, keys, and where the object is on the current frame."""
+"""Diameters of dots, outline included: ticks, keys, and the object on the current frame."""
 
 AXIS_OPACITY = 0.8
 
 MIN_BRIGHTNESS = 0.2
-"""A colour of the theme that is darker is meant to be dark."""
+"""A theme colour whose components are all below this is meant to be dark: it is not fully brightened."""
 
 MOST_VIEWS = 24
-"""Views whose ticks and axes stay on the graphics card for each path, while it is looked at from here and there."""
+"""The most views of a path whose ticks and axes stay on the graphics card."""
 
 
 @functools.cache
 def _dot_shader() -> gpu.types.GPUShader:
-    """Return the shader of round dots with an outline. Those of Blender are square."""
+    """Return a shader for round dots with an outline. Blender's own dots are square."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("MAT4", "ModelViewProjectionMatrix")
     info.push_constant("VEC4", "color")
     info.push_constant("VEC4", "outline")
     info.push_constant("FLOAT", "size")
     info.push_constant("FLOAT", "border")
-    # Blender sets this where the screen turns linear colours into those it shows.
+    # Blender sets this if the shader has to convert sRGB colours to linear ones.
     info.push_constant("BOOL", "srgbTarget")
     info.vertex_in(0, "VEC3", "pos")
     info.fragment_out(0, "VEC4", "fragColor")
@@ -73,7 +73,7 @@ def _dot_shader() -> gpu.types.GPUShader:
         }
         """
     )
-    # A pixel that the edge runs through is covered in part.
+    # A pixel on the edge is covered partly.
     info.fragment_source(
         """
         void main()
@@ -92,17 +92,17 @@ def _dot_shader() -> gpu.types.GPUShader:
 
 
 def brightened(color: Sequence[float]) -> Color:
-    """Return a colour of the theme as bright as lines have to be beside those of modes."""
+    """Return a theme colour, brightened to match the lines of modes."""
     red, green, blue = (part / max(*color, MIN_BRIGHTNESS) for part in color)
     return red, green, blue, 1.0
 
 
 Batch = gpu.types.GPUBatch | None
-"""Something on the graphics card; None where there is nothing of the kind."""
+"""A batch on the graphics card; None if it would be empty."""
 
 
 class _Marks(NamedTuple):
-    """The ticks and axes of a path that can be told apart in a view, on the graphics card."""
+    """The ticks and axes of a path that are legible in a view, on the graphics card."""
 
     native_ticks: Batch
     desired_ticks: Batch
@@ -120,10 +120,10 @@ class _Batches:
     selected: Batch
 
     pieces: tuple[tuple[int, Batch], ...]
-    """The pieces of the mode's path, or else of Blender's, by what holds it."""
+    """The pieces of the mode's path (without a mode: of Blender's), with the numbers of their holders."""
 
     views: dict[tuple, _Marks] = field(default_factory=dict)
-    """The marks in the views that the path was last seen in."""
+    """The marks for the views in which the path was seen lately."""
 
     @classmethod
     def of(cls, path: DrawnPath) -> _Batches:
@@ -140,7 +140,7 @@ class _Batches:
         )
 
     def marks(self, pen: Pen, *, every_tick: bool) -> _Marks:
-        """Return what of the path can be told apart in the view that is being drawn."""
+        """Return the ticks and axes that are legible in the view being drawn."""
         path, projection = self.path, np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
         view = projection.tobytes(), pen.size, pen.scale, every_tick
         if view not in self.views:
@@ -163,10 +163,10 @@ _batches: WeakKeyDictionary[DrawnPath, _Batches] = WeakKeyDictionary()
 
 
 def batch_of(kind: Primitive, points: np.ndarray | list) -> Batch:
-    """Return points (n, 3) on the graphics card, to be drawn as lines or dots."""
+    """Return a batch of points (n, 3), to be drawn as lines or dots."""
     if not len(points):
         return None
-    # Other shaders draw it, too: all take places alone.
+    # Other shaders can draw it, too: all take positions alone.
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     content: Any = {"pos": np.ascontiguousarray(points, dtype=np.float32)}
     return batch_for_shader(shader, kind, content)
@@ -186,7 +186,7 @@ class Pen:
         self.scale = context.preferences.system.ui_scale
 
     def held_color(self, holder: int, free: Color) -> Color:
-        """Return the colour of what something is held in, from that of the world."""
+        """Return the colour of a holder by its number, or `free` for 0, the world."""
         if holder == 0:
             return free
         return self.look.tick_color if holder == PASSING_HOLDER else self.hues[hue_of(holder) - 1]
@@ -219,11 +219,11 @@ class Pen:
 
 
 beside: list[Callable[[Pen, Transform, DrawnPath, float, RigidMotionOverlay], None]] = []
-"""What else is drawn of each path, below it and in its space, on a frame of its Action."""
+"""Functions that draw more for each path, below it and in its space, on a frame of its Action."""
 
 
 def drawn(draw: Callable[[], None]) -> Callable[[], None]:
-    """Return what Blender may call while it draws an editor: it never raises, and a problem is logged."""
+    """Return a draw callback that never raises: an exception is logged."""
 
     @functools.wraps(draw)
     def draw_or_complain() -> None:
@@ -231,7 +231,7 @@ def drawn(draw: Callable[[], None]) -> Callable[[], None]:
         try:
             draw()
         except Exception as problem:
-            # Once: the next redraw is a moment away.
+            # Log it once: the next redraw is a moment away.
             if repr(problem) != _complaint:
                 _complaint = repr(problem)
                 log.exception("The paths could not be drawn")
@@ -241,7 +241,7 @@ def drawn(draw: Callable[[], None]) -> Callable[[], None]:
 
 @contextmanager
 def blended() -> Iterator[None]:
-    """Have what is drawn be blended with what is there, and dots have sizes of their own."""
+    """Turn on alpha blending, and dot sizes set by the shader."""
     gpu.state.blend_set("ALPHA")
     gpu.state.program_point_size_set(True)
     try:
@@ -253,16 +253,16 @@ def blended() -> Iterator[None]:
 
 @drawn
 def draw_paths() -> None:
-    """Draw paths of the selected objects or bones, and what is beside them, in a viewport."""
+    """Draw the paths of the selected objects or bones, and what `beside` adds, in a viewport."""
     if is_shown(bpy.context):
         _draw(bpy.context)
 
 
 @drawn
 def follow_selection() -> None:
-    """Have the viewports drawn anew if keys were selected in the editor that is being drawn."""
+    """Redraw the viewports if the key selection was changed in the editor being drawn."""
     context = bpy.context
-    # While it plays the viewports are drawn anyway, as fast as they can be.
+    # During playback the viewports are redrawn anyway.
     if not is_shown(context) or existing(context.screen).is_animation_playing:
         return
     if cache.notice_selection(selected_in_view(context)):
@@ -270,7 +270,7 @@ def follow_selection() -> None:
 
 
 def redraw(context: bpy.types.Context, *kinds: str) -> None:
-    """Have all areas of these types be drawn anew."""
+    """Tag all areas of these types for redraw."""
     for window in existing(context.window_manager).windows:
         for area in window.screen.areas:
             if area.type in kinds:
@@ -330,10 +330,10 @@ DRAWN_SPACES = (
     (bpy.types.SpaceDopeSheetEditor, follow_selection, "POST_PIXEL"),
     (bpy.types.SpaceGraphEditor, follow_selection, "POST_PIXEL"),
 )
-"""The editors, what is called when one is drawn, and when."""
+"""Editors, their draw callbacks, and the moment of the call."""
 
 _complaint = ""
-"""The last problem."""
+"""The last logged problem."""
 
 
 def register() -> None:

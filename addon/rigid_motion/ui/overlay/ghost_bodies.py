@@ -1,7 +1,7 @@
-"""Meshes that armatures deform, as ghosts: as they were seen on frames that were shown, since nobody else knows them.
+"""Ghosts of skinned meshes, recorded on frames that were shown, since they cannot be computed for other frames.
 
-What is seen is kept with few triangles, in the world. It is forgotten when keys of the armature or the mesh change; a
-pose that is not keyed changes nothing.
+They are kept in the world, with few triangles, until keys of the armature or the mesh change. Unkeyed changes of the
+pose do not count.
 """
 
 from __future__ import annotations
@@ -25,59 +25,59 @@ from .ghosts import fewer_triangles, ghost_frames
 from .settings import overlay_settings
 
 MAX_SEEN_BODIES = 16
-"""The number of meshes that are kept."""
+"""The most meshes that are kept."""
 
 
 class OnCard(NamedTuple):
-    """What a ghost looks like, on the graphics card."""
+    """The appearance of a ghost, on the graphics card."""
 
     triangles: gpu.types.GPUBatch | None
     edges: gpu.types.GPUBatch | None
 
     corners: np.ndarray
-    """Of its bounding box, shape (8, 4)."""
+    """The homogeneous corners of its bounding box, shape (8, 4)."""
 
 
 @dataclass(eq=False)
 class SeenBody:
-    """One mesh, in the world."""
+    """The recorded places of one mesh, in the world."""
 
     mesh: int
-    """The session id of its data."""
+    """The session id of the mesh data."""
 
     keys: bytes
-    """All keys that it moves by."""
+    """The digest of the armature's keys."""
 
     count: int
-    """The number of its vertices."""
+    """The number of vertices of the mesh."""
 
     kept: np.ndarray
-    """The numbers of the vertices that are kept, (v,)."""
+    """The indices of the vertices that are kept, (v,)."""
 
     triangles: np.ndarray
-    """The corners of triangles among these, (t, 3)."""
+    """The triangles, as indices into the kept vertices, (t, 3)."""
 
     places: dict[float, np.ndarray] = field(default_factory=dict)
-    """Where they were in the world, (v, 3), by the frames of the scene."""
+    """The kept vertices in the world, (v, 3), by the frame of the scene."""
 
     batches: dict[float, OnCard] = field(default_factory=dict)
-    """What is on the graphics card of that."""
+    """Their batches, by the frame of the scene."""
 
 
 _seen: dict[int, SeenBody] = {}
-"""By the session id of the object of the mesh; those noted last come last."""
+"""Recorded meshes by the session id of their object; the last recorded come last."""
 
 _known_keys: dict[int, tuple[bytes, np.ndarray]] = {}
-"""See `_keys`, by the session ids of armatures."""
+"""Results of `_keys` by the session ids of armatures."""
 
 
 def bodies_of(transform: Transform) -> list[bpy.types.Object]:
-    """Return the objects whose meshes an armature deforms: that of a bone, or of one of these objects."""
+    """Return the mesh objects that an armature deforms: the armature of a bone, or of one of these objects."""
     obj = transform.animated
     rig = obj if obj.type == "ARMATURE" else obj.find_armature()
     if rig is None:
         return []
-    # What hangs on a rig is its child, or lies beside it.
+    # A skinned mesh is a child of the rig, or in one of its collections.
     beside = [item for collection in rig.users_collection for item in collection.objects]
     return [
         item for item in dict.fromkeys((*rig.children, *beside)) if item.type == "MESH" and item.find_armature() == rig
@@ -85,14 +85,14 @@ def bodies_of(transform: Transform) -> list[bpy.types.Object]:
 
 
 def _rigs(context: Any) -> dict[bpy.types.Object, list[bpy.types.Object]]:
-    """Return the selected armatures with the objects that they deform."""
+    """Return the selected armatures with the visible objects that they deform."""
     transforms = {one.animated: one for one in map(transform_of, selected_in_view(context))}
     found = {bodies[0].find_armature(): bodies for one in transforms.values() if (bodies := bodies_of(one))}
     return {rig: [body for body in bodies if body.visible_get()] for rig, bodies in found.items() if rig is not None}
 
 
 def _keys(rig: bpy.types.Object) -> tuple[bytes, np.ndarray]:
-    """Return a digest of the keys in an armature's Action, and their frames (k,); read anew after an edit alone."""
+    """Return a digest of the keys in an armature's Action, and their frames (k,); read again only after an edit."""
     if rig.session_uid not in _known_keys:
         summary, frames = hashlib.blake2b(digest_size=16), [np.empty(0)]
         for fcurve in active_fcurves(rig):
@@ -110,7 +110,7 @@ def _frames(rig: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
 
 
 def note(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Take down the meshes of the selected armatures on the frame that is shown, if ghosts are to be on it."""
+    """Record the meshes of the selected armatures on the frame that is shown, if it has a ghost."""
     settings, now = overlay_settings(scene), float(scene.frame_current_final)
     if settings.show_ghosts and settings.show_bodies and depsgraph.mode == "VIEWPORT":
         for rig, bodies in _rigs(bpy.context).items():
@@ -122,7 +122,7 @@ def _note(body: bpy.types.Object, now: float, keys: bytes, depsgraph: bpy.types.
     evaluated: Any = body.evaluated_get(depsgraph)
     mesh = evaluated.data
     mesh.calc_loop_triangles()
-    if not len(mesh.loop_triangles):  # as while it is edited
+    if not len(mesh.loop_triangles):  # for example in Edit Mode
         return
     places: np.ndarray = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", places)
@@ -143,8 +143,9 @@ def _note(body: bpy.types.Object, now: float, keys: bytes, depsgraph: bpy.types.
 
 
 def seen_bodies(context: Any) -> Iterator[tuple[bpy.types.Object, SeenBody, np.ndarray]]:
-    """Yield the meshes of the selected armatures that were seen with the keys as they are: the armature, what was seen,
-    and the frames that have ghosts.
+    """Yield the meshes of the selected armatures that were recorded with the present keys.
+
+    Each comes as the armature, the recorded mesh, and the frames that have ghosts.
     """
     for rig, bodies in _rigs(context).items():
         for body in bodies:

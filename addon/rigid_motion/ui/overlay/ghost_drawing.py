@@ -1,6 +1,6 @@
-"""Ghosts on the screen: those next to the current frame, before it and behind it, fainter the further they are away.
+"""Drawing of ghosts before and after the current frame, which fade with their distance from it.
 
-Where they cover more of a view than it has, only every second, third, ... is left, and these are fainter.
+If they would cover too much of the view, only every second, third, ... is drawn, and fainter.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ from .points import DrawnPath
 from .settings import RigidMotionOverlay, is_shown, overlay_settings
 
 SOLID_OPACITY, EDGE_OPACITY = 0.22, 0.6
-"""Opacity of the triangles and of the edges of the ghost that is next to the current frame."""
+"""Opacity of the triangles and of the edges of the ghost next to the current frame."""
 
 LEAST_FADE = 0.25
-"""The part of that which the furthest one has."""
+"""The furthest ghost has this fraction of that opacity."""
 
 EDGE_WIDTH = 1.0
-"""The width of edges, in pixels at a resolution scale of 1."""
+"""Line width of edges, in pixels at a resolution scale of 1."""
 
 MIN_GHOST_DISTANCE_FRAMES = 0.5
-"""Frames from the current one within which there is no ghost, since the thing itself is there."""
+"""No ghost is drawn within so many frames of the current one, where the object itself is."""
 
 MAX_COVERED_RATIO, FULL_CONTRAST_RATIO = 1.5, 0.4
-"""How many times ghosts may cover a view in all, and up to where they have their full contrast."""
+"""How many times ghosts may cover the view in all, and up to where they keep full contrast."""
 
 
 _shapes: dict[tuple[int, str], OnCard] = {}
-"""By the identity of what is moved."""
+"""Ghosts of objects and bones by the identity of their transform."""
 
 _with_bodies: set[int] = set()
 """The session ids of armatures whose bones have no ghosts, since their meshes have."""
@@ -80,13 +80,13 @@ def unregister() -> None:
 
 
 def forget(uids: set[int] | None = None) -> None:
-    """Have shapes be looked at anew: of objects with these session ids, or all."""
+    """Drop the shapes of objects with these session ids, or all, to read them again."""
     for identity in [identity for identity in _shapes if uids is None or identity[0] in uids]:
         del _shapes[identity]
 
 
 def fades(frames: np.ndarray, now: float, settings: RigidMotionOverlay) -> np.ndarray:
-    """Return how much of their contrast ghosts (g,) on rising frames have: 0 for those that are not shown."""
+    """Return the contrast (0 to 1) of ghosts (g,) on rising frames: 0 for ghosts that are not shown."""
     result = np.zeros(len(frames))
     before = np.flatnonzero(frames < now - MIN_GHOST_DISTANCE_FRAMES)[::-1][: settings.ghosts_before]
     behind = np.flatnonzero(frames > now + MIN_GHOST_DISTANCE_FRAMES)[: settings.ghosts_after]
@@ -96,9 +96,9 @@ def fades(frames: np.ndarray, now: float, settings: RigidMotionOverlay) -> np.nd
 
 
 def thinned_out(fade: np.ndarray, covered: np.ndarray) -> np.ndarray:
-    """Return what is left of the contrast of ghosts (g,) that cover so much of a view each, in parts of it.
+    """Return the contrast left to ghosts (g,), given the fraction of the view that each covers.
 
-    The same ones are left wherever the current frame is.
+    The same ghosts are kept wherever the current frame is.
     """
     numbers, step = np.arange(len(fade)), 1
     while step < len(fade) and covered[(fade > 0.0) & (numbers % step == 0)].sum() > MAX_COVERED_RATIO:
@@ -109,8 +109,9 @@ def thinned_out(fade: np.ndarray, covered: np.ndarray) -> np.ndarray:
 
 
 def covered_by(corners: np.ndarray, matrices: np.ndarray) -> np.ndarray:
-    """Return how much of a view boxes cover, (g,): corners (8, 4) or of each (g, 8, 4), and matrices (g, 4, 4) into
-    clip space.
+    """Return the fraction of the view that each box covers, (g,).
+
+    Corners are (8, 4), or (g, 8, 4) for each box; matrices (g, 4, 4) map them to clip space.
     """
     clip = corners @ matrices.transpose(0, 2, 1)
     is_near = (clip[..., 3] <= 0.0).any(axis=1)
@@ -126,12 +127,12 @@ def box_of(points: np.ndarray) -> np.ndarray:
 
 
 def tint(pen: Pen, frame: float, now: float, holder: int = 0) -> Color:
-    """Return the colour of a ghost: that of what holds it, or else of the past or the future."""
+    """Return the colour of a ghost: that of its holder, or else that of the past or the future."""
     return pen.held_color(holder, pen.look.past_color if frame < now else pen.look.future_color)
 
 
 def draw_ghosts(pen: Pen, transform: Transform, path: DrawnPath, now: float, settings: RigidMotionOverlay) -> None:
-    """Draw the ghosts of something around a frame, as the keys have it, in the space of the matrix stack."""
+    """Draw the ghosts of a transform around a frame of its Action, in the space of the matrix stack."""
     identity, ghosts = transform.identity, path.ghosts
     if ghosts is None or transform.animated.session_uid in _with_bodies:
         return
@@ -144,7 +145,7 @@ def draw_ghosts(pen: Pen, transform: Transform, path: DrawnPath, now: float, set
 
 @drawn
 def draw_bodies() -> None:
-    """Draw the meshes of the selected armatures in the viewport that is being drawn."""
+    """Draw the ghosts of the selected armatures' meshes in the viewport being drawn."""
     context: Any = bpy.context
     _with_bodies.clear()
     settings = overlay_settings(context.scene)
@@ -161,7 +162,7 @@ def draw_bodies() -> None:
 
 
 def _look_of_body(seen: SeenBody, frames: np.ndarray, number: int) -> OnCard:
-    """Return what a mesh looks like on one of the frames (n,) on which it was seen."""
+    """Return the appearance of a mesh on one of the frames (n,) on which it was recorded, by its index."""
     frame = float(frames[number])
     if frame not in seen.batches:
         places = seen.places[frame]
@@ -170,7 +171,7 @@ def _look_of_body(seen: SeenBody, frames: np.ndarray, number: int) -> OnCard:
 
 
 def _draw(pen: Pen, ghosts: Ghosts, now: float, settings: RigidMotionOverlay, look_of: Callable[[int], OnCard]) -> None:
-    """Draw what looks like that, by its number, around a frame, as far as the view has room for it."""
+    """Draw ghosts around a frame, as far as the view has room; `look_of` returns the appearance of one by its index."""
     fade = fades(ghosts.frames, now, settings)
     looks = {number: look_of(number) for number in np.flatnonzero(fade).tolist()}
     if not looks:
@@ -184,7 +185,7 @@ def _draw(pen: Pen, ghosts: Ghosts, now: float, settings: RigidMotionOverlay, lo
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.face_culling_set("BACK")
     try:
-        # From afar, so that what is nearer in time lies over it.
+        # Furthest in time first, so that nearer ghosts cover them.
         for number in sorted(np.flatnonzero(fade).tolist(), key=lambda number: fade[number]):
             holder = 0 if ghosts.holders is None else int(ghosts.holders[number])
             *rgb, alpha = tint(pen, float(ghosts.frames[number]), now, holder)

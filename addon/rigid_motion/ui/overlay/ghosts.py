@@ -1,7 +1,7 @@
-"""Ghosts: what moves, as it is every few frames, all at once. Where they are, as arrays, and what they look like.
+"""Ghosts of an object or bone every few frames: their places and shapes, as arrays.
 
-An object is shown by its own geometry as it is on the current frame, by its axes where it has none; a bone as an
-octahedron. No window and no graphics card is needed here.
+An object is shown by its own geometry on the current frame, or by its axes if it has none; a bone as an octahedron. No
+window and no graphics card is needed here.
 """
 
 from __future__ import annotations
@@ -17,57 +17,57 @@ from ...blender import existing
 from ...motion.affine import AffineMaps
 
 MOST_GHOSTS = 2000
-"""About the most ghosts of one path: where it has more, they are further apart."""
+"""Approximate maximum of ghosts per path: longer paths get larger steps."""
 
 MOST_EDGES = 4000
-"""The most edges of something that is shown with them: more would hide one another."""
+"""The most edges that are drawn: more would hide one another, so none are."""
 
 MOST_TRIANGLES = 2000000
-"""The most triangles of something that is not shown by its bounding box."""
+"""An object with more triangles is shown by its bounding box."""
 
 FEW_TRIANGLES = 6000
-"""So many are enough to see what a ghost is: it has no more."""
+"""The most triangles of a ghost: enough to recognise it."""
 
 MAX_CELLS = 96
-"""The cells of the finest grid along the longest side of something, see `fewer_triangles`."""
+"""Cells of the finest grid along the longest side of a mesh, see `fewer_triangles`."""
 
 GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that have triangles."""
 
 WIDEST_BONE_RATIO = 0.1
-"""The place along a bone where its octahedron is widest, and its width there, as parts of its length."""
+"""Where the octahedron of a bone is widest, and its half-width there, as fractions of the bone's length."""
 
 BOX_EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
-"""The edges of a bounding box, by Blender's order of its corners."""
+"""The edges of a bounding box, as indices of its corners in Blender's order."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What a ghost looks like, in its own space."""
+    """The shape of a ghost, in its own space."""
 
     lines: np.ndarray
-    """The ends of edges, one after the other, shape (2 e, 3)."""
+    """The ends of the edges, two rows each, shape (2 e, 3)."""
 
     triangles: np.ndarray
-    """The corners of triangles, one after the other, shape (3 t, 3)."""
+    """The corners of the triangles, three rows each, shape (3 t, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ghosts:
-    """Where something is every few frames, in the space of its path."""
+    """The places of an object or bone every few frames, in the space of its path."""
 
     frames: np.ndarray
-    """Shape (g,), rising."""
+    """Rising frames, shape (g,)."""
 
     matrices: np.ndarray
-    """Shape (g, 4, 4), for columns of homogeneous coordinates."""
+    """Matrices for homogeneous column vectors, shape (g, 4, 4)."""
 
     holders: np.ndarray | None = None
-    """The numbers of what holds it, see `points.Piece`, shape (g,). None for what nothing ever holds."""
+    """The numbers of its holders, see `points.Piece`, shape (g,). None if it is never held."""
 
 
 def ghost_frames(first: int, last: int, step: int, keys: np.ndarray) -> np.ndarray:
-    """Return the multiples of a step from the first frame to the last; for a negative step the frames of keys (k,)."""
+    """Return the multiples of a step from the first to the last frame; for a negative step, the frames of keys (k,)."""
     if step < 0:
         return keys
     step = max(step, -(-(last - first) // MOST_GHOSTS))
@@ -82,16 +82,16 @@ def matrices_of(maps: AffineMaps) -> np.ndarray:
 
 
 def shape_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> Shape:
-    """Return what ghosts of something look like."""
+    """Return the shape of an object's or a bone's ghosts."""
     if transform.is_part:
         return octahedron(transform.pose_bone.bone.length)
     obj = transform.animated.evaluated_get(depsgraph)
     shape = _geometry(obj) if obj.type in GEOMETRY else None
-    return shape or _plain(obj)
+    return shape or _box_or_axes(obj)
 
 
 def octahedron(length: float) -> Shape:
-    """Return a bone of a length along y, as Blender draws it."""
+    """Return the shape of a bone of this length along y, as Blender draws it."""
     wide = WIDEST_BONE_RATIO * length
     head, tail = np.zeros(3), np.array((0.0, length, 0.0))
     ring = [np.array((x, wide, z)) for x, z in ((wide, wide), (-wide, wide), (-wide, -wide), (wide, -wide))]
@@ -103,7 +103,7 @@ def octahedron(length: float) -> Shape:
 
 
 def _geometry(obj: bpy.types.Object) -> Shape | None:
-    """Return the triangles and edges of an evaluated object; None where there are none or too many."""
+    """Return the triangles and edges of an evaluated object; None if it has no triangles or too many."""
     mesh = existing(obj.to_mesh())
     try:
         mesh.calc_loop_triangles()
@@ -120,9 +120,9 @@ def _geometry(obj: bpy.types.Object) -> Shape | None:
 
 
 def fewer_triangles(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers of some of the vertices (v, 3), and triangles (t, 3) among these that look much the same.
+    """Return a simpler mesh: the indices of kept vertices of (v, 3), and triangles (t, 3) as indices into these.
 
-    Vertices in one cell of a grid become one.
+    All vertices in one cell of a grid become one.
     """
     kept, few, cells = np.arange(len(vertices)), triangles, MAX_CELLS
     extent = max(float(np.ptp(vertices, axis=0).max()), 1e-9)
@@ -141,8 +141,8 @@ def _read(items: bpy.types.bpy_prop_collection, name: str, kind: type, width: in
     return result.reshape(-1, width)
 
 
-def _plain(obj: bpy.types.Object) -> Shape:
-    """Return the bounding box of an object, or a cross of its axes where it has no size."""
+def _box_or_axes(obj: bpy.types.Object) -> Shape:
+    """Return the bounding box of an object, or a cross of its axes if it has no size."""
     corners = np.array(obj.bound_box)
     if np.ptp(corners) > 0.0:
         return Shape(corners[np.ravel(BOX_EDGES)], np.empty((0, 3)))
