@@ -157,7 +157,7 @@ def begun(tool: Carrier, after: bool) -> SimpleNamespace:
     assert operator.read(handles_of(bpy.context))
     operator.begin(None)
     assert operator._can_bend()
-    operator._learn()
+    operator._measure_bending()
     return operator
 
 

@@ -1,4 +1,4 @@
-"""Result of *Clean Motion* in the viewport: paths before and after, and the spikes, as long as its redo panel is open."""
+"""Result of *Clean Motion* in the viewport while its redo panel is open: paths before and after, and the spikes."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The motion of something that is held: in the world, run by run in what holds it, and from one to the next.
+"""Motion of held objects in the world: in each holder in turn, and blended from one holder to the next.
 
-Holders that move by keys alone are worked out from these; others are where they were seen, see `records`.
+Holders that move by keys alone are computed from these; for others, places recorded by `records` are used.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .seen import SeenMotion
 
 
 class HeldMotion(SeenMotion):
-    """Something that is held at times, what holds it, and where that carries it. Its path is in the world."""
+    """The motion of an object or bone that is held at times. Its path is in the world."""
 
     def __init__(self, target: Transform, source: KeyedTransform, carried: CarriedTargets, space: Space) -> None:
         super().__init__(target, source, carried, space)
@@ -42,7 +42,7 @@ class HeldMotion(SeenMotion):
         self.ids = frozenset(self._parents.ids).union(*(holder.ids for holder in by_keys))
         seen = [holder for holder, _ in self._holders.values() if isinstance(holder, PlaceRecord)]
         self.records = tuple((record, record.version) for record in seen)
-        # A thing that passes at once is in both places next to each other.
+        # Where the holder changes at once, two neighbouring frames show both places.
         self.jumps = tuple(moment for switch in source.switches for moment in (switch.begin, switch.frame - 1e-3))
 
     def _read(self, holder: Holder, carried: CarriedTargets) -> Parents | PlaceRecord:
@@ -55,12 +55,12 @@ class HeldMotion(SeenMotion):
 
     @property
     def has_path(self) -> bool:
-        """Return whether it is seen as its keys have it: in a strip that is entered it has no path."""
+        """Return whether it is seen where its keys put it: in a tweaked NLA strip it has no path."""
         return not existing(self.target.animated.animation_data).use_tweak_mode
 
     @property
     def range(self) -> tuple[int, int]:
-        """The first and last whole frame of its path: where it is held there, those of the scene."""
+        """The first and last whole frame of its path; the scene's start or end if it is held at that end."""
         (first, last), ends = self.source.seen_range, self.source.keyed_range
         if self.source.hold_at(ends[0])[0]:
             first = min(first, self._scene.frame_start)
@@ -98,13 +98,13 @@ class HeldMotion(SeenMotion):
     def _place(
         self, result: AffineMaps, run: HoldRun, frames: np.ndarray, chosen: np.ndarray, mode: str | None
     ) -> None:
-        """Put where a run has it on the chosen ones of frames (n,) into a result (n,)."""
+        """Write the places of a run on the chosen frames of (n,) into a result (n,)."""
         if chosen.any():
             spaces = self._space_of(self.source.hold_at(run.stretch.first)[0], frames[chosen])
             result[chosen] = self._placed(run.source, run.moments(frames[chosen]), mode, *spaces)
 
     def _space_of(self, number: int, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
-        """Return what `Parents.spaces` does for frames (n,) of keys in the holder of a number."""
+        """Return the same as `Parents.spaces` for frames (n,), for keys in the holder of this number."""
         held = self._holders.get(number)
         if held is not None:
             holder, offset = held
@@ -123,7 +123,7 @@ class HeldMotion(SeenMotion):
         return maps, turns
 
     def holders_at(self, frames: np.ndarray) -> np.ndarray:
-        """Return the numbers of what holds it on frames (n,), PASSING_HOLDER where it passes."""
+        """Return the numbers of its holders on frames (n,), PASSING_HOLDER between two of them."""
         numbers = np.zeros(len(frames), dtype=int)
         for run in self.source.runs:
             at = frames >= run.stretch.first if run is not self.source.runs[0] else np.ones(len(frames), dtype=bool)
@@ -133,20 +133,20 @@ class HeldMotion(SeenMotion):
         return numbers
 
     def pieces(self, frames: np.ndarray) -> tuple[Piece, ...]:
-        """Return the pieces of a path of points on frames (n,); each goes on to the beginning of the next."""
+        """Return the pieces of a path with points on frames (n,); each goes on to the beginning of the next."""
         holders = self.holders_at(frames)
         bounds = [0, *(np.flatnonzero(np.diff(holders)) + 1).tolist(), len(holders) - 1]
         return tuple(Piece(first, last, int(holders[first])) for first, last in pairwise(bounds) if last > first)
 
 
 def motion_of(target: Transform, source: KeyedTransform, carried: CarriedTargets, space: Space) -> SeenMotion:
-    """Return how something with keys is seen: carried by its parents, or by what holds it at any time."""
+    """Return the motion of a target with keys: carried by its parents, or by its holders if it has any."""
     is_held = source.held is not None and any(source.hold_at(run.stretch.first)[0] for run in source.runs)
     return (HeldMotion if is_held else SeenMotion)(target, source, carried, space)
 
 
 def motion_now(target: Transform, depsgraph: bpy.types.Depsgraph) -> SeenMotion:
-    """Return how a target that has a path is seen, read anew."""
+    """Return the motion of a target that has a path, read anew."""
     carried = CarriedTargets()
     source = existing(carried.read([target])[target][1])
     return motion_of(target, source, carried, space_of(target, depsgraph))

@@ -1,7 +1,7 @@
-"""What the paths of each kind of transform are in, and how large its axes are drawn.
+"""Space of a transform's location channels, for objects and bones, and the length of its drawn axes.
 
 The path of a bone is that of its head, in the space of its channels, placed by its parent as it is posed on the current
-frame. The head of a bone that only turns stays where it is: there it is the path of the tail.
+frame. The head of a bone that only turns stays in place: there it is the path of the tail.
 """
 
 from __future__ import annotations
@@ -19,18 +19,20 @@ from .parents import unless_same
 
 
 class Space(NamedTuple):
-    """What the channels of something are in on the current frame."""
+    """The space of an object's or a bone's channels on the current frame."""
 
     matrix: Matrix
-    """The map from the space of its location into the world."""
+    """The map from the space of its location channels into the world."""
 
     turn: np.ndarray | None = None
-    """What stands between its rotation and that space, (3, 3), where these are not the same: where a bone does not
-    inherit the rotation or scale of its parent, or is not moved along its own axes. None where they are."""
+    """The rotation (3, 3) from the axes of that space to those of its rotation; None if they are the same.
+
+    They differ if a bone does not inherit the rotation or scale of its parent, or moves along other axes than its own.
+    """
 
 
 def space_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> Space:
-    """Return what the channels of something are in, as what carries it is on the current frame."""
+    """Return the space of a transform's channels, with its parents as they are on the current frame."""
     if not transform.is_part:
         return Space(_space_of_object(transform.animated, depsgraph))
     if (base := transform.motion.base) is not None:
@@ -49,22 +51,22 @@ def _space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> 
     def posed(basis: Matrix) -> Matrix:
         return rest.convert_local_to_pose(basis, rest.matrix_local, **above)
 
-    stands = posed(Matrix())
-    space = Matrix.Translation(stands.translation[:])
+    unmoved = posed(Matrix())
+    space = Matrix.Translation(unmoved.translation[:])
     for column in range(3):
         unit = [float(row == column) for row in range(3)]
-        along = posed(Matrix.Translation(unit)).translation - stands.translation
+        along = posed(Matrix.Translation(unit)).translation - unmoved.translation
         for row in range(3):
             space[row][column] = along[row]
-    turned = space.to_3x3().inverted_safe() @ stands.to_3x3()
+    turned = space.to_3x3().inverted_safe() @ unmoved.to_3x3()
     return Space(rig.matrix_world @ space, unless_same(np.array(turned)))
 
 
 def _space_of_object(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
-    """Return the matrix from the space of an object's channels into the world, as its parent is on the current frame.
+    """Return the matrix from an object's channels into the world, with its parent as it is on the current frame.
 
-    For a parent that is an object: that one's evaluated matrix, and the inverse at parenting. For a bone, vertices or a
-    lattice: what takes the object's evaluated location, rotation and scale to where it is seen, constraints included.
+    With an object as parent: the parent's evaluated matrix times the inverse at parenting. With a bone, vertices or a
+    lattice: the map from the object's evaluated location, rotation and scale to where it is seen, constraints included.
     """
     if obj.parent is None:
         return Matrix.Identity(4)
@@ -75,7 +77,7 @@ def _space_of_object(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> M
 
 
 def axis_length_of(transform: Transform) -> float:
-    """Return how long its local axes are at scale 1: half as long as it is."""
+    """Return the length of its drawn local axes at scale 1: half its size."""
     if transform.is_part:
         return 0.5 * transform.pose_bone.bone.length or 1.0
     obj = transform.animated

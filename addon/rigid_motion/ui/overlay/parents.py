@@ -1,7 +1,7 @@
-"""Where parents carry what hangs on them, frame by frame: as their keys and modes have it, without playing the scene.
+"""Motion of parents, frame by frame: computed from their keys and modes, without playing the scene.
 
-That is known of parents that move by keys alone. Where a constraint, a driver, strips or a simulation has a part in it,
-the overlay takes parents as they are on the current frame. Frames are those of the scene.
+This works for parents that move by keys alone. If constraints, drivers, NLA strips or a simulation take part, the
+overlay uses the parents as they are on the current frame. Frames are those of the scene.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from ...blender import existing, pose_bones
 from ...motion.affine import AffineMaps
 
 MAX_DIRECTION_ROUNDING = 1e-5
-"""Components of directions that differ by less are the same in single precision."""
+"""Directions whose components differ by less are the same in single precision."""
 
 MOST_SPACES = 32
-"""The number of results of `Parents.spaces` that are kept: while something is dragged, what carries it is the same."""
+"""The most results of `Parents.spaces` that are kept: while an object is dragged, its parents stay the same."""
 
 _spaces: dict[tuple, tuple[AffineMaps, np.ndarray | None]] = {}
-"""By all that they depend on."""
+"""Results of `Parents.spaces` by everything they depend on."""
 
 WHOLE_OBJECTS = ("OBJECT", "ARMATURE")
-"""Types of parents that carry an object by their own transform."""
+"""Types of parents whose own transform carries a child object."""
 
 
 class CarriedTargets:
-    """Several targets and what they hang on: read once, and worked out once for all looked at on the same frames."""
+    """Several targets and their parents, each read once, and computed once for the same frames."""
 
     def __init__(self) -> None:
         self._not_promised = functools.cache(not_promised)
@@ -48,12 +48,12 @@ class CarriedTargets:
         self._posed: dict[tuple[Transform, bytes], AffineMaps] = {}
 
     def read(self, transforms: Iterable[Transform]) -> dict[Transform, tuple[Binding | None, KeyedTransform | None]]:
-        """Return the binding that each moves by, and what is keyed there; None where there is none."""
+        """Return the binding and the source of each transform, None where it has none."""
         transforms = list(transforms)
         if missing := [transform for transform in transforms if transform not in self._read]:
             bindings = active_bindings(missing)
             for item in missing:
-                # What else a rig with a layer moves is in the strip below.
+                # Other bones of a rig with a layer are keyed in the strip below.
                 keyed = (binding := bindings.get(item)) is not None and binding.is_keyed
                 if item.motion.base is None and not keyed and is_plain(item.animated):
                     bindings[item] = binding_below(item, existing(strips_of(item.animated)))
@@ -66,11 +66,11 @@ class CarriedTargets:
         return {transform: self._read[transform] for transform in transforms}
 
     def follows(self, bone: Transform) -> bool:
-        """Return whether a bone follows constraints or drivers, or hangs on one that does."""
+        """Return whether a bone, or a bone above it, follows constraints or drivers."""
         return bone.carrier.name in self._not_promised(bone.animated)
 
     def channels(self, transform: Transform, frames: np.ndarray) -> AffineMaps:
-        """Return what the channels of something say on frames (n,), with its mode."""
+        """Return the maps of an object's or a bone's own channels on frames (n,), in its mode."""
         key = transform, frames.tobytes()
         if key not in self._channels:
             _, source = self._read[transform]
@@ -81,7 +81,7 @@ class CarriedTargets:
         return self._channels[key]
 
     def posed(self, bone: bpy.types.PoseBone, frames: np.ndarray) -> AffineMaps:
-        """Return where a bone is in the space of its rig on frames (n,)."""
+        """Return the maps of a bone in the space of its rig on frames (n,)."""
         transform = transform_of(bone)
         key = transform, frames.tobytes()
         if key not in self._posed:
@@ -92,47 +92,47 @@ class CarriedTargets:
 
 
 def _hierarchy(rig: bpy.types.Object) -> tuple[Hierarchy, dict[str, int]]:
-    """Return the bones of a rig, and their numbers by name."""
+    """Return the bones of a rig, and their indices by name."""
     return Hierarchy(list(pose_bones(rig))), {bone.name: number for number, bone in enumerate(pose_bones(rig))}
 
 
 class Parents:
-    """What carries an object or a bone, read from keys.
+    """The parents of an object or a bone, read from keys.
 
     Parameters
     ----------
     target : Transform
-    carried : Carried
-        That of all targets that are looked at together.
+    carried : CarriedTargets
+        Shared by all targets that are drawn together.
     itself : bool
-        Read the target, too, for where it is itself.
+        Also read the target, to know where it is itself.
     """
 
     def __init__(self, target: Transform, carried: CarriedTargets, *, itself: bool = False) -> None:
         self.target, self._carried = target, carried
-        self._read = carried.read((target, *_above(target)) if itself else _above(target))
+        self._read = carried.read((target, *_ancestors(target)) if itself else _ancestors(target))
         self.known = all(
             _moves_by_keys(one, carried) and (source is not None or binding is None or not binding.is_keyed)
             for one, (binding, source) in self._read.items()
         )
-        """True if nothing but keys moves them."""
+        """True if nothing but keys moves the parents."""
         self.move_by_keys = self.known and any(source is not None for _, source in self._read.values())
-        """True if they move, and by keys alone."""
+        """True if the parents move, and by keys alone."""
         self.carriers = frozenset(self._read)
-        """All that carries it, and where it is read, the target itself."""
+        """All its parents, with the target if that is read, too."""
         self.ids = {item.animated.session_uid for item in self._read}
         self.ids |= {binding.slot.action.session_uid for binding, _ in self._read.values() if binding is not None}
-        """Session ids of the data-blocks that decide on it."""
+        """Session ids of the data-blocks that determine the motion of the parents."""
 
     @property
     def digest(self) -> tuple:
-        """Differs wherever anything differs that decides where they carry the target."""
-        result: list[object] = [_hung(self.target)]
+        """A digest of everything that determines where the parents carry the target."""
+        result: list[object] = [_parenting(self.target)]
         for one, (_, source) in self._read.items():
             keyed = source.keyed if source is not None else ()
             stands = [getattr(one.carrier, prop)[:] for name, prop in one.properties.items() if name not in keyed]
             rest = None if source is None else (source.digest, tuple(source.rest.items()))
-            result.append((*one.identity, one.order, rest, tuple(stands), one.original().tobytes(), _hung(one)))
+            result.append((*one.identity, one.order, rest, tuple(stands), one.original().tobytes(), _parenting(one)))
         return tuple(result)
 
     def spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
@@ -146,7 +146,8 @@ class Parents:
         -------
         maps : AffineMaps, shape (n,)
         turned : array, shape (n, 3, 3), or None
-            What stands between the target's rotation and that space, see `kinds.Space`. None where nothing does.
+            Rotations from the axes of that space to those of the target's rotation, see `kinds.Space`; None if all are
+            the identity.
         """
         key = self.target.identity, self.digest, frames.tobytes()
         if key not in _spaces:
@@ -172,7 +173,7 @@ class Parents:
         return maps, unless_same(turned)
 
     def places(self, frames: np.ndarray) -> AffineMaps:
-        """Return where the target itself is in the world on frames (n,)."""
+        """Return the maps of the target itself in the world on frames (n,)."""
         world = self._world(self.target.animated, frames)
         return world @ self._carried.posed(self.target.pose_bone, frames) if self.target.is_part else world
 
@@ -192,10 +193,10 @@ class Parents:
 
 
 def follows_keys(target: Transform, parents: Parents) -> bool:
-    """Return whether the keys of its parents, and nothing else, carry a target along as its own keys are edited.
+    """Return whether the parents' keys alone carry a target along while its own keys are edited.
 
-    Strips may be elsewhere in time: what hangs on something is seen on the current frame as long as they are edited,
-    but for those of layers.
+    The times of a tweaked strip may differ from those of the scene. So its object is drawn with the parents of the
+    current frame, except in layers.
     """
     obj = target.animated
     is_in_strip = existing(obj.animation_data).use_tweak_mode and not (target.motion.base and is_plain(obj))
@@ -203,15 +204,15 @@ def follows_keys(target: Transform, parents: Parents) -> bool:
 
 
 def unless_same(turned: np.ndarray) -> np.ndarray | None:
-    """Return turns (..., 3, 3), or None where all of them are by nothing."""
+    """Return rotations (..., 3, 3), or None if all of them are the identity."""
     return None if np.abs(turned - np.eye(3)).max() < MAX_DIRECTION_ROUNDING else turned
 
 
-def _above(target: Transform) -> Iterator[Transform]:
-    """Yield all that carries something: the bones that it hangs on, and the objects."""
+def _ancestors(target: Transform) -> Iterator[Transform]:
+    """Yield all parents of a transform: bones, and objects."""
     obj = target.animated
     if target.is_part and (base := target.motion.base) is not None:
-        yield from (transform_of(base), *_above(transform_of(base)))
+        yield from (transform_of(base), *_ancestors(transform_of(base)))
         return
     if target.is_part:
         yield from map(transform_of, target.pose_bone.parent_recursive)
@@ -224,7 +225,7 @@ def _above(target: Transform) -> Iterator[Transform]:
 
 
 def _moves_by_keys(transform: Transform, carried: CarriedTargets) -> bool:
-    """Return whether nothing but keys of its Action has a part in where something is."""
+    """Return whether keys of its Action alone determine the motion of a transform."""
     obj = transform.animated
     if transform.is_part:
         return not carried.follows(transform)
@@ -235,12 +236,13 @@ def _moves_by_keys(transform: Transform, carried: CarriedTargets) -> bool:
         driver.data_path.removeprefix("delta_") in MOVING_CHANNELS for driver in data.drivers
     )
     constrained = any(not constraint.mute and constraint.influence > 0.0 for constraint in obj.constraints)
-    return not (in_strips or driven or constrained or body is not None) and _hangs_on_a_whole(obj)
+    return not (in_strips or driven or constrained or body is not None) and _has_no_deforming_parent(obj)
 
 
-def _hangs_on_a_whole(obj: bpy.types.Object) -> bool:
-    """Return whether an object hangs on nothing, on an object or on a bone:
-    on vertices it goes where these are deformed.
+def _has_no_deforming_parent(obj: bpy.types.Object) -> bool:
+    """Return whether an object has no parent, or an object or bone as a parent that carries it as a whole.
+
+    An object parented to vertices follows their deformation.
     """
     if obj.parent is None or obj.parent_type in WHOLE_OBJECTS:
         return True
@@ -249,8 +251,8 @@ def _hangs_on_a_whole(obj: bpy.types.Object) -> bool:
     return bone is not None and not bone.bone.use_relative_parent
 
 
-def _hung(transform: Transform) -> tuple:
-    """Return how something hangs on its parent."""
+def _parenting(transform: Transform) -> tuple:
+    """Return the settings of the parenting of an object or bone."""
     if not transform.is_part:
         obj = transform.animated
         return obj.parent_type, obj.parent_bone, tuple(row[:] for row in obj.matrix_parent_inverse[:])
@@ -260,7 +262,7 @@ def _hung(transform: Transform) -> tuple:
 
 
 def identity(*shape: int) -> AffineMaps:
-    """Return maps of this shape that leave all where it is."""
+    """Return identity maps of this shape."""
     return AffineMaps(np.tile(np.eye(3), (*shape, 1, 1)), np.zeros((*shape, 3)))
 
 

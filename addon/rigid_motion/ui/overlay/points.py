@@ -1,11 +1,11 @@
-"""The points of a path: where an object comes through, natively and in a mode, as arrays for the overlay to draw.
+"""Sampled motion paths as arrays: places of an object natively and in its mode, and the ticks to draw on them.
 
 Points are (n, 3), in the world or in the space of the object's channels, its own delta transforms included. Frames are
 those of the Action. No window and no graphics card is needed here.
 
-On a short path, or one that is looked at from afar, ticks would be a solid bar. They stay evenly timed: of a path that
-moves too little from tick to tick, only every second, fifth, tenth... is left. Where the object nearly rests even those
-are too close to one another, or to a key, and left out. Distances are in pixels at a resolution scale of 1.
+On a short path, or one seen from afar, ticks would merge into a solid bar. They stay evenly timed: if the object moves
+too little from tick to tick, only every second, fifth, tenth... is kept. Where the object nearly rests, ticks too close
+to one another or to a key are left out. Distances are in pixels at a resolution scale of 1.
 """
 
 from __future__ import annotations
@@ -19,103 +19,103 @@ import numpy as np
 from .ghosts import Ghosts
 
 MIN_PATH_SAMPLES = 256
-"""A path gets this many samples, or one on every frame where those are more: bends look round then."""
+"""A path has at least this many samples, so that its bends look round; or one on every frame, if these are more."""
 
 MAX_SAMPLES_PER_FRAME = 16
-"""The most samples in a frame."""
+"""The most samples per frame."""
 
 MAX_PATH_SAMPLES = 8192
-"""About the most samples, and the most ticks, of one path. Where it has more frames, samples are further apart."""
+"""Approximate maximum of samples, and of ticks, per path. With more frames, samples are further apart."""
 
 MAX_TICKS, MAX_AXES = 60, 20
-"""About the most ticks of a path where no more were requested, and the most of them with axes."""
+"""Approximate maximum of ticks per path unless more were requested, and of ticks with axes."""
 
 
 SMOOTH_EXTENT_WIDTHS = 5000
 """The extent of a path, in widths of its line, up to which no corners show on the screen."""
 
 TICK_GAP = 14.0
-"""From tick to tick where the path goes at its usual speed, at least."""
+"""Minimum distance between ticks where the object moves at its usual speed, in pixels."""
 
 AXES_GAP = 36.0
-"""The gap from axes to axes."""
+"""Minimum distance between axes at that speed, in pixels."""
 
 MIN_TICK_DISTANCE_PX = 9.0
-"""From a tick to its neighbour, at least, and to a key."""
+"""Minimum distance of a tick to its neighbours and to keys, in pixels."""
 
 AT_REST = 1.0
-"""The least distance from tick to tick that says something of the usual speed."""
+"""Shorter distances between ticks, in pixels, do not count for the usual speed."""
 
 TICK_STEPS_FRAMES = [digit * 10**power for power in range(7) for digit in (1, 2, 5)]
 
 
 PASSING_HOLDER = -1
-"""Where there is no single holder: what passes from one to another."""
+"""The holder's number while an object passes from one holder to another."""
 
 
 class Piece(NamedTuple):
-    """A part of a path, from one of its points to another, both included."""
+    """A part of a path, between two indices of its points, both included."""
 
     first: int
     last: int
 
     holder: int
-    """The number of what holds it there, 0 for the world, or PASSING_HOLDER."""
+    """The number of its holder there, 0 for the world, or PASSING_HOLDER."""
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnPath:
-    """The path of an object's origin or of a point of a bone: as Blender's in-betweens have it, and as a mode does."""
+    """The path of an object's origin or a point of a bone, with Blender's in-betweens and with those of a mode."""
 
     frames: np.ndarray
-    """Shape (m,), rising, with the whole frames (or as many of them as can be told apart) and the keys."""
+    """Rising frames, shape (m,): whole frames (or as many as can be told apart), frames between them, and keys."""
 
     native: np.ndarray
-    """Places on these frames if Blender fills in, shape (m, 3)."""
+    """Places on these frames with Blender's interpolation, shape (m, 3)."""
 
     desired: np.ndarray | None
-    """Places if the mode does, shape (m, 3). None where there is no other mode than Blender's."""
+    """Places in the mode, shape (m, 3). None if there is no other mode than Blender's."""
 
     key_frames: np.ndarray
     """Frames of the Action with keys, shape (k,)."""
 
     keys: np.ndarray
-    """The keys, shape (k, 3). They are the same in all modes."""
+    """Places on the keys, shape (k, 3), the same in all modes."""
 
     selected: np.ndarray
-    """True for the keys that are selected, shape (k,)."""
+    """True for selected keys, shape (k,)."""
 
     tick_frames: np.ndarray
     """Evenly spaced frames, shape (t,)."""
 
     native_ticks: np.ndarray
-    """Places on these as Blender has it, shape (t, 3)."""
+    """Places on these frames with Blender's interpolation, shape (t, 3)."""
 
     desired_ticks: np.ndarray | None
-    """Places on these as the mode has it, shape (t, 3)."""
+    """Places on these frames in the mode, shape (t, 3). None without a mode."""
 
     axis_frames: np.ndarray
-    """Frames with ticks that have axes, shape (a,)."""
+    """Frames of the ticks with axes, shape (a,)."""
 
     axes: np.ndarray
-    """The rotation on these, in the mode or else natively: the ends of its local axes, shape (a, 3, 2, 3)."""
+    """Local axes on these frames, in the mode or else natively, by their two ends: shape (a, 3, 2, 3)."""
 
     in_world: bool = False
-    """True if all of it is in the space of the world, and not in that of the channels."""
+    """True if all places are in the world, and not in the space of the channels."""
 
     ghosts: Ghosts | None = None
-    """The poses every few frames; None where that was not asked for."""
+    """Ghosts every few frames; None if they were not requested."""
 
     pieces: tuple[Piece, ...] = ()
-    """What holds it where, in the order of its points; empty for what nothing ever holds."""
+    """Its pieces by holder, in the order of its points; empty if it is never held."""
 
     @property
     def line(self) -> np.ndarray:
-        """The places of the mode, or else of Blender, shape (m, 3)."""
+        """Places in the mode, or else with Blender's interpolation, shape (m, 3)."""
         return self.native if self.desired is None else self.desired
 
     def at(self, frame: float) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return where it is at a frame, natively and in the mode, each of shape (3,). The path holds its ends."""
+        """Return its places at a frame, natively and in the mode, (3,) each. Outside of the path its ends count."""
 
         def point(line: np.ndarray) -> np.ndarray:
             return np.array([np.interp(frame, self.frames, column) for column in line.T])
@@ -124,7 +124,7 @@ class DrawnPath:
 
 
 def sample_frames(first: int, last: int) -> np.ndarray:
-    """Return evenly spaced frames from the first to the last whole one: close enough for a path to look round."""
+    """Return evenly spaced frames from the first to the last whole one, close enough for the path to look round."""
     length = last - first
     if length > MAX_PATH_SAMPLES:
         return np.append(np.arange(first, last, -(-length // MAX_PATH_SAMPLES)), last).astype(np.float64)
@@ -135,7 +135,8 @@ def sample_frames(first: int, last: int) -> np.ndarray:
 
 def tick_frames(first: int, last: int, step: int = 0) -> np.ndarray:
     """Return the multiples of a step, the same for all objects, from the first frame to the last.
-    0 chooses 1, 2, 5, 10...
+
+    A step of 0 chooses 1, 2, 5, 10...
     """
     length = last - first
     step = max(step, -(-length // MAX_PATH_SAMPLES)) if step else _round_step(length, MAX_TICKS)
@@ -143,7 +144,7 @@ def tick_frames(first: int, last: int, step: int = 0) -> np.ndarray:
 
 
 def axis_frames(ticks: np.ndarray) -> np.ndarray:
-    """Return those of the ticks that have axes."""
+    """Return the ticks that have axes."""
     if len(ticks) < 2:
         return ticks
     step = ticks[1] - ticks[0]
@@ -151,15 +152,15 @@ def axis_frames(ticks: np.ndarray) -> np.ndarray:
 
 
 def _round_step(length: int, most: int) -> int:
-    """Return the least of 1, 2, 5, 10, 20... that a length has at most this many of."""
+    """Return the smallest of 1, 2, 5, 10, 20... that fits into a length at most this many times."""
     return next(step for step in TICK_STEPS_FRAMES if length <= most * step)
 
 
 def thinned(line: np.ndarray) -> np.ndarray:
-    """Return the points of a line without those that make no visible difference, shape (fewer, 3).
+    """Return a line without the points that make no visible difference, shape (fewer, 3).
 
-    Every other point goes where the line stays within 1/`SMOOTH_EXTENT_WIDTHS` of its extent, and so on until all have
-    to stay.
+    Every other point is dropped where the line stays within 1/`SMOOTH_EXTENT_WIDTHS` of its extent. This is repeated
+    until every point is needed.
     """
     if len(line) < 3:
         return line
@@ -179,34 +180,34 @@ def thinned(line: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Readable:
-    """What of a path is drawn in a view."""
+    """The ticks and axes of a path that are drawn in a view."""
 
     native_ticks: np.ndarray
-    """True for its ticks that are drawn on Blender's path, shape (t,)."""
+    """True for ticks that are drawn on Blender's path, shape (t,)."""
 
     desired_ticks: np.ndarray | None
-    """True for its ticks that are drawn on the mode's path, shape (t,). None without one."""
+    """True for ticks that are drawn on the mode's path, shape (t,). None without a mode."""
 
     axes: np.ndarray
-    """True for its axes that are drawn, shape (a,)."""
+    """True for axes that are drawn, shape (a,)."""
 
 
 def readable(
     path: DrawnPath, projection: np.ndarray, size: tuple[float, float], scale: float = 1.0, *, every_tick: bool = False
 ) -> Readable:
-    """Return what of a path can be told apart in a view.
+    """Return the ticks and axes of a path that are legible in a view.
 
     Parameters
     ----------
-    path : Path
+    path : DrawnPath
     projection : array, shape (4, 4)
-        From the space of the path to clip space, for columns of homogeneous coordinates.
+        From the space of the path to clip space, for homogeneous column vectors.
     size : tuple
         Width and height of the view in pixels.
     scale : float
         The resolution scale of the interface.
     every_tick : bool
-        Draw all ticks, since just these were requested.
+        Draw all ticks, since exactly these were requested.
     """
 
     def pixels(points: np.ndarray) -> np.ndarray:
@@ -219,7 +220,7 @@ def readable(
         every = np.ones(len(native), dtype=bool)
         return Readable(every, None if desired is None else every, some_axes)
     keys = pixels(path.keys)
-    # The same frames on both, so that they can be compared.
+    # Use the same frames on both paths, to make them comparable.
     step = _step(native if desired is None else desired, TICK_GAP)
     return Readable(
         _spaced(native, step, keys, MIN_TICK_DISTANCE_PX, path.tick_frames),
@@ -229,15 +230,16 @@ def readable(
 
 
 def on_screen(points: np.ndarray, projection: np.ndarray, size: tuple[float, float]) -> np.ndarray:
-    """Return where points (n, 3) are in a view, in pixels, shape (n, 2). Not a number behind the viewer."""
+    """Return the pixels (n, 2) of points (n, 3) in a view, NaN behind the viewer."""
     clip = points @ projection[:, :3].T + projection[:, 3]
     depth = np.where(clip[:, 3] > 0.0, clip[:, 3], np.nan)
     return 0.5 * (clip[:, :2] / depth[:, None] + 1.0) * size
 
 
 def _step(pixels: np.ndarray, gap: float) -> int:
-    """Return the first of 1, 2, 5, 10... points (n, 2) after which a path has usually gone as far as
-    the gap, 0 for none.
+    """Return the smallest step of 1, 2, 5, 10... points (n, 2) with a median distance of at least the gap.
+
+    0 if there is none.
     """
     for step in TICK_STEPS_FRAMES:
         across, up = (pixels[step::step] - pixels[:-step:step]).T
@@ -251,7 +253,7 @@ def _step(pixels: np.ndarray, gap: float) -> int:
 
 
 def _spaced(pixels: np.ndarray, step: int, keys: np.ndarray, clear: float, frames: np.ndarray) -> np.ndarray:
-    """Return which of these points (n, 2) are on multiples of the step, and clear of one another and of keys (k, 2)."""
+    """Return which points (n, 2) are on multiples of the step, and `clear` pixels away from others and keys (k, 2)."""
     chosen = np.zeros(len(pixels), dtype=bool)
     if not step:
         return chosen

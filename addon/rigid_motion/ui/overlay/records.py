@@ -1,7 +1,7 @@
-"""Where what follows constraints or drivers was seen, on frames that were shown: nobody else knows it of other ones.
+"""Recorded places of objects and bones that follow constraints or drivers, which are known on shown frames only.
 
-Playing once through the frames makes a record whole. What is edited since is seen anew on the frame that is shown, and
-on others once these are. Frames are those of the scene.
+Playing all frames once completes a record. After an edit, each frame is recorded again when it is next shown. Frames
+are those of the scene.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from ...motion.affine import AffineMaps
 from .blends import blended
 
 MAX_MATRIX_ROUNDING = 1e-6
-"""Matrices whose parts differ by less are the same."""
+"""Matrices whose elements differ by less are the same."""
 
 
 class PlaceRecord:
-    """The places of an object or a bone in the world."""
+    """The recorded places of an object or a bone in the world."""
 
     def __init__(self, transform: Transform) -> None:
         self.transform: Transform | None = transform
-        """None after an undo, until it is asked for again."""
+        """None after an undo, until `record_of` is called again."""
         self.places: dict[float, np.ndarray] = {}
-        """Matrices (4, 4) by the frames on which they were seen."""
+        """Matrices (4, 4) by the frames on which they were recorded."""
         self.version = 0
 
     def note(self, frame: float, depsgraph: bpy.types.Depsgraph) -> None:
-        """Take down where it is on the frame that is shown."""
+        """Record the place on the frame that is shown."""
         if self.transform is None:
             return
         evaluated: Any = self.transform.animated.evaluated_get(depsgraph)
@@ -43,7 +43,7 @@ class PlaceRecord:
             self.version += 1
 
     def maps(self, frames: np.ndarray) -> AffineMaps:
-        """Return where it is on frames (n,): between those that were shown, and beyond these as on the nearest one."""
+        """Return the maps on frames (n,): blended between recorded frames, and those of the nearest one outside."""
         known = np.array(sorted(self.places))
         places = np.stack([self.places[frame] for frame in known.tolist()])
         seen = AffineMaps(places[:, :3, :3], places[:, :3, 3])
@@ -54,11 +54,11 @@ class PlaceRecord:
 
 
 _records: dict[tuple[int, str], PlaceRecord] = {}
-"""By the identity of what is seen."""
+"""Records by the identity of their transform."""
 
 
 def record_of(transform: Transform, frame: float, depsgraph: bpy.types.Depsgraph) -> PlaceRecord:
-    """Return the record of something, from now on kept up to date by `note`."""
+    """Return the record of a transform; from now on `note` keeps it up to date."""
     record = _records.setdefault(transform.identity, PlaceRecord(transform))
     record.transform = transform
     record.note(frame, depsgraph)
@@ -66,20 +66,20 @@ def record_of(transform: Transform, frame: float, depsgraph: bpy.types.Depsgraph
 
 
 def note(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Take down where all is that has a record, on the frame that is shown."""
+    """Record the places of all transforms that have a record, on the frame that is shown."""
     for identity, record in list(_records.items()):
         try:
             record.note(scene.frame_current_final, depsgraph)
-        except (ReferenceError, KeyError):  # it was removed or renamed
+        except (ReferenceError, KeyError):  # the object or bone was
             del _records[identity]
 
 
 def suspend() -> None:
-    """Let go of what Blender replaces by an undo. Records stay."""
+    """Drop references to data that Blender replaces on undo. Recorded places stay."""
     for record in _records.values():
         record.transform = None
 
 
 def clear() -> None:
-    """Forget all."""
+    """Drop all records."""
     _records.clear()

@@ -1,4 +1,4 @@
-"""Where something with keys is seen on any frames: for its path, its ghosts, and all else that is drawn of it."""
+"""Motion of an object or bone with keys, on any frames: the source of its path, its ghosts and other drawings."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from .points import DrawnPath, Piece, axis_frames, sample_frames, tick_frames
 from .records import PlaceRecord
 
 MAX_FRAMES = 4096
-"""The most frames that it is looked at on, in even steps."""
+"""The most frames on which the motion is sampled, in even steps."""
 
 
 class SeenMotion:
-    """Something with keys in its Action, where these and what carries it have it.
+    """The motion of an object or bone with keys in its Action, carried by its parents.
 
-    Places are in the space of its path: the world, where it is carried by what moves by keys alone; or else that of its
-    channels, which is as it is on the current frame.
+    Places are in the space of its path: the world, if only keys move its parents; or else the space of its channels as
+    it is on the current frame.
 
     Parameters
     ----------
     target : Transform
-    source : Source
-    carried : Carried
-        That of all targets that are looked at together.
+    source : KeyedTransform
+    carried : CarriedTargets
+        Shared by all targets that are drawn together.
     space : Space
-        What its channels are in on the current frame.
+        The space of its channels on the current frame.
     """
 
     records: tuple[tuple[PlaceRecord, int], ...] = ()
-    """What is known as it was seen alone, and how often that has changed."""
+    """Place records that it depends on, with their versions when it was read."""
 
     jumps: tuple[float, ...] = ()
-    """Frames on which it may be in another place than on those next to them."""
+    """Frames where its place may jump."""
 
     def __init__(self, target: Transform, source: KeyedTransform, carried: CarriedTargets, space: Space) -> None:
         self.target, self.source, self._parents = target, source, Parents(target, carried)
@@ -50,18 +50,18 @@ class SeenMotion:
         """The map from the space of its path into the world."""
         self._turn = space.turn
         self.carriers = self._parents.carriers
-        """All that carries it at any time, as far as that moves by keys."""
+        """All its parents, and its holders that move by keys."""
         self.ids = frozenset(self._parents.ids if self.in_world else ())
-        """Session ids of the data-blocks that decide on where it is carried."""
+        """Session ids of the data-blocks that determine the motion of its parents and holders."""
         self.point = np.array(target.motion.lead)
-        """The point on its own axes that its path is of, shape (3,)."""
+        """The point whose path is drawn, on its own axes, shape (3,)."""
         if target.is_part and not self.point.any():
             bone = target.pose_bone.bone
             self.point[1] = bone.length * (LOCATION not in source.keyed or bone.use_connect)
 
     @property
     def has_path(self) -> bool:
-        """Return whether it has the two keys that a path needs, or is carried along as it rests."""
+        """Return whether it has the two keys that a path needs, or is carried along at rest."""
         return len(self.source.key_frames) > 1 or self.source.carried is not None
 
     @property
@@ -71,25 +71,25 @@ class SeenMotion:
 
     @property
     def digest(self) -> tuple:
-        """Differs wherever anything differs that decides where it is carried."""
+        """A digest of everything that determines where it is carried."""
         return self._parents.digest if self.in_world else ()
 
     def frames(self, per_frame: int = 1) -> np.ndarray:
-        """Return frames from the first to the last, so many in each where these are not too many."""
+        """Return evenly spaced frames from the first to the last: `per_frame` in each, at most MAX_FRAMES steps."""
         first, last = self.range
         return np.linspace(first, last, min(per_frame * (last - first), MAX_FRAMES) + 1)
 
     def spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
-        """Return what `Parents.spaces` does, into the space of the path."""
+        """Return the same as `Parents.spaces`, but into the space of the path."""
         if self.in_world:
             return self._parents.spaces(frames)
         turn = None if self._turn is None else np.broadcast_to(self._turn, (len(frames), 3, 3))
         return identity(len(frames)), turn
 
     def places(self, frames: np.ndarray, mode: str | None = None) -> AffineMaps:
-        """Return where it is on rising frames (n,). ValueError where its numbers make no motion.
+        """Return the maps on rising frames (n,). ValueError if its numbers make no motion.
 
-        `mode` is in place of those of its segments.
+        `mode` replaces the modes of its segments.
         """
         return self._placed(self.source, frames, mode, *self.spaces(frames))
 
@@ -101,7 +101,7 @@ class SeenMotion:
         spaces: AffineMaps,
         turns: np.ndarray | None,
     ) -> AffineMaps:
-        """Return where the channels of a source put it on frames (n,) in these spaces, see `Parents.spaces`."""
+        """Return the maps of a source's channels on frames (n,) in these spaces, see `Parents.spaces`."""
         if mode is not None:
             source = replace(source, mode=MODE_NUMBERS[mode])
         maps = shown(self.target, source, frames)[1]
@@ -111,33 +111,33 @@ class SeenMotion:
         return spaces @ AffineMaps(maps.axes if turns is None else turns @ maps.axes, origins)
 
     def at_point(self, frames: np.ndarray, mode: str | None = None) -> AffineMaps:
-        """Return what `places` does, with the point that its path is of for an origin."""
+        """Return the same as `places`, with the point of the path as origin."""
         maps = self.places(frames, mode)
         return AffineMaps(maps.axes, maps.at(self.point))
 
     def holders_at(self, _frames: np.ndarray) -> np.ndarray | None:
-        """Return the numbers of what holds it on frames (n,), see `points.Piece`; None for what nothing ever holds."""
+        """Return the numbers of its holders on frames (n,), see `points.Piece`; None if it is never held."""
         return None
 
     def pieces(self, _frames: np.ndarray) -> tuple[Piece, ...]:
-        """Return the pieces of a path of points on frames (n,)."""
+        """Return the pieces of a path with points on frames (n,)."""
         return ()
 
     def trace(
         self, mode: str | None = None, tick_step: int = 0, axes_size: float = 1.0, selected: np.ndarray | None = None
     ) -> DrawnPath | None:
-        """Return its path, None where it is a single point. ValueError where its numbers make no motion.
+        """Return its path, None if it has one frame only. ValueError if its numbers make no motion.
 
         Parameters
         ----------
         mode : str, optional
-            One of `MODE_IDS`, to see what it would do. None for the modes that the segments have.
+            One of `MODE_IDS`, as a preview. None for the modes of the segments.
         tick_step : int
-            Frames from tick to tick, which are on multiples of it. 0 for as many as can be read.
+            Ticks are on multiples of this many frames. 0 for as many as are legible.
         axes_size : float
-            Of the axes at the ticks. At 1 they are half as long as it is.
+            Length of the axes at the ticks. At 1 they are half as long as the object or bone.
         selected : array, shape (n,), optional
-            The frames of the keys that are selected.
+            The frames of the selected keys.
         """
         first, last = self.range
         if first == last:
@@ -172,6 +172,6 @@ class SeenMotion:
         )
 
     def ghosts(self, step: int, mode: str | None) -> Ghosts:
-        """Return where it is on `ghost_frames`. ValueError where its numbers make no motion."""
+        """Return its ghosts on `ghost_frames`. ValueError if its numbers make no motion."""
         frames = ghost_frames(*self.range, step, self.source.keyed_frames)
         return Ghosts(frames, matrices_of(self.places(frames, mode)), self.holders_at(frames))

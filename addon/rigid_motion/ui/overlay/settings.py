@@ -1,4 +1,4 @@
-"""What the overlay shows: settings of the scene, and where an animator finds them."""
+"""Settings of the overlay, stored on scenes, and their place in Blender's interface."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ HIDDEN_LABEL = n_("Hidden by Viewport Overlays")
 
 _bool, _int, _float = (partial(kind, options=set()) for kind in (BoolProperty, IntProperty, FloatProperty))
 _enum = partial(EnumProperty, options=set(), translation_context=OWN_WORDS)
-"""Properties of the scene that cannot be animated."""
+"""Property types of the scene's settings, which cannot be animated."""
 
 
 @with_properties
@@ -137,7 +137,7 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
 
     @property
     def frames_between_ghosts(self) -> int:
-        """Frames from ghost to ghost, -1 for those of keys."""
+        """Frames between ghosts, -1 for ghosts on keys."""
         return self.ghost_step if self.ghosts_on == "STEP" else -1
 
 
@@ -163,7 +163,7 @@ class RIGID_MOTION_OT_update_path(Operator):
 
 
 def draw_settings(layout: bpy.types.UILayout, context: Any) -> None:
-    """Draw the settings of the overlay, for a panel."""
+    """Draw the settings of the overlay in a panel."""
     settings = overlay_settings(context.scene)
     if (settings.show_paths or settings.show_ghosts) and not is_shown(context):
         draw_text(context, layout, HIDDEN_LABEL, "INFO")
@@ -205,7 +205,7 @@ def _draw_ghost_settings(layout: bpy.types.UILayout, settings: RigidMotionOverla
 
 
 def draw_toggle(panel: Any, context: Any) -> None:
-    """Draw the overlay's place among Blender's own, in the viewport's Overlays pop-over."""
+    """Draw the overlay's checkboxes in the Overlays pop-over of the viewport."""
     column = panel.layout.column()
     column.active = context.space_data.overlay.show_overlays and context.space_data.overlay.show_motion_paths
     settings = overlay_settings(context.scene)
@@ -214,7 +214,7 @@ def draw_toggle(panel: Any, context: Any) -> None:
 
 
 def is_shown(context: Any) -> bool:
-    """Return whether the scene, and the viewport if the context is in one, show paths or ghosts."""
+    """Return whether paths or ghosts are shown in the scene, and in the viewport if the context has one."""
     overlay, settings = getattr(context.space_data, "overlay", None), overlay_settings(context.scene)
     in_view = not isinstance(overlay, bpy.types.View3DOverlay) or (overlay.show_overlays and overlay.show_motion_paths)
     return in_view and (settings.show_paths or settings.show_ghosts)

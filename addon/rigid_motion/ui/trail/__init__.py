@@ -1,13 +1,13 @@
-"""Editing paths in the viewport: the tool *Edit Path*, whose handles are the keys on the paths that the overlay draws.
+"""Editing of motion paths in the viewport: the tool *Edit Path*, with the keys on the overlay's paths as handles.
 
-A key is selected here as it is in the Dope Sheet. Each operator is one step of undo.
+Keys are selected here as in the Dope Sheet. Each operator is one undo step.
 
-handles   keys on the screen, and what their channels are in
-tool      the tool, its keys, and the operator that takes it
+handles   keys on the screen, and the space of their channels
+tool      the tool, its keymap, and the operator that activates it
 picking   operators that select, insert and delete keys
-dragging  operators that move, turn and retime keys
+dragging  operators that move, rotate and retime keys
 arms      tangents on the screen
-tangents  handles by which their speed is set, and paths are bent
+tangents  tangent handles that set the speed, and bend paths
 
-proportional  keys around those that are dragged, which follow
+proportional  neighbours of dragged keys, which follow them
 """

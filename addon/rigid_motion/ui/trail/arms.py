@@ -1,4 +1,4 @@
-"""Tangents at the selected keys of paths, on the screen: handles on both sides, which say how fast it is there."""
+"""Tangents at the selected keys of paths: a handle on each side of a key shows the speed there."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from .handles import Handles, key_under, nearest_under
 from .tool import TOOL
 
 HANDLE_SECONDS = 1.0 / 3.0
-"""A handle is as long as the way in this time."""
+"""A handle is as long as the distance travelled in this time."""
 
 MIN_HANDLE_PX = 28.0
-"""At a resolution scale of 1, so that slow motion has handles that can be taken."""
+"""Minimum length of a handle, in pixels at a resolution scale of 1: slow motion, too, has handles to grab."""
 
 
 SAMPLES_BESIDE_KEY = (1, 2, 3)
-"""How many samples beside a key its tangents are read from."""
+"""Tangents are read from these samples beside a key, counted from it."""
 
 
 def arms_of(path: DrawnPath) -> tuple[np.ndarray, np.ndarray]:
-    """Return the tangents at the keys of a path, before them and behind them, in its space, away from the key.
+    """Return the tangents at the keys of a path, before and after each key, in the path's space, away from the key.
 
-    By a frame, from the samples beside keys; and the ways to the nearest samples, which have a direction also where the
-    body comes to rest; each (k, 2, 3). They are NaN where there is no path.
+    Two arrays (k, 2, 3): velocities in units per frame, from the samples beside keys; and the vectors to the nearest
+    samples, which have a direction even where the body comes to rest. Both are NaN beyond the ends of the path.
     """
     at = np.searchsorted(path.frames, path.key_frames)
     steps = at[:, None, None] + np.array((-1, 1))[:, None] * SAMPLES_BESIDE_KEY
     within = np.clip(steps, 0, len(path.line) - 1)
     times = np.abs(path.frames[within] - path.key_frames[:, None, None])
     ways = np.where((steps == within)[..., None], path.line[within] - path.line[at][:, None, None], np.nan)
-    # The slope of the cubic through the key and three samples.
+    # Slope of the cubic through the key and three samples.
     apart = times[..., None] - times[..., None, :] + np.eye(len(SAMPLES_BESIDE_KEY))
     with np.errstate(invalid="ignore", divide="ignore"):
         weights = times.prod(axis=-1, keepdims=True) / (times**2 * apart.prod(axis=-1))
@@ -43,9 +43,9 @@ def arms_of(path: DrawnPath) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ends_of(path: DrawnPath, projection: np.ndarray, size: tuple[float, float], scale: float) -> np.ndarray:
-    """Return where the handles of the selected keys end, in the space of the path, shape (k, 2, 3).
+    """Return the end points of the handles of the selected keys, in the space of the path, shape (k, 2, 3).
 
-    `projection` (4, 4) leads from there to clip space of a view of this size.
+    `projection` (4, 4) maps that space to clip space of a view of this size.
     """
     velocities, ways = (rows[path.selected] for rows in arms_of(path))
     keys, frames = path.keys[path.selected][:, None], HANDLE_SECONDS * frame_rate()
@@ -60,13 +60,13 @@ def ends_of(path: DrawnPath, projection: np.ndarray, size: tuple[float, float], 
 
 
 def frame_rate() -> float:
-    """Return the frames of a second."""
+    """Return the frames per second."""
     render = scene().render
     return float(render.fps / render.fps_base)
 
 
 def is_shown(path: DrawnPath, overlay: Any) -> bool:
-    """Return whether the handles of a path are shown: of modes as they are keyed, while the tool is taken."""
+    """Return whether handles of a path are shown: while the tool is active and the overlay shows keyed modes."""
     context: Any = bpy.context
     tool = context.workspace.tools.from_space_view3d_mode(context.mode)
     is_edited = tool is not None and tool.idname == TOOL and overlay.show_paths and overlay.mode == "CHOSEN"
@@ -74,9 +74,9 @@ def is_shown(path: DrawnPath, overlay: Any) -> bool:
 
 
 def tangent_under(context: Any, handles: list[Handles], place: np.ndarray) -> tuple[Handles, float, int] | None:
-    """Return whose handle a place on the screen is on, the frame of its key, and its side.
+    """Return the handle at a place on the screen: its path, the frame of its key, and its side.
 
-    None where it is on none, or on a key.
+    None if there is no handle, or if there is a key.
     """
     if key_under(context, handles, place) is not None:
         return None

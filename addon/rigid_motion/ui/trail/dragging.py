@@ -1,7 +1,7 @@
-"""Selected keys on paths are moved, turned and retimed by the mouse, as Blender's own transforms go.
+"""Operators that move, rotate and retime selected keys on paths with the mouse, as Blender's own transforms do.
 
-X, Y and Z lock an axis of the world, Ctrl goes in steps, Shift is fine, and a number is typed, along X if none is
-locked. A click or Enter confirms, a right click or Esc brings all back.
+X, Y and Z lock an axis of the world, Ctrl snaps to steps, Shift is for precision. A typed number goes along X if no
+axis is locked. A click or Enter confirms, a right click or Esc restores everything.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ from .handles import Handles, OnPath, handles_of, key_under, select, selected_sp
 from .picking import RIGID_MOTION_OT_select_path_keys, mouse_of, pressed_at
 
 STEP_PX = 50.0
-"""Steps of Ctrl are the largest power of ten that is no more than so many pixels, at a resolution scale of 1."""
+"""With Ctrl, a step is the largest power of ten that is at most so many pixels at a resolution scale of 1."""
 
 STEP_DEG, FINE_STEP_DEG = 5.0, 1.0
-"""Steps of Ctrl, and with Shift, of turns."""
+"""Steps of rotation with Ctrl, and with Ctrl and Shift, in degrees."""
 
 FINE_STEP_RATIO = 0.1
-"""Steps of Ctrl with Shift are so much smaller."""
+"""With Ctrl and Shift, steps are smaller by this factor."""
 
 AXES = "XYZ"
 
 
 class DragInput(MouseInput):
-    """What mouse and keyboard say while keys are dragged. `place` is where the mouse is, in pixels of the region."""
+    """Mouse and keyboard input during a drag. `place` is the mouse in pixels of the region, slowed down by Shift."""
 
     def __init__(self, place: np.ndarray) -> None:
         super().__init__()
         self.first, self.place, self._mouse = place.copy(), place.copy(), place.copy()
         self.axis: int | None = None
-        """The axis of the world that is locked, 0 to 2."""
+        """The locked axis of the world, 0 to 2; None if none is locked."""
 
     def move(self, event: bpy.types.Event, ratio: float) -> None:
         mouse = mouse_of(event)
@@ -69,13 +69,13 @@ class Dragging(OnPath):
 
     bl_options = {"REGISTER", "UNDO", "BLOCKING"}  # noqa: RUF012 - Blender reads it
     leaves_carried: ClassVar[bool] = True
-    """True if keys go along with those of what carries them."""
+    """True if keys are left out that move along with the keys of their parents or holders."""
     takes_neighbours: ClassVar[bool] = True
-    """True if Proportional Editing takes the keys around along."""
+    """True if Proportional Editing applies to the keys around."""
     _hit: tuple[Handles, float] | None = None
-    """The key that is under the mouse, by its frame, or else the first that is selected."""
+    """The key under the mouse, by its frame, or else the first selected one."""
     shown_reach: ClassVar[float] = 0.0
-    """The frames around moved keys on which others follow them, while these are dragged."""
+    """The range of Proportional Editing in frames, drawn during the drag."""
     keys_text: ClassVar[str] = n_(
         "LMB, Enter: Confirm | Esc, RMB: Cancel | X, Y, Z: Axis | Ctrl: Steps | Shift: Precision | "
         "0-9: Number | O, Wheel: Proportional"
@@ -111,7 +111,7 @@ class Dragging(OnPath):
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Bring all back. Blender calls it, too, where it ends the operator by itself."""
+        """Restore the keys. Blender also calls it when it ends the operator by itself."""
         self._edits.cancel()
         self._hide(context)
         self.finish(())
@@ -124,19 +124,19 @@ class Dragging(OnPath):
         return self.finish(self._refused)
 
     def grab(self, context: bpy.types.Context, handles: list[Handles], place: np.ndarray) -> bool:
-        """Take the key at a place on the screen, and select it alone unless it is selected; return whether one is."""
+        """Hit the key at a place on the screen, and select it alone unless it is selected; return whether one is hit."""
         self._hit = key_under(context, handles, place)
         if self._hit is None:
             return False
         one, frame = self._hit
         if frame not in one.selected:
             select(context, handles, {one.target: np.array([frame])})
-            # What is adjusted after the drag (F9) is then what was dragged.
+            # So the redo panel (F9) acts on the dragged keys.
             bpy.ops.ed.undo_push(message=RIGID_MOTION_OT_select_path_keys.bl_label)
         return True
 
     def read(self, handles: list[Handles]) -> bool:
-        """Get ready to edit the selected keys, and return whether there are any that can be."""
+        """Prepare the edit of the selected keys, and return whether any of them can be edited."""
         reach = proportional.reach() if self.takes_neighbours else 0.0
         spaces, self._refused = selected_spaces(handles, reach, leave_carried=self.leaves_carried), list[Refused]()
         self._edits: Any = KeyEdits(spaces, refused=self._refused)
@@ -146,7 +146,7 @@ class Dragging(OnPath):
         return len(self._edits) > 0
 
     def press(self, context: Any, event: bpy.types.Event) -> bool:
-        """Take a key that is none of the mouse's or of a number, and say whether it changed anything."""
+        """Handle a keyboard key that is neither for the mouse nor for a number; return whether it changed anything."""
         if not self.takes_neighbours or event.value != "PRESS" or not proportional.change(event):
             return False
         self._edits.cancel()
@@ -154,27 +154,27 @@ class Dragging(OnPath):
         return self.read(handles_of(context))
 
     def tell(self, context: Any) -> None:
-        """Have the status bar show the keys, and the viewport the range of Proportional Editing."""
+        """Show the shortcuts in the status bar, and the range of Proportional Editing in the viewport."""
         Dragging.shown_reach = proportional.reach() if self.takes_neighbours else 0.0
         existing(context.workspace).status_text_set(self.keys_shown())
 
     def keys_shown(self) -> str:
-        """Return what the status bar says of keys."""
+        """Return the shortcuts for the status bar."""
         return iface_(self.keys_text)
 
     def begin(self, context: Any) -> None:
-        """Note how the viewport is when the drag begins."""
+        """Store the state of the viewport when the drag begins."""
 
     def drag(self, context: Any) -> str:
-        """Edit the keys as the input has it, and return what to show in the header."""
+        """Edit the keys from the input, and return the text for the header."""
         raise NotImplementedError
 
     def apply(self) -> None:
-        """Edit the keys as the properties have it."""
+        """Edit the keys from the operator's properties."""
         raise NotImplementedError
 
     def at(self, context: Any, place: np.ndarray, direction: Vector | None) -> Vector:
-        """Return the point of the world at a place on the screen: as deep as the keys, or on the axis through them."""
+        """Return the point of the world at a place on the screen, at the depth of the keys or on the locked axis."""
         where = context.region, context.region_data, place.tolist()
         if direction is None:
             return region_2d_to_location_3d(*where, self._pivot)
@@ -189,7 +189,7 @@ class Dragging(OnPath):
 
 
 def direction_of(axis: int | None) -> Vector | None:
-    """Return the direction of an axis of the world, None where none is locked."""
+    """Return the direction of an axis of the world, None if none is locked."""
     return None if axis is None else Vector([float(axis == row) for row in range(3)])
 
 
@@ -284,7 +284,7 @@ class RIGID_MOTION_OT_retime_path_keys(Dragging):
         if number is not None:
             self.frames = number
         else:
-            # As the path was at first: along that which is drawn now the key would run away from the mouse.
+            # Use the original path: along the present one the key would run away from the mouse.
             _, moment = one.nearest_moment(context, self._input.place)
             self.frames = (moment if self._input.is_fine else round(moment)) - frame
         self.apply()

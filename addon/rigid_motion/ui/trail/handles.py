@@ -1,4 +1,4 @@
-"""Keys on the paths that are drawn: where they are in the world and on the screen, and what their channels are in.
+"""Keys on drawn paths as handles: their places in the world and on the screen, and the space of their channels.
 
 Places on the screen are x, y in pixels of the viewport's region, shape (2,) or (n, 2).
 """
@@ -30,7 +30,7 @@ from ..overlay.settings import is_shown, overlay_settings
 from .proportional import falloff
 
 REACH_PX = 14.0
-"""How far from a key or a path the mouse may be to mean it, at a resolution scale of 1."""
+"""How close the mouse must be to hit a key or a path, in pixels at a resolution scale of 1."""
 
 NO_KEYS_SELECTED = n_("Select keys on the path first: click on them, or press A for all")
 
@@ -39,27 +39,27 @@ KEY_EDITORS = ("VIEW_3D", "DOPESHEET_EDITOR", "GRAPH_EDITOR", "TIMELINE")
 
 @dataclass(frozen=True, eq=False)
 class Handles:
-    """The keys of one path that is drawn."""
+    """The keys of one drawn path."""
 
     target: Transform
     space: Matrix
     path: DrawnPath
 
     def in_world(self, points: np.ndarray) -> np.ndarray:
-        """Return points (n, 3) of its path's space in the world."""
+        """Return points (n, 3) of the path's space in the world."""
         return maps_of(self.space).at(points)
 
     @property
     def selected(self) -> np.ndarray:
-        """The frames of its keys that are selected, shape (n,)."""
+        """The frames of the selected keys, shape (n,)."""
         return self.path.key_frames[self.path.selected]
 
     def at_keys(self, context: Any) -> np.ndarray:
-        """Return where its keys are on the screen, (k, 2)."""
+        """Return the keys on the screen, (k, 2)."""
         return _on_screen(context, self.in_world(self.path.keys))
 
     def nearest_moment(self, context: Any, place: np.ndarray) -> tuple[float, float]:
-        """Return how far from a place on the screen its path is, in pixels, and the frame where it is so near."""
+        """Return the distance in pixels from a place on the screen to the path, and the frame of the nearest point."""
         path = self.path
         line = _on_screen(context, self.in_world(path.line))
         chords, away = np.diff(line, axis=0), place - line[:-1]
@@ -83,7 +83,7 @@ def _on_screen(context: Any, points: np.ndarray) -> np.ndarray:
 
 
 def key_under(context: Any, handles: Iterable[Handles], place: np.ndarray) -> tuple[Handles, float] | None:
-    """Return the key that a place on the screen is on, by its frame; None where it is on none."""
+    """Return the key at a place on the screen, by its frame; None if there is none."""
     hit = nearest_under(context, ((one, one.at_keys(context)) for one in handles), place)
     return None if hit is None else (hit[0], float(hit[0].path.key_frames[hit[1]]))
 
@@ -91,7 +91,7 @@ def key_under(context: Any, handles: Iterable[Handles], place: np.ndarray) -> tu
 def nearest_under(
     context: Any, shown: Iterable[tuple[Handles, np.ndarray]], place: np.ndarray
 ) -> tuple[Handles, int] | None:
-    """Return which of the points (n, 2) of which path a place on the screen is on; None where it is on none."""
+    """Return the path and index of the nearest point (n, 2) at a place on the screen; None if none is in reach."""
     nearest, result = REACH_PX * context.preferences.system.ui_scale, None
     for one, points in shown:
         distances = np.nan_to_num(np.linalg.norm(points - place, axis=1), nan=np.inf)
@@ -101,7 +101,7 @@ def nearest_under(
 
 
 def select(context: bpy.types.Context, handles: Iterable[Handles], chosen: dict[Transform, np.ndarray]) -> None:
-    """Have these frames of keys be selected, (n,) of each target, and no others of the paths."""
+    """Select keys on these frames, (n,) by target, and deselect all others of the paths."""
     for one in handles:
         select_keys(one.target, chosen.get(one.target, np.empty(0)))
     cache.notice_selection(one.target for one in handles)
@@ -111,9 +111,9 @@ def select(context: bpy.types.Context, handles: Iterable[Handles], chosen: dict[
 def selected_spaces(
     handles: Iterable[Handles], reach: float = 0.0, *, leave_carried: bool
 ) -> dict[Transform, KeySpaces]:
-    """Return the selected keys, with those within so many frames of them, and what their channels are in; see `spaces`.
+    """Return the spaces of the selected keys, and of the keys within `reach` frames of them; see `spaces`.
 
-    The weight of each is that which Proportional Editing gives it.
+    Proportional Editing determines the weight of each key.
     """
     keys = {}
     for one in (one for one in handles if len(one.selected)):
@@ -126,8 +126,9 @@ def selected_spaces(
 def spaces(
     keys: Mapping[Handles, tuple[np.ndarray, np.ndarray]], *, leave_carried: bool = False
 ) -> dict[Transform, KeySpaces]:
-    """Return what the channels of keys are in, from their frames and weights, (n,) each; without those, if these are
-    to be left, whose parent or holder has one on the same frame, which carries them along.
+    """Return the spaces of keys, from their frames and weights, (n,) each.
+
+    With `leave_carried`, keys are left out if a parent or holder has a key on the same frame, which carries them along.
     """
     carried, depsgraph = CarriedTargets(), existing(view_layer().depsgraph)
     frames = {one.target: at for one, (at, _) in keys.items()}
@@ -150,14 +151,14 @@ class OnPath(Operator):
     """Operators on the keys of the paths that are drawn."""
 
     def finish(self, refused: Iterable[Refused]) -> Returned:
-        """Report why some could not be edited, have the rest be drawn, and return what Blender is told."""
+        """Report refusals, redraw, and return the operator's result."""
         if reasons := dict.fromkeys(map(str, refused)):
             self.report({"WARNING"}, "\n".join(reasons))
         redraw(bpy.context, *KEY_EDITORS)
         return {"FINISHED"}
 
     def without_keys(self, handles: list[Handles], refused: Iterable[Refused] = ()) -> Returned:
-        """Return what Blender is told where no key can be edited: without paths, to do what the key is for itself."""
+        """Return the operator's result if no key can be edited: without paths, the event is passed on to Blender."""
         reasons = "\n".join(dict.fromkeys(map(str, refused)))
         if handles:
             self.report({"WARNING"}, reasons or rpt_(NO_KEYS_SELECTED))

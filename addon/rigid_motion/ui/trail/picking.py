@@ -1,4 +1,4 @@
-"""Keys on paths are selected, inserted where a path is clicked on, and deleted."""
+"""Operators that select keys on paths, insert one where a path is clicked, and delete keys."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ KEY_THERE = n_("{name} already has a key on frame {frame:g}")
 
 
 def mouse_of(event: bpy.types.Event) -> np.ndarray:
-    """Return where the mouse is in the region, (2,)."""
+    """Return the position of the mouse in the region, (2,)."""
     return np.array((event.mouse_region_x, event.mouse_region_y), float)
 
 
 def pressed_at(event: bpy.types.Event) -> np.ndarray:
-    """Return where the mouse was in the region when its button was pressed for a drag, (2,)."""
+    """Return the position in the region where the mouse button was pressed for a drag, (2,)."""
     moved = event.mouse_x - event.mouse_prev_press_x, event.mouse_y - event.mouse_prev_press_y
     return mouse_of(event) - moved
 
@@ -43,7 +43,7 @@ class _Selecting(OnPath):
     extend: bool = BoolProperty(description="Keep what is selected already", options={"SKIP_SAVE", "HIDDEN"})
 
     def choose(self, context: bpy.types.Context, handles: list[Handles], chosen: dict[Transform, np.ndarray]) -> None:
-        """Select these frames of keys; with Extend also those that are selected already."""
+        """Select keys on these frames; with Extend, keep the selection, too."""
         if self.extend:
             chosen = {one.target: np.union1d(chosen.get(one.target, ()), one.selected) for one in handles}
         select(context, handles, chosen)
@@ -94,7 +94,7 @@ class RIGID_MOTION_OT_box_path_keys(_Selecting):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> Returned:
         handles, is_drag = handles_of(context), event.value == "CLICK_DRAG"
         self._first = pressed_at(event) if is_drag else None
-        # A key or tangent that is dragged is moved, in whatever order Blender asks those that drags are for.
+        # A drag on a key or tangent is for other operators, in whatever order Blender asks them.
         takes = () if not is_drag or self.extend else (key_under, tangent_under)
         if not handles or any(take(context, handles, pressed_at(event)) for take in takes):
             return {"PASS_THROUGH", "CANCELLED"}
@@ -123,7 +123,7 @@ class RIGID_MOTION_OT_box_path_keys(_Selecting):
         return {"RUNNING_MODAL"}
 
     def cancel(self, _context: bpy.types.Context) -> None:
-        """Draw no box any more."""
+        """Stop drawing the box."""
         bpy.types.SpaceView3D.draw_handler_remove(self._drawing, "WINDOW")
 
     def _draw(self) -> None:
@@ -210,7 +210,7 @@ class RIGID_MOTION_OT_set_path_point(OnPath):
         return self.finish(())
 
     def point_of(self, target: Transform, scene: bpy.types.Scene) -> Vector:
-        """Return the point on the own axes of something."""
+        """Return the chosen point in the local space of an object or bone."""
         if self.point == "CURSOR":
             return world_matrix(target).inverted_safe() @ scene.cursor.location
         mesh = target.animated.data

@@ -1,7 +1,7 @@
-"""Proportional Editing of keys on paths: those around a moved one follow it, the less the more frames they are away.
+"""Proportional Editing of keys on paths: neighbours of a moved key follow it, less with more frames between them.
 
-It goes by frames, and not by distance, as in the Dope Sheet, whose settings these are: a path that crosses itself or
-rests has keys side by side that have nothing to do with one another.
+It uses frames instead of distance, as the Dope Sheet does, and its settings. Where a path crosses itself or rests, keys
+are side by side that have nothing to do with one another.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...blender import scene
 
 RANGE_FACTOR = 1.2
-"""By what a step of the wheel multiplies the range, or divides it."""
+"""Factor by which a step of the wheel multiplies or divides the range."""
 
 LARGER, SMALLER = {"WHEELDOWNMOUSE", "PAGE_UP"}, {"WHEELUPMOUSE", "PAGE_DOWN"}
 """Events that change the range, as in Blender's own transforms."""
@@ -31,7 +31,7 @@ FALLOFFS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "CONSTANT": np.ceil,
     "RANDOM": lambda near: near * np.random.default_rng(0).random(near.shape),
 }
-"""How much of a movement is left, from 1 at the moved keys to 0 at the end of the range: Blender's, by their names."""
+"""Weights by Blender's names of falloffs, from 1 at the moved keys to 0 at the end of the range."""
 
 
 def settings() -> Any:
@@ -40,18 +40,18 @@ def settings() -> Any:
 
 
 def reach() -> float:
-    """Return the range in frames, 0 where it is switched off."""
+    """Return the range in frames, 0 if it is switched off."""
     return float(settings().proportional_size) if settings().use_proportional_action else 0.0
 
 
 def falloff(away: np.ndarray, within: float) -> np.ndarray:
-    """Return the weights of keys that are so many frames away from moved ones, (n,): 1 where these are."""
+    """Return the weights (n,) of keys, by their distances in frames to moved keys: 1 for the moved ones."""
     near = np.clip(1.0 - away / within, 0.0, 1.0) if within > 0.0 else np.zeros(away.shape)
     return np.where(away > 0.0, FALLOFFS[settings().proportional_edit_falloff](near), 1.0)
 
 
 def change(event: bpy.types.Event) -> bool:
-    """Take a key that switches it or changes its range, and say whether it was one."""
+    """Handle an event that toggles it or changes its range; return whether it was one."""
     tools = settings()
     if event.type == "O":
         tools.use_proportional_action = not tools.use_proportional_action
@@ -65,7 +65,7 @@ def change(event: bpy.types.Event) -> bool:
 
 
 def text() -> str:
-    """Return what the header says of it; nothing where it is switched off."""
+    """Return the text for the header, empty if it is switched off."""
     if not reach():
         return ""
     tools = settings()

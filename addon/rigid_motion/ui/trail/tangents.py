@@ -1,7 +1,8 @@
-"""Tangents at the selected keys of paths: handles in both directions, as long as the way of a third of a second.
+"""Tangents at the selected keys of paths: operator and drawing of handles that set the speed, and bend the path.
 
-Where one is dragged along itself the body becomes faster or slower on that side of the key, and its path stays. B bends
-the path, too: a key is inserted halfway in the segment, and moved so that the path leaves where the handle points.
+A handle is as long as the distance travelled in a third of a second. Dragging it along itself makes the body faster or
+slower on that side of the key, and the path stays. B also bends the path: a key is inserted halfway in the segment, and
+moved until the path leaves in the direction of the handle.
 """
 
 from __future__ import annotations
@@ -40,20 +41,22 @@ from .handles import Handles, handles_of, spaces
 HANDLE_DIAMETER_PX, HANDLE_WIDTH_PX = 8.0, 1.5
 
 MIN_SLOPE = 0.05
-"""The progress at a key up to which its speed says nothing of the direction."""
+"""The progress at a key, up to which its velocity has no reliable direction."""
 
 BEND_RATIO = 0.5
-"""The part of the segment after which the key is inserted that bends the path. At the keys of *Smooth Screw* segments
-of like durations have most say: were it nearer, it would have to be far off."""
+"""The place of the inserted key that bends the path, as a fraction of the segment.
+
+At the keys of *Smooth Screw*, segments of like durations have most effect: a nearer key would have to be moved far.
+"""
 
 TRIED_RATIO = 0.1
-"""The part of the way of a segment by which the key that bends it is moved to see what that does."""
+"""Trial movement of the key that bends the path, as a fraction of the segment's length."""
 
 MIN_LENGTH_RATIO = 0.5
-"""How much of its length a tangent keeps at least, at an even speed, where the path is bent."""
+"""While the path is bent, a tangent keeps at least this fraction of its length at an even speed."""
 
 SPEED_STEP_RATIO, FINE_SPEED_STEP_RATIO = 0.1, 0.01
-"""Steps of Ctrl, and with Shift, in parts of an even speed."""
+"""Steps of speed with Ctrl, and with Ctrl and Shift, as fractions of the even speed."""
 
 RANGE_COLOUR, RANGE_WIDTH_PX = (1.0, 1.0, 1.0, 0.35), 9.0
 
@@ -61,7 +64,7 @@ NO_ROOM = n_("{name} has no frame between the keys for one that bends the path: 
 
 
 def draw(pen: Pen, _: Transform, path: DrawnPath, _frame: float, overlay: RigidMotionOverlay) -> None:
-    """Draw the handles of a path, and while keys are dragged the range of Proportional Editing, in its space."""
+    """Draw the handles of a path in its space, and the range of Proportional Editing while keys are dragged."""
     if Dragging.shown_reach and path.selected.any():
         away = np.abs(path.frames[:, None] - path.key_frames[path.selected]).min(axis=1)
         within = (away[:-1] <= Dragging.shown_reach) & (away[1:] <= Dragging.shown_reach)
@@ -110,13 +113,13 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         self._bent: KeyEdits | None = None
         if self._hit is not None:
             self.target, self.frame = self._hit[0].target.name, self._hit[1]
-        one = self._one(handles)
+        one = self._edited_handles(handles)
         if one is None:
             return False
         self._target, self._edits = one.target, self._tangent(one.target)
         if not self._edits:
             return False
-        self._pivot = Vector(one.in_world(one.path.keys)[self._number(one)].tolist())
+        self._pivot = Vector(one.in_world(one.path.keys)[self._key_index(one)].tolist())
         self._even = self._at_even_speed(one, self._edits)
         return True
 
@@ -134,7 +137,7 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
             return False
         self._is_bending = not self._is_bending and self._can_bend()
         if self._is_bending:
-            self._learn()
+            self._measure_bending()
         self.tell(context)
         return True
 
@@ -162,22 +165,22 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
             self._move(np.array(self.bend))
             if not (edits := self._tangent(self._target)):
                 return
-            even = self._at_even_speed(existing(self._one(handles_of(bpy.context))), edits)
+            even = self._at_even_speed(existing(self._edited_handles(handles_of(bpy.context))), edits)
         else:
             self._bent = None
         edits.apply(self.speed / frame_rate() / max(float(np.linalg.norm(even)), 1e-9))
 
-    def _one(self, handles: list[Handles]) -> Handles | None:
+    def _edited_handles(self, handles: list[Handles]) -> Handles | None:
         return next((one for one in handles if one.target.name == self.target), None)
 
-    def _number(self, one: Handles) -> int:
+    def _key_index(self, one: Handles) -> int:
         return int(np.argmin(np.abs(one.path.key_frames - self.frame)))
 
     def _tangent(self, target: Transform) -> TangentEdit:
         return TangentEdit(target, self.frame, SIDE_AFTER if self.after else SIDE_BEFORE, refused=self._refused)
 
     def _at_even_speed(self, one: Handles, edits: TangentEdit) -> np.ndarray:
-        """Return how far it would go from the key in a frame, in the world, were its progress even, shape (3,)."""
+        """Return the velocity at the key if progress were even, in the world, per frame, shape (3,)."""
         if edits.slope > MIN_SLOPE:
             return self._velocity(one) / edits.slope
         by = SLOPE_STEP_RATIO * np.diff(edits.ends)[0]
@@ -187,36 +190,39 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         return np.asarray((last - first) * SLOPE_STEP_RATIO / (edits.first_share * abs(by)))
 
     def _velocity(self, one: Handles) -> np.ndarray:
-        arm = arms_of(one.path)[0][self._number(one), int(self.after)]
+        arm = arms_of(one.path)[0][self._key_index(one), int(self.after)]
         return np.asarray(maps_of(one.space).axes @ arm)
 
     def _can_bend(self) -> bool:
-        """Insert the key that bends the path, if it is not there; return whether there is room for it."""
+        """Insert the key that bends the path unless it exists; return whether there is room for it."""
         if self._bent is None:
             first, last = self._edits.ends
             at = float(round(first + BEND_RATIO * (last - first)))
             if not min(first, last) < at < max(first, last):
                 self._refused.append(Refused(NO_ROOM, name=self._target.name))
                 return False
-            chosen = existing(self._one(handles_of(bpy.context))).selected
+            chosen = existing(self._edited_handles(handles_of(bpy.context))).selected
             self._edits.cancel()
             insert_key(self._target, at)
             select_keys(self._target, chosen)
             view_layer().update()
-            one = existing(self._one(handles_of(bpy.context)))
+            one = existing(self._edited_handles(handles_of(bpy.context)))
             self._bent = KeyEdits(spaces({one: (np.array((at,)), np.ones(1))}))
         return True
 
     def _move(self, by: np.ndarray) -> None:
         existing(self._bent).move(lambda _: np.array(Matrix.Translation(by.tolist())))
 
-    def _learn(self) -> None:
-        """Find how the tangent at the key turns as the key that bends the path moves: evenly, where no handle acts."""
+    def _measure_bending(self) -> None:
+        """Measure how the tangent at the key depends on the place of the key that bends the path.
+
+        The dependence is linear where no handle acts.
+        """
 
         def tangent_with(by: np.ndarray) -> np.ndarray:
             self._move(by)
             self._tangent(self._target).apply(None)
-            return self._velocity(existing(self._one(handles_of(bpy.context))))
+            return self._velocity(existing(self._edited_handles(handles_of(bpy.context))))
 
         self._straight = tangent_with(np.zeros(3))
         step = TRIED_RATIO * float(np.linalg.norm(self._straight) * abs(np.diff(self._edits.ends)[0]))
@@ -224,10 +230,10 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         self._turns = (np.array(tried) - self._straight).T / step
 
     def _bend_towards(self, arm: np.ndarray) -> np.ndarray:
-        """Return how far the key that bends the path is to be moved for the tangent to point along an arm, (3,)."""
+        """Return the movement (3,) of the key that bends the path, which makes the tangent point along an arm."""
         both = np.stack((arm / max(float(np.linalg.norm(arm)), 1e-9), self._straight), axis=1)
         along, stays = np.linalg.lstsq(self._turns, both, rcond=1e-6)[0].T
-        # As long a tangent as moves the key least.
+        # Choose the length of the tangent that moves the key least.
         length = float(np.linalg.norm(self._straight))
         return np.asarray(np.clip(along @ stays / (along @ along), MIN_LENGTH_RATIO * length, length) * along - stays)
 

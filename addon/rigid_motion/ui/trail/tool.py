@@ -1,6 +1,6 @@
-"""The tool *Edit Path* in the toolbar of the viewport, in Object Mode and in Pose Mode, and what its keys do.
+"""The tool *Edit Path* in the viewport's toolbar, in Object Mode and Pose Mode, with its keymap.
 
-Keys and clicks that are on no path are left to Blender: it selects objects and bones with this tool, too.
+Events that hit no path are left to Blender: this tool selects objects and bones, too.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from ...blender import Operator, Returned
 from ..overlay.settings import overlay_settings
 
 TOOL = "rigid_motion.edit_path"
-"""The name of the tool, and of the operator that takes it."""
+"""The id of the tool, and of the operator that activates it."""
 
 ANOTHER_TOOL = "builtin.select_box"
-"""The tool that is taken when this one is put away."""
+"""The tool that is activated when this one is switched off."""
 
 NO_MODE = n_("Paths are edited in the viewport, in Object Mode or Pose Mode")
 
@@ -34,7 +34,7 @@ KEYMAP = (
     ("rigid_motion.select_path_keys", CLICK, None),
     ("rigid_motion.select_path_keys", CLICK | {"shift": True}, EXTEND),
     ("rigid_motion.insert_path_key", CLICK | {"ctrl": True}, None),
-    # What is dragged is a tangent, a key or a box.
+    # The mouse may drag a tangent, a key or a box.
     ("rigid_motion.drag_path_tangent", DRAG, None),
     ("rigid_motion.move_path_keys", DRAG, None),
     ("rigid_motion.box_path_keys", DRAG, None),
