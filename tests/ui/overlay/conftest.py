@@ -1,4 +1,4 @@
-"""A new file with the extension switched on, in which an overlay that fails makes the test fail."""
+"""The fixture `scene` for the overlay: a new file, in which an error of the overlay fails the test."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def scene(
     extension: bpy.types.Context, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[bpy.types.Scene]:
     """The scene of a new file without objects."""
-    # What was complained of before is complained of again.
+    # An error that was logged in an earlier test is logged again.
     monkeypatch.setattr(drawing, "_complaint", "")
     yield extension.scene
     assert complaints(caplog) == []

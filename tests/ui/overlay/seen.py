@@ -1,4 +1,4 @@
-"""Whether paths, ghosts and axes are where Blender shows what they are of."""
+"""Comparison of paths, ghosts and axes with the places that Blender shows."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NEAR = 3e-5
 
 
 def assert_where_it_is_seen(carrier: Carrier, scene: bpy.types.Scene, point: tuple = (0.0, 0.0, 0.0)) -> DrawnPath:
-    """The path of a point of an object or a bone, its ghosts and its axes, on all frames that it has."""
+    """Check the path of a point of an object or a bone, its ghosts and its axes on all its frames; return the path."""
     scene.rigid_motion_overlay.show_ghosts = True
     bpy.context.view_layer.update()
     expected = worlds(carrier, WHOLE)

@@ -1,4 +1,4 @@
-"""A path is worked out once, and again only after an edit that it depends on."""
+"""The path cache: a path is computed once, and again only after an edit that it depends on."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def obj(scene) -> bpy.types.Object:
 
 
 def updated() -> None:
-    """Let Blender tell what was edited."""
+    """Let Blender report the edits to its handlers."""
     bpy.context.view_layer.update()
 
 
@@ -76,7 +76,7 @@ def test_a_path_goes_along_with_a_component_that_is_not_keyed(scene, obj):
 
 
 def test_keys_selected_without_a_word_from_blender_are_noticed_when_asked_for(scene, obj):
-    """As in the Dope Sheet, where selecting is no edit."""
+    """In the Dope Sheet, for example, selecting is no edit."""
     path = path_of(obj, bpy.context)
     assert not notice_selection([obj])
     select(obj)

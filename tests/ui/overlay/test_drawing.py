@@ -1,4 +1,4 @@
-"""What can be said of drawing without a window: it stays silent, or says once what is wrong, and never raises."""
+"""Drawing without a window: it stays silent or logs an error once, and never raises."""
 
 from __future__ import annotations
 

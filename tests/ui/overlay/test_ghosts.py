@@ -1,4 +1,4 @@
-"""Paths, ghosts and axes are where Blender shows the thing itself on their frames; ghosts look like it."""
+"""Ghosts: with paths and axes they are where Blender shows the object on their frames, and they look like it."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_a_bone_is_an_octahedron_of_its_length():
 
 
 def test_of_a_large_mesh_few_triangles_stay_near_it():
-    """A sphere of 100 000 triangles is one of a tenth of these, without a hole, and as large."""
+    """A sphere of 100 000 triangles keeps at most a tenth of them, has no holes, and stays as large."""
     rows, columns = 160, 320
     across, up = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, columns), np.linspace(0.0, np.pi, rows))
     sphere = np.stack((np.sin(up) * np.cos(across), np.sin(up) * np.sin(across), np.cos(up)), axis=-1).reshape(-1, 3)
@@ -179,7 +179,7 @@ def test_meshes_of_an_armature_are_seen_and_forgotten_when_their_keys_change(sce
         evaluated = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
         expected = [evaluated.matrix_world @ vertex.co for vertex in evaluated.data.vertices]
         assert places == pytest.approx(np.array(expected)[seen.kept], abs=1e-5)
-    # A pose without a key changes nothing.
+    # An unkeyed change of the pose changes nothing.
     rig.pose.bones["Hand"].rotation_quaternion = (0.5, 0.5, 0.5, 0.5)
     bpy.context.view_layer.update()
     assert len(list(seen_bodies(bpy.context))) == 1
@@ -196,7 +196,7 @@ def test_meshes_of_an_armature_are_seen_and_forgotten_when_their_keys_change(sce
 
 
 def skinned() -> tuple[bpy.types.Object, bpy.types.Object]:
-    """A rig whose hand swings, and a mesh that goes along with it."""
+    """Return a rig whose hand swings, and a mesh that it deforms."""
     rig = new_rig()
     set_mode(key_bone(rig.pose.bones["Hand"]), "dq_sclerp")
     mesh = bpy.data.meshes.new("Body")

@@ -1,4 +1,4 @@
-"""Paths and ghosts of what is held are where Blender shows it, run by run and while it passes."""
+"""Paths and ghosts of held objects are where Blender shows them, in each holder and between two holders."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.any_blender
 
 
 def passed_around(prop, holders):
-    """Hold something in one after the other, from frame 8 on; over some frames, too; and let go."""
+    """Hold a prop in one holder after the other from frame 8 on, some of them over several frames, and let it go."""
     for frame, holder, frames in zip((8, 18, 27, 36), (*holders, holders[0], None), (0, 5, None, 3), strict=True):
         bpy.context.scene.frame_set(frame)
         hold_in(prop, holder, frames=frames)

@@ -1,4 +1,4 @@
-"""The paths of things with offset layers: where they are seen, or none."""
+"""Paths of objects and bones with offset layers: where Blender shows them, or none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Under parents that move by keys, paths are in the world, as Blender shows it on every frame."""
+"""Paths under parents that move by keys are in the world, where Blender shows the object on every frame."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.ui.rigs import FRAMES, key_bone, new_rig
 
 @pytest.fixture
 def table(scene) -> bpy.types.Object:
-    """A parent that moves by a mode, scaled unevenly, on one that moves as well."""
+    """A parent that moves in a mode, scaled unevenly, on another one that moves as well."""
     table, floor = key(new_object("Table"), FRAMES, seed=1, scale="uneven"), key(new_object("Floor"), FRAMES, seed=2)
     give_own_deltas(floor)
     table.parent = floor

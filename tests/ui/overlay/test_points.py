@@ -1,4 +1,4 @@
-"""The points of a path are where Blender shows the object, or would show it in the mode."""
+"""Points of a path are where Blender shows the object, or would show it in the mode."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 
 def on(path: DrawnPath, line: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """The points of a line of a path that are on these frames."""
+    """Return the points of a path's line on these frames."""
     assert np.isin(frames, path.frames).all()
     return line[np.searchsorted(path.frames, frames)]
 
@@ -46,7 +46,7 @@ def shown_origins(obj: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
 
 
 def mesh() -> bpy.types.Object:
-    """A triangle that stands somewhere, 2 by 3 by 1 units large."""
+    """Return a triangle off the origin, 2 by 3 by 1 units large."""
     data = bpy.data.meshes.new("Ground")
     data.from_pydata([(0, 0, 0), (2, 0, 0), (0, 3, 1)], [], [(0, 1, 2)])
     obj = new_object("Ground", data=data)

@@ -1,4 +1,4 @@
-"""Ticks and axes leave the line of a path to be seen: in a view that looks down on it, a unit as wide as is said."""
+"""Spacing of ticks and axes on a path, in a view from above of a given scale: the line stays visible."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SIZE = (1000.0, 500.0)
 
 
 def straight(frames: int, places: np.ndarray | None = None, *, mode: bool = False, keys: tuple = (0, -1)) -> DrawnPath:
-    """A path along x with a tick on each of its frames, by one unit in all, or with these places."""
+    """Return a path along x with a tick on each of its frames, one unit long in all, or with these places."""
     at = np.arange(1.0, frames + 1.0)
     line = np.zeros((frames, 3))
     line[:, 0] = np.linspace(0.0, 1.0, frames) if places is None else places
@@ -33,12 +33,12 @@ def straight(frames: int, places: np.ndarray | None = None, *, mode: bool = Fals
 
 
 def view(width: float) -> np.ndarray:
-    """An orthographic projection in which a unit is so many pixels wide."""
+    """Return an orthographic projection in which a unit is `width` pixels wide."""
     return np.diag((2.0 * width / SIZE[0], 2.0 * width / SIZE[1], 0.0, 1.0))
 
 
 def ticks(path: DrawnPath, width: float, **options: object) -> np.ndarray:
-    """The frames of the ticks that are drawn."""
+    """Return the frames of the ticks that are drawn."""
     return path.tick_frames[readable(path, view(width), SIZE, **options).native_ticks]
 
 
@@ -68,7 +68,7 @@ def test_no_tick_touches_another_or_a_key_where_the_object_slows_down():
     assert (np.diff(drawn) >= MIN_TICK_DISTANCE_PX).all()
     assert drawn.min() >= MIN_TICK_DISTANCE_PX
     assert drawn.max() <= 900.0 - MIN_TICK_DISTANCE_PX
-    # In the middle, where it is fast, there is one on every frame.
+    # In the middle, where the object is fast, there is a tick on every frame.
     assert chosen[20:40].all()
 
 

@@ -1,4 +1,4 @@
-"""A scene whose overlay shows paths, and keys on them to be edited, with what Blender shows as the oracle."""
+"""Fixtures for editing paths: a scene whose overlay shows paths, and objects and bones with keys to edit."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def with_deltas() -> Carrier:
 
 
 def on_parent(kind: str) -> Callable[[], Carrier]:
-    """On a table that moves, on one that is larger too, or on a bone that moves."""
+    """Return a maker of props: on a moving table, on one that is scaled, too, or on a moving bone."""
 
     def make() -> Carrier:
         prop = new_prop(kind)
@@ -51,7 +51,7 @@ def on_parent(kind: str) -> Callable[[], Carrier]:
 
 
 def bone(**settings: object) -> Callable[[], Carrier]:
-    """A hand below bones that move."""
+    """Return a maker of hands below moving bones."""
 
     def make() -> Carrier:
         rig = new_rig(**settings)
@@ -75,7 +75,7 @@ CARRIERS: dict[str, Callable[[], Carrier]] = {
 
 
 def choose(carrier: Carrier, *frames: float) -> Carrier:
-    """Select something alone, and these keys of it."""
+    """Select one object or bone, and these keys of it."""
     if isinstance(carrier, bpy.types.PoseBone):
         pose_mode(carrier.id_data, carrier.name)
     else:
@@ -85,13 +85,13 @@ def choose(carrier: Carrier, *frames: float) -> Carrier:
 
 
 def held_prop(kind: str, *frames: float) -> Carrier:
-    """A prop that goes from hand to hand."""
+    """Return a prop that passes from hand to hand."""
     prop = new_prop(kind)
     handled(prop, *new_hands())
     return choose(prop, *frames)
 
 
 def about(point: Sequence[float], turn: Quaternion) -> np.ndarray:
-    """The map (4, 4) that turns the world about a point."""
+    """Return the map (4, 4) that turns the world about a point."""
     middle = Matrix.Translation(point)
     return np.array(middle @ turn.to_matrix().to_4x4() @ middle.inverted())

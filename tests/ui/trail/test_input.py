@@ -1,4 +1,4 @@
-"""What mouse and keyboard say while keys are dragged: as Blender's own transforms have it. Events are made up."""
+"""Mouse and keyboard input during a drag of keys, as in Blender's own transforms. Events are made up."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ def test_other_keys_are_none_of_its(given):
 
 
 WIDTH = 200
-"""Pixels of a viewport that looks down on the world, ten units wide."""
+"""Width in pixels of a viewport that looks down on the world, ten units wide."""
 
 
 def dragged(given: DragInput, kind: str) -> SimpleNamespace:
-    """An operator that drags a key at the origin, in an orthographic view along -Z."""
+    """Return an operator that drags a key at the origin, in an orthographic view along -Z."""
     view = SimpleNamespace(
         is_perspective=False,
         view_perspective="ORTHO",
@@ -81,7 +81,7 @@ def dragged(given: DragInput, kind: str) -> SimpleNamespace:
 
 
 def mouse_at(x: float, y: float, *others: SimpleNamespace) -> DragInput:
-    """An input that began beside the middle of the viewport, by 40 pixels to the right."""
+    """Return an input that began 40 pixels to the right of the viewport's centre."""
     given = DragInput(np.array((140.0, 100.0)))
     for one in (*others, event("MOUSEMOVE", x, y, "NOTHING", **({"ctrl": True} if others[-1:] == (CTRL,) else {}))):
         given.handle(one)

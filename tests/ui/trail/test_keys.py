@@ -1,4 +1,4 @@
-"""Keys on paths are retimed, inserted, deleted and selected: where, and with which motion, Blender's F-curves say."""
+"""Keys on paths are retimed, inserted, deleted and selected, with Blender's F-curves as the reference."""
 
 from __future__ import annotations
 

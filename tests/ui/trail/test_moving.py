@@ -1,4 +1,4 @@
-"""Keys on paths go where they are moved to in the world, as Blender shows them, and others stay where they are."""
+"""Keys on paths move in the world to where they are dragged, as Blender shows them; other keys stay."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.ui.conftest import select_keys
 from tests.ui.trail.conftest import CARRIERS, MIDDLE, MOVE, TURN, about, bone, choose, held_prop
 
 NEAR = 2e-5
-"""Metres that places after a round through the channels are off, of up to ten."""
+"""Tolerance in metres of places after a round trip through the channels, for places up to ten metres."""
 
 operators = bpy.ops.rigid_motion
 
@@ -38,7 +38,7 @@ EDITS = moved, turned
 
 
 def assert_edited(carrier: Carrier, edit: Callable[[], set[str]], frames: Sequence[float], near: float = NEAR) -> None:
-    """The keys of something that are selected, on these frames, go where an edit has them go."""
+    """Check that the selected keys of an object or bone, on these frames, go where an edit moves them."""
     before = worlds(carrier, frames)
     middle = before[:, :3, 3].mean(axis=0)
     assert edit() == {"FINISHED"}
@@ -85,7 +85,7 @@ def test_keys_of_what_is_held_go_where_they_are_moved_to(scene, frame, how):
 def test_a_bone_that_only_turns_points_where_its_tail_is_dragged(scene):
     hand = bone(use_connect=True)()
     for index in range(3):
-        curves_of(hand)  # read anew: removing one moves the others
+        curves_of(hand)  # read again: removing one moves the others
         fcurves = hand.id_data.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
         fcurves.remove(fcurves.find(hand.path_from_id("location"), index=index))
     choose(hand, MIDDLE)

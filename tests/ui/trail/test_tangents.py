@@ -1,4 +1,4 @@
-"""Tangents at keys: speeds as Blender shows them, on a path that stays, or leaves its key where a handle points."""
+"""Tangents at keys: speeds are as Blender shows them, and the path stays, or leaves its key along a handle."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ operators = bpy.ops.rigid_motion
 
 DENSE = np.arange(FRAMES[0], FRAMES[-1] + 0.125, 0.25)
 INSTANT = 1.0 / 64.0
-"""Frames over which a speed is measured."""
+"""Frames over which a velocity is measured."""
 
 NEAR = 2e-6
-"""By how much poses in single precision differ, in parts of the largest number in them."""
+"""Relative difference of poses in single precision, as a fraction of the largest number in them."""
 
 SIDES = {False: (FRAMES[0], MIDDLE), True: (MIDDLE, FRAMES[2])}
-"""The segments before the key and behind it."""
+"""The segments before and after the key."""
 
 
 def arc(mode: str, handle_type: str = "AUTO_CLAMPED") -> Carrier:
-    """Something on a path that bends gently, with its second key selected."""
+    """Return an object on a gently curved path, with its second key selected."""
     tool = new_object()
     write(tool, "location", np.array(FRAMES), np.array([(0, 0, 0), (3, 1, 0.5), (5, 4, 1), (4, 7, 2)]), "BEZIER")
     angles = (0, 0, 0), (0.2, 0.3, 0.5), (0.5, 0.2, 1.2), (0.3, 0, 1.8)
@@ -52,7 +52,7 @@ def arc(mode: str, handle_type: str = "AUTO_CLAMPED") -> Carrier:
 
 
 def velocity(carrier: Carrier, after: bool) -> np.ndarray:
-    """How it leaves the middle key or comes to it, away from that, in units a second."""
+    """Return the velocity after or before the middle key, pointing away from it, in units per second."""
     at, beside = worlds(carrier, [MIDDLE, MIDDLE + (INSTANT if after else -INSTANT)])[:, :3, 3]
     return (beside - at) / INSTANT * frame_rate()
 
@@ -89,7 +89,7 @@ def test_the_path_stays_and_so_does_all_else(scene, kind, how):
 
 
 def stop_parents(carrier: Carrier) -> None:
-    """Have what carries it stand still."""
+    """Stop the motion of the parents."""
     if isinstance(carrier, bpy.types.PoseBone):
         fcurves = carrier.id_data.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
         for fcurve in [fcurve for fcurve in fcurves if carrier.name not in fcurve.data_path]:
@@ -148,7 +148,7 @@ def test_what_is_held_is_faster_in_its_hand_alone(scene, number, after):
 
 
 def begun(tool: Carrier, after: bool) -> SimpleNamespace:
-    """The operator as it is when a tangent is being dragged, with B pressed."""
+    """Return the operator in the state of dragging a tangent, with B pressed."""
     cls = RIGID_MOTION_OT_drag_path_tangent
     operator = SimpleNamespace(_hit=None, target=tool.name, frame=MIDDLE, after=after, speed=0.0, bend=(0.0, 0.0, 0.0))
     for name, method in vars(cls).items():
@@ -175,7 +175,7 @@ def test_a_path_leaves_its_key_where_the_tangent_is_bent_to(scene, mode, after):
     assert np.linalg.norm(now) == pytest.approx(np.linalg.norm(arm), rel=0.05)
     assert_same(worlds(tool, FRAMES), keys)
     assert key_frames(tool, selected=True).tolist() == [MIDDLE]
-    if mode != "motor_spline":  # which has no corners, so its path bends on the other side, too
+    if mode != "motor_spline":  # it has no corners, so its path also bends on the other side
         assert_same(worlds(tool, outside(SIDES[after])), others)
     bent = worlds(tool, DENSE)
     operator._edits.cancel()

@@ -124,7 +124,7 @@ class Dragging(OnPath):
         return self.finish(self._refused)
 
     def grab(self, context: bpy.types.Context, handles: list[Handles], place: np.ndarray) -> bool:
-        """Hit the key at a place on the screen, and select it alone unless it is selected; return whether one is hit."""
+        """Hit the key at a place on the screen, and select it alone unless it is selected; return whether it exists."""
         self._hit = key_under(context, handles, place)
         if self._hit is None:
             return False
