@@ -1,4 +1,4 @@
-"""A new file with the extension switched on, edits followed; and keyed objects to act on."""
+"""Fixtures for the interface: a new file with the extension registered and live updates on, and keyed objects."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def tool(extension) -> bpy.types.Object:
 
 
 def keyed(name: str, rotation_mode: str = "QUATERNION") -> bpy.types.Object:
-    """A selected, active object, moved along x and turned a quarter about z from each key to the next."""
+    """Return a selected, active object that moves along x and turns a quarter about z from key to key."""
     obj = turning(name, 90.0 * np.arange(len(FRAMES)), FRAMES, rotation_mode)
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
@@ -27,7 +27,7 @@ def keyed(name: str, rotation_mode: str = "QUATERNION") -> bpy.types.Object:
 
 
 def select_keys(carrier: bpy.types.Object | bpy.types.PoseBone, *frames: float) -> None:
-    """Have these keys of an object or a bone selected, and no others of it."""
+    """Select the keys of an object or a bone on these frames, and deselect all others of it."""
     for fcurve in curves_of(carrier).values():
         for key in fcurve.keyframe_points:
             key.select_control_point = key.co.x in frames

@@ -1,4 +1,4 @@
-"""A rig in Pose Mode, with keyed bones to act on."""
+"""Rigs in Pose Mode with keyed bones, for tests of the interface."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CHAIN = (
 
 
 def new_rig(name: str = "Rig", **settings: object) -> bpy.types.Object:
-    """An armature that leans, in Pose Mode without a selected bone. `settings` are properties of its hand."""
+    """Return a tilted armature in Pose Mode with no bone selected. `settings` are properties of its hand."""
     rig = rigs.new_rig(name, CHAIN, **settings)
     rig.rotation_mode, rig.location, rig.rotation_quaternion = "QUATERNION", (1.0, 2.0, 3.0), (0.8, 0.0, 0.6, 0.0)
     rigs.pose_mode(rig)
@@ -27,12 +27,12 @@ def new_rig(name: str = "Rig", **settings: object) -> bpy.types.Object:
 
 
 def key_bone(bone: bpy.types.PoseBone, **how: object) -> bpy.types.PoseBone:
-    """Key a bone of this rig at random, which turns by less than half a turn from key to key."""
+    """Key a bone of this rig at random, turning by less than half a turn from key to key."""
     return key(bone, FRAMES, seed=1743, **how)
 
 
 def keyed_rig(name: str = "Rig") -> bpy.types.Object:
-    """A rig with keys on all bones, which are selected but for the hip; the hand is the active bone."""
+    """Return a rig with keys on all bones. All but the hip are selected; the hand is the active bone."""
     rig = new_rig(name)
     for bone in rig.pose.bones:
         key_bone(bone)

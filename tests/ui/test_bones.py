@@ -1,4 +1,4 @@
-"""Pose bones in the interface: which are meant, what menus and operators say."""
+"""Pose bones in the interface: which bones editors act on, and what operators do with them."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_key_poses_begin_with_a_larger_tolerance_for_as_long_as_nobody_sets_one(
     monkeypatch.setattr(animation, "reduce_keys_of", lambda *args, **_: asked.append(args[2]))
     bones = list(map(transform_of, body.pose.bones))
     own, offered = (first_tolerance(bpy.context.scene, bones, shared=shared) for shared in (False, True))
-    # The last is the redo panel, after Key Poses was switched on: the tolerance stands that own keys were offered.
+    # The last call is the redo panel after switching Key Poses on: the tolerance is the one offered for own keys.
     for tolerances in ({}, {"tolerance": 0.5 * offered}, {"tolerance": own, "offered": own}):
         with pytest.raises(RuntimeError):
             operators.reduce_keys(shared=True, **tolerances)

@@ -1,4 +1,4 @@
-"""Breakdown, Push and Relax as operators: by a factor, and by the mouse, whose events are made up here."""
+"""Breakdown, Push and Relax as operators: by a factor, and by made-up events of the mouse."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_a_breakdown_is_keyed_by_its_factor(tool):
     animation.set_mode(tool, "dq_sclerp")
     bpy.context.scene.frame_set(14)
     assert operators.breakdown(factor=0.25) == {"FINISHED"}
-    # A quarter of the quarter turn about an axis beside the origin: x and y go along an arc.
+    # A quarter of the quarter turn about an axis off the origin: x and y follow an arc.
     keys = Poses(
         [[2.0, 0.0, 0.0], [4.0, 0.0, 0.0]], [[np.cos(a), 0.0, 0.0, np.sin(a)] for a in np.pi * np.arange(1, 3) / 4]
     )

@@ -1,4 +1,4 @@
-"""*Clean Motion* from the interface: what is selected, what it says, and what is drawn beside it."""
+"""*Clean Motion* from the interface: on selected objects, with its report and its drawn result."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def shaky(obj: bpy.types.Object, repeats: int = 0) -> bpy.types.Object:
 
 @pytest.fixture
 def said(extension, capfd):
-    """What the operator says where it is done."""
+    """Return a function that runs the operator and returns its report."""
 
     def act(**settings: object) -> str:
         capfd.readouterr()

@@ -1,4 +1,4 @@
-"""Deviations: pops and kinks are found on paths and gone to, and what is smooth has none."""
+"""Deviations: pops and kinks on paths are found, and the playhead jumps to them; smooth motion has none."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FRAMES = np.arange(1.0, 81.0)
 
 
 def circling(pop: float = 0.0, turned: float = 0.0) -> bpy.types.Object:
-    """A key on every frame of a circle; on frame 30 it is off by so much, and turned."""
+    """Return an object keyed on every frame of a circle; on frame 30 it is displaced by `pop`, and turned."""
     angles = FRAMES / 30.0
     places = np.stack((3.0 * np.cos(angles), 3.0 * np.sin(angles), 0.0 * angles), axis=1)
     places[29] += pop

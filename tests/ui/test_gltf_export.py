@@ -1,4 +1,4 @@
-"""*File > Export > glTF, Reduced*: what Blender's exporter writes, with fewer keys, within the tolerance."""
+"""*File > Export > glTF, Reduced*: the file of Blender's exporter, with fewer keys, within the tolerance."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rigid_motion import animation
 from tests.gltf.player import File, off
 
 TOLERANCE = 0.01
-"""Metres."""
+"""Tolerance in metres."""
 
 
 @pytest.fixture
 def cube(extension) -> bpy.types.Object:
-    """A cube with a screw between three keys, 2 m and 150 degrees."""
+    """A cube on a screw motion between three keys, 2 m and 150 degrees."""
     mesh = bpy.data.meshes.new("Cube")
     mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
     obj = bpy.data.objects.new("Cube", mesh)

@@ -1,4 +1,4 @@
-"""Holding things from the interface: who is meant, one operator for each verb, and what the panel says."""
+"""Holding from the interface: which objects the operators act on, each operator, and the texts of the panel."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ operators = bpy.ops.rigid_motion
 
 
 def select(*items, active):
-    """Have these objects selected, and one active."""
+    """Select these objects, and make one active."""
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj in (*items, active))
     bpy.context.view_layer.objects.active = active
@@ -28,7 +28,7 @@ def select(*items, active):
 
 @pytest.fixture
 def stage(extension):
-    """A mug, a hand that moves, and another one; the mug selected first, the hand last."""
+    """A mug, a hand that moves, and another one; the mug is selected first, the moving hand last."""
     mug, left, right = new_object("Mug"), key(new_object("Left"), FRAMES, seed=1), key(new_object("Right"), FRAMES)
     mug.location = (0.4, 0.2, 1.0)
     bpy.context.scene.frame_set(11)

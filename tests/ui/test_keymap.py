@@ -1,4 +1,4 @@
-"""The shortcuts: Blender has nothing else on them."""
+"""The extension's shortcuts are free in Blender's own keymaps."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import bpy
 import pytest
 
 SHARED = {"Window", "Screen", "Screen Editing", "Frames", "Animation", "Markers", "View2D", "Animation Channels"}
-"""Keymaps that are asked in all of the editors, or in parts of them."""
+"""Keymaps that apply in all editors, or in parts of them."""
 
 OF_EDITORS = {"3D View", "3D View Generic", "Object Mode", "Object Non-modal", "Pose"}
 OF_EDITORS |= {"Dopesheet", "Dopesheet Generic", "Graph Editor", "Graph Editor Generic"}
 
 
 def keymaps_of_blender(name):
-    """The keymaps that Blender comes with: name, and the operator, key and modifiers of each item."""
+    """Yield the keymaps of a key configuration: the name, and the operator, key and modifiers of each item."""
     path = Path(bpy.utils.system_resource("SCRIPTS")) / "presets/keyconfig/keymap_data" / f"{name}.py"
     spec = importlib.util.spec_from_file_location(name, path)
     module = importlib.util.module_from_spec(spec)

@@ -1,4 +1,4 @@
-"""*Add Layer* and *Merge Layer* as an animator calls them."""
+"""*Add Layer* and *Merge Layer* as operators."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""F1 over what the extension has, and the buttons in its preferences: the right page of the documentation."""
+"""Online manual: F1 on operators and properties, and buttons in the preferences, open the right page."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def page(doc_id: str) -> str | None:
-    """What Blender opens for the identity that it gives a button, for instance "RIGID_MOTION_OT_bake.step"."""
+    """Return the page that Blender opens for the id of a button, for example "RIGID_MOTION_OT_bake.step"."""
     return WM_OT_doc_view_manual._lookup_rna_url(_wm_doc_get_id(doc_id, do_url=False), verbose=False)
 
 
@@ -41,7 +41,7 @@ def test_every_property_that_is_drawn_says_what_it_is_for_and_has_a_page(cls, ex
         name = prop.identifier
         assert prop.name
         assert prop.description or prop.type == "COLLECTION"
-        # Before 5.0 Blender knows no preferences of extensions by their names, so the map is asked.
+        # Before 5.0 Blender cannot look up preferences of extensions by name, so the map is asked.
         url = WM_OT_doc_view_manual._lookup_rna_url(f"bpy.types.{cls.__name__}.{name}", verbose=False)
         assert url.startswith(manual.DOCS), name
 

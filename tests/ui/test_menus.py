@@ -1,4 +1,4 @@
-"""Menus and pies, as far as they are the same without a window: what they offer. How they look, tests/gui shows."""
+"""Entries of menus and pies, tested without a window. Tests in tests/gui show their looks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.ui.conftest import FRAMES, select_keys
 
 
 class Layout:
-    """Notes what a menu draws."""
+    """A stand-in for a layout that records what a menu draws."""
 
     def __init__(self):
         self.drawn = []
@@ -38,7 +38,7 @@ class Layout:
 
 
 def drawn(menu):
-    """What a menu draws for the active object: operator or menu, icon, properties."""
+    """Return what a menu draws for the active object: operator or menu, icon, properties."""
     layout = Layout()
     own = {name: getattr(menu, name, None) for name in ("scope", "pie", "menu", "beside")}
     menu.draw(SimpleNamespace(layout=layout, **own), bpy.context)
@@ -50,7 +50,7 @@ MODE_MENUS = [getattr(menus, f"RIGID_MOTION_MT_{name}") for name in ("view", "ke
 
 
 def offered(menu):
-    """The modes that a menu offers, and how it calls them."""
+    """Return the modes that a menu offers, with their labels."""
     return {properties.mode: properties.text for name, _, properties in drawn(menu) if name == "rigid_motion.set_mode"}
 
 
@@ -83,7 +83,7 @@ def test_the_mode_that_is_chosen_is_ticked_and_modes_that_are_mixed_have_dots(to
 
 
 def icons():
-    """The icons of the modes that have one."""
+    """Return the icons of the modes that have one."""
     entries = drawn(menus.RIGID_MOTION_MT_view)
     return {p.mode: icon for name, icon, p in entries if name == "rigid_motion.set_mode" and icon != "BLANK1"}
 

@@ -1,4 +1,4 @@
-"""Operators, called as scripts do: on the selected objects."""
+"""Operators called from scripts, acting on the selected objects."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ operators = bpy.ops.rigid_motion
 
 
 def modes(obj):
-    """The modes of the three segments."""
+    """Return the modes of the three segments."""
     return modes_of(obj, FRAMES[:-1])
 
 
 def turns(obj):
-    """The keys of the channel of turns, frames and values."""
+    """Return the keys of the channel of whole turns: values by frames."""
     fcurve = curves_of(obj).get(("rigid_motion.turns", 0))
     return {} if fcurve is None else {key.co.x: key.co.y for key in fcurve.keyframe_points}
 
@@ -95,7 +95,7 @@ def test_without_any_object_an_operator_says_why_not(extension, name):
 
 
 def refusal_of(name: str) -> str:
-    """Why an operator is greyed out; "" where it is not."""
+    """Return why an operator is greyed out, "" if it is not."""
     operator = getattr(operators, name)
     if operator.poll():
         return ""
@@ -165,7 +165,7 @@ def test_cycles_are_on_all_channels_and_in_front(tool):
 
 
 def recorded() -> bpy.types.Object:
-    """A selected, active object with a key on every frame of a wild motion about a metre wide."""
+    """Return a selected, active object with a key on every frame of a wild motion, about a metre wide."""
     random, frames = np.random.default_rng(3), np.arange(1.0, 62.0)
     keys = Poses(random.normal(size=(3, 3)), random.normal(size=(3, 4)))
     obj = new_object("Tool")
@@ -201,7 +201,7 @@ def test_every_operator_and_property_says_what_it_is_for(extension):
         assert operator.bl_idname.startswith("rigid_motion.")
         assert operator.bl_description, operator
         assert not operator.bl_description.endswith("."), operator
-        # An export and a port change nothing.
+        # Exports and ports change nothing that could be undone.
         without_undo = operator.__module__ in (gltf_export.__name__, live.__name__)
         assert {"REGISTER", "UNDO"} - operator.bl_options <= ({"UNDO"} if without_undo else set()), operator
         kind = getattr(bpy.ops.rigid_motion, operator.bl_idname.partition(".")[2]).get_rna_type()

@@ -1,4 +1,4 @@
-"""What the panel shows of an object, without a window: the segment under the playhead, and what there is to know."""
+"""The panel's content for an object, without a window: the segment under the playhead, and notes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ IN_THE_FIRST_SEGMENT = 5.0
 
 
 def notes_on(obj, frame=IN_THE_FIRST_SEGMENT):
-    """What the panel says on a frame, and the mode of the segment it shows."""
+    """Return the notes of the panel on a frame, and the mode of the segment it shows."""
     bpy.context.scene.frame_set(int(frame))
     segment, notes = facts_and_notes(obj, frame)
     return [text for _, text in notes], segment and segment.mode

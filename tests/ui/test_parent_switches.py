@@ -1,4 +1,4 @@
-"""Rigify's human: parents switched between two keys by Rigify's own operator. What is held stays where it is seen."""
+"""Parent switching with Rigify's own operator, between two keys of a mode: the hand stays where it is seen."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ HAND, TORSO = "hand_ik.L", "torso"
 PARENTS = ("None", "Root", "Torso", "Hips", "Chest", "Head")
 POSES = {HAND: ((0.3, -0.2, 0.4), (0.9, 0.7, 1.2)), TORSO: ((0.2, 0.3, 0.1), (0.2, 0.5, 1.4))}
 STAYS = 1e-5
-"""Metres, and parts of axes."""
+"""Tolerance in metres, and for components of axes."""
 
 
 @pytest.fixture
 def rig(human, extension) -> Iterator[bpy.types.Object]:
-    """The human in Pose Mode with its own operators, a screw on the left hand and on the torso."""
+    """The human in Pose Mode with its own operators, in the mode Screw on the left hand and the torso."""
     script = human["rig_ui"].as_module()
     pose_mode(human)
     key_controls(human, POSES, (1, 21))
@@ -34,12 +34,12 @@ def rig(human, extension) -> Iterator[bpy.types.Object]:
 
 
 def switch(rig: bpy.types.Object, parent: str) -> set[str]:
-    """As the button in the sidebar does."""
+    """Switch the parent as the button in the sidebar does."""
     (name,) = set(re.findall(r"pose\.(rigify_switch_parent_(?!bake)\w+)", rig["rig_ui"].as_string()))
     settings = {"bone": HAND, "prop_bone": "upper_arm_parent.L", "prop_id": "IK_parent", "locks": (False, False, False)}
     names = str(list(PARENTS)).replace("'", '"')
     settings["parent_names"] = names
-    # Where it is not invoked it has not read the names of the parents.
+    # Without being invoked, the operator has not read the names of the parents.
     operator = bpy.types.Operator.bl_rna_get_subclass_py(f"POSE_OT_{name}")
     operator.init_invoke(SimpleNamespace(**settings, report=print), bpy.context)
     return getattr(bpy.ops.pose, name)("EXEC_DEFAULT", True, selected=str(PARENTS.index(parent)), **settings)

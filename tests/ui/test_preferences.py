@@ -1,4 +1,4 @@
-"""The preferences, as they act once the package is an extension of Blender's."""
+"""The preferences of the package, installed as an extension of Blender."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.ui.conftest import keyed
 
 @pytest.fixture
 def chosen(empty_file):
-    """The preferences of the extension, switched on as Blender does it."""
+    """The preferences of the extension, registered as Blender does it."""
     entry = bpy.context.preferences.addons.new()
     entry.module = EXTENSION
     rigid_motion.register()

@@ -1,4 +1,4 @@
-"""*Reduce into Holds* and *Bake to World* from the interface, on what is selected."""
+"""*Reduce into Holds* and *Bake to World* from the interface, on the selected objects."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ operators = bpy.ops.rigid_motion
 
 @pytest.fixture
 def scene_of_both(extension) -> tuple[bpy.types.Object, bpy.types.Object]:
-    """A tool that was in a hand from frame 20 on, and the body."""
+    """A tool, which is in a hand from frame 20 on, and the rig of the hand."""
     body, tool = recorded_rig(), new_object("Tool")
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 90
     places = worlds(body.pose.bones["Hand.R"], np.clip(FRAMES, 20, 90))

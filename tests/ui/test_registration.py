@@ -1,4 +1,4 @@
-"""The extension switched on and off."""
+"""Registering and unregistering the extension."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rigid_motion.ui import keymap, menus
 
 
 def footprint():
-    """Whatever of Blender the extension adds to: classes, properties, menus, keymaps, handlers."""
+    """Return what the extension may add to in Blender: classes, properties, menus, keymaps, handlers."""
     keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
     places = dict.fromkeys((shortcut.keymap, shortcut.space) for shortcut in keymap.SHORTCUTS)
     result = [keymaps.find(name, space_type=space) for name, space in places]
@@ -40,7 +40,7 @@ def test_switched_off_it_leaves_nothing_behind_however_often(empty_file):
 
 
 def test_a_look_through_the_file_that_still_waits_is_called_off(empty_file):
-    """In a window Blender is asked for one as soon as it is idle."""
+    """In a window Blender runs the first look through the file as soon as it is idle."""
     rigid_motion.register()
     bpy.app.timers.register(follower.first_look, first_interval=1.0)
     rigid_motion.unregister()

@@ -1,4 +1,4 @@
-"""Which transforms an editor means. It needs no screen: areas and what they show are there in the background too."""
+"""Transforms that operators act on in each editor. No screen is needed: areas exist in the background, too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the panel says, and how it fits."""
+"""Texts of the panel: cautions, summaries, and line breaks."""
 
 from __future__ import annotations
 
