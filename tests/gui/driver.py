@@ -1,8 +1,8 @@
-"""A hand on mouse and keyboard of a Blender window, for scenarios that run inside that Blender.
+"""Simulated mouse and keyboard of a Blender window, for scenarios that run inside that Blender.
 
-A scenario is a generator: Blender only notes what the hand does, and deals with it and draws when the scenario yields.
-So all that a hand does is written `yield from hand.press("G")`; a plain `yield` lets Blender do it, `yield 0.5`
-lets half a second pass. Blender has to be started with --enable-event-simulate, which keeps the real mouse out.
+A scenario is a generator. Blender only queues the events; it handles them and draws when the scenario yields. So every
+action is written `yield from hand.press("G")`; a plain `yield` lets Blender handle it, `yield 0.5` waits half a second.
+Blender has to be started with --enable-event-simulate, which also blocks the real mouse.
 """
 
 from __future__ import annotations
@@ -24,32 +24,34 @@ from tests.gui.places import Box, Place
 
 T = TypeVar("T")
 Steps = Generator[float | None, None, T]
-"""What a hand does: a generator of seconds to wait (None: as long as Blender needs), with a result at its end."""
+"""The actions of a hand: a generator of seconds to wait (None: as long as Blender needs), with a result."""
 
 TURNS = 4
-"""Turns of Blender's main loop between two steps: an event may make others, and each turn ends with drawing."""
+"""Turns of Blender's main loop between two steps: an event may cause others, and each turn ends with drawing."""
 
 PAUSE = 0.1
-"""Seconds between two steps: a button that is pressed flashes for a moment before it does what it is for."""
+"""Seconds between two steps: a pressed button flashes for a moment before it acts."""
 
 QUICK, SMOOTH = "OFF", "8"
-"""How edges are smoothed in 3D Views, and in pictures that pages show, as Blender comes: it draws a view as often,
-which without a graphics card is two thirds of the time."""
+"""Anti-aliasing of 3D Views: during scenarios, and in pictures for pages, where it is Blender's default.
+
+With SMOOTH Blender draws a view eight times: without a graphics card that would be two thirds of the time.
+"""
 
 SHOWN = Path(__file__).resolve().parents[2] / "docs" / "window"
-"""The pictures that pages show, as SCENARIO/NAME.png."""
+"""The pictures on pages of the documentation, as SCENARIO/NAME.png."""
 
 PATIENCE = 30.0
-"""Seconds that something may take to become true, where other windows and tests keep the processors busy as well."""
+"""Seconds to wait for a condition, since other windows and tests keep the processors busy as well."""
 
 PIE_RADIUS = 150
-"""Pixels from the middle of a pie menu to one of its items."""
+"""Pixels from the centre of a pie menu to one of its items."""
 
 FOLDED_PANEL = 25
-"""Pixels from the header of a panel that is folded to that of the next one."""
+"""Pixels from the header of a folded panel to the next header."""
 
 FOLDED = 50
-"""Pixels: the redo panel is higher than this once it is unfolded."""
+"""Height in pixels: the redo panel is higher than this once it is unfolded."""
 
 COMPASS = {
     "W": (-1, 0),
@@ -64,16 +66,16 @@ COMPASS = {
 """The directions of a pie menu, in the order of its items."""
 
 DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
-"""Names of the keys that digits are typed with."""
+"""Blender's names of the digit keys."""
 
 
 class Hand:
-    """Mouse and keyboard of Blender's first window, and a camera for it.
+    """Mouse and keyboard of Blender's first window, and a camera for pictures of it.
 
     Parameters
     ----------
     pictures
-        Folder that pictures go to.
+        Folder for the pictures.
     """
 
     def __init__(self, pictures: Path) -> None:
@@ -82,28 +84,28 @@ class Hand:
 
     @property
     def window(self) -> bpy.types.Window:
-        """The window, asked for anew each time: opening a file replaces it."""
+        """The window, looked up each time: opening a file replaces it."""
         return bpy.context.window_manager.windows[0]
 
     def area(self, kind: str) -> bpy.types.Area:
-        """The largest area of this type in the window."""
+        """Return the largest area of this type in the window."""
         return places.area(self.window, kind)
 
     def open_animation_workspace(self) -> Steps[None]:
-        """Show the viewport beside the Dope Sheet."""
+        """Open the Animation workspace, with the viewport next to the Dope Sheet."""
         self.window.workspace = bpy.data.workspaces["Animation"]
         yield from self.wait_until(lambda: self.window.screen.name == "Animation", "the Animation workspace opens")
 
-    # What a mouse does
+    # Mouse
 
     def hover(self, place: Place) -> Steps[None]:
-        """Move the mouse to a place. Keys are for the area that the mouse is in."""
+        """Move the mouse to a place. Keys go to the area under the mouse."""
         self.place = place
         self._event("MOUSEMOVE", "NOTHING")
-        yield 0  # nothing flashes under a mouse that moves
+        yield 0  # nothing flashes when the mouse moves
 
     def glide(self, place: Place, steps: int = 5) -> Steps[None]:
-        """Move the mouse to a place by way of others on a straight line."""
+        """Move the mouse to a place in steps along a straight line."""
         (x, y), (to_x, to_y) = self.place, place
         for step in range(1, steps + 1):
             yield from self.hover((x + (to_x - x) * step // steps, y + (to_y - y) * step // steps))
@@ -114,10 +116,10 @@ class Hand:
             yield from self.hover(place)
         yield from self.press(button, **modifiers)
 
-    # What a keyboard does
+    # Keyboard
 
     def press(self, key: str, **modifiers: bool) -> Steps[None]:
-        """Press a key and let go of it: `press("Z", ctrl=True)`. Keys are called as in `bpy.types.Event.type`."""
+        """Press a key and release it: `press("Z", ctrl=True)`. Keys are named as in `bpy.types.Event.type`."""
         held = [f"LEFT_{name.upper()}" for name, down in modifiers.items() if down]
         for name in held:
             self._event(name, "PRESS", **modifiers)
@@ -128,16 +130,16 @@ class Hand:
         yield
 
     def type(self, text: str) -> Steps[None]:
-        """Type a text into the field that has the cursor, or a number into what is being dragged."""
+        """Type a text into the active field, or a number during a drag."""
         for character in text:
-            # What has no key of its own comes from F24, which nothing listens to: only the character counts.
+            # Characters without a key come from F24, which has no shortcut: only the character counts.
             key = DIGITS[int(character)] if character.isdigit() else "F24"
             self._event(key, "PRESS", unicode=character)
             self._event(key, "RELEASE")
         yield
 
     def enter(self, text: str, place: Place | None = None) -> Steps[None]:
-        """Type a value into the field at a place, or under the mouse, in place of the one that it has."""
+        """Replace the value of the field at a place, or under the mouse."""
         if place:
             yield from self.hover(place)
         yield from self.press("RET")
@@ -152,7 +154,7 @@ class Hand:
     # Menus and buttons
 
     def open_menu(self, area: bpy.types.Area, menu: str) -> Steps[None]:
-        """Open a menu of an area's header by clicking along it. Menus are called by class: "DOPESHEET_MT_key"."""
+        """Open a menu of an area's header by clicking along it. Menus are named by class: "DOPESHEET_MT_key"."""
         header = places.region(area, "HEADER")
         with _drawings_of(menu) as drawings:
             for x in range(header.x + 30, header.x + header.width, 35):
@@ -163,19 +165,19 @@ class Hand:
         raise LookupError(f"no click into the header of the {area.type} opens {menu}")
 
     def choose(self, label: str) -> Steps[None]:
-        """Choose an entry of the menu that is open, or of its submenus, by typing its name."""
+        """Choose an entry of the open menu, or of its submenus, by typing its name."""
         yield from self.press("SPACE")
         yield from self._find_and_run(label)
 
     def choose_row(self, row: int) -> Steps[None]:
-        """Choose a row, from 0, of the values that a click on a property has opened; they cannot be found by typing."""
+        """Choose a row, from 0, of the open list of a property's values, which cannot be found by typing."""
         yield from self.press("HOME")
         for _ in range(row):
             yield from self.press("DOWN_ARROW")
         yield from self.press("RET")
 
     def search(self, label: str) -> Steps[None]:
-        """Run what F3 finds first for a text, in the area that the mouse is in."""
+        """Run the first result of F3 for a text, in the area under the mouse."""
         yield from self.press("F3")
         yield from self._find_and_run(label)
 
@@ -188,7 +190,7 @@ class Hand:
     def pie(
         self, key: str, direction: str, picture: str | None = None, box: Box | None = None, **modifiers: bool
     ) -> Steps[None]:
-        """Hold the key of a pie menu, move in a direction of `COMPASS`, and let go; with a picture before, if named."""
+        """Hold the key of a pie menu, move in a direction of `COMPASS`, take a picture if it is named, and release."""
         (x, y), (right, up) = self.place, COMPASS[direction]
         self._event(key, "PRESS", **modifiers)
         yield 0.3
@@ -200,7 +202,7 @@ class Hand:
         yield
 
     def unfold_redo_panel(self, area: bpy.types.Area) -> Steps[bpy.types.Region]:
-        """Unfold what an area shows of the last operation, if it is not; and its region."""
+        """Unfold the redo panel of an area if it is folded; return its region."""
         redo = places.region(area, "HUD")
         if redo.height < FOLDED:
             yield from self.click(places.centre(redo))
@@ -219,7 +221,7 @@ class Hand:
         yield
 
     def find_button(self, area: bpy.types.Area, kind: str, what: str, *, narrow: bool = False) -> Steps[Place]:
-        """Where in a region the button of a property or an operator is, found by moving the mouse over all of it.
+        """Return the place of the button of a property or operator in a region, found by moving the mouse across it.
 
         Parameters
         ----------
@@ -228,57 +230,57 @@ class Hand:
         what
             The end of the property's data path ("rigid_motion.mode"), or the operator ("action.bake_keys").
         narrow
-            Whether it is no wider than its icon.
+            True if the button is no wider than its icon.
         """
         part = places.region(area, kind)
-        flat = part.height < 40  # a header: one row of narrow buttons, where a sidebar has many rows of wide ones
+        flat = part.height < 40  # a header has one row of narrow buttons, a sidebar many rows of wide ones
         right, down = 15 if flat or narrow else part.width // 4, part.height // 2 if flat else 15
         columns = range(part.x + right, part.x + part.width, right)
-        if right > 15:  # most buttons of a sidebar reach to its middle
+        if right > 15:  # most buttons of a sidebar extend to its middle
             columns = sorted(columns, key=lambda x: abs(x - part.x - part.width // 2))
         for x in columns:
             for y in range(part.y + part.height - down, part.y, -down):
                 yield from self.hover((x, y))
-                if f".{self._under_the_mouse(area, part)}".endswith(f".{what}"):
+                if f".{self._button_under_mouse(area, part)}".endswith(f".{what}"):
                     return x, y
         raise LookupError(f"{what} has no button in the {kind} region of the {area.type}")
 
-    def _under_the_mouse(self, area: bpy.types.Area, part: bpy.types.Region) -> str:
-        """The data path of the property, or the operator, whose button the mouse is over; "" over anything else."""
+    def _button_under_mouse(self, area: bpy.types.Area, part: bpy.types.Region) -> str:
+        """Return the data path of the property, or the operator, of the button under the mouse; "" without a button."""
         copy_command = bpy.ops.ui.copy_python_command_button
         with bpy.context.temp_override(window=self.window, area=area, region=part):
             owned = getattr(bpy.context, "property", None)
             if owned:
                 return owned[1]
-            # Which operator a button runs, Blender tells by way of the clipboard alone: "bpy.ops.action.bake_keys()".
+            # Blender names a button's operator through the clipboard only: "bpy.ops.action.bake_keys()".
             if not copy_command.poll():
                 return ""
             copy_command()
         return bpy.context.window_manager.clipboard.partition("(")[0]
 
-    # What an eye does
+    # Screen
 
     def wait_until(self, condition: Callable[[], object], what: str, seconds: float = PATIENCE) -> Steps[None]:
-        """Wait for something to become true; an AssertionError that says what where it does not in that time."""
+        """Wait for a condition to become true. AssertionError with `what` if it does not in time."""
         end = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < end, f"not within {seconds} s: {what}"
             yield
 
     def look(self, edges: str = QUICK) -> Steps[np.ndarray]:
-        """What is on the screen, drawn anew: pixels as in `tests.gui.pictures`."""
+        """Redraw, and return the pixels of the screen as in `tests.gui.pictures`."""
         system = bpy.context.preferences.system
         system.viewport_aa = edges
         for area in self.window.screen.areas:
             area.tag_redraw()
-        yield 0.5  # the screen is the affair of another process, which may be behind
+        yield 0.5  # another process owns the screen, and may be late
         screen = os.environ.get("BLENDER_GUI_SCREEN")
         pixels = read_screen(Path(screen).read_bytes()) if screen else self._screenshot()
         system.viewport_aa = QUICK
         return pixels
 
     def picture(self, name: str, box: Box | None = None) -> Steps[np.ndarray]:
-        """Keep what is on the screen, or the part of it in a box, as NAME.png; and have its pixels."""
+        """Save the screen, or the part of it in a box, as NAME.png; return its pixels."""
         shown = (SHOWN / self.pictures.name / f"{name}.png").is_file()
         pixels = yield from self.look(SMOOTH if shown else QUICK)
         if box:
@@ -301,7 +303,7 @@ class Hand:
 
 @contextmanager
 def _drawings_of(menu: str) -> Iterator[list[str]]:
-    """A list that grows whenever Blender draws this menu, which it does when the menu opens."""
+    """Yield a list that grows whenever Blender draws this menu, that is, when the menu opens."""
     drawings: list[str] = []
 
     def draw(self: bpy.types.Menu, context: bpy.types.Context) -> None:
@@ -316,14 +318,14 @@ def _drawings_of(menu: str) -> Iterator[list[str]]:
 
 
 def run(scenario: Steps[None], hand: Hand, seconds: float, done: Callable[[str | None], None]) -> None:
-    """Do a scenario from now on, step by step, in Blender's own time.
+    """Run a scenario step by step from a timer of Blender.
 
     Parameters
     ----------
     seconds
-        What all of it may take; then it is stopped where it is.
+        Time limit of the scenario, which is then stopped.
     done
-        Called at the end with what went wrong as a text, None where nothing did. There is a picture "failed" then.
+        Called at the end with the error as a text, None without one. After an error there is a picture "failed".
     """
     end = time.monotonic() + seconds
     turns = 0
@@ -342,7 +344,7 @@ def run(scenario: Steps[None], hand: Hand, seconds: float, done: Callable[[str |
             return None
         except Exception:
             if failure is None:
-                # Only now: what is on the screen may say more than the traceback.
+                # Take the picture first: the screen may tell more than the traceback.
                 failure, scenario = traceback.format_exc(), hand.picture("failed")
                 return 0.0
             done(failure)

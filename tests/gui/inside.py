@@ -1,9 +1,9 @@
-"""What Blender runs when it was started for a scenario: install the extension, do the scenario, report, and quit.
+"""Script for a Blender that runs one scenario: install the extension, run the scenario, report, and quit.
 
     blender --factory-startup --enable-event-simulate --python tests/gui/inside.py -- SCENARIO ZIP PICTURES RESULT
 
-SCENARIO is a module of tests/gui/scenarios/, ZIP the extension, PICTURES a folder, RESULT a file for the outcome: JSON
-with "blender", its version, and "failure", a text or null.
+SCENARIO is a module of tests/gui/scenarios/, ZIP the extension, PICTURES a folder, RESULT a JSON file for the outcome:
+"blender", its version, and "failure", a text or null.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2] / folder) for folder in 
 from tests.gui.driver import QUICK, Hand, run
 
 SECONDS = 180.0
-"""What one scenario may take, in a Blender that draws without a graphics card."""
+"""Time limit of a scenario, in a Blender that draws without a graphics card."""
 
 
 def main(name: str, package: str, pictures: str, result: str) -> None:
-    """Start a scenario; Blender goes on with it once this returns."""
+    """Start a scenario; Blender continues it once this returns."""
 
     def done(failure: str | None) -> None:
         beside = Path(f"{result}.part")
@@ -34,7 +34,7 @@ def main(name: str, package: str, pictures: str, result: str) -> None:
         bpy.ops.wm.quit_blender()
 
     try:
-        _settle(Path(result).parent)
+        _simplify_preferences(Path(result).parent)
         bpy.ops.extensions.package_install_files(filepath=package, repo="user_default", enable_on_install=True)
         hand = Hand(Path(pictures))
         run(importlib.import_module(f"tests.gui.scenarios.{name}").scenario(hand), hand, SECONDS, done)
@@ -42,8 +42,8 @@ def main(name: str, package: str, pictures: str, result: str) -> None:
         done(traceback.format_exc())
 
 
-def _settle(temporary: Path) -> None:
-    """Let nothing pop up, move by itself, be drawn for longer than it takes to work with, or be written elsewhere."""
+def _simplify_preferences(temporary: Path) -> None:
+    """Turn off pop-ups and animations of the interface, draw quickly, and keep files in a temporary folder."""
     preferences = bpy.context.preferences
     preferences.system.viewport_aa = QUICK
     preferences.view.show_splash = False

@@ -1,4 +1,4 @@
-"""What scenarios work on, the default cube or an arm with a hand: asked for anew each time, for undo replaces them."""
+"""Objects for scenarios, the default cube or an arm with a hand; looked up each time, since undo replaces them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FRAMES = (1, 20, 40)
 
 
 def extension() -> bpy.types.Addon:
-    """The extension, as Blender's preferences list it."""
+    """Return the entry of the extension in Blender's preferences."""
     return next(entry for entry in bpy.context.preferences.addons if entry.module.endswith(".rigid_motion"))
 
 
@@ -24,7 +24,7 @@ def cube() -> bpy.types.Object:
 
 
 def key_the_cube() -> None:
-    """Three keys, each a move with a turn about an axis that leans."""
+    """Set three keys, with different places and rotations about a tilted axis."""
     obj = cube()
     obj.rotation_mode = "QUATERNION"
     for frame, location, angle in zip(FRAMES, ((-3, 0, 0), (0, 1, 1), (3, -1, 0)), (0, 1.8, 3.0), strict=True):
@@ -34,7 +34,7 @@ def key_the_cube() -> None:
 
 
 def on_screen(name: str) -> np.ndarray:
-    """The world matrix of an object as it is on the screen, for which nothing is evaluated anew."""
+    """Return the world matrix of an object as it is on the screen, without evaluating it again."""
     return np.array(bpy.data.objects[name].evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
 
 
@@ -47,14 +47,14 @@ def hand_bone() -> bpy.types.PoseBone:
 
 
 def now() -> np.ndarray:
-    """How the hand is seen, in the space of its channels."""
+    """Return the visible matrix of the hand, in the space of its channels."""
     bone = rig().evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones["Hand"]
     above = {"parent_matrix": bone.parent.matrix, "parent_matrix_local": bone.parent.bone.matrix_local}
     return np.array(bone.bone.convert_local_to_pose(bone.matrix, bone.bone.matrix_local, **above, invert=True))
 
 
 def make_the_rig() -> None:
-    """An arm and a hand that stands off it, each moved and turned from key to key, and nothing else."""
+    """Make the only object: a rig of an arm and a separate hand, both moving and rotating from key to key."""
     bpy.data.batch_remove(bpy.data.objects)
     obj = new_rig("Rig", (Rest("Arm", (0, 0, 0), (0, 0.2, 1.5)), Rest("Hand", (0, 0.3, 1.7), (0.4, 0.3, 2.6), "Arm")))
     for number, bone in enumerate(obj.pose.bones):
@@ -71,7 +71,7 @@ def _key(carrier: bpy.types.Object | bpy.types.PoseBone, frame: int, location: t
 
 
 def pose_the_rig(hand: Hand) -> Steps[bpy.types.Area]:
-    """The rig in the Animation workspace, in Pose Mode with all bones selected, by hand; and the viewport."""
+    """Make the rig in the Animation workspace, in Pose Mode with all bones selected by hand; return the viewport."""
     yield from hand.open_animation_workspace()
     view = hand.area("VIEW_3D")
     view.spaces.active.region_3d.view_distance, view.spaces.active.region_3d.view_location = 5, (0, 0, 1.2)
@@ -85,7 +85,7 @@ def pose_the_rig(hand: Hand) -> Steps[bpy.types.Area]:
 
 
 def only_the_hand(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Click on the hand on the screen."""
+    """Select the hand alone by a click on the screen."""
     matrix = rig().evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones["Hand"].matrix
     yield from hand.click(places.point(view, matrix.translation + 0.5 * hand_bone().length * matrix.col[1].xyz))
     yield from hand.wait_until(

@@ -1,7 +1,8 @@
-"""Pictures of a Blender window: read from the file in which a virtual screen keeps its pixels, written as PNG.
+"""Pictures of a Blender window: read from a virtual screen's dump, written as PNG.
 
-Pixels are (height, width, 3) arrays of red, green, blue in 0 to 255, the top row first. NumPy alone, so that it runs in
-Blender's Python as well as in that of the tests. Formats: X Window Dump version 7 (X11/XWDFile.h), PNG (RFC 2083).
+Pixels are (height, width, 3) arrays of red, green, blue from 0 to 255, the top row first. The module needs NumPy alone,
+to run in Blender's Python as well as in that of the tests. Formats: X Window Dump version 7 (X11/XWDFile.h), PNG (RFC
+2083).
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 COLOUR_BYTES = 12
-"""Bytes of an entry in an X Window Dump's table of colours, which lies between header and pixels."""
+"""Bytes per entry of an X Window Dump's colour table, which lies between header and pixels."""
 
 
 def read_screen(dump: bytes) -> np.ndarray:
-    """The pixels of an X Window Dump of a screen with true colours, 32 bits a pixel, as virtual screens have them.
+    """Return the pixels of an X Window Dump with true colours, 32 bits per pixel, as virtual screens write it.
 
     Raises
     ------
@@ -38,12 +39,12 @@ def read_screen(dump: bytes) -> np.ndarray:
 
 
 def part_of(pixels: np.ndarray, box: tuple[int, int, int, int]) -> np.ndarray:
-    """The pixels in a box: x and y of its lower left corner, width and height, as Blender's areas have them.
+    """Return the pixels in a box: x and y of its lower left corner, width and height, as for Blender's areas.
 
     Raises
     ------
     ValueError
-        Where nothing of the picture is in the box.
+        If no part of the picture is in the box.
     """
     x, y, width, height = box
     top = len(pixels) - y - height
@@ -54,9 +55,9 @@ def part_of(pixels: np.ndarray, box: tuple[int, int, int, int]) -> np.ndarray:
 
 
 def write_png(path: Path, pixels: np.ndarray) -> None:
-    """Write pixels as a PNG file, or nothing at all."""
+    """Write pixels as a PNG file, completely or not at all."""
     height, width, _ = pixels.shape
-    rows = np.zeros((height, 1 + width * 3), np.uint8)  # each row begins with its filter: none
+    rows = np.zeros((height, 1 + width * 3), np.uint8)  # each row begins with its filter type, 0 for none
     rows[:, 1:] = pixels.reshape(height, width * 3)
     header = struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0)
     chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b"")]

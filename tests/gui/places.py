@@ -1,8 +1,8 @@
-"""Where things are in a Blender window: areas, regions, keys in the Dope Sheet, points of the scene.
+"""Places in a Blender window: of areas, regions, keys in the Dope Sheet, and points of the scene.
 
-A place is x, y in pixels of the window, from its lower left corner, as Blender's mouse events have it; a box is the
-place of its own lower left corner, width and height. Types are Blender's own: `Area.type` ("VIEW_3D"), `Region.type`
-("WINDOW", "HEADER", "UI").
+A place is x, y in pixels from the lower left corner of the window, as in Blender's mouse events. A box is the place of
+its lower left corner, width and height. Types are Blender's own: `Area.type` ("VIEW_3D"), `Region.type` ("WINDOW",
+"HEADER", "UI").
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ REDO_ROWS = 44
 """Pixels from the top of the redo panel to the middle of its first row."""
 
 REDO_ROW = 22
-"""Pixels from there to the next row."""
+"""Pixels from one row of the redo panel to the next."""
 
 
 def area(window: bpy.types.Window, kind: str) -> bpy.types.Area:
-    """The largest area of this type, for instance "VIEW_3D"."""
+    """Return the largest area of this type, for example "VIEW_3D"."""
     result = [item for item in window.screen.areas if item.type == kind]
     if not result:
         raise LookupError(f"no {kind} in the window, only {', '.join(item.type for item in window.screen.areas)}")
@@ -31,7 +31,7 @@ def area(window: bpy.types.Window, kind: str) -> bpy.types.Area:
 
 
 def region(area: bpy.types.Area, kind: str = "WINDOW") -> bpy.types.Region:
-    """The region of this type in an area; it has to be open."""
+    """Return the region of this type in an area; it has to be open."""
     result = next((item for item in area.regions if item.type == kind), None)
     if result is None or min(result.width, result.height) <= 1:
         raise LookupError(f"the {kind} region of the {area.type} is not open")
@@ -39,30 +39,30 @@ def region(area: bpy.types.Area, kind: str = "WINDOW") -> bpy.types.Region:
 
 
 def centre(part: bpy.types.Area | bpy.types.Region) -> Place:
-    """The middle of an area or a region."""
+    """Return the centre of an area or a region."""
     return part.x + part.width // 2, part.y + part.height // 2
 
 
 def box(part: bpy.types.Area | bpy.types.Region) -> Box:
-    """All of an area or a region."""
+    """Return the box of an area or a region."""
     return part.x, part.y, part.width, part.height
 
 
 def redo_row(redo: bpy.types.Region, number: int, across: float = 0.75) -> Place:
-    """A row of an unfolded redo panel, from 0, at a share of its width."""
+    """Return the place of a row of an unfolded redo panel, from 0, at a fraction of its width."""
     return redo.x + int(across * redo.width), redo.y + redo.height - REDO_ROWS - number * REDO_ROW
 
 
 def box_around(place: Place, width: int, height: int) -> Box:
-    """A box of this size with a place in its middle."""
+    """Return a box of this size around a place."""
     x, y = place
     return x - width // 2, y - height // 2, width, height
 
 
 def key(area: bpy.types.Area, frame: float, row: int = 0) -> Place:
-    """A key in a Dope Sheet: in the summary (row 0), or in the row of a channel below it."""
+    """Return the place of a key in a Dope Sheet: in the summary (row 0), or in the row of a channel below it."""
     scale = bpy.context.preferences.system.ui_scale
-    # Blender's anim_channels_defines: rows of 0.8 widgets, 0.1 widgets apart, below the strip with the frame numbers.
+    # Blender's anim_channels_defines: rows 0.8 widgets high, 0.1 widgets apart, below the frame numbers.
     widget, time_strip = 20 * scale, 23 * scale
     view_y = -time_strip - 0.1 * widget - (row + 0.5) * 0.9 * widget
     window_region = region(area)
@@ -71,7 +71,7 @@ def key(area: bpy.types.Area, frame: float, row: int = 0) -> Place:
 
 
 def playhead(area: bpy.types.Area, frame: float) -> Place:
-    """The number of a frame on top of a Dope Sheet, where a click puts the playhead."""
+    """Return the place of a frame number at the top of a Dope Sheet, where a click moves the playhead."""
     window_region = region(area)
     x, _ = window_region.view2d.view_to_region(frame, 0, clip=False)
     strip = 23 * bpy.context.preferences.system.ui_scale
@@ -79,7 +79,7 @@ def playhead(area: bpy.types.Area, frame: float) -> Place:
 
 
 def point(area: bpy.types.Area, location: Sequence[float]) -> Place:
-    """A point of the scene, in a 3D View."""
+    """Return the place of a point of the scene in a 3D View."""
     window_region = region(area)
     seen = location_3d_to_region_2d(window_region, area.spaces.active.region_3d, location)
     if seen is None:

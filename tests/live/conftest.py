@@ -1,4 +1,4 @@
-"""The extension switched on, a port that is listened to, and somebody who sends to it."""
+"""Fixtures for live streams: the extension with a free port in its settings, a clock, and a sender."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.live.performing import Sent
 
 @pytest.fixture
 def port(extension) -> int:
-    """A port that nobody has, in the settings of the scene."""
+    """A free port, set in the settings of the scene."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as tried:
         tried.bind(("127.0.0.1", 0))
         number = tried.getsockname()[1]
@@ -25,7 +25,7 @@ def port(extension) -> int:
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The time that Blender believes it is."""
+    """The time that Blender reads, as a list of one number to be changed."""
     now = [50.0]
     monkeypatch.setattr(receiving.time, "monotonic", lambda: now[0])
     return now
@@ -33,13 +33,13 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 @pytest.fixture
 def live(extension) -> bpy.types.PropertyGroup:
-    """The settings of the scene."""
+    """The live settings of the scene."""
     return extension.scene.rigid_motion_live
 
 
 @pytest.fixture
 def sent(port) -> Iterator[Sent]:
-    """What another program sends to a port that Blender listens to."""
+    """A sender to a port that Blender listens to."""
     assert bpy.ops.rigid_motion.live_listen() == {"FINISHED"}
     sending = Sent(port)
     yield sending

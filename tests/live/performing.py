@@ -1,4 +1,4 @@
-"""A performer for tests: a skeleton that dances, what it sends, and a rig that it can drive."""
+"""A performer for tests: a dancing skeleton, the datagrams it sends, and a rig that it can drive."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ TIMES_OF_A_SECOND = np.arange(60) / 60.0
 
 
 def dance(times: np.ndarray) -> Poses:
-    """Poses (joints, n) in their parents' space at moments (n,)."""
+    """Return poses (joints, n) in their parents' space at times (n,), in seconds."""
     phases = np.random.default_rng(2).uniform(0.0, 6.0, (len(JOINTS), 1, 3))
     angles = 0.5 * np.sin(2.0 * times[:, None] + phases)
     positions = np.repeat(PLACES[:, None], len(times), axis=1)
@@ -47,27 +47,27 @@ def in_world(poses: Poses) -> Poses:
 
 
 def frames_of_vmc(times: np.ndarray) -> list[list[bytes]]:
-    """The datagrams of each moment."""
+    """Return the datagrams of VMC for each time."""
     performer, world = Performer(JOINTS, in_world(REST[:, None])[:, 0]), in_world(dance(times))
     return [write(moment, performer(world[:, row])) for row, moment in enumerate(times.tolist())]
 
 
 class Sent:
-    """A socket that another program sends from, and the clock of the one that listens."""
+    """The socket of a sending program; it also sets the time of the listener."""
 
     def __init__(self, port: int) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._to = ("127.0.0.1", port)
 
     def send(self, datagrams: Iterable[bytes], now: float) -> None:
-        """Send datagrams, and have Blender look at its port as if it was so late."""
+        """Send datagrams, and let Blender read its port at the time `now`."""
         for datagram in datagrams:
             self._socket.sendto(datagram, self._to)
         time.sleep(0.001)
         receiving.listening().tick(now)
 
     def dance(self, first: int, last: int, now: float = 50.0) -> None:
-        """Send the frames of a dance, from one to another."""
+        """Send the frames of a dance from `first` up to `last`."""
         for row, datagrams in enumerate(frames_of_vmc(np.arange(first, last) / 60.0), first):
             self.send(datagrams, now + row / 60.0)
 
@@ -76,7 +76,7 @@ class Sent:
 
 
 def new_rig(prefix: str = "", larger: float = 1.0, turned_by: float = 0.3) -> bpy.types.Object:
-    """An armature of the dancer, as large and with other names, its bones rolled anyhow."""
+    """Return an armature of the dancer, scaled and with a name prefix, its bones rolled by `turned_by`."""
     heads, bones = in_world(REST[:, None])[:, 0].positions * larger, []
     for joint, (name, parent) in enumerate(zip(JOINTS, PARENTS.tolist(), strict=True)):
         children = heads[joint == PARENTS]
@@ -86,6 +86,6 @@ def new_rig(prefix: str = "", larger: float = 1.0, turned_by: float = 0.3) -> bp
 
 
 def heads_of(rig: bpy.types.Object) -> np.ndarray:
-    """Where the bones of a rig are in the world, shape (joints, 3)."""
+    """Return the heads of a rig's bones in the world, shape (joints, 3)."""
     bpy.context.view_layer.update()
     return np.array([rig.matrix_world @ bone.head for bone in rig.pose.bones])

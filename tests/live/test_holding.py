@@ -1,4 +1,4 @@
-"""What is held in a stream: shown in the hand of the rig, and recorded as held in it."""
+"""Objects held in a stream: shown in the hand of the rig, and recorded as held in it."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ pytestmark = [pytest.mark.network, pytest.mark.any_blender]
 
 TIMES = np.arange(180) / 60.0
 FIRST, BEGINS = 10, 30
-"""The frame that a recording begins on, and the sample that is shown then."""
+"""The first frame of a recording, and the sample that is shown on it."""
 
 DELAY, TOLERANCE = 0.1, 0.005
 RADIUS = 0.1
-"""Of the ball of the tool, whose points are off by the tolerance at most."""
+"""Radius of the ball around the tool, whose points are off by the tolerance at most."""
 
 GRIP = Poses([0.1, 0.05, 0.0], [0.6, 0.0, 0.8, 0.0])
 HANDS, TAKES = ("LeftHand", "Head"), (60, 100, 140)
-"""The joints that hold the sword, and the samples from which on these do, and nothing does again."""
+"""The joints that hold the sword, and the samples at which each takes it and the last lets go."""
 
 PLAYED = np.arange(40, 160)
-"""Samples that a recording surely has."""
+"""Samples that are certainly in a recording."""
 
 SLIP = 2e-6
-"""Metres that holding itself may cost."""
+"""Error caused by holding itself, at most, in metres."""
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def hand_at(row: int) -> str | None:
 
 @cache
 def swords() -> Poses:
-    """Where the sword is (n,): on a table, in the hand, at the head, and where that let go of it."""
+    """Return the poses (n,) of the sword: on a table, in the hand, at the head, and where it was let go."""
     there, poses = in_world(dance(TIMES)), []
     for row in range(len(TIMES)):
         if (hand := hand_at(row)) is not None:
@@ -67,7 +67,7 @@ def swords() -> Poses:
 
 @cache
 def datagrams_of(*, holds: bool) -> list[tuple[list[bytes], list[bytes]]]:
-    """What describes the bodies, and what a sample of the dance with the sword makes, of each sample."""
+    """Return for each sample the datagrams that describe the bodies, and those of the dance with the sword."""
     there, poses, result = swords(), dance(TIMES), []
     sender = Sender([StreamBody.rigid("sword", radius=RADIUS), BODY], TOLERANCE, DELAY, rate=60.0)
     for row, moment in enumerate(TIMES.tolist()):
@@ -81,7 +81,7 @@ def datagrams_of(*, holds: bool) -> list[tuple[list[bytes], list[bytes]]]:
 def perform(
     sent, clock, *, holds: bool = True, loss: float = 0.0, until: int | None = None, on_row=lambda row: None
 ) -> None:
-    """Send a dance with a sword, of which a part is lost, and record it from one sample on."""
+    """Send a dance with a sword, losing a fraction of the datagrams, and record it from sample BEGINS on."""
     rng = np.random.default_rng(3)
     for row, (described, datagrams) in enumerate(datagrams_of(holds=holds)[:until]):
         clock[0] += 1.0 / 60.0
@@ -102,7 +102,7 @@ def seen_sword() -> Poses:
 
 
 def play(rows: np.ndarray) -> tuple[Poses, list[Poses]]:
-    """Where the sword is at samples (n,) of the recording, and where it is in each of the hands."""
+    """Return the poses of the sword at samples (n,) of the recording, in the world and in each of the hands."""
     swords, grips, rig = [], [[], []], next(obj for obj in bpy.context.scene.objects if obj.type == "ARMATURE")
     for frame in map(frame_of, rows.tolist()):
         bpy.context.scene.frame_set(int(np.floor(frame)), subframe=frame % 1.0)
@@ -117,12 +117,12 @@ def listed(poses: list[Poses]) -> Poses:
 
 
 def off_by(poses: Poses, others: Poses) -> float:
-    """Metres by which any point of the ball of the sword is off at most; others (n,) or ()."""
+    """Return the largest error of any point of the sword's ball, in metres; `others` are (n,) or ()."""
     return float(shell_error(poses, listed([others] * len(poses)) if others.shape == () else others, RADIUS).max())
 
 
 def grip_in(rig: bpy.types.Object, joint: str) -> Poses:
-    """The grip as the bone of a rig has it whose joints are turned by nothing at rest."""
+    """Return the grip in the space of a rig's bone, whose joint has no rotation in the rest pose."""
     bone = rig.data.bones[joint]
     head = Poses(np.array(bone.head_local), [1.0, 0.0, 0.0, 0.0])
     return placed(placed(inverse(unscaled(np.array(bone.matrix_local, dtype=np.float64))), head), GRIP)

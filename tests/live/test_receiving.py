@@ -1,4 +1,4 @@
-"""Bodies that come over a network, on objects and rigs."""
+"""Bodies received over a network drive objects and rigs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ pytestmark = [pytest.mark.network, pytest.mark.any_blender]
 
 TIMES = np.arange(90) / 60.0
 SINGLE = 2e-6
-"""What single precision leaves of metres."""
+"""Tolerance for single precision, in metres."""
 
 
 @pytest.mark.parametrize(("prefix", "larger", "turned_by"), [("mixamorig:", 1.0, 0.7), ("", 1.3, 0.2)])
@@ -37,7 +37,7 @@ def test_a_rig_is_where_its_object_and_its_parent_put_it(live, sent):
     rig.parent = stage = bpy.data.objects.new("Stage", None)
     bpy.context.scene.collection.objects.link(stage)
     stage.rotation_euler.z, stage.location.x, rig.location.y = np.pi / 2, 5.0, 1.0
-    # As importers leave them: in other axes and units.
+    # As importers leave rigs: in other axes and units.
     rig.rotation_euler.x, rig.scale = 0.4, (0.5, 0.5, 0.5)
     rig.data.transform(
         rig.matrix_basis.inverted() @ bpy.data.objects["Rig"].matrix_basis.__class__.Translation((0, 1, 0))

@@ -1,4 +1,4 @@
-"""What comes, as keys: at the moments that were sent by the codec, thinned from what VMC sends on every frame."""
+"""Recording of streams as keys: at the times sent by the codec, or reduced from VMC, which sends every frame."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ pytestmark = [pytest.mark.network, pytest.mark.any_blender]
 
 TIMES = np.arange(150) / 60.0
 FIRST, BEGINS = 10, 30
-"""The frame that a recording begins on, and the sample that is shown then."""
+"""The first frame of a recording, and the sample that is shown on it."""
 
 AGAIN = 80
-"""The sample with which a sender begins once more."""
+"""The sample at which a sender starts again."""
 
 TOLERANCE = 0.002
 
@@ -34,7 +34,7 @@ def live(extension):
 
 
 def record(sent, clock, frames: list[list[bytes]]) -> None:
-    """Send all of it, and record from one sample on."""
+    """Send all frames, and record from sample BEGINS on."""
     for row, datagrams in enumerate(frames):
         clock[0] = 50.0 + TIMES[row]
         sent.send(datagrams, clock[0])
@@ -45,7 +45,7 @@ def record(sent, clock, frames: list[list[bytes]]) -> None:
 
 
 def off_by(rig: bpy.types.Object, delay: float = 0.0, part: str = "head") -> float:
-    """Metres by which heads or tails of a rig that is played again are off, at any sample and frame in between."""
+    """Return the largest error of heads or tails of a replayed rig, in metres, on samples and frames between."""
     there, worst = in_world(dance(TIMES)), 0.0
     arms = np.array([getattr(bone, f"{part}_local") - bone.head_local for bone in rig.data.bones])
     world = there.positions + rotate(there.quaternions, arms[:, None])
@@ -59,7 +59,7 @@ def off_by(rig: bpy.types.Object, delay: float = 0.0, part: str = "head") -> flo
 
 
 def counts(obj: bpy.types.Object) -> list[int]:
-    """Keys of each rotation."""
+    """Return the number of keys of each rotation channel."""
     return [len(one.keyframe_points) for one in channelbag_of(obj).fcurves if one.data_path.endswith("_quaternion")]
 
 
@@ -69,7 +69,7 @@ def test_vmc_is_thinned_within_the_tolerance_and_plays_again(live, sent, clock, 
     record(sent, clock, frames_of_vmc(TIMES))
     assert rig.animation_data.action.name == "Rig Live"
     assert rig.animation_data.action.frame_range[0] == FIRST
-    # Blender's own in-betweens of quaternions are not the shortest way.
+    # Blender's own interpolation of quaternions does not take the shortest way.
     for part in ("head", "tail"):
         assert off_by(rig, part=part) < TOLERANCE * (1.5 if mode == "BLENDER" else 1.05)
     assert max(counts(rig)) < 0.5 * (len(TIMES) - BEGINS)
@@ -96,7 +96,7 @@ def test_what_comes_by_the_codec_has_keys_at_the_moments_that_were_sent(live, se
     (fcurve, *_) = channelbag_of(bpy.data.objects["ball"]).fcurves
     keys = np.array([key.co[0] for key in fcurve.keyframe_points])
     moments = TIMES[BEGINS] - 0.1 + (keys - FIRST) / 30
-    # Moments of knots lie on a grid of the sender's; the first and last are those of the recording itself.
+    # Times of knots are on a grid of the sender; the first and last are those of the recording itself.
     assert np.ptp(np.round(moments[1:-1] * 60) - moments[1:-1] * 60) < 1e-2
     assert 5 < len(keys) < 0.6 * len(TIMES)
     assert counts(rig)[0] == len(keys)

@@ -1,4 +1,4 @@
-"""Rigs and objects of Blender, as VMC for other programs."""
+"""Rigs and objects of Blender are sent to other programs as VMC."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.network
 
 @pytest.fixture
 def listener(extension):
-    """Another program."""
+    """The socket of another program that receives."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         other.setblocking(False)

@@ -1,4 +1,4 @@
-"""When a way to the network is opened, and when not."""
+"""Sockets: when they are opened, and when not."""
 
 from __future__ import annotations
 
