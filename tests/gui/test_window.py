@@ -1,7 +1,7 @@
-"""The extension in a real Blender window, by simulated mouse and keys: every scenario in a Blender of its own.
+"""Test of the extension in real Blender windows, by simulated mouse and keys: each scenario in a Blender of its own.
 
-Runs where the environment variable BLENDER names a Blender with a window, for instance BLENDER=/opt/blender/blender, or
-BLENDER=.ci/blender-window on a Linux server. The pictures are in renders/gui/SCENARIO/.
+It runs if the environment variable BLENDER names a Blender with a window, for example
+BLENDER=/opt/blender/blender, or BLENDER=.ci/blender-window on a Linux server. Pictures go to renders/gui/SCENARIO/.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = sorted(path.stem for path in (ROOT / "tests" / "gui" / "scenarios").glob("*.py"))
 
 SECONDS = 300
-"""What one Blender may take in all; a scenario stops itself long before."""
+"""Time limit of one Blender in seconds; a scenario stops itself long before."""
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def blender() -> str:
 
 @pytest.fixture(scope="module")
 def shaders(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where Mesa keeps shaders that were compiled, which without a graphics card takes ten seconds of each Blender."""
+    """Mesa's folder of compiled shaders: compiling without a graphics card takes ten seconds of each Blender."""
     return tmp_path_factory.mktemp("shaders")
 
 
@@ -55,7 +55,7 @@ def test_scenario(scenario, blender, extension_zip, shaders, tmp_path):
 
 
 def run(command: list[str | Path], user: Path, shaders: Path) -> str:
-    """What a program says on both its channels; it and what it started are ended when its time is up."""
+    """Return a program's output and errors; after the time limit it is ended with all programs it started."""
     user.mkdir()
     folders = {"BLENDER_USER_RESOURCES": str(user), "MESA_SHADER_CACHE_DIR": str(shaders)}
     environment = os.environ | folders | {"PYTHONDONTWRITEBYTECODE": "1"}

@@ -1,4 +1,4 @@
-"""Two bones in Pose Mode, by hand: a pie, Auto Key between keys, undo, and the tool."""
+"""Bones in Pose Mode, edited by hand: a mode from the pie, Auto Key between keys, undo, and the tool Edit Path."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ WHOLE = range(1, 46, 2)
 SCREW = "dq_sclerp"
 
 ALIKE = 2e-5
-"""What poses may differ by that are the same, in metres and in parts of a rotation matrix."""
+"""Tolerance for equal poses, in metres and for elements of a rotation matrix."""
 
 APART = 0.1
-"""How far, in metres, the screw is at least from Blender's own way half-way between keys."""
+"""The screw is at least this far from Blender's own path halfway between keys, in metres."""
 
 
 def assert_as_keyed(*frames: float) -> None:
-    """The hand has keys on these frames, and both bones are seen where their modes have them."""
+    """Check that the hand has keys on these frames, and that both bones are where their modes put them."""
     assert key_frames(hand_bone()).tolist() == list(frames), key_frames(hand_bone())
     assert_posed(rig(), WHOLE, ("Arm", "Hand"))
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """An animator has an arm and a hand move by screws, and works on."""
+    """An animator chooses the screw for an arm and a hand, and continues to edit them."""
     view = yield from pose_the_rig(hand)
     yield from chosen(hand)
     yield from only_the_hand(hand, view)
@@ -42,7 +42,7 @@ def scenario(hand: Hand) -> Steps[None]:
 
 
 def chosen(hand: Hand) -> Steps[None]:
-    """The screw for all bones from the pie; undone and redone."""
+    """Choose the screw for all bones in the pie; undo and redo it."""
     native = seen(rig(), "Hand")
     yield from hand.pie("T", "E", alt=True, picture="pie")
     assert {bone.rigid_motion.mode for bone in rig().pose.bones} == {SCREW}
@@ -55,7 +55,7 @@ def chosen(hand: Hand) -> Steps[None]:
 
 
 def turned(hand: Hand) -> Steps[None]:
-    """R Z with Auto Key on a frame between keys: what is under the cursor is what is keyed. Undone."""
+    """Press R Z with Auto Key on a frame between keys: the visible pose is keyed. Undo it."""
     bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
     bpy.context.scene.frame_set(30)
     yield
@@ -76,7 +76,7 @@ def turned(hand: Hand) -> Steps[None]:
 
 
 def undo_until_keyed(hand: Hand, *frames: float) -> Steps[None]:
-    """Undo until the hand has keys on these frames, where all is as its modes have it."""
+    """Undo until the hand has keys on these frames, and check that the bones are where their modes put them."""
     for _ in range(8):
         yield from hand.press("Z", ctrl=True)
         if key_frames(hand_bone()).tolist() == list(frames):

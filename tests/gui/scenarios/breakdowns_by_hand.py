@@ -26,7 +26,7 @@ def scenario(hand: Hand) -> Steps[None]:
 
 
 def assert_on_the_screw(factor: float) -> None:
-    """The hand is on the way between its first two keys, as `make_the_rig` sets them."""
+    """Check that the hand is at a fraction of the way between its first two keys, as `make_the_rig` sets them."""
     quaternions = [(np.cos(a / 2), 0.6 * np.sin(a / 2), 0.0, 0.8 * np.sin(a / 2)) for a in (0.0, 1.6)]
     keys = Poses([(-1.0, -0.3, 0.4), (0.0, 0.0, 0.0)], quaternions)
     expected = interpolate((0.0, 1.0), keys, np.array([factor]), SCREW, extrapolate=True)
@@ -37,7 +37,7 @@ def assert_on_the_screw(factor: float) -> None:
 
 
 def start(hand: Hand, view: bpy.types.Area) -> Steps[tuple[int, int]]:
-    """Run it from Pose > In-Betweens; where the mouse is then."""
+    """Run Breakdown from Pose > In-Betweens; return the place of the mouse."""
     centre = places.centre(places.region(view))
     yield from hand.hover(centre)
     with bpy.context.temp_override(window=hand.window, area=view, region=places.region(view)):
@@ -74,7 +74,7 @@ def dragged_and_confirmed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
-    """By F3, for the bones whose channels are shown; the factor is in its header. A right click cancels."""
+    """Run Relax by F3 for the bones whose channels are shown; the header shows the factor. A right click cancels."""
     before = snapshot(hand_bone())
     yield from hand.hover(places.centre(places.region(sheet)))
     for ending in ("RET", "RIGHTMOUSE"):
@@ -89,5 +89,5 @@ def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
 
 
 def undo_steps() -> int:
-    """How many operators Blender remembers."""
+    """Return how many operators Blender remembers."""
     return len(bpy.context.window_manager.operators)

@@ -1,4 +1,4 @@
-"""A solved camera that shakes: cleaned by a button, less so in the redo panel; undone."""
+"""Clean Motion on a shaky solved camera: run by a button, weakened in the redo panel, and undone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SPIKE = 60
 
 
 def solved_camera() -> None:
-    """A camera that goes round a cube, as a solver has it: with a key on every frame, trembling, and once far off."""
+    """Make a camera that circles a cube as a solver leaves it: keyed on every frame, with jitter and one spike."""
     random, angles = np.random.default_rng(7), FRAMES / 60.0
     bpy.ops.mesh.primitive_cube_add(size=1.0)
     camera = bpy.data.objects.new("Solved", bpy.data.cameras.new("Solved"))
@@ -33,7 +33,7 @@ def solved_camera() -> None:
 
 
 def jerks() -> float:
-    """How much the keys of its rotation jump from frame to frame."""
+    """Return the mean jerkiness of its rotation keys: their fourth differences from frame to frame."""
     curves = bpy.data.objects["Solved"].animation_data.action.layers[0].strips[0].channelbags[0].fcurves
     values = (
         np.array([key.co.y for key in fcurve.keyframe_points]) for fcurve in curves if "rotation" in fcurve.data_path
@@ -42,7 +42,7 @@ def jerks() -> float:
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """Click the button, ask for less in the redo panel, and undo it."""
+    """Click the button, set a lower value in the redo panel, and undo it."""
     yield from hand.open_animation_workspace()
     view = hand.area("VIEW_3D")
     bpy.data.batch_remove(bpy.data.objects)

@@ -1,6 +1,6 @@
-"""Curves that are what is seen: keys dragged, inserted and typed, and cycles.
+"""F-curves edited by hand: keys dragged, inserted and typed, and cycles.
 
-While anything is dragged the pose on the screen is held against `tests.animation.oracle` after every redraw.
+During a drag, the pose on the screen is compared with `tests.animation.oracle` after every redraw.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from tests.gui.keyed import FRAMES, cube, key_the_cube, on_screen
 WHOLE = range(1, 61)
 
 ALIKE = 2e-5
-"""What poses may differ by that are the same, in metres and in parts of a rotation matrix."""
+"""Tolerance for equal poses, in metres and for elements of a rotation matrix."""
 
 
 def assert_place_on_the_screw() -> None:
-    """What is on the screen now is what the mode makes of the keys as they are now."""
+    """Check that the screen shows the mode's pose for the present keys."""
     frame = bpy.context.scene.frame_current
     np.testing.assert_allclose(on_screen("Cube"), expected_worlds(cube(), [frame])[0], atol=ALIKE)
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """An animator chooses the screw, and works on its curves."""
+    """An animator chooses the screw, and edits its F-curves."""
     yield from hand.open_animation_workspace()
     view, sheet = hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR")
     key_the_cube()
@@ -47,7 +47,7 @@ def scenario(hand: Hand) -> Steps[None]:
 
 
 def dragged(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
-    """Keys and handles follow the mouse, and the body with them; Esc lets all be as it was."""
+    """Drag keys and handles: the body follows them; Esc restores everything."""
     middle = places.centre(places.region(graph))
     before, there = snapshot(cube()), on_screen("Cube")
     for key, confirm in (("G", False), ("S", True), ("G", True)):
@@ -75,7 +75,7 @@ def dragged(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
 
 
 def cycled(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
-    """*Make Cyclic* of Blender's, with in-betweens there."""
+    """Run Blender's *Make Cyclic*, and check the in-betweens in the repeated part."""
     region = places.region(graph)
     with bpy.context.temp_override(window=hand.window, area=graph, region=region):
         bpy.ops.graph.select_all(action="SELECT")
@@ -95,7 +95,7 @@ def cycled(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
 
 
 def inserted(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[None]:
-    """A key at the playhead keeps the pose on the screen; undone, the keys around it are as they were."""
+    """Insert a key at the playhead: the pose on the screen stays. After undo, the keys around it are as before."""
     keys, before = snapshot(cube()), shown_worlds([cube()], WHOLE)[0]
     yield from hand.click(places.playhead(sheet, 15))
     assert bpy.context.scene.frame_current == 15, bpy.context.scene.frame_current
@@ -112,7 +112,7 @@ def inserted(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[N
 
 
 def typed(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
-    """With Auto Key a value that is typed into the Properties editor is the value of the key."""
+    """With Auto Key, a value typed into the Properties editor becomes the value of the key."""
     bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
     cube().select_set(True)
     bpy.context.view_layer.objects.active = cube()

@@ -1,4 +1,4 @@
-"""Pops on the path of the cube are marked, and gone to by the buttons in the sidebar."""
+"""Pops on the path of the cube are marked, and buttons in the sidebar jump to them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ POPS = (24, 51)
 
 
 def marks(hand: Hand, view: bpy.types.Area, name: str) -> Steps[int]:
-    """Keep a picture of the viewport, and count the pixels of marks."""
+    """Take a picture of the viewport, and return the number of pixels of marks."""
     part = places.region(view)
     pixels = yield from hand.picture(name, places.box(part))
     shown = pixels[:, : part.width * 3 // 4] / 255

@@ -1,6 +1,6 @@
-"""The extension in a Blender that speaks German: a report, the panel, tooltips, menus, the pie and the preferences.
+"""German translation in Blender's interface: a report, the panel, tooltips, menus, the pie and the preferences.
 
-Blender's module for Python knows no languages, so this is where the dictionary meets the real interface.
+Blender's module for Python has no languages, so the translation is tested in the real interface here.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ NOTHING_REDUCED = "The keys here are neither reduced nor cleaned"
 
 
 def key(turns: dict[int, float]) -> None:
-    """Key the cube on these frames, moved along x and turned about z by degrees; from nothing."""
+    """Replace the keys of the cube: on these frames, moved along x and rotated about z by degrees."""
     obj = cube()
     obj.animation_data_clear()
     obj.rotation_mode = "QUATERNION"
@@ -41,13 +41,13 @@ def speak(language: str) -> None:
 
 
 def notes(frame: int) -> list[str]:
-    """What the panel says of the cube on a frame."""
+    """Return the notes of the panel for the cube on a frame."""
     bpy.context.scene.frame_set(frame)
     return [text for _, text in import_module(f"{extension().module}.ui.notes").facts_and_notes(cube(), frame)[1]]
 
 
 def refusal() -> str:
-    """What Blender reports where the cube is refused."""
+    """Return Blender's report when the mode of the cube is refused."""
     try:
         bpy.ops.rigid_motion.set_mode(mode=SCREW)
     except RuntimeError as error:
@@ -56,7 +56,7 @@ def refusal() -> str:
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """An animator works in German; then in English again; then without the extension."""
+    """An animator works in German, then in English again, then without the extension."""
     speak("de_DE")
     view = hand.area("VIEW_3D")
     yield from reported()
@@ -68,7 +68,7 @@ def scenario(hand: Hand) -> Steps[None]:
 
 
 def reported() -> Steps[None]:
-    """In reports, and in the texts that operators put together."""
+    """Check reports, and texts that operators assemble."""
     key({1: 0, 20: 90, 40: 100})
     curve = cube().animation_data.action.layers[0].strips[0].channelbags[0].fcurves.find("location", index=1)
     curve.modifiers.new("ENVELOPE")
@@ -80,7 +80,7 @@ def reported() -> Steps[None]:
 
 
 def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Where words are short of room, and where notes are long."""
+    """Take pictures of the panel where space is short and where notes are long."""
     yield from hand.open_sidebar(view, "Animation")
     sidebar = places.region(view, "UI")
     key({1: 0, 20: 90, 40: 269})
@@ -101,9 +101,9 @@ def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def of_others(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """What is refused, what has no keys, and nothing at all; and the Item tab beside it.
+    """Take pictures of the sidebar with a refusal, without keys, and without an active object, with its Item tab.
 
-    What is told of which object, `tests/ui/test_panels.py` asks without a window.
+    `tests/ui/test_panels.py` checks the notes for each object without a window.
     """
     sidebar, seen = places.region(view, "UI"), set[bytes]()
     for number, act in enumerate(
@@ -121,7 +121,7 @@ def of_others(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def in_menus(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """The pie, and the menu that is behind a right click."""
+    """Take pictures of the pie and of the context menu."""
     centre = places.centre(places.region(view))
     yield from hand.hover(centre)
     yield from hand.pie("T", "N", picture="pie", box=places.box_around(centre, 900, 420), alt=True)
@@ -134,7 +134,7 @@ def in_menus(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def preferences(hand: Hand) -> Steps[None]:
-    """The preferences of the extension, in the window that Blender opens for its own."""
+    """Take a picture of the extension's preferences, in the window of Blender's own."""
     module = next(module for module in addon_utils.modules() if module.__name__ == extension().module)
     addon_utils.module_bl_info(module)["show_expanded"] = True
     bpy.context.window_manager.addon_search = "Rigid Motion"
@@ -146,7 +146,7 @@ def preferences(hand: Hand) -> Steps[None]:
 
 
 def other_languages() -> Steps[None]:
-    """English texts where the language is English, another's where it has none of its own, or the extension is off."""
+    """Check that texts are English in English, in languages without a translation, and without the extension."""
     assert pgettext_rpt(NOTHING_REDUCED).startswith("Die Schlüsselbilder")
     assert pgettext_iface("Live Update") == "Live-Aktualisierung"
     for language in ("en_US", "fr_FR"):

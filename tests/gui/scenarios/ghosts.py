@@ -1,6 +1,6 @@
-"""Ghosts of a sword that hangs on a moving arm, of bones and of a skinned body; switched on in the panel.
+"""Ghosts of a sword on a moving arm, of bones and of a skinned body; switched on in the panel.
 
-That they are drawn, and in their colour, is counted in the pixels of the screen.
+The pixels of the screen show that they are drawn, and in their colours.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tests.rigs.recorded import FRAMES, recorded_rig
 
 
 def tinted(hand: Hand, view: bpy.types.Area, name: str) -> Steps[np.ndarray]:
-    """Keep a picture of the viewport, and count its pixels that are reddish as the past, and greenish as the future."""
+    """Take a picture of the viewport, and count its pixels tinted red for the past and cyan for the future."""
     part = places.region(view)
     pixels = yield from hand.picture(name, places.box(part))
     red, green, blue = (pixels[:, : part.width * 2 // 3].astype(float) / 255).transpose(2, 0, 1)
@@ -81,7 +81,7 @@ def scenario(hand: Hand) -> Steps[None]:
 
 
 def skin_of(rig: bpy.types.Object) -> bpy.types.Object:
-    """A body of a ball around each bone, which goes along with it."""
+    """Make a skinned body with a ball around each bone."""
     mesh = bmesh.new()
     groups = mesh.verts.layers.deform.verify()
     for number, bone in enumerate(rig.data.bones):
@@ -104,7 +104,7 @@ def skin_of(rig: bpy.types.Object) -> bpy.types.Object:
 
 
 def sword_on_an_arm() -> None:
-    """The cube as a sword that swings, on an arm that goes round and along."""
+    """Turn the cube into a sword that swings, on an arm that circles and travels."""
     key_the_cube()
     arm = bpy.data.objects.new("Arm", None)
     bpy.context.collection.objects.link(arm)

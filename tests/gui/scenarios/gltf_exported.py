@@ -15,11 +15,11 @@ from tests.rigs.recorded import FRAMES, recorded_rig
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """A recorded rig is exported by hand, and the file has fewer keys than the recording."""
+    """Export a recorded rig by hand: the file has fewer keys than the recording."""
     recorded_rig()
     bpy.context.scene.frame_end = int(FRAMES[-1])
     target = Path(tempfile.mkdtemp()) / "rig.glb"
-    # Events can be simulated in the first window alone.
+    # Events can be simulated in the first window only.
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
     yield from hand.hover(places.centre(hand.area("VIEW_3D")))
     yield from hand.press("F4")

@@ -1,4 +1,4 @@
-"""A mug that a bone of a rig picks up, hands over to another bone and lets go.
+"""Holding by hand: a bone of a rig picks up a mug, hands it over to another bone and lets it go.
 
 By clicks and keys: the pie, its menu, the sidebar, the Key menu of the Dope Sheet, and the redo panel.
 """
@@ -16,7 +16,7 @@ from tests.gui.keyed import on_screen, pose_the_rig, rig
 TAKEN, PASSED, FREE = 10, 20, 34
 
 SLIP = 2e-6
-"""How far a thing may be from where it was in the hand that holds it: parts of its matrix, lengths in metres."""
+"""Tolerance for the mug's place in its holder: for elements of its matrix, lengths in metres."""
 
 
 def mug() -> bpy.types.Object:
@@ -24,13 +24,13 @@ def mug() -> bpy.types.Object:
 
 
 def now() -> str:
-    """The bone that holds the mug."""
+    """Return the name of the bone that holds the mug, "" for none."""
     holder = hold_facts(mug()).now
     return "" if holder is None else holder.bone
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """An animator lets the bones of an arm pass a mug on."""
+    """An animator passes a mug between the bones of an arm."""
     view, sheet = (yield from pose_the_rig(hand)), hand.area("DOPESHEET_EDITOR")
     obj = bpy.data.objects.new("Mug", bpy.data.meshes.new("Mug"))
     obj.data.from_pydata([(0, 0, 0), (0.2, 0, 0), (0, 0.2, 0), (0, 0, 0.3)], [], [(0, 1, 2), (0, 1, 3), (1, 2, 3)])
@@ -57,7 +57,7 @@ def at(frame: int, bone: str) -> Steps[None]:
 
 
 def picked_up(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """By the pie; undone and done again as one step."""
+    """Pick the mug up by the pie; undo and redo it as one step."""
     yield from at(TAKEN, "Hand")
     there = on_screen("Mug")
     yield from hand.hover(places.centre(places.region(view)))
@@ -74,7 +74,7 @@ def picked_up(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def handed_over(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
-    """To the other bone, by the Dope Sheet's Key menu; longer, in the redo panel."""
+    """Hand the mug over by the Dope Sheet's Key menu, then over more frames in the redo panel."""
     yield from at(PASSED, "Arm")
     yield from hand.open_menu(sheet, "DOPESHEET_MT_key")
     yield from hand.choose("Hold In")
@@ -84,7 +84,7 @@ def handed_over(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
 
 
 def set_in_redo_panel(hand: Hand, area: bpy.types.Area, frames: int) -> Steps[None]:
-    """Over how many frames it passes, in what is unfolded after an operator."""
+    """Set the number of frames of a transition in the unfolded redo panel."""
     redo = yield from hand.unfold_redo_panel(area)
     yield from hand.picture(f"redo-{frames}")
     yield from hand.enter(str(frames), places.redo_row(redo, 0))
@@ -92,7 +92,7 @@ def set_in_redo_panel(hand: Hand, area: bpy.types.Area, frames: int) -> Steps[No
 
 
 def let_go(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Let go, over three frames: in the dialog of Pass, and in the redo panel."""
+    """Let the mug go over three frames: in the dialog of Pass, and in the redo panel."""
     yield from at(FREE, "Arm")
     for verb in ("Let Go", "Pass"):
         yield from hand.hover(places.centre(places.region(view)))
@@ -107,7 +107,7 @@ def let_go(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def seen_in_the_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
-    """The panel, where it is set how long it passes."""
+    """Set the number of frames of a transition in the panel."""
     bpy.ops.object.mode_set(mode="OBJECT")
     rig().select_set(False)
     bpy.context.view_layer.objects.active = mug()
@@ -130,7 +130,7 @@ def seen_in_the_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
 
 
 def seen_along_its_path(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """In the colours of what holds it."""
+    """Take a picture of the path in the colours of the holders."""
     settings = bpy.context.scene.rigid_motion_overlay
     settings.show_paths = settings.show_ghosts = True
     yield from hand.picture("path", places.box(places.region(view)))

@@ -1,4 +1,4 @@
-"""A layer on a cube: added, posed and keyed by hand, looked at, merged, and undone."""
+"""An offset layer on a cube: added, posed and keyed by hand, viewed, merged, and undone."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ EVERY = range(FRAMES[0], FRAMES[-1] + 1)
 
 
 def worlds() -> np.ndarray:
-    """Where the cube is on all frames, (m, 4, 4)."""
+    """Return the world matrices of the cube on all frames, (m, 4, 4)."""
     return shown_worlds([cube()], EVERY)[0]
 
 
@@ -57,7 +57,7 @@ def scenario(hand: Hand) -> Steps[None]:
 
 
 def keyed_by_hand(hand: Hand, view: bpy.types.Area, frame: int) -> Steps[None]:
-    """Move what is selected upwards on a frame, turn it, and key both."""
+    """Move the selected object upwards on a frame, rotate it, and key both."""
     bpy.context.scene.frame_set(frame)
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("G")

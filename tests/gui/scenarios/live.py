@@ -1,4 +1,4 @@
-"""A performer with a sword comes from another program: heard, recorded, undone, played again, and the arm edited."""
+"""Live streaming from another program: a performer with a sword is received, recorded, undone, replayed and edited."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ RATE = 60
 GRIP = Poses([0.1, 0.0, 0.05], [0.8, 0.6, 0.0, 0.0])
 HAND = "LeftHand"
 TAKEN = 2.0
-"""Seconds after which the hand takes the sword."""
+"""Time in seconds at which the hand takes the sword."""
 
 SLIP = 2e-6
-"""What single precision leaves of where the sword is in the hand."""
+"""Tolerance of single precision for the sword in the hand."""
 
 MOVED = 0.01
-"""Metres by which a performer that dances soon has moved."""
+"""A dancing performer soon moves more than this, in metres."""
 
 
 class Program:
-    """Another program, that sends a performer who takes a sword, in real time."""
+    """A sending program: a performer who takes a sword, in real time."""
 
     def __init__(self, port: int) -> None:
         self._socket, self._to = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), ("127.0.0.1", port)
         self._sender = Sender([BODY, StreamBody.rigid("sword", radius=0.1)], rate=RATE)
         self._began, self._sent = time.monotonic(), 0
-        # Blender tells timers apart by identity, and a method is another object each time.
+        # Blender identifies timers by identity, and a bound method is a new object each time.
         self._timer = self._send
         bpy.app.timers.register(self._timer, persistent=True)
 
@@ -64,14 +64,14 @@ class Program:
 
 
 def free_port() -> int:
-    """Return a UDP port that no other window of the tests listens to."""
+    """Return a free UDP port, which no other window of the tests uses."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as tried:
         tried.bind(("127.0.0.1", 0))
         return int(tried.getsockname()[1])
 
 
 def rig() -> bpy.types.Object:
-    """The rig, asked for anew each time: undo replaces it."""
+    """Return the rig, looked up each time: undo replaces it."""
     return bpy.data.objects["Rig"]
 
 
@@ -80,7 +80,7 @@ def sword() -> bpy.types.Object:
 
 
 def grips(frames: range) -> np.ndarray:
-    """Where the sword is in the hand on these frames, (n, 4, 4)."""
+    """Return the sword's matrices in the hand on these frames, (n, 4, 4)."""
     result = []
     for frame in frames:
         bpy.context.scene.frame_set(frame)
@@ -122,7 +122,7 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.picture("live")
     bpy.ops.rigid_motion.live_finish("EXEC_DEFAULT", True)
     yield from hand.wait_until(lambda: len(sword().constraints) == 1, "the recording is held in the hand")
-    # Undone and done again by keys, while the performer goes on.
+    # Undo and redo by keys while the performer goes on.
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("Z", ctrl=True)
     yield from hand.wait_until(lambda: not sword().constraints and not sword().animation_data, "one undo takes it back")

@@ -1,7 +1,7 @@
-"""Each mode's character in a small scene: what the pages in docs/ show, and that it is so.
+"""Pictures of the modes for the pages in docs/: a small scene shows the character of each mode, and checks it.
 
-In every scene bodies go from key to key, with ghosts of them on the way and their paths drawn by the overlay. What a
-picture is meant to show is measured on the poses that Blender evaluates, before it is taken.
+In every scene bodies move from key to key, with ghosts on the way, and the overlay draws their paths. Before a picture
+is taken, what it should show is measured on the poses that Blender evaluates.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ SIZE = (960, 480)
 """Width and height of a picture, in pixels."""
 
 VIEW_SCALE = 1.44
-"""How wide an orthographic viewport sees at a view distance of 1: Blender's sensor of 72 mm before a lens of 50 mm."""
+"""Width seen by an orthographic viewport at a view distance of 1: Blender's 72 mm sensor with a 50 mm lens."""
 
 TEXT = 0.045
-"""How high a text is, in widths of the picture."""
+"""Height of a text, as a fraction of the picture's width."""
 
 Color = tuple[float, float, float]
 NATIVE, MODE = (0.80, 0.80, 0.80), (0.20, 0.72, 1.0)
-"""The overlay's colours for Blender's own path and for a mode's, as on the screen."""
+"""The overlay's colours of Blender's own path and of a mode's, as on the screen."""
 
 WOOD, METAL, STAND = (0.72, 0.48, 0.26), (0.55, 0.58, 0.62), (0.30, 0.31, 0.33)
 
 GHOST = 0.22
-"""How opaque a ghost is."""
+"""Opacity of a ghost."""
 
 Box = tuple[Sequence[float], Sequence[float]]
-"""Middle and size."""
+"""Centre and size of a box."""
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """A lid, a hammer, a stick that is thrown, and a dart on a winding way."""
-    bpy.context.preferences.view.ui_scale = 1.5  # pages show pictures smaller than they are
+    """Take pictures of a lid, a hammer, a thrown stick, and a dart on a winding path."""
+    bpy.context.preferences.view.ui_scale = 1.5  # pages show the pictures at a smaller size
     yield 1.0
     view = hand.area("VIEW_3D")
     settle(view)
@@ -59,7 +59,7 @@ def scenario(hand: Hand) -> Steps[None]:
 
 
 def settle(view: bpy.types.Area) -> None:
-    """A calm viewport: bodies in their own colours, and nothing but the paths drawn over them."""
+    """Set up the viewport: bodies in their own colours, no overlays but the paths."""
     space = view.spaces.active
     space.show_gizmo = space.show_region_toolbar = space.show_region_ui = False
     space.shading.color_type = "OBJECT"
@@ -71,7 +71,7 @@ def settle(view: bpy.types.Area) -> None:
 
 
 def picture(hand: Hand, view: bpy.types.Area, name: str, width: float) -> Steps[None]:
-    """Keep the middle of the viewport, in which so much of the scene is to be seen from side to side."""
+    """Take a picture of the middle of the viewport, which shows `width` of the scene from side to side."""
     part = places.region(view)
     space = view.spaces.active.region_3d
     for text in bpy.data.curves:
@@ -83,11 +83,11 @@ def picture(hand: Hand, view: bpy.types.Area, name: str, width: float) -> Steps[
     assert drawn > 200, f"{name}: {drawn} pixels of a path"
 
 
-# Scenes: each builds itself, says what has to be true, aims the viewport, and returns how wide it is
+# Scenes: each builds itself, checks its claim, aims the viewport, and returns its width
 
 
 def lid(view: bpy.types.Area) -> float:
-    """The lid of a chest, with its origin in its middle. By the screw it stays in its hinge."""
+    """Show the lid of a chest, with its origin in its middle. The screw keeps it in its hinge."""
     aim(view, (80, 0, 16), (0.35, 0, 0.34))
     body("Chest", STAND, ((0.6, 0, -0.3), (1.2, 0.7, 0.58)))
     cover = body("Lid", WOOD, ((0, 0, 0), (1.2, 0.7, 0.1)), ((0.62, 0, 0), (0.05, 0.12, 0.1)))
@@ -108,7 +108,7 @@ def lid(view: bpy.types.Area) -> float:
 
 
 def hammer(view: bpy.types.Area) -> float:
-    """A hammer that is swung about a wrist, with its origin in the head. By the screw it stays in the hand."""
+    """Show a hammer swung about a wrist, with its origin in the head. The screw keeps it in the hand."""
     aim(view, (90, 0, 0), (0, 0, 0.38))
     wrist, grip = Vector((0, 0, 0)), Vector((0, 0, -1.0))
     tool = body("Hammer", WOOD, ((0, 0, -0.5), (0.07, 0.07, 1.1)), ((0, 0, 0.02), (0.4, 0.16, 0.17)))
@@ -132,7 +132,7 @@ def hammer(view: bpy.types.Area) -> float:
 
 
 def throw(view: bpy.types.Area) -> float:
-    """A stick that flies and turns. Its middle flies straight with Straight, and bends with the screw."""
+    """Show a flying, turning stick. Its middle moves straight with Straight, and on a curve with the screw."""
     aim(view, (90, 0, 0), (0, 0, 0.77))
     sticks = [body(name, METAL, ((0, 0, 0), (0.9, 0.08, 0.08)), ((0.4, 0, 0), (0.16, 0.12, 0.12))) for name in "AB"]
     for stick, mode in zip(sticks, (STRAIGHT, SCREW), strict=True):
@@ -152,7 +152,7 @@ def throw(view: bpy.types.Area) -> float:
 
 
 def flight(view: bpy.types.Area) -> float:
-    """Two darts with the same four keys. The smooth screw has no corner at them."""
+    """Show two darts with the same four keys. Smooth Screw has no corner at them."""
     aim(view, (0, 0, 0), (0, -0.1, 0))
     sharpest = {}
     for mode, x, name in ((SCREW, -1.25, "Screw"), (SMOOTH, 1.25, "Smooth Screw")):
@@ -177,11 +177,11 @@ def flight(view: bpy.types.Area) -> float:
     return 4.9
 
 
-# What they are built of
+# Parts of the scenes
 
 
 def aim(view: bpy.types.Area, degrees: Sequence[float], middle: Sequence[float]) -> None:
-    """Look at a point from a direction, which is given as the rotation of a camera."""
+    """Look at a point in the direction of a camera with this rotation."""
     space = view.spaces.active.region_3d
     space.view_perspective = "ORTHO"
     space.view_rotation = Euler([math.radians(angle) for angle in degrees]).to_quaternion()
@@ -189,7 +189,7 @@ def aim(view: bpy.types.Area, degrees: Sequence[float], middle: Sequence[float])
 
 
 def body(name: str, color: Color, *boxes: Box) -> bpy.types.Object:
-    """A body of boxes around its origin."""
+    """Make a body of boxes around its origin."""
     corners, faces = [], []
     for middle, size in boxes:
         first = len(corners)
@@ -218,28 +218,28 @@ def key(obj: bpy.types.Object, frame: int, location: Sequence[float], rotation: 
 
 
 def run_evenly(obj: bpy.types.Object) -> None:
-    """Have no easing between the keys."""
+    """Remove the easing between the keys."""
     for fcurve in curves_of(obj).values():
         for point in fcurve.keyframe_points:
             point.interpolation = "LINEAR"
 
 
 def choose(obj: bpy.types.Object, mode: str) -> None:
-    """Give an object a mode, as the animator does, and compare it with Blender's own path."""
+    """Choose a mode for an object, as an animator does, and show Blender's own path for comparison."""
     select_only(obj)
     bpy.ops.rigid_motion.set_mode(mode=mode)
     bpy.context.scene.rigid_motion_overlay.show_native = True
 
 
 def show_chosen_paths() -> None:
-    """Show the paths of all objects that have keys, each in its own mode alone."""
+    """Show the paths of all objects with keys, only in their own modes."""
     for obj in bpy.context.scene.objects:
         obj.select_set(obj.animation_data is not None)
     bpy.context.scene.rigid_motion_overlay.show_native = False
 
 
 def shown(obj: bpy.types.Object) -> np.ndarray:
-    """The object's world matrices on all frames from its first key to its last, and they are as they have to be."""
+    """Return the object's world matrices on all frames from its first to its last key, after checking them."""
     first, last = (int(frame) for frame in obj.animation_data.action.frame_range)
     frames = range(first, last + 1)
     assert_shown([obj], frames)
@@ -247,13 +247,13 @@ def shown(obj: bpy.types.Object) -> np.ndarray:
 
 
 def stray(worlds: np.ndarray, point: Sequence[float]) -> float:
-    """How far a point of a body comes away from where it is on the first frame."""
+    """Return the largest distance of a point of a body from its place on the first frame."""
     way = (worlds @ np.array((*point, 1.0)))[:, :3]
     return float(np.linalg.norm(way - way[0], axis=1).max())
 
 
 def sharpest_bend(worlds: np.ndarray) -> float:
-    """The most that a path turns from one frame to the next, in degrees."""
+    """Return the largest angle between the path's steps of neighbouring frames, in degrees."""
     steps = np.diff(worlds[:, :3, 3], axis=0)
     steps /= np.linalg.norm(steps, axis=1, keepdims=True)
     alike = np.einsum("ij,ij->i", steps[:-1], steps[1:])
@@ -261,23 +261,23 @@ def sharpest_bend(worlds: np.ndarray) -> float:
 
 
 def ghosts(obj: bpy.types.Object, worlds: np.ndarray, color: Color, frames: Sequence[int]) -> None:
-    """What the object is like on these frames, counted from its first, which is 1, to be seen through."""
+    """Add transparent copies of the object on these frames, counted from 1."""
     for frame in frames:
         ghost = add("Ghost", obj.data, (*linear(color), GHOST))
         ghost.matrix_world = Matrix(worlds[frame - 1])
 
 
 def label(text: str, place: Sequence[float], color: Color, view: bpy.types.Area) -> None:
-    """A text that faces the viewer, with its middle at a place; of one height in all pictures, once they are framed."""
+    """Add a text that faces the viewer, centred at a place. `picture` gives all texts the same height."""
     data = bpy.data.curves.new(text, "FONT")
     data.body = text
     data.align_x, data.align_y = "CENTER", "CENTER"
-    # Light falls on it as on everything, so it is given more than it is to show.
+    # It is lit like everything else, so its colour is brighter than it should appear.
     obj = add(text, data, (*(1.6 * part for part in linear(color)), 1.0))
     obj.location, obj.rotation_quaternion = place, view.spaces.active.region_3d.view_rotation
     obj.show_in_front = True
 
 
 def linear(color: Color) -> Color:
-    """A colour as on the screen, in the linear form that objects have."""
+    """Convert a colour from screen values to the linear values of objects."""
     return tuple(part**2.2 for part in color)

@@ -1,4 +1,4 @@
-"""A mode chosen from the menus, by the pies and in the panel, with undo and baking, all by mouse and keys."""
+"""Modes chosen from the menus, by the pies and in the panel, with undo and baking, all by mouse and keys."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from tests.gui.keyed import FRAMES, cube, key_the_cube
 
 BETWEEN = range(4, 41, 9)
 STRAIGHT, SCREW, SMOOTH = (dict.fromkeys(map(float, FRAMES), number) for number in (1, 2, 7))
-"""What keys say if the whole cube has a mode."""
+"""Mode numbers by key frame, if the whole cube has that mode."""
 
 ROW = 26
 """Pixels from one row of a panel to the next."""
 
 
 def assert_modes(modes: dict[float, int]) -> None:
-    """The keys of the cube say these modes, and on every frame it is where they have it."""
+    """Check that the keys of the cube have these modes, and that it is where they put it on every frame."""
     assert said() == modes, said()
     assert_shown([cube()], BETWEEN)
 
 
 def said() -> dict[float, int]:
-    """The frames of the cube's keys that say a mode, and its number."""
+    """Return the mode numbers by frame, for the keys of the cube that have one."""
     curve = curve_of(cube(), "location")
     marks = read_marks(curve).tolist()
     return {key.co.x: mark - 1 for key, mark in zip(curve.keyframe_points, marks, strict=True) if mark}
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """An animator tries modes on the cube in two editors, takes some back, and bakes."""
+    """An animator tries modes on the cube in two editors, undoes some, and bakes."""
     yield from hand.open_animation_workspace()
     view, sheet = hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR")
     key_the_cube()
@@ -45,7 +45,7 @@ def scenario(hand: Hand) -> Steps[None]:
 
 
 def in_the_viewport(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """By the pie, taken back, from the Object menu and from the context menu: for the whole object."""
+    """Choose a mode for the whole object: by the pie, undone, from the Object menu and from the context menu."""
     centre = places.centre(places.region(view))
     around = places.box_around(centre, 840, 380)
     yield from hand.hover(centre)
@@ -54,7 +54,7 @@ def in_the_viewport(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.hover(centre)
     yield from hand.press("Z", ctrl=True)
     assert_modes({})
-    # The tooltip is wider than what is free beside the pie.
+    # The tooltip is wider than the free space next to the pie.
     bpy.context.preferences.view.show_tooltips = False
     yield from hand.pie("T", "E", picture="pie", box=around, alt=True)
     bpy.context.preferences.view.show_tooltips = True
@@ -74,13 +74,13 @@ def in_the_viewport(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
-    """From the Key menu, the context menu and by the pie: for the selected keys."""
+    """Choose a mode for the selected keys: from the Key menu, the context menu and by the pie."""
     yield from hand.click(places.key(sheet, 1))
     yield from hand.open_menu(sheet, "DOPESHEET_MT_key")
     yield from hand.press("UP_ARROW")
     yield from hand.press("RIGHT_ARROW")
     yield from hand.picture("menu", (sheet.x, sheet.y + sheet.height - 120, 920, 660))
-    # A search would find the same mode among those for all segments.
+    # A search would find the same mode in the menu for all segments.
     yield from hand.press("DOWN_ARROW")
     yield from hand.press("DOWN_ARROW")
     yield from hand.press("RET")
@@ -102,12 +102,12 @@ def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
 
 
 def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """For the whole object, then for the segment under the playhead; and its turns."""
+    """Choose a mode in the panel for the whole object, then for the segment under the playhead; set its turns."""
     bpy.ops.rigid_motion.set_mode(mode="motor_spline")
     bpy.ops.ed.undo_push(message="Mode")
     yield from hand.open_sidebar(view, "Animation")
     x, y = yield from hand.find_button(view, "UI", "rigid_motion.turns")
-    # Above the turns are the frames, the segment and the object.
+    # Above the turns are rows for the frames, the segment and the object.
     yield from hand.click((x, y + 3 * ROW))
     yield from hand.choose_row(3)
     assert_modes(STRAIGHT)
@@ -129,7 +129,7 @@ def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def baked(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """By the button and its dialog; and back by F3."""
+    """Bake by the button and its dialog; unbake by F3."""
     before = shown_worlds([cube()], BETWEEN)[0]
     button = yield from hand.find_button(view, "UI", "rigid_motion.bake")
     yield from hand.click(button)

@@ -1,4 +1,4 @@
-"""A BVH file imported, reduced by a button to the keys that it was made with, and its dense keys discarded; undone."""
+"""A BVH file imported, reduced by a button to about the keys it was made with, its dense keys discarded; undone."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ NAME = "Walk"
 
 
 def rig() -> bpy.types.Object:
-    """The rig, asked for anew each time: undo replaces it."""
+    """Return the rig, looked up each time: undo replaces it."""
     return bpy.data.objects[NAME]
 
 
 def count() -> int:
-    """How many keys all bones have."""
+    """Return the number of keys of all bones."""
     return sum(map(len, keys_of(rig()).values()))
 
 
 def handle_types() -> set[str]:
-    """The types that handles have by now."""
+    """Return the present types of the right handles."""
     curves = rig().animation_data.action.layers[0].strips[0].channelbags[0].fcurves
     return {key.handle_right_type for curve in curves for key in curve.keyframe_points}
 
 
 def import_walk() -> int:
-    """Import a file that was exported from a hand-made animation, and return how many keys that has."""
+    """Import a file exported from a hand-made animation; return the number of keys of that animation."""
     addon_utils.enable("io_anim_bvh")
     made = hand_made(AUTOMATIC, "XYZ")
     own = sum(map(len, keys_of(made).values()))

@@ -1,6 +1,6 @@
-"""The paths of the cube on the screen: shown from the panel, compared, hidden, and kept up with when keys are moved.
+"""Paths of the cube on the screen: shown from the panel, compared, hidden, and updated when keys move.
 
-That they are drawn, and in their colours, is counted in the pixels of the screen.
+The pixels of the screen show that they are drawn, and in their colours.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from tests.gui.keyed import FRAMES, cube, key_the_cube
 
 Color = tuple[float, float, float]
 NATIVE, MODE, SELECTED = (0.80, 0.80, 0.80), (0.20, 0.72, 1.0), (1.0, 0.75, 0.20)
-"""The overlay's colours, as the preferences have them at first."""
+"""The overlay's colours, as in the default preferences."""
 
 
 def look(hand: Hand, view: bpy.types.Area, name: str) -> Steps[dict[Color, int]]:
-    """Keep a picture of the viewport, and count its pixels of each of the overlay's colours."""
+    """Take a picture of the viewport, and count its pixels of each of the overlay's colours."""
     part = places.region(view)
     pixels = yield from hand.picture(name, places.box(part))
-    # The sidebar and the rotation gizmo are drawn over the right of the viewport.
+    # The sidebar and the rotation gizmo cover the right of the viewport.
     shown = pixels[:, : part.width * 2 // 3] / 255
     return {color: int((np.abs(shown - color).max(axis=2) < 0.02).sum()) for color in (NATIVE, MODE, SELECTED)}
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """An animator looks at the cube's way, sees what a screw would make of it, plays, and puts it all out of sight."""
+    """An animator looks at the cube's path, previews a screw, plays, and hides it all."""
     key_the_cube()
     cube().scale = (0.4, 0.6, 0.25)
     for screen in bpy.data.screens:
@@ -42,7 +42,7 @@ def scenario(hand: Hand) -> Steps[None]:
 
 
 def shown_from_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Blender's path alone, and then beside that of a mode that nobody has chosen yet."""
+    """Show Blender's path alone, then with that of a mode as a preview."""
     settings = bpy.context.scene.rigid_motion_overlay
     without = yield from look(hand, view, "without")
     assert without[MODE] == 0, without
@@ -70,7 +70,7 @@ def shown_from_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def hidden(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """With all overlays, and with the object."""
+    """Hide the paths with all overlays, and with the object."""
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("Z", shift=True, alt=True)
     assert not view.spaces.active.overlay.show_overlays
@@ -87,7 +87,7 @@ def hidden(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def beside_the_dope_sheet(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[None]:
-    """A key that is selected or moved there is so in the viewport, and playing leaves the path."""
+    """Select and move a key in the Dope Sheet: the viewport follows, and playback leaves the path."""
     yield from hand.hover(places.centre(places.region(sheet)))
     yield from hand.press("A", alt=True)
     seen = yield from look(hand, view, "no-key-selected")

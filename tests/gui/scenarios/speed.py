@@ -1,6 +1,6 @@
-"""How fast the cube goes, as a curve in the Graph Editor; evened by the button in the sidebar, and undone.
+"""Speed of the cube as a curve in the Graph Editor; equalised by the button in the sidebar, and undone.
 
-That the curve is drawn, and is a level line afterwards, is read from the pixels of the screen.
+The pixels of the screen show that the curve is drawn, and is level afterwards.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ BLUE, ORANGE = (0.20, 0.72, 1.0), (1.0, 0.75, 0.20)
 
 
 def rows_of(pixels: np.ndarray, color: tuple[float, float, float]) -> np.ndarray:
-    """The rows, from below, of the pixels of a colour in the left two thirds of a picture, where no text is."""
+    """Return the rows, from below, of the pixels of a colour in the left three fifths of a picture, without text."""
     shown = pixels[:, : pixels.shape[1] * 3 // 5] / 255
     return len(shown) - np.nonzero(np.abs(shown - color).max(axis=2) < 0.05)[0]
 

@@ -1,6 +1,6 @@
-"""The path of a prop edited by hand: keys selected, moved, turned, retimed, inserted and deleted with the mouse.
+"""Editing of a prop's path by hand: keys selected, moved, rotated, retimed, inserted and deleted with the mouse.
 
-Each edit is one step back and forth.
+Each edit is one step of undo and redo.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tests.gui.keyed import FRAMES, cube, key_the_cube, on_screen
 from tests.gui.places import Place
 
 NEAR_PX = 3
-"""Pixels that a key may be off the mouse that has dragged it."""
+"""Tolerance in pixels between a dragged key and the mouse."""
 
 
 def scenario(hand: Hand) -> Steps[None]:
@@ -45,7 +45,7 @@ def take_the_tool(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def at(view: bpy.types.Area, frame: float) -> Place:
-    """Where the cube is on a frame, on the screen."""
+    """Return the place of the cube on the screen, on a frame."""
     scene = bpy.context.scene
     before = scene.frame_current
     where = world_of(frame)
@@ -54,7 +54,7 @@ def at(view: bpy.types.Area, frame: float) -> Place:
 
 
 def drag(hand: Hand, first: Place, last: Place, steps: int = 6, **modifiers: bool) -> Steps[None]:
-    """Press the left button at a place, and let go of it at another."""
+    """Press the left button at a place, and release it at another."""
     yield from hand.hover(first)
     held = [f"LEFT_{name.upper()}" for name in modifiers]
     for name in held:
@@ -72,13 +72,13 @@ def drag(hand: Hand, first: Place, last: Place, steps: int = 6, **modifiers: boo
 
 
 def assert_at(view: bpy.types.Area, frame: float, place: Place) -> None:
-    """On a frame the cube is at a place on the screen."""
+    """Check that the cube is at a place on the screen, on a frame."""
     off = np.subtract(at(view, frame), place)
     assert np.abs(off).max() <= NEAR_PX, (frame, off)
 
 
 def back_and_forth(hand: Hand, before: dict) -> Steps[None]:
-    """What was edited is one step back, and forth again."""
+    """Check that the edit is one step of undo and redo; end with it undone."""
     after = snapshot(cube())
     assert after != before
     yield from hand.press("Z", ctrl=True)
@@ -114,7 +114,7 @@ def selected(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def moved(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """By G: where the mouse is, given up, and along an axis with a number."""
+    """Move keys by G: to the mouse, cancelled, and along an axis by a number."""
     yield from hand.click(at(view, FRAMES[1]))
     before, (x, y) = snapshot(cube()), at(view, FRAMES[1])
     yield from hand.press("G")
@@ -135,13 +135,13 @@ def moved(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def world_of(frame: float) -> Vector:
-    """Where the cube is on a frame."""
+    """Return the place of the cube in the world, on a frame."""
     bpy.context.scene.frame_set(int(frame))
     return Vector(on_screen("Cube")[:3, 3])
 
 
 def dragged(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """With the left button on the key, which is selected by that."""
+    """Drag a key with the left button, which also selects it."""
     before, (x, y) = snapshot(cube()), at(view, FRAMES[0])
     yield from drag(hand, (x, y), (x + 40, y - 50))
     assert frames_selected() == [FRAMES[0]]
@@ -151,7 +151,7 @@ def dragged(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def turned(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """By R: with the mouse, and by degrees about Z."""
+    """Rotate keys by R: with the mouse, and about Z by degrees."""
     yield from hand.click(at(view, FRAMES[1]))
     before, (x, y) = snapshot(cube()), at(view, FRAMES[1])
     yield from hand.hover((x + 120, y))
@@ -169,7 +169,7 @@ def turned(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def retimed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """By dragging a key with Alt along the path to where it is five frames later."""
+    """Retime a key: drag it with Alt along the path to its place five frames later."""
     bpy.context.scene.frame_set(FRAMES[1])
     before, pose = snapshot(cube()), cube().matrix_basis.copy()
     later = at(view, FRAMES[1] + 5)
@@ -184,7 +184,7 @@ def retimed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def inserted(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """By clicking on the path with Ctrl: the motion stays as it is."""
+    """Insert a key by Ctrl-clicking on the path: the motion stays."""
     before, frame = snapshot(cube()), 30
     places_before = [world_of(frame) for frame in range(1, 41, 3)]
     yield from hand.click(at(view, frame), ctrl=True)

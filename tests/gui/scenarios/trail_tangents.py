@@ -1,4 +1,4 @@
-"""Tangents at the keys of a path dragged by their handles, and keys that follow those around them."""
+"""Tangents at the keys of a path, dragged by their handles, and Proportional Editing of keys."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.gui.scenarios.trail import at, back_and_forth, frames_selected, take_
 
 MIDDLE = FRAMES[1]
 INSTANT = 0.02
-"""Frames over which a speed is measured."""
+"""Frames over which a velocity is measured."""
 
 
 def scenario(hand: Hand) -> Steps[None]:
@@ -36,7 +36,7 @@ def scenario(hand: Hand) -> Steps[None]:
 
 
 def key_an_arc() -> None:
-    """Three keys on an arc, which the cube follows as it turns."""
+    """Set three keys on an arc, with the cube turning along it."""
     obj = cube()
     obj.scale, obj.rotation_mode = (0.4, 0.6, 0.25), "QUATERNION"
     for frame, location, angle in zip(FRAMES, ((-3, -2, 0), (-0.5, 1.5, 0.8), (3, 2.5, 0)), (0.9, 0.4, 0), strict=True):
@@ -48,7 +48,7 @@ def key_an_arc() -> None:
 
 
 def velocity(side: int) -> Vector:
-    """How the cube leaves the middle key (1) or comes to it (-1), in units a second, away from the key."""
+    """Return the velocity after (1) or before (-1) the middle key, in units per second, pointing away from the key."""
     scene = bpy.context.scene
     ends = []
     for frame in (MIDDLE, MIDDLE + side * INSTANT):
@@ -60,7 +60,7 @@ def velocity(side: int) -> Vector:
 
 
 def handle(view: bpy.types.Area, side: int) -> Place:
-    """Where the handle is, on the screen."""
+    """Return the place of the handle on the screen."""
     return places.point(view, world_of(MIDDLE) + velocity(side) / 3.0)
 
 
@@ -69,7 +69,7 @@ def towards(first: Place, last: Place, factor: float) -> Place:
 
 
 def faster(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Faster by six tenths behind the key: there alone, and on the path as it was."""
+    """Make the cube 60 % faster after the key: only there, and on the same path."""
     before, key = snapshot(cube()), at(view, MIDDLE)
     stays = [world_of(frame) for frame in (*range(1, MIDDLE + 1), FRAMES[2])]
     speeds, end = [velocity(side).length for side in (-1, 1)], handle(view, 1)
@@ -95,7 +95,7 @@ def held_down(hand: Hand, place: Place) -> Steps[None]:
 
 
 def bent(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """With B the path leaves the key where the handle is dragged."""
+    """With B, bend the path to leave the key in the direction of the dragged handle."""
     before, key, end = snapshot(cube()), at(view, MIDDLE), handle(view, 1)
     aside = end[0] - 20, end[1] + 90
     yield from held_down(hand, end)
@@ -113,7 +113,7 @@ def bent(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def followed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Keys on both sides follow one that is moved, as far as the range goes that the wheel sets."""
+    """Move a key: keys on both sides follow it within the range that the wheel sets."""
     for frame in (10, 15, 25, 30):
         bpy.ops.rigid_motion.insert_path_key(frame=frame)
     yield from hand.press("A", alt=True)
