@@ -109,16 +109,16 @@ def play(rows: np.ndarray) -> tuple[Poses, list[Poses]]:
         swords.append(seen_sword())
         for hand, poses in zip(HANDS, grips, strict=True):
             poses.append(placed(inverse(seen_hand((rig.name, hand))), swords[-1]))
-    return listed(swords), [*map(listed, grips)]
+    return stacked(swords), [*map(stacked, grips)]
 
 
-def listed(poses: list[Poses]) -> Poses:
+def stacked(poses: list[Poses]) -> Poses:
     return Poses([pose.positions for pose in poses], [pose.quaternions for pose in poses])
 
 
 def off_by(poses: Poses, others: Poses) -> float:
     """Return the largest error of any point of the sword's ball, in metres; `others` are (n,) or ()."""
-    return float(shell_error(poses, listed([others] * len(poses)) if others.shape == () else others, RADIUS).max())
+    return float(shell_error(poses, stacked([others] * len(poses)) if others.shape == () else others, RADIUS).max())
 
 
 def grip_in(rig: bpy.types.Object, joint: str) -> Poses:
@@ -181,7 +181,7 @@ def test_it_is_shown_in_the_hand_of_a_rig_of_another_size_and_place_and_is_recor
         if TAKES[0] + 12 <= row < TAKES[1]:
             bpy.context.view_layer.update()
             grip = placed(inverse(seen_hand(("Rig", "LeftHand"))), seen_sword())
-            slips.append(off_by(listed([grip]), grip_in(rig, "LeftHand")))
+            slips.append(off_by(stacked([grip]), grip_in(rig, "LeftHand")))
 
     perform(sent, clock, on_row=look)
     assert len(slips) > 20
@@ -199,7 +199,7 @@ def test_what_is_not_held_any_more_is_shown_and_recorded_in_the_world_over_keys_
         if row == BEGINS - 5:
             bpy.context.scene.frame_set(round(frame_of(TAKES[0] + 20)))
             bpy.context.view_layer.update()
-            assert off_by(listed([seen_sword()]), swords()[0]) < 1.02 * TOLERANCE
+            assert off_by(stacked([seen_sword()]), swords()[0]) < 1.02 * TOLERANCE
             bpy.context.scene.frame_set(FIRST)
 
     perform(sent, clock, holds=False, on_row=look)
@@ -219,7 +219,7 @@ def test_what_held_it_and_is_gone_leaves_it_in_the_world(live, sent, clock):
     for row in range(40, TAKES[1]):
         frame = frame_of(row)
         bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
-        assert off_by(listed([seen_sword()]), swords()[row]) < 2.0 * TOLERANCE, row
+        assert off_by(stacked([seen_sword()]), swords()[row]) < 2.0 * TOLERANCE, row
 
 
 def test_what_follows_the_sword_cannot_hold_it_and_that_is_said(live, sent, clock):
@@ -261,7 +261,7 @@ def test_bodies_hold_one_another_and_skeletons_that_are_held_have_keys_in_the_wo
         bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
         moment = TIMES[BEGINS] - DELAY + (frame - FIRST) / 30
         glove_seen = unscaled(np.array(bpy.data.objects["glove"].matrix_world, dtype=np.float64))
-        assert off_by(listed([placed(inverse(glove_seen), seen_sword())]), GRIP) < 1.02 * TOLERANCE
+        assert off_by(stacked([placed(inverse(glove_seen), seen_sword())]), GRIP) < 1.02 * TOLERANCE
         head = in_world(dance(np.array([moment])))[JOINTS.index("Head"), 0].positions
         assert np.linalg.norm(seen_hand(("dancer", "Head")).positions - head) < 2.0 * TOLERANCE
 
@@ -281,5 +281,5 @@ def test_a_rig_of_rigify_holds_by_what_follows_its_hands_by_ik_as_well(live, sen
         for frame in map(frame_of, rows.tolist()):
             bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
             poses.append(placed(inverse(seen_hand((rig.name, "DEF-hand.L"))), seen_sword()))
-        grips.append(listed(poses))
+        grips.append(stacked(poses))
     assert off_by(grips[1], grips[0]) < TOLERANCE

@@ -32,7 +32,7 @@ def shaky(obj: bpy.types.Object, repeats: int = 0) -> bpy.types.Object:
 
 
 @pytest.fixture
-def said(extension, capfd):
+def report_of(extension, capfd):
     """Return a function that runs the operator and returns its report."""
 
     def act(**settings: object) -> str:
@@ -43,11 +43,11 @@ def said(extension, capfd):
     return act
 
 
-def test_it_says_how_much_trembled_and_by_how_much_it_was_moved(said):
+def test_it_says_how_much_trembled_and_by_how_much_it_was_moved(report_of):
     obj = shaky(new_object())
     before = snapshot(obj)
     assert operators.clean_motion.poll()
-    text = said(radius=0.1)
+    text = report_of(radius=0.1)
     assert text.startswith("Info: Tool: jitters by 1.79 mm; moved at most ")
     assert text.endswith("; 1 key was a spike")
     assert len(key_frames(obj)) == len(FRAMES)
@@ -58,21 +58,21 @@ def test_it_says_how_much_trembled_and_by_how_much_it_was_moved(said):
     }
 
 
-def test_a_camera_is_spoken_of_in_pixels_and_several_things_in_lengths(said):
+def test_a_camera_is_spoken_of_in_pixels_and_several_things_in_lengths(report_of):
     camera = shaky(new_object("Camera", data=bpy.data.cameras.new("Camera")), repeats=3)
-    text = said(nearest=5.0)
+    text = report_of(nearest=5.0)
     assert "jitters by 1.2 pixels; moved at most " in text
     assert text.endswith("1 key was a spike; repeated keys: 3")
     operators.restore_keys()
     shaky(new_object()).select_set(True)
     camera.select_set(True)
-    assert "pixels" not in said()
+    assert "pixels" not in report_of()
 
 
-def test_of_a_rig_in_object_mode_all_keyed_bones_are_cleaned(said):
+def test_of_a_rig_in_object_mode_all_keyed_bones_are_cleaned(report_of):
     rig = recorded_rig()
     select_only(rig)
-    text = said()
+    text = report_of()
     assert text.startswith("Info: 7 bones: jitters by ")
     assert text.endswith("; no foot clearly stands: none is held")
     ((before, after, _),) = cleaned._cleanings

@@ -22,11 +22,11 @@ ROW = 26
 
 def assert_modes(modes: dict[float, int]) -> None:
     """Check that the keys of the cube have these modes, and that it is where they put it on every frame."""
-    assert said() == modes, said()
+    assert marked_modes() == modes, marked_modes()
     assert_shown([cube()], BETWEEN)
 
 
-def said() -> dict[float, int]:
+def marked_modes() -> dict[float, int]:
     """Return the mode numbers by frame, for the keys of the cube that have one."""
     curve = curve_of(cube(), "location")
     marks = read_marks(curve).tolist()
@@ -98,7 +98,7 @@ def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
     yield from hand.pie("T", "E", alt=True)
     yield from hand.picture("no-key-selected")
     yield from hand.press("ESC")
-    assert said() == {1: 2, 20: 1, 40: 0}, "without a selected key nothing changes"
+    assert marked_modes() == {1: 2, 20: 1, 40: 0}, "without a selected key nothing changes"
 
 
 def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:

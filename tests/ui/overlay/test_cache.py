@@ -19,7 +19,7 @@ def obj(scene) -> bpy.types.Object:
     return key(new_object())
 
 
-def updated() -> None:
+def report_edits() -> None:
     """Let Blender report the edits to its handlers."""
     bpy.context.view_layer.update()
 
@@ -28,7 +28,7 @@ def test_an_edit_that_does_not_matter_leaves_the_path(scene, obj):
     path = path_of(obj, bpy.context)
     obj.color = (1, 0, 0, 1)
     obj["note"] = 7
-    updated()
+    report_edits()
     assert path_of(obj, bpy.context) is path
 
 
@@ -58,20 +58,20 @@ EDITS = {
 
 @pytest.mark.parametrize("edit", EDITS)
 def test_an_edit_that_matters_gives_another_path(scene, obj, edit):
-    updated()
+    report_edits()
     path = path_of(obj, bpy.context)
     EDITS[edit](obj, scene.rigid_motion_overlay)
-    updated()
+    report_edits()
     assert path_of(obj, bpy.context) is not path
 
 
 def test_a_path_goes_along_with_a_component_that_is_not_keyed(scene, obj):
     fcurves = obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
     fcurves.remove(fcurves.find("location", index=2))
-    updated()
+    report_edits()
     before = path_of(obj, bpy.context).native
     obj.location.z += 5.0
-    updated()
+    report_edits()
     assert path_of(obj, bpy.context).native - before == pytest.approx(np.broadcast_to((0.0, 0.0, 5.0), before.shape))
 
 
@@ -88,7 +88,7 @@ def test_keys_selected_without_a_word_from_blender_are_noticed_when_asked_for(sc
 
 def test_paths_that_were_not_drawn_for_long_are_dropped(scene):
     objects = [key(new_object(f"Tool {number}")) for number in range(MAX_SPARE_PATHS + 20)]
-    updated()
+    report_edits()
     paths = [path_of(obj, bpy.context) for obj in objects]
     path_of(objects[0], bpy.context)
     keep_only(drawn=1)

@@ -147,7 +147,7 @@ def test_what_is_held_is_faster_in_its_hand_alone(scene, number, after):
     assert worlds(prop, outside(ends, frames)) == pytest.approx(others, abs=2e-5)
 
 
-def begun(tool: Carrier, after: bool) -> SimpleNamespace:
+def bending_operator(tool: Carrier, after: bool) -> SimpleNamespace:
     """Return the operator in the state of dragging a tangent, with B pressed."""
     cls = RIGID_MOTION_OT_drag_path_tangent
     operator = SimpleNamespace(_hit=None, target=tool.name, frame=MIDDLE, after=after, speed=0.0, bend=(0.0, 0.0, 0.0))
@@ -156,7 +156,7 @@ def begun(tool: Carrier, after: bool) -> SimpleNamespace:
             setattr(operator, name, MethodType(method, operator))
     assert operator.read(handles_of(bpy.context))
     operator.begin(None)
-    assert operator._can_bend()
+    assert operator._ensure_bending_key()
     operator._measure_bending()
     return operator
 
@@ -166,7 +166,7 @@ def test_a_path_leaves_its_key_where_the_tangent_is_bent_to(scene, mode, after):
     tool = arc(mode)
     before, keys, others = snapshot(tool), worlds(tool, FRAMES), worlds(tool, outside(SIDES[after]))
     arm = velocity(tool, after) @ np.array(Euler((0.3, -0.2, 0.4)).to_matrix())
-    operator = begun(tool, after)
+    operator = bending_operator(tool, after)
     for factor in (2.0, 1.0):
         operator.bend, operator.speed = tuple(operator._bend_towards(factor * arm)), float(np.linalg.norm(arm))
         operator.apply()

@@ -98,7 +98,7 @@ def drawn_paths(targets: Sequence[Transform], context: Any) -> list[tuple[Matrix
             entry is None
             or entry.stale
             or (entry.is_outdated and not is_playing)
-            or entry.settings != (*settings, b"" if entry.above else _bytes(space.turn))
+            or entry.settings != (*settings, b"" if entry.above else _turn_bytes(space.turn))
         ):
             stale.append(target)
     if stale:
@@ -124,7 +124,7 @@ def shown_paths(context: Any) -> list[tuple[Transform, Matrix, DrawnPath]]:
     return [(target, *path) for target, path in zip(targets, paths, strict=True) if path is not None]
 
 
-def _bytes(turn: np.ndarray | None) -> bytes:
+def _turn_bytes(turn: np.ndarray | None) -> bytes:
     return b"" if turn is None else turn.astype(np.float32).tobytes()
 
 
@@ -171,7 +171,7 @@ def _read(
 ) -> _Entry:
     data = target.animated.animation_data
     action = data.action if data else None
-    entry = _Entry(None, (), (*settings, _bytes(space.turn)), action.session_uid if action else 0)
+    entry = _Entry(None, (), (*settings, _turn_bytes(space.turn)), action.session_uid if action else 0)
     if binding is None or source is None:
         # If it was refused, the panel says why.
         return entry

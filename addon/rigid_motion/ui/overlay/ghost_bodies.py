@@ -103,7 +103,7 @@ def _keys(rig: bpy.types.Object) -> tuple[bytes, np.ndarray]:
     return _known_keys[rig.session_uid]
 
 
-def _frames(rig: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
+def _frames_with_ghosts(rig: bpy.types.Object, scene: bpy.types.Scene) -> np.ndarray:
     """Return the frames of the scene that have ghosts."""
     step = overlay_settings(scene).frames_between_ghosts
     return ghost_frames(scene.frame_start, scene.frame_end, step, _keys(rig)[1])
@@ -114,11 +114,11 @@ def note(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     settings, now = overlay_settings(scene), float(scene.frame_current_final)
     if settings.show_ghosts and settings.show_bodies and depsgraph.mode == "VIEWPORT":
         for rig, bodies in _rigs(bpy.context).items():
-            for body in bodies if np.any(np.abs(_frames(rig, scene) - now) < 1e-3) else ():
-                _note(body, now, _keys(rig)[0], depsgraph)
+            for body in bodies if np.any(np.abs(_frames_with_ghosts(rig, scene) - now) < 1e-3) else ():
+                _record_body(body, now, _keys(rig)[0], depsgraph)
 
 
-def _note(body: bpy.types.Object, now: float, keys: bytes, depsgraph: bpy.types.Depsgraph) -> None:
+def _record_body(body: bpy.types.Object, now: float, keys: bytes, depsgraph: bpy.types.Depsgraph) -> None:
     evaluated: Any = body.evaluated_get(depsgraph)
     mesh = evaluated.data
     mesh.calc_loop_triangles()
@@ -151,7 +151,7 @@ def seen_bodies(context: Any) -> Iterator[tuple[bpy.types.Object, SeenBody, np.n
         for body in bodies:
             seen = _seen.get(body.session_uid)
             if seen is not None and seen.keys == _keys(rig)[0]:
-                yield rig, seen, _frames(rig, context.scene)
+                yield rig, seen, _frames_with_ghosts(rig, context.scene)
 
 
 @persistent

@@ -31,7 +31,7 @@ class HeldMotion(SeenMotion):
         super().__init__(target, source, carried, space)
         context: Any = bpy.context
         self._scene, self._depsgraph = context.scene, context.view_layer.depsgraph
-        self._free, self.in_world, self.space = maps_of(space.matrix), True, identity()
+        self._channel_space, self.in_world, self.space = maps_of(space.matrix), True, identity()
         self._holders = {
             holder.number: (self._read(holder, carried), maps_of(holder.offset))
             for holder in holders_of(target)
@@ -70,7 +70,9 @@ class HeldMotion(SeenMotion):
 
     @property
     def digest(self) -> tuple:
-        space = b"" if self._parents.known else self._free.axes.tobytes() + self._free.origins.tobytes()
+        space = (
+            b"" if self._parents.known else self._channel_space.axes.tobytes() + self._channel_space.origins.tobytes()
+        )
         return (
             self._parents.digest,
             space,
@@ -111,7 +113,7 @@ class HeldMotion(SeenMotion):
             return (holder.places(frames) if isinstance(holder, Parents) else holder.maps(frames)) @ offset, None
         if self._parents.known:
             return self._parents.spaces(frames)
-        return identity(len(frames)) @ self._free, self._turn
+        return identity(len(frames)) @ self._channel_space, self._turn
 
     def spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray]:
         maps, numbers = identity(len(frames)), np.array([self.source.hold_at(frame)[0] for frame in frames.tolist()])

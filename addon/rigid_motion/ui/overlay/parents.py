@@ -158,7 +158,7 @@ class Parents:
 
     def _spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
         if not self.target.is_part:
-            return self._carrying(self.target.animated, frames), None
+            return self._parent_maps(self.target.animated, frames), None
         if (base := self.target.motion.base) is not None:
             return self._world(base, frames), None
         bone, stands = self.target.pose_bone, identity(len(frames))
@@ -178,9 +178,9 @@ class Parents:
         return world @ self._carried.posed(self.target.pose_bone, frames) if self.target.is_part else world
 
     def _world(self, obj: bpy.types.Object, frames: np.ndarray) -> AffineMaps:
-        return self._carrying(obj, frames) @ self._carried.channels(transform_of(obj), frames)
+        return self._parent_maps(obj, frames) @ self._carried.channels(transform_of(obj), frames)
 
-    def _carrying(self, obj: bpy.types.Object, frames: np.ndarray) -> AffineMaps:
+    def _parent_maps(self, obj: bpy.types.Object, frames: np.ndarray) -> AffineMaps:
         parent = obj.parent
         if parent is None:
             return identity(len(frames))

@@ -215,13 +215,13 @@ def readable(
 
     native, axes = pixels(path.native_ticks), pixels(path.axes[:, 0, 0])
     desired = None if path.desired_ticks is None else pixels(path.desired_ticks)
-    some_axes = _spaced(axes, _step(axes, AXES_GAP), np.empty((0, 2)), 0.5 * AXES_GAP, path.axis_frames)
+    some_axes = _spaced(axes, _legible_step(axes, AXES_GAP), np.empty((0, 2)), 0.5 * AXES_GAP, path.axis_frames)
     if every_tick:
         every = np.ones(len(native), dtype=bool)
         return Readable(every, None if desired is None else every, some_axes)
     keys = pixels(path.keys)
     # Use the same frames on both paths, to make them comparable.
-    step = _step(native if desired is None else desired, TICK_GAP)
+    step = _legible_step(native if desired is None else desired, TICK_GAP)
     return Readable(
         _spaced(native, step, keys, MIN_TICK_DISTANCE_PX, path.tick_frames),
         None if desired is None else _spaced(desired, step, keys, MIN_TICK_DISTANCE_PX, path.tick_frames),
@@ -236,7 +236,7 @@ def on_screen(points: np.ndarray, projection: np.ndarray, size: tuple[float, flo
     return 0.5 * (clip[:, :2] / depth[:, None] + 1.0) * size
 
 
-def _step(pixels: np.ndarray, gap: float) -> int:
+def _legible_step(pixels: np.ndarray, gap: float) -> int:
     """Return the smallest step of 1, 2, 5, 10... points (n, 2) with a median distance of at least the gap.
 
     0 if there is none.

@@ -56,12 +56,12 @@ class Handles:
 
     def at_keys(self, context: Any) -> np.ndarray:
         """Return the keys on the screen, (k, 2)."""
-        return _on_screen(context, self.in_world(self.path.keys))
+        return _to_pixels(context, self.in_world(self.path.keys))
 
     def nearest_moment(self, context: Any, place: np.ndarray) -> tuple[float, float]:
         """Return the distance in pixels from a place on the screen to the path, and the frame of the nearest point."""
         path = self.path
-        line = _on_screen(context, self.in_world(path.line))
+        line = _to_pixels(context, self.in_world(path.line))
         chords, away = np.diff(line, axis=0), place - line[:-1]
         lengths = np.einsum("ij,ij->i", chords, chords)
         shares = np.clip(np.einsum("ij,ij->i", away, chords) / np.where(lengths > 0.0, lengths, 1.0), 0.0, 1.0)
@@ -77,7 +77,7 @@ def handles_of(context: bpy.types.Context) -> list[Handles]:
     return [Handles(*one) for one in cache.shown_paths(context)] if is_drawn else []
 
 
-def _on_screen(context: Any, points: np.ndarray) -> np.ndarray:
+def _to_pixels(context: Any, points: np.ndarray) -> np.ndarray:
     region, view = context.region, context.region_data
     return on_screen(points, np.array(view.perspective_matrix), (region.width, region.height))
 

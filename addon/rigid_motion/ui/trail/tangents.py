@@ -116,11 +116,11 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         one = self._edited_handles(handles)
         if one is None:
             return False
-        self._target, self._edits = one.target, self._tangent(one.target)
+        self._target, self._edits = one.target, self._new_edit(one.target)
         if not self._edits:
             return False
         self._pivot = Vector(one.in_world(one.path.keys)[self._key_index(one)].tolist())
-        self._even = self._at_even_speed(one, self._edits)
+        self._even = self._even_velocity(one, self._edits)
         return True
 
     def begin(self, _context: Any) -> None:
@@ -135,7 +135,7 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
     def press(self, context: Any, event: bpy.types.Event) -> bool:
         if event.type != "B" or event.value != "PRESS":
             return False
-        self._is_bending = not self._is_bending and self._can_bend()
+        self._is_bending = not self._is_bending and self._ensure_bending_key()
         if self._is_bending:
             self._measure_bending()
         self.tell(context)
@@ -161,11 +161,11 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
 
     def apply(self) -> None:
         edits, even = self._edits, self._even
-        if any(self.bend) and self._can_bend():
+        if any(self.bend) and self._ensure_bending_key():
             self._move(np.array(self.bend))
-            if not (edits := self._tangent(self._target)):
+            if not (edits := self._new_edit(self._target)):
                 return
-            even = self._at_even_speed(existing(self._edited_handles(handles_of(bpy.context))), edits)
+            even = self._even_velocity(existing(self._edited_handles(handles_of(bpy.context))), edits)
         else:
             self._bent = None
         edits.apply(self.speed / frame_rate() / max(float(np.linalg.norm(even)), 1e-9))
@@ -176,10 +176,10 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
     def _key_index(self, one: Handles) -> int:
         return int(np.argmin(np.abs(one.path.key_frames - self.frame)))
 
-    def _tangent(self, target: Transform) -> TangentEdit:
+    def _new_edit(self, target: Transform) -> TangentEdit:
         return TangentEdit(target, self.frame, SIDE_AFTER if self.after else SIDE_BEFORE, refused=self._refused)
 
-    def _at_even_speed(self, one: Handles, edits: TangentEdit) -> np.ndarray:
+    def _even_velocity(self, one: Handles, edits: TangentEdit) -> np.ndarray:
         """Return the velocity at the key if progress were even, in the world, per frame, shape (3,)."""
         if edits.slope > MIN_SLOPE:
             return self._velocity(one) / edits.slope
@@ -193,7 +193,7 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         arm = arms_of(one.path)[0][self._key_index(one), int(self.after)]
         return np.asarray(maps_of(one.space).axes @ arm)
 
-    def _can_bend(self) -> bool:
+    def _ensure_bending_key(self) -> bool:
         """Insert the key that bends the path unless it exists; return whether there is room for it."""
         if self._bent is None:
             first, last = self._edits.ends
@@ -221,7 +221,7 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
 
         def tangent_with(by: np.ndarray) -> np.ndarray:
             self._move(by)
-            self._tangent(self._target).apply(None)
+            self._new_edit(self._target).apply(None)
             return self._velocity(existing(self._edited_handles(handles_of(bpy.context))))
 
         self._straight = tangent_with(np.zeros(3))
