@@ -60,7 +60,7 @@ class HeldMotion(SeenMotion):
 
     @property
     def range(self) -> tuple[int, int]:
-        """The first and last whole frame of its path; the scene's start or end if it is held at that end."""
+        """The first and last whole frame of its path, extended to the scene's range at an end where it is held."""
         (first, last), ends = self.source.seen_range, self.source.keyed_range
         if self.source.hold_at(ends[0])[0]:
             first = min(first, self._scene.frame_start)
