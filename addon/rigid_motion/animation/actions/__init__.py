@@ -1,9 +1,9 @@
-"""What Actions hold: slots, channels, keys, modes; read into sources, which are arrays with a digest.
+"""Actions: slots, channels, keys and modifiers, and their conversion to sources (arrays with a digest).
 
-marks       what keys say of the segments that they begin
-modifiers   modifiers of F-curves: ours, and the animator's
-channels    the F-curves of a slot, written and read as arrays
-slots       what moves something, by which F-curves
+marks       the mode and the holder that keys store for the segments they begin
+modifiers   F-curve modifiers: this extension's terms, and the animator's own
+channels    reading and writing the F-curves of a slot as arrays
+slots       the slots that animate objects and bones, and their F-curves
 refusals    why rigid motion cannot act on something, and the way out
 reading     from Blender's data to sources
 

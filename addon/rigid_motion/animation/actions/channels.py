@@ -1,6 +1,6 @@
-"""Channels: the F-curves of one data-block's slot in its Action, written, and read as arrays.
+"""Channels: read and write the F-curves of one data-block's slot in its Action as arrays.
 
-Frames are Blender's, sub-frames included; values are in the channel's own units. Blender keeps both in single
+Frames are Blender's, sub-frames included. Values are in the channel's own units. Blender stores both in single
 precision.
 """
 
@@ -39,20 +39,20 @@ KEY_FIELDS = {
     **dict.fromkeys(("back", "amplitude", "period"), (1, np.float32)),
     **dict.fromkeys(("select_control_point", "select_left_handle", "select_right_handle"), (1, np.bool_)),
 }
-"""All there is to a key: how many numbers, and of which type."""
+"""All fields of a key: how many numbers each has, and their type."""
 
 KeyFields = dict[str, np.ndarray]
-"""All there is to n keys, each field of shape (n, width)."""
+"""All fields of n keys, each of shape (n, width)."""
 
 BREAKDOWN_KEY = enum_value(bpy.types.Keyframe, "type", "BREAKDOWN")
-"""The code of this type of keys."""
+"""The code of the key type Breakdown."""
 
 AUTOMATIC_HANDLES = [enum_value(bpy.types.Keyframe, "handle_left_type", name) for name in ("AUTO", "AUTO_CLAMPED")]
-"""The codes of the types of handles that Blender sets by the keys around."""
+"""The codes of the handle types that Blender computes from the neighbouring keys."""
 
 
 def channelbag_of(animated: bpy.types.ID) -> bpy.types.ActionChannelbag:
-    """Return the channels of `animated` in its Action; make what is missing of Action, slot, layer and strip."""
+    """Return the channels of `animated` in its Action; create the Action, slot, layer and strip where missing."""
     data = existing(getattr(animated, "animation_data", None) or animated.animation_data_create())
     if data.action is None:
         data.action = bpy.data.actions.new(f"{animated.name}Action")
@@ -77,22 +77,22 @@ def write_channel(
     interpolation: str = "LINEAR",
     group: str = "",
 ) -> None:
-    """Replace a property's channels by keys of these values.
+    """Replace the channels of a property by keys with these values.
 
     Parameters
     ----------
     animated : bpy.types.ID
         The owner of the property.
     data_path : str
-        The property, from `animated` on: "location".
+        The data path of the property, relative to `animated`: "location".
     frames : array, shape (n,)
-        Rising. They need not be whole.
+        In rising order. Sub-frames are allowed.
     values : array, shape (n,) or (n, channels)
-        One channel for a single number, one for each component of a vector.
+        One channel for a single number, or one for each component of a vector.
     key_type, interpolation : str
-        What every key gets; the names are those of `bpy.types.Keyframe`.
+        Used for every key; the names are those of `bpy.types.Keyframe`.
     group : str
-        Where the Dope Sheet lists the channels. Empty for none.
+        The group that the Dope Sheet lists the channels in. Empty for none.
     """
     channelbag = channelbag_of(animated)
     fcurves = channelbag.fcurves
@@ -114,7 +114,7 @@ def replace_keys(
     key_type: str | np.ndarray = "KEYFRAME",
     selected: np.ndarray | bool = True,
 ) -> None:
-    """Give an F-curve these new keys in place of those it has: see `new_key_fields`."""
+    """Replace the keys of an F-curve by new ones: see `new_key_fields`."""
     set_key_fields(fcurve, new_key_fields(frames, values, interpolation, key_type, selected=selected))
 
 
@@ -126,9 +126,9 @@ def new_key_fields(
     *,
     selected: np.ndarray | bool = False,
 ) -> KeyFields:
-    """Return all there is to new keys, whose handles Blender sets: on frames that rise, with these values, (n,) each.
+    """Return all fields of new keys on rising frames (n,) with these values (n,); Blender computes their handles.
 
-    Interpolation and type are names for every key, see `write_channel`, or codes for each (n,).
+    Interpolation and key type are one name for all keys, see `write_channel`, or one code for each key (n,).
     """
     fields: KeyFields = {name: np.zeros((len(frames), width), kind) for name, (width, kind) in KEY_FIELDS.items()}
     for name in ("co", "handle_left", "handle_right"):
@@ -143,13 +143,13 @@ def new_key_fields(
 
 
 def merged_keys(fields: KeyFields, others: KeyFields) -> KeyFields:
-    """Return all there is to keys, and to others on frames on which there are none of these."""
+    """Return the fields of all keys, plus those of the other keys; both must be on different frames."""
     order = np.argsort(np.append(fields["co"][:, 0], others["co"][:, 0]), kind="stable")
     return {name: np.concatenate((numbers, others[name]))[order] for name, numbers in fields.items()}
 
 
 def key_fields(keys: bpy.types.bpy_prop_collection) -> KeyFields:
-    """Return all there is to the `keyframe_points` of an F-curve."""
+    """Return all fields of the `keyframe_points` of an F-curve."""
     fields: KeyFields = {name: np.empty((len(keys), width), kind) for name, (width, kind) in KEY_FIELDS.items()}
     for name, numbers in fields.items():
         keys.foreach_get(name, numbers.ravel())
@@ -157,7 +157,7 @@ def key_fields(keys: bpy.types.bpy_prop_collection) -> KeyFields:
 
 
 def set_key_fields(fcurve: bpy.types.FCurve, fields: KeyFields) -> None:
-    """Give an F-curve these keys in place of those it has."""
+    """Replace the keys of an F-curve by these."""
     keys = fcurve.keyframe_points
     keys.clear()
     keys.add(len(fields["co"]))
@@ -167,7 +167,7 @@ def set_key_fields(fcurve: bpy.types.FCurve, fields: KeyFields) -> None:
 
 
 def key_points(fcurve: bpy.types.FCurve, name: str = "co") -> np.ndarray:
-    """Return frame and value of the keys of an F-curve, or of their handles on one side, shape (n, 2)."""
+    """Return the frames and values of the keys of an F-curve, or of their handles on one side, shape (n, 2)."""
     points = np.empty((len(fcurve.keyframe_points), 2), np.float32)
     fcurve.keyframe_points.foreach_get(name, points.ravel())
     return points
@@ -181,14 +181,14 @@ def selected_keys(fcurve: bpy.types.FCurve) -> np.ndarray:
 
 
 def ensure_group(channelbag: bpy.types.ActionChannelbag, name: str) -> bpy.types.ActionGroup:
-    """Return the group of this name, made where there is none yet."""
+    """Return the group of this name; create it if there is none."""
     return channelbag.groups.get(name) or channelbag.groups.new(name)
 
 
 def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag, path: str) -> bpy.types.FCurve:
-    """Return a copy of an F-curve for this data path, in place of what another slot has there.
+    """Return a copy of an F-curve under this data path, replacing the F-curve that another slot has there.
 
-    A new one is in a group of the same name. Terms are left out: they are planned from the keys.
+    A new F-curve joins a group of the same name. Terms are not copied: they are planned from the keys.
     """
     index = fcurve.array_index
     copy = channelbag.fcurves.find(path, index=index)
@@ -206,15 +206,15 @@ def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag
 
 
 def code_of(name: str, value: str) -> int:
-    """Return the number that stands for a value of one of the enumerations of `bpy.types.Keyframe`."""
+    """Return the integer code of a value of one of the enumerations of `bpy.types.Keyframe`."""
     return enum_value(bpy.types.Keyframe, name, value)
 
 
 class ReadChannels(NamedTuple):
-    """Channels of one owner that are keyed together."""
+    """Channels of one owner with keys on the same frames."""
 
     numbers: list[int]
-    """Their numbers in the sequence of the owner's channels."""
+    """Their indices in the sequence of the owner's channels."""
 
     keys: Keys
 
@@ -222,16 +222,17 @@ class ReadChannels(NamedTuple):
     """The marks of the keys of each channel, shape (c, n): see `marks`."""
 
     holds: np.ndarray
-    """What the keys of each channel are held in, shape (c, n): see `marks.hold`; -1 where they do not say."""
+    """The holds of the keys of each channel, shape (c, n): see `marks.hold`; -1 for keys that store none."""
 
 
 def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[ReadChannels]:
-    """Return the keys of F-curves that have some, those together that are keyed together, and the Cycles modifier that
-    each begins with; none of their other modifiers.
+    """Return the keys of F-curves that have any, with their Cycles modifiers but none of their other modifiers.
+
+    F-curves are read together if they agree in key frames, breakdowns, extrapolation and Cycles.
     """
     points, together = [key_points(fcurve) for fcurve in fcurves], dict[tuple, list[int]]()
     for number, fcurve in enumerate(fcurves):
-        # A channel that no mode fills says nothing of the types of others.
+        # Group by breakdowns, too: a channel that no mode fills must not decide for the others.
         (types,) = _read_property("type", [fcurve.keyframe_points], CODE)
         times, is_breakdown = points[number][:, 0], types == BREAKDOWN_KEY
         key = times.tobytes(), fcurve.extrapolation, read_cycles(fcurve), is_breakdown.tobytes()
@@ -242,13 +243,15 @@ def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[ReadChannels]:
         stacked, is_linear = np.stack([points[number] for number in numbers]), extrapolation == "LINEAR"
         result.append(ReadChannels(numbers, *_read_together(channels, stacked, is_linear, cycles, breakdowns)))
     if any((read.holds >= 0).any() for read in result):
-        # Also of channels that say no holds themselves: those of the others are theirs, too.
-        result = [read._replace(keys=replace(read.keys, automatic=_automatic(fcurves, read))) for read in result]
+        # Also for channels that store no holds themselves: the holds of the other channels apply to them, too.
+        result = [
+            read._replace(keys=replace(read.keys, automatic=_automatic_handles(fcurves, read))) for read in result
+        ]
     return result
 
 
-def _automatic(fcurves: Sequence[bpy.types.FCurve], read: ReadChannels) -> np.ndarray:
-    """Return which handles of some of these F-curves Blender sets, to the left and to the right: (c, n, 2)."""
+def _automatic_handles(fcurves: Sequence[bpy.types.FCurve], read: ReadChannels) -> np.ndarray:
+    """Return which handles of these channels Blender computes, left and right: (c, n, 2)."""
     channels = [fcurves[number].keyframe_points for number in read.numbers]
     types = [_read_property(f"handle_{side}_type", channels, CODE) for side in ("left", "right")]
     return np.isin(np.stack(types, axis=-1), AUTOMATIC_HANDLES)
@@ -257,9 +260,9 @@ def _automatic(fcurves: Sequence[bpy.types.FCurve], read: ReadChannels) -> np.nd
 def _read_together(
     channels: Sequence, points: np.ndarray, linear: bool, cycles: Cycles | None, breakdowns: np.ndarray
 ) -> tuple[Keys, np.ndarray, np.ndarray]:
-    """Return the keys of several `keyframe_points` with these frames and values (c, n, 2), and what they say (c, n).
+    """Return the keys of several `keyframe_points` with these points (c, n, 2), and their marks and holds (c, n).
 
-    `breakdowns` are the keys of this type, shape (n,).
+    `breakdowns` says which keys are of this type, shape (n,).
     """
     interpolation = _read_property("interpolation", channels, CODE)
     _replace_unknown(interpolation, INTERPOLATIONS, CONSTANT)
@@ -274,7 +277,7 @@ def _read_together(
         _replace_unknown(easing, EASINGS, AUTO_EASING)
         settings = np.stack((back, amplitude, _read_property("period", channels, np.float32)))
     numbers = (np.abs(part).max(initial=0.0) for part in (points, left, right, settings) if part is not None)
-    # What is no number is not smaller, either.
+    # Comparisons with NaN are false, so NaN counts as unsound, too.
     is_sound = all(number < MAX_NUMBER for number in numbers) and bool(np.all(np.diff(points[0, :, 0]) >= 0.0))
     marked = breakdowns if breakdowns.any() else None
     holds = np.full(points.shape[:2], -1)
@@ -285,7 +288,7 @@ def _read_together(
 
 
 def _read_property(name: str, channels: Sequence, dtype: type, *width: int) -> np.ndarray:
-    """Return a property of the n keys of each of c channels, (c, n) or (c, n, width)."""
+    """Return a property of the n keys of each of c channels, shape (c, n) or (c, n, width)."""
     values: np.ndarray = np.empty((len(channels), len(channels[0]), *width), dtype)
     for keys, buffer in zip(channels, values, strict=True):
         keys.foreach_get(name, buffer.ravel())
@@ -293,5 +296,5 @@ def _read_property(name: str, channels: Sequence, dtype: type, *width: int) -> n
 
 
 def _replace_unknown(codes: np.ndarray, names: dict[int, str], replacement: int) -> None:
-    """Treat codes without a meaning, in a damaged file, as Blender does. Those with a meaning have no gaps."""
+    """Replace unknown codes in a damaged file as Blender does. The known codes have no gaps between them."""
     codes[(codes < min(names)) | (codes > max(names))] = replacement

@@ -1,7 +1,7 @@
-"""F-curve modifiers: ours, which are the terms of in-betweens, and the animator's.
+"""F-curve modifiers: the terms that this extension adds for in-betweens, and the animator's own modifiers.
 
-Terms are known by what they are, not by their names, which are the animator's to change: additive *Generators* of a
-product of linear factors in a restricted range, of which the last factor is constant. Nothing in Blender makes such.
+Terms are recognised by their settings, not by their names, which the animator may change: additive *Generators* with a
+product of linear factors in a restricted range, whose last factor is constant. Nothing in Blender creates any.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..fcurves.keys import Cycles
 
 
 def is_term(modifier: bpy.types.FModifier) -> TypeGuard[bpy.types.FModifierGenerator]:
-    """Return whether a modifier is one of ours."""
+    """Return whether a modifier is a term."""
     return (
         isinstance(modifier, bpy.types.FModifierGenerator)
         and modifier.use_restricted_range
@@ -39,32 +39,32 @@ def has_terms(fcurve: bpy.types.FCurve) -> bool:
 
 
 def on_top(fcurve: bpy.types.FCurve) -> Iterator[bpy.types.FModifier]:
-    """Yield what comes on top of keys and terms: the animator's modifiers but for Cycles, as far as they have a say."""
+    """Yield modifiers that act on top of keys and terms: the animator's unmuted modifiers other than Cycles."""
     for modifier in fcurve.modifiers:
         if modifier.type != "CYCLES" and not modifier.mute and not is_term(modifier):
             yield modifier
 
 
 def longest_step(fcurve: bpy.types.FCurve) -> float:
-    """Return by how many frames the Stepped modifiers of an F-curve look elsewhere, at most."""
+    """Return the largest distance, in frames, at which the Stepped modifiers of an F-curve sample another frame."""
     stepped = (item for item in fcurve.modifiers if isinstance(item, bpy.types.FModifierStepped) and not item.mute)
     return float(sum(item.frame_step for item in stepped))
 
 
 def misplaced(fcurve: bpy.types.FCurve) -> list[bpy.types.FModifier]:
-    """Return the animator's modifiers that act on what is seen only behind all terms, with those that follow them.
+    """Return the animator's modifiers that must come behind all terms to act on the visible motion, and any after them.
 
-    None where there are no terms behind them. What steps time, and what adds, is the same in front of terms.
+    Empty if no terms follow them. Modifiers that step time or add values work as well in front of terms.
     """
     behind = list(dropwhile(lambda item: is_term(item) or _commutes(item), fcurve.modifiers))
     return [item for item in behind if not is_term(item)] if any(map(is_term, behind)) else []
 
 
 def settings_of_others(fcurve: bpy.types.FCurve) -> tuple[float, int]:
-    """Return what terms depend on of the animator's modifiers: `longest_step`, and how many are `misplaced`."""
+    """Return what terms depend on in the animator's modifiers: `longest_step`, and the number of `misplaced`."""
     kinds = np.empty(len(fcurve.modifiers), np.int32)
     fcurve.modifiers.foreach_get("type", kinds)
-    # To look at each of many terms takes its time.
+    # Inspecting each of many terms is slow.
     return (longest_step(fcurve), len(misplaced(fcurve))) if len(set(kinds.tolist())) > 1 else (0.0, 0)
 
 
@@ -77,7 +77,7 @@ def _commutes(modifier: bpy.types.FModifier) -> bool:
 
 
 def read_cycles(fcurve: bpy.types.FCurve) -> Cycles | None:
-    """Return the Cycles of an F-curve: Blender has one only where it is the first of the modifiers."""
+    """Return the Cycles of an F-curve: Blender honours it only as the first modifier."""
     first = fcurve.modifiers[0] if fcurve.modifiers else None
     return cycles_of(first) if isinstance(first, bpy.types.FModifierCycles) and not first.mute else None
 
@@ -87,34 +87,34 @@ def cycles_of(modifier: bpy.types.FModifierCycles) -> Cycles:
 
 
 def add_cycles(fcurve: bpy.types.FCurve, cycles: Cycles) -> None:
-    """Give an F-curve Cycles like these, in front of all its other modifiers."""
+    """Give an F-curve these Cycles, in front of all its other modifiers."""
     modifiers = fcurve.modifiers
     if not modifiers or modifiers[0].type != "CYCLES":
-        # Blender adds one behind others as no more than a wish, or not at all.
+        # Behind other modifiers, Blender adds one that has no effect, or none at all.
         behind = [_settings_of(modifier) for modifier in modifiers if modifier.type != "CYCLES"]
         for modifier in list(modifiers):
             modifiers.remove(modifier)
         modifiers.new("CYCLES")
         for settings in behind:
-            _add(fcurve, settings)
+            _add_modifier(fcurve, settings)
     modes = {"mode_before": cycles.before, "mode_after": cycles.after}
     counts = {"cycles_before": cycles.before_count, "cycles_after": cycles.after_count}
     set_settings(modifiers[0], {"mute": False, **modes, **counts})
 
 
 def copy_modifier(modifier: bpy.types.FModifier, fcurve: bpy.types.FCurve) -> None:
-    """Add a copy of a modifier to an F-curve, behind all others."""
-    _add(fcurve, _settings_of(modifier))
+    """Append a copy of a modifier to an F-curve."""
+    _add_modifier(fcurve, _settings_of(modifier))
 
 
 def put_behind(fcurve: bpy.types.FCurve, modifier: bpy.types.FModifier) -> None:
-    """Have one of the modifiers of an F-curve be the last. Blender has no way but to make it anew."""
+    """Move one of the modifiers of an F-curve to the end. Blender offers no way but to recreate it."""
     settings = _settings_of(modifier)
     fcurve.modifiers.remove(modifier)
-    _add(fcurve, settings)
+    _add_modifier(fcurve, settings)
 
 
-def _add(fcurve: bpy.types.FCurve, settings: Mapping[str, Any]) -> None:
+def _add_modifier(fcurve: bpy.types.FCurve, settings: Mapping[str, Any]) -> None:
     modifier = existing(fcurve.modifiers.new(settings["type"]))
     set_settings(modifier, settings)
     if isinstance(modifier, bpy.types.FModifierEnvelope):
@@ -130,7 +130,7 @@ def _settings_of(modifier: bpy.types.FModifier) -> dict[str, Any]:
 
 
 def settings_of(item: bpy.types.bpy_struct) -> dict[str, Any]:
-    """Return all plain properties of an F-curve or a modifier that can be set."""
+    """Return all writable plain properties of an F-curve or a modifier."""
     result = {}
     for prop in item.bl_rna.properties:
         if not prop.is_readonly and prop.type not in ("POINTER", "COLLECTION"):
@@ -140,7 +140,7 @@ def settings_of(item: bpy.types.bpy_struct) -> dict[str, Any]:
 
 
 def set_settings(item: bpy.types.bpy_struct, settings: Mapping[str, Any]) -> None:
-    """Set plain properties, those first that others depend on."""
+    """Set plain properties, beginning with those that others depend on."""
     names = (name for name in settings if name not in ("type", "control_points"))
     for name in sorted(names, key=lambda name: (name != "mode", name != "poly_order", name != "frame_start")):
         setattr(item, name, settings[name])

@@ -1,6 +1,6 @@
-"""From Blender's data to sources: what is keyed of a transform in a slot.
+"""Reading sources: the keys of a transform in a slot, converted from Blender's data to arrays.
 
-What modifiers of the animator's make of a channel comes on top of the mode, and a source does not know of it.
+The effect of the animator's own modifiers comes on top of the mode, so a source does not include it.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from .refusals import refuse_drivers, refuse_envelope, refuse_linked, refuse_mov
 from .slots import Binding
 
 DIGEST_COUNT = 2**24
-"""The number of digests that a term can keep as its influence, which is in single precision."""
+"""The number of digests that fit in the influence of a term, which is in single precision."""
 
 
 def read(binding: Binding) -> KeyedTransform:
-    """Return what is keyed of a transform in a slot. `Refused` where there can be no in-betweens of it."""
+    """Return the keys of a transform in a slot as a source. Raises `Refused` if it cannot have in-betweens."""
     (source,) = keyed_in([binding])
     if isinstance(source, Refused):
         raise source
@@ -35,24 +35,24 @@ def read(binding: Binding) -> KeyedTransform:
 
 
 def keyed_in(bindings: Sequence[Binding]) -> list[KeyedTransform | Refused]:
-    """Return what is keyed in each of several bindings, or why there can be no in-betweens of it.
+    """Return the source of each of several bindings, or why it cannot have in-betweens.
 
-    Where several users of a slot differ in what in-betweens depend on, it is what the leading one of them has.
+    If the users of a slot differ in something that in-betweens depend on, the `leading` user counts.
 
-    Numbers and modes are as they are, which may be any in a damaged file: see `refuse_numbers`.
+    Numbers and modes are not checked, and may be anything in a damaged file: see `refuse_numbers`.
     """
     return list(map(leading, sources_of_users(bindings)))
 
 
 def leading(users: list[KeyedTransform | Refused]) -> KeyedTransform | Refused:
-    """Return the source of the user that most parts of a slot move, or the first of these."""
+    """Return the source of the user with the most parts moved by the slot, or the first of several such users."""
     return max(users, key=lambda source: len(source.keyed) if isinstance(source, KeyedTransform) else -1)
 
 
 def planned_from(binding: Binding) -> int | None:
-    """Return the digest of the source that the terms in a slot were planned from, None where there are none.
+    """Return the digest of the source that the terms in a slot were planned from, None if there are no terms.
 
-    It is that of no source where some of them are missing, or there are copies of them.
+    If some of the terms are missing or duplicated, the digest matches no source.
     """
     modifiers = (modifier for fcurve in binding.moving.values() for modifier in fcurve.modifiers)
     kept, count = next((modifier.influence for modifier in modifiers if is_term(modifier)), None), 0
@@ -66,12 +66,12 @@ def planned_from(binding: Binding) -> int | None:
 
 
 def influence_for(source: KeyedTransform, count: int) -> float:
-    """Return what terms have for an influence, which is not in use: the digest of their source, and their number."""
+    """Return the influence, otherwise unused, that terms store: the digest of their source plus the number of terms."""
     return (source.digest24 + count) % DIGEST_COUNT / DIGEST_COUNT
 
 
 def sources_of_users(bindings: Sequence[Binding]) -> list[list[KeyedTransform | Refused]]:
-    """Return what is keyed in each of the bindings as each of its users has it."""
+    """Return the source of each user of each binding."""
     drivers: dict[bpy.types.ID, set[Channel]] = {}
 
     def source_of(user: Transform, binding: Binding) -> KeyedTransform | Refused:
@@ -88,7 +88,7 @@ def sources_of_users(bindings: Sequence[Binding]) -> list[list[KeyedTransform | 
 
 
 def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> KeyedTransform:
-    """Return what is keyed in a slot as one of its users has it. `Refused` where there can be no in-betweens of it."""
+    """Return the keys in a slot as one of its users has them. Raises `Refused` if it cannot have in-betweens."""
     refuse_linked(user, binding)
     refuse_moving_deltas(user, binding, drivers)
     channels = user.channels
@@ -106,7 +106,7 @@ def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> 
     turns = [curve] if curve is not None and not curve.mute and curve.keyframe_points else []
     names = frozenset(map(PART_OF.__getitem__, keyed))
     if keyed and turns and ROWS[ROTATION].start not in left and any(key.co.y for key in turns[0].keyframe_points):
-        names |= {ROTATION}  # It turns, with keys of its rotation or without.
+        names |= {ROTATION}  # The Turns channel turns the object, even without keys of its rotation.
     rest = {
         row: 0.0 if row in driven else getattr(user.carrier, path.removeprefix(user.prefix))[index]
         for row, (path, index) in channels.items()
@@ -114,7 +114,7 @@ def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> 
     }
     reads, of_turns = read_keys(list(keyed.values())), read_keys(turns)
     rows, goes_on = list(keyed), any(read.keys.linear or read.keys.cycles is not None for read in reads)
-    axes = _said_by(of_turns)
+    axes = _marks_in(of_turns)
     return KeyedTransform(
         channels=tuple(([rows[number] for number in read.numbers], read.keys) for read in reads),
         mode=_modes_in(reads),
@@ -128,36 +128,34 @@ def _source(user: Transform, binding: Binding, drivers: Collection[Channel]) -> 
         original=user.original(),
         location_axes=user.location_axes,
         driven=frozenset(still),
-        held=_held_in(reads),
+        held=_holds_in(reads),
     )
 
 
 def _modes_in(channels: list[ReadChannels]) -> int | Marks:
-    """Return the modes that keys say, those that this version does not know as `UNKNOWN_MODE`; 0 where none says
-    any.
-    """
-    said = _said_by(channels)
+    """Return the modes that keys store, 0 if none does; modes unknown to this version become `UNKNOWN_MODE`."""
+    said = _marks_in(channels)
     if said is None:
         return 0
     numbers = np.where(np.isin(said.numbers, list(MODE_NAMES)), said.numbers, UNKNOWN_MODE)
     return int(numbers[0]) if np.all(numbers == numbers[0]) else Marks(said.frames, numbers)
 
 
-def _said_by(reads: list[ReadChannels]) -> Marks | None:
-    """Return what the marks of keys say from which frame on, as numbers from 0; None where there are none."""
+def _marks_in(reads: list[ReadChannels]) -> Marks | None:
+    """Return the marks of keys and the frames that they apply from, as numbers from 0; None if there are no marks."""
     return _on_frames(reads, [read.marks for read in reads])
 
 
-def _held_in(reads: list[ReadChannels]) -> Marks | None:
-    """Return what keys are held in from which frame on, see `marks.hold`; None where all are held in nothing."""
+def _holds_in(reads: list[ReadChannels]) -> Marks | None:
+    """Return the holds of keys and the frames that they apply from, see `marks.hold`; None if no key has a holder."""
     holds = _on_frames(reads, [read.holds + 1 for read in reads])
     return None if holds is None or not (holds.numbers >= hold(1)).any() else holds
 
 
 def _on_frames(reads: list[ReadChannels], of_keys: list[np.ndarray]) -> Marks | None:
-    """Return the numbers of keys, (c, n) for each read, 0 where they say none, from which frame on, as numbers from 0.
+    """Return numbers of keys, (c, n) for each read, from 1 (0: none), as numbers from 0 that apply from frames on.
 
-    On one frame most channels have it, or else the first of them: whoever types a setting of a key takes its mark off.
+    If channels disagree on a frame, most marked keys win, or else the first: typing into a setting removes the mark.
     """
     if not any(numbers.any() for numbers in of_keys):
         return None
@@ -170,7 +168,7 @@ def _on_frames(reads: list[ReadChannels], of_keys: list[np.ndarray]) -> Marks | 
     frames, numbers, votes = map(np.concatenate, zip(*parts, strict=True))
     order = np.argsort(frames, kind="stable")
     frames, numbers, votes = frames[order], numbers[order], votes[order]
-    # What is no number is no frame that there was, either.
+    # NaN is not a new frame.
     with np.errstate(invalid="ignore"):
         first = ~(np.diff(frames, prepend=-np.inf) <= SAME_FRAME)
     size = int(numbers.max()) + 1
@@ -181,18 +179,18 @@ def _on_frames(reads: list[ReadChannels], of_keys: list[np.ndarray]) -> Marks | 
 
 
 def is_marked(binding: Binding) -> bool:
-    """Return whether the keys of a slot say a mode, Blender's own among them."""
+    """Return whether the keys of a slot store a mode, Blender's own included."""
     return any(map(has_marks, binding.keyed))
 
 
 def modes_said(binding: Binding) -> int | Marks:
-    """Return the modes that the keys of a slot say, as a `KeyedTransform` has them."""
+    """Return the modes that the keys of a slot store, as in a `KeyedTransform`."""
     keyed = [fcurve for fcurve in binding.keyed if not fcurve.mute]
     return _modes_in(read_keys(keyed))
 
 
 def added_values(binding: Binding, user: Transform, source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
-    """Return what modifiers of the animator's add to the channels of a slot on these frames (m,), shape (10, m)."""
+    """Return the offsets that the animator's modifiers add to the channels of a slot on frames (m,), shape (10, m)."""
     added = np.zeros((10, len(frames)))
     curves = {row: binding.curves.get(channel) for row, channel in user.channels.items()}
     changed = {row: fcurve for row, fcurve in curves.items() if fcurve is not None and any(on_top(fcurve))}

@@ -1,4 +1,4 @@
-"""Why rigid motion cannot act on something: every reason, and the way out of each."""
+"""Refusals: every reason why rigid motion cannot act on something, and the way out of each."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .modifiers import on_top
 from .slots import Binding
 
 MOST_FRAMES = 250_000
-"""The longest motion that is filled in: two hours and a quarter at 30 frames a second."""
+"""The longest motion with in-betweens, in frames: two hours and a quarter at 30 frames a second."""
 
 MOST_TURNS = 1000
-"""Whole turns from one key to the next."""
+"""The largest number of whole turns from one key to the next."""
 
 ENVELOPE_MODIFIER = enum_value(bpy.types.FModifier, "type", "ENVELOPE")
-"""The code of this type of modifiers."""
+"""The code of this modifier type."""
 
 ENVELOPED_CHANNEL = n_(
     "{name}: {channel} has an Envelope modifier, which does not work with modes: mute or remove it, or bake the "
@@ -70,7 +70,7 @@ NO_SUCH_TURNS = n_(
 
 
 def refuse_drivers(user: Transform, binding: Binding, driven: Collection[int]) -> None:
-    """Raise `Refused` where any of the components of a user is driven, muted or sampled, which are given by rows."""
+    """Raise `Refused` if any of these components of a user, given by rows, is driven, muted or sampled."""
     for channel in (user.channels[row] for row in sorted(driven)):
         fcurve = binding.curves.get(channel)
         is_silent = fcurve is not None and (fcurve.mute or len(fcurve.sampled_points))
@@ -78,13 +78,13 @@ def refuse_drivers(user: Transform, binding: Binding, driven: Collection[int]) -
 
 
 def refuse_layered(user: Transform) -> None:
-    """Raise `Refused` where a user moves by an offset layer."""
+    """Raise `Refused` if a user moves by an offset layer."""
     if user.motion.base is not None:
         raise Refused(LAYERED, name=user.name)
 
 
 def refuse_linked(user: Transform, binding: Binding | None = None) -> None:
-    """Raise `Refused` where what is moved, or the Action that moves it, belongs to another file."""
+    """Raise `Refused` if the user, or the Action that moves it, belongs to another file."""
     if not user.animated.is_editable:
         raise Refused(LINKED_REFUSAL, name=user.animated.name)
     if binding is not None and not binding.slot.is_editable:
@@ -92,7 +92,7 @@ def refuse_linked(user: Transform, binding: Binding | None = None) -> None:
 
 
 def refuse_moving_deltas(user: Transform, binding: Binding, drivers: Collection[Channel]) -> None:
-    """Raise `Refused` where a delta rotation on top of a user's channels moves: its pose is none of a rigid motion."""
+    """Raise `Refused` if a delta rotation on top of a user's channels is animated: its pose is no rigid motion then."""
     path = f"delta_{user.rotation}"
     for index in range(0 if user.is_part else WIDTHS[user.rotation]):
         fcurve = binding.curves.get((path, index))
@@ -101,22 +101,22 @@ def refuse_moving_deltas(user: Transform, binding: Binding, drivers: Collection[
 
 
 def refuse_envelope(name: str, fcurve: bpy.types.FCurve) -> None:
-    """Raise `Refused` where a channel has what nothing can be put in front of."""
+    """Raise `Refused` if a channel has an Envelope modifier, which terms cannot be put in front of."""
     types = np.empty(len(fcurve.modifiers), np.int32)
-    # A look at each of them takes longer than all else.
+    # Inspecting each modifier would take longer than all else.
     fcurve.modifiers.foreach_get("type", types)
     if any(not fcurve.modifiers[number].mute for number in np.flatnonzero(types == ENVELOPE_MODIFIER).tolist()):
         raise Refused(ENVELOPED_CHANNEL, name=name, channel=_label(fcurve.data_path, fcurve.array_index))
 
 
 def refuse_tolerance(tolerance: float) -> None:
-    """Raise `Refused` where a tolerance is no finite number above zero."""
+    """Raise `Refused` unless a tolerance is a finite number above zero."""
     if not 0.0 < tolerance < np.inf:
         raise Refused(n_("the tolerance must be a number above zero, not {tolerance:g}"), tolerance=tolerance)
 
 
 def refuse_modified(name: str, binding: Binding) -> None:
-    """Raise `Refused` where modifiers or layers change what keys say, so that other keys would not say the same."""
+    """Raise `Refused` if modifiers or layers change the effect of keys, so that other keys would not give the same."""
     for user in binding.users:
         refuse_layered(user)
     if any(any(on_top(fcurve)) for fcurve in binding.curves.values()):
@@ -124,7 +124,7 @@ def refuse_modified(name: str, binding: Binding) -> None:
 
 
 def refuse_numbers(name: str, source: KeyedTransform) -> None:
-    """Raise `Refused` where the numbers of a source make no motion, or too long a one."""
+    """Raise `Refused` if the numbers of a source give no motion, or one that is too long."""
     if np.any(source.modes_at(source.keyed_frames) == UNKNOWN_MODE) if source.channels else source.mode == UNKNOWN_MODE:
         raise Refused(NO_SUCH_MODE, name=name)
     if (turns := source.turns) is not None:
@@ -137,7 +137,7 @@ def refuse_numbers(name: str, source: KeyedTransform) -> None:
         raise Refused(NOT_FINITE, name=name)
     for rows, keys in source.channels:
         if not keys.is_sound:
-            _explain_damage(name, source.order, rows, keys)
+            _refuse_damaged_key(name, source.order, rows, keys)
     frames = np.ptp((source.keyed_range, source.seen_range) if source.is_linear else source.keyed_range, axis=-1).max()
     if frames > MOST_FRAMES:
         raise Refused(TOO_LONG, name=name, frames=frames, most=MOST_FRAMES)
@@ -146,11 +146,11 @@ def refuse_numbers(name: str, source: KeyedTransform) -> None:
         raise Refused(OTHER_ROUNDS if len(rounds) == 1 else DIFFERENT_CYCLES, name=name)
 
 
-def _explain_damage(name: str, order: str | None, rows: list[int], keys: Keys) -> None:
-    """Raise `Refused` with the first key that no motion can be computed from, or that is before the one before it."""
+def _refuse_damaged_key(name: str, order: str | None, rows: list[int], keys: Keys) -> None:
+    """Raise `Refused` for the first key with invalid numbers, or on an earlier frame than the key before it."""
     settings = None if keys.easing_settings is None else np.moveaxis(keys.easing_settings, 0, -1)
     parts = [part for part in (keys.points, keys.left, keys.right, settings) if part is not None]
-    # What is no number is not smaller, either.
+    # Comparisons with NaN are false, so NaN counts as damage, too.
     damaged = ~(np.abs(np.concatenate(parts, axis=-1)) < MAX_NUMBER).all(axis=-1)
     damaged[:, 1:] |= np.diff(keys.times) < 0.0
     channel, key = np.argwhere(damaged)[0].tolist()
@@ -159,7 +159,7 @@ def _explain_damage(name: str, order: str | None, rows: list[int], keys: Keys) -
 
 
 def _label(path: str, index: int) -> str:
-    """Return a channel as the Dope Sheet names it."""
+    """Return the name of a channel in the Dope Sheet."""
     name = path.rpartition(".")[2]
     axes = "WXYZ" if WIDTHS.get(name.removeprefix("delta_")) == 4 else "XYZ"
     return f"{iface_(bpy.types.Object.bl_rna.properties[name].name)} {axes[index]}"

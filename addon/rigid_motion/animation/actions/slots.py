@@ -1,7 +1,7 @@
-"""Which Action slots move something, and the F-curves in them, transform by transform.
+"""Action slots: which ones move given objects and bones, and the F-curves in them, transform by transform.
 
 A slot may have several users, and moves transforms of each: the object itself, and the bones of a rig.
-`bindings_in_slot` is where a slot is taken apart.
+`bindings_in_slot` splits a slot into these transforms.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ Curves = dict[Channel, bpy.types.FCurve]
 
 @dataclass(frozen=True)
 class Slot:
-    """One of the slots that move something, with everything else that it moves."""
+    """A slot that moves objects, with its users and the frames that are played."""
 
     action: bpy.types.Action
     handle: int
     users: tuple[bpy.types.Object, ...]
     strips: frozenset[tuple[int, int] | None]
-    """The frames of the Action that strips show; None where it plays by itself."""
+    """The frames of the Action that NLA strips show; None stands for playing without a strip."""
 
     @property
     def key(self) -> tuple[bpy.types.Action, int]:
@@ -36,7 +36,7 @@ class Slot:
 
     @property
     def seen(self) -> tuple[int, int]:
-        """The frames that are seen: those of the strips, and of all scenes where it plays by itself."""
+        """The frames that are shown: those of the strips, and of the users' scenes if it plays without a strip."""
         spans = [strip for strip in self.strips if strip is not None]
         if None in self.strips:
             scenes = {scene for obj in self.users for scene in obj.users_scene} or set(bpy.data.scenes)
@@ -54,30 +54,30 @@ class Slot:
 
     @property
     def is_editable(self) -> bool:
-        """Return whether its Action may be written: not where that is linked, or overrides what is.
+        """Return whether its Action may be written: it must be neither linked nor a library override.
 
-        Python would be let write linked Actions, and overrides of them lose what is written when the file is opened.
+        Python is allowed to write linked Actions, and overrides of them lose the changes when the file is opened.
         """
         return self.action.is_editable and self.action.override_library is None
 
     def plays_in(self, animated: bpy.types.Object) -> bool:
-        """Return whether something moves by it outside of strips, or in the strip that is being edited."""
+        """Return whether an object plays the slot in its active Action: outside of strips, or in the edited strip."""
         data = animated.animation_data
         return data is not None and (data.action, data.action_slot_handle) == self.key
 
 
 @dataclass(frozen=True, eq=False)
 class Binding:
-    """One transform that a slot animates: of each of the slot's users the same one."""
+    """One transform that a slot animates, the same one of each of the slot's users."""
 
     slot: Slot
     prefix: str
-    """From the user to what is moved, in data paths: none for the user itself."""
+    """The data path prefix from the user to the animated bone; empty for the user itself."""
 
     users: tuple[Transform, ...]
 
     curves: Curves
-    """Its F-curves, those that were made meanwhile included."""
+    """Its F-curves, updated when F-curves are added or removed."""
 
     @property
     def channelbag(self) -> bpy.types.ActionChannelbag:
@@ -85,12 +85,12 @@ class Binding:
 
     @property
     def name(self) -> str:
-        """The name for messages: that of its first user."""
+        """The name for messages: that of the first user."""
         return self.users[0].name
 
     @property
     def moving(self) -> Curves:
-        """Its channels of location, rotation and scale, which modes are for. What it has of others is none of ours."""
+        """Its channels of location, rotation and scale, which modes act on. Others are left alone."""
         return {
             (path, index): fcurve
             for (path, index), fcurve in self.curves.items()
@@ -99,7 +99,7 @@ class Binding:
 
     @property
     def keyed(self) -> list[bpy.types.FCurve]:
-        """Those of these channels that have keys."""
+        """The channels in `moving` that have keys."""
         return [fcurve for fcurve in self.moving.values() if fcurve.keyframe_points]
 
     @property
@@ -108,7 +108,7 @@ class Binding:
         return any(fcurve.keyframe_points or fcurve.sampled_points for fcurve in self.moving.values())
 
     def ensure_curve(self, channel: Channel) -> bpy.types.FCurve:
-        """Return the F-curve of a channel, made where there is none yet."""
+        """Return the F-curve of a channel; create it if there is none."""
         fcurve = self.curves.get(channel)
         if fcurve is None:
             (path, index), fcurves = channel, self.channelbag.fcurves
@@ -122,7 +122,7 @@ class Binding:
 
 
 def bindings_in_slot(slot: Slot, prefixes: Collection[str] | None = None) -> list[Binding]:
-    """Return what a slot moves, transform by transform: these, or all that it has something of."""
+    """Return the transforms that a slot moves: those with these prefixes, or all of them."""
     curves: dict[str, Curves] = {prefix: {} for prefix in (("",) if prefixes is None else prefixes)}
     for fcurve in slot.fcurves:
         path = fcurve.data_path
@@ -139,7 +139,7 @@ def bindings_in_slot(slot: Slot, prefixes: Collection[str] | None = None) -> lis
 
 
 def bindings_of(transforms: Iterable[Transform]) -> list[Binding]:
-    """Return the slots that move these, and of each slot what is in it of them."""
+    """Return the bindings of these transforms, in all slots that move them."""
     prefixes: dict[bpy.types.Object, dict[str, None]] = {}
     for transform in transforms:
         prefixes.setdefault(transform.animated, {})[transform.prefix] = None
@@ -151,18 +151,18 @@ def bindings_of(transforms: Iterable[Transform]) -> list[Binding]:
 
 
 def bindings_in(actions: Iterable[bpy.types.Action]) -> list[Binding]:
-    """Return what these Actions move, transform by transform."""
+    """Return the bindings of these Actions, one for each transform."""
     return [binding for slot in slots_in(actions) for binding in bindings_in_slot(slot)]
 
 
 def bindings_for(transform: Transform) -> list[Binding]:
-    """Return what moves a transform, as if nothing else used the same slots: without a look at other objects."""
+    """Return the bindings of a transform, without other users of the same slots: no other objects are visited."""
     slots = slots_alone(transform.animated)
     return [binding for slot in slots for binding in bindings_in_slot(slot, (transform.prefix,))]
 
 
 def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
-    """Return the slots that move these objects, in Actions of their own and in NLA strips; each once."""
+    """Return the slots that move these objects, in their active Actions and in NLA strips; each slot once."""
     desired = {slot.key for obj in objects for slot in slots_alone(obj)}
     return [slot for slot in slots_in(action for action, _ in desired) if slot.key in desired]
 
@@ -170,13 +170,13 @@ def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
 def slots_in(actions: Iterable[bpy.types.Action]) -> list[Slot]:
     """Return the slots of these Actions that move an object.
 
-    They are ordered by the names of their users, and those of one user from the bottom of its NLA to the top: what
-    depends on the order comes out the same whichever was edited.
+    Slots are ordered by the names of their users, and for one user from the bottom of its NLA to the top. So any result
+    that depends on the order is the same, no matter which object was edited.
     """
     actions = set(actions)
     if not actions:
         return []
-    # A slot's own list of users may have some that are gone, which crashes Blender 5.2.
+    # A slot's own list of users may contain deleted objects, which crashes Blender 5.2.
     owners = bpy.data.user_map(subset=actions, key_types={"ACTION"}, value_types={"OBJECT"})
     same: dict[tuple[bpy.types.Action, int], list[Slot]] = {}
     for obj in sorted(set().union(*owners.values()), key=lambda obj: obj.name_full):
@@ -190,12 +190,12 @@ def slots_in(actions: Iterable[bpy.types.Action]) -> list[Slot]:
 
 
 def slots_alone(obj: bpy.types.Object) -> list[Slot]:
-    """Return the slots that move an object, as if nothing else used them."""
+    """Return the slots that move an object, ignoring other users of the same slots."""
     data = obj.animation_data
     if data is None:
         return []
     result: dict[tuple[bpy.types.Action, int], set[tuple[int, int] | None]] = {}
-    # Some of Blender's operators leave the handle of a slot that is no longer there.
+    # Some of Blender's operators leave the handle of a deleted slot behind.
     if data.action is not None and (slot := data.action_slot) is not None:
         result[data.action, slot.handle] = {None}
     for strip in strips_in(data.nla_tracks):
@@ -206,12 +206,12 @@ def slots_alone(obj: bpy.types.Object) -> list[Slot]:
 
 
 def active_fcurves(animated: bpy.types.Object) -> Iterable[bpy.types.FCurve]:
-    """Return the F-curves of an object's slot, without a look at anything else in the file."""
+    """Return the F-curves of an object's active slot, without visiting anything else in the file."""
     return next((slot.fcurves for slot in slots_alone(animated) if slot.plays_in(animated)), ())
 
 
 def strips_in(owners: Iterable[bpy.types.NlaTrack | bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
-    """Yield the strips in NLA tracks, and those in strips of strips."""
+    """Yield the strips in NLA tracks, including strips nested in meta strips."""
     for owner in owners:
         for strip in owner.strips:
             yield strip
