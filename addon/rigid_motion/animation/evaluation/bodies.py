@@ -1,8 +1,8 @@
-"""From channels to rows of values, and to the poses of a body.
+"""Body poses: from channel values to the poses of a body, and its progress in each segment.
 
-Values are rows of components, each of many sources behind the other. Progress in a segment is the share of the chord
-over all channels that modes change, a radian counting as much as a unit of length. Where none of them changes, and the
-body makes whole turns all the same, it is what the interpolation of the keys says.
+Values are rows of components; the values of several sources follow each other in each row. Progress in a segment is the
+fraction of the chord over all channels that modes change, with a radian counting as one unit of length. If none of
+these channels changes, but the body makes whole turns, progress follows the interpolation of the keys.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ from .components import AXIS_ANGLE, LOCATION, ROTATION, ROWS, SCALE
 from .sources import KeyedTransform, sampled
 
 LEAST_SCALE = 1e-3
-"""The least scale whose growth is measured."""
+"""Smaller scales count as this one when growth is measured."""
 
 NO_AXIS = 1e-35
-"""The square of the length up to which an axis is none, and turns by nothing: Blender's."""
+"""The squared length up to which an axis counts as none and gives no rotation, as in Blender."""
 
 
 def channels_at_ends(segments: list[tuple[KeyedTransform, slice]]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the channels' own values where each segment starts and where it ends, (10, S) each."""
+    """Return the channels' own values at the start and at the end of each segment, (10, S) each."""
     starts, ends = zip(*(source.bounds for source, _ in segments), strict=True)
     return sampled(segments, starts), sampled(segments, ends)
 
 
 def progress_weights(start: np.ndarray, end: np.ndarray, like: KeyedTransform) -> tuple[np.ndarray, np.ndarray]:
-    """Return what the progress in S segments is made of: weights of channels (10, S), and what to take off, (S,).
+    """Return the weights of channels (10, S) that give the progress in S segments, and the offsets to subtract, (S,).
 
-    A scale has a say only if the modes change it.
+    Scale counts only if the modes change it.
     """
     chord = end - start
     chord[ROWS[SCALE]] *= like.uniform_scale
     weights = chord.copy()
     if like.order is None:
-        # A unit quaternion moves by half of the angle that the object turns.
+        # A unit quaternion moves by half the angle of the rotation.
         weights[ROWS[ROTATION]] *= 4.0
     total = np.einsum("rs,rs->s", weights, chord)
     weights /= np.where(total > MAX_SAME_POSE_CHANGE**2, total, np.inf)
@@ -50,10 +50,10 @@ def progress_weights(start: np.ndarray, end: np.ndarray, like: KeyedTransform) -
 
 
 def idle_progress(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
-    """Return how far segments have come on rising frames (m,) where no channel changes: as their keys are interpolated.
+    """Return progress on rising frames (m,) in segments where no channel changes: it follows the keys' interpolation.
 
-    It is that of a value with the keys of the first channel that modes change, or else of all, which goes up by one
-    from each to the next, and rests at a key where handles are.
+    Progress is that of a value that rises by one from each key to the next, and rests at keys with handles. It uses the
+    keys of the first channel that modes change, or else of the first channel.
     """
     numbered_rows = [(row, place, keys) for rows, keys in source.channels for place, row in enumerate(rows)]
     _, place, keys = min(numbered_rows, key=lambda one: (one[0] not in source.filled_rows, one[0]))
@@ -75,7 +75,7 @@ def idle_progress(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
 
 
 def turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:
-    """Put unit quaternions in place of what the channels (10, m) turn by."""
+    """Replace the rotation in channels (10, m) by unit quaternions, in place."""
     turns = rows[ROWS[ROTATION]]
     if order == AXIS_ANGLE:
         squared = np.einsum("rm,rm->m", turns[1:], turns[1:])
@@ -88,15 +88,15 @@ def turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:
         return
     lengths = np.sqrt(np.einsum("rm,rm->m", turns, turns))
     if not lengths.all():
-        # Blender turns by half a turn about x where a quaternion has no length.
+        # Blender rotates by half a turn about X if a quaternion has no length.
         turns[1, lengths == 0.0] = lengths[lengths == 0.0] = 1.0
     turns /= lengths
 
 
 def body_poses(rows: np.ndarray, original: np.ndarray, axes: np.ndarray | None, source: KeyedTransform) -> Poses:
-    """Return the poses (S, k) of S segments that channels (10, S, k) give.
+    """Return the poses (S, k) of S segments for channels (10, S, k).
 
-    With the objects' own delta transforms (10, S, 1), and along the axes (S, 3, 3) that location has.
+    They include the objects' own delta transforms (10, S, 1); `axes` (S, 3, 3) are those that location runs along.
     """
     flat = rows.reshape(len(rows), -1).copy()
     turn_into_quaternions(flat, source.order)
@@ -110,18 +110,18 @@ def body_poses(rows: np.ndarray, original: np.ndarray, axes: np.ndarray | None, 
 
 
 def between(first: Poses, second: Poses, *, shortest: bool = True) -> np.ndarray:
-    """Return the twists from poses (n,) to others, and the growth of log scale, shape (7, n)."""
+    """Return the twists from poses (n,) to other poses, and the growth of log scale, shape (7, n)."""
     rows = np.zeros((7, len(first.positions)))
     ends = first.positions, first.quaternions, second.positions, second.quaternions
     rows[:6] = twists.between(*ends, shortest=shortest)
     if first.scales is not None and second.scales is not None:
-        # Blender's own in-betweens may pass 0.
+        # Blender's own in-betweens may pass through 0.
         rows[6] = np.log(np.maximum(second.scales, LEAST_SCALE) / np.maximum(first.scales, LEAST_SCALE))
     return rows
 
 
 def location_axes(sources: Sequence[KeyedTransform], owners: np.ndarray) -> np.ndarray | None:
-    """Return the axes that the location of each segment runs along, (S, 3, 3), None where all have their own."""
+    """Return the axes that the location of each segment runs along, (S, 3, 3); None if all have their own axes."""
     if all(source.location_axes is None for source in sources):
         return None
     same = np.eye(3)

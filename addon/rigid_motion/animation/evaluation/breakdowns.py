@@ -1,11 +1,11 @@
-"""Breakdowns: keys that lie on the path of a mode between the keys around them, instead of shaping it.
+"""Breakdowns: keys that lie on the path of a mode between the neighbouring keys, instead of shaping the path.
 
-The path of a smooth mode or of a blend of motors is another one where a key more lies on it. A key that is inserted on
-an in-between would so change the motion around it. Of type *Breakdown* it leaves the path as it is, and tells only when
-the body is there; moved off the path it takes the path along, smoothly where the mode is.
+One more key on the path of a smooth mode or of a blend of motors changes that path. So a key inserted on an in-between
+would change the motion around it. A key of type *Breakdown* leaves the path unchanged, and only sets when the body is
+there. When moved off the path, it takes the path along, smoothly if the mode is smooth.
 
-A path has P segments, of S from key to key. How far a key has come along its path is where that is nearest to it, a
-radian counting as much as a unit of length.
+Paths have P segments, which breakdowns divide into S segments from key to key. The progress of a key along its path is
+where the path is nearest to the key, with a radian counting as one unit of length.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from ...motion.quaternions import multiply, rotate
 from .bodies import between
 
 COARSE_PROGRESS = np.linspace(-0.25, 1.25, 49)
-"""Progress at which a path is first compared with a key: an easing may pass both ends."""
+"""Progress at which a path is first compared with a key: easing may overshoot both ends."""
 
 FINE_OFFSETS = np.linspace(-1.0, 1.0, 9)
-"""Around the best of these it is compared on nine more, in the distance of two of them, over and over."""
+"""Offsets from the best progress so far that each refinement tries, in steps that shrink to a quarter each round."""
 
 REFINEMENT_ROUNDS = 14
-"""How often: to more digits than single precision has."""
+"""The number of refinements: enough for more digits than single precision has."""
 
 PosesAt = Callable[[np.ndarray, np.ndarray], Poses]
-"""From counts (P,) and progress (m,) to the poses (m,) on paths."""
+"""From the number of samples on each path segment (P,) and their progress (m,) to the poses (m,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,25 +37,25 @@ class Passages:
     """How S segments from key to key lie on the P segments of paths."""
 
     first: np.ndarray
-    """The first of the segments on each segment of a path, and the end, shape (P + 1,)."""
+    """The index of the first segment on each segment of a path, and the total at the end, shape (P + 1,)."""
 
     progress: np.ndarray
-    """The progress along its segment of the path where each of the segments starts and ends, shape (2, S)."""
+    """The progress along the path segment at the start and the end of each segment, shape (2, S)."""
 
     offsets: Poses
-    """The difference from the path where each of the segments starts, in the body's own axes, shape (S,)."""
+    """The offset from the path at the start of each segment, in the body's own axes, shape (S,)."""
 
     changes: np.ndarray
-    """The twists by which that changes up to its end, and the growth of log scale, shape (7, S)."""
+    """The twist that changes the offset up to the end of each segment, and the growth of log scale, shape (7, S)."""
 
     smooth: np.ndarray
-    """True if it changes without a corner, shape (S,)."""
+    """True if the offset changes without a corner, shape (S,)."""
 
     @classmethod
     def of(cls, passed: np.ndarray, keys: Poses, poses_at: PosesAt, smooth: np.ndarray) -> Passages:
-        """Find where keys (S, 2) at both ends of segments are on their paths.
+        """Find the progress of keys (S, 2), at both ends of segments, on their paths.
 
-        `passed` (S,) says which of the segments start with a key that lies on a path, `smooth` (P,) is that of paths.
+        `passed` (S,) says which segments start with a key that lies on a path, `smooth` (P,) which paths are smooth.
         """
         first = np.append(np.flatnonzero(~passed), len(passed))
         owners = np.repeat(np.arange(len(first) - 1), np.diff(first))
@@ -66,21 +66,23 @@ class Passages:
         at, off = _nearest(keys[inner, 0], many, poses_at)
         progress[0, inner] = progress[1, inner - 1] = at
         offs[0][:, inner] = offs[1][:, inner - 1] = off
-        offsets, ends = (_moved(offset) for offset in offs)
+        offsets, ends = (_poses_of_twists(offset) for offset in offs)
         changes = np.concatenate((between(offsets, ends)[:6], offs[1, 6:] - offs[0, 6:]))
         return cls(first, progress, offsets, changes, smooth[owners])
 
     def along(self, counts: np.ndarray, progress: np.ndarray) -> tuple[np.ndarray, Poses]:
-        """Return progress (m,) along paths, and how far off it the body is, from that in segments with counts (S,)."""
+        """Return progress along paths and offsets from them, (m,) each, for samples at `progress`, `counts` of each."""
         begin, end = self.progress.repeat(counts, axis=1)
         share = np.clip(progress, 0.0, 1.0)
         share = np.where(self.smooth.repeat(counts), share * share * (3.0 - 2.0 * share), share)
         offsets = self.offsets[np.arange(len(self.smooth)).repeat(counts)]
-        return begin + (end - begin) * progress, moved_by(offsets, _moved(share * self.changes.repeat(counts, axis=1)))
+        return begin + (end - begin) * progress, moved_by(
+            offsets, _poses_of_twists(share * self.changes.repeat(counts, axis=1))
+        )
 
 
 def moved_by(poses: Poses, moves: Poses) -> Poses:
-    """Return poses (m,) after moves (m,) along the body's own axes."""
+    """Return poses (m,) moved by motions (m,) in the body's own axes."""
     return replace(
         poses,
         positions=poses.positions + rotate(poses.quaternions, moves.positions),
@@ -90,9 +92,9 @@ def moved_by(poses: Poses, moves: Poses) -> Poses:
 
 
 def _nearest(keys: Poses, counts: np.ndarray, poses_at: PosesAt) -> tuple[np.ndarray, np.ndarray]:
-    """Return where paths are nearest to keys (k,), and the twists and log scale (7, k) from there to the keys.
+    """Return the progress at which paths are nearest to keys (k,), and the twists and log scale (7, k) from there.
 
-    `counts` are those of the keys on each path.
+    `counts` are the numbers of keys on each path.
     """
     many = np.repeat(np.arange(len(counts)), counts)
 
@@ -112,7 +114,7 @@ def _nearest(keys: Poses, counts: np.ndarray, poses_at: PosesAt) -> tuple[np.nda
     return best[:, 0], off(best)[..., 0]
 
 
-def _moved(rows: np.ndarray) -> Poses:
-    """Return the motions (n,) of twists and growths of log scale (7, n)."""
+def _poses_of_twists(rows: np.ndarray) -> Poses:
+    """Return the motions (n,) for twists and growths of log scale (7, n)."""
     quaternions, translations = twists.exponential(rows[:6])
     return Poses(translations.T, quaternions.T, np.exp(rows[6]))

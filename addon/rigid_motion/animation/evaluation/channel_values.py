@@ -1,9 +1,9 @@
-"""From the poses of a body to values of its channels: quaternions, Euler angles, or an angle about an axis.
+"""Channel values: convert the poses of a body to quaternions, Euler angles, or an angle about an axis.
 
-Each rotation has many values that turn alike. Those of a segment are continuous, and begin as its first key has them.
-That does not depend on which moments are asked for: values are followed from the key on, in steps of their own.
+Many channel values give the same rotation. In a segment, values are continuous and start with those of its first key.
+They do not depend on which moments are sampled: values are tracked from that key in fixed steps of their own.
 
-All arrays are of samples m, which stand in segments S one behind the other, in each of them at rising progress.
+All arrays hold m samples in S segments, one segment after the other, with rising progress in each.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from .components import AXIS_ANGLE, LOCATION, REST_COMPONENTS, ROTATION, ROWS, S
 from .marks import FULL_TURN
 
 TURN_STEPS = 12
-"""Steps in which a rotation is followed from key to key, and once more for each turn that it makes."""
+"""The number of steps in which a rotation is tracked from key to key, plus as many for each whole turn."""
 
 MOST_STEPS = 4096
-"""The most steps in a segment, whose body may go on turning far beyond its keys."""
+"""The largest number of steps to either side of a segment's first key: a body may turn far beyond its keys."""
 
 NO_TURN = 1e-9
 """The sine of half an angle below which a rotation has no axis."""
 
 MIN_LENGTH_RATIO = 0.5
-"""Beyond keys lengths that differ get no shorter than this part of the shorter one."""
+"""Outside the keys, a length that changes never falls below this fraction of the shorter key."""
 
 
 def steps_of(
     counts: np.ndarray, progress: np.ndarray, turns: np.ndarray, order: str | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the steps in which rotations are followed: how many there are in each segment (S,), and their progress.
+    """Return the steps in which rotations are tracked: their number in each segment (S,), and their progress.
 
-    Segments without samples have none. Each of the others has one at progress 0.
+    Segments without samples have no steps. All others have one at progress 0.
     """
     used = counts > 0
     if order is None:
-        # What the modes make of quaternions is continuous.
+        # The quaternions of the modes are continuous.
         return used.astype(int), np.zeros(np.count_nonzero(used))
     starts = np.concatenate(((0,), np.cumsum(counts[used])[:-1]))
     density = TURN_STEPS * (1.0 + np.abs(turns[used]))
@@ -61,22 +61,22 @@ def channel_values(
     order: str | None,
     is_step: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return what the channels have to be for these poses, shape (10, m).
+    """Return the channel values that give these poses, shape (10, m).
 
     Parameters
     ----------
     poses : Poses, shape (m,)
-        Positions run along the axes that location does.
+        Positions are along the axes that location runs along.
     counts : array of int, shape (S,)
     progress : array, shape (m,)
-        0 on the first sample that is at the key, of each segment with any.
+        0 at the key, which each segment with samples must have at least once.
     ends : array, shape (2, 10, S)
-        The channels at both keys.
+        The channels at both keys of each segment.
     original : array, shape (10, S)
         The objects' own delta transforms.
     order : str or None
     is_step : array of bool, shape (m,), optional
-        Which of the samples are those of `steps_of`; all of them if it is not given.
+        Which samples are those of `steps_of`; all of them if not given.
     """
     rows = np.zeros((10, len(progress)))
     rows[ROWS[LOCATION]] = poses.positions.T - original[ROWS[LOCATION]].repeat(counts, axis=1)
@@ -99,7 +99,7 @@ def channel_values(
         rotation[1:] *= _lengths(first[1:], last[1:], many, progress)
     else:
         angles = _eulers(turns, many, starts, steps, order)
-        # Both triples of angles that turn alike, with whole turns.
+        # Both triples of angles for the same rotation, with whole turns.
         offsets = [_whole_turns(first[:3] - both[:, keys]) for both in (angles, other_angles(angles, order))]
         others = other_angles(angles, order)
         misses = [
@@ -112,37 +112,37 @@ def channel_values(
     return rows
 
 
-def _before(many: np.ndarray, starts: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Return for each of the samples the number of the step before it, of the first one of its segment before all."""
+def _preceding_steps(many: np.ndarray, starts: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return the index of the step at or before each sample; before the first step of a segment, that step."""
     passed = np.searchsorted(steps, np.arange(many.sum()), side="right") - 1
     return np.maximum(passed, np.searchsorted(steps, starts).repeat(many))
 
 
 def _eulers(turns: np.ndarray, many: np.ndarray, starts: np.ndarray, steps: np.ndarray, order: str) -> np.ndarray:
-    """Return Euler angles (3, m) of unit quaternions (m, 4), each of the triples that is nearest to the step before it.
+    """Return Euler angles (3, m) of unit quaternions (m, 4): for each, the triple nearest to the step before it.
 
-    So they are the same whichever other samples there are, also where gimbal lock is near and angles are fast.
+    So angles do not depend on the other samples, even near gimbal lock, where they are fast.
     """
     angles = extrinsic_eulers_from_quaternions(turns, order, starts.tolist()).T
     if len(steps) == len(turns):
         return angles
     of_steps = extrinsic_eulers_from_quaternions(turns[steps], order, np.searchsorted(steps, starts).tolist()).T
-    near = of_steps[:, _before(many, starts, steps)]
+    near = of_steps[:, _preceding_steps(many, starts, steps)]
     i, j, k = ("XYZ".index(axis) for axis in order)
     sign = (i - j) * (j - k) * (k - i) // 2
-    # Triples that turn alike differ by half turns in the half sum and the half difference of the outer angles.
+    # Triples for the same rotation differ by half turns in half the sum and half the difference of the outer angles.
     outer, outer_near = sign * angles[k], sign * near[k]
     by_sum = np.rint((outer_near + near[i] - outer - angles[i]) / FULL_TURN)
     by_difference = np.rint((outer_near - near[i] - outer + angles[i]) / FULL_TURN)
     angles = np.where((by_sum + by_difference) % 2 == 1, other_angles(angles, order), angles)
     angles += _whole_turns(near - angles)
-    # At gimbal lock, as at a key, some of them are free: that of the steps does not depend on other samples.
+    # At gimbal lock, as at a key, some angles are free: those of the steps do not depend on other samples.
     angles[:, steps] = of_steps
     return angles
 
 
 def other_angles(angles: np.ndarray, order: str) -> np.ndarray:
-    """Return the other Euler angles (3, ...) that turn alike: half a turn more outside, less in the middle."""
+    """Return the other Euler angles (3, ...) of the same rotation: outer ones plus pi, pi minus the middle one."""
     others = angles + np.pi
     middle = "XYZ".index(order[1])
     others[middle] = np.pi - angles[middle]
@@ -154,7 +154,7 @@ def _whole_turns(angles: np.ndarray) -> np.ndarray:
 
 
 def _lengths(first: np.ndarray, last: np.ndarray, many: np.ndarray, progress: np.ndarray) -> np.ndarray:
-    """Return lengths (m,) that run evenly between those of vectors (., s), where these have any."""
+    """Return lengths (m,) that change linearly between those of vectors (., s); zero vectors count as length 1."""
     begin, end = (np.sqrt(np.einsum("ks,ks->s", key, key)) for key in (first, last))
     begin, end = (np.where(length > 0.0, length, 1.0) for length in (begin, end))
     least = (MIN_LENGTH_RATIO * np.minimum(begin, end)).repeat(many)
@@ -164,17 +164,17 @@ def _lengths(first: np.ndarray, last: np.ndarray, many: np.ndarray, progress: np
 def _axis_angles(
     turns: np.ndarray, many: np.ndarray, starts: np.ndarray, keys: np.ndarray, first: np.ndarray, steps: np.ndarray
 ) -> np.ndarray:
-    """Return angles and unit axes (4, m) of unit quaternions (m, 4), which go on from those at keys (4, s).
+    """Return angles and unit axes (4, m) of unit quaternions (m, 4), continuing those at keys (4, s).
 
-    Where a body hardly turns an axis may swing round between two samples. So the sense of each is that of the step
-    before it, whichever other samples there are.
+    While a body hardly turns, its axis may swing round between two samples. So the sign of each axis follows the step
+    before it, independent of the other samples.
     """
     w, vectors = turns[:, 0], turns[:, 1:].T
     sines = np.sqrt(np.einsum("km,km->m", vectors, vectors))
     is_free = sines < NO_TURN
     axes = vectors / np.where(is_free, 1.0, sines)
     if is_free.any():
-        # What does not turn has the axis of its neighbour, which is better than another one.
+        # A sample without rotation takes the axis of its neighbour, which is better than an arbitrary one.
         every = np.arange(len(w))
         at = np.maximum.accumulate(np.where(is_free, -1, every))
         behind = np.minimum.accumulate(np.where(is_free, len(w), every)[::-1])[::-1]
@@ -182,7 +182,7 @@ def _axis_angles(
         near = np.where(at >= floor, at, np.where(behind < top, behind, -1))
         keyed = first[1:] / np.maximum(np.sqrt(np.einsum("ks,ks->s", first[1:], first[1:])), NO_TURN)
         axes = np.where(near >= 0, axes[:, near], keyed.repeat(many, axis=1))
-    before, owners = _before(many, starts, steps), np.arange(len(many)).repeat(many)[steps]
+    before, owners = _preceding_steps(many, starts, steps), np.arange(len(many)).repeat(many)[steps]
     flips = np.einsum("km,km->m", axes[:, steps[1:]], axes[:, steps[:-1]]) < 0.0
     passed = np.concatenate(((0,), np.cumsum(flips & (owners[1:] == owners[:-1]))))
     is_against = np.einsum("km,km->m", axes, axes[:, steps[before]]) < 0.0
@@ -198,10 +198,10 @@ def _axis_angles(
 
 
 def rotation_values(quaternions: np.ndarray, first: np.ndarray, order: str | None) -> np.ndarray:
-    """Return a motion's rotations (m, 4) as the rows of channels, the first as near to `first` (4,) as may be, (4, m).
+    """Return rotations (m, 4) as the rows of channels (4, m), starting as near to `first` (4,) as possible.
 
-    The order is None for quaternions, which stay as long as they are and of which the first one stays, AXIS_ANGLE, or
-    that of Euler angles, which have the first three rows.
+    The order is None for quaternions (lengths and the first sign are kept), AXIS_ANGLE, or an order of
+    Euler angles in the first three rows.
     """
     if order is None:
         return align_signs(quaternions).T

@@ -1,13 +1,13 @@
-"""From what was keyed to what is to happen between the keys, and to the values that make channels do it.
+"""Differences: the values to add to the channels of sources so that they follow their modes between keys.
 
-Arrays alone, many sources at once: the ten components of location, rotation and scale are rows, and the samples (or
-segments, or keys) of all sources stand one behind the other along the last axis. A segment runs from one frame that has
-a key in any channel that modes change to the next. How far the object has come in it is what Blender's own in-betweens
-say: their share of the chord over all of these. So a segment follows the easing, the handles and the overshoot of its
-keys, whatever its mode. A smooth mode has a timing of its own, even from key to key, and that is kept where keys are
-not eased: handles shape single channels, and it is in their place.
+Works on arrays alone, many sources at once: the ten components of location, rotation and scale are rows, and the
+samples (or segments, or keys) of all sources follow each other along the last axis. A segment runs from one frame with
+a key in any channel that modes change to the next such frame. Progress in a segment is that of Blender's own
+in-betweens: their fraction of the chord over all these channels. So a segment follows the easing, the handles and the
+overshoot of its keys in any mode. A smooth mode has a timing of its own, even from key to key, which is used if keys
+are not eased: it takes the place of handles, which shape single channels.
 
-What is added to channels repeats with them: it is worked out for the first round of cycles.
+The added values repeat with the channels: they are computed for the first round of cycles.
 """
 
 from __future__ import annotations
@@ -29,20 +29,21 @@ from .ends import SLOPE_MOMENTS, Ends, corrected, packed
 from .sources import KeyedTransform, each, sampled, values_of
 
 MOST_PREPARED = 4
-"""Motions of as many groups of sources stay prepared: each round of planning asks for other frames of the same ones."""
+"""The number of groups of sources with prepared motion: each planning round asks for other frames of the same ones."""
 
 
 class InBetweens(NamedTuple):
-    """The motion of one source as a body, with the delta transforms that the object has anyway; poses are (m,).
+    """The motion of one source as a body, including the object's delta transforms; poses are (m,).
 
-    It is in the space of the channels; but where location runs along other axes than the body's at rest, in those.
+    Poses are in the space of the channels; along the axes of location if these differ from the body's axes at
+    rest.
     """
 
     native: Poses
-    """What Blender's own in-betweens make of the keys."""
+    """The poses of Blender's own in-betweens."""
 
     desired: Poses
-    """What the modes make of them."""
+    """The poses of the modes."""
 
 
 def in_betweens(
@@ -55,13 +56,13 @@ def in_betweens(
     source : Source
     frames : array, shape (m,)
     mode : str, optional
-        One of `MODE_IDS` for all segments, instead of the modes that they have.
+        One of `MODE_IDS`, used for all segments instead of their own modes.
     progress : array, shape (m,), optional
-        How far the body has come in its segment on these frames, 0 to 1 and beyond, instead of what the channels say.
+        Progress in the segment on these frames, 0 to 1 and beyond, instead of that of the channels.
     """
     frames = np.asarray(frames, dtype=np.float64)
     chosen = source if mode is None else replace(source, mode=MODE_NUMBERS[mode])
-    native, difference = _both(chosen, frames, progress)
+    native, difference = _native_and_difference(chosen, frames, progress)
     axes = None if source.location_axes is None else source.location_axes[None]
 
     def moved(rows: np.ndarray) -> Poses:
@@ -74,14 +75,14 @@ def in_betweens(
 
 
 def seen_values(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
-    """Return the values that channels are to have on any rising frames (m,), shape (10, m)."""
-    return np.add(*_both(source, np.asarray(frames, dtype=np.float64)))
+    """Return the values that the modes give channels on any rising frames (m,), shape (10, m)."""
+    return np.add(*_native_and_difference(source, np.asarray(frames, dtype=np.float64)))
 
 
-def _both(
+def _native_and_difference(
     source: KeyedTransform, frames: np.ndarray, progress: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the channels' own values and what is to be added, (10, m) each, also outside of spans."""
+    """Return the channels' own values and the values to add, (10, m) each, also outside of spans."""
     (native,) = values_of([source], [frames])
     folded, order = frames, np.arange(len(frames))
     if source.cyclic is not None:
@@ -94,9 +95,9 @@ def _both(
 
 
 def progress_at(sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Return how far along its segment of the path, 0 to 1, each source is on rising frames of its own, (m,)."""
+    """Return the progress of each source along its path segment, 0 to 1, on its own rising frames, (m,) each."""
     result: dict[int, np.ndarray] = {}
-    for numbers in _alike(sources):
+    for numbers in _groups_of_similar(sources):
         motion = _Motion.of([sources[number] for number in numbers])
         _, counts, along, _ = motion.moments([frames[number] for number in numbers], None)
         if motion.passages is not None:
@@ -109,29 +110,29 @@ def progress_at(sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray])
 def channel_differences(
     sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray], given: np.ndarray | None = None
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return what is to be added to the channels of each source, and the values that they have by themselves.
+    """Return the values to add to the channels of each source, and the channels' own values.
 
     Parameters
     ----------
     sources : sequence of Source
     frames : sequence of array, shape (m,)
-        Rising doubles for each. Those that are not inside of `spans` have no difference.
+        Rising float64 frames for each source. Frames outside of `spans` have no difference.
     given : array, shape (m,), optional
-        How far the body of the only source has come in its segment.
+        Progress in the segment, if there is only one source.
 
     Returns
     -------
     list of pairs of array, shape (10, m)
-        Both together are the values that channels are to have: quaternions as long as those of the keys, evenly from
-        one to the other, continuous in each span and in the sign that the key at its beginning has; angles
-        continuous, and nearest to those of the key at the beginning. Rows that are not filled have no difference.
+        Their sum is the desired channel values. Quaternions have lengths that change evenly between those of the keys,
+            are continuous in each span, and start with the sign of the first key. Angles are continuous, and nearest to
+            those of the key at the start. Rows that are not filled have no difference.
     """
     if any(source.switches for source in sources):
         return _differences_of_runs(sources, frames, given)
     differences = [np.zeros((10, len(times))) for times in frames]
     natives: dict[int, np.ndarray] = {}
     acting = [number for number, source in enumerate(sources) if source.is_live and source.is_repeatable]
-    for portion in _alike([sources[number] for number in acting]):
+    for portion in _groups_of_similar([sources[number] for number in acting]):
         numbers = [acting[place] for place in portion]
         some, times = [sources[number] for number in numbers], [frames[number] for number in numbers]
         values, native, live = _prepared(*some).values(times, given)
@@ -148,7 +149,7 @@ def channel_differences(
 def _differences_of_runs(
     sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray], given: np.ndarray | None
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return `channel_differences` of sources, some of which pass from one holder to another: each run by itself."""
+    """Return `channel_differences` of sources that may switch holders: each run is evaluated by itself."""
     runs = [(number, run) for number, source in enumerate(sources) for run in source.runs]
     bounds = [frames[number].searchsorted((run.stretch.first, run.stretch.until)) for number, run in runs]
     parts = [
@@ -174,9 +175,9 @@ def _differences_of_runs(
     return list(zip(differences, natives, strict=True))
 
 
-def _alike(sources: Sequence[KeyedTransform]) -> list[list[int]]:
-    """Return the numbers of the sources that are worked on together: those that turn and scale alike,
-    and have keys that are passed or not.
+def _groups_of_similar(sources: Sequence[KeyedTransform]) -> list[list[int]]:
+    """Return groups of source numbers that are evaluated together: same rotation order, same treatment of scale, and
+    with or without passed keys.
     """
     alike: dict[tuple, list[int]] = {}
     for number, source in enumerate(sources):
@@ -186,14 +187,14 @@ def _alike(sources: Sequence[KeyedTransform]) -> list[list[int]]:
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """The motion of alike sources in S segments from key to key, on P segments of paths: those that pass keys."""
+    """The motion of similar sources in S segments from key to key, on P path segments, which may pass keys."""
 
     sources: list[KeyedTransform]
     modes: np.ndarray
-    """Of the segments, shape (S,)."""
+    """The numbers of the segments' modes, shape (S,)."""
 
     ends: Ends
-    """Of the paths' segments."""
+    """The ends of the path segments."""
 
     channels: np.ndarray
     """The channels' own values at both ends of segments, shape (2, 10, S)."""
@@ -202,19 +203,19 @@ class _Motion:
     """See `progress_weights`, shape (10, S)."""
 
     offsets: np.ndarray
-    """Shape (S,)."""
+    """The offsets to subtract from progress, shape (S,)."""
 
     lacks: np.ndarray | None
-    """The slopes that progress lacks at both ends, shape (2, S); None where it lacks nothing."""
+    """The slopes that progress lacks at both ends, shape (2, S); None if it lacks none."""
 
     idle: np.ndarray
-    """Which segments turn although no channel changes, shape (S,)."""
+    """True for segments that turn although no channel changes, shape (S,)."""
 
     passages: Passages | None
 
     @classmethod
     def of(cls, sources: Sequence[KeyedTransform]) -> _Motion:
-        """Prepare for the motion of sources that turn and scale alike."""
+        """Prepare the motion of sources with the same rotation order and treatment of scale."""
         sources = [source.looped for source in sources]
         paths = [source.path for source in sources]
         segments = _segments(paths)
@@ -246,7 +247,7 @@ class _Motion:
     def _passing(
         cls, sources: list[KeyedTransform], modes: np.ndarray, ends: Ends, lacks: np.ndarray | None
     ) -> _Motion:
-        """Return the motion of sources with keys that their paths, whose segments have these modes and ends, pass."""
+        """Return the motion of sources whose paths, with these modes and ends of segments, pass some of their keys."""
         segments = _segments(sources)
         bounds = channels_at_ends(segments)
         passed = np.concatenate([source.passed[:-1] for source in sources])
@@ -261,14 +262,14 @@ class _Motion:
 
     @property
     def owners(self) -> np.ndarray:
-        """The number of the source of each segment, shape (S,)."""
+        """The index of the source of each segment, shape (S,)."""
         return self.ends.owners if self.passages is None else self.ends.owners.repeat(np.diff(self.passages.first))
 
     def moments(
         self, frames: Sequence[np.ndarray], given: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return what channels have on rising frames of each source, (10, m), how many frames segments have, (S,), how
-        far these have come, (m,), and whether a mode acts, (m,): not on keys, in holds, or where channels stand still.
+        """Return the channels' own values on rising frames of each source, (10, m), the number of frames per segment,
+        (S,), the progress, (m,), and whether a mode acts, (m,): not on keys, in holds, or where channels stand still.
         """
         sources, samples = self.sources, each(self.sources, map(len, frames))
         every_frame = np.concatenate(frames)
@@ -297,9 +298,9 @@ class _Motion:
     def values(
         self, frames: Sequence[np.ndarray], given: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what channels are to have on rising frames of each source, and have by themselves, (10, m) each.
+        """Return the desired and the channels' own values on rising frames of each source, (10, m) each.
 
-        And where a mode acts, (m,).
+        Also returns whether a mode acts, (m,).
         """
         native, every, progress, acts = self.moments(frames, given)
         order, live, values = self.sources[0].order, np.flatnonzero(acts), np.zeros((10, len(acts)))
@@ -327,7 +328,7 @@ class _Motion:
         return values, native, acts
 
     def _poses(self, counts: np.ndarray, progress: np.ndarray) -> Poses:
-        """Return the poses (m,) in segments, counts[i] in the i-th, at this progress (m,)."""
+        """Return the poses (m,) at this progress (m,), of which counts[i] are in segment i."""
         if self.passages is None:
             return _poses(self.ends, self.modes, counts, progress)
         along, off = self.passages.along(counts, progress)
@@ -336,7 +337,7 @@ class _Motion:
 
 
 def _poses(ends: Ends, modes: np.ndarray, counts: np.ndarray, progress: np.ndarray) -> Poses:
-    """Return the poses (m,) that the modes (P,) of paths' segments make, counts[i] in the i-th, at progress (m,)."""
+    """Return the poses (m,) that the modes (P,) of path segments give at progress (m,), counts[i] in segment i."""
     used = np.unique(modes[counts > 0])
     if len(used) == 1:
         return ends.poses(counts, progress, MODE_NAMES[used[0]])
@@ -357,9 +358,9 @@ def _segments(sources: Sequence[KeyedTransform]) -> list[tuple[KeyedTransform, s
 
 
 def _counts(sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return how many samples segments have, (segments,), and which are inside of them, or where channels go on, (m,).
+    """Return the number of samples per segment, (segments,), and which lie inside one or where channels go on, (m,).
 
-    What is outside of the keys belongs to the outermost ones.
+    Samples outside of all keys belong to the outermost segments.
     """
     counts, inside = [], []
     for source, times in zip(sources, frames, strict=True):

@@ -1,17 +1,17 @@
-"""What segments run between: the poses at their ends, how they turn, the keys beside them, and what modes make of them.
+"""Ends of segments: the poses at their keys, their turns, the neighbouring keys, and the poses of each mode.
 
-Arrays are of S segments, one behind the other.
+Arrays are of S segments, one after the other.
 
-A smooth mode looks at the keys beside a segment, and with handles at how fast the motion passes its keys. The direction
-of the tangent at a key is that of the mode, a mean of the twists before and after it. How far the motion has come in a
-segment is what the channels say, as in the other modes: their progress along the segment's chord. The screws on both
-sides of a key differ in speed and direction. So the tangent is made as long on either side as the screw is along the
-mean of both, which makes the speed the same where handles are smooth and the path is straight; what is lacking on a
-bent path, for the speed that Blender's own in-betweens have in that direction, is added to the progress. With two keys,
-and where no handle has a say, nothing changes.
+A smooth mode looks at the keys next to a segment and, with handles, at how fast the motion passes its keys. The
+direction of the tangent at a key is that of the mode, a mean of the twists before and after it. Progress in a segment
+comes from the channels, as in other modes, along the segment's chord. The screws on both sides of a key differ in speed
+and direction. So the tangent on either side is as long as that screw is along the mean of both, which makes the speed
+equal where handles are smooth and the path is straight. On a bent path, progress gets an addition for what is lacking
+of the speed of Blender's own in-betweens in that direction. With two keys, or if no handle has an effect, nothing
+changes.
 
-Twists (6, S) are along the body's own axes at the key, a radian counting as much as a unit of length; segments stand
-along the last axis.
+Twists (6, S) are along the body's own axes at the key, with a radian counting as one unit of length; segments are along
+the last axis.
 """
 
 from __future__ import annotations
@@ -32,27 +32,27 @@ from .sources import KeyedTransform
 from .turning import Turning, needs_turning, turning_of, without_spins
 
 SLOPE_STEP_RATIO = 1.0 / 8.0
-"""The part of a segment that slopes are measured over: exact for cubics in time, and finite for vertical handles."""
+"""The fraction of a segment over which slopes are measured: exact for cubics in time, finite for vertical handles."""
 
 SLOPE_WEIGHTS = np.array((18.0, -9.0, 2.0)) / (6.0 * SLOPE_STEP_RATIO)
-"""The slope at 0 of the cubic through 0 and three values that are `SLOPE_STEP_RATIO` apart."""
+"""Weights that give the slope at 0 of the cubic through 0 and three values `SLOPE_STEP_RATIO` apart."""
 
 SLOPE_MOMENTS = np.concatenate((np.arange(1, 4) * SLOPE_STEP_RATIO, 1.0 - np.arange(3, 0, -1) * SLOPE_STEP_RATIO))
-"""The moments in the time of a segment where it is measured: next to its first key, and next to its second."""
+"""The times in a segment, 0 to 1, at which slopes are measured: next to its first key, and next to its second."""
 
 AT_REST = 1e-9
-"""What moves and turns by less from key to key rests, but for rounding."""
+"""A body that moves and turns by less from key to key is at rest, except for rounding."""
 
 MAX_SLOPE = 3.0
 """The largest slope of progress that is corrected: up to here a cubic between two keys does not turn back.
 Source: Fritsch and Carlson, "Monotone piecewise cubic interpolation", 1980."""
 
 MIN_TANGENT_LENGTH = 0.1
-"""The length of a tangent from which on progress is not corrected any further to make up for it."""
+"""Shorter tangents count as this long when progress is corrected for them."""
 
 MIN_MEAN_SPEED_RATIO = 0.01
-"""The least part that the mean has of the squared speeds that it is made of: where the motion turns back on itself
-there is no direction to measure along."""
+"""The smallest squared mean speed as a fraction of the squared speeds it is made of: if the motion turns back on
+itself there is no direction to measure along."""
 
 
 def with_neighbours(
@@ -60,12 +60,12 @@ def with_neighbours(
 ) -> tuple[np.ndarray, Poses]:
     """Return frames and poses (S, 4) of the keys around each segment, from those (S, 2) at its ends.
 
-    `pairs` are the segments that meet, as `meeting` finds them. Where there is none, or a cycle jumps, the motion goes
-    on as in the segment; where a segment holds, it rests.
+    `pairs` are the adjacent segments found by `meeting`. Without a neighbour, or if a cycle jumps, the motion goes on
+    as in the segment; if the neighbour holds, it rests.
     """
     rows = packed(keys)
     previous, following = packed(beyond(keys[:, 0], keys[:, 1])), packed(beyond(keys[:, 1], keys[:, 0]))
-    # Between two keys on one frame there is nothing, and what is on either side meets there.
+    # Segments between two keys on one frame are empty, and the segments on either side meet there.
     lasts = times[:, 1] > times[:, 0]
     duration = np.where(lasts, times[:, 1] - times[:, 0], 1.0)
     left, right = pairs
@@ -84,13 +84,13 @@ def with_neighbours(
 def spins_of_neighbours(
     signs: np.ndarray, spins: np.ndarray, around: Poses, holds: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]
 ) -> tuple[Poses, np.ndarray]:
-    """Return what spins make of `with_neighbours`: the keys (S, 4) in signs that say which way round segments turn, and
-    the angular velocities (3, 2, S, 3) that spins add at both ends of the three segments between them.
+    """Return `with_neighbours` with spins: the keys (S, 4) with signs that say which way round segments turn, and the
+    angular velocities (3, 2, S, 3) that spins add at both ends of the three segments between them.
 
-    From the signs (S,) and velocities (3, 2, S) of the segments.
+    Takes the signs (S,) and velocities (3, 2, S) of the segments.
     """
     quaternions = around.quaternions.copy()
-    # Where nothing is beside a segment, its motion goes on.
+    # A segment without a neighbour continues its own motion.
     steps = signs[:, None].repeat(3, axis=1)
     beside = np.stack((spins[:, [0, 0]], spins, spins[:, [1, 1]]), axis=3)
     left, right = pairs
@@ -102,7 +102,7 @@ def spins_of_neighbours(
 
 
 def meeting(owners: np.ndarray, times: np.ndarray, keys: Poses) -> tuple[np.ndarray, np.ndarray]:
-    """Return the segments (p,) before and after each key at which two of them meet: both have the same pose there."""
+    """Return the segments (p,) before and after each key where two segments meet with the same pose."""
     rows, lasts = packed(keys), np.flatnonzero(times[:, 1] > times[:, 0])
     left, right = lasts[:-1], lasts[1:]
     meet = (owners[right] == owners[left]) & np.all(rows[right, 0] == rows[left, 1], axis=1)
@@ -118,7 +118,7 @@ def packed(poses: Poses) -> np.ndarray:
 def native_twists(keys: Poses, measured: Poses) -> np.ndarray:
     """Return Blender's own twists at both ends, and the growth of log scale, shape (2, 7, S), in unit time.
 
-    From the poses at both keys (S, 2) and those of Blender's own in-betweens at the moments `SLOPE_MOMENTS` (S, 6).
+    Takes the poses at both keys (S, 2) and those of Blender's own in-betweens at the moments `SLOPE_MOMENTS` (S, 6).
     """
     count = len(keys.positions)
     ends = keys[np.arange(count).repeat(6), np.tile((0, 0, 0, 1, 1, 1), count)]
@@ -135,11 +135,11 @@ def tangents_and_lacks(
     times: np.ndarray,
     pairs: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lengths of tangents at both ends of S segments, and what the slopes of progress lack there, (2, S).
+    """Return the lengths of tangents at both ends of S segments, and the slopes that progress lacks there, (2, S) each.
 
-    From the slopes of progress (2, S), and as (2, 7, S) Blender's own twists and those from key to key, at both ends in
-    unit time. The growth of log scale counts where nothing else changes. Where none of the segments in `pairs`, before
-    a key and after it (p,), meet there, tangents are 1 and nothing lacks.
+    Takes the slopes of progress (2, S) and, as (2, 7, S), Blender's own twists and those from key to key, at both ends
+    in unit time. The growth of log scale counts only if nothing else changes. `pairs` are the segments before and after
+    each shared key (p,); at other ends tangents are 1 and no slope is lacking.
     """
     tangents, lacks = np.ones(slopes.shape), np.zeros(slopes.shape)
     durations = times[:, 1] - times[:, 0]
@@ -164,7 +164,7 @@ def tangents_and_lacks(
 
 
 def corrected(progress: np.ndarray, elapsed: np.ndarray, lacks: np.ndarray) -> np.ndarray:
-    """Return progress (m,) with the slopes that it lacks (2, m) at either end, at times from 0 to 1 in its segment."""
+    """Return progress (m,) plus the slopes that it lacks (2, m) at both ends, at times from 0 to 1 in its segment."""
     left = 1.0 - elapsed
     added = elapsed * left * (left * lacks[0] - elapsed * lacks[1])
     return np.where((elapsed > 0.0) & (left > 0.0), progress + added, progress)
@@ -181,49 +181,49 @@ def _ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """What S segments of several sources run between, with the objects' own delta transforms."""
+    """The ends of S segments of several sources, including the objects' own delta transforms."""
 
     owners: np.ndarray
-    """The number of the source of each, shape (S,)."""
+    """The index of the source of each segment, shape (S,)."""
 
     times: np.ndarray
     """The frames of both keys, shape (S, 2)."""
 
     keys: Poses
-    """The poses at both, shape (S, 2)."""
+    """The poses at both keys, shape (S, 2)."""
 
     axes: np.ndarray | None
-    """The axes that location runs along, as columns in those of the poses, shape (S, 3, 3); None where they are one."""
+    """The axes that location runs along, as columns in the axes of the poses, (S, 3, 3); None if both are the same."""
 
     original: np.ndarray
     """The objects' own delta transforms, shape (10, S)."""
 
     pairs: tuple[np.ndarray, np.ndarray] | None = None
-    """For smooth modes the segments that meet at a key, before it and after it."""
+    """For smooth modes, the segments before and after each key where two segments meet."""
 
     around: tuple[np.ndarray, Poses] | None = None
-    """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
+    """For smooth modes, frames and poses of the four keys around each segment, shape (S, 4)."""
 
     turning: Turning | None = None
-    """The turning of the segments, None where all of them go the shortest way."""
+    """The turning of the segments, None if all of them turn the shortest way."""
 
     whole: Turning | None = None
-    """The turning in whole turns alone, for smooth modes."""
+    """For smooth modes, the turning in whole turns only."""
 
     spins: np.ndarray | None = None
-    """For smooth modes what spins add at both ends of the three segments around, shape (3, 2, S, 3)."""
+    """For smooth modes, the velocities that spins add at both ends of the three segments around, shape (3, 2, S, 3)."""
 
     tangents: np.ndarray | None = None
-    """The lengths of the tangents of smooth modes at both keys, shape (2, S); None where all are 1."""
+    """The lengths of the tangents of smooth modes at both keys, shape (2, S); None if all are 1."""
 
     prepared: dict[str, Callable[..., Poses]] = field(default_factory=dict)
-    """The poses that each mode makes of all segments, once it has been asked for."""
+    """The pose functions of the modes used so far, each for all segments."""
 
     @classmethod
     def of(
         cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[KeyedTransform, slice]], smooth: np.ndarray
     ) -> Ends:
-        """Return the ends of the channels (10, S) at both ends, and which of the segments have a smooth mode."""
+        """Return the ends of segments with these channels (10, S) at each end; `smooth` marks those of smooth modes."""
         sources = [source for source, _ in segments]
         owners = np.repeat(np.arange(len(sources)), [span.stop - span.start for _, span in segments])
         firsts, lasts = ([source.key_frames[part] for source in sources] for part in (slice(-1), slice(1, None)))
@@ -246,7 +246,7 @@ class Ends:
 
     @cached_property
     def screws(self) -> np.ndarray:
-        """The twists from key to key with spins, as they are at both ends, and the growths of log scale, (2, 7, S)."""
+        """The twists from key to key with spins, at both ends, and the growths of log scale, (2, 7, S)."""
         first, second = self.keys[:, 0], self.keys[:, 1]
         turned = second.quaternions if self.whole is None else self.whole.second
         second = replace(second, quaternions=turned)
@@ -258,13 +258,11 @@ class Ends:
     def at_keys(
         self, progress: np.ndarray, measured: np.ndarray, source: KeyedTransform
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return `tangents_and_lacks`, from progress (S, 6) and the channels (., S, 6) at the moments
-        `SLOPE_MOMENTS`.
-        """
+        """Return `tangents_and_lacks`, from progress (S, 6) and channels (., S, 6) at the moments `SLOPE_MOMENTS`."""
         slopes = np.stack((progress[:, :3] @ SLOPE_WEIGHTS, (1.0 - progress[:, :2:-1]) @ SLOPE_WEIGHTS))
         poses = body_poses(measured, self.original[..., None], self.axes, source)
         if self.whole is not None:
-            # Angles turn by spins, too. These are known, and what is left is less than half a turn.
+            # Angles turn by spins, too. These are known, and the rest is less than half a turn.
             poses = without_spins(poses, self.whole.by_angles, progress)
         native = native_twists(self.keys, poses)
         assert self.pairs is not None
@@ -273,14 +271,14 @@ class Ends:
         return tangents_and_lacks(slopes, native, self.screws, self.times, self.pairs)
 
     def poses(self, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
-        """Return what a mode makes of the segments, each with so many samples (S,) of this progress (m,).
+        """Return the poses of a mode in the segments, for samples with this progress (m,), numbering `counts` (S,).
 
         Positions are along the body's own axes at rest.
         """
         if mode not in self.prepared:
             self.prepared[mode] = self._prepare(mode)
         is_smooth = KEYFRAME_MODES[mode].is_smooth
-        # Of the three segments between four keys the one in the middle.
+        # The middle one of the three segments between four keys.
         of_each = np.multiply.outer(counts, (0, 1, 0)).ravel() if is_smooth else counts
         poses = self.prepared[mode](of_each, progress, slice(0, len(of_each)))
         turning = self.whole if is_smooth else self.turning

@@ -1,4 +1,4 @@
-"""What keys say beyond their values: marks from frames on, which frames are one, and whether anything changes."""
+"""Marks: numbers that keys set from a frame on, such as modes; which frames are one; and whether curves change."""
 
 from __future__ import annotations
 
@@ -11,51 +11,50 @@ from ..fcurves.keys import Keys
 FULL_TURN = 2.0 * np.pi
 
 HALF_TURN = np.pi - 1e-4
-"""Half a turn between two keys by angles, of which single precision has lost a little."""
+"""The smallest angle, in radians, that counts as half a turn: single precision may lose a little."""
 
 WHOLE_TURN = 1e-5
-"""Turns of the channel that differ by less from whole ones do so for rounding."""
+"""Turns in the Turns channel that differ from whole turns by less are rounded to them."""
 
 MAX_PARALLEL_COSINE_GAP = 1e-6
-"""Axes are parallel whose cosine is nearer to one: by less than a tenth of a degree."""
+"""Axes count as parallel if one minus their cosine is smaller: less than a tenth of a degree."""
 
 SCREW_AXIS = "SCREW"
-"""Turns are about the axis that a segment turns about anyway, and the local Z axis where it does not turn."""
+"""Turns are about the axis of the segment's own rotation, or about the local Z axis if it does not rotate."""
 
 TURN_AXES = (SCREW_AXIS, "X", "Y", "Z")
-"""The axes that turns are about: that of the segment's screw, or always the same local axis."""
+"""The possible axes of turns: the segment's screw axis, or a fixed local axis."""
 
 SAME_FRAME = 0.01
-"""Keys closer than this are one key to Blender, and here."""
+"""Keys closer than this, in frames, are one key to Blender, and here."""
 
 SAME_VALUE = 1e-5
-"""Values that differ by less, relative or absolute below 1, are the same: keys that took what was seen are so far off.
-"""
+"""Values that differ by less (relative, absolute below 1) are the same: keys set from visible poses are so far off."""
 
 
 def distinct(frames: np.ndarray) -> np.ndarray:
-    """Return rising frames of keys, those that are one key to Blender once."""
+    """Return rising frames of keys, counting keys that are one key to Blender only once."""
     return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
 
 
 def near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return which frames (n,) are any of others (m,) to Blender, shape (n,)."""
+    """Return which frames (n,) coincide with any of the others (m,) to Blender, shape (n,)."""
     frames, others = np.asarray(frames, dtype=np.float64), np.sort(others)
     first = np.searchsorted(others, frames - SAME_FRAME, side="right")
     return first < np.searchsorted(others, frames + SAME_FRAME)
 
 
 def without(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the frames (n,) that are none of others (m,) to Blender."""
+    """Return the frames (n,) that coincide with none of the others (m,) to Blender."""
     return frames[~near(frames, others)]
 
 
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """Numbers that hold from frames on, each until the next; before the first one there is that one, too."""
+    """Numbers that apply from given frames on, each until the next; the first one also applies before its frame."""
 
     frames: np.ndarray
-    """Rising, shape (n,)."""
+    """In rising order, shape (n,)."""
 
     numbers: np.ndarray
     """Shape (n,)."""
@@ -69,7 +68,7 @@ class Marks:
 
 
 def vary(keys: Keys) -> np.ndarray:
-    """Return which curves (c,) have more than one value, at keys or handles."""
+    """Return which curves (c,) have more than one value, in keys or handles."""
     if len(keys.times) < 2:
         return np.zeros(len(keys.points), dtype=bool)
     values = [points[..., 1] for points in (keys.points, keys.left, keys.right) if points is not None]
@@ -77,7 +76,7 @@ def vary(keys: Keys) -> np.ndarray:
 
 
 def sweeps(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return by how much angles change (S,) of angles and axes (4, S) to others; 0 where the axes are not parallel."""
+    """Return the change of angle (S,) between angles and axes (4, S); 0 if the axes are not parallel."""
     lengths = np.sqrt(np.einsum("ks,ks->s", start[1:], start[1:]) * np.einsum("ks,ks->s", end[1:], end[1:]))
     dot = np.einsum("ks,ks->s", start[1:], end[1:])
     is_parallel = (lengths > 0.0) & (np.abs(dot) >= (1.0 - MAX_PARALLEL_COSINE_GAP) * lengths)
@@ -85,7 +84,7 @@ def sweeps(start: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def turns_at(keys: Keys, frames: np.ndarray) -> np.ndarray:
-    """Return what the channel of turns has from frames (m,) on: none before its first key, whole ones but for parts."""
+    """Return the Turns channel as steps at frames (m,): 0 before its first key, and rounded if almost whole."""
     at = np.searchsorted(keys.times, frames, side="right") - 1
     turns = np.where(at < 0, 0.0, keys.values[0, np.clip(at, 0, None)])
     whole = np.rint(turns)

@@ -1,9 +1,9 @@
-"""Runs: stretches of keys that are held in the same, each a source of its own.
+"""Runs: stretches of keys with the same holder, each evaluated as a source of its own.
 
-The channels of something that is held have its pose in the space of the holder. So what they have between keys that are
-held in different things is no motion: there the motion of the keys before it goes on, up to the key that is held in
-something else. Where it is passed over some frames, which begin before that key, both motions go on at their speed.
-Otherwise what is picked up or put down has come to rest.
+The channels of a held object are its pose in the space of the holder. So values between keys with different holders are
+no motion: the motion of the earlier keys continues until the key with the new holder. If the switch takes some frames,
+which begin before that key, both motions continue at their speed. Otherwise an object that is picked up or put down has
+come to rest.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from ..fcurves.keys import Keys
 from .marks import SAME_FRAME, SAME_VALUE, Marks, distinct
 
 MOST_FRAMES = 63
-"""The most frames over which something passes from one holder to the next."""
+"""The largest number of frames that a switch from one holder to the next may take."""
 
 
 PASS_LEAD_FRAMES = 1.0 / 64.0
-"""By how many frames what passes over is there before its key. Blender takes keys for one that are nearer than 0.01."""
+"""The frames by which a switch is complete before its key. Blender merges keys that are closer than 0.01 frames."""
 
 
 class Switch(NamedTuple):
-    """The key at which something passes from one holder to another; 0 is none, that is its parent or the world."""
+    """The key at which an object switches from one holder to another; 0 is none, that is, its parent or the world."""
 
     frame: float
     before: int
     after: int
 
     begin: float
-    """The frame from which on it passes over: `frame`, where it does so at once."""
+    """The first frame of the switch; equal to `frame` if it is instantaneous."""
 
     @property
     def there(self) -> float:
-        """The frame at which it has passed over, just before its key: on the key nothing hides what is posed."""
+        """The frame at which the switch is complete, just before its key: on the key, nothing hides a new pose."""
         return self.frame - min(PASS_LEAD_FRAMES, (self.frame - self.begin) / 2)
 
     @property
@@ -52,20 +52,20 @@ class Stretch:
     """A run of keys, and the frames on which its motion is shown."""
 
     first: float
-    """The frame of its first key, from which on it is shown."""
+    """The frame of the first key; the motion is shown from there on."""
 
     until: float
     """The frame of the first key of the next run, or infinity."""
 
     comes: bool
-    """True if it moves before its first key as it does from there on, and otherwise rests there."""
+    """True if the motion extends to before the first key, False if it rests there."""
 
     goes: bool
-    """True if it moves on behind its last key, and otherwise rests there."""
+    """True if the motion extends beyond the last key, False if it rests there."""
 
 
 def switches_of(keyed_frames: np.ndarray, held: Marks | None) -> tuple[Switch, ...]:
-    """Return the switches of keys on these frames (n,) that say these holds, in the order of time."""
+    """Return the switches of keys on these frames (n,) with these holds, in order of time."""
     frames = distinct(keyed_frames)
     if held is None or not len(frames):
         return ()
@@ -81,7 +81,7 @@ def switches_of(keyed_frames: np.ndarray, held: Marks | None) -> tuple[Switch, .
 
 
 def stretches_of(keyed_frames: np.ndarray, switches: tuple[Switch, ...], *, is_linear: bool) -> list[Stretch]:
-    """Return the stretches of time between switches, of which the outermost may go on outside of all keys."""
+    """Return the stretches of time between switches; the outermost may extend beyond all keys."""
     firsts = [float(keyed_frames[0]), *(switch.frame for switch in switches)]
     passing = [is_linear, *(not switch.is_at_once for switch in switches), is_linear]
     return [
@@ -91,12 +91,12 @@ def stretches_of(keyed_frames: np.ndarray, switches: tuple[Switch, ...], *, is_l
 
 
 def keys_in(keys: Keys, stretch: Stretch) -> Keys | None:
-    """Return the keys of a stretch as if there were no others; None where there are none in it."""
+    """Return the keys of a stretch as if there were no others; None if it has none."""
     chosen = (keys.times >= stretch.first) & (keys.times < stretch.until)
     if not chosen.any():
         return None
     if keys.breakdowns is not None and not stretch.goes:
-        # A breakdown that rests where the key before it is does not shape the way to that.
+        # A breakdown that rests where the key before it is does not shape the motion towards that key.
         rests = np.abs(np.diff(keys.values)) <= SAME_VALUE * np.maximum(1.0, np.abs(keys.values[:, 1:]))
         shapes = chosen & np.append(True, ~(keys.breakdowns[1:] & chosen[:-1] & rests.all(axis=0)))
         chosen[np.flatnonzero(shapes)[-1] + 1 :] = False
@@ -110,7 +110,7 @@ def keys_in(keys: Keys, stretch: Stretch) -> Keys | None:
         slopes, chords = auto_clamped_slopes(durations, values), np.diff(values) / durations
         slopes[:, 0] = chords[:, 0] if stretch.comes else 0.0
         slopes[:, -1] = chords[:, -1] if stretch.goes else 0.0
-    # Where some of the handles are the animator's the others are Blender's, but those at the ends. One key alone rests.
+    # If some handles are the animator's, Blender's others keep their values, except at the ends. A single key rests.
     is_end = np.isin(np.arange(count), (0, count - 1))[:, None]
     automatic = part.automatic & (part.automatic.all(axis=(1, 2), keepdims=True) | is_end) | (count == 1)
     before, after = np.append(durations[:1], durations)[:count], np.append(durations, durations[-1:])[-count:]
@@ -124,5 +124,5 @@ def keys_in(keys: Keys, stretch: Stretch) -> Keys | None:
 
 
 def resting_in(keys: Keys, stretch: Stretch) -> np.ndarray:
-    """Return the values (c,) of channels without a key in a stretch: those that their curves have as it begins."""
+    """Return the values (c,) of channels without a key in a stretch: their values at its start."""
     return evaluate([keys], [np.array([stretch.first])])[0][:, 0]

@@ -1,6 +1,6 @@
-"""The sources that terms were planned from last, for as long as there is room: they tell what an edit has changed.
+"""Cache of the sources that terms were last planned from: comparing with them tells what an edit has changed.
 
-They are kept by their digests, which terms keep too, so that undo and redo find them again.
+Sources are stored by digest, which terms store, too, so undo and redo find them again. The cache has limited room.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from collections import OrderedDict
 from .sources import KeyedTransform
 
 MOST_KEYS = 2**20
-"""Of all that are kept: some 32 MB, hundreds of undo steps of an ordinary file."""
+"""The largest total number of keys in the cache: about 32 MB, or hundreds of undo steps of an ordinary file."""
 
 
 class _Sources(OrderedDict[int, KeyedTransform]):
-    """Those used last come last; what is too much in keys is dropped."""
+    """Sources by digest, the most recently used last, with their total number of keys."""
 
     size = 0
 
@@ -27,7 +27,7 @@ known = _Sources()
 
 
 def cache_source(source: KeyedTransform) -> None:
-    """Keep a source; those that were not used for longest go where there is no room."""
+    """Add a source to the cache, dropping the least recently used ones if there is no room."""
     known.drop(source.digest24)
     known[source.digest24] = source
     known.size += source.key_count
@@ -36,11 +36,11 @@ def cache_source(source: KeyedTransform) -> None:
 
 
 def cached_source(digest: int | None) -> KeyedTransform | None:
-    """Return the source with this digest, of 24 bits; None where it is not known any more."""
+    """Return the source with this 24-bit digest; None if it is no longer cached."""
     return None if digest is None else known.get(digest)
 
 
 def clear() -> None:
-    """Forget the sources of a file that is no longer open."""
+    """Forget the sources of a file that has been closed."""
     known.clear()
     known.size = 0

@@ -1,9 +1,10 @@
-"""What the animator keyed: the location, rotation and scale channels of one slot and their modes, as arrays.
+"""Sources: the keyed location, rotation and scale channels of one slot and their modes, as arrays.
 
-A source is read, never written. Its digest tells whether anything changed that its motion depends on. Frames are those
-of the Action; values are in the channels' own units.
+A source is read, never written. Its digest changes whenever anything changes that its motion depends on. Frames are
+those of the Action. Values are in the channels' own units.
 
-A key of any part that modes fill is one of the whole body: what has no key of its own there has the value of its curve.
+A key of any part that modes fill is a key of the whole body: channels without a key there use the values of their
+curves.
 """
 
 from __future__ import annotations
@@ -38,67 +39,68 @@ from .runs import MOST_FRAMES, Stretch, Switch, keys_in, resting_in, stretches_o
 __all__ = ["SAME_FRAME", "SCREW_AXIS", "TURN_AXES", "WHOLE_TURN", "KeyedTransform", "Marks", "distinct"]
 
 OUTSIDE_REACH_FRAMES = 12.0
-"""Frames that are looked at outside of the seen ones. A Stepped modifier of no more changes nothing, when it comes."""
+"""Frames sampled outside of the visible range. A Stepped modifier with no more frames can be added without replanning.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class KeyedTransform:
-    """The keys of one slot, the values that what it does not key rests at, and the segments between keys."""
+    """The keys of one slot, the rest values of its unkeyed components, and the segments between keys."""
 
     order: str | None
     """The order of Euler angles, AXIS_ANGLE, or None for quaternions."""
 
     keyed: frozenset[str]
-    """The parts of location, rotation and scale that are keyed, in one of their components at least, or turned."""
+    """The parts (location, rotation, scale) that are keyed in at least one component, or turned."""
 
     channels: tuple[tuple[list[int], Keys], ...]
-    """The channels with keys, those together that are keyed together: their rows among the components, and keys."""
+    """The channels with keys, grouped if keyed together: their rows among the components, and their keys."""
 
     rest: dict[int, float]
-    """The values of components that have no keys, of what is keyed, by their rows."""
+    """The values of components without keys, in parts that are keyed, by row."""
 
     original: np.ndarray
-    """An object's own delta transforms, as components, shape (10,): modes act on what is seen with them."""
+    """An object's own delta transforms as components, shape (10,): modes act on the motion including them."""
 
     mode: int | Marks
-    """The number of the mode of all segments, or of those from frames on. 0 is Blender's own."""
+    """The number of the mode of all segments, or the numbers from given frames on. 0 is Blender's own."""
 
     turns: Keys | None = None
-    """The channel of whole turns more, of segments from the frames of its keys on; None where it has no say."""
+    """The Turns channel: extra whole turns of segments from the frames of its keys on; None if it has no effect."""
 
     turns_axis: str | Marks = SCREW_AXIS
-    """One of `TURN_AXES`, or their numbers there."""
+    """One of `TURN_AXES`, or indices into it."""
 
     location_axes: np.ndarray | None = None
-    """The axes that location runs along, as columns (3, 3) in those of the body at rest; None where they are one."""
+    """The axes that location runs along, as columns (3, 3) in the body's axes at rest; None if both are the same."""
 
     seen: tuple[int, int] | None = None
-    """First and last frame that are seen of it, in scenes and strips."""
+    """The first and last frame that scenes and strips show."""
 
     reach: float = OUTSIDE_REACH_FRAMES
-    """How many frames before and behind the seen ones motion blur and Stepped modifiers look at, at most."""
+    """The largest number of frames outside of `seen` that motion blur and Stepped modifiers sample."""
 
     driven: frozenset[int] = frozenset()
-    """The rows of components that drivers move, or whose channels are muted: to the others they are still."""
+    """The rows of components that drivers move, or whose channels are muted: to the other rows they are at rest."""
 
     held: Marks | None = None
-    """What keys are held in from frames on, as `actions.marks.hold` has it; None where all are in the space of the
-    channels."""
+    """The holders of keys from given frames on, see `actions.marks.hold`; None if all keys are in the space of
+    the channels."""
 
     shaping: np.ndarray | None = None
-    """The frames of the keys that segments run between, where they are not those of the channels."""
+    """The frames of the keys that segments run between, if these are not the frames of the channels' keys."""
 
     carried: tuple[int, int] | None = None
-    """First and last frame on which its base moves, where it is the offset of a layer."""
+    """The first and last frame on which its base moves, if it is the offset of a layer."""
 
     @cached_property
     def digest(self) -> str:
-        """Differs wherever anything differs that the motion depends on."""
+        """Differs whenever something differs that the motion depends on."""
         summary = hashlib.blake2b(digest_size=16)
         for rows, keys in self.channels:
             summary.update(bytes(rows))
             summary.update(keys.raw)
-        # Where something stands that is not keyed does not change how it moves.
+        # The rest location does not affect the motion.
         rest = {row: value for row, value in self.rest.items() if row >= ROWS[ROTATION].start}
         seen = (self.seen, self.reach) if self.goes_on and self.cyclic is None else None
         summary.update(repr((self.order, sorted(self.keyed), rest, self.mode, sorted(self.driven), seen)).encode())
@@ -123,12 +125,12 @@ class KeyedTransform:
 
     @cached_property
     def key_count(self) -> int:
-        """The number of keys that its channels have."""
+        """The number of keys in all channels."""
         return sum(keys.interpolation.size for keys in self.curves)
 
     @cached_property
     def changing(self) -> frozenset[str]:
-        """The parts that turns, or channels with more than one value, change."""
+        """The parts changed by turns, or by channels with more than one value."""
         parts = {
             PART_OF[row]
             for rows, keys in self.channels
@@ -141,7 +143,7 @@ class KeyedTransform:
 
     @cached_property
     def keyed_frames(self) -> np.ndarray:
-        """Frames on which any of the channels has a key of the animator's, shape (k,)."""
+        """Frames on which any channel has one of the animator's keys, shape (k,)."""
         return np.unique(np.concatenate([np.empty(0), *(keys.times for keys in self.curves)]))
 
     @cached_property
@@ -151,29 +153,29 @@ class KeyedTransform:
 
     @cached_property
     def goes_on(self) -> bool:
-        """Return whether any channel goes on outside of its keys, by cycles or at its slope."""
+        """Return whether any channel continues outside of its keys, by cycles or with its slope."""
         return any(keys.linear or keys.cycles is not None for keys in self.curves)
 
     @cached_property
     def is_linear(self) -> bool:
-        """Return whether it goes on at its slope outside of its keys."""
+        """Return whether the motion continues with its slope outside of its keys."""
         return self.cyclic is None and any(keys.linear for keys in self.curves)
 
     @cached_property
     def is_smooth(self) -> bool:
-        """Return whether a mode in it looks at the keys around a segment."""
+        """Return whether any of its modes looks at the keys next to a segment."""
         return bool(np.isin(self.mode.numbers if isinstance(self.mode, Marks) else self.mode, SMOOTH_MODES).any())
 
     @cached_property
     def cyclic(self) -> Keys | None:
-        """The first of the channels that change and repeat."""
+        """The keys of the first channel that changes and repeats."""
         return next((keys for keys in self.curves if keys.cycles is not None and vary(keys).any()), None)
 
     @cached_property
     def key_frames(self) -> np.ndarray:
-        """Frames of the keys that segments run between, without keys that are one to Blender, (n,).
+        """Frames of the keys that segments run between, merging keys that are one to Blender, (n,).
 
-        They are those of what the modes change, or else all; on a `path` only those that shape it.
+        These are the frames of channels that the modes change, or else of all; on a `path`, only those that shape it.
         """
         if self.shaping is not None:
             return self.shaping
@@ -182,18 +184,18 @@ class KeyedTransform:
 
     @cached_property
     def filled_curves(self) -> list[Keys]:
-        """The keys of the channels that the modes change, with those that are keyed together with them."""
+        """The keys of the channels that the modes change, and of any channels keyed together with them."""
         filled = set(self.filled_rows)
         return [keys for rows, keys in self.channels if not filled.isdisjoint(rows)]
 
     @cached_property
     def is_repeatable(self) -> bool:
-        """Return whether the motion in every round of its cycles is that in the first."""
+        """Return whether every round of its cycles has the same motion as the first."""
         return self.cyclic is None or repeat(self.channels, self.cyclic, self.order)
 
     @cached_property
     def looped(self) -> KeyedTransform:
-        """Source with a segment more on either side, where a mode looks over the seam of endless rounds."""
+        """Source with one more segment on either side, if a mode looks across the seam of endless cycles."""
         if self.cyclic is None or self.cyclic.cycles is None or not self.is_smooth or len(self.key_frames) < 2:
             return self
         endless = tuple(
@@ -207,9 +209,9 @@ class KeyedTransform:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """The frames on which the channels have the values of the first and second keys of segments, (n - 1,) each.
+        """The frames at which the channels have the values of the first and second key of each segment, (n - 1,) each.
 
-        They are other ones than those of the segments where a cycle jumps.
+        Where a cycle jumps, these are not the frames of the segment itself.
         """
         starts, ends = self.key_frames[:-1].copy(), self.key_frames[1:].copy()
         if self.shaping is not None and self.cyclic is not None and self.cyclic.cycles is not None:
@@ -220,7 +222,7 @@ class KeyedTransform:
         return starts, ends
 
     def folded(self, frames: np.ndarray) -> np.ndarray:
-        """Return frames (m,) folded back into the first round of its cycles, as they are where there are none."""
+        """Return frames (m,) folded back into the first round of cycles; unchanged if there are no cycles."""
         return frames if self.cyclic is None else cycled(self.cyclic, frames)[0]
 
     @cached_property
@@ -230,8 +232,8 @@ class KeyedTransform:
 
     @cached_property
     def _starts(self) -> tuple[np.ndarray, np.ndarray]:
-        """A moment into each segment, as the cycles have it, and whether they run backwards there, both (n - 1,)."""
-        # In a copy that runs backwards that is a moment before its original's end.
+        """A moment just inside each segment, folded by cycles, and whether they run backwards there, (n - 1,) each."""
+        # In a copy that runs backwards, this moment is just before the end of the original segment.
         starts = self.key_frames[:-1] + SAME_FRAME
         return (starts, np.zeros(len(starts), dtype=bool)) if self.cyclic is None else cycled(self.cyclic, starts)
 
@@ -240,7 +242,7 @@ class KeyedTransform:
         return self.mode.at(frames) if isinstance(self.mode, Marks) else np.full(len(frames), self.mode)
 
     def mode_at(self, frame: float) -> int:
-        """Return the number of the mode of the segment that a frame is in: of the first or the last one outside of all.
+        """Return the number of the mode of the segment at a frame; outside of all keys, of the outermost segment.
 
         A mode that begins within a segment does not act there.
         """
@@ -249,14 +251,14 @@ class KeyedTransform:
 
     @cached_property
     def axes_of_turns(self) -> np.ndarray:
-        """The axis that turns of each segment are about, of `TURN_AXES`, shape (n - 1,)."""
+        """The axis of each segment's turns, one of `TURN_AXES`, shape (n - 1,)."""
         if isinstance(self.turns_axis, Marks):
             return np.array(TURN_AXES)[self.turns_axis.at(self._starts[0])]
         return np.full(len(self._starts[0]), self.turns_axis)
 
     @cached_property
     def segment_turns(self) -> np.ndarray:
-        """The turns more of each segment that is not Blender's own, whole ones but for inserted keys, (n - 1,)."""
+        """The extra turns of each segment, 0 in Blender's own mode; whole unless keys were inserted, (n - 1,)."""
         if self.turns is None or ROTATION not in self.keyed:
             return np.zeros(len(self._starts[0]))
         turns = turns_at(self.turns, self._starts[0])
@@ -269,7 +271,7 @@ class KeyedTransform:
 
     @cached_property
     def has_half_turns(self) -> bool:
-        """Return whether an angle goes by half a turn or more from one key to the next."""
+        """Return whether an angle changes by half a turn or more from one key to the next."""
         if self.order is None or len(self.key_frames) < 2:
             return False
         angles = self.values_at(self.key_frames)[ROWS[ROTATION]]
@@ -279,10 +281,10 @@ class KeyedTransform:
 
     @cached_property
     def passed(self) -> np.ndarray:
-        """Return which keys lie on the path between the keys around them instead of shaping it, shape (n,).
+        """Return which keys lie on the path between the neighbouring keys instead of shaping it, shape (n,).
 
-        Breakdowns in all channels to be filled that have a key there, that is, between others with the same mode, where
-        a path depends on its keys and goes the shortest way round.
+        These are breakdowns in all filled channels with a key there. They lie between keys of one mode, whose path
+        depends on its keys and turns the shortest way.
         """
         passed = np.zeros(len(self.key_frames), dtype=bool)
         goes_the_shortest_way = self.turns is None and not self.has_half_turns
@@ -299,29 +301,29 @@ class KeyedTransform:
         """Source without the keys that are `passed`, but otherwise the same."""
         if not self.passed.any():
             return self
-        # Channels keep these keys: one without a key on the others would be elsewhere there.
+        # Channels keep these keys: without them, a channel that has no key on other frames would be elsewhere.
         return replace(self, shaping=self.key_frames[~self.passed])
 
     @cached_property
     def is_live(self) -> bool:
-        """Return whether there is a segment that is to be filled in otherwise than Blender does."""
+        """Return whether any segment is filled differently from Blender's own in-betweens."""
         if not self.curves or len(self.key_frames) < 2:
             return False
         return bool(self.switches) or bool(np.any(self.modes))
 
     @cached_property
     def switches(self) -> tuple[Switch, ...]:
-        """Where it passes from one holder to another."""
+        """The switches from one holder to another."""
         return switches_of(self.keyed_frames, self.held)
 
     @cached_property
     def runs(self) -> list[HoldRun]:
-        """The stretches of keys that are held in the same, one behind the other; one alone where nothing is passed."""
+        """The stretches of keys with the same holder, in order; a single one if there are no switches."""
         stretches = stretches_of(self.keyed_frames, self.switches, is_linear=self.is_linear)
-        return [HoldRun(stretch, self._in(stretch)) for stretch in stretches]
+        return [HoldRun(stretch, self._restricted_to(stretch)) for stretch in stretches]
 
     def hold_at(self, frame: float) -> tuple[int, int]:
-        """Return the number of the holder that a key on a frame is in, 0 for none, and the frames of its passing."""
+        """Return the number of the holder of a key on a frame, 0 for none, and how many frames the switch takes."""
         if self.held is None:
             return 0, 0
         number, frames = divmod(int(self.held.at(np.array([frame + 0.5 * SAME_FRAME]))[0]), MOST_FRAMES + 1)
@@ -331,21 +333,21 @@ class KeyedTransform:
         """Return the run whose motion is shown on a frame."""
         return next((run for run in self.runs if frame < run.stretch.until), self.runs[-1])
 
-    def _in(self, stretch: Stretch) -> KeyedTransform:
-        """Return the source with the keys of a stretch alone; what has none there rests."""
+    def _restricted_to(self, stretch: Stretch) -> KeyedTransform:
+        """Return the source with the keys of a stretch alone; channels without a key there rest."""
         channels, rest = [], dict(self.rest)
         for rows, keys in self.channels:
             if (part := keys_in(keys, stretch)) is not None:
                 channels.append((rows, part))
             else:
                 rest.update(zip(rows, resting_in(keys, stretch).tolist(), strict=True))
-        # A holder has no other axes for location, as the parent of a bone may have.
+        # In a holder, location has no axes of its own, unlike under the parent of a bone.
         axes = None if self.hold_at(stretch.first)[0] else self.location_axes
         return replace(self, channels=tuple(channels), rest=rest, held=None, seen=None, location_axes=axes)
 
     @cached_property
     def seen_range(self) -> tuple[int, int]:
-        """The first and last whole frame that anything is seen on, also where it goes on outside of its keys."""
+        """The first and last whole frame that is shown, including frames outside of the keys if motion goes on."""
         first, last = self.keyed_range
         if self.seen is not None and self.goes_on:
             first, last = min(first, self.seen[0]), max(last, self.seen[1])
@@ -355,7 +357,7 @@ class KeyedTransform:
 
     @property
     def goes_on_to(self) -> tuple[float, float]:
-        """The frames before its first key and behind its last one to which terms take what goes on at its slope."""
+        """The outermost frames to which terms extend a motion that continues with its slope."""
         assert self.seen is not None
         return self.seen[0] - self.reach, self.seen[1] + self.reach
 
@@ -369,14 +371,14 @@ class KeyedTransform:
 
     @cached_property
     def uniform_scale(self) -> bool:
-        """Return whether the scale is animated, on every key the same along all axes and positive: else it is left."""
+        """Return whether the scale is animated, and on every key uniform and positive; other scales are left alone."""
         if SCALE not in self.keyed & self.changing:
             return False
         x, y, z = self.values_at(self.keyed_frames)[ROWS[SCALE]]
         return bool(np.allclose(x, y) and np.allclose(x, z) and np.all(x > 0.0) and np.ptp(x) > 0.0)
 
     def values_at(self, frames: np.ndarray) -> np.ndarray:
-        """Return what the channels alone have on these frames, shape (10, m)."""
+        """Return the channels' own values at these frames, shape (10, m)."""
         return values_of([self], [frames])[0]
 
     @cached_property
@@ -386,13 +388,13 @@ class KeyedTransform:
 
     @cached_property
     def has_handles(self) -> np.ndarray:
-        """Return whether handles shape a segment, and no easing does nor a hold, shape (n - 1,)."""
+        """Return whether handles shape a segment without easing or holding keys, shape (n - 1,)."""
         is_bezier = self._interpolations == BEZIER
         return np.all(is_bezier | (self._interpolations == LINEAR), axis=0) & np.any(is_bezier, axis=0)
 
     @cached_property
     def _interpolations(self) -> np.ndarray:
-        """The codes of the keys of what the modes change, or else of all, that segments run on from, (., n - 1)."""
+        """The interpolation codes at the start of segments, for channels that modes change or else all, (., n - 1)."""
         starts, codes = self.key_frames[:-1] + SAME_FRAME, dict[int, np.ndarray]()
         for rows, keys in self.channels:
             at = starts if keys.cycles is None else cycled(keys, starts)[0]
@@ -403,23 +405,23 @@ class KeyedTransform:
 
 @dataclass(frozen=True, eq=False)
 class HoldRun:
-    """A stretch of keys that are held in the same."""
+    """A stretch of keys with the same holder."""
 
     stretch: Stretch
     source: KeyedTransform
-    """With these keys alone."""
+    """The source with these keys alone."""
 
     def moments(self, frames: np.ndarray) -> np.ndarray:
-        """Return the frames of its own motion that are shown on frames (m,): it may rest outside of its keys."""
+        """Return the frames of the run's own motion shown on frames (m,): it may rest outside of its keys."""
         first, last = self.source.keyed_range
         return np.clip(frames, -np.inf if self.stretch.comes else first, np.inf if self.stretch.goes else last)
 
 
 def repeat(channels: tuple[tuple[list[int], Keys], ...], cyclic: Keys, order: str | None) -> bool:
-    """Return whether the motion in every round is that in the first, where one of the channels that change is `cyclic`.
+    """Return whether every round has the same motion as the first; `cyclic` is one of the changing channels.
 
-    So it is where all of them go round together, and in rounds with an offset turn and grow by nothing, or turn about
-    one and the same axis.
+    This is so if all changing channels have the same cycles and range, and rounds with an offset add no rotation and no
+    scale, or only rotation about a single axis.
     """
     cycles, ends = cyclic.cycles, cyclic.times[[0, -1]].tolist()
     assert cycles is not None
@@ -433,20 +435,20 @@ def repeat(channels: tuple[tuple[list[int], Keys], ...], cyclic: Keys, order: st
         change[rows] = keys.values[:, -1] - keys.values[:, 0]
         turning += int(np.count_nonzero(vary(keys)[[3 <= row < 7 for row in rows]]))
     if order is not None:
-        # Angles of other axes stand still where a single one changes.
+        # The axes of the other angles are fixed if a single one changes.
         angles = slice(3, 4) if order == AXIS_ANGLE else slice(3, 6)
         change[angles] -= FULL_TURN * np.rint(change[angles] / FULL_TURN) if turning > 1 else change[angles]
     return bool(np.abs(change[3:]).max() < 1e-6)
 
 
 def each(sources: Sequence[KeyedTransform], counts: Iterable[int]) -> list[tuple[KeyedTransform, slice]]:
-    """Return each source with the span of what it has this many of."""
+    """Return each source with the slice of its items, given the number of items of each."""
     bounds = [0, *itertools.accumulate(counts)]
     return [(source, slice(*span)) for source, span in zip(sources, itertools.pairwise(bounds), strict=True)]
 
 
 def sampled(samples: list[tuple[KeyedTransform, slice]], frames: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the channels' own values at the frames of each source, m in all, (10, m). What it does not key rests."""
+    """Return the channels' own values at the frames of each source, m in all, (10, m). Unkeyed ones are at rest."""
     rows = np.empty((10, samples[-1][1].stop if samples else 0))
     curves, times, out, apart = [], [], [], []
     for (source, span), at in zip(samples, frames, strict=True):
@@ -470,7 +472,7 @@ def sampled(samples: list[tuple[KeyedTransform, slice]], frames: Sequence[np.nda
 
 
 def values_of(sources: Sequence[KeyedTransform], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Return what the channels of each source alone have on frames of its own, shape (10, m)."""
+    """Return the channels' own values of each source at its frames, shape (10, m)."""
     samples = each(sources, map(len, frames))
     rows = sampled(samples, frames)
     return [rows[:, span] for _, span in samples]

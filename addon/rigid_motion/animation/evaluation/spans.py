@@ -1,4 +1,4 @@
-"""Spans: the stretches of time in which what is added to channels is smooth."""
+"""Spans: the stretches of time in which the values added to channels are smooth."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ BOUNCE_CODE = {name: code for code, name in INTERPOLATIONS.items()}["BOUNCE"]
 EASE_IN_CODE, EASE_IN_OUT_CODE = (code for code, name in EASINGS.items() if name in ("EASE_IN", "EASE_IN_OUT"))
 
 BOUNCE_LANDING_TIMES = np.array((1.0 / 2.75, 2.0 / 2.75, 2.5 / 2.75))
-"""When a ball lands that bounces out, 0 to 1."""
+"""The times, 0 to 1, at which the ball of an easing-out bounce lands."""
 
 ELASTIC_PERIOD_RATIOS = 0.3, 0.45
-"""ELASTIC's own period, in durations of a segment: and where it eases in and out."""
+"""The default period of ELASTIC as a fraction of the segment, and the one for easing in and out."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """A stretch of time in which the difference of some rows is smooth."""
+    """A stretch of time in which the difference in some rows is smooth."""
 
     rows: tuple[int, ...]
     """The rows among the components."""
@@ -34,13 +34,13 @@ class Span:
     last_is_key: bool
 
     breaks: tuple[float, ...]
-    """Frames inside of it at which the timing has a kink."""
+    """Frames inside the span at which the timing has a kink."""
 
 
 def spans(source: KeyedTransform) -> list[Span]:
     """Return the stretches in which the modes act, in order of time.
 
-    Of cycles those between the first key and the last: what is added repeats with the channels.
+    For cycles, only those between the first and the last key: the added values repeat with the channels.
     """
     if source.switches:
         return _spans_of_runs(source)
@@ -64,24 +64,27 @@ def spans(source: KeyedTransform) -> list[Span]:
 
 
 def _spans_of_runs(source: KeyedTransform) -> list[Span]:
-    """Return the stretches of time from key to key of something that passes from one holder to another.
+    """Return the stretches of time from key to key for an object that switches holders.
 
-    What its channels have between the last key in one and the first in the next is the same for none of the modes.
+    In no mode do the channels keep their own values between the last key in one holder and the first in the next.
     """
-    # What turns about an axis need have no keys of its rotation.
+    # An object that turns about an axis may have no rotation keys.
     times = dict.fromkeys(source.filled_rows, np.full(1, np.inf))
     times |= {row: keys.times for rows, keys in source.channels for row in rows}
-    # Angles stay together: near gimbal lock what one of them has depends on the others.
+    # Angles stay together: near gimbal lock each of them depends on the others.
     parts = [tuple(row for row in sorted(times) if PART_OF[row] == part) for part in ROWS]
     breaks = np.unique(np.concatenate([distinct(source.keyed_frames), *map(_breaks, source.curves)]))
     result: list[Span] = []
     for run in source.runs:
         ends = [*distinct(run.source.keyed_frames).tolist(), *({run.stretch.until} - {np.inf})]
         for rows in filter(None, parts):
-            # The frame of a switch is the next run's, and a channel has its own value where it has a key alone.
+            # The frame of a switch belongs to the next run, and a channel has its own value only on its own keys.
             is_key = [all(np.abs(times[row] - frame).min() < SAME_FRAME for row in rows) for frame in ends]
-            # Strips come to a key by a hair too early, where curves have its value already.
-            shown = [*ends[:-1], _before(ends[-1]) if is_key[-1] and ends[-1] == run.stretch.until else ends[-1]]
+            # Strips reach a key slightly early, when curves already have its value.
+            shown = [
+                *ends[:-1],
+                _frame_before_key(ends[-1]) if is_key[-1] and ends[-1] == run.stretch.until else ends[-1],
+            ]
             is_key[-1] |= ends[-1] == run.stretch.until
             result += [
                 Span(rows, first, last, *are_keys, tuple(breaks[(breaks > first) & (breaks < last)]))
@@ -95,13 +98,13 @@ def _spans_of_runs(source: KeyedTransform) -> list[Span]:
     return result
 
 
-def _before(frame: float) -> float:
-    """Return the last frame in single precision before a key on which curves do not have its value yet."""
+def _frame_before_key(frame: float) -> float:
+    """Return the last single-precision frame before a key on which curves do not yet have its value."""
     return float(np.nextafter(np.float32(frame - KEY_TOLERANCE), np.float32(-np.inf)))
 
 
 def _breaks(keys: Keys) -> np.ndarray:
-    """Return frames (b,) at which the easings of these keys have a kink between two of them."""
+    """Return the frames (b,) at which the easings of these keys have a kink between two keys."""
     if keys.easing is None or keys.easing_settings is None:
         return np.empty(0)
     codes, easings, periods = (rows[:, :-1] for rows in (keys.interpolation, keys.easing, keys.easing_settings[2]))
@@ -110,7 +113,7 @@ def _breaks(keys: Keys) -> np.ndarray:
         periods = np.where(
             periods == 0.0, np.where(easings == EASE_IN_OUT_CODE, *ELASTIC_PERIOD_RATIOS[::-1]), periods / durations
         )
-    # By how much of the segment a kink is away from its steep end.
+    # The distance of each kink from the steep end of its segment, as a fraction of the segment.
     away = np.full((len(BOUNCE_LANDING_TIMES), *codes.shape), np.nan)
     away[:, codes == BOUNCE_CODE] = BOUNCE_LANDING_TIMES[:, None]
     away[:, codes == ELASTIC] = 0.25 * periods[codes == ELASTIC]

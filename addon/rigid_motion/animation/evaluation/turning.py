@@ -1,10 +1,10 @@
-"""How far bodies turn between their keys beyond the shortest way: by whole turns, of angles or of the channel.
+"""Turning: rotation between keys beyond the shortest way, by angle channels or by whole turns of the Turns channel.
 
-An angle about an axis that is the same at both keys says how far. So do Euler angles: of the axis that goes furthest in
-a segment, if that is more than half a turn, as many turns are added to the shortest rotation as it lacks of the angle;
-at half a turn, which has two shortest ways, the sense of the angle decides. The axis stands still in the body where the
-angles turned about before it change less, and else in space. What the channel of turns has comes on top. Inserted keys
-may leave parts of turns in it: a part is taken off the way to the second key, and made by the spin.
+An angle about the same axis at both keys says how far the body turns. So do Euler angles: the axis that turns furthest
+in a segment counts if it turns more than half a turn, and whole turns are added to the shortest rotation until it
+matches that angle. At half a turn there are two shortest ways, and the sign of the angle decides. The axis is fixed in
+the body if the angles that precede it change less, and in space otherwise. The Turns channel comes on top. Inserted
+keys may leave fractions of turns in it: a fraction is taken off the rotation to the second key, and made by the spin.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .marks import HALF_TURN, SAME_VALUE, SCREW_AXIS, sweeps
 from .sources import KeyedTransform
 
 NO_TURN = 1e-4
-"""Radians: what turns by less has no axis."""
+"""A rotation by less than this angle, in radians, has no axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,17 +35,17 @@ class Turning:
     spins: Spins
 
     by_angles: Spins
-    """Spins that the angles of the channels make by themselves."""
+    """Spins from the angles of the channels alone."""
 
     first: np.ndarray
     """The quaternions of the first keys, shape (S, 4)."""
 
     second: np.ndarray
-    """The rotations that segments turn to without spins, in the sign that says which way round: the second keys, but
-    for what is not whole of the spins, shape (S, 4)."""
+    """The rotations that segments reach without spins: the second keys, less any fractional turns of the spins. Their
+    signs say which way round, shape (S, 4)."""
 
     turn: np.ndarray
-    """The rotation there as a vector along the axes of the body, shape (3, S)."""
+    """The rotation from `first` to `second` as a vector along the axes of the body, shape (3, S)."""
 
     @cached_property
     def twists(self) -> np.ndarray:
@@ -54,12 +54,12 @@ class Turning:
 
     @property
     def totals(self) -> np.ndarray:
-        """By how much each segment turns, in radians, shape (S,)."""
+        """The total rotation of each segment, in radians, shape (S,)."""
         return np.linalg.norm(self.turn + self.twists[:, 0], axis=0)
 
     @property
     def about(self) -> np.ndarray:
-        """Angles that segments turn about the axes of their spins, in radians, shape (S,)."""
+        """The rotation of each segment about the axis of its spin, in radians, shape (S,)."""
         return np.einsum("ks,ks->s", self.turn + self.twists[:, 0], self.axes_in_body)
 
     @property
@@ -69,7 +69,7 @@ class Turning:
 
 
 def needs_turning(source: KeyedTransform) -> bool:
-    """Return whether any segment may turn otherwise than by the shortest way."""
+    """Return whether any segment may turn other than by the shortest way."""
     return source.has_half_turns or source.turns is not None
 
 
@@ -85,9 +85,9 @@ def turning(
 ) -> Turning:
     """Return how S segments turn.
 
-    From the channels (., S) at both ends, the poses (S, 2) that they make, and the rotations (S, 4) of the objects' own
-    delta transforms. `turns` (S,) is what the channel of turns has: what is not whole of it is a part of the turn to
-    the second key. `axes` (S,), of `TURN_AXES`, are what they are about, `backwards` (S,) whether time runs backwards.
+    Takes the channels (., S) at both ends, their poses (S, 2), and the rotations (S, 4) of the objects' delta
+    transforms. `turns` (S,) are from the Turns channel: a fraction is part of the rotation to the second key. `axes`
+    (S,), from `TURN_AXES`, are the axes of the turns; `backwards` (S,) says whether time runs backwards.
     """
     first, count = keys.quaternions[:, 0], len(turns)
     second, turn = _shortest(first, keys.quaternions[:, 1])
@@ -104,9 +104,9 @@ def turning(
 def turning_of(
     sources: Sequence[KeyedTransform], start: np.ndarray, end: np.ndarray, keys: Poses, original: np.ndarray
 ) -> tuple[Turning, Turning]:
-    """Return how S segments of alike sources turn, and the same in whole turns alone.
+    """Return how S segments of similar sources turn, and the same with whole turns only.
 
-    From their channels (10, S) and poses (S, 2) at both ends, and the objects' own delta transforms (10, S).
+    Takes their channels (10, S) and poses (S, 2) at both ends, and the objects' own delta transforms (10, S).
     """
     turns = np.concatenate([source.segment_turns for source in sources])
     backwards = np.concatenate([source.run_backwards for source in sources])
@@ -115,7 +115,7 @@ def turning_of(
     result = turning(*given, turns, axes, backwards)
     if np.all(turns == np.rint(turns)):
         return result, result
-    # What is not whole goes by the shortest way between the keys, as without what the channel has.
+    # Fractional turns go the shortest way between the keys, as without the Turns channel.
     by_angles, spins = turning(*given, np.zeros_like(turns), axes, backwards), result.spins
     lacking = result.about - np.einsum("ks,ks->s", by_angles.turn, result.axes_in_body)
     whole = np.where(spins.turns == np.rint(spins.turns), spins.turns, np.rint(lacking / FULL_TURN))
@@ -123,7 +123,7 @@ def turning_of(
 
 
 def turning_in(source: KeyedTransform, segment: int, turns: float | None = None) -> Turning:
-    """Return how one of the segments of a source turns, with other turns than those of its channel if so given."""
+    """Return how one segment of a source turns, with `turns` instead of those of its channel if given."""
     rows, original, one = values_at_ends(source, segment), source.original[:, None], slice(segment, segment + 1)
     poses = body_poses(rows[:, None], original[..., None], None, source)
     channel = source.segment_turns[one] if turns is None else np.array([turns])
@@ -133,24 +133,24 @@ def turning_in(source: KeyedTransform, segment: int, turns: float | None = None)
 
 
 def values_at_ends(source: KeyedTransform, segment: int) -> np.ndarray:
-    """Return what the channels have at both ends of a segment, (10, 2)."""
+    """Return the channel values at both ends of a segment, (10, 2)."""
     return source.values_at(source.key_frames[segment : segment + 2])
 
 
 def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the shortest turns (3, S) from quaternions (S, 4) to others."""
+    """Return the shortest rotations (3, S) from quaternions (S, 4) to others."""
     nowhere = np.zeros((len(first), 3))
     return twists.between(nowhere, first, nowhere, second)[:3]
 
 
 def _shortest(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the second quaternions (S, 4), in the sign of the shorter way from the first, and the turns (3, S)."""
+    """Return the second quaternions (S, 4), signed for the shortest way from the first, and the rotations (3, S)."""
     signs = np.where(np.einsum("si,si->s", first, second) < 0.0, -1.0, 1.0)
     return second * signs[:, None], shortest_turns(first, second)
 
 
-def _take_off(result: Turning, some: np.ndarray, parts: np.ndarray) -> None:
-    """Take off what is not whole of the spins of some segments, in turns (s,), from where they turn to; in place."""
+def _subtract_fractions(result: Turning, some: np.ndarray, parts: np.ndarray) -> None:
+    """Subtract the fractional turns (s,) of some segments' spins from the rotations they reach, in place."""
     if parts.any():
         spins = Spins(-parts, result.spins.axes[:, some], result.spins.in_space[some])
         ends = Poses(np.zeros((len(some), 3)), result.second[some])
@@ -166,10 +166,10 @@ def _add_angles(
     order: str,
     parts: np.ndarray,
 ) -> np.ndarray:
-    """Add the turns that angles (4, S) at both ends say, and have half turns go in their sense; in place.
+    """Add the turns given by angles (4, S) at both ends, and make half turns follow the sign of the angle, in place.
 
-    `parts` (S,) is what the channel has that is not whole: so much of what the angles say is spin. Returns the sense of
-    the angle that counts, 0 where none does, shape (S,).
+    `parts` (S,) are the fractional turns of the channel: that much of the angles is spin. Returns the sign of the angle
+    that counts, 0 if none does, shape (S,).
     """
     senses, spins = np.zeros(len(parts)), result.spins
     if order == AXIS_ANGLE:
@@ -178,7 +178,7 @@ def _add_angles(
         change = (end - start)[:3]
         furthest = np.abs(change).argmax(axis=0)
         by = np.take_along_axis(change, furthest[None], axis=0)[0]
-    # An angle that changes by rounding alone has no sense.
+    # An angle that changes only by rounding has no sign.
     some = np.flatnonzero((np.abs(by) >= HALF_TURN) | ((parts != 0.0) & (np.abs(by) > SAME_VALUE)))
     if not len(some):
         return senses
@@ -196,7 +196,7 @@ def _add_angles(
         axes = np.where(stands[:, None], rotate(original[some], _mean(in_space)), _mean(in_body))
     spins.axes[:, some], spins.in_space[some] = axes.T, stands
     part = sense * parts[some]
-    _take_off(result, some, part)
+    _subtract_fractions(result, some, part)
     turn, by = result.turn[:, some], by - FULL_TURN * part
     about = np.einsum("sk,sk->s", axes, np.where(stands[:, None], rotate(result.first[some], turn.T), turn.T))
     # Half a turn has two shortest ways, and rounding errors would choose one of them.
@@ -215,7 +215,7 @@ def _add_angles(
 
 
 def _axis(angles: np.ndarray, axis: np.ndarray, order: str, *, before: bool) -> np.ndarray:
-    """Return one of the axes of Euler angles (3, S) each, (S, 3): in the body, `before` other turns, or in space."""
+    """Return an axis of each triple of Euler angles (3, S), (S, 3): in the body (turns `before` it), or in space."""
     result = np.eye(3)[axis]
     turn = np.array([order.index(name) for name in "XYZ"])
     others = turn[:, None] < turn[axis] if before else turn[:, None] > turn[axis]
@@ -224,7 +224,7 @@ def _axis(angles: np.ndarray, axis: np.ndarray, order: str, *, before: bool) -> 
 
 
 def _mean(ends: np.ndarray) -> np.ndarray:
-    """Return the unit vector (S, 3) half-way between two (2, S, 3), the first one where they are opposite."""
+    """Return the unit vector (S, 3) half-way between two (2, S, 3), or the first one if they are opposite."""
     total = ends.sum(axis=0)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > NO_TURN, total / np.maximum(length, NO_TURN), ends[0])
@@ -233,24 +233,24 @@ def _mean(ends: np.ndarray) -> np.ndarray:
 def _add_channel(
     result: Turning, turns: np.ndarray, senses: np.ndarray, axes: np.ndarray, backwards: np.ndarray
 ) -> None:
-    """Add what the channel has, in place: about the axis of the angles' own turns where these have a sense (S,)."""
+    """Add the turns of the channel, in place: about the axis of the angles' turns if these have a sign (S,)."""
     spins, others = result.spins, np.flatnonzero((turns != 0.0) & (senses == 0.0))
     spins.turns[:] += senses * turns
     if not len(others):
         return
     size = np.linalg.norm(result.turn[:, others], axis=0)
     is_local = (axes[others] != SCREW_AXIS) | (size < NO_TURN)
-    # What has no axis of its own turns about the last of them, Z.
+    # A segment without an axis of its own turns about Z, the last of the axes.
     local = np.eye(3)[:, ["XYZ".find(name) for name in axes[others]]]
     spins.axes[:, others] = np.where(is_local, local, result.turn[:, others] / np.maximum(size, NO_TURN))
     spins.in_space[others] = False
     added = np.where(is_local & backwards[others], -1, 1) * turns[others]
     spins.turns[others] += added
-    _take_off(result, others, added - np.rint(added))
+    _subtract_fractions(result, others, added - np.rint(added))
 
 
 def without_spins(measured: Poses, spins: Spins, progress: np.ndarray) -> Poses:
-    """Return poses (S, k) at this progress (S, k) of S segments without the spins that they have."""
+    """Return poses (S, k) at this progress (S, k) of S segments with the segments' spins removed."""
     counts = np.full(len(progress), progress.shape[1])
     flat = Poses(measured.positions.reshape(-1, 3), measured.quaternions.reshape(-1, 4))
     unspun = replace(spins, turns=-spins.turns).add_to(flat, counts, progress.ravel())

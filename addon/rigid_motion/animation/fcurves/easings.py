@@ -1,7 +1,7 @@
-"""Easings: Robert Penner's equations, in the form in which Blender has them, on arrays.
+"""Easings: Robert Penner's equations on arrays, in Blender's form.
 
-Time and value both run from 0 to 1 over a segment. An easing is written down once, as it eases in; easing out is the
-same turned about the middle of the segment, and in-out is one half of each. The names are those of
+Time and value both run from 0 to 1 over a segment. Each easing is defined once, as ease-in; ease-out is that rotated
+about the middle of the segment, and in-out is one half of each. The names are those of
 `bpy.types.Keyframe.interpolation` and `.easing`.
 """
 
@@ -13,23 +13,23 @@ import numpy as np
 
 
 def ease(interpolation: str, easing: str, u: np.ndarray, back: np.ndarray | float = 0.0) -> np.ndarray:
-    """Return how much of the change of a segment is done at `u`.
+    """Return the fraction of a segment's change that is done at `u`.
 
     Parameters
     ----------
     interpolation : str
         A key of `EASE_IN`.
     easing : str
-        AUTO (which is out for BACK and BOUNCE, in for the others), EASE_IN, EASE_OUT or EASE_IN_OUT.
+        AUTO (EASE_OUT for BACK and BOUNCE, EASE_IN for the others), EASE_IN, EASE_OUT or EASE_IN_OUT.
     u : array, shape (n,)
         Time in the segment, 0 to 1.
     back : float or array, shape (n,)
-        By how much BACK overshoots, in Blender's measure.
+        The overshoot of BACK, as Blender measures it.
 
     Returns
     -------
     array, shape (n,)
-        0 at the start and 1 at the end; BACK leaves that range in between.
+        0 at the start and 1 at the end; BACK leaves this range in between.
     """
     easing = _AUTO_EASINGS.get(interpolation, "EASE_IN") if easing == "AUTO" else easing
     if interpolation == "BACK" and easing == "EASE_IN_OUT":
@@ -45,20 +45,20 @@ def elastic(
     amplitude: np.ndarray | float,
     period: np.ndarray | float,
 ) -> np.ndarray:
-    """Return how far ELASTIC has moved a value at `u`.
+    """Return the change of value by ELASTIC at `u`.
 
     Parameters
     ----------
     easing : str
-        AUTO (which is out), EASE_IN, EASE_OUT or EASE_IN_OUT.
+        AUTO (EASE_OUT), EASE_IN, EASE_OUT or EASE_IN_OUT.
     u : array, shape (n,)
         Time in the segment, 0 to 1.
     change : float or array, shape (n,)
-        Change of value over the segment. Falling is not rising turned upside down: the swings differ in phase.
+        Change of value over the segment. Falling is not rising upside down: the swings differ in phase.
     amplitude : float or array, shape (n,)
-        Largest swing, in units of value. Where it is less than the change, swings shrink in proportion.
+        Largest swing, in units of value. If it is less than the change, swings shrink in proportion.
     period : float or array, shape (n,)
-        Of one swing, as a fraction of the segment's duration. 0 for Blender's own, 0.3 (in-out: 0.45).
+        The length of one swing, as a fraction of the segment's duration. 0 for Blender's default, 0.3 (in-out: 0.45).
 
     Returns
     -------
@@ -75,7 +75,7 @@ def elastic(
 
     def ease_in(time: np.ndarray) -> np.ndarray:
         left = time - 1.0
-        # A weak swing grows to full size close to the key, or it would not reach it.
+        # A weak swing grows to full size close to the key; otherwise it would not reach the key.
         near = np.abs(left) < np.abs(lag)
         with np.errstate(divide="ignore", invalid="ignore"):
             size = np.where(near, 1.0 + (shrunk - 1.0) * np.abs(left / lag), shrunk)
@@ -88,7 +88,7 @@ def elastic(
 def _directed(
     ease_in: Callable[[np.ndarray], np.ndarray], easing: str, u: np.ndarray, change: np.ndarray | float
 ) -> np.ndarray:
-    """Return what eases in from 0 to `change`, made to ease in, out, or in and out."""
+    """Return the values of a function that eases in from 0 to `change`, converted to ease in, out, or in and out."""
     if easing == "EASE_IN":
         return ease_in(u)
     if easing == "EASE_OUT":
@@ -103,7 +103,7 @@ def _back(u: np.ndarray, back: np.ndarray | float) -> np.ndarray:
 
 
 def _bounce(u: np.ndarray, _: object) -> np.ndarray:
-    """Return four parabolas, each with its vertex where the ball is highest; the first is half a one."""
+    """Return four parabolas, each with its vertex where the ball is highest; the first is only half of one."""
     left = 1.0 - u
     arc = np.searchsorted((1.0 / 2.75, 2.0 / 2.75, 2.5 / 2.75), left, side="right")
     top = np.array((0.0, 1.5 / 2.75, 2.25 / 2.75, 2.625 / 2.75))[arc]
@@ -122,6 +122,6 @@ EASE_IN: dict[str, Callable[[np.ndarray, np.ndarray | float], np.ndarray]] = {
     "BACK": _back,
     "BOUNCE": _bounce,
 }
-"""From time and BACK's overshoot to value, easing in. ELASTIC is not here: it depends on the size of the change."""
+"""Functions from time and BACK's overshoot to value, easing in. ELASTIC is missing: it depends on the change's size."""
 
 _AUTO_EASINGS = {"BACK": "EASE_OUT", "BOUNCE": "EASE_OUT"}

@@ -1,4 +1,4 @@
-"""The values of F-curves on frames, in double precision."""
+"""Evaluation of F-curves: their values on frames, in double precision."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ def evaluate(
     Parameters
     ----------
     curves : sequence of Keys
-        Without keys curves are 0 everywhere, as in Blender.
+        Curves without keys are 0 everywhere, as in Blender.
     times : sequence of array, shape (m,)
-        Frames for each of them. They are taken as they are, not in single precision as Blender does: values are smooth
-        in time between keys.
+        Frames for each of the curves. They are not rounded to single precision as in Blender: values are smooth in
+            time between keys.
     out : sequence of array, shape (c, m), optional
-        What to put the values into.
+        Arrays to write the values to.
 
     Returns
     -------
     sequence of array, shape (c, m)
-        NaN where keys or handles are not finite. What Blender does to the channels
-        of whole numbers and enumerations, which it rounds, is left out.
+        NaN where keys or handles are not finite. Values are not rounded as Blender does for channels of whole
+            numbers and enumerations.
     """
     if out is None:
         out = [np.empty((len(keys.points), len(frames))) for keys, frames in zip(curves, times, strict=True)]
@@ -45,7 +45,7 @@ def evaluate(
 
 
 def _evaluate(keys: Keys, frames: np.ndarray, out: np.ndarray) -> None:
-    """Put the values of curves with keys on these frames (m,) into `out`, which is 0, shape (c, m)."""
+    """Write the values of curves with keys on these frames (m,) to `out`, which is 0, shape (c, m)."""
     rounds = None
     if keys.cycles is not None:
         frames, _, rounds = fold(keys, frames)
@@ -68,7 +68,7 @@ def _evaluate(keys: Keys, frames: np.ndarray, out: np.ndarray) -> None:
 
 
 def _ease(keys: Keys, at: np.ndarray, u: np.ndarray, out: np.ndarray) -> None:
-    """Replace the values (c, m) in segments (m,) that ease, at times u (m,) from 0 to 1."""
+    """Replace the values (c, m) in segments (m,) with easing, at times u (m,) from 0 to 1."""
     if keys.easing is None or keys.easing_settings is None:
         return
     kinds = (keys.interpolation * len(EASINGS) + keys.easing)[:, at]
@@ -89,7 +89,7 @@ def _ease(keys: Keys, at: np.ndarray, u: np.ndarray, out: np.ndarray) -> None:
 
 
 def _extrapolate(keys: Keys, frames: np.ndarray, out: np.ndarray) -> None:
-    """Have values (c, m) go on at the slope of their curves before the first key and behind the last."""
+    """Extend values (c, m) with the slope of their curves before the first key and after the last."""
     last = len(keys.times) - 1
     for side, end, beside, handles in ((-1, 0, min(1, last), keys.left), (1, last, max(last - 1, 0), keys.right)):
         beyond = np.flatnonzero(side * (frames - keys.times[end]) > 0.0)

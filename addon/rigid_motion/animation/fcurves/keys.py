@@ -1,6 +1,6 @@
-"""F-curves as arrays: their keys, what these make of the time between them, and Cycles, which say what frame is shown.
+"""F-curves as arrays: their keys, the segments between them as cubics, and Cycles modifiers that fold frames back.
 
-Frames and values are Blender's, in its single precision.
+Frames and values are Blender's, in single precision.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ EASINGS = dict(enumerate(("AUTO", "EASE_IN", "EASE_OUT", "EASE_IN_OUT")))
 AUTO_EASING = 0
 
 CODE = np.uint8
-"""The type that Blender keeps codes in: any other takes longer to read."""
+"""The type in which Blender stores codes: reading into any other type is slower."""
 
 KEY_TOLERANCE = float(np.float32(1e-4))
-"""Frames from a key within which Blender takes its value."""
+"""The distance from a key, in frames, within which Blender uses the key's value."""
 
 MAX_NUMBER = 1e30
-"""Frames and values from here on are damage. An infinite one that is typed, or set by a script, becomes 3.4e38."""
+"""Frames and values from this size on are damage. An infinite one, typed or set by a script, becomes 3.4e38."""
 
 
 @dataclass(frozen=True)
 class Cycles:
-    """A Cycles modifier. Modes are NONE, REPEAT, REPEAT_OFFSET or MIRROR; a count of 0 is without end."""
+    """A Cycles modifier. Modes are NONE, REPEAT, REPEAT_OFFSET or MIRROR; a count of 0 means endless."""
 
     before: str
     after: str
@@ -47,7 +47,7 @@ class Cycles:
 
     @property
     def endless(self) -> Cycles:
-        """Cycles whose rounds have no end on either side: what a mode sees that looks over the seam of a round."""
+        """Cycles with endless rounds on both sides, as a mode sees them that looks across the seam of a round."""
         before, after = self.before, self.after
         return Cycles(after if before == "NONE" else before, before if after == "NONE" else after, 0, 0)
 
@@ -56,46 +56,46 @@ class Cycles:
 class Keys:
     """c F-curves that are keyed together: n keys each, on the same frames, with the same extrapolation and cycles.
 
-    Frames and values are in single precision, codes are `INTERPOLATIONS` and `EASINGS`. What does not bear on the
-    values of the curves is None.
+    Frames and values are in single precision; codes are those of `INTERPOLATIONS` and `EASINGS`. Fields that do not
+    affect the values of the curves are None.
     """
 
     points: np.ndarray
     """Frame and value, shape (c, n, 2)."""
 
     interpolation: np.ndarray
-    """Codes of the segments that the keys begin, shape (c, n)."""
+    """Interpolation codes of the segments that the keys begin, shape (c, n)."""
 
     left: np.ndarray | None = None
-    """The handles before the keys, frame and value, shape (c, n, 2)."""
+    """The left handles of the keys, frame and value, shape (c, n, 2)."""
 
     right: np.ndarray | None = None
-    """The handles behind the keys, frame and value, shape (c, n, 2)."""
+    """The right handles of the keys, frame and value, shape (c, n, 2)."""
 
     easing: np.ndarray | None = None
-    """Codes, shape (c, n)."""
+    """Easing codes, shape (c, n)."""
 
     easing_settings: np.ndarray | None = None
-    """BACK's overshoot, ELASTIC's amplitude and ELASTIC's period in frames, shape (3, c, n)."""
+    """BACK's overshoot, ELASTIC's amplitude, and ELASTIC's period in frames, shape (3, c, n)."""
 
     linear: bool = False
-    """True if the curves go on at their slope outside of the keys, instead of holding their value."""
+    """True if the curves continue with their slope outside of the keys, False if they hold their value."""
 
     cycles: Cycles | None = None
 
     breakdowns: np.ndarray | None = None
-    """True for the keys of type *Breakdown*, shape (n,), where any is."""
+    """True for the keys of type *Breakdown*, shape (n,); None if there are none."""
 
     automatic: np.ndarray | None = None
-    """True for handles that Blender sets by the keys around, to the left and to the right of each, shape (c, n, 2),
-    where that is asked for."""
+    """True for handles that Blender computes from the neighbouring keys, left and right, shape (c, n, 2); None unless
+    requested."""
 
     is_sound: bool = True
-    """True if all numbers that were read are smaller than `MAX_NUMBER`, and the keys in the order of their frames."""
+    """True if all numbers read are smaller than `MAX_NUMBER`, and the keys are in the order of their frames."""
 
     @cached_property
     def times(self) -> np.ndarray:
-        """Frames of the keys, shape (n,), double precision."""
+        """Frames of the keys, shape (n,), in double precision."""
         return self.points[0, :, 0].astype(np.float64)
 
     @property
@@ -105,7 +105,7 @@ class Keys:
 
     @cached_property
     def rates(self) -> np.ndarray:
-        """One over the frames from each key to the next, 0 where there are none, shape (n,)."""
+        """One over the number of frames from each key to the next, 0 where that is 0, shape (n,)."""
         durations = np.diff(self.times, append=self.times[-1:])
         return np.divide(1.0, durations, out=np.zeros_like(durations), where=durations != 0.0)
 
@@ -113,9 +113,9 @@ class Keys:
     def cubics(self) -> tuple[np.ndarray, np.ndarray | None]:
         """Value and time from each key to the next as cubics of a parameter from 0 to 1.
 
-        Values (4, c, n) are coefficients of 1, t, t^2 and t^3, or (2, c, n) where no segment is BEZIER; what eases runs
-        straight here. Times, from 0 to 1, are coefficients of t, t^2 and t^3, shape (3, c, n), or (3, 1, n) where all
-        curves have them in common; None where time itself is the parameter.
+        Values are coefficients of 1, t, t^2 and t^3, (4, c, n), or (2, c, n) if no segment is BEZIER; segments with
+        easing are linear here. Times, from 0 to 1, are coefficients of t, t^2 and t^3, shape (3, c, n), or (3, 1, n) if
+        they are the same for all curves; None if time itself is the parameter.
         """
         following = np.roll(self.points, -1, axis=1)
         is_moving = (self.rates != 0.0) & (self.interpolation != CONSTANT)
@@ -132,11 +132,11 @@ class Keys:
         return values, times[:, :1] if (times == times[:, :1]).all() else times
 
     def only(self, channels: Sequence[int]) -> Keys:
-        """Return the keys of these channels alone."""
+        """Return the keys of only these channels."""
         return self._part((channels,))
 
     def at(self, chosen: np.ndarray) -> Keys:
-        """Return the chosen ones of the keys, by a mask of shape (n,)."""
+        """Return the chosen keys, given a mask of shape (n,)."""
         part = self._part((slice(None), chosen))
         return part if self.breakdowns is None else replace(part, breakdowns=self.breakdowns[chosen])
 
@@ -149,7 +149,7 @@ class Keys:
 
     @property
     def raw(self) -> bytes:
-        """All of it as bytes, for a digest that tells whether anything has changed."""
+        """All fields as bytes, for a digest that tells whether anything has changed."""
         names = ("points", "interpolation", "left", "right", "easing", "easing_settings", "breakdowns", "automatic")
         present = [array for name in names if (array := getattr(self, name)) is not None]
         header = f"{self.points.shape} {len(present)} {self.linear} {self.cycles};"
@@ -159,17 +159,17 @@ class Keys:
 def cycled(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return times (m,) folded back into the range of the keys by their Cycles, and whether time runs backwards there.
 
-    Where no cycle reaches they are what they were.
+    Times that no cycle reaches are unchanged.
     """
     return fold(keys, np.asarray(times))[:2]
 
 
 @np.errstate(all="ignore")
 def fold(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what `cycled` does, and how many times the change from the first to the last key is to be added.
+    """Return the results of `cycled`, and how many times to add the change from the first to the last key.
 
-    Outside of the keys in single precision and in Blender's order of steps: it decides on which side of a key a frame
-    falls. Between them times stay what they are.
+    Outside of the keys, the computation is in single precision and in Blender's order of steps, which decides on which
+    side of a key a frame falls. Times between the keys are unchanged.
     """
     result, folded = times.astype(np.float64), times.astype(np.float32)
     backwards, rounds = np.zeros(times.shape, dtype=bool), np.zeros(times.shape, np.float32)

@@ -1,41 +1,41 @@
-"""Bezier segments as cubics: the parameter at which they reach a time, and handles to run through given values by."""
+"""Solvers for Bezier segments: the parameter at which a segment reaches a time, and handles through given values."""
 
 from __future__ import annotations
 
 import numpy as np
 
 NEWTON_TOLERANCE = 1e-5
-"""Last step of Newton's method: the error left is about its square."""
+"""The size of a step below which Newton's method stops: the remaining error is about its square."""
 
 NEWTON_STEPS = 4
-"""The number of steps that Newton's method takes before bisection helps it."""
+"""The number of steps of Newton's method before bisection helps it."""
 
 BRACKETED_STEPS = 100
-"""More than bisection alone takes to the last bit."""
+"""The largest number of steps with bisection: more than bisection alone needs for the last bit."""
 
 IN_TIME = (1.0 / 3.0, 2.0 / 3.0)
-"""The times of handles with which a segment is a cubic in time."""
+"""The times of handles that make a segment a cubic in time."""
 
 MAX_ROOT_ERROR = 1e-6
-"""The largest error with which nothing better is looked for: a few times the rounding of single precision."""
+"""Handles with a smaller error are not replaced by better ones: a few times single-precision rounding."""
 
 LEAST_PULL = 1e-6
-"""The least that a handle counts for, relative to the largest, to be moved for the others."""
+"""Changes of handles with a smaller effect, relative to the largest, are left out of the least-squares fit."""
 
 
 def bezier_cubics(start: np.ndarray, right: np.ndarray, left: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return bezier curves as cubics, after the correction that keeps frames from running backwards.
+    """Return Bezier curves as cubics, after the correction that keeps frames from running backwards.
 
     Parameters
     ----------
     start, right, left, end : array, shape (k, 2)
-        Key, its handle, the handle of the next key and that key. Single precision: Blender's rounding matters where
-        frames are many and segments short.
+        Key, its right handle, the left handle of the next key, and that key. In single precision: Blender's rounding
+            matters if frame numbers are large and segments short.
 
     Returns
     -------
     array, shape (3, k, 2)
-        Coefficients of t, t^2 and t^3 for frame and value from the first key on.
+        Coefficients of t, t^2 and t^3 for frame and value relative to the first key.
     """
     duration = end[:, :1] - start[:, :1]
     rises = [one[:, 1] - other[:, 1] for one, other in ((start, end), (right, left), (left, end))]
@@ -49,7 +49,7 @@ def bezier_cubics(start: np.ndarray, right: np.ndarray, left: np.ndarray, end: n
 
 
 def _shortened(key: np.ndarray, handle: np.ndarray, duration: np.ndarray) -> np.ndarray:
-    """Return the handle, no longer in time than the segment."""
+    """Return the handle, shortened to be no longer in time than the segment."""
     arm = key - handle
     length = np.abs(arm[:, :1])
     long = length > duration
@@ -60,8 +60,8 @@ def _shortened(key: np.ndarray, handle: np.ndarray, duration: np.ndarray) -> np.
 def solve_cubics(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
     """Return the t from 0 to 1 at which the cubic c1 t + c2 t^2 + c3 t^3 is u.
 
-    There is one for every u from 0 to 1: the cubic goes from 0 to 1, and handles no longer than the segment let it turn
-    at most before it leaves 0 for good and after it has reached 1.
+    There is one for every u from 0 to 1: the cubic goes from 0 to 1, and as handles are no longer than the segment, it
+    turns back only before it finally leaves 0 and after it has reached 1.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def solve_cubics(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
     """
     c1, c2, c3 = cubics
     twice, thrice = 2.0 * c2, 3.0 * c3
-    # Newton's method, from the cubic in u that goes through both ends with the slopes that t has there.
+    # Newton's method, starting from the cubic in u through both ends with the slopes that t has there.
     at_start, at_end = (np.clip(1.0 / slope, 0.0, 3.0) for slope in (c1, c1 + twice + thrice))
     t = u * (at_start + u * (3.0 - 2.0 * at_start - at_end + u * (at_start + at_end - 2.0)))
     for _ in range(NEWTON_STEPS):
@@ -93,7 +93,7 @@ def solve_cubics(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
 
 
 def _solve_bracketed(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
-    """Solve cubics near a vanishing slope: by Newton's steps, and by bisection where these lead out."""
+    """Solve cubics near a zero slope: by Newton steps, or by bisection if a step leaves the bracket."""
     c1, c2, c3 = cubics
     low, high = np.zeros_like(u), np.ones_like(u)
     t = np.clip(u, 0.0, 1.0)
@@ -110,23 +110,23 @@ def _solve_bracketed(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
 
 
 def fit_together(times: np.ndarray, values: np.ndarray, shares: np.ndarray, native: np.ndarray) -> np.ndarray:
-    """Return the handles of segments from (0, 0) to (1, 1) whose mean is nearest to values at times.
+    """Return the handles of segments from (0, 0) to (1, 1) whose mean is nearest to `values` at `times`.
 
-    They keep the times of their handles. Where that is much better, every other segment is a cubic in time instead.
+    Handles keep their times. If that is much better, every other segment becomes a cubic in time instead.
 
     Parameters
     ----------
     times, values : array, shape (m,)
         Times from 0 to 1.
     shares : array, shape (c,)
-        What each of the segments counts for in the mean.
+        The weight of each segment in the mean.
     native : array, shape (c, 2)
         The times of both handles.
 
     Returns
     -------
     array, shape (c, 2, 2)
-        Time and value of either handle of each.
+        Time and value of both handles of each segment.
     """
     mixed = native.copy()
     mixed[np.argsort(-shares)[1::2]] = IN_TIME
@@ -140,7 +140,7 @@ def _nearest(x: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.nd
     t = solve_cubics(np.tile(times, len(x)), cubics.repeat(len(times), axis=1)).reshape(len(x), -1)
     pulls = np.stack((3.0 * t * (1.0 - t) ** 2, 3.0 * t * t * (1.0 - t)), axis=1)
     desired = values - t**3
-    # From where each of them would be alone, as little as can be.
+    # Start with each segment fitted alone, and change it as little as possible.
     y = np.stack([np.linalg.lstsq(of_one.T, rest, rcond=None)[0] for of_one, rest in zip(pulls, desired, strict=True)])
     together = (shares[:, None, None] * pulls).reshape(-1, len(times))
     off = shares @ desired - y.ravel() @ together

@@ -1,13 +1,13 @@
-"""Following edits: what is keyed anew, moved, pasted or deleted has its in-betweens at once.
+"""Following edits: in-betweens are updated as soon as keys are inserted, moved, pasted or deleted.
 
-kept_timing    handles with which a motion goes on as it did beside a key that was inserted
-kept_runs      the same of what is held, in its holder and behind its last key there
-shared_turns   turns of segments that keys divide
-inserted       keys that were inserted on in-betweens: their fellow channels, and the motion beside them
-unkeyed        poses without keys, which are set again once something was written
-changes        what Blender tells of edits, and which channels they were about
-assigned       poses of the world that are assigned to held things
-refreshing     from what is keyed to the terms in its channels
+kept_timing    handles that keep the motion unchanged next to an inserted key
+kept_runs      the same for held objects, in their holder and after the last key there
+shared_turns   turns of segments that are divided by keys
+inserted       keys inserted on in-betweens: keys in the other channels, and the motion around them
+unkeyed        poses without keys, which are restored after something was written
+changes        edits reported by Blender, and the channels that they affect
+assigned       world poses assigned to held objects
+refreshing     from keys to the terms in their channels
 follower       the handlers
 
 Each module imports only those above it.

@@ -1,9 +1,9 @@
-"""Poses of the world that scripts and add-ons assign to held objects, as `matrix_world`.
+"""World poses that scripts and add-ons assign to held objects as `matrix_world`.
 
-Blender gives the channels what is seen then where nothing holds the object. So they are set once more, to what is seen
-there in the hand, and with them keys that were inserted of it. What tells is that the matrix is other than Blender has
-evaluated it: no edit of channels does that, whatever their values. With *Keep Transform* it is the parent that is
-another one. Of bones nothing tells: `matrix` is only evaluated.
+Blender then sets the channels as if no holder held the object. So they are set once more, to give that pose in the
+holder, along with any keys just inserted from them. An assignment is recognised by a matrix that differs from Blender's
+evaluated one: no edit of channels changes it. With *Keep Transform*, the parent differs as well. For bones there is no
+such sign: their `matrix` is only evaluated.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from ..transforms import WIDTHS, Transform
 from .changes import graphs_of
 
 MAX_MATRIX_ROUNDING = 1e-4
-"""What channels lose of a matrix, relative to it and absolute below 1. Where they lose more it was not for them."""
+"""The rounding error of a matrix set through channels, relative, absolute below 1. A larger one is no assignment."""
 
 
 class Assigned(NamedTuple):
-    """A pose in the world that was assigned to an object that is held."""
+    """A world pose that was assigned to a held object."""
 
     transform: Transform
     world: Matrix
     values: np.ndarray
-    """The components (10,) that Blender took it for."""
+    """The components (10,) that Blender set for the pose."""
     scale: np.ndarray
-    """What it was scaled by before, (3,)."""
+    """The scale before the assignment, (3,)."""
 
 
 class Settled(NamedTuple):
-    """What had something held be elsewhere, and what is there in place of it: components (10,) each."""
+    """The components (10,) that put a held object in the wrong place, and the corrected ones."""
 
     transform: Transform
     before: np.ndarray
@@ -49,7 +49,7 @@ class Settled(NamedTuple):
 
 
 def assigned(objects: Iterable[bpy.types.Object]) -> list[Assigned]:
-    """Return what poses were assigned to held ones among objects since they were evaluated."""
+    """Return the poses assigned to held objects, among these objects, since they were last evaluated."""
     graphs = [graph for scene in bpy.data.scenes for graph in graphs_of(scene)]
     held = (obj for obj in objects if len(obj.constraints) and obj.is_editable)
     return [item for obj in held if (item := _assigned(obj, graphs)) is not None]
@@ -71,7 +71,7 @@ def _parent(evaluated: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def _holder_of(transform: Transform) -> Holder | None:
-    """Return what holds something now; None where it passes, too."""
+    """Return the present holder of a transform; None also while it passes to another one."""
     held = [number for number, one in constraints_to(transform).items() if one.influence and not one.mute]
     if len(held) != 1 or any(one.influence for one in passings_of(transform)):
         return None
@@ -79,7 +79,7 @@ def _holder_of(transform: Transform) -> Holder | None:
 
 
 def settled(items: Iterable[Assigned]) -> list[Settled]:
-    """Return what has things be where they were assigned to be, in what holds them as they are evaluated."""
+    """Return the components that put objects in their assigned poses, given their holders as evaluated now."""
     result, depsgraph = [], view_layer().depsgraph
     for item in items:
         transform, holder = item.transform, _holder_of(item.transform)
@@ -93,7 +93,7 @@ def settled(items: Iterable[Assigned]) -> list[Settled]:
 
 
 def set_keys(item: Settled, frame: float) -> bool:
-    """Give the keys of a transform on a frame of the scene other values where they have those before.
+    """Correct the keys of a transform on a frame of the scene that still have the values from before.
 
     Returns whether there are any.
     """
@@ -111,6 +111,6 @@ def set_keys(item: Settled, frame: float) -> bool:
 
 
 def set_values(item: Settled) -> None:
-    """Give a transform its other values."""
+    """Give a transform its corrected values."""
     for part, prop in item.transform.properties.items():
         setattr(item.transform.carrier, prop, item.after[ROWS[part]][: WIDTHS[prop]])

@@ -1,4 +1,4 @@
-"""From what keys say they are held in to the constraints: their influences, and the poses in which things arrive."""
+"""Apply holds: update the constraints of held objects from their keys: influences, and poses to arrive in."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ from .keying import InfluenceKeys, Passing, holding_keys, passing, passing_keys
 from .placing import hang_of, matrices_of, poses_of, rows_of
 
 MAX_SAME_FRAMES = 1e-4
-"""Frames of handles that differ by less are the same."""
+"""Handles whose frames differ by less are the same."""
 
 
 def has_holders(binding: Binding) -> bool:
-    """Return whether any user of a binding has constraints of ours."""
+    """Return whether any user of a binding has holding constraints of this extension."""
     return any(is_ours(constraint) for user in binding.users for constraint in user.carrier.constraints)
 
 
 def restore_holds(binding: Binding) -> None:
-    """Have keys of which a setting was typed over say again what they are held in: what constraints do on their frames.
+    """Restore the holds of keys in which a setting was typed over, from the effect of the constraints on their frames.
 
-    Keys of all channels may have lost it at once, as the Graph Editor copies a setting to all selected ones.
+    Keys of all channels may have lost their holds at once, as the Graph Editor copies a setting to all selected keys.
     """
     lost = [(fcurve, places) for fcurve in binding.moving.values() if (places := mend_marks(fcurve)).any()]
     if not lost:
@@ -73,15 +73,15 @@ def restore_holds(binding: Binding) -> None:
 
 
 def apply_holds(binding: Binding, source: KeyedTransform, *, may_key: bool = True) -> bool:
-    """Have the constraints of a transform hold it as its keys say. Returns whether anything was changed.
+    """Make the constraints of a transform hold it as its keys say. Returns whether anything was changed.
 
-    Unless `may_key`, keys are only moved, for Blender remembers where in memory they are: what else there is to do is
-    done later.
+    Unless `may_key`, keys are only moved, never added, because Blender remembers their memory addresses; the rest is done
+    later.
     """
     if source.held is None and not has_holders(binding):
         return False
     if not source.channels:
-        # As it has no keys it stays in what it is held in now.
+        # Without keys it stays in its present holder.
         return may_key and _release(binding)
     if may_key:
         changed = _complete(binding, source)
@@ -96,7 +96,7 @@ def apply_holds(binding: Binding, source: KeyedTransform, *, may_key: bool = Tru
     none = InfluenceKeys(np.array([source.keyed_range[0]]), np.zeros(1), np.full(1, CONSTANT))
     for user in binding.users:
         ours = _passings(user, binding).values()
-        # Those that pass in another Action do not in this one, whatever keys that came from there say.
+        # Constraints that pass in another Action have no effect in this one, even if keys copied from there name them.
         for constraint in (item for item in passings_of(user) if item not in ours):
             changed |= _key(binding, channel_of(user, constraint), none, may_key)
     if passings and may_key and (poses := passing(source)) is not None:
@@ -109,25 +109,25 @@ def _passings(user: Transform, binding: Binding) -> dict[int, Constraint]:
 
 
 def _of_all(binding: Binding, of_user: Callable) -> dict[int, Constraint]:
-    """Return the constraints of all users of a binding by numbers: those of the first that has one of it."""
+    """Return the passing constraints of all users of a binding by number; the first user with a number counts."""
     return {number: item for user in reversed(binding.users) for number, item in of_user(user).items()}
 
 
 def _influences(binding: Binding, of_user: Callable) -> dict[Channel, int]:
-    """Return the numbers of constraints by the channels of their influences, whatever names they have at each user."""
+    """Return the numbers of constraints by the channels of their influences, which may differ in name between users."""
     return {
         channel_of(user, item): number for user in reversed(binding.users) for number, item in of_user(user).items()
     }
 
 
 def channels_of(binding: Binding) -> set[Channel]:
-    """Return the channels of all constraints of ours, which have what the keys of the transforms say."""
+    """Return the channels of all holding constraints of this extension, which are written from the transforms' keys."""
     ours = [(user, item) for user in binding.users for item in user.carrier.constraints if is_ours(item)]
     return {channel_of(user, item, prop) for user, item in ours for prop in ("influence", "eval_time")}
 
 
 def _release(binding: Binding) -> bool:
-    """Remove the influences of all constraints of ours. Returns whether there were any."""
+    """Remove the F-curves of all holding constraints. Returns whether there were any."""
     there = channels_of(binding) & binding.curves.keys()
     for channel in there:
         binding.remove_curve(channel)
@@ -140,7 +140,7 @@ def _is_complete(user: Transform, source: KeyedTransform, binding: Binding) -> b
 
 
 def _complete(binding: Binding, source: KeyedTransform) -> bool:
-    """Have all users have the constraints that keys speak of, as far as holders are known, each in its own space."""
+    """Add missing constraints to all users if their holders are known, and update the spaces they are evaluated in."""
     (held, passed), changed = spoken_of(source), False
     for user in binding.users:
         if not user.animated.is_editable:
@@ -165,7 +165,7 @@ def _complete(binding: Binding, source: KeyedTransform) -> bool:
 
 
 def _key(binding: Binding, channel: Channel, keys: InfluenceKeys, may_key: bool = True) -> bool:
-    """Have an F-curve of a constraint have these keys. Returns whether it had others."""
+    """Give an F-curve of a constraint these keys. Returns whether it had others."""
     if not may_key and len(binding.curves[channel].keyframe_points if channel in binding.curves else ()) != len(
         keys.frames
     ):
@@ -205,17 +205,17 @@ def _key(binding: Binding, channel: Channel, keys: InfluenceKeys, may_key: bool 
 
 
 def _arrive(binding: Binding, source: KeyedTransform, poses: Passing) -> bool:
-    """Have the constraints that pass show the poses in which something arrives."""
+    """Make the passing constraints show the poses in which the object arrives."""
     slot, changed, last = _slot_of(binding), False, int(np.ceil(poses.frames[-1]))
     bag = channelbag_in(binding.slot.action.layers[0].strips[0], slot)
     user = binding.users[0]
-    # What has no keys is as it is.
+    # Parts without keys stay as they are.
     lacking = [PART_OF[row] not in source.keyed for row in range(len(poses.rows))]
     poses.rows[lacking] = user.components()[lacking, None]
     rows = _in_spaces(user, poses, {holder.number: holder.offset for holder in holders_of(user)})
     values = {channel: rows[row] for row, channel in user.channels.items()}
     if not user.is_part and user.order is None:
-        # Action constraints turn objects by a delta quaternion without a length, which is half a turn about x.
+        # Action constraints rotate objects by a delta quaternion of length 0, which is half a turn about X.
         identity = np.ones(1), *np.zeros((3, 1))
         values |= {("delta_rotation_quaternion", index): one for index, one in enumerate(identity)}
     for (path, index), numbers in values.items():
@@ -239,7 +239,7 @@ def _arrive(binding: Binding, source: KeyedTransform, poses: Passing) -> bool:
 
 
 def _in_spaces(user: Transform, poses: Passing, offsets: dict[int, Matrix]) -> np.ndarray:
-    """Return poses (10, m) as constraints see them, in whose spaces those of the channels are at these offsets."""
+    """Return poses (10, m) in the spaces of the constraints; `offsets` are the channel spaces in those."""
     rows = poses.rows.copy()
     for number, offset in {0: hang_of(user), **offsets}.items():
         at = np.flatnonzero(poses.numbers == number)
@@ -250,7 +250,7 @@ def _in_spaces(user: Transform, poses: Passing, offsets: dict[int, Matrix]) -> n
 
 
 def _slot_of(binding: Binding) -> bpy.types.ActionSlot:
-    """Return the slot with the poses in which what a slot moves arrives, made where there is none yet."""
+    """Return the slot with the poses in which the slot's users arrive; create it if there is none."""
     action = binding.slot.action
     own = next(slot for slot in action.slots if slot.handle == binding.slot.handle)
     name = f"{own.name_display} passing"

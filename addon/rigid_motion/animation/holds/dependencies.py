@@ -1,4 +1,4 @@
-"""What follows what: whether a holder would wait for what it is to hold."""
+"""Dependency cycles: whether a holder already depends on the object it is about to hold."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ Node = tuple[bpy.types.Object, str]
 
 
 Chain = tuple[bpy.types.Constraint, set[str]]
-"""A constraint that moves a chain of bones, and the names of those of them that are above its own."""
+"""A constraint that moves a chain of bones, and the names of the bones in the chain above its own."""
 
 
 def node_of(user: Transform) -> Node:
-    """Return what a transform is to others."""
+    """Return the node of a transform."""
     return user.animated, user.carrier.name if user.is_part else ""
 
 
 def follows(node: Node, other: Node) -> bool:
-    """Return whether a node is where it is, or may be at another time, because of where another one is."""
+    """Return whether the pose of a node depends on that of another one, or may do so at another time."""
     known, open_nodes, chains = {node}, [node], cache(_chains)
     while open_nodes:
         for leader in _leaders(*open_nodes.pop(), chains):
@@ -37,7 +37,7 @@ def follows(node: Node, other: Node) -> bool:
 
 
 def _leaders(obj: bpy.types.Object, bone: str, chains: Callable[[bpy.types.Object], list[Chain]]) -> Iterator[Node]:
-    """Yield what an object or bone follows directly: by parents, constraints, chains of IK, and drivers."""
+    """Yield the direct dependencies of an object or bone: parents, constraints, IK chains and drivers."""
     pose_bone = obj.pose.bones.get(bone) if bone and obj.pose is not None else None
     if pose_bone is None:
         if obj.parent is not None:
@@ -60,7 +60,7 @@ def _leaders(obj: bpy.types.Object, bone: str, chains: Callable[[bpy.types.Objec
 
 
 def _chains(rig: bpy.types.Object) -> list[Chain]:
-    """Return all chains of a rig."""
+    """Return all constraint chains of a rig."""
     result = []
     for bone in () if rig.pose is None else rig.pose.bones:
         for constraint in bone.constraints:
@@ -72,7 +72,7 @@ def _chains(rig: bpy.types.Object) -> list[Chain]:
 
 
 def _targets(constraint: bpy.types.Constraint) -> Iterator[Node]:
-    """Yield what a constraint looks at: all its objects, with the bones that are named beside them."""
+    """Yield the targets of a constraint: all its objects, with the bones named for them."""
     if not constraint.mute:
         for item in (constraint, *getattr(constraint, "targets", ())):
             for prop in item.bl_rna.properties:

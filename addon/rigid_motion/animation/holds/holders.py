@@ -1,8 +1,8 @@
-"""What a transform is held in: the constraints of ours, which the keys tell apart by numbers.
+"""Holders: the constraints that hold a transform, numbered so that keys can refer to them.
 
-A constraint has its number itself, where it means nothing: one that passes for the name of a bone of no object, one
-that holds in the last row of its inverse. So it stays ours when it is renamed, and goes where it is copied; and the
-F-curves of its influence may be deleted.
+The number is stored in the constraint itself, where it has no effect: a passing constraint has it in the name of a
+bone of no object, a holding one in the last row of its inverse. So the constraint is recognised after being renamed or
+copied, and the F-curves of its influence may be deleted.
 """
 
 from __future__ import annotations
@@ -23,35 +23,35 @@ from ..transforms import Channel, Refused, Transform, transform_of
 from .placing import channel_space, converted, hang_of, hangs_on_bone, world_of
 
 Constraint = Any
-"""A *Child Of* or *Action* constraint, which have different properties."""
+"""A *Child Of* or *Action* constraint; the two types have different properties."""
 
 HOLD_KINDS = {"CHILD_OF": "Held In", "ACTION": "Pass To"}
-"""The types of our constraints, and how their names begin."""
+"""The types of this extension's constraints, and the beginning of their names."""
 
 _HOLDER_NAME = re.compile(r"rigid_motion (\d+)")
 
 _INVERSE_MARK = 2.0**-100
-"""What stands for 1 in the last row of an inverse: nothing, in any product that Blender makes with it."""
+"""The unit of the number in the last row of an inverse: it vanishes in any product that Blender forms with it."""
 
 MAX_SCALE_ROUNDING = 1e-5
-"""Scales that differ from one by less do so for rounding."""
+"""Scales that differ from one by less do so only by rounding."""
 
 TOO_MANY = n_("{name} has had {most} holders, the most that keys can distinguish: remove constraints that hold nothing")
 
 
 class Holder(NamedTuple):
-    """What something can be held in."""
+    """An object or bone that can hold a transform."""
 
     number: int
-    """What keys say that are held in it; 0 is the parent of the transform or the world."""
+    """The number that keys refer to; 0 is the parent of the transform or the world."""
 
     target: bpy.types.Object | None
     bone: str
     """The name of a bone of the target, "" for none."""
 
     offset: Matrix = Matrix()
-    """Where the space of channels is in it. Channels keep their units: so it takes out the scale that the holder had
-    when it first held something, and has that of their own parent."""
+    """The space of the channels relative to the holder. Channels keep their units: the offset removes the scale that the
+    holder had when it first held something, and applies that of the transform's own parent."""
 
     @property
     def name(self) -> str:
@@ -61,7 +61,7 @@ class Holder(NamedTuple):
         return self.bone or self.target.name
 
     def matrix(self, depsgraph: bpy.types.Depsgraph) -> Matrix:
-        """Return where the space of channels is that it holds."""
+        """Return the world matrix of the channel space in this holder."""
         assert self.target is not None
         return world_of(self.target, self.bone, depsgraph) @ self.offset
 
@@ -69,7 +69,7 @@ class Holder(NamedTuple):
 def world_in(
     user: Transform, holder: Holder | None, basis: Matrix, depsgraph: bpy.types.Depsgraph | None = None
 ) -> Matrix:
-    """Return where channels that have this matrix put a transform in a holder; None is its parent or the world."""
+    """Return the world matrix of a transform with this channel matrix in a holder; None for its parent or the world."""
     if holder is None:
         return converted(user, basis, "LOCAL", "WORLD", depsgraph)
     return holder.matrix(depsgraph or bpy.context.evaluated_depsgraph_get()) @ basis
@@ -78,14 +78,14 @@ def world_in(
 def basis_in(
     user: Transform, holder: Holder | None, world: Matrix, depsgraph: bpy.types.Depsgraph | None = None
 ) -> Matrix:
-    """Return the matrix that channels need to have in a holder for a transform to be there in the world."""
+    """Return the channel matrix that gives a transform this world matrix in a holder."""
     if holder is None:
         return converted(user, world, "WORLD", "LOCAL", depsgraph)
     return holder.matrix(depsgraph or bpy.context.evaluated_depsgraph_get()).inverted_safe() @ world
 
 
 def number_of(constraint: Constraint) -> int | None:
-    """Return the number of the holder that a constraint of ours is to; None where it is none of ours."""
+    """Return the holder number of a constraint; None if it is not one of this extension's."""
     if constraint.type == "CHILD_OF":
         number = constraint.inverse_matrix[3][0] / _INVERSE_MARK
         return int(number) if 1.0 <= number <= MAX_MARK else None
@@ -94,26 +94,26 @@ def number_of(constraint: Constraint) -> int | None:
 
 
 def is_ours(constraint: Constraint) -> bool:
-    """Return whether a constraint is one of those that hold and pass."""
+    """Return whether a constraint is one of this extension's holding or passing constraints."""
     return number_of(constraint) is not None
 
 
 def constraints_to(user: Transform) -> dict[int, Constraint]:
-    """Return the constraints that hold a transform, by the numbers of their holders."""
+    """Return the constraints that hold a transform, by holder number."""
     ours = [(number_of(item), item) for item in user.carrier.constraints if item.type == "CHILD_OF"]
     return {number: constraint for number, constraint in reversed(ours) if number is not None}
 
 
 def passings_of(user: Transform) -> list[Constraint]:
-    """Return the constraints that pass a transform on, of all its Actions."""
+    """Return the passing constraints of a transform, in all its Actions."""
     return [item for item in user.carrier.constraints if item.type == "ACTION" and is_ours(item)]
 
 
 def passings_in(user: Transform, action: bpy.types.Action) -> dict[int, Constraint]:
-    """Return the constraints that pass a transform on in an Action, by the numbers of those that they pass it to.
+    """Return the passing constraints of a transform in an Action, by the number of the holder they pass to.
 
-    Strips may have others: each constraint shows the poses of one Action. One of an Action that the transform no longer
-    moves by is any's.
+    NLA strips may have others: each constraint shows the poses of one Action. A constraint with an Action that the
+    transform no longer uses is available to any Action.
     """
     others = {slot.action for slot in slots_alone(user.animated)} - {action}
     ours = [(number_of(item), item) for item in passings_of(user) if item.action not in others]
@@ -126,7 +126,7 @@ def channel_of(user: Transform, constraint: Constraint, prop: str = "influence")
 
 
 def holders_of(user: Transform) -> list[Holder]:
-    """Return what a transform has been held in, by its constraints, in the order of their numbers."""
+    """Return the holders of a transform from its constraints, in the order of their numbers."""
     result = []
     for number, constraint in sorted(constraints_to(user).items()):
         offset = constraint.inverse_matrix.copy()
@@ -136,9 +136,9 @@ def holders_of(user: Transform) -> list[Holder]:
 
 
 def add_holder(binding: Binding, target: bpy.types.Object, bone: str) -> int:
-    """Have the transforms of a binding be able to be held in something, and return the number of that.
+    """Add a holder to the transforms of a binding, and return its number.
 
-    Where possible it is that which others know it by, so that keys may be pasted from one to another.
+    If possible, the number is the one that others use for it, so that keys may be pasted between them.
     """
     taken = {number for user in binding.users for number in constraints_to(user)}
     for holder in holders_of(binding.users[0]):
@@ -155,7 +155,7 @@ def add_holder(binding: Binding, target: bpy.types.Object, bone: str) -> int:
         label += "'"
     added = [(user, add_constraint(user, Holder(number, target, bone), label)) for user in binding.users]
     if not target.evaluated_get(bpy.context.evaluated_depsgraph_get()).is_evaluated:
-        # What was hidden is evaluated now that something depends on it.
+        # A hidden target is evaluated from now on, as something depends on it.
         cast(bpy.types.ViewLayer, bpy.context.view_layer).update()
         for user, constraint in added:
             set_offset(constraint, user, number)
@@ -163,10 +163,10 @@ def add_holder(binding: Binding, target: bpy.types.Object, bone: str) -> int:
 
 
 def own_space(user: Transform) -> tuple[str, bpy.types.Object | None, str]:
-    """Return the space that the channels of a transform are in where nothing holds it: its kind, object and bone.
+    """Return the space of a transform's channels when no holder holds it: its kind, object and bone.
 
-    Blender's local space of an object knows its parent, but not the bone. Things without parents are in the world
-    anyway, and in a space of their own where they have delta transforms.
+    Blender's local space of an object includes its parent, but not the parent bone. Objects without parents are in the
+    world anyway, and would be in a space of their own with delta transforms.
     """
     if hangs_on_bone(user):
         return "CUSTOM", user.animated.parent, user.animated.parent_bone
@@ -174,9 +174,9 @@ def own_space(user: Transform) -> tuple[str, bpy.types.Object | None, str]:
 
 
 def known_holder(binding: Binding, number: int) -> tuple[Holder, str] | None:
-    """Return the holder that keys of a transform speak of, which has no constraint to it, and the name of one.
+    """Return a holder that keys refer to but that has no constraint yet, and a name for the constraint.
 
-    That is what the other users of the slot are held in, or what all others of this number are.
+    It comes from the other users of the slot, or from the file if all holders with this number are the same there.
     """
     for other in binding.users:
         if (constraint := constraints_to(other).get(number)) is not None and constraint.target is not None:
@@ -189,7 +189,7 @@ def known_holder(binding: Binding, number: int) -> tuple[Holder, str] | None:
 
 
 def _all_holders() -> Iterator[Holder]:
-    """Yield what anything in the file is held in."""
+    """Yield all holders in the file."""
     for obj in bpy.data.objects:
         for carrier in (obj, *(() if obj.pose is None else obj.pose.bones)):
             if len(carrier.constraints):
@@ -197,7 +197,7 @@ def _all_holders() -> Iterator[Holder]:
 
 
 def add_constraint(user: Transform, holder: Holder, label: str) -> Constraint:
-    """Have a transform be able to be held in something, as others are; or else so that its scale now is taken out."""
+    """Add a constraint to a holder, with the holder's offset if it has one, or else one that removes its present scale."""
     constraint = _added(user, "CHILD_OF", label)
     constraint.target, constraint.subtarget = holder.target, holder.bone
     constraint.set_inverse_pending, constraint.target_space = False, "WORLD"
@@ -210,9 +210,9 @@ def add_constraint(user: Transform, holder: Holder, label: str) -> Constraint:
 
 
 def keep_space(constraint: Constraint, user: Transform) -> bool:
-    """Have a constraint see the channels of a transform as they are where nothing holds it. Returns whether it did not.
+    """Make a constraint see a transform's channels as they are without a holder. Returns whether it was changed.
 
-    A constraint that holds, of something that hangs on another bone than before or on none, is set anew.
+    If the object's parent bone has changed, was added or removed, a holding constraint gets a new offset.
     """
     kind, obj, bone = own = own_space(user)
     before = constraint.owner_space, constraint.space_object, constraint.space_subtarget
@@ -228,11 +228,11 @@ def keep_space(constraint: Constraint, user: Transform) -> bool:
 
 
 def set_offset(constraint: Constraint, user: Transform, number: int) -> None:
-    """Set the inverse of a constraint that holds by the scale that its holder has now: see `Holder.offset`."""
+    """Set the inverse of a holding constraint from the present scale of its holder: see `Holder.offset`."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     there = world_of(constraint.target, constraint.subtarget, depsgraph)
     location, rotation, _ = there.decompose()
-    # Blender turns by angles where it leaves scale out, which tremble near gimbal lock: so scale is taken out once.
+    # If scale is left out, Blender rotates by angles, which jitter near gimbal lock: so scale is removed once, here.
     unscaled = there.inverted_safe() @ Matrix.LocRotScale(cast(Any, location), rotation, None)
     units = abs(channel_space(user, depsgraph).to_3x3().determinant()) ** (1 / 3)
     _set_inverse(constraint, _without_noise(unscaled @ Matrix.Scale(units, 4)) @ hang_of(user).inverted_safe(), number)
@@ -244,16 +244,16 @@ def _set_inverse(constraint: Constraint, inverse: Matrix, number: int) -> None:
 
 
 def _without_noise(matrix: Matrix) -> Matrix:
-    """Return a matrix without a location, and the identity for what is one but for rounding."""
+    """Return a matrix without location, replaced by the identity if it differs from that only by rounding."""
     matrix.translation = 0.0, 0.0, 0.0
     return Matrix() if np.abs(np.array(matrix) - np.eye(4)).max() < MAX_SCALE_ROUNDING else matrix
 
 
 def add_passing(user: Transform, holder: Holder, label: str) -> Constraint:
-    """Have a transform be able to pass over to a holder; to its parent or the world where that has no target."""
+    """Add a constraint that passes a transform to a holder; to its parent or the world if the holder has no target."""
     constraint = _added(user, "ACTION", label)
     constraint.subtarget = f"rigid_motion {holder.number}"
-    # To choose how it mixes changes the space.
+    # Setting the mix mode changes the space.
     constraint.mix_mode, constraint.use_eval_time = "REPLACE", True
     if holder.target is None:
         keep_space(constraint, user)
@@ -264,7 +264,7 @@ def add_passing(user: Transform, holder: Holder, label: str) -> Constraint:
 
 
 def _added(user: Transform, kind: str, label: str) -> Constraint:
-    """Return a new constraint in front of all that are not ours. What holds is in front of what passes."""
+    """Add a constraint in front of all foreign constraints; holding constraints go in front of passing ones."""
     constraints: Any = user.carrier.constraints
     before = sum(is_ours(item) and kind in ("ACTION", item.type) for item in constraints)
     constraint = constraints.new(kind)
@@ -275,7 +275,7 @@ def _added(user: Transform, kind: str, label: str) -> Constraint:
 
 
 def _let_go(user: Transform, influence: Channel) -> None:
-    """Key an influence 0 in all Actions that have none of it: where only some strips key it, others have it be 1."""
+    """Key an influence at 0 in all Actions without it: if only some strips key it, the others leave it at 1."""
     path, index = influence
     for slot in slots_alone(user.animated):
         if slot.is_editable and (bag := slot.channelbag) is not None and bag.fcurves.find(path, index=index) is None:
@@ -284,7 +284,7 @@ def _let_go(user: Transform, influence: Channel) -> None:
 
 
 def spoken_of(source: KeyedTransform) -> tuple[dict[int, float], set[int]]:
-    """Return the numbers of the holders that keys are in, from which frame on, and of those that are passed to."""
+    """Return the numbers of the holders of keys, with their first frames, and the numbers of holders that are passed to."""
     if source.held is None:
         return {}, set()
     frames = source.keyed_frames

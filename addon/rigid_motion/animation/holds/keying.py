@@ -1,4 +1,4 @@
-"""From what keys are held in to the keys of influences, and the poses in which things arrive."""
+"""Keys of constraint influences from the holds of keys, and the poses in which objects arrive at their holders."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ from ..evaluation.sources import KeyedTransform
 from ..fcurves.keys import BEZIER, CONSTANT
 
 SUBFRAME_POSES = 8
-"""How many poses a frame has of those in which something arrives that moves: renderers blur motion by such parts."""
+"""The number of poses per frame while a moving object arrives: renderers blur motion over such parts of a frame."""
 
 
 class InfluenceKeys(NamedTuple):
-    """The keys of an influence, n of them."""
+    """The n keys of an influence."""
 
     frames: np.ndarray
     values: np.ndarray
     interpolations: np.ndarray
-    """Their codes. Where they are BEZIER both handles are level, a third of the segment long: a smoothstep."""
+    """Interpolation codes. At BEZIER both handles are level and a third of the segment long: a smoothstep."""
 
 
 class Passing(NamedTuple):
-    """The poses in which something arrives while it passes from one holder to another, one passing after the other."""
+    """The arrival poses while an object passes from one holder to another, for one passing after the other."""
 
     frames: np.ndarray
-    """On a clock of their own, from 0 on, rising, shape (m,)."""
+    """Rising frames on a clock of their own that starts at 0, shape (m,)."""
 
     rows: np.ndarray
-    """The channels in the space of the holder in which it arrives then, shape (10, m)."""
+    """The channels in the space of the holder being passed to, shape (10, m)."""
 
     numbers: np.ndarray
     """The number of that holder, shape (m,)."""
 
     clocks: dict[int, np.ndarray]
-    """For each of these holders what the clock has at frames: both ends of each passing, shape (2 p, 2)."""
+    """For each of these holders, frames and clock values at both ends of each passing, shape (2 p, 2)."""
 
 
 def holding_keys(source: KeyedTransform, number: int) -> InfluenceKeys:
-    """Return the keys of how far something is held in the holder of this number: not at all, or all of it."""
+    """Return the influence keys for being held in the holder of this number: 0 or 1."""
     switches = source.switches
     first = source.keyed_range[0] if source.channels else 0.0
     frames = [first, *(switch.frame for switch in switches)]
@@ -52,7 +52,7 @@ def holding_keys(source: KeyedTransform, number: int) -> InfluenceKeys:
 
 
 def passing_keys(source: KeyedTransform, number: int) -> InfluenceKeys:
-    """Return the keys of how far something has passed over to the holder of this number."""
+    """Return the influence keys for passing to the holder of this number."""
     first = source.keyed_range[0] if source.channels else 0.0
     keys = [(first, 0.0, CONSTANT)]
     for switch in source.switches:
@@ -64,7 +64,7 @@ def passing_keys(source: KeyedTransform, number: int) -> InfluenceKeys:
 
 
 def passing(source: KeyedTransform) -> Passing | None:
-    """Return the poses in which something arrives at all holders that it passes over to; None where it does nowhere."""
+    """Return the arrival poses at all holders that an object passes to; None if it passes to none."""
     frames, rows, numbers, clocks, clock = [], [], [], dict[int, list[tuple[float, float]]](), 0.0
     for switch, run in zip(source.switches, source.runs[1:], strict=True):
         if switch.is_at_once:

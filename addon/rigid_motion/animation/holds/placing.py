@@ -1,6 +1,6 @@
-"""Where things are: in the world, in the space of their channels, and the components that put them there.
+"""Placing objects and bones: their poses in the world and in channel spaces, and the components that produce them.
 
-Spaces are Blender's matrices as it shows them now; many poses are arrays (..., 4, 4) in double precision.
+Spaces are Blender's matrices as currently evaluated; arrays of poses have shape (..., 4, 4), in double precision.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from .dependencies import node_of
 
 
 def world_of(obj: bpy.types.Object, bone: str, depsgraph: bpy.types.Depsgraph) -> Matrix:
-    """Return where an object or one of its bones is, "" for none."""
+    """Return the world matrix of an object or of one of its bones, "" for none."""
     evaluated = obj.evaluated_get(depsgraph)
     matrix = evaluated.matrix_world
     return matrix @ cast(bpy.types.Pose, evaluated.pose).bones[bone].matrix if bone else matrix.copy()
 
 
 def hang_of(user: Transform) -> Matrix:
-    """Return where the space of a transform's channels is in what `own_space` says."""
+    """Return the space of a transform's channels relative to the space given by `own_space`."""
     obj = user.animated
     if not hangs_on_bone(user):
         return Matrix()
@@ -38,9 +38,9 @@ def hang_of(user: Transform) -> Matrix:
 
 
 def channel_space(user: Transform, depsgraph: bpy.types.Depsgraph) -> Matrix:
-    """Return where the space of a transform's channels is in the world where nothing holds it.
+    """Return the world matrix of the space of a transform's channels when no holder holds it.
 
-    Of bones some inherit location otherwise than rotation; theirs is that of a bone at rest.
+    Some bones inherit location differently from rotation; for them it is the space of a bone at rest.
     """
     obj = user.animated
     if user.is_part:
@@ -54,19 +54,19 @@ def channel_space(user: Transform, depsgraph: bpy.types.Depsgraph) -> Matrix:
 
 
 def world_matrix(transform: Transform) -> Matrix:
-    """Return where something is seen on the frame that is shown."""
+    """Return the world matrix of a transform on the current frame."""
     return world_of(*node_of(transform), bpy.context.evaluated_depsgraph_get())
 
 
 def converted(
     transform: Transform, matrix: Matrix, first: str, second: str, depsgraph: bpy.types.Depsgraph | None = None
 ) -> Matrix:
-    """Return a matrix between the world and the space of the channels where nothing holds a transform."""
+    """Convert a matrix between the world and the space of a transform's channels when no holder holds it."""
     obj = transform.animated
     if transform.is_part:
         spaces: dict[str, Any] = {"pose_bone": transform.carrier, "from_space": first, "to_space": second}
         return obj.convert_space(matrix=matrix, **spaces)
-    # Blender's local space of an object is another one without a parent, or on a bone.
+    # Blender's local space of an object is a different one if it has no parent, or hangs on a bone.
     space = channel_space(transform, depsgraph or bpy.context.evaluated_depsgraph_get())
     return space @ matrix if second == "WORLD" else space.inverted_safe() @ matrix
 
@@ -77,7 +77,7 @@ def hangs_on_bone(user: Transform) -> bool:
 
 
 def unevenness_of(matrix: Matrix) -> float:
-    """Return how far the axes of a matrix are from being at right angles and of one length, 0 where they are."""
+    """Return how far the axes of a matrix are from being orthogonal and of equal length, 0 if they are."""
     axes = np.array(matrix.to_3x3())
     squares = axes.T @ axes
     return float(np.abs(squares / (np.trace(squares) / 3.0) - np.eye(3)).max())
@@ -86,16 +86,16 @@ def unevenness_of(matrix: Matrix) -> float:
 def poses_of(matrices: np.ndarray) -> tuple[Poses, np.ndarray]:
     """Return the rigid part of matrices (..., 4, 4) without shear, shape (...), and their scales, shape (..., 3)."""
     axes = matrices[..., :3, :3]
-    # Blender has what is mirrored along one axis mirrored along all of them, and turned.
+    # Blender represents a mirroring along one axis as one along all axes, plus a rotation.
     sizes = np.linalg.norm(axes, axis=-2) * np.where(np.linalg.det(axes) < 0.0, -1.0, 1.0)[..., None]
     turns = from_matrices(axes / np.where(sizes == 0.0, 1.0, sizes)[..., None, :])
     return Poses(matrices[..., :3, 3], turns), sizes
 
 
 def rows_of(poses: Poses, sizes: np.ndarray, transform: Transform, first: np.ndarray) -> np.ndarray:
-    """Return the components (10, m) of poses (m,) with scales (m, 3), the first rotation near to `first` (10,).
+    """Return the components (10, m) of poses (m,) with scales (m, 3), the first rotation near that of `first` (10,).
 
-    From one to the next rotations do not jump.
+    Rotations do not jump from one pose to the next.
     """
     turns = poses.quaternions
     if turns[0] @ first[ROWS[ROTATION]] < 0.0 and transform.order is None:
@@ -107,7 +107,7 @@ def rows_of(poses: Poses, sizes: np.ndarray, transform: Transform, first: np.nda
 
 
 def matrices_of(rows: np.ndarray, order: str | None) -> np.ndarray:
-    """Return the matrices (m, 4, 4) of components (10, m) whose rotations are of an order."""
+    """Return the matrices (m, 4, 4) of components (10, m) with rotations of this order."""
     rows, result = rows.copy(), np.tile(np.eye(4), (rows.shape[1], 1, 1))
     turn_into_quaternions(rows, order)
     result[:, :3, :3] = np.moveaxis(matrices(rows[ROWS[ROTATION]].T), -1, 0) * rows[ROWS[SCALE]].T[:, None]

@@ -1,4 +1,4 @@
-"""What keeps something from being held as its keys say, in one sentence with the way out."""
+"""Problems with holding: why an object cannot be held as its keys say, in one sentence with the way out."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .dependencies import follows, node_of
 from .holders import channel_of, constraints_to, passings_in, spoken_of
 
 MAX_VALUE_ROUNDING = 1e-5
-"""Values that differ by less stand still."""
+"""Values that differ by less are equal except for rounding."""
 
 ITSELF = n_("{name} cannot be held in itself: select its holder last, so that it is active")
 CYCLE = n_("{name} cannot be held in {holder}, which follows it: {holder} would wait for itself")
@@ -37,7 +37,7 @@ MUTED = n_(
 
 
 def refuse_holder(transform: Transform, target: bpy.types.Object, bone: str) -> None:
-    """Raise `Refused` where a transform cannot be held in an object or a bone of it."""
+    """Raise `Refused` if a transform cannot be held in this object or bone."""
     if (target, bone) == node_of(transform):
         raise Refused(ITSELF, name=transform.name)
     if follows((target, bone), node_of(transform)):
@@ -45,14 +45,14 @@ def refuse_holder(transform: Transform, target: bpy.types.Object, bone: str) -> 
 
 
 def refuse_motion(transform: Transform, source: KeyedTransform | None) -> None:
-    """Raise `Refused` where a transform that is keyed so cannot be held in anything."""
+    """Raise `Refused` if a transform with these keys cannot be held in anything."""
     if source is not None and any(keys.cycles is not None for keys in source.curves):
         raise Refused(REPEATS, name=transform.name)
     refuse_space(transform)
 
 
 def refuse_space(transform: Transform) -> None:
-    """Raise `Refused` where no constraint knows the space of the channels of a transform, or moves it there."""
+    """Raise `Refused` if constraints cannot reproduce a transform's channel space, or cannot move the transform."""
     if not np.allclose(transform.original(), REST_COMPONENTS, atol=MAX_VALUE_ROUNDING):
         raise Refused(DELTAS, name=transform.name)
     carrier, parent = transform.carrier, transform.animated.parent
@@ -66,7 +66,7 @@ def refuse_space(transform: Transform) -> None:
 
 
 def refuse_holds(transform: Transform, binding: Binding, source: KeyedTransform) -> None:
-    """Raise `Refused` where a transform is not held as its keys in a slot say."""
+    """Raise `Refused` if a transform is not held as its keys in a slot say."""
     held, passed = spoken_of(source)
     if not held:
         return

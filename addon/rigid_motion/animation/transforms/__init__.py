@@ -1,11 +1,11 @@
-"""What is moved: one small interface for whatever has location, rotation and scale: objects and pose bones.
+"""Transforms: one small interface for objects and pose bones, which have location, rotation and scale.
 
-A transform knows whose Action animates it, and on which property its channels are.
+A transform knows the data-block whose Action animates it, and the data path of its channels.
 
-sizes      how large things are, and how far they reach
-posing     where the poses of bones put them
+sizes      the sizes of objects and rigs, and how far bones reach
+posing     forward kinematics of bones
 
-Both import what is here.
+Both import this module.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ...motion.eulers import ORDERS, quaternions_from_extrinsic_eulers
 from ..evaluation.components import LOCATION, REST_COMPONENTS, ROTATION, ROWS, SCALE
 
 OWN_WORDS = "Rigid Motion"
-"""The context of words that Blender has another translation for, or one that is too long where they are shown."""
+"""The translation context for words that Blender translates differently, or too long for where they are shown."""
 
 LINKED_REFUSAL = n_(
     "{name} is linked from another file: make it local first (Object > Relations > Make Local), "
@@ -34,23 +34,23 @@ LINKED_REFUSAL = n_(
 """The reason why a data-block cannot be edited, and the way out."""
 
 MOTION_PROPERTY = "rigid_motion"
-"""The name of the properties of this extension on objects and pose bones."""
+"""The name of this extension's property groups on objects and pose bones."""
 
 TURNS_PROPERTY = f"{MOTION_PROPERTY}.turns"
-"""The property by whose keys segments make whole turns more."""
+"""The property whose keys add whole turns to segments."""
 
 GROUP_NAME = "Rigid Motion"
-"""The group of F-curves that the channel of turns of an object is in."""
+"""The F-curve group for the Turns channel of an object."""
 
 WIDTHS = {LOCATION: 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, SCALE: 3}
-"""The properties that move something, and how many components each has."""
+"""The properties that move an object or bone, and the number of components of each."""
 
 _ROTATIONS = {None: "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
 
 _BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.')
 
 Channel = tuple[str, int]
-"""Data path, from what is animated on, and index."""
+"""Data path, relative to the animated data-block, and array index."""
 
 
 class Note(Protocol):
@@ -65,7 +65,7 @@ class Note(Protocol):
 
 
 class ObjectMotion(Protocol):
-    """What this extension keeps on an object or a pose bone, see `properties`."""
+    """The extension's properties of an object or a pose bone, see `properties`."""
 
     turns: int
     lead: Sequence[float]
@@ -75,9 +75,9 @@ class ObjectMotion(Protocol):
 
 
 class Refused(ValueError):
-    """Why rigid motion cannot act on something: names it, and the way out.
+    """Why rigid motion cannot act on something, with the name of that and the way out.
 
-    The text is in English, with placeholders for facts; without any of these it stays as it is.
+    The text is in English, with placeholders for facts; without facts it is used unchanged.
     """
 
     def __init__(self, text: str, **facts: object) -> None:
@@ -85,20 +85,20 @@ class Refused(ValueError):
 
 
 class Transform:
-    """Something with location, rotation and scale, as its animated data-block's Action moves it.
+    """An object or bone with location, rotation and scale, animated by the Action of its data-block.
 
-    What bones differ in from objects is asked of it, never guessed from data paths.
+    Differences between bones and objects are answered here, never guessed from data paths.
     """
 
     def __init__(self, carrier: bpy.types.Object | bpy.types.PoseBone) -> None:
         self.carrier = carrier
-        """The object or bone that has the properties."""
+        """The object or bone that owns the properties."""
         self.animated = cast(bpy.types.Object, carrier.id_data)
-        """The data-block whose Action it is."""
+        """The data-block that owns the Action."""
         self.is_part = isinstance(carrier, bpy.types.PoseBone)
-        """True if it is a part of its data-block, with a name that can be changed, and not the data-block itself."""
+        """True for a bone, a part of its data-block with a name that can change; False for the data-block itself."""
         self.prefix = prefix_of(carrier.name) if self.is_part else ""
-        """From the data-block to the carrier, in data paths."""
+        """The data path from the data-block to the carrier."""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Transform) and (self.animated, self.prefix) == (other.animated, other.prefix)
@@ -108,7 +108,7 @@ class Transform:
 
     @property
     def identity(self) -> tuple[int, str]:
-        """What it is known by where nothing of Blender's can be kept: its data-block's session id, and its prefix."""
+        """A key that outlives Blender's references: the data-block's session id, and the prefix."""
         return self.animated.session_uid, self.prefix
 
     @property
@@ -117,22 +117,22 @@ class Transform:
 
     @property
     def label(self) -> str:
-        """The name in front of its mode, in English."""
+        """The word in front of its mode, in English."""
         return n_("Bone", OWN_WORDS) if self.is_part else n_("Object", OWN_WORDS)
 
     @property
     def group(self) -> str:
-        """The group that Blender puts its channels into."""
+        """The F-curve group that Blender uses for its channels."""
         return self.carrier.name if self.is_part else "Object Transforms"
 
     @property
     def location_axes(self) -> np.ndarray | None:
-        """The axes that it is moved along, as columns (3, 3) in those that it turns about; None where they are one.
+        """The axes that location runs along, as columns (3, 3) in the axes of rotation; None if both are the same.
 
-        Without *Local Location* a bone is moved along the axes of its parent, and still turns about its own.
+        Without *Local Location*, a bone moves along the axes of its parent, but rotates about its own.
         """
         bone = self.pose_bone.bone if self.is_part else None
-        # What was just made in Edit Mode has no bone before that is left.
+        # A bone just created in Edit Mode has no bone data before leaving that mode.
         if bone is None or bone.use_local_location:
             return None
         axes = bone.matrix_local.to_3x3().transposed()
@@ -140,33 +140,33 @@ class Transform:
 
     @property
     def pose_bone(self) -> bpy.types.PoseBone:
-        """The carrier, of what is a part."""
+        """The carrier, if it is a bone."""
         return cast(bpy.types.PoseBone, self.carrier)
 
     @property
     def motion(self) -> ObjectMotion:
-        """The properties that this extension keeps on it."""
+        """The extension's properties of the carrier."""
         return getattr(self.carrier, MOTION_PROPERTY)
 
     @property
     def rotation(self) -> str:
-        """The property that turns it."""
+        """The name of the rotation property in use."""
         return rotation_by(self.order)
 
     @property
     def order(self) -> str | None:
-        """None where it turns by quaternions, AXIS_ANGLE, or the order of its Euler angles."""
+        """None for quaternions, AXIS_ANGLE, or the order of its Euler angles."""
         mode = self.carrier.rotation_mode
         return None if mode == "QUATERNION" else mode
 
     @property
     def properties(self) -> dict[str, str]:
-        """Location, rotation and scale, and which property each of them is."""
+        """The property for each of location, rotation and scale."""
         return {LOCATION: "location", ROTATION: self.rotation, SCALE: "scale"}
 
     @property
     def channels(self) -> dict[int, Channel]:
-        """The channel of each of its components, by their rows."""
+        """The channel of each of its components, by row."""
         return channels_under(self.prefix, self.rotation)
 
     @property
@@ -174,14 +174,14 @@ class Transform:
         return self.prefix + TURNS_PROPERTY, 0
 
     def components(self) -> np.ndarray:
-        """Return its properties as they are now, as the ten components of a source."""
+        """Return its current properties as the ten components of a source."""
         result = REST_COMPONENTS.copy()
         for part, prop in self.properties.items():
             result[ROWS[part].start :][: WIDTHS[prop]] = getattr(self.carrier, prop)
         return result
 
     def original(self) -> np.ndarray:
-        """Return what comes on top of its channels, as components (10,): the delta transforms of an object.
+        """Return the delta transforms of an object, on top of its channels, as components (10,).
 
         The rotation is a unit quaternion.
         """
@@ -198,13 +198,13 @@ class Transform:
 
 
 def rotation_by(order: str | None) -> str:
-    """Return the property that turns something by quaternions, None, AXIS_ANGLE, or Euler angles of an order."""
+    """Return the rotation property for quaternions (None), AXIS_ANGLE, or an order of Euler angles."""
     return _ROTATIONS.get(order, "rotation_euler")
 
 
 @cache
 def channels_under(prefix: str, rotation: str) -> dict[int, Channel]:
-    """Return the channels of a transform's components whose data paths begin so, by their rows."""
+    """Return the channels of a transform's components by row, given the prefix of their data paths."""
     return {
         ROWS[part].start + index: (prefix + prop, index)
         for part, prop in ((LOCATION, "location"), (ROTATION, rotation), (SCALE, "scale"))
@@ -214,26 +214,26 @@ def channels_under(prefix: str, rotation: str) -> dict[int, Channel]:
 
 @lru_cache(maxsize=65536)
 def prefix_of(name: str) -> str:
-    """Return how the data paths of a bone's properties begin, from its object."""
+    """Return the prefix of the data paths of a bone's properties, relative to its object."""
     return f'pose.bones["{bpy.utils.escape_identifier(name)}"].'
 
 
 @lru_cache(maxsize=65536)
 def split_path(path: str) -> tuple[str, str]:
-    """Return the prefix of a data path, "" where it is not that of a bone's property, and the rest of it."""
+    """Return the bone prefix of a data path, "" if the property is not a bone's, and the rest of the path."""
     result = _BONE.match(path)
     return (result[0], path[result.end() :]) if result else ("", path)
 
 
 @lru_cache(maxsize=65536)
 def bone_name(prefix: str) -> str:
-    """Return the name of the bone that data paths which begin so speak of."""
+    """Return the name of the bone that a data path prefix refers to."""
     result = _BONE.fullmatch(prefix)
     return "" if result is None else bpy.utils.unescape_identifier(result[1])
 
 
 def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> Transform:
-    """Return the transform of something that Blender has, where it is none already."""
+    """Return the transform of an object or pose bone; a transform is returned unchanged."""
     if isinstance(carrier, Transform):
         return carrier
     if not isinstance(carrier, bpy.types.Object | bpy.types.PoseBone):
@@ -242,7 +242,7 @@ def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> 
 
 
 def transform_in(obj: bpy.types.Object, prefix: str) -> Transform | None:
-    """Return what data paths that begin so lead to in an object, None where it has no such thing."""
+    """Return the transform at a data path prefix in an object; None if there is no such bone."""
     if not prefix:
         return Transform(obj)
     bone = None if obj.pose is None else obj.pose.bones.get(bone_name(prefix))
@@ -250,10 +250,9 @@ def transform_in(obj: bpy.types.Object, prefix: str) -> Transform | None:
 
 
 def let_override_be_read(rig: bpy.types.Object) -> None:
-    """Have what an override keeps on bones be there when its file is opened again.
+    """Make sure that properties overridden on bones are restored when the file is opened again.
 
-    Blender 5 does not read it where the library has nothing of the kind on the bone, not even what is made when it is
-    asked for.
+    Blender 5 does not read them if the library has no such properties on the bone, not even ones created on access.
     """
     reference = existing(rig.override_library).reference
     for bone in reference.pose.bones if isinstance(reference, bpy.types.Object) and reference.pose is not None else ():

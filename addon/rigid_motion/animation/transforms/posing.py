@@ -1,9 +1,9 @@
-"""Forward kinematics of rigs by Blender's rule, for many frames at once: where poses put bones.
+"""Forward kinematics of rigs by Blender's rules: the poses of bones from their channels, for many frames at once.
 
-A bone is placed by its parent as *Inherit Rotation*, *Inherit Scale*, *Local Location* and *Connected* say, with uneven
-and negative scale, and shear where that comes of it. Constraints and drivers have no part in it.
+A bone follows its parent according to *Inherit Rotation*, *Inherit Scale*, *Local Location* and *Connected*, including
+uneven and negative scale and any resulting shear. Constraints and drivers are ignored.
 
-Source: `BKE_bone_parent_transform_calc_from_matrices` in Blender's `armature.cc`, for the rule.
+Source of the rules: `BKE_bone_parent_transform_calc_from_matrices` in Blender's `armature.cc`.
 """
 
 from __future__ import annotations
@@ -16,28 +16,28 @@ import numpy as np
 from ...motion.affine import AffineMaps, turned
 
 SOME_SHEAR = 1e-4
-"""Cosines between axes that are smaller are none to Blender."""
+"""Smaller cosines between axes do not count as shear in Blender."""
 
 
 class Hierarchy:
-    """All bones of a rig at rest, numbered in this order, and what each inherits from its parent."""
+    """All bones of a rig at rest, numbered in the given order, and their parents."""
 
     def __init__(self, bones: Sequence[bpy.types.PoseBone]) -> None:
         self.bones = [bone.bone for bone in bones]
         numbers = {bone.name: number for number, bone in enumerate(bones)}
         self.parents = np.array([numbers[bone.parent.name] if bone.parent else -1 for bone in bones], dtype=np.int64)
         self.order = sorted(range(len(bones)), key=lambda number: len(bones[number].parent_recursive))
-        """The numbers of the bones, parents before their children."""
+        """The numbers of the bones, parents before children."""
         rest = np.array([bone.matrix_local for bone in self.bones], dtype=np.float64).reshape(-1, 4, 4)
         self.rest = AffineMaps(rest[:, :3, :3], rest[:, :3, 3])
-        """The poses of bones at rest, shape (bones,)."""
+        """The rest poses of bones, shape (bones,)."""
         inverse = np.linalg.inv(rest)
         offsets = np.where((self.parents >= 0)[:, None, None], inverse[self.parents] @ rest, rest)
         self.offsets = AffineMaps(offsets[:, :3, :3], offsets[:, :3, 3])
-        """The poses of bones at rest in the spaces of their parents."""
+        """The rest poses of bones in the spaces of their parents."""
 
     def pose(self, numbers: Iterable[int], channels: AffineMaps, placed: AffineMaps) -> None:
-        """Place these bones anew, and all that hang on them, in `placed`, shape (bones, n)."""
+        """Update the poses of these bones, and of all bones below them, in `placed`, shape (bones, n)."""
         changed = set(numbers)
         for number in self.order:
             if number in changed or self.parents[number] in changed:
@@ -46,14 +46,14 @@ class Hierarchy:
                 placed[number] = self.placed(number, channels[number], placed[parent] if parent >= 0 else None)
 
     def placed(self, number: int, channels: AffineMaps, above: AffineMaps | None) -> AffineMaps:
-        """Return where a bone with these channels (n,) is, its parent being at `above` (n,), None where it has none."""
+        """Return the poses of a bone with channels (n,); `above` (n,) are its parent's poses, None without a parent."""
         bone, offset, parent = self.bones[number], self.offsets[number], int(self.parents[number])
         if above is None:
             along = offset.axes if bone.use_local_location else np.eye(3)
             return AffineMaps(offset.axes @ channels.axes, offset.origins + turned(along, channels.origins))
         along = above.axes @ offset.axes if bone.use_local_location else above.axes
         origins = above.at(offset.origins)
-        # Blender leaves a connected bone where its parent ends.
+        # Blender keeps a connected bone at the tail of its parent.
         if not bone.use_connect:
             origins = origins + turned(along, channels.origins)
         axes, growth = _inherited(bone, above.axes, self.rest.axes[parent], offset.axes)
@@ -63,10 +63,10 @@ class Hierarchy:
 def _inherited(
     bone: bpy.types.Bone, above: np.ndarray, above_at_rest: np.ndarray, offset: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray | float]:
-    """Return what a bone's rotation and scale are applied in, (n, 3, 3), and what its axes are scaled by in the end.
+    """Return the axes in which a bone's rotation and scale apply, (n, 3, 3), and the final scale of its axes.
 
-    `above` are the axes (n, 3, 3) of its parent, `above_at_rest` and `offset` (3, 3) the parent's at rest and its own
-    at rest in that.
+    `above` are the axes (n, 3, 3) of its parent, `above_at_rest` (3, 3) the parent's at rest, `offset` (3, 3) its own
+    at rest relative to the parent.
     """
     growth: np.ndarray | float = 1.0
     mode = bone.inherit_scale
@@ -95,10 +95,9 @@ def _inherited(
 
 
 def without_shear(axes: np.ndarray, *, normalise: bool = False) -> np.ndarray:
-    """Return axes (n, 3, 3) made orthogonal around y as Blender does it:
-    x and z are both turned by half of what they lack.
+    """Return axes (n, 3, 3) made orthogonal around Y as Blender does it: X and Z each turn by half of the deviation.
 
-    The volume stays, unless they are to have the length 1.
+    The volume is kept, unless axes are normalised to length 1.
     """
     x, y, z = np.moveaxis(axes, -1, 0)
     unit_y = _unit(y)[0]
@@ -115,14 +114,14 @@ def without_shear(axes: np.ndarray, *, normalise: bool = False) -> np.ndarray:
 
 
 def _lengths_by_volume(axes: np.ndarray) -> np.ndarray:
-    """Return the lengths of axes (n, 3, 3) as rows (n, 1, 3) whose product is the volume, also where there is shear."""
+    """Return the lengths of axes (n, 3, 3) as rows (n, 1, 3), whose product is the volume, even with shear."""
     lengths = _unit(axes, 1)[1]
     product = lengths.prod(axis=-1, keepdims=True)
     return lengths * np.cbrt(np.abs(np.linalg.det(axes))[:, None, None] / np.where(product > 0.0, product, 1.0))
 
 
 def _unit(vectors: np.ndarray, axis: int = -1) -> tuple[np.ndarray, np.ndarray]:
-    """Return vectors of length 1, and the lengths that they had. Those without a length stay zero."""
+    """Return vectors normalised to length 1, and their former lengths. Zero vectors stay zero."""
     lengths = np.linalg.norm(vectors, axis=axis, keepdims=True)
     return vectors / np.where(lengths > 0.0, lengths, 1.0), lengths
 

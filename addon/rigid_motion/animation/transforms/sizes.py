@@ -1,4 +1,4 @@
-"""How large things are, whatever hangs on them included: in the scene's units, and in those of their channels."""
+"""Sizes of objects and rigs, including everything attached to them, in the scene's units and in those of channels."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from ...gltf.sizes import MIN_BALL_RADIUS_RATIO, OF_A_BODY, OF_KEY_POSES
 from . import Transform, transform_of
 
 SOME_SIZE = 0.1
-"""The radius, in metres, of what has no size."""
+"""The radius, in metres, of an object without a size."""
 
 SAME_PLACE = 0.1
-"""Heads of bones that are closer than this, of a bone's length, make no size."""
+"""A rig whose heads extend over less than this fraction of its longest bone is as large as that bone."""
 
 
 def reaches_of(rig: bpy.types.Object) -> dict[str, float]:
-    """Return how far each bone of a rig reaches from its head at rest, in the rig's unit, by their names.
+    """Return the distance that each bone of a rig reaches from its head at rest, in the rig's unit, by bone name.
 
-    That is its length, the farthest vertex that it deforms and the farthest corner of what is parented to it, and at
-    least a share of the figure's size: three centimetres of a grown-up.
+    It is the largest of the bone's length, the distance of the farthest vertex that it deforms or the farthest corner
+    of an object parented to it, and a fraction of the figure's size: three centimetres for an adult.
 
-    Importers make up the lengths of bones that nothing hangs on: such a bone reaches no further than the one before it,
-    as far as that is long, or its head is from the head of that.
+    Importers invent the lengths of bones without children: such a bone reaches no further than its parent's length, or
+    the distance between both heads, if that is more.
     """
     bones = {bone.name: bone for bone in cast(bpy.types.Pose, rig.pose).bones}
     heads = {name: np.array(bone.bone.head_local) for name, bone in bones.items()}
@@ -53,7 +53,7 @@ def deforms(rig: bpy.types.Object, obj: bpy.types.Object) -> bool:
 
 
 def _away_from(heads: Mapping[str, np.ndarray], obj: bpy.types.Object, into_rig: np.ndarray) -> dict[str, np.ndarray]:
-    """Return how far from the heads (3,) of bones the vertices in their groups are, (n, 3) each, in the rig's space."""
+    """Return the offsets (n, 3) of the vertices in each bone's group from the bone's head (3,), in the rig's space."""
     vertices = cast(bpy.types.Mesh, obj.data).vertices
     places = np.empty(3 * len(vertices), dtype=np.float32)
     vertices.foreach_get("co", places)
@@ -72,7 +72,7 @@ def _length(bone: bpy.types.Bone) -> float:
 
 
 def drawn_size(obj: bpy.types.Object) -> float:
-    """Return how large an empty or a camera is drawn, 0 for all else."""
+    """Return the display size of an empty or a camera, 0 for other objects."""
     if isinstance(obj.data, bpy.types.Camera):
         return obj.data.display_size
     return obj.empty_display_size if obj.type == "EMPTY" else 0.0
@@ -87,16 +87,16 @@ def metres_per_unit(scene: bpy.types.Scene) -> float:
 
 
 def size_of(matrix: object) -> float:
-    """Return the scale of a matrix, the same along all axes."""
+    """Return the uniform scale with the same volume as a matrix."""
     return float(np.cbrt(abs(np.linalg.det(np.array(matrix)[:3, :3]))))
 
 
 def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
     """Return how far an object or a pose bone reaches from its origin, in the scene's units.
 
-    That is the farthest corner of the bounding boxes of an object and of all that is parented to it, as they are now,
-    how far a bone reaches at rest (`reaches_of`), and of a rig how far its bones reach as it is posed now. Empties and
-    cameras are as large as they are drawn; what has no size at all counts as ten centimetres.
+    For objects, this is the farthest corner of the current bounding boxes of the object and all its children; for
+    bones, the reach at rest (`reaches_of`); for rigs, that of the bones as posed now. Empties and cameras are as large
+    as drawn. Anything without a size counts as ten centimetres.
     """
     if isinstance(obj, bpy.types.PoseBone):
         return reaches_of(transform_of(obj).animated)[obj.name] * scale_in_scene(transform_of(obj))
@@ -112,7 +112,7 @@ def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
 
 
 def _corners(evaluated: bpy.types.Object) -> np.ndarray:
-    """Return the corners of an object's bounding box in the world, (8, 3): its origin where it has no size."""
+    """Return the corners of an object's bounding box in the world, (8, 3): its origin if it has no size."""
     world = np.array(evaluated.matrix_world)
     return np.array(evaluated.bound_box) @ world[:3, :3].T + world[:3, 3]
 
@@ -120,8 +120,8 @@ def _corners(evaluated: bpy.types.Object) -> np.ndarray:
 def rig_size(rig: bpy.types.Object) -> float:
     """Return the size of a rig in the scene's units: the largest extent of its joints along any of its axes, at rest.
 
-    Joints are the heads of bones, for importers make up where the last bones end. A rig whose heads are in one place is
-    as large as the bone that reaches farthest.
+    Joints are the heads of bones, as importers invent the tails of the last bones. If all heads are in one place, a rig
+    is as large as its longest bone.
     """
     return _extent(rig) * size_of(_evaluated(rig).matrix_world)
 
@@ -134,9 +134,9 @@ def _extent(rig: bpy.types.Object) -> float:
 
 
 def first_tolerance(scene: bpy.types.Scene, targets: Iterable[Transform], *, shared: bool = False) -> float:
-    """Return the tolerance to begin with, in the scene's units: a millimetre, and of a rig a share of its size.
+    """Return the initial tolerance, in the scene's units: a millimetre, or for rigs a fraction of their size.
 
-    That is larger where its bones share key poses.
+    The fraction is larger if the bones share key poses.
     """
     sizes = [rig_size(rig) for rig in {target.animated for target in targets if target.is_part}]
     if not sizes or max(sizes) <= 0.0:
@@ -149,17 +149,17 @@ def _evaluated(obj: bpy.types.Object) -> bpy.types.Object:
 
 
 def scale_in_scene(transform: Transform) -> float:
-    """Return the size of something in the scene as it is now, 1 where it has none."""
+    """Return the current scale of a transform's data-block in the scene, 1 if it is zero."""
     return size_of(_evaluated(transform.animated).matrix_world) or 1.0
 
 
 def into_scene(transform: Transform) -> np.ndarray:
-    """Return what takes the axes of an object's channels to those of the scene, (3, 3): its parents, as they are."""
+    """Return the matrix (3, 3) from the axes of an object's channels to those of the scene, with its parents now."""
     obj = transform.animated
     if obj.parent is None and not obj.constraints:
         return np.eye(3)
     basis, world = np.array(obj.matrix_basis.to_3x3()), np.array(_evaluated(obj).matrix_world.to_3x3())
     if not (size_of(basis) > 0.0 and size_of(world) > 0.0):
         return np.eye(3)
-    # Constraints may turn it anyhow: then only its size counts.
+    # Constraints may rotate it in any way: then only the scale counts.
     return np.eye(3) * size_of(world) / size_of(basis) if obj.constraints else world @ np.linalg.inv(basis)
