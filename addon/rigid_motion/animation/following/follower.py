@@ -1,7 +1,7 @@
-"""Keeping in-betweens up to date: whatever the animator edits, by hand or by script, shows at once.
+"""The follower: handlers that keep in-betweens up to date after every edit, by hand or by script.
 
-Blender's handlers tell that something was edited, before it is evaluated: then what is written is evaluated along with
-it. What was added they tell of only afterwards. A frame that is played costs nothing.
+Blender's handlers report edits before they are evaluated, so that new terms are evaluated along with them. Additions
+are reported only afterwards. Playing back a frame costs nothing.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ Targets = Iterable[bpy.types.Object | bpy.types.PoseBone | Transform]
 
 
 class Follower:
-    """Follows the edits of the file that is open."""
+    """Follows the edits of the open file."""
 
     def __init__(self) -> None:
         self.enabled = True
-        """True if edits are followed at once."""
+        """True if edits are followed immediately."""
         self.busy = False
-        """True if the edits that Blender tells of are the extension's."""
+        """True while reported edits are the extension's own."""
         self.handlers = {
             "depsgraph_update_pre": self._handler(self.before_update),
             "depsgraph_update_post": self._handler(self.after_update),
@@ -65,37 +65,37 @@ class Follower:
         self.begin_file()
 
     def begin_file(self) -> None:
-        """Know nothing of the file that is open."""
+        """Reset everything that is known of the open file."""
         self.ranges: dict[int, tuple[int, int]] | None = None
-        """First and last frame of each scene, by session id, when the file was looked through; None before."""
+        """First and last frame of each scene, by session id, when the file was last refreshed; None before."""
         self.followed: set[int] = set()
         """The Actions, by session id, that were followed before Blender evaluated them."""
         self.added: set[tuple[int, int]] = set()
         """The objects and Actions, by session id, that were added to dependency graphs."""
         self.unkeyed: list[UnkeyedPoses] = []
-        """Poses without keys that are to be set again."""
+        """Poses without keys that must be restored."""
         self.undoes = False
-        """True while objects are those of an undo step, whose matrices are of nothing evaluated yet."""
+        """True while objects come from an undo step, and their matrices do not match any evaluation yet."""
         self.assigned: list[Assigned] = []
-        """Poses of the world that held things are to have once they are evaluated."""
+        """World poses that held objects must get once they are evaluated."""
         self.settled: dict[tuple[tuple[int, str], bytes], Settled] = {}
-        """What became of such poses, by their things and components: Blender's undo steps have these."""
+        """Results for such poses, by transform and components, as Blender's undo steps contain these components."""
         self.forget_snapshots()
 
     def forget_snapshots(self) -> None:
         self.snapshots: dict[tuple[int, int], Snapshot | int] = {}
-        """The keys of slots, where there are no modes their number, by the Action's session id and the slot's handle.
+        """The keys of slots, or just their number if there are no modes, by the Action's session id and slot handle.
         """
         self.bits: dict[int, tuple[tuple, list[Slot], np.ndarray | None]] = {}
-        """What objects and their bones had beside their keys, and the slots that moved them, by session id."""
+        """The other settings of objects and their bones, and the slots that moved them, by session id."""
 
     def _handler(self, method: Callable) -> Callable:
-        """Return a handler that stays quiet while edits are not followed, and never raises into Blender."""
+        """Return a handler that does nothing while edits are not followed, and never raises into Blender."""
 
         @persistent
         @functools.wraps(method)
         def follow(*arguments: object) -> None:
-            # A render that is watched changes frames on a thread of its own, where nothing may be written.
+            # A render with a visible window changes frames on a thread of its own, where nothing may be written.
             if self.enabled and not self.busy and threading.current_thread() is threading.main_thread():
                 try:
                     with self.own_edits():
@@ -107,7 +107,7 @@ class Follower:
 
     @contextmanager
     def own_edits(self) -> Iterator[None]:
-        """Have the edits that Blender tells of meanwhile be the extension's."""
+        """Treat edits reported during this context as the extension's own."""
         before, self.busy = self.busy, True
         try:
             yield
@@ -115,9 +115,9 @@ class Follower:
             self.busy = before
 
     def refresh(self, targets: Targets | None = None) -> int:
-        """Bring the in-betweens of these up to date, or of all in the file.
+        """Update the in-betweens of these targets, or of everything in the file.
 
-        Returns how much had to be changed, counted in transforms of slots.
+        Returns how many transforms of slots had to be changed.
         """
         if targets is not None:
             bindings = bindings_of(map(transform_of, targets))
@@ -130,12 +130,12 @@ class Follower:
         return count
 
     def _is_plain(self, slot: Slot) -> bool:
-        """Return whether a slot had no modes when it was looked at last, and has as many keys since."""
+        """Return whether a slot had no modes when it was last examined, and still has the same number of keys."""
         number = self.snapshots.get(_key_of(slot))
         return isinstance(number, int) and number == _count_keys(slot)
 
     def _remember(self, bindings: Iterable[Binding]) -> None:
-        """Keep what these have by now."""
+        """Store the present state of these bindings."""
         by_slot: dict[Slot, list[Binding]] = {}
         for binding in bindings:
             by_slot.setdefault(binding.slot, []).append(binding)
@@ -149,7 +149,7 @@ class Follower:
                 self.snapshots[_key_of(slot)] = Snapshot(slot)
 
     def follow(self, actions: Collection[bpy.types.Action], frame: float) -> None:
-        """Refresh what these Actions, which were edited, move."""
+        """Refresh everything moved by these edited Actions."""
         for slot in slots_in(actions):
             if slot.is_editable and (not self._is_plain(slot) or has_modes(slot)):
                 snapshot = self.snapshots.get(_key_of(slot))
@@ -161,9 +161,9 @@ class Follower:
     def _refresh(
         self, bindings: Sequence[Binding], edited: Collection[Channel] | None, frame: float, **options: bool
     ) -> None:
-        """Refresh these bindings, and keep the poses that have no keys.
+        """Refresh these bindings, and keep poses that have no keys.
 
-        Where it is not known which channels were edited, all that are written may be.
+        If `edited` is None, any channel that is written may have been edited.
         """
 
         def keep_poses(stale: Iterable[Binding]) -> None:
@@ -182,7 +182,7 @@ class Follower:
             self._remember(bindings)
 
     def follow_objects(self, objects: Collection[bpy.types.Object], frame: float) -> None:
-        """Refresh what moves these objects where it depends on something of theirs that is not as it was."""
+        """Refresh the motion of these objects if settings that it depends on have changed."""
         edited: list[Transform] = []
         left: set[bpy.types.Action] = set()
         for obj in objects:
@@ -198,17 +198,17 @@ class Follower:
             elif bones is not None:
                 numbers = np.flatnonzero((bones != bones_before).any(axis=1)).tolist()
                 edited += [transform_of(pose_bones(obj)[number]) for number in numbers]
-        # What others move by may have been planned for those that move by it no longer.
+        # Slots that these objects no longer use may have been planned for them, and still move others.
         bindings = (*bindings_in(left & set(bpy.data.actions)), *bindings_of(edited))
         self._refresh([*{(item.slot.key, item.prefix): item for item in bindings}.values()], (), frame)
 
     def refresh_file(self) -> None:
-        """Refresh all there is in the file."""
-        self.ranges = _ranges()
+        """Refresh everything in the file."""
+        self.ranges = _scene_ranges()
         self.refresh()
 
     def settle(self, items: Iterable[Settled], frame: float) -> None:
-        """Have held things be where they were assigned to be in the world, on this frame of the scene."""
+        """Put held objects where they were assigned to be in the world, on this frame of the scene."""
         keyed = [item for item in items if set_keys(item, frame)]
         if keyed:
             self.refresh(item.transform for item in keyed)
@@ -228,7 +228,7 @@ class Follower:
         self.follow_objects(objects, scene.frame_current_final)
 
     def after_update(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-        if self.ranges is None or (depsgraph.id_type_updated("SCENE") and self.ranges != _ranges()):
+        if self.ranges is None or (depsgraph.id_type_updated("SCENE") and self.ranges != _scene_ranges()):
             self.refresh_file()
         actions = {action for action in edited_actions(depsgraph) if action.session_uid not in self.followed}
         self.followed = set()
@@ -261,7 +261,7 @@ class Follower:
 
     def after_undo(self, scene: bpy.types.Scene, *_: object) -> None:
         self.undoes = True
-        # What there was is back with its terms; but nothing that was kept of it is to be trusted.
+        # Undo restores the motion with its terms, but no stored state can be trusted.
         self.forget_snapshots()
         self.unkeyed.clear()
         objects = map(Transform, bpy.data.objects if self.settled else ())
@@ -282,12 +282,12 @@ class Follower:
 
 
 def has_modes(slot: Slot) -> bool:
-    """Return whether the keys of a slot say a mode, or it has terms."""
+    """Return whether the keys of a slot store a mode, or it has terms."""
     curves = (fcurve for fcurve in slot.fcurves if split_path(fcurve.data_path)[1] in WIDTHS)
     return any(has_marks(fcurve) or has_terms(fcurve) for fcurve in curves)
 
 
-def _ranges() -> dict[int, tuple[int, int]]:
+def _scene_ranges() -> dict[int, tuple[int, int]]:
     return {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
 
 
@@ -304,17 +304,17 @@ refresh = follower.refresh
 
 
 def set_enabled(enabled: bool) -> None:
-    """Follow edits at once, or else only when `refresh` is called."""
+    """Follow edits immediately, or else only when `refresh` is called."""
     follower.enabled, follower.ranges = enabled, None
 
 
 def is_enabled() -> bool:
-    """Return whether edits are followed at once."""
+    """Return whether edits are followed immediately."""
     return follower.enabled
 
 
 def first_look() -> None:
-    """Look through the file as soon as Blender is idle."""
+    """Refresh the file as soon as Blender is idle."""
     follower.refresh_file()
 
 
@@ -322,7 +322,7 @@ def register() -> None:
     follower.begin_file()
     append_handlers(follower.handlers)
     if not bpy.app.background:
-        # While an extension is switched on, the file is out of its reach.
+        # While an extension is being enabled, it cannot access the file.
         bpy.app.timers.register(first_look, first_interval=0.0)
 
 
@@ -330,5 +330,5 @@ def unregister() -> None:
     if bpy.app.timers.is_registered(first_look):
         bpy.app.timers.unregister(first_look)
     remove_handlers(follower.handlers)
-    # What is edited from now on is no edit that is followed later.
+    # Edits from now on must not be followed later.
     source_cache.clear()

@@ -1,9 +1,9 @@
-"""Keys that were inserted where a mode acts: what else is keyed there, so that the motion goes on as it did.
+"""Keys inserted where a mode acts: fellow keys in the other channels, so that the motion continues unchanged.
 
-A key that is inserted takes the value that is seen, for that is what its channel has. Auto Key and buttons key single
-components, though, and a key of any is one of the whole body: without keys of their own on that frame the others would
-be Blender's in-between there. So all that modes fill get keys, with the values that are seen; and where they have none
-on the keys of the body before and behind it, they get them there, too, which the new ones would move otherwise.
+An inserted key takes the visible value, because that is its channel's value. But Auto Key and buttons key single
+components, while a key in any channel is a key of the whole body: without keys of their own on that frame, the other
+channels would be Blender's in-betweens there. So all channels that modes fill get keys with the visible values. If they
+have no keys on the body's keys before and after, they get them there, too, as the new keys would change these poses.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from .kept_timing import Insertion, nearest_key
 
 
 def key_fellows(binding: Binding, new: KeyedTransform, old: KeyedTransform) -> bool:
-    """Key all that modes fill on frames where any of it was keyed on an in-between of a mode, and on the keys around.
+    """Key all filled channels on frames where any of them was keyed on an in-between of a mode, and on the keys around.
 
-    `old` is what was keyed before. Returns whether any was keyed.
+    `old` is the source before the edit. Returns whether any key was inserted.
     """
     if not old.is_live or old.order != new.order:
         return False
     times, before, none = _times_of(new), _times_of(old), np.empty(0)
     rows = sorted({*old.filled_rows, *new.filled_rows} & times.keys())
-    # Where keys were moved or replaced none was inserted, nor where channels came with others in their place.
+    # If keys were moved or replaced, or channels came with others in their place, no key was inserted.
     if any(len(without(before.get(row, none), times[row])) for row in rows):
         return False
     added = [none, *(without(times[row], before.get(row, none)) for row in rows)]
-    # Where terms needed a channel it has a key on the first frame of all.
+    # Channels created for terms have a key on the first frame of all.
     frames = without(np.unique(np.concatenate(added)), np.union1d(old.key_frames, old.keyed_range[0]))
     frames = frames[[_is_in_between(old, frame) for frame in frames.tolist()]] if len(frames) else frames
     if not len(frames):
@@ -55,7 +55,7 @@ def key_fellows(binding: Binding, new: KeyedTransform, old: KeyedTransform) -> b
 
 
 def divided(binding: Binding, new: KeyedTransform, old: KeyedTransform) -> Insertion | None:
-    """Return the insertion of a single key of all channels that has the pose of the motion as it was, if it is one."""
+    """Return the insertion if a single key of all channels was inserted that has the previous pose of the motion."""
     added = without(new.key_frames, old.key_frames)
     if len(added) != 1 or len(new.key_frames) != len(old.key_frames) + 1 or old.order != new.order:
         return None
@@ -74,7 +74,7 @@ def divided(binding: Binding, new: KeyedTransform, old: KeyedTransform) -> Inser
         at = int(np.argmin(np.abs(keys.times - frame)))
         off = np.abs(keys.values[:, at] - seen[rows]) > SAME_VALUE * np.maximum(1.0, np.abs(seen[rows]))
         if abs(keys.times[at] - frame) >= SAME_FRAME:
-            # Blender's own in-betweens are those of each channel by itself.
+            # Blender's own in-betweens treat each channel separately.
             off[:] = mode != 0
         if np.any(off & [row in filled for row in rows]):
             return None
@@ -93,7 +93,7 @@ def _curves_of(binding: Binding) -> dict[int, bpy.types.FCurve]:
 
 
 Times = dict[int, np.ndarray]
-"""Frames of keys by the rows of their components."""
+"""Frames of keys by row of the component."""
 
 
 def _times_of(source: KeyedTransform) -> Times:
@@ -101,13 +101,13 @@ def _times_of(source: KeyedTransform) -> Times:
 
 
 def _is_in_between(source: KeyedTransform, frame: float) -> bool:
-    """Return whether a mode acts on a frame: between two keys, and outside where the motion goes on."""
+    """Return whether a mode acts on a frame: between two keys, and outside of them if the motion continues."""
     first, last = source.key_frames[[0, -1]]
     return (first < frame < last or source.goes_on) and source.mode_at(frame) != 0
 
 
 def _mark_breakdown(curves: Mapping[int, bpy.types.FCurve], frame: float) -> None:
-    """Make a new key a breakdown, where the path would be another one with a key more that shapes it."""
+    """Turn a new key into a breakdown, for a mode whose path changes with one more shaping key."""
     for fcurve in curves.values():
         number, points = nearest_key(fcurve, frame)
         if len(points) and abs(points[number, 0] - frame) < SAME_FRAME:
@@ -115,14 +115,14 @@ def _mark_breakdown(curves: Mapping[int, bpy.types.FCurve], frame: float) -> Non
 
 
 def set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
-    """Give a key this value, handles along with it; insert one that the channel lacks."""
+    """Set the value of a key, moving its handles along; insert the key if the channel lacks it."""
     keys, (number, points) = fcurve.keyframe_points, nearest_key(fcurve, frame)
     times = points[:, 0]
     if len(times) and abs(times[number] - frame) < SAME_FRAME:
         keys[number].co_ui.y = value
     else:
         before = keys[int(np.argmax(np.where(times < frame, times, -np.inf)))] if (times < frame).any() else None
-        # Read first: an insertion moves the other keys elsewhere in memory.
+        # Read first: an insertion moves the other keys in memory.
         eased = None if before is None else (before.interpolation, before.easing)
         key = existing(keys.insert(frame, value))
         if eased is not None:

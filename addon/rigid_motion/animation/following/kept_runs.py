@@ -1,8 +1,8 @@
-"""Handles with which what is held moves on in its holder as it did, after a key more was inserted there.
+"""Handles that keep the motion of a held object in its holder unchanged after one more key was inserted there.
 
-The keys in one holder are a motion for themselves: automatic handles do not see the keys in others. As soon as one of
-them is set those of its neighbours are Blender's, which does see these; so all that would be others are set. Behind its
-last key, where something passes over, the motion goes on at its speed, and so it does to a key that is inserted there.
+The keys in one holder are a motion of their own: automatic handles ignore the keys in other holders. As soon as one
+handle is set, Blender computes those of its neighbours, from all keys; so all handles that would change are set. After
+the last key in a holder, an object that passes on continues at its speed, also up to a key inserted there.
 """
 
 from __future__ import annotations
@@ -22,35 +22,35 @@ from ..fcurves.keys import BEZIER, LINEAR, Keys
 from ..fcurves.solvers import bezier_cubics, solve_cubics
 
 SAME_HANDLE = 1e-6
-"""Frames and values of handles that differ by less, relative or absolute below 1, are the same in single precision."""
+"""Frames and values of handles that differ by less (relative, absolute below 1) are the same in single precision."""
 
 Curves = Mapping[int, bpy.types.FCurve]
-"""F-curves by the rows of their components."""
+"""F-curves by row of the component."""
 
 
 def keep_run(curves: Curves, old: KeyedTransform, new: KeyedTransform, frame: float, *, may_free: bool) -> None:
-    """Have keys of one holder move something as those that were there before a key more on this frame.
+    """Make the keys of one holder move the object as they did before another key was inserted on this frame.
 
-    `may_free` is true where the handles around that key are set afterwards.
+    `may_free` is true if the handles around that key are set afterwards.
     """
     was = {row: keys.only([number]) for rows, keys in old.channels for number, row in enumerate(rows)}
     channels = [
-        ([row], _divided(was.get(row), keys.only([number]), frame))
+        ([row], _divided_keys(was.get(row), keys.only([number]), frame))
         for rows, keys in new.channels
         for number, row in enumerate(rows)
     ]
     if frame > old.key_frames[-1] > old.key_frames[0]:
-        channels = _at_speed(old, replace(new, channels=tuple(channels)))
+        channels = _channels_at_former_speed(old, replace(new, channels=tuple(channels)))
     there = {row: keys.only([number]) for rows, keys in new.channels for number, row in enumerate(rows)}
     for (row,), keys in channels:
-        if keys.left is not None and (may_free or len(_off(_handles(keys), _handles(there[row])))):
+        if keys.left is not None and (may_free or len(_differing_handles(_handles(keys), _handles(there[row])))):
             _set_handles(curves[row], keys)
 
 
-def _divided(was: Keys | None, keys: Keys, frame: float) -> Keys:
-    """Return the keys of a channel with the handles that it had, and those of a new one by de Casteljau's division.
+def _divided_keys(was: Keys | None, keys: Keys, frame: float) -> Keys:
+    """Return the keys of a channel with its previous handles, and with a new key's handles by de Casteljau's division.
 
-    Behind the last key it goes on straight.
+    After the last key, the motion continues in a straight line.
     """
     at = int(np.argmin(np.abs(keys.times - frame)))
     others = np.arange(len(keys.times)) != at
@@ -78,10 +78,10 @@ def _divided(was: Keys | None, keys: Keys, frame: float) -> Keys:
     return replace(keys, interpolation=codes, **dict(zip(("left", "right"), handles, strict=True)))
 
 
-def _at_speed(old: KeyedTransform, new: KeyedTransform) -> list[tuple[list[int], Keys]]:
-    """Return the channels with which a motion passes the key that was its last one, to a new one, as fast as it did.
+def _channels_at_former_speed(old: KeyedTransform, new: KeyedTransform) -> list[tuple[list[int], Keys]]:
+    """Return the channels that make a motion pass its former last key, on the way to a new one, at its former speed.
 
-    A smooth mode, which now looks at both, has it pass in proportion to the slopes of the channels there.
+    A smooth mode, which now looks at both keys, gives a speed in proportion to the slopes of the channels there.
     """
     before, last, frame = new.key_frames[-3:].tolist()
     near = np.concatenate((before + (last - before) * SLOPE_MOMENTS[3:], last + (frame - last) * SLOPE_MOMENTS[:3]))
@@ -104,28 +104,30 @@ def _at_speed(old: KeyedTransform, new: KeyedTransform) -> list[tuple[list[int],
 
 
 def _handles(keys: Keys) -> np.ndarray:
-    """Return the handles of the keys of one channel, left and right ones, (2, n, 2)."""
+    """Return the handles of the keys of one channel, left and right, (2, n, 2)."""
     assert keys.left is not None
     assert keys.right is not None
     return np.stack((keys.left[0], keys.right[0]))
 
 
-def _off(desired: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """Return the places of keys whose handles (2, n, 2) are others than those desired."""
+def _differing_handles(desired: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Return the indices of keys whose handles (2, n, 2) differ from those desired."""
     return np.flatnonzero((np.abs(there - desired) > SAME_HANDLE * np.maximum(1.0, np.abs(desired))).any(axis=(0, 2)))
 
 
 def _set_handles(fcurve: bpy.types.FCurve, keys: Keys) -> None:
-    """Give an F-curve the handles and interpolations of these keys of it, one channel, where it has others."""
+    """Set the handles and interpolations of an F-curve to those of these keys, of one channel, if they differ."""
     first = int(np.searchsorted(key_points(fcurve)[:, 0], keys.points[0, 0, 0] - 0.5 * SAME_FRAME))
     span = slice(first, first + len(keys.times))
     points, desired = fcurve.keyframe_points[span], _handles(keys)
     for point, code in zip(points, keys.interpolation[0].tolist(), strict=True):
         if code == LINEAR:
             point.interpolation = "LINEAR"
-    # Those that Blender sets are others as soon as their neighbours are.
+    # Handles that Blender computes change when those of their neighbours do.
     for _ in range(len(points)):
-        off = _off(desired, np.stack([key_points(fcurve, f"handle_{side}")[span] for side in ("left", "right")]))
+        off = _differing_handles(
+            desired, np.stack([key_points(fcurve, f"handle_{side}")[span] for side in ("left", "right")])
+        )
         if not len(off):
             break
         for place in off.tolist():

@@ -1,8 +1,8 @@
-"""Handles for a key that was inserted on an in-between, with which the motion goes on as it did.
+"""Handles for a key inserted on an in-between that keep the timing of the motion unchanged.
 
-Blender gives a key that is inserted on an F-curve such handles that the curve stays as it was. A mode's in-between does
-not lie on the F-curves. How far a body has come between two keys is what all channels make of it together: so here they
-get the timing that the motion had, before the new key and behind it, and the handles beside these are kept.
+Blender gives a key inserted on an F-curve handles that keep the curve unchanged. But the in-between of a mode does not
+lie on the F-curves. The progress of a body between two keys comes from all channels together: so here the new handles
+of all channels together give the previous timing before and after the new key, and the outer handles are kept.
 """
 
 from __future__ import annotations
@@ -22,61 +22,61 @@ from ..fcurves.keys import Keys
 from ..fcurves.solvers import fit_together, solve_cubics
 
 TIMING_MOMENTS = np.linspace(0.0, 1.0, 41)
-"""Moments of either side, at which the timing is looked at."""
+"""The times on either side of the key at which timing is compared, 0 to 1."""
 
 IN_TIME = np.array((1.0, 2.0)) / 3.0
-"""The times of handles with which a segment is a cubic in time."""
+"""The times of handles that make a segment a cubic in time."""
 
 MIN_PROGRESS = 1e-6
-"""Progress along a path that is none."""
+"""Less progress along a path than this counts as none."""
 
 
 def nearest_key(fcurve: bpy.types.FCurve, frame: float) -> tuple[int, np.ndarray]:
-    """Return the number of the key nearest to a frame, 0 where there is none, and frame and value of all, (n, 2)."""
+    """Return the index of the key nearest to a frame, 0 if there is none, and frame and value of all keys, (n, 2)."""
     points = key_points(fcurve)
     return int(np.argmin(np.abs(points[:, 0] - frame))) if len(points) else 0, points
 
 
 @dataclass(frozen=True, eq=False)
 class Insertion:
-    """A key that was inserted of the motion as it was."""
+    """A key inserted with the pose that the motion had there."""
 
     curves: Mapping[int, bpy.types.FCurve]
-    """The channels by the rows of their components."""
+    """The channels by row of the component."""
 
     old: KeyedTransform
-    """As it was without the key."""
+    """The source before the insertion."""
 
     frame: float
 
     @property
     def segment(self) -> int:
-        """The number of the segment that it divides."""
+        """The index of the segment that the key divides."""
         return int(np.searchsorted(self.old.key_frames, self.frame)) - 1
 
     @property
     def is_shaped(self) -> bool:
-        """Return whether handles shape the segment that it divides, if it divides one of a mode."""
+        """Return whether the key divides a segment of a mode that is shaped by handles."""
         old = self.old
         is_inside = old.key_frames[0] < self.frame < old.key_frames[-1]
         return is_inside and bool(old.has_handles[self.segment]) and old.mode_at(self.frame) != 0
 
     @property
     def frames(self) -> np.ndarray:
-        """Those of the key before it, its own and that of the key behind it, (3,)."""
+        """The frames of the previous key, the new key and the next key, (3,)."""
         return np.insert(self.old.key_frames[self.segment : self.segment + 2], 1, self.frame)
 
     @property
     def moments(self) -> np.ndarray:
-        """`TIMING_MOMENTS` before the key and then behind it, as frames."""
+        """`TIMING_MOMENTS` before the key and then after it, as frames."""
         first, frame, last = self.frames.tolist()
         moments = np.concatenate((first + (frame - first) * TIMING_MOMENTS, frame + (last - frame) * TIMING_MOMENTS))
-        # On the last frame the next segment begins.
+        # The last frame belongs to the next segment.
         moments[-1] = np.nextafter(last, first)
         return moments
 
     def keep(self, progress: np.ndarray) -> None:
-        """Set the handles with which the progress at `TIMING_MOMENTS` on either side is this again, (2, m)."""
+        """Set handles that give this progress (2, m) at `TIMING_MOMENTS` on either side of the key."""
         filled, curved, linear = set(self.old.filled_rows), [], np.zeros(2)
         for rows, keys in self.old.channels:
             for number, row in enumerate(rows):
@@ -85,8 +85,8 @@ class Insertion:
                     weight = 4.0 if self.old.order is None and PART_OF[row] == ROTATION else 1.0
                     shares = weight * np.diff([key.co.y for key in three]) ** 2
                     if three[0].interpolation == "BEZIER":
-                        _free(three, keys, number)
-                        curved.append((row, three, shares, _divided(keys, number, self.frames)))
+                        _free_handles(three, keys, number)
+                        curved.append((row, three, shares, _divided_handle_times(keys, number, self.frames)))
                     else:
                         linear += shares
         if not curved:
@@ -100,17 +100,19 @@ class Insertion:
                 handles = fit_together(
                     TIMING_MOMENTS, desired, np.array(shares)[:, side] / total, np.array(times)[:, side]
                 )
-                self._go_on(side, of_all, begun[-1], linear[side] / total)
+                self._extend_motion(side, of_all, begun[-1], linear[side] / total)
             for three, of_one in zip(of_all, handles, strict=True):
                 _set_handles(three[side], three[side + 1], of_one)
         for row, *_ in curved:
             self.curves[row].update()
 
-    def _go_on(self, side: int, of_all: Iterable[list[bpy.types.Keyframe]], share: float, linear: float) -> None:
-        """Have it go on before its first key or behind its last one at the speed that it had, by handles outside.
+    def _extend_motion(
+        self, side: int, of_all: Iterable[list[bpy.types.Keyframe]], share: float, linear: float
+    ) -> None:
+        """Extend the motion before the first or after the last key at its former speed, by the outer handles.
 
-        `share` is the part of the segment on this side, and `linear` that of channels without handles to that of those
-        which have some, `of_all`.
+        `share` is the fraction of the segment on this side, `linear` the weight of channels without handles relative to
+        that of the channels with handles, `of_all`.
         """
         frames, duration = self.frames, float(np.diff(self.frames)[side])
         if not self.old.is_linear or frames[2 * side] != self.old.key_frames[-side]:
@@ -124,7 +126,7 @@ class Insertion:
 
 
 def keep_timing(insertions: Iterable[Insertion]) -> None:
-    """Set the handles of new keys and of those beside them, where handles shape the segment."""
+    """Set the handles of new keys and of their neighbours, if handles shape the segment."""
     shaped = [inserted for inserted in insertions if inserted.is_shaped]
     if shaped:
         of_all = progress_at([inserted.old for inserted in shaped], [inserted.moments for inserted in shaped])
@@ -133,17 +135,17 @@ def keep_timing(insertions: Iterable[Insertion]) -> None:
 
 
 def _keys_on(fcurve: bpy.types.FCurve, frames: np.ndarray) -> list[bpy.types.Keyframe] | None:
-    """Return the keys on three frames, if there are any and none between them."""
+    """Return the keys on three frames, if all exist and no other keys lie between them."""
     at, points = nearest_key(fcurve, frames[1])
     beside = slice(max(at - 1, 0), at + 2)
     is_on = len(points[beside]) == 3 and np.abs(points[beside, 0] - frames).max() < SAME_FRAME
     return list(fcurve.keyframe_points[beside]) if is_on else None
 
 
-def _divided(keys: Keys, number: int, frames: np.ndarray) -> np.ndarray:
-    """Return the times of handles (2, 2) with which a curve would be as it was on either side of the second frame.
+def _divided_handle_times(keys: Keys, number: int, frames: np.ndarray) -> np.ndarray:
+    """Return the handle times (2, 2) that keep a curve unchanged on either side of the second of three frames.
 
-    From 0 to 1 on either side, `IN_TIME` where there was no handle on the first frame or on the last.
+    Times are from 0 to 1 on either side, or `IN_TIME` if there was no handle on the first or last frame.
     """
     first, last = np.abs(keys.times - frames[[0, 2], None]).argmin(axis=1)
     if (
@@ -158,14 +160,14 @@ def _divided(keys: Keys, number: int, frames: np.ndarray) -> np.ndarray:
     share = (frames[1] - frames[0]) / duration
     cubic = np.array((3.0 * p[1], 3.0 * (p[2] - 2.0 * p[1]), 1.0 + 3.0 * (p[1] - p[2])))
     t = solve_cubics(np.array((share,)), cubic[:, None])[0]
-    # By de Casteljau.
+    # De Casteljau's division.
     q = [a + t * (b - a) for a, b in pairwise(p)]
     r = [a + t * (b - a) for a, b in pairwise(q)]
     return np.array(((q[0] / share, r[0] / share), ((r[1] - share) / (1.0 - share), (q[2] - share) / (1.0 - share))))
 
 
-def _free(three: list[bpy.types.Keyframe], keys: Keys, number: int) -> None:
-    """Let three keys have the handles that they had, on the sides that they have in common with others."""
+def _free_handles(three: list[bpy.types.Keyframe], keys: Keys, number: int) -> None:
+    """Free the handles of three keys, and restore the former outer handles of the first and the last key."""
     for key in three:
         key.handle_left_type = key.handle_right_type = "FREE"
     for key, of_keys, side in ((three[0], keys.left, "handle_left"), (three[2], keys.right, "handle_right")):
@@ -175,6 +177,6 @@ def _free(three: list[bpy.types.Keyframe], keys: Keys, number: int) -> None:
 
 
 def _set_handles(first: bpy.types.Keyframe, last: bpy.types.Keyframe, handles: np.ndarray) -> None:
-    """Set the handles between two keys to those of a segment from (0, 0) to (1, 1)."""
+    """Set the handles between two keys, given as those of a segment from (0, 0) to (1, 1)."""
     right, left = (np.array(first.co) + handles * (last.co - first.co)).tolist()
     first.handle_right, last.handle_left = right, left

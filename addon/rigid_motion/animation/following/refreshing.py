@@ -1,7 +1,7 @@
-"""From what is keyed to the terms in its channels: read, planned, compared with what there is, written.
+"""Refreshing: read the keys of transforms, plan terms, compare them with the existing ones, and write them.
 
-Whether anything has changed that in-betweens depend on, the digest of the source tells: the terms keep that of what
-they were planned from. They travel with the file through undo, redo, saving and loading.
+The digest of a source tells whether anything has changed that in-betweens depend on: terms store the digest of the
+source that they were planned from. Terms travel with the file through undo, redo, saving and loading.
 """
 
 from __future__ import annotations
@@ -38,28 +38,28 @@ def refresh_bindings(
     is_doubtful: bool = False,
     before_writing: Callable[[Collection[Binding]], object] = lambda _: None,
 ) -> int:
-    """Bring the terms of these bindings up to date with what is keyed in them.
+    """Update the terms of these bindings from their keys.
 
     Parameters
     ----------
     bindings
-        Those of Actions that are not editable are left alone.
+        Bindings in Actions that are not editable are ignored.
     may_key
-        Whether keys that were inserted on in-betweens may be completed.
+        Whether keys inserted on in-betweens may be completed.
     is_doubtful
-        Whether terms may be others than those that were planned.
+        Whether terms may differ from those that were planned.
     before_writing
-        Is called once before anything is written that has Blender evaluate Actions anew, with what is to be written.
+        Called once with the bindings to be written, before any writing makes Blender evaluate Actions again.
 
     Returns
     -------
     int
-        How many of them were changed.
+        The number of bindings that were changed.
     """
     bindings = [binding for binding in bindings if binding.slot.is_editable]
     for binding in bindings:
         _tidy(binding)
-    _adopt(bindings)
+    _apply_awaited_modes(bindings)
     for binding in filter(has_holders, bindings):
         restore_holds(binding)
     marked = [binding for binding in bindings if is_marked(binding) or has_holders(binding)]
@@ -80,8 +80,8 @@ def refresh_bindings(
         before_writing([*dropped, *held, *(binding for binding, _ in stale)])
     for binding in dropped:
         remove_terms(binding)
-    stale = _completed(stale) if stale and may_key else stale
-    # Not before: what has the same keys as something else had is no edit of that which was followed.
+    stale = _complete_inserted_keys(stale) if stale and may_key else stale
+    # Not earlier: a source that merely has the same keys as another one is no followed edit of that one.
     for source in current.values():
         cache_source(source)
     count = len(dropped) + (sum(_apply(stale)) if stale else 0)
@@ -89,7 +89,7 @@ def refresh_bindings(
 
 
 def _tidy(binding: Binding) -> None:
-    """Do what Blender does where a channel has no modifiers: without keys it is gone, and *Make Cyclic* works."""
+    """Do what Blender does for channels without modifiers: remove channels without keys, and let *Make Cyclic* work."""
     for channel, fcurve in list(binding.curves.items()):
         modifiers = fcurve.modifiers
         if not modifiers or channel[0].removeprefix(binding.prefix) not in WIDTHS:
@@ -104,8 +104,8 @@ def _tidy(binding: Binding) -> None:
             add_cycles(fcurve, cycles_of(last))
 
 
-def _adopt(bindings: Iterable[Binding]) -> None:
-    """Give keys the mode that their transform has waited with for the first of them."""
+def _apply_awaited_modes(bindings: Iterable[Binding]) -> None:
+    """Mark the first keys of transforms with the mode chosen before they had any."""
     for binding in bindings:
         for user in binding.users:
             if (mode := user.motion.awaited) != "BLENDER" and binding.is_keyed and user.animated.is_editable:
@@ -115,14 +115,14 @@ def _adopt(bindings: Iterable[Binding]) -> None:
 
 
 def mark_all(binding: Binding, number: int) -> None:
-    """Have all keys of a slot say this mode; none at all where it is Blender's, but what they are held in."""
+    """Mark all keys of a slot with this mode; remove the marks if it is Blender's own, except on keys with a hold."""
     for (path, _), fcurve in binding.curves.items():
         if path.removeprefix(binding.prefix) in WIDTHS and fcurve.keyframe_points:
             write_marks(fcurve, np.where(read_holds(fcurve) >= 0, number + 1, number + 1 if number else 0))
 
 
 def _is_desired(binding: Binding, source: KeyedTransform | Refused) -> bool:
-    """Return whether there is more to a source than Blender's own in-betweens, and it can be had."""
+    """Return whether a source differs from Blender's own in-betweens, and its numbers are valid."""
     if isinstance(source, Refused):
         return False
     try:
@@ -132,8 +132,8 @@ def _is_desired(binding: Binding, source: KeyedTransform | Refused) -> bool:
     return source.is_live
 
 
-def _completed(stale: Sequence[Reading]) -> list[Reading]:
-    """Complete keys that were inserted on in-betweens, and return what is keyed then."""
+def _complete_inserted_keys(stale: Sequence[Reading]) -> list[Reading]:
+    """Complete keys that were inserted on in-betweens, and return the new readings."""
     olds = [cached_source(planned_from(binding)) for binding, _ in stale]
     result = list(stale)
 
@@ -148,7 +148,7 @@ def _completed(stale: Sequence[Reading]) -> list[Reading]:
 
 
 def _read_anew(readings: Sequence[Reading], changed: Collection[Binding]) -> list[Reading]:
-    """Return readings with what is keyed by now in those of them that were changed."""
+    """Return the readings, read again for the bindings that were changed."""
     old = [binding for binding, _ in readings if binding in changed]
     fresh = dict(zip(old, keyed_in(old), strict=True))
     return [
@@ -158,7 +158,7 @@ def _read_anew(readings: Sequence[Reading], changed: Collection[Binding]) -> lis
 
 
 def _apply(stale: Sequence[Reading]) -> list[bool]:
-    """Plan and write the terms of these. Those with numbers that make no motion have none."""
+    """Plan and write the terms of these readings. Readings whose numbers give no motion get no terms."""
     try:
         planned = plan([source for _, source in stale])
     except ValueError:
@@ -168,21 +168,21 @@ def _apply(stale: Sequence[Reading]) -> list[bool]:
     result = []
     for (binding, source), terms in zip(stale, planned, strict=True):
         result.append(apply(binding, source, terms))
-        _carry_marks(binding, source)
+        _complete_marks(binding, source)
         result[-1] |= apply_holds(binding, source, may_key=is_keying_safe())
         cache_source(source)
     return result
 
 
-def _carry_marks(binding: Binding, source: KeyedTransform) -> None:
-    """Mark the keys that go on with what others say, or differ from them, so that they say it without these."""
+def _complete_marks(binding: Binding, source: KeyedTransform) -> None:
+    """Mark keys that inherit a mode or hold from others or disagree with them, so that they keep it without those."""
     voting = {row for rows, _ in source.channels for row in rows}
     for row, channel in binding.users[0].channels.items():
         if (fcurve := binding.curves.get(channel)) is None or not fcurve.keyframe_points:
             continue
         frames = key_points(fcurve)[:, 0].astype(np.float64) + 0.5 * SAME_FRAME
         marks, modes = read_marks(fcurve), source.modes_at(frames) + 1
-        # A channel that has no say now, as it is muted, may say otherwise later.
+        # A channel that does not count now, because it is muted, may have another mode later.
         modes = modes if row in voting else np.where(marks, marks, modes)
         if not np.array_equal(marks, modes):
             write_marks(fcurve, modes)
@@ -194,7 +194,7 @@ def _carry_marks(binding: Binding, source: KeyedTransform) -> None:
 
 
 def is_keying_safe() -> bool:
-    """Return whether keys may be inserted: not while Blender moves keys, for it remembers where in memory they are."""
+    """Return whether keys may be inserted: not while Blender moves keys, as it remembers their memory addresses."""
     manager = bpy.context.window_manager
     windows = () if manager is None else manager.windows
     return not any(item.bl_idname.startswith("TRANSFORM_OT_") for window in windows for item in window.modal_operators)

@@ -1,4 +1,4 @@
-"""Turns of segments, and how they are shared out where keys divide these."""
+"""Turns of segments, and their distribution when keys divide a segment or when its parts are joined."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from ..transforms import GROUP_NAME, bone_name
 def set_turns_in(
     binding: Binding, turns: float | Sequence[float], frames: Sequence[float] | np.ndarray, axis: str | None = None
 ) -> None:
-    """Key the channel of turns of a slot on the frames of keys that begin segments, with one number on all of these or
-    one on each, rising; and behind them where others go on. About this one of `TURN_AXES`, all of them, if it is given.
+    """Key the Turns channel of a slot on the frames of keys that begin segments: one number for all, or one for each in
+    rising order. Other turns continue after them. If given, `axis`, one of `TURN_AXES`, applies to the whole channel.
 
-    Where there are no turns in any segment, the channel goes.
+    If no segment has turns, the channel is removed.
     """
     keyed, channel = frames_in(binding), binding.users[0].turns_channel
     is_chosen, numbers = near(keyed, np.asarray(frames)), turns_in(binding, keyed)
@@ -39,44 +39,44 @@ def set_turns_in(
     if fcurve.group is None:
         fcurve.group = ensure_group(binding.channelbag, bone_name(binding.prefix) or GROUP_NAME)
     mark = max(read_marks(fcurve)[:1], default=0) if axis is None else TURN_AXES.index(axis) + 1
-    # Muted it has no say. Now it has, and all other segments keep the turns that they had without.
+    # A muted channel has no effect. It is unmuted now, and all other segments turn as they did while it was muted.
     old, selected = (
         (np.empty(0), np.empty(0, bool)) if fcurve.mute else (key_points(fcurve)[:, 0], selected_keys(fcurve))
     )
     fcurve.mute = False
     kept = is_chosen | near(keyed, old) | ~(np.abs(np.diff(numbers, prepend=np.nan)) <= WHOLE_TURN)
-    # Selected as the key of the pose is, so that both move together.
+    # Select keys as the keys of the pose are selected, so that both move together.
     selected = is_chosen | near(keyed, old[selected])
     replace_keys(fcurve, keyed[kept], numbers[kept], interpolation="CONSTANT", selected=selected[kept])
     write_marks(fcurve, np.full(np.count_nonzero(kept), mark))
 
 
 STRAIGHT_MODES = ("lerp_slerp",)
-"""Modes by which the path of the origin does not depend on how the body turns."""
+"""Modes in which the path of the origin does not depend on the rotation of the body."""
 
 ONE_AXIS = 1e-5
-"""Radians off an axis, for rounding."""
+"""Rotations within this angle, in radians, of an axis differ from it only by rounding."""
 
 SAMPLES_PER_TURN = 16
-"""Samples of each part of a segment, and of each turn in it, to see how far a motion turns."""
+"""Samples for each part of a segment, and for each turn in it, to measure how far a motion turns."""
 
 
 def share_out_turns(
     binding: Binding, source: KeyedTransform, old: KeyedTransform, progress: float | None = None
 ) -> bool:
-    """Share the turns of segments out among the parts that keys divide them into, so that the motion stays as it is.
+    """Distribute the turns of segments among the parts that keys divide them into, keeping the motion unchanged.
 
-    Where keys go between such parts, these have whole turns together again. Returns whether anything was changed.
+    If keys between such parts are removed, the joined segment gets whole turns again. Returns whether anything changed.
 
     Parameters
     ----------
     binding : Binding
     source : Source
-        What is keyed by now.
+        The present keys.
     old : Source
-        What was keyed before.
+        The keys before the edit.
     progress : float, optional
-        How far the pose of the one new key is along its segment, instead of where the body was on its frame.
+        Progress of the pose of the one new key along its segment, instead of the body's progress on its frame.
     """
     if old.order != source.order or source.cyclic is not None or not needs_turning(old):
         return False
@@ -91,10 +91,10 @@ def share_out_turns(
 
 
 def _divided(old: KeyedTransform, source: KeyedTransform, progress: float | None) -> dict[float, float]:
-    """Return the turns of the parts that keys divide segments into, by the frames that these begin on."""
+    """Return the turns of the parts that keys divide segments into, by the first frame of each part."""
     shared: dict[float, float] = {}
     for segment in np.flatnonzero(old.modes).tolist():
-        parts = _within(source.key_frames, *old.key_frames[segment : segment + 2])
+        parts = _segments_within(source.key_frames, *old.key_frames[segment : segment + 2])
         are_as_before = source.segment_turns[parts] == old.segment_turns[segment]
         if len(parts) > 1 and np.all(are_as_before & (source.modes[parts] != 0)):
             turned = turning_in(old, segment)
@@ -108,11 +108,11 @@ def _divided(old: KeyedTransform, source: KeyedTransform, progress: float | None
 
 
 def _joined(old: KeyedTransform, source: KeyedTransform) -> dict[float, float]:
-    """Return the whole turns of segments in place of which there were several, not all of them in whole turns."""
+    """Return the whole turns of segments that were joined from several parts, at least one with fractional turns."""
     shared: dict[float, float] = {}
     for segment in np.flatnonzero(source.segment_turns != np.rint(source.segment_turns)).tolist():
         ends = source.key_frames[segment : segment + 2]
-        parts = _within(old.key_frames, *ends)
+        parts = _segments_within(old.key_frames, *ends)
         if len(parts) > 1 and source.segment_turns[segment] == old.segment_turns[parts[0]]:
             turned = turning_in(old, int(parts[0]))
             shares, axes = _shares(old, turned, ends)
@@ -120,15 +120,15 @@ def _joined(old: KeyedTransform, source: KeyedTransform) -> dict[float, float]:
     return shared
 
 
-def _within(frames: np.ndarray, first: float, last: float) -> np.ndarray:
-    """Return the segments between these frames of keys that begin from a first frame on, and before a last one."""
+def _segments_within(frames: np.ndarray, first: float, last: float) -> np.ndarray:
+    """Return the segments between these key frames that begin at `first` or later, and before `last`."""
     return np.flatnonzero((frames[:-1] > first - SAME_FRAME) & (frames[:-1] < last - SAME_FRAME))
 
 
 def _is_enough_in_whole_turns(source: KeyedTransform, segment: int, turned: Turning) -> bool:
-    """Return whether it makes no difference for the motion what part of a turn is spin.
+    """Return whether the motion is the same no matter which part of a turn is spin.
 
-    So it is where all of it is about one axis, and the path of the origin does not depend on it.
+    This is so if the whole turn is about one axis, and the path of the origin does not depend on it.
     """
     ends = source.values_at(source.key_frames[segment : segment + 2])[ROWS[LOCATION]]
     is_straight = MODE_NAMES[source.modes[segment]] in STRAIGHT_MODES or not np.ptp(ends, axis=1).any()
@@ -138,9 +138,9 @@ def _is_enough_in_whole_turns(source: KeyedTransform, segment: int, turned: Turn
 def _shares(
     source: KeyedTransform, turned: Turning, frames: np.ndarray, along: Sequence[float] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return what part of the turn of a segment is made from each of the frames (p + 1,) in it to the next, (p,); and
-    the axis of its spins as it lies in the body on each of them, (p, 3). `along` is the progress (p + 1,) on the
-    frames, if it is not that of the motion.
+    """Return the fraction of a segment's turn made from each of the frames (p + 1,) in it to the next, (p,), and
+    the axis of its spins in the body on each of them, (p, 3). `along` is the progress (p + 1,) on the frames, if it is
+    not that of the motion.
     """
     most = max(abs(float(turned.spins.turns[0])), float(np.abs(source.segment_turns).sum()))
     steps = SAMPLES_PER_TURN * (1 + int(most))
@@ -161,10 +161,9 @@ def _shares(
 def _turns_of(
     source: KeyedTransform, segment: int, of: Turning, share: float, axis: np.ndarray, *, whole: bool
 ) -> float:
-    """Return the turns that a segment needs to have this share of a turning,
-    whose axis (3,) is as it lies in the body there.
+    """Return the turns that a segment needs for this fraction of a turning, whose axis in the body there is (3,).
 
-    They are whole where that is enough: where the path of the origin does not depend on what part of a turn is spin.
+    They are whole if that is sufficient: if the path of the origin does not depend on which part of a turn is spin.
     """
 
     def about(result: Turning) -> float:

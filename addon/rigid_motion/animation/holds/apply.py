@@ -75,16 +75,16 @@ def restore_holds(binding: Binding) -> None:
 def apply_holds(binding: Binding, source: KeyedTransform, *, may_key: bool = True) -> bool:
     """Make the constraints of a transform hold it as its keys say. Returns whether anything was changed.
 
-    Unless `may_key`, keys are only moved, never added, because Blender remembers their memory addresses; the rest is done
+    Unless `may_key`, keys are only moved, not added, because Blender remembers their memory addresses; the rest is done
     later.
     """
     if source.held is None and not has_holders(binding):
         return False
     if not source.channels:
         # Without keys it stays in its present holder.
-        return may_key and _release(binding)
+        return may_key and _remove_influences(binding)
     if may_key:
-        changed = _complete(binding, source)
+        changed = _add_missing_constraints(binding, source)
     elif not all(_is_complete(user, source, binding) for user in binding.users):
         return False
     else:
@@ -92,15 +92,15 @@ def apply_holds(binding: Binding, source: KeyedTransform, *, may_key: bool = Tru
     holding, passings = _influences(binding, constraints_to), _influences(binding, partial(_passings, binding=binding))
     for keys_for, channels in ((holding_keys, holding), (passing_keys, passings)):
         for channel, number in channels.items():
-            changed |= _key(binding, channel, keys_for(source, number), may_key)
+            changed |= _write_influence(binding, channel, keys_for(source, number), may_key)
     none = InfluenceKeys(np.array([source.keyed_range[0]]), np.zeros(1), np.full(1, CONSTANT))
     for user in binding.users:
         ours = _passings(user, binding).values()
         # Constraints that pass in another Action have no effect in this one, even if keys copied from there name them.
         for constraint in (item for item in passings_of(user) if item not in ours):
-            changed |= _key(binding, channel_of(user, constraint), none, may_key)
+            changed |= _write_influence(binding, channel_of(user, constraint), none, may_key)
     if passings and may_key and (poses := passing(source)) is not None:
-        changed |= _arrive(binding, source, poses)
+        changed |= _write_arrival_poses(binding, source, poses)
     return changed
 
 
@@ -108,7 +108,7 @@ def _passings(user: Transform, binding: Binding) -> dict[int, Constraint]:
     return passings_in(user, binding.slot.action)
 
 
-def _of_all(binding: Binding, of_user: Callable) -> dict[int, Constraint]:
+def _of_all_users(binding: Binding, of_user: Callable) -> dict[int, Constraint]:
     """Return the passing constraints of all users of a binding by number; the first user with a number counts."""
     return {number: item for user in reversed(binding.users) for number, item in of_user(user).items()}
 
@@ -126,7 +126,7 @@ def channels_of(binding: Binding) -> set[Channel]:
     return {channel_of(user, item, prop) for user, item in ours for prop in ("influence", "eval_time")}
 
 
-def _release(binding: Binding) -> bool:
+def _remove_influences(binding: Binding) -> bool:
     """Remove the F-curves of all holding constraints. Returns whether there were any."""
     there = channels_of(binding) & binding.curves.keys()
     for channel in there:
@@ -139,7 +139,7 @@ def _is_complete(user: Transform, source: KeyedTransform, binding: Binding) -> b
     return held.keys() <= constraints_to(user).keys() and passed <= _passings(user, binding).keys()
 
 
-def _complete(binding: Binding, source: KeyedTransform) -> bool:
+def _add_missing_constraints(binding: Binding, source: KeyedTransform) -> bool:
     """Add missing constraints to all users if their holders are known, and update the spaces they are evaluated in."""
     (held, passed), changed = spoken_of(source), False
     for user in binding.users:
@@ -154,7 +154,7 @@ def _complete(binding: Binding, source: KeyedTransform) -> bool:
                 changed = True
         holders = {0: Holder(0, None, ""), **{holder.number: holder for holder in holders_of(user)}}
         for number in sorted((passed & holders.keys()) - _passings(user, binding).keys()):
-            fellow = _of_all(binding, partial(_passings, binding=binding)).get(number)
+            fellow = _of_all_users(binding, partial(_passings, binding=binding)).get(number)
             label = f"{HOLD_KINDS['ACTION']} {holders[number].name or 'World'}" if fellow is None else fellow.name
             add_passing(user, holders[number], label)
             changed = True
@@ -164,7 +164,7 @@ def _complete(binding: Binding, source: KeyedTransform) -> bool:
     return changed
 
 
-def _key(binding: Binding, channel: Channel, keys: InfluenceKeys, may_key: bool = True) -> bool:
+def _write_influence(binding: Binding, channel: Channel, keys: InfluenceKeys, may_key: bool = True) -> bool:
     """Give an F-curve of a constraint these keys. Returns whether it had others."""
     if not may_key and len(binding.curves[channel].keyframe_points if channel in binding.curves else ()) != len(
         keys.frames
@@ -204,7 +204,7 @@ def _key(binding: Binding, channel: Channel, keys: InfluenceKeys, may_key: bool 
     return True
 
 
-def _arrive(binding: Binding, source: KeyedTransform, poses: Passing) -> bool:
+def _write_arrival_poses(binding: Binding, source: KeyedTransform, poses: Passing) -> bool:
     """Make the passing constraints show the poses in which the object arrives."""
     slot, changed, last = _slot_of(binding), False, int(np.ceil(poses.frames[-1]))
     bag = channelbag_in(binding.slot.action.layers[0].strips[0], slot)
@@ -229,7 +229,7 @@ def _arrive(binding: Binding, source: KeyedTransform, poses: Passing) -> bool:
         for number, constraint in _passings(user, binding).items():
             if (keys := poses.clocks.get(number)) is not None:
                 clock = InfluenceKeys(keys[:, 0], keys[:, 1] / last, np.full(len(keys), LINEAR))
-                changed |= _key(binding, channel_of(user, constraint, "eval_time"), clock)
+                changed |= _write_influence(binding, channel_of(user, constraint, "eval_time"), clock)
             shows = binding.slot.action, slot, 0, last
             if (constraint.action, constraint.action_slot, constraint.frame_start, constraint.frame_end) != shows:
                 constraint.action, constraint.action_slot = binding.slot.action, slot

@@ -50,7 +50,7 @@ class Holder(NamedTuple):
     """The name of a bone of the target, "" for none."""
 
     offset: Matrix = Matrix()
-    """The space of the channels relative to the holder. Channels keep their units: the offset removes the scale that the
+    """The space of channels relative to the holder. Channels keep their units: the offset removes the scale that the
     holder had when it first held something, and applies that of the transform's own parent."""
 
     @property
@@ -197,8 +197,8 @@ def _all_holders() -> Iterator[Holder]:
 
 
 def add_constraint(user: Transform, holder: Holder, label: str) -> Constraint:
-    """Add a constraint to a holder, with the holder's offset if it has one, or else one that removes its present scale."""
-    constraint = _added(user, "CHILD_OF", label)
+    """Add a constraint to a holder, with the holder's offset, or else one that removes the holder's present scale."""
+    constraint = _insert_constraint(user, "CHILD_OF", label)
     constraint.target, constraint.subtarget = holder.target, holder.bone
     constraint.set_inverse_pending, constraint.target_space = False, "WORLD"
     keep_space(constraint, user)
@@ -251,7 +251,7 @@ def _without_noise(matrix: Matrix) -> Matrix:
 
 def add_passing(user: Transform, holder: Holder, label: str) -> Constraint:
     """Add a constraint that passes a transform to a holder; to its parent or the world if the holder has no target."""
-    constraint = _added(user, "ACTION", label)
+    constraint = _insert_constraint(user, "ACTION", label)
     constraint.subtarget = f"rigid_motion {holder.number}"
     # Setting the mix mode changes the space.
     constraint.mix_mode, constraint.use_eval_time = "REPLACE", True
@@ -263,18 +263,18 @@ def add_passing(user: Transform, holder: Holder, label: str) -> Constraint:
     return constraint
 
 
-def _added(user: Transform, kind: str, label: str) -> Constraint:
+def _insert_constraint(user: Transform, kind: str, label: str) -> Constraint:
     """Add a constraint in front of all foreign constraints; holding constraints go in front of passing ones."""
     constraints: Any = user.carrier.constraints
     before = sum(is_ours(item) and kind in ("ACTION", item.type) for item in constraints)
     constraint = constraints.new(kind)
     constraint.name, constraint.show_expanded, constraint.influence = label, False, 0.0
     constraints.move(len(constraints) - 1, before)
-    _let_go(user, channel_of(user, constraints[before]))
+    _key_zero_influence(user, channel_of(user, constraints[before]))
     return constraints[before]
 
 
-def _let_go(user: Transform, influence: Channel) -> None:
+def _key_zero_influence(user: Transform, influence: Channel) -> None:
     """Key an influence at 0 in all Actions without it: if only some strips key it, the others leave it at 1."""
     path, index = influence
     for slot in slots_alone(user.animated):
@@ -284,7 +284,7 @@ def _let_go(user: Transform, influence: Channel) -> None:
 
 
 def spoken_of(source: KeyedTransform) -> tuple[dict[int, float], set[int]]:
-    """Return the numbers of the holders of keys, with their first frames, and the numbers of holders that are passed to."""
+    """Return the numbers of the holders of keys, with their first frames, and of the holders that are passed to."""
     if source.held is None:
         return {}, set()
     frames = source.keyed_frames
