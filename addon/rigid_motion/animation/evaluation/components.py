@@ -1,4 +1,4 @@
-"""Components of a transform: their ten rows in arrays, and the numbers of modes in channels and files.
+"""Components of a transform: their ten rows in arrays, and the numbers that stand for modes.
 
 Components are location, rotation (a quaternion, three angles, or an angle and an axis) and scale.
 """
@@ -25,7 +25,7 @@ REST_COMPONENTS = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)
 """The components at rest. Rotations are quaternions unless they are channel values."""
 
 MODE_NUMBERS = {"BLENDER": 0, **{name: mode.number for name, mode in KEYFRAME_MODES.items()}}
-"""Mode names, and their numbers in marks and saved files. 0 stands for Blender's own in-betweens."""
+"""Mode names and their numbers, 0 for Blender's own in-betweens. The marks of keys store the number plus one."""
 
 MODE_IDS = tuple(MODE_NUMBERS)
 """The names of the modes."""

@@ -124,8 +124,8 @@ def channel_differences(
     -------
     list of pairs of array, shape (10, m)
         Their sum is the desired channel values. Quaternions have lengths that change evenly between those of the keys,
-            are continuous in each span, and start with the sign of the first key. Angles are continuous, and nearest to
-            those of the key at the start. Rows that are not filled have no difference.
+        are continuous in each span, and start with the sign of the first key. Angles are continuous, and nearest to
+        those of the key at the start. Rows that are not filled have no difference.
     """
     if any(source.switches for source in sources):
         return _differences_of_runs(sources, frames, given)

@@ -6,8 +6,8 @@ A smooth mode looks at the keys next to a segment and, with handles, at how fast
 direction of the tangent at a key is that of the mode, a mean of the twists before and after it. Progress in a segment
 comes from the channels, as in other modes, along the segment's chord. The screws on both sides of a key differ in speed
 and direction. So the tangent on either side is as long as that screw is along the mean of both, which makes the speed
-equal where handles are smooth and the path is straight. On a bent path, progress gets an addition for what is lacking
-of the speed of Blender's own in-betweens in that direction. With two keys, or if no handle has an effect, nothing
+equal where handles are smooth and the path is straight. On a bent path, progress is corrected by the speed that is
+lacking to that of Blender's own in-betweens in that direction. With two keys, or if no handle has an effect, nothing
 changes.
 
 Twists (6, S) are along the body's own axes at the key, with a radian counting as one unit of length; segments are along

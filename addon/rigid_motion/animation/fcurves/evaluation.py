@@ -25,7 +25,7 @@ def evaluate(
         Curves without keys are 0 everywhere, as in Blender.
     times : sequence of array, shape (m,)
         Frames for each of the curves. They are not rounded to single precision as in Blender: values are smooth in
-            time between keys.
+        time between keys.
     out : sequence of array, shape (c, m), optional
         Arrays to write the values to.
 
@@ -33,7 +33,7 @@ def evaluate(
     -------
     sequence of array, shape (c, m)
         NaN where keys or handles are not finite. Values are not rounded as Blender does for channels of whole
-            numbers and enumerations.
+        numbers and enumerations.
     """
     if out is None:
         out = [np.empty((len(keys.points), len(frames))) for keys, frames in zip(curves, times, strict=True)]

@@ -30,7 +30,7 @@ def bezier_cubics(start: np.ndarray, right: np.ndarray, left: np.ndarray, end: n
     ----------
     start, right, left, end : array, shape (k, 2)
         Key, its right handle, the left handle of the next key, and that key. In single precision: Blender's rounding
-            matters if frame numbers are large and segments short.
+        matters if frame numbers are large and segments short.
 
     Returns
     -------
