@@ -1,1 +1,1 @@
-"""From recordings to numbers: clips, choices of keys, what each mode makes of them, and how far off that is."""
+"""Analysis of recordings: clips, choices of keys, what each mode reconstructs from the keys, and its errors."""

@@ -1,8 +1,8 @@
-"""Choices of keys: which samples of a clip a mode may keep, evenly in time or wherever the motion needs them.
+"""Choices of keys: which samples of a clip a mode may keep, evenly spaced in time or where the motion needs them.
 
-A clip under a choice is a `Reconstruction`, whatever the choice: that names the folder, and says itself in captions,
-in the report and in `metrics.csv`. Amounts stay as the user wrote them. Tolerances are lengths with a unit, or in the
-unit of the recording. Radii are of the balls in which no point is off by more than the shell error.
+A clip under any choice is a `Reconstruction`. The choice names the folder of its results, and describes itself in
+captions, in the report and in `metrics.csv`. Amounts stay as the user wrote them. A tolerance is a length with a unit,
+or in the unit of the recording. A radius is that of the ball in which no point is off by more than the shell error.
 """
 
 from __future__ import annotations
@@ -23,30 +23,30 @@ from rigid_motion_batch.recordings.cleaning import RIGID_RADIUS_M as RIGID_RADIU
 from rigid_motion_batch.recordings.clips import Clip
 
 MILLIMETRES = {"mm": 1, "cm": 10, "m": 1000}
-"""Units of tolerances and radii, and how many millimetres they have."""
+"""Units of tolerances and radii, with their lengths in millimetres."""
 
 Radius = float | np.ndarray
-"""Of the ball at every joint, in metres: one for all, or shape (joints,)."""
+"""The radius of the ball at every joint, in metres: one for all joints, or shape (joints,)."""
 
 Keys = tuple[np.ndarray, ...]
-"""The samples that are keys of each joint, rising; a joint that stays as it is has a single one."""
+"""For each joint the samples that are keys, in rising order; a joint that never changes has a single key."""
 
 METRES = {unit: length * 1e-3 for unit, length in MILLIMETRES.items()}
-"""Units of tolerances and radii, and their lengths."""
+"""Units of tolerances and radii, with their lengths in metres."""
 
 NUMBER = r"\d{1,6}(?:\.\d{1,6})?"
-"""What rates are made of: names of folders as well."""
+"""The pattern of rates. Folders are named by rates too."""
 
 LENGTH = re.compile(
     rf"\s*((?=\.?\d)\d{{0,6}}\.?\d{{0,6}}(?:e[+-]?\d)?)\s*({'|'.join(METRES)})?\s*", re.ASCII | re.IGNORECASE
 )
-"""How lengths are written: 5mm, 5 MM, .5cm, 5e-3."""
+"""The pattern of lengths: 5mm, 5 MM, .5cm, 5e-3."""
 
 
 def read_length(text: str, problem: str) -> tuple[str, str]:
-    """Return the number and the unit of a length above 0, "0.5" and "cm" of ".5 CM"; the unit may be empty.
+    """Return the number and the unit of a length above 0: "0.5" and "cm" for ".5 CM". The unit may be empty.
 
-    Raises ValueError with the problem where it is none.
+    Raises ValueError with the text `problem` if it is no such length.
     """
     parts = LENGTH.fullmatch(text)
     if not parts or not Decimal(parts[1]):
@@ -56,16 +56,16 @@ def read_length(text: str, problem: str) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Choice(ABC):
-    """A way to choose keys, and how much of it."""
+    """A way to choose keys, with its amount."""
 
     written: str
     """The amount as the user wrote it: "7.5", "5mm"."""
 
     decimation: ClassVar[str]
-    """What metrics.csv calls it: "uniform" or "adaptive"."""
+    """Its name in metrics.csv: "uniform" or "adaptive"."""
 
     unit: ClassVar[str] = "keys/s"
-    """What follows the amounts, if anything."""
+    """The text after the amount, if any."""
 
     def __post_init__(self) -> None:
         if not re.fullmatch(NUMBER, self.written, re.ASCII) or float(self.written) <= 0.0:
@@ -73,19 +73,19 @@ class Choice(ABC):
 
     @abstractmethod
     def keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool = False) -> Keys:
-        """Return the samples of each joint that are kept under a mode, the same for all where they are `shared`.
+        """Return the samples that each joint keeps under a mode; with `shared`, all joints keep the same samples.
 
-        The radius of the shell, or of the balls at the joints, is in metres. The clip has to have two `ends`.
+        The radius of the shell, or of the balls at the joints, is in metres. The clip must have two `ends`.
         """
 
     @property
     def name(self) -> str:
-        """Unique among the choices of a run, and safe as the name of a folder."""
+        """A name that is unique among the choices of a run, and safe as the name of a folder."""
         return self.written
 
     @property
     def amount(self) -> str:
-        """What was written, as prose has it."""
+        """The amount as written, for use in prose."""
         return self.written
 
     @property
@@ -95,38 +95,38 @@ class Choice(ABC):
 
     @property
     def phrase(self) -> str:
-        """The same in a sentence: "at 10 keys/s"."""
+        """The same for the middle of a sentence: "at 10 keys/s"."""
         return f"at {self.title}"
 
     @property
     def rate(self) -> str:
-        """The keys a second that were asked for, as written; empty where none were."""
+        """The requested keys per second, as written; empty if no rate was requested."""
         return self.written
 
     @abstractmethod
     def ends(self, times: np.ndarray) -> tuple[int, int] | None:
-        """Return the samples of the first and the last key, which all modes keep, among a clip's times, shape (n,).
+        """Return the samples of the first and the last key, which all modes keep, given the clip's times, shape (n,).
 
-        None where the clip is too short for two keys.
+        None if the clip is too short for two keys.
         """
 
     def tolerance(self, clip: Clip) -> float | None:
-        """Return the largest shell error that is allowed, in metres; None where nothing is said of it."""
+        """Return the largest allowed shell error in metres; None if the choice sets no limit."""
         return None
 
     @property
     def size(self) -> float:
-        """What choices of one kind are sorted by."""
+        """The value by which choices of one kind are sorted."""
         return float(self.written)
 
     @property
     def requested(self) -> tuple[Fraction, str]:
-        """The amount exactly, and what it is counted in: the same for "5" and "5.0", for "5mm" and "0.5cm"."""
+        """The exact amount and its unit: the same for "5" and "5.0", and for "5mm" and "0.5cm"."""
         return Fraction(self.written), self.unit
 
 
 class Uniform(Choice):
-    """So many keys a second, evenly in time: the same for all modes."""
+    """A fixed number of keys per second, evenly spaced in time: the same keys for all modes."""
 
     decimation = "uniform"
 
@@ -139,20 +139,20 @@ class Uniform(Choice):
 
 
 class Budget(Choice):
-    """So many keys a second on average, where they make the RMS shell error of a mode smallest."""
+    """An average number of keys per second, placed where the RMS shell error of the mode is smallest."""
 
     decimation = "adaptive"
     unit = "keys/s on average"
 
     def keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool = False) -> Keys:
-        poses = min(self._count(clip.times), len(clip.times))
+        poses = min(self._key_count(clip.times), len(clip.times))
         return _reduced(clip, mode, radius, shared, budget=poses * (1 if shared else clip.joints))
 
     def ends(self, times: np.ndarray) -> tuple[int, int] | None:
-        return (0, len(times) - 1) if self._count(times) > 1 else None
+        return (0, len(times) - 1) if self._key_count(times) > 1 else None
 
-    def _count(self, times: np.ndarray) -> int:
-        """As many keys as a sender at that rate has ticks: the allowance is for rounding, as in 2.0 * 0.5."""
+    def _key_count(self, times: np.ndarray) -> int:
+        """Return as many keys as a sender at this rate has ticks. The 1e-9 absorbs rounding, as in 2.0 * 0.5."""
         return int(float(times[-1] - times[0]) * float(self.written) + 1e-9) + 1
 
     @property
@@ -161,7 +161,7 @@ class Budget(Choice):
 
 
 class Tolerance(Choice):
-    """The fewest keys with which the shell error of a mode stays within a length at every sample."""
+    """The fewest keys with which a mode's shell error stays within a length at every sample."""
 
     decimation = "adaptive"
     unit = ""
@@ -200,14 +200,14 @@ class Tolerance(Choice):
         return self.metres(clip.metres_per_unit)
 
     def metres(self, per_unit: float) -> float:
-        """Return the length in metres, given how many a unit of the recording has."""
+        """Return the length in metres, given the metres per unit of the recording."""
         number, unit = self._parts()
         return float(number) * (METRES[unit] if unit else per_unit)
 
     def problem_with(self, clip: Clip, radius: float) -> str:
-        """Return what is wrong where a clip does not move as far as the tolerance, "5" for "5mm"; else nothing.
+        """Return a message if the tolerance exceeds the whole motion of a clip, such as "5" meant as "5mm"; else "".
 
-        The radius of the shell is in metres; of a body the places of its joints count.
+        The radius of the shell is in metres. For a whole body, the motion is measured by the positions of its joints.
         """
         if clip.rest_body is None:
             poses = clip.in_metres(clip.poses)
@@ -226,11 +226,11 @@ class Tolerance(Choice):
 
     @property
     def is_length(self) -> bool:
-        """Whether it says its unit, and does not go by that of the recording."""
+        """Whether the tolerance has a unit of its own, instead of the unit of the recording."""
         return bool(self._parts()[1])
 
     def alike(self, metres: float, per_unit: float) -> str:
-        """Another length, in metres, written in the unit that this one is in."""
+        """Return another length, given in metres, as text in the unit of this tolerance."""
         _, unit = self._parts()
         length = round(metres / (METRES[unit] if unit else per_unit), 4)
         return f"{length:.3g} {unit or 'units'}"
@@ -246,7 +246,7 @@ class Tolerance(Choice):
         return Fraction(number) * MILLIMETRES.get(unit, 1), "mm" if unit else ""
 
     def _parts(self) -> tuple[str, str]:
-        """Return the number and the unit, which may be empty."""
+        """Return the number and the unit; the unit may be empty."""
         return read_length(
             self.written,
             "is not a tolerance; give a length such as 5mm, 0.5cm or 0.005m, or a plain number in the unit of the "
@@ -255,7 +255,7 @@ class Tolerance(Choice):
 
 
 def _reduced(clip: Clip, mode: str, radius: Radius, shared: bool, **requested: Any) -> Keys:
-    """Return the fewest keys within a tolerance, or so many with the least error: the RMS error of a rigid body."""
+    """Return the fewest keys within a tolerance, or the best of a budget: for a rigid body, by the RMS error."""
     times, poses, radius = clip.times, clip.poses, radius / clip.metres_per_unit
     if clip.rest_body is None:
         rms = "budget" in requested
@@ -265,7 +265,7 @@ def _reduced(clip: Clip, mode: str, radius: Radius, shared: bool, **requested: A
 
 
 def fewest_keys(choices: Iterable[Choice]) -> list[Choice]:
-    """Of each kind of choice that which keeps the fewest keys, where modes differ most."""
+    """Return, for each kind of choice, the one that keeps the fewest keys: modes differ most there."""
     kinds: dict[type[Choice], list[Choice]] = {}
     for choice in choices:
         kinds.setdefault(type(choice), []).append(choice)
@@ -273,7 +273,7 @@ def fewest_keys(choices: Iterable[Choice]) -> list[Choice]:
 
 
 def distinct(choices: Iterable[Choice]) -> list[Choice]:
-    """Choices of one kind without those that want the same as one before them, however it is written."""
+    """Return the choices without repeats of the same amount, however it is written."""
     first: dict[tuple[Fraction, str], Choice] = {}
     for choice in choices:
         first.setdefault(choice.requested, choice)
@@ -282,16 +282,16 @@ def distinct(choices: Iterable[Choice]) -> list[Choice]:
 
 @dataclass(frozen=True)
 class Radii:
-    """Plain data, as parameters of tasks."""
+    """The radii of shells, as plain data that tasks can take as a parameter."""
 
     rigid: float = RIGID_RADIUS_M
-    """Of a single rigid body."""
+    """For a single rigid body, in metres."""
 
     joint: float = JOINT_RADIUS_M
-    """Of every joint of a whole body."""
+    """For every joint of a whole body, in metres."""
 
     def of(self, clip: Clip) -> np.ndarray:
-        """Return the radii of the joints of a clip, shape (joints,); a rigid body has one."""
+        """Return the radius of each joint of a clip, shape (joints,); a rigid body has one."""
         return np.full(clip.joints, self.joint if clip.rest_body else self.rigid)
 
 
@@ -299,12 +299,12 @@ EVERYWHERE = Radii()
 
 
 def read_radii(text: str) -> Radii:
-    """Return a radius for everything. Raises ValueError where it is none."""
+    """Return radii with one value for everything. Raises ValueError if the text is no length above 0."""
     radius = radius_in_metres(text)
     return Radii(radius, radius)
 
 
 def radius_in_metres(text: str) -> float:
-    """Return a radius as it is written: 3cm, or 0.03, which is metres. Raises ValueError where it is none above 0."""
+    """Return a radius such as 3cm, or 0.03 (metres), in metres. Raises ValueError if it is no length above 0."""
     number, unit = read_length(text, "is not a length above 0, such as 3cm or 0.03")
     return float(number) * METRES[unit or "m"]

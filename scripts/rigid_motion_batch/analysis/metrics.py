@@ -1,7 +1,7 @@
-"""What a comparison found, in numbers: the rows of `metrics.csv` and `metrics_joints.csv`, and the poses behind them.
+"""Metrics of a comparison: the rows of `metrics.csv` and `metrics_joints.csv`, and the tables of poses.
 
-Errors are in metres, of whole bodies in the root's space; the poses in the tables keep the unit of their recording.
-The numbers are written so that `float` reads back exactly what was computed.
+Errors are in metres; errors of whole bodies are in the root's space. Poses in tables keep the unit of the recording.
+Numbers are written so that `float` reads back exactly the computed value.
 """
 
 from __future__ import annotations
@@ -23,36 +23,36 @@ from .choices import Choice, Keys
 from .reconstructions import Ground, MotionErrors, Reconstruction
 
 BYTES_PER_KEY = 7 * 8
-"""A position and a quaternion, as doubles: what the paper sends for an update."""
+"""A position and a quaternion as doubles: the size of one update in the paper."""
 
 MAX_ROUNDING_M = 1e-9
-"""An error below this, in metres, is rounding: every sample was a key, or nothing moved."""
+"""Errors below this, in metres, are rounding: every sample was a key, or nothing moved."""
 
 BLOCK_ROWS = 10_000
-"""Rows of a table that are made at a time."""
+"""Rows of a table that are written at a time."""
 
 
 @dataclass(frozen=True)
 class Metrics:
-    """One clip with one choice of keys under one mode. The fields are the columns of `metrics.csv`, in their order."""
+    """One clip with one choice of keys under one mode. The fields are the columns of `metrics.csv`, in order."""
 
     clip: str
     mode: str
 
     rate_hz: str
-    """As the user wrote it; empty where a tolerance decides."""
+    """As the user wrote it; empty if the choice is a tolerance."""
 
     keys: int | None
-    """Empty of somebody else's motion, as all that is counted by keys."""
+    """None for a motion from --against, as for all values that are counted by keys."""
 
     samples: int
-    """How many samples of the recording were compared: those between the first and the last key, both included."""
+    """The number of compared samples: from the first key to the last, both included."""
 
     duration_s: float
-    """From the first key to the last."""
+    """Time from the first key to the last."""
 
     bytes_per_s: float | None
-    """Of the keys that were really kept, not of the rate that was asked for: see `row_of`."""
+    """Counts the keys that were kept, not the requested rate: see `row_of`."""
 
     rms_shell_m: float
     p95_shell_m: float
@@ -65,44 +65,46 @@ class Metrics:
     """How the keys were chosen: "uniform" or "adaptive"."""
 
     tolerance_m: float | None
-    """The largest shell error that was allowed; empty in the table where a rate decides."""
+    """The largest allowed shell error; empty in the table if the choice is a rate."""
 
     keys_per_s: float | None
-    """On average, the first key not counted; of a whole body, for each joint."""
+    """On average, not counting the first key; for a whole body, per joint."""
 
     joints: int | None = None
-    """How many a whole body has; this and the following are empty for a single rigid body."""
+    """The number of joints of a whole body; this and the following fields are empty for a single rigid body."""
 
     key_frames: int | None = None
-    """Samples that are a key of any joint: key poses, where joints share them."""
+    """The number of samples that are a key of any joint: the key poses, if joints share them."""
 
     worst_joint: str | None = None
-    """The one that `max_shell_m` is of."""
+    """The joint that `max_shell_m` belongs to."""
 
     foot_slide_m: float | None = None
-    """The farthest that a joint which stands on the ground in the recording gets from where it began to stand."""
+    """The farthest that a joint gets from where it began to stand, while it stands on the ground in the recording."""
 
     recorded_slide_m: float | None = None
     """The same in the recording itself."""
 
     still_point_m: float | None = None
-    """The farthest that the point which stays in the recording, such as a pivot, gets from where it was; empty of whole
-    bodies, and where no point stays."""
+    """The farthest that a point which stays put in the recording, such as a pivot, gets from its place.
+
+    Empty for whole bodies, and if no point stays put.
+    """
 
 
 @dataclass(frozen=True)
 class JointMetrics:
-    """One joint of a clip with one choice of keys under one mode: the columns of `metrics_joints.csv`."""
+    """One joint of a clip with one choice of keys under one mode: the columns of `metrics_joints.csv`, in order."""
 
     clip: str
     joint: str
     mode: str
 
     rate_hz: str
-    """As the user wrote it; empty where a tolerance decides."""
+    """As the user wrote it; empty if the choice is a tolerance."""
 
     keys: int | None
-    """1 of a joint that stays as it is in its parent's space."""
+    """1 for a joint that never changes in its parent's space."""
 
     samples: int
     rms_shell_m: float
@@ -110,7 +112,7 @@ class JointMetrics:
     max_shell_m: float
 
     worst_s: float
-    """When that is, in seconds from the first key on."""
+    """The time of the largest shell error, in seconds from the first key."""
 
     rms_position_m: float
     rms_rotation_deg: float
@@ -120,7 +122,7 @@ class JointMetrics:
 
 
 def of_errors(clip: Clip, choice: Choice, errors: Errors | MotionErrors) -> dict[str, Any]:
-    """Return the fields of a row that any motion has, of errors in metres and radians."""
+    """Return the fields that rows of clips and of joints share, from errors in metres and radians."""
     return {
         "clip": clip.name,
         "rate_hz": choice.rate,
@@ -141,14 +143,14 @@ def row_of(made: Reconstruction, mode: str, errors: MotionErrors, ground: Ground
 
     Notes
     -----
-    `bytes_per_s` is (keys - 1) / duration times 56 bytes. A recording that is thinned to 10 keys a second keeps fewer
-    where it has gaps or is slow itself, and it is what would be sent that counts. The first key is not counted, since a
-    stretch of the motion costs the key at its end: keys exactly a tenth of a second apart are 560 bytes a second for
-    any length of the clip.
+    `bytes_per_s` is (keys - 1) / duration times 56 bytes. A recording that is thinned to 10 keys per second keeps fewer
+    keys where it has gaps or a lower rate itself; only keys that would be sent count. The first key is not counted,
+    since each segment of the motion costs the key at its end: keys exactly a tenth of a second apart are 560 bytes per
+    second for any length of the clip.
     """
     clip, keys = made.clip, made.keys[mode]
     duration = float(made.times[-1] - made.times[0])
-    # A joint that stays as it is has its key once, and sends nothing.
+    # A joint that never changes has one key, and sends nothing.
     count = sum(map(len, keys))
     sent = count - len(keys)
     moving_joints = sum(len(own) > 1 for own in keys)
@@ -170,7 +172,7 @@ def row_of(made: Reconstruction, mode: str, errors: MotionErrors, ground: Ground
 
 
 def rows_of_joints(made: Reconstruction, mode: str, errors: MotionErrors) -> Iterator[JointMetrics]:
-    """Yield the rows of a mode, a joint of a whole body each."""
+    """Yield the rows of a mode, one for each joint of a whole body."""
     clip, times = made.clip, made.times
     of_joints = map(Errors, errors.shell, errors.position, errors.rotation, errors.velocity)
     for name, keys, own in zip(clip.whole_body.joints, made.keys[mode], of_joints, strict=True):
@@ -184,13 +186,13 @@ def rows_of_joints(made: Reconstruction, mode: str, errors: MotionErrors) -> Ite
 
 
 def key_samples(keys: Keys) -> np.ndarray:
-    """Return the samples that are a key of any joint that moves."""
+    """Return the samples that are a key of any moving joint."""
     moving_ones = [own for own in keys if len(own) > 1]
     return np.unique(np.concatenate(moving_ones)) if moving_ones else keys[0]
 
 
 def geometric_mean(values: np.ndarray) -> np.ndarray:
-    """Return the geometric mean over the first axis of what is not NaN; NaN where nothing is left."""
+    """Return the geometric mean over the first axis, ignoring NaN; NaN if no value is left."""
     known = np.isfinite(values) & (values > 0.0)
     count = known.sum(axis=0)
     total = np.log(np.where(known, values, 1.0)).sum(axis=0)
@@ -198,7 +200,7 @@ def geometric_mean(values: np.ndarray) -> np.ndarray:
 
 
 def write_poses(path: Path, times: np.ndarray, poses: Poses) -> None:
-    """Write a table of poses (n,) at times (n,): `t,x,y,z,qw,qx,qy,qz`, and `s` where the poses have scales."""
+    """Write a table of poses (n,) at times (n,): `t,x,y,z,qw,qx,qy,qz`, and `s` if the poses have scales."""
     columns = [times, *poses.positions.T, *poses.quaternions.T]
     header = "t,x,y,z,qw,qx,qy,qz"
     if poses.scales is not None:
@@ -211,9 +213,9 @@ def write_poses(path: Path, times: np.ndarray, poses: Poses) -> None:
 
 
 def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[list[str]]:
-    """Yield the rows of a table of numbers, columns of shape (n,), some at a time.
+    """Yield the lines of a table of numbers in blocks, given columns of shape (n,).
 
-    Numbers take many times their memory as text, and a recording may have hours of them.
+    As text, numbers take many times their memory, and a recording may be hours long.
     """
     for first in range(0, len(columns[0]), BLOCK_ROWS):
         rows = np.stack([column[first : first + BLOCK_ROWS] for column in columns], axis=-1).tolist()
@@ -221,9 +223,9 @@ def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[list[str]]:
 
 
 def table_names(choice: Choice, modes: Iterable[str], other: str = "", *, body: bool = False) -> list[str]:
-    """Return the files that `write_tables` writes for a choice; `other` is a motion whose keys are unknown.
+    """Return the names of the files that `write_tables` writes for a choice; `other` is a motion with unknown keys.
 
-    Of a whole body those are its keys: one for all modes where they have the same.
+    For a whole body, these are its keys only: one file for all modes if the modes share keys.
     """
     modes = tuple(modes)
     keys = ["keys.csv"] if choice.decimation == "uniform" else [f"{mode}.keys.csv" for mode in modes]
@@ -231,10 +233,11 @@ def table_names(choice: Choice, modes: Iterable[str], other: str = "", *, body: 
 
 
 def write_tables(folder: Path, made: Reconstruction) -> None:
-    """Write the keys, and of a rigid body a `MODE.csv` for every mode, into `folder`.
+    """Write the keys into `folder`, and for a rigid body a `MODE.csv` for every mode.
 
-    Keys that were chosen evenly are those of all modes, in `keys.csv`; others are in a `MODE.keys.csv` for each. Of a
-    whole body a row is a joint's pose in its parent's space, in the unit of the recording: `joint,t,x,y,z,qw,qx,qy,qz`.
+    Evenly spaced keys are the same for all modes: they are in `keys.csv`. Other keys are in a `MODE.keys.csv` for each
+    mode. A row of a whole body is a joint's pose in its parent's space, in the unit of the recording:
+    `joint,t,x,y,z,qw,qx,qy,qz`.
     """
     clip, times, body = made.clip, made.times, made.clip.rest_body is not None
     for mode in () if body else made.keys:
@@ -260,7 +263,7 @@ def _write_key_poses(path: Path, clip: Clip, keys: Keys) -> None:
 
 
 def join_tables(path: Path, parts: Iterable[Path]) -> None:
-    """Write the rows of tables that have the same header, at least one, under a single one."""
+    """Concatenate tables with the same header, at least one, under a single header."""
     with replacing(path) as stream:
         for number, part in enumerate(parts):
             with part.open(encoding="utf-8", newline="") as source:

@@ -1,9 +1,9 @@
-"""Keys needed: how few keys each mode can do with to be as good as the reference is with many, evenly spaced ones.
+"""Keys needed: how few keys each mode needs to be as good as the reference with many evenly spaced keys.
 
-As good means: the same RMS shell error, over the same samples. The reference keeps keys at the rates of the paper's
-table; the others keep evenly spaced keys too, or those that `reduce_keys` finds, or fewer that `fit_keys` has moved:
-these are no samples, but have as many numbers. The same numbers are the points of the curve of error over keys a
-second. Errors are in metres.
+"As good" means the same RMS shell error over the same samples. The reference keeps keys at the rates of the paper's
+table. The other modes keep evenly spaced keys too, or the keys that `reduce_keys` finds, or fewer keys that `fit_keys`
+has moved: fitted keys are not samples, but have as many numbers. The same numbers are the points of the curve of error
+against keys per second. Errors are in metres.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from .modes import REFERENCE
 from .reconstructions import Reconstruction, same_motions
 
 RATES = ("30", "20", "15", "12", "8", "5")
-"""Keys a second of the reference that others are to be as good as."""
+"""Keys per second of the reference."""
 
 TABLE_RATES = RATES[:4]
-"""Those of the paper's table; the lower ones make the curve longer."""
+"""The rates of the paper's table; the lower ones extend the curve."""
 
 DECIMATIONS = ("uniform", "adaptive", "fitted")
-"""The ways to have fewer keys, of which the last is not always tried."""
+"""The ways to have fewer keys; the last is not always tried."""
 
 MAX_FITS = 3
-"""How often fewer keys are fitted, to find how few will do."""
+"""The maximum number of fits in the search for the fewest fitted keys."""
 
 KEY_COUNT_PRECISION_RATIO = 0.02
-"""The search for key poses ends where one knows their number to so much of it: every step reduces keys anew."""
+"""The search for the number of key poses ends at this relative precision: every step reduces keys anew."""
 
 
 @dataclass(frozen=True)
 class NeededRow:
-    """A row of keys_needed.csv. The last four are None where every sample would be needed."""
+    """A row of keys_needed.csv. The last four fields are None if every sample would be needed."""
 
     clip: str
     mode: str
@@ -57,21 +57,21 @@ class NeededRow:
 
 @dataclass(frozen=True, eq=False)
 class KeysNeeded:
-    """What one clip takes. The axes are groups of modes, decimations and rates, in the order of the fields."""
+    """The keys needed on one clip. The axes are groups of modes, decimations and rates, in the order of the fields."""
 
     clip: str
 
     groups: tuple[tuple[str, ...], ...]
-    """The modes, those together that are one motion on this clip."""
+    """The modes, grouped by the motion that they give on this clip."""
 
     rates: tuple[str, ...]
-    """Keys a second of the reference."""
+    """Keys per second of the reference."""
 
     durations: np.ndarray
-    """Seconds from the first key of the reference to the last, shape (rates,). NaN where it has no two keys."""
+    """Seconds from the first key of the reference to the last, shape (rates,). NaN if the reference lacks two keys."""
 
     reference_keys: np.ndarray
-    """How many keys the reference had, shape (rates,)."""
+    """The number of keys of the reference, shape (rates,)."""
 
     targets: np.ndarray
     """The RMS shell error of the reference, shape (rates,)."""
@@ -79,59 +79,59 @@ class KeysNeeded:
     keys: np.ndarray
     """The keys needed, shape (groups, decimations, rates).
 
-    Infinite where nothing less than every sample is as good; NaN where there is nothing to be as good as: where the
-    reference has no two keys, or all samples for keys.
+    Infinite if only all samples are as good as the reference. NaN if the reference has no error to match: if it lacks
+    two keys, or every sample is a key.
     """
 
     reached: np.ndarray
-    """The RMS shell error with these keys, of the shape of `keys`."""
+    """The RMS shell error with these keys, shaped like `keys`."""
 
     uniform_errors: np.ndarray
-    """The RMS shell error with as many evenly spaced keys a second as the reference has, shape (groups, rates)."""
+    """The RMS shell error with the same evenly spaced keys as the reference, shape (groups, rates)."""
 
     reference: str = REFERENCE
-    """The mode that the others are to be as good as."""
+    """The mode that sets the error to match."""
 
     @property
     def reference_keys_per_s(self) -> np.ndarray:
-        """The keys a second that the reference really had, shape (rates,)."""
+        """The actual keys per second of the reference, shape (rates,)."""
         return (self.reference_keys - 1.0) / self.durations
 
     @property
     def shares(self) -> np.ndarray:
-        """The keys as a share of the reference's, of the shape of `keys`."""
+        """The keys as a fraction of the reference's keys, shaped like `keys`."""
         return self.keys / self.reference_keys
 
     @property
     def keys_per_s(self) -> np.ndarray:
-        """The keys a second on average, of the shape of `keys`: those after the first, over the time."""
+        """The average keys per second, shaped like `keys`: all keys but the first, divided by the duration."""
         return (self.keys - 1.0) / self.durations
 
 
 @dataclass(frozen=True, eq=False)
 class Ways:
-    """The ways to have fewer keys of a clip, and how good they are. All errors are RMS shell errors in metres.
+    """The ways to have fewer keys on a clip, and how good they are. All errors are RMS shell errors in metres.
 
-    Keys of a single rigid body are where the motion needs them, or moved to where they fit best. Those of a whole body
-    are key poses, the same samples for all joints: the best of so many that `reduce_skeleton_keys` finds, which keep
-    the largest error small, or evenly spaced ones where these are better; how many is searched for.
+    Keys of a single rigid body are where the motion needs them, or moved to where they fit best. Keys of a whole body
+    are key poses, the same samples for all joints: either the keys that `reduce_skeleton_keys` finds, which keep the
+    largest error small, or evenly spaced keys if these are better. The number of key poses is searched for.
     """
 
     clip: Clip
 
     radius: float | np.ndarray
-    """Of the shell of a rigid body, or of the balls at the joints, in metres, one or shape (joints,)."""
+    """The radius of a rigid body's shell, or of the balls at the joints, in metres: one value, or shape (joints,)."""
 
     fit: bool = False
     """Whether to find fitted keys of a rigid body too, which takes two to three times as long."""
 
     @property
     def decimations(self) -> tuple[str, ...]:
-        """Those of `DECIMATIONS` that are tried."""
+        """The members of `DECIMATIONS` that are tried."""
         return DECIMATIONS if self.fit else DECIMATIONS[:2]
 
     def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
-        """Return keys, and their error, in each of the ways but for evenly spaced ones, of which it takes so many."""
+        """Return keys and their error for each way but even spacing; `evenly` is the number of keys that it needs."""
         if self.clip.rest_body:
             return [self._key_poses(mode, target, evenly)]
         adaptive = self._reduced(mode, target)
@@ -139,17 +139,17 @@ class Ways:
         return [*result, self._fewest_fitted(mode, target, *result[0])] if self.fit else result
 
     def between(self, first: int, last: int) -> Self:
-        """Return the same for the part of the clip from one sample to another."""
+        """Return the same ways for the part of the clip from one sample to another."""
         return replace(self, clip=part_of(self.clip, first, last))
 
     def error(self, keys: np.ndarray, mode: str) -> float:
-        """Return that of a mode that has these samples for keys of all joints."""
+        """Return the error of a mode with these samples as keys of all joints."""
         radii = np.broadcast_to(np.asarray(self.radius, dtype=float), (self.clip.joints,))
         made = Reconstruction(self.clip, Uniform("1"), {mode: (keys,) * len(radii)}, radii, shared=True)
         return rms(made.shell(mode))
 
     def _key_poses(self, mode: str, target: float, evenly: int) -> tuple[np.ndarray, float]:
-        """Return as many key poses as evenly spaced ones at most, if those of the motion are any better."""
+        """Return the fewest key poses within the target, and their error. The search starts at the number `evenly`."""
         samples = len(self.clip.times)
         best_of = cache(lambda budget: self._best_of(budget, mode))
         start = min(evenly, samples)
@@ -160,7 +160,7 @@ class Ways:
         )
 
     def _best_of(self, budget: int, mode: str) -> tuple[np.ndarray, float]:
-        """Return so many key poses at most, and their error."""
+        """Return at most `budget` key poses, and their error."""
         clip, budget = self.clip, max(budget, 2)
         if budget >= len(clip.times):
             every = np.arange(len(clip.times))
@@ -168,7 +168,7 @@ class Ways:
         radius, parents = self.radius / clip.metres_per_unit, clip.whole_body.parents
         result = reduce_skeleton_keys(clip.times, clip.poses, parents, mode, radius=radius, budget=budget, shared=True)
         keys = max(cast(Keys, result), key=len)
-        # Keys with the smallest largest error may have a larger RMS error than evenly spaced ones.
+        # Keys that minimize the largest error may have a larger RMS error than evenly spaced keys.
         evenly = evenly_spaced(clip, budget - 1)
         return min(((some, self.error(some, mode)) for some in (keys, evenly)), key=itemgetter(1))
 
@@ -179,9 +179,9 @@ class Ways:
     def _fewest_fitted(
         self, mode: str, target: float, adaptive: np.ndarray, reached: float
     ) -> tuple[np.ndarray, float]:
-        """Return the fewest keys, and their error, that are within the target when fitted.
+        """Return the fewest keys that are within the target when fitted, and their error.
 
-        They are searched from the adaptive ones on, which have reached this error without.
+        The search starts from the adaptive keys, which reach the error `reached` without fitting.
         """
         clip, best, keys, aim = self.clip, adaptive, adaptive, target
         for number in range(MAX_FITS):
@@ -210,17 +210,17 @@ def keys_needed(
     Parameters
     ----------
     ways : Ways
-        The clip, and what can be done with it.
+        The clip, and the ways to have fewer keys of it.
     modes : iterable of str
     reference : str
-        The mode that they are to be as good as.
+        The mode that sets the error to match.
     advance : callable
         Called once for each of `RATES`.
 
     Notes
     -----
-    The adaptive keys begin and end where the reference's do. Evenly spaced ones are searched for by bisection, as if
-    the error fell with every key: the result is as good as the reference, one key fewer is not.
+    The adaptive keys begin and end at the ends of the reference's keys. The number of evenly spaced keys is found by
+    bisection, as if the error fell with every key: the result is as good as the reference, and one key fewer is not.
     """
     clip, groups = ways.clip, same_motions(ways.clip, tuple(modes))
     shape = len(groups), len(ways.decimations), len(RATES)
@@ -249,22 +249,22 @@ def keys_needed(
 
 
 def evenly_spaced(clip: Clip, segments: int) -> np.ndarray:
-    """Return samples nearest to the ends of so many segments of equal duration, from the first sample to the last."""
+    """Return the samples nearest to the ends of that many segments of equal duration, from the first sample to the last."""
     return decimate(clip.times, segments / float(clip.times[-1] - clip.times[0]))
 
 
 def _fewest_evenly(ways: Ways, mode: str, target: float, start: np.ndarray) -> np.ndarray:
-    """Return the fewest evenly spaced keys with which a mode is within the target, searched from as many as `start`."""
+    """Return the fewest evenly spaced keys with which a mode is within the target, searched from `len(start)` keys."""
 
     def good(segments: int) -> bool:
         return ways.error(evenly_spaced(ways.clip, segments), mode) <= target
 
-    # Twice the samples are ticks enough for every sample to be a key, which is always good.
+    # Ticks at twice the number of samples make every sample a key, which is always good.
     return evenly_spaced(ways.clip, fewest(good, len(start) - 1, 2 * len(ways.clip.times)))
 
 
 def fewest(is_enough: Callable[[int], bool], start: int, most: int, *, too_few: int = 0, near: float = 0.0) -> int:
-    """Return the least number that is enough, known to a share of it, as if all above were; the most always is."""
+    """Return the least number that is enough, to the relative precision `near`, as if all larger ones were; `most` is."""
     enough = start
     while enough < most and not is_enough(enough):
         too_few, enough = enough, min(2 * enough, most)
@@ -278,7 +278,7 @@ def fewest(is_enough: Callable[[int], bool], start: int, most: int, *, too_few: 
 
 
 def part_of(clip: Clip, first: int, last: int) -> Clip:
-    """Return a clip from one sample to another."""
+    """Return the part of a clip from one sample to another, both included."""
     part = slice(first, last + 1)
     return replace(clip, times=clip.times[part], poses=clip.poses[..., part])
 
@@ -288,24 +288,24 @@ def part_of(clip: Clip, first: int, last: int) -> Clip:
 
 @dataclass(frozen=True, eq=False)
 class Overall:
-    """Geometric means over clips. The axes are groups, decimations and rates."""
+    """Geometric means over clips. The axes are groups of modes, decimations and rates."""
 
     groups: tuple[tuple[str, ...], ...]
-    """The modes, those together that are one motion on every clip."""
+    """The modes, grouped by the motion that they give on every clip."""
 
     rates: tuple[str, ...]
 
     clips: np.ndarray
-    """Over how many clips each mean goes, shape (groups, decimations, rates): those where the error was reached."""
+    """The number of clips in each mean, those that reached the error, shape (groups, decimations, rates)."""
 
     asked: np.ndarray
-    """How many clips there were, shape (rates,): those on which the reference had an error."""
+    """The number of clips on which the reference had an error, shape (rates,)."""
 
     keys_per_s: np.ndarray
-    """Shape (groups, decimations, rates), NaN over no clips."""
+    """Shape (groups, decimations, rates), NaN if no clip counts."""
 
     shares: np.ndarray
-    """Of the reference's keys, shape (groups, decimations, rates)."""
+    """Fractions of the reference's keys, shape (groups, decimations, rates)."""
 
     reached: np.ndarray
     """The RMS shell error, shape (groups, decimations, rates)."""
@@ -314,11 +314,11 @@ class Overall:
     """Shape (rates,)."""
 
     uniform_errors: np.ndarray
-    """The RMS shell error with as many evenly spaced keys a second, shape (groups, rates)."""
+    """The RMS shell error with as many evenly spaced keys per second as the reference, shape (groups, rates)."""
 
 
 def overall(clips: Sequence[KeysNeeded]) -> Overall:
-    """Return the geometric means over some clips of one run, at least one."""
+    """Return the geometric means over the clips of one run, at least one clip."""
     modes = [mode for group in clips[0].groups for mode in group]
     places = {mode: tuple(_place(clip, mode) for clip in clips) for mode in modes}
     groups = tuple(tuple(mode for mode in modes if places[mode] == same) for same in dict.fromkeys(places.values()))
@@ -344,7 +344,7 @@ def overall(clips: Sequence[KeysNeeded]) -> Overall:
 
 
 def _place(clip: KeysNeeded, mode: str) -> int:
-    """Which group of the clip a mode is in."""
+    """Return the index of the group of the clip that contains a mode."""
     return next(place for place, group in enumerate(clip.groups) if mode in group)
 
 
@@ -352,7 +352,7 @@ def _place(clip: KeysNeeded, mode: str) -> int:
 
 
 def rows_of(clip: KeysNeeded) -> Iterator[NeededRow]:
-    """Yield a row for every mode, decimation and rate, but where the reference has no error to be as good as."""
+    """Yield a row for every mode, decimation and rate, except where the reference has no error to match."""
     for group, decimation, rate in np.argwhere(~np.isnan(clip.keys)).tolist():
         at = group, decimation, rate
         result: list[Any] = [None] * 4

@@ -1,8 +1,8 @@
-"""Reconstructions: what each mode makes of the few keys that are kept of a clip.
+"""Reconstructions: the motion that each mode makes from the few keys that are kept of a clip.
 
-A single rigid body has the keys of one joint, which hangs on nothing. Of a whole body every joint is interpolated in
-its parent's space, as a rig has its keys, and shown where that puts it: in the root's space, through the hierarchy.
-Times and poses are the clip's, what is shown and errors are in metres.
+A single rigid body has the keys of one joint without a parent. Every joint of a whole body is interpolated in its
+parent's space, where a rig has its keys, and shown in the root's space, through the hierarchy. Times and poses are
+those of the clip; shown poses and errors are in metres.
 """
 
 from __future__ import annotations
@@ -28,30 +28,30 @@ from rigid_motion_batch.recordings.clips import Clip
 from .choices import RIGID_RADIUS_M, Choice, Keys, Uniform
 
 Groups = tuple[tuple[str, ...], ...]
-"""Modes, those together that are one motion."""
+"""Modes, grouped by the motion that they give."""
 
 BLOCK_SAMPLES = 4096
-"""Samples of all joints that are worked on at once."""
+"""Samples that are processed at once, for all joints."""
 
 MAX_STILL_CHANGE = 1e-6
-"""A joint none of whose numbers changes by more, in its parent's space, needs one key."""
+"""A joint whose numbers all change by at most this, in its parent's space, needs only one key."""
 
 COMPARED_SAMPLES = 512
-"""Samples, evenly spread, that tell whether two modes are one motion."""
+"""Number of evenly spaced samples that decide whether two modes are one motion."""
 
 PROBE_KEY_STRIDE = 4
-"""Of so many samples one is a key where it is looked which modes are one motion."""
+"""Every n-th sample is a key in the test for modes that are one motion."""
 
 FEWEST_PROBED = 4
-"""Keys that are needed to see which modes are one motion: between two, a spline is a screw like any other."""
+"""Fewest keys that can show which modes are one motion: between two keys, a spline is a screw like any other."""
 
 NO_KEYS = np.array([], dtype=int)
-"""Of somebody else's motion: they are not known."""
+"""The keys of a motion from --against: they are unknown."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
-    """A clip under one choice of keys: the keys that each mode kept, and what it fills in between them.
+    """A clip under one choice of keys: the keys that each mode kept, and the motion that it fills in between them.
 
     All modes begin and end with the same samples.
     """
@@ -62,17 +62,17 @@ class Reconstruction:
     """How the keys were chosen."""
 
     keys: dict[str, Keys]
-    """Mode id to the keys of the joints; none of somebody else's motion, which comes last."""
+    """Mode id to the keys of the joints. A motion from --against comes last, without keys."""
 
     radii: np.ndarray
-    """Of the balls around the joints, or of the shell of a rigid body, in metres, shape (joints,)."""
+    """Radii of the balls around the joints, or of the shell of a rigid body, in metres, shape (joints,)."""
 
     shared: bool = False
-    """Whether the keys are key poses: the same samples for all joints that move."""
+    """Whether the keys are key poses: the same samples for all moving joints."""
 
     @cached_property
     def samples(self) -> slice:
-        """The samples of the clip between the first and the last key, both included."""
+        """The samples of the clip from the first key to the last, both included."""
         keys = [own for own in next(iter(self.keys.values())) if len(own) > 1]
         first, last = (keys[0][0], keys[0][-1]) if keys else (0, len(self.clip.times) - 1)
         return slice(int(first), int(last) + 1)
@@ -87,13 +87,13 @@ class Reconstruction:
         return self.clip.rest_body.skeleton if self.clip.rest_body else Skeleton([-1])
 
     def filled_in(self, mode: str, times: np.ndarray) -> Poses:
-        """Return what a mode makes of its keys at any times (m,), as the poses of the clip are.
+        """Return the motion of a mode at any times (m,), in the form of the clip's poses.
 
-        In the unit of the recording: shape (m,), or of joints in their parents' space (joints, m).
+        In the unit of the recording: shape (m,), or (joints, m) in the spaces of the parents.
         """
         clip, keys = self.clip, self.keys[mode]
         if not len(keys[0]):
-            assert clip.against is not None  # it alone has no keys
+            assert clip.against is not None  #  the only motion without keys
             return clip.against.at(times)
         if clip.rest_body is None:
             return interpolate(clip.times[keys[0]], clip.poses[keys[0]], times, mode)
@@ -106,11 +106,11 @@ class Reconstruction:
         return filled
 
     def shown(self, mode: str, times: np.ndarray) -> Poses:
-        """Return where that puts the joints, in metres, shape (joints, m)."""
+        """Return the poses of the joints under a mode at any times (m,), in metres, shape (joints, m)."""
         return self._in_root_space(self.filled_in(mode, times))
 
     def truth(self, samples: slice | np.ndarray) -> Poses:
-        """Return where the joints were in the recording, in metres, shape (joints, m)."""
+        """Return the recorded poses of the joints, in metres, shape (joints, m)."""
         return self._in_root_space(self.clip.poses[..., samples])
 
     def _in_root_space(self, poses: Poses) -> Poses:
@@ -123,7 +123,7 @@ class Reconstruction:
         return np.concatenate(parts, axis=1)
 
     def blocks(self, overlap: int = 0) -> Iterator[slice]:
-        """Yield `samples` a block at a time, each with so many of those before it."""
+        """Yield `samples` in blocks, each extended by `overlap` samples of the block before."""
         for first in range(self.samples.start, self.samples.stop, BLOCK_SAMPLES):
             yield slice(max(self.samples.start, first - overlap), min(first + BLOCK_SAMPLES, self.samples.stop))
 
@@ -131,29 +131,29 @@ class Reconstruction:
 def reconstruct(
     clip: Clip, choice: Choice, modes: Sequence[str], radius: float | np.ndarray, *, shared: bool = False
 ) -> Reconstruction | None:
-    """Choose keys of the clip, of all of its joints, for every mode.
+    """Choose keys of all joints of the clip, for every mode.
 
     Parameters
     ----------
     clip : Clip
-        What the user compares with it comes after the modes.
+        A motion in `clip.against` comes after the modes.
     choice : Choice
     modes : sequence of str
         Of `rigid_motion.motion.MODES`.
     radius : float or array, shape (joints,)
-        Of the shell, or of the balls at the joints, in metres.
+        Radius of the shell, or of the balls at the joints, in metres.
     shared : bool
-        Whether keys that the motion chooses are key poses; evenly spaced ones always are.
+        Whether adaptive keys are key poses; evenly spaced keys always are.
 
     Returns
     -------
     Reconstruction or None
-        None where the clip is too short for two keys.
+        None if the clip is too short for two keys.
 
     Notes
     -----
-    Modes that are one motion get one choice of keys, made for the first of them: choosing by the motion takes time,
-    and rounding must not make them look different.
+    Modes that are one motion get the same keys, chosen for the first of them: adaptive choices take time, and rounding
+    must not make the modes look different.
     """
     if choice.ends(clip.times) is None:
         return None
@@ -169,7 +169,7 @@ def reconstruct(
 
 
 def moving(clip: Clip) -> np.ndarray:
-    """Return which joints do not stay as they are in their parents' space, shape (joints,); a rigid body counts."""
+    """Return which joints change in their parents' space, shape (joints,); a rigid body always counts as moving."""
     if clip.rest_body is None:
         return np.array([True])
     poses = clip.poses
@@ -181,10 +181,9 @@ def moving(clip: Clip) -> np.ndarray:
 
 
 def same_motions(clip: Clip, modes: Sequence[str]) -> Groups:
-    """Return the modes in groups that are one motion of this clip, seen with about every `PROBE_KEY_STRIDE`th sample as
-    a key.
+    """Return the modes, grouped by the motion that they give on this clip.
 
-    Each is on its own where there are too few samples to see it.
+    About every `PROBE_KEY_STRIDE`th sample is a key in this test. With too few keys, each mode is a group of its own.
     """
     probe = reconstruct(replace(clip, against=None), probing(clip), modes, 0.0)
     if probe is None or 1 < max(map(len, probe.keys[modes[0]])) < FEWEST_PROBED:
@@ -193,16 +192,16 @@ def same_motions(clip: Clip, modes: Sequence[str]) -> Groups:
 
 
 def probing(clip: Clip) -> Uniform:
-    """About every `PROBE_KEY_STRIDE`th sample as a key."""
+    """Return the choice of about every `PROBE_KEY_STRIDE`th sample as a key."""
     rate = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0]) / PROBE_KEY_STRIDE
     return Uniform(f"{max(rate, 1e-6):.6f}")
 
 
 def identical_modes(made: Reconstruction) -> Groups:
-    """Return the modes in groups that put every joint at the same place.
+    """Return the modes, grouped by equal poses of every joint.
 
-    The same means: apart by less than a millionth of their error, by the shell measure, or than what rounding does.
-    Some modes are one curve by theory (ScLERP and the SLERP of motors); this looks whether they were.
+    Equal means that the shell error between two modes is below a millionth of their error, or within rounding. Some
+    modes are one curve in theory (ScLERP and the SLERP of motors); this checks whether they were in practice.
     """
     samples = np.unique(np.linspace(made.samples.start, made.samples.stop - 1, COMPARED_SAMPLES).astype(int))
     truth = made.truth(samples)
@@ -211,7 +210,7 @@ def identical_modes(made: Reconstruction) -> Groups:
 
 
 def joint_groups(groupings: Iterable[Groups]) -> Groups:
-    """Return the modes in groups that are together in all of these groupings of the same modes."""
+    """Return groups of the modes that are together in all of these groupings of the same modes."""
     places: dict[str, list[int]] = {}
     for groups in groupings:
         for place, group in enumerate(groups):
@@ -224,7 +223,7 @@ def joint_groups(groupings: Iterable[Groups]) -> Groups:
 
 
 def alike(poses: Mapping[str, Poses], largest: Mapping[str, float]) -> Groups:
-    """Return modes whose poses are the same but for a millionth of their largest error and for rounding, in metres."""
+    """Return modes grouped by equal poses, up to a millionth of their largest error in metres and to rounding."""
     groups: list[list[str]] = []
     for mode, own in poses.items():
         for group in groups:
@@ -239,51 +238,51 @@ def alike(poses: Mapping[str, Poses], largest: Mapping[str, float]) -> Groups:
 
 @dataclass(frozen=True, eq=False)
 class MotionErrors:
-    """How far off a mode is, in metres and radians."""
+    """The errors of a mode, in metres and radians."""
 
     shell: np.ndarray
     """Shape (joints, n), at each sample from the first key to the last."""
 
     position: np.ndarray
-    """RMS over the samples, shape (joints,); and so the following."""
+    """RMS over the samples, shape (joints,), as are `rotation` and `velocity`."""
 
     rotation: np.ndarray
     velocity: np.ndarray
 
     slide: float
-    """The farthest that a joint which stands on the ground in the recording gets from where it began to stand."""
+    """The farthest that a joint gets from where it began to stand, while it stands on the ground in the recording."""
 
     still_point: float
-    """The farthest that the point of a rigid body which stays in the recording gets from where it was, in metres."""
+    """The farthest that a point of a rigid body which stays put in the recording gets from its place, in metres."""
 
     largest: np.ndarray
     """The largest error of any joint in position, in metres, and in rotation, in degrees, shape (2, n)."""
 
     places: np.ndarray
-    """Where the mode puts the joints, in metres with z up, single precision, shape (joints, n, 3)."""
+    """The positions of the joints under the mode, in metres with z up, single precision, shape (joints, n, 3)."""
 
     @property
     def worst(self) -> tuple[int, int]:
-        """The joint and the sample of the largest error."""
+        """The joint and the sample of the largest shell error."""
         joint, sample = np.unravel_index(np.argmax(self.shell), self.shell.shape)
         return int(joint), int(sample)
 
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """What stands on the ground or stays in its place in a recording, from the first key to the last."""
+    """The joints that stand on the ground in a recording, or its point that stays put, from first key to last."""
 
     joints: np.ndarray
-    """Those that stand at any time; of a rigid body none."""
+    """The joints that stand at any time; empty for a rigid body."""
 
     stands: np.ndarray
-    """When, shape (those joints, n)."""
+    """Which samples each of these joints stands at, shape (standing joints, n)."""
 
     slide: float
-    """The farthest that one of them slides in the recording itself, in metres."""
+    """The farthest that a standing joint slides in the recording itself, in metres."""
 
     still_point: np.ndarray | None = None
-    """From the origin of a rigid body to the point of it that stays, along its axes and in metres, shape (3,)."""
+    """The offset from a rigid body's origin to its point that stays put, along its axes and in metres, shape (3,)."""
 
     @classmethod
     def of(cls, made: Reconstruction) -> Ground:
@@ -297,7 +296,7 @@ class Ground:
 
 
 def errors_of(made: Reconstruction, mode: str, ground: Ground) -> MotionErrors:
-    """Return how far off a mode is, joint by joint."""
+    """Return the errors of a mode, joint by joint."""
     joints, start, count = len(made.skeleton), made.samples.start, len(made.times)
     shell, places = np.empty((joints, count)), np.empty((joints, count, 3), dtype=np.float32)
     feet, largest = np.empty((len(ground.joints), count, 3)), np.empty((2, count))
@@ -313,7 +312,7 @@ def errors_of(made: Reconstruction, mode: str, ground: Ground) -> MotionErrors:
         places[:, own] = upright = _upright(made, shown)
         shell[:, own], feet[:, own] = errors.shell, upright[ground.joints]
         largest[:, own] = errors.position.max(axis=0), np.degrees(errors.rotation).max(axis=0)
-        # The first sample of a block is the last of the one before, where velocities begin.
+        # The first sample of a block is the last of the block before: its velocity starts there.
         new = slice(int(block.start > start), None)
         squares += [
             np.square(some).sum(axis=-1) for some in (errors.position[:, new], errors.rotation[:, new], errors.velocity)
@@ -324,20 +323,20 @@ def errors_of(made: Reconstruction, mode: str, ground: Ground) -> MotionErrors:
 
 
 MAX_PIVOT_DRIFT_M = 0.01
-"""Metres from its mean place up to which a point stays: as a pivot does that is held by hand."""
+"""How far a point that stays put may be from its mean place, in metres: as a pivot is that is held by hand."""
 
 MAX_PIVOT_DISTANCE_M = 1.0
-"""Metres from the origin of a body to a point of it, at most."""
+"""The largest distance from a body's origin to its pivot, in metres."""
 
 MIN_MOVE_PER_DRIFT = 10.0
-"""How many times as far the origin or the shell of a body gets that has such a point: else all of it stays."""
+"""How many times farther than the pivot the origin or the shell must move: otherwise the whole body stays put."""
 
 
 def still_point(poses: Poses) -> np.ndarray | None:
-    """Return the point of a rigid body that moves least while the body moves: a pivot, or a hinge; None without one.
+    """Return the point of a rigid body that stays put while the body moves, a pivot or a hinge; None without one.
 
-    Of poses (n,) in metres; from the body's origin along its axes, shape (3,). Of a line of such points it is the
-    nearest to the origin.
+    `poses`, (n,), are in metres. The point is given from the body's origin along its axes, shape (3,). If a line of
+    points qualifies, the point nearest to the origin is returned.
     """
     turns, ways = rotate(poses.quaternions[:, None], np.eye(3)), poses.positions - poses.positions.mean(axis=0)
     matrices = np.swapaxes(turns - turns.mean(axis=0), 1, 2).reshape(-1, 3)
@@ -355,10 +354,10 @@ def still_point(poses: Poses) -> np.ndarray | None:
 
 
 def point_at(poses: Poses, point: np.ndarray) -> np.ndarray:
-    """Return where a point of a body is, (n, 3)."""
+    """Return the positions of a point of a body, (n, 3)."""
     return poses.positions + rotate(poses.quaternions, point)
 
 
 def _upright(made: Reconstruction, poses: Poses) -> np.ndarray:
-    """Return positions with the third axis upwards."""
+    """Return positions with z up."""
     return to_blender(poses, made.clip.axes).positions

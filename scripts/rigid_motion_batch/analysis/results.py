@@ -1,7 +1,7 @@
-"""What a comparison finds of a clip, as arrays and tables: all that a report shows, and what a film is made of.
+"""Results of a comparison of a clip, as arrays and tables: all that a report shows and that a film is made of.
 
-Poses are in metres with z up; errors in metres and degrees. Numbers that belong together are in one dataclass, and a
-report measures nothing.
+Poses are in metres with z up; errors in metres and degrees. Numbers that belong together are in one dataclass. A
+report measures nothing itself.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from .reconstructions import Ground, MotionErrors, Reconstruction, errors_of, id
 
 @dataclass(frozen=True, eq=False)
 class MotionResult:
-    """What one or several modes make of a clip under a choice of keys: a line of the chart, a lane of the film."""
+    """The motion of one or more equal modes on a clip and choice of keys: a line of the chart, a lane of the film."""
 
     modes: tuple[str, ...]
-    """Those that give the same motion; the first names it."""
+    """The modes that give this motion; the first names it."""
 
     metrics: tuple[Metrics, ...]
     """A row for each of the modes."""
 
     keys: np.ndarray
-    """The samples of the clip that are keys, shape (k,); of a body those that are a key of any joint."""
+    """The samples of the clip that are keys, shape (k,); for a body, the samples that are a key of any joint."""
 
     poses: Poses
-    """At the samples that are compared, shape (n,); of a body shape (joints, n), where quaternions are the identity."""
+    """The poses at the compared samples, shape (n,); for a body (joints, n), with identity quaternions."""
 
     errors: np.ndarray
-    """Shell and position in metres, rotation in degrees, shape (3, n); of a body the largest of all joints."""
+    """Shell and position in metres, rotation in degrees, shape (3, n); for a body, the largest of all joints."""
 
     joint_errors: np.ndarray | None = None
     """The shell errors of a body's joints, shape (joints, n)."""
@@ -45,11 +45,11 @@ class MotionResult:
 
 @dataclass(frozen=True)
 class ChoiceNumbers:
-    """A clip under one choice of keys without its arrays: what many clips are compared by."""
+    """A clip under one choice of keys, without arrays: the numbers for comparing many clips."""
 
     choice: Choice
     groups: tuple[tuple[str, ...], ...]
-    """The modes, those together that give the same motion."""
+    """The modes, grouped by the motion that they give."""
 
     rows: tuple[Metrics, ...]
     """One for each mode."""
@@ -62,7 +62,7 @@ class ChoiceResult:
     choice: Choice
 
     first: int
-    """The sample of the clip with which those begin that are compared."""
+    """The first compared sample of the clip."""
 
     motions: tuple[MotionResult, ...]
 
@@ -74,7 +74,7 @@ class ChoiceResult:
 
     @property
     def rows(self) -> list[Metrics]:
-        """The rows of all modes, in the order of these."""
+        """The rows of all modes, in the order of `keys`."""
         rows = {row.mode: row for motion in self.motions for row in motion.metrics}
         return [rows[mode] for mode in self.keys]
 
@@ -86,31 +86,31 @@ class ChoiceResult:
 
 @dataclass(frozen=True, eq=False)
 class ClipResult:
-    """All that was found of a clip."""
+    """All results of a clip."""
 
     facts: ClipFacts
 
     times: np.ndarray
-    """Seconds, of all samples of the clip."""
+    """The times of all samples of the clip, in seconds."""
 
     truth: Poses
-    """The recording, shape (n,); of a body shape (joints, n), where quaternions are the identity."""
+    """The recording, shape (n,); for a body (joints, n), with identity quaternions."""
 
     parents: np.ndarray | None
-    """Of each joint of a body; -1 for a root."""
+    """The parent of each joint of a body; -1 for a root."""
 
     choices: tuple[ChoiceResult, ...]
     needed: KeysNeeded | None = None
-    """The keys that are needed, where that was looked for."""
+    """The keys needed, if they were counted."""
 
 
 def made_again(clip: Clip, result: ChoiceResult, radii: Radii, *, shared: bool) -> Reconstruction:
-    """Return the same by the keys that were chosen before."""
+    """Return the reconstruction of a result, with the keys that were chosen before."""
     return Reconstruction(clip, result.choice, dict(result.keys), radii.of(clip), shared)
 
 
 def measured(made: Reconstruction) -> ChoiceResult:
-    """Measure what was made. Of modes that are one motion what is as long as the recording is kept for the first."""
+    """Measure a reconstruction. Of modes that are one motion, arrays over all samples are kept for the first only."""
     clip, ground, groups = made.clip, Ground.of(made), identical_modes(made)
     rows: dict[str, Metrics] = {}
     joints: list[JointMetrics] = []
@@ -139,7 +139,7 @@ def measured(made: Reconstruction) -> ChoiceResult:
 
 
 def clip_result(clip: Clip, choices: Sequence[ChoiceResult], needed: KeysNeeded | None = None) -> ClipResult:
-    """Gather what was found of a clip."""
+    """Gather the results of a clip."""
     rest_body = clip.rest_body
     if rest_body is None:
         truth = clip.in_blender(clip.poses)
@@ -156,5 +156,5 @@ def clip_result(clip: Clip, choices: Sequence[ChoiceResult], needed: KeysNeeded 
 
 
 def _places(positions: np.ndarray) -> Poses:
-    """Poses of which only the positions count."""
+    """Return poses of which only the positions matter."""
     return Poses(positions, np.broadcast_to((1.0, 0.0, 0.0, 0.0), (*positions.shape[:-1], 4)))

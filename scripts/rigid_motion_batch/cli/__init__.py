@@ -1,1 +1,1 @@
-"""The commands that users run, and their start."""
+"""The commands that users run, and the code that starts them."""

@@ -23,10 +23,10 @@ from rigid_motion_batch.keying.sessions import do_all
 from rigid_motion_batch.keying.work import RunningJob, Work
 
 BAKED, UNBAKED = "-baked", "-unbaked"
-"""Endings of the names of files that are written."""
+"""Suffixes of the names of written files."""
 
 STEP_RANGE_FRAMES = 0.01, 1e6
-"""Frames from key to key: keys closer than that are one key to Blender."""
+"""Allowed range of frames between keys: Blender treats keys closer than the minimum as one key."""
 
 EPILOG = """
 examples:
@@ -110,7 +110,7 @@ class Bake(Work):
 
 
 class Unbake(Work):
-    """Taking that back."""
+    """Un-baking: restoring the original keys."""
 
     doing, done = "Un-baking", "un-baked"
 

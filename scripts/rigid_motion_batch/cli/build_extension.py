@@ -35,14 +35,14 @@ Exit code: 0 done, 2 it could not be built, or Blender calls it invalid.
 """
 
 OTHER_FILES = (MANIFEST, LICENSE)
-"""Files that go into the zip beside the package."""
+"""Files that go into the zip next to the package."""
 
 ZIP_EPOCH = (1980, 1, 1, 0, 0, 0)
-"""The time of every file in the zip, the earliest that a zip can hold: the same bytes whenever it is built."""
+"""The timestamp of every file in the zip, the earliest that a zip can hold: every build gives the same bytes."""
 
 
 class BuildError(Exception):
-    """Why there is no zip, in words for whoever asked for it."""
+    """The reason why there is no zip, as a message for the user."""
 
 
 def build(folder: Path) -> Path:
@@ -51,9 +51,9 @@ def build(folder: Path) -> Path:
     Raises
     ------
     BuildError
-        Where a part of the extension is missing, or Blender's builder or validator refuses it.
+        If a part of the extension is missing, or Blender's builder or validator refuses it.
     OSError
-        Where the folder cannot be written.
+        If the folder cannot be written.
     """
     with tempfile.TemporaryDirectory() as temporary:
         staged, built = Path(temporary) / "staged", Path(temporary) / "built.zip"
@@ -68,7 +68,7 @@ def build(folder: Path) -> Path:
 
 
 def _stage(folder: Path) -> None:
-    """Lay out the extension as it is to be in the zip."""
+    """Lay out the files of the extension as they will be in the zip."""
     try:
         shutil.copytree(EXTENSION, folder, ignore=shutil.ignore_patterns("__pycache__", "py.typed"))
         for path in OTHER_FILES:
@@ -78,7 +78,7 @@ def _stage(folder: Path) -> None:
 
 
 def _blender_ext(*arguments: str) -> None:
-    """Run Blender's own command for extensions, with the tags that Blender knows, as if Blender ran it."""
+    """Run Blender's own command for extensions as Blender runs it, with the tags that Blender knows."""
     import bpy
 
     scripts = Path(cast(Any, bpy.utils).system_resource("SCRIPTS"))
@@ -91,7 +91,7 @@ def _blender_ext(*arguments: str) -> None:
 
 
 def _repack(built: Path, package: Path) -> None:
-    """Write the same files in order of their names, with one time and one mode: what a file system adds is left out."""
+    """Write the same files sorted by name, with one timestamp and one mode, to leave out what a file system adds."""
     with (
         zipfile.ZipFile(built) as source,
         zipfile.ZipFile(package, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target,
