@@ -249,7 +249,7 @@ def keys_needed(
 
 
 def evenly_spaced(clip: Clip, segments: int) -> np.ndarray:
-    """Return the samples nearest to the ends of that many segments of equal duration, from the first sample to the last."""
+    """Return the samples nearest to the ends of that many segments of equal duration, from first sample to last."""
     return decimate(clip.times, segments / float(clip.times[-1] - clip.times[0]))
 
 
@@ -264,7 +264,7 @@ def _fewest_evenly(ways: Ways, mode: str, target: float, start: np.ndarray) -> n
 
 
 def fewest(is_enough: Callable[[int], bool], start: int, most: int, *, too_few: int = 0, near: float = 0.0) -> int:
-    """Return the least number that is enough, to the relative precision `near`, as if all larger ones were; `most` is."""
+    """Return the least number that is enough, to a relative precision, as if all above were; `most` always is."""
     enough = start
     while enough < most and not is_enough(enough):
         too_few, enough = enough, min(2 * enough, most)

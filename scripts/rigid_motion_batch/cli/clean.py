@@ -27,12 +27,12 @@ from rigid_motion_batch.recordings.options import add_reading_options, reading_o
 PROGRAM = f"{'python scripts/bootstrap.py' if CHECKOUT else INSTALLED} clean"
 
 IN_FOLDERS = (".bvh", ".chan", ".csv", ".g2o", ".tsv", ".tum")
-"""Endings of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
+"""Extensions of the files that are taken from a folder. Other readable files may be anything: .json, .txt."""
 
 ANIMATED = (".blend", ".fbx", *GLTF)
 
 DEFAULT_FOCAL_PX = 2667.0
-"""Pixels: a lens of 50 mm on 36 mm, 1920 pixels wide, as cameras in Blender begin."""
+"""In pixels: Blender's default camera, a lens of 50 mm on a sensor of 36 mm, 1920 pixels wide."""
 
 EPILOG = f"""
 examples:
@@ -119,15 +119,15 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     try:
         options.reading = reading_options(options)
-        options.work = Clean.of(options, how=Cleaning(*_how_far(options), options.axes, options.reading))
+        options.work = Clean.of(options, how=Cleaning(*_tolerance_and_radius(options), options.axes, options.reading))
         options.todo = _planned(options)
     except ValueError as error:
         parser.error(str(error))
     return options
 
 
-def _how_far(options: argparse.Namespace) -> tuple[Tolerance | None, float | None]:
-    """Return the tolerance and the radius. Raises ValueError for options that do not go together."""
+def _tolerance_and_radius(options: argparse.Namespace) -> tuple[Tolerance | None, float | None]:
+    """Return the tolerance and the radius. Raises ValueError for options that exclude each other."""
     if options.pixels is None:
         if options.nearest or options.focal:
             raise ValueError("--nearest and --focal say how large a pixel is: add --pixels, or leave them out")

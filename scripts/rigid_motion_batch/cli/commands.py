@@ -1,4 +1,4 @@
-"""Every command, and its start: as `rigid-motion NAME`, or as a script of a checkout, also within Blender."""
+"""The list of commands, and how they start: as `rigid-motion NAME`, or as a script of a checkout, also in Blender."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ RESEARCH = {
     "stream_tables": "making.stream_tables",
     "pages": "pages",
 }
-"""The programs that `python scripts/research NAME` runs of a checkout: the module of the package `research`."""
+"""The programs that `python scripts/research NAME` runs in a checkout: name to module in the package `research`."""
 
 COMMANDS = {
     "compare": ("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
@@ -40,31 +40,31 @@ COMMANDS = {
     "bundle": ("job_bundle", "write a comparison as a job for render farms"),
     "build": ("build_extension", "build the zip that Blender installs"),
 }
-"""The module of each in this package, with `main(arguments)`, which returns the exit code, and what it is about. Its
-script has the same name."""
+"""Name to module of this package and summary. The module has a `main(arguments)` that returns the exit code. Its script
+has the same name."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `rigid-motion COMMAND ...`, and return the exit code.
 
-    Without arguments given, those of this process are taken, and the work is done in a child of it: see `supervising`.
+    Without `arguments`, take those of this process, and work in a child process: see `supervising`.
     """
     if arguments is not None:
-        return _main(list(arguments))
+        return _run_named(list(arguments))
     given = sys.argv[1:]
     if given and given[0] in COMMANDS:
-        return _as_program(f"{INSTALLED} {given[0]}", lambda: _main(given))
-    return _as_program(INSTALLED, lambda: _main(given), alone=True)
+        return _as_program(f"{INSTALLED} {given[0]}", lambda: _run_named(given))
+    return _as_program(INSTALLED, lambda: _run_named(given), alone=True)
 
 
 def launch(script: str) -> None:
-    """Run the command of a script, given its `__file__`, and end with its exit code."""
+    """Run the command of a script, given its `__file__`, and exit with its exit code."""
     program, arguments = program_of(Path(script).name), own_arguments(script)
     sys.exit(_as_program(program, lambda: _run(program, f".{Path(script).stem}", arguments)))
 
 
 def launch_research(arguments: Sequence[str]) -> None:
-    """Run a study or a benchmark of the checkout, and end with its exit code."""
+    """Run a study or a benchmark of the checkout, and exit with its exit code."""
     name, *rest = arguments or ["--help"]
     if name in ("-h", "--help"):
         print("usage: python scripts/research NAME ...\n\n" + "\n".join(f"  {name}" for name in RESEARCH))
@@ -77,7 +77,7 @@ def launch_research(arguments: Sequence[str]) -> None:
     sys.exit(_as_program(program, lambda: _run(program, f"research.{RESEARCH[name]}", rest)))
 
 
-def _main(arguments: list[str]) -> int:
+def _run_named(arguments: list[str]) -> int:
     name, *rest = arguments or ["--help"]
     if name in ("-h", "--help"):
         print(_help())
@@ -94,7 +94,7 @@ def _main(arguments: list[str]) -> int:
 
 
 def _as_program(program: str, do: Callable[[], int], *, alone: bool = False) -> int:
-    """Do something as a process of its own, with what that has to see to, and return the exit code."""
+    """Run a function as a program, with its streams and a supervised child process, and return the exit code."""
     standard_streams.prepare()
     try:
         code = do() if begin_child() or alone else supervise(program)
@@ -104,7 +104,7 @@ def _as_program(program: str, do: Callable[[], int], *, alone: bool = False) -> 
 
 
 def _run(program: str, module: str, arguments: Sequence[str]) -> int:
-    """Run a command; what it needs and is not here, such as in a Blender's own Python, is said in its name."""
+    """Run a command. Name the command in the message if a module is missing, such as in Blender's own Python."""
     received: list[int] = []
 
     def interrupt(number: int, _: object) -> None:

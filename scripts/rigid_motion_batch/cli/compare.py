@@ -1,6 +1,6 @@
-"""Compare interpolation modes on recorded trajectories: the program that people run, and what it shows in the end.
+"""The command `compare`: compare interpolation modes on recorded trajectories, and print the outcome.
 
-Its options are in `compare_options`, its tasks in `pipeline.comparison`.
+The options are in `compare_options`, the tasks in `pipeline.comparison`.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ from . import terminal
 PROGRAM = program_of(SCRIPT)
 
 TEXT_OPTIONS = ("--json", "--open", "--quiet")
-"""Options that are about what is printed, and are no part of the command that a report names."""
+"""Options that affect only the printed output: a report leaves them out of its command."""
 
 DRAWING_STAGES = steps.STAGES[steps.STAGES.index("build") :]
-"""Stages after all is measured."""
+"""Stages after all measurements."""
 
 BLENDER_START_S = 120.0
-"""Seconds that a Blender has to say which it is."""
+"""Seconds that a Blender has to print its version."""
 
 
 def main(arguments: list[str]) -> int:
@@ -82,7 +82,7 @@ def main(arguments: list[str]) -> int:
 
 
 def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Comparison:
-    """Return what is requested by these options of that command, with a Blender of that version."""
+    """Return the comparison that these options of a command request, with a Blender of this version."""
     stage, details = options.stage, {"Blender": blender} if blender else {}
     if stage:
         speed = "real time" if stage.slow_motion == 1 else f"{stage.slow_motion:g} times slower"
@@ -120,26 +120,26 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
 
 
 def _blender(options: argparse.Namespace) -> str:
-    """Return the version of the Blender that films and reads; empty where none is needed, and there is none.
+    """Return the version of the Blender that films and reads; empty if none is needed and there is none.
 
     Raises
     ------
     RunError, SubjectError
-        Where one is needed that there is not, with the way out.
+        If a Blender is needed and missing. The message says what to do.
     """
     read = next((item for item in [*options.inputs, options.against or ""] if _suffix(item) in IN_BLENDER), None)
     if not (options.blender or blender_program() or find_spec("bpy")):
         if options.stage or read:
             raise RunError(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))
         return ""
-    # Another program has libraries of its own.
+    # Another Blender program has libraries of its own.
     on_screen = options.stage and options.engine != "cycles" and not options.blender
     if on_screen and (missing := missing_for_rendering()):
         raise RunError(f"{way_out(missing)}\nOr go without videos: --no-video")
     if options.blender:
         return version_of(options.blender)
     if options.stage and options.subject not in MODELS:
-        # Only here is Blender loaded, which takes longer than all else before the work begins.
+        # Blender is loaded only here: loading takes longer than all other work before the tasks begin.
         from rigid_motion_batch.scenes.subject import load_subject
 
         load_subject(options.subject)
@@ -164,13 +164,13 @@ def version_of(blender: str) -> str:
 
 
 def _suffix(source: str) -> str:
-    """Return the suffix of the file of a source: ".fbx" of walk.fbx:Hand."""
+    """Return the suffix of the file of a source: ".fbx" for walk.fbx:Hand."""
     lower = source.lower()
     return next((end for end in IN_BLENDER if lower.endswith(end) or f"{end}:" in lower), "")
 
 
 def _executor(jobs: int | None) -> Executor:
-    """Return the executor of the tasks, with so many processes: 0 for this one, None for one a processor."""
+    """Return the executor of the tasks with this number of processes: 0 is this process, None one per processor."""
     return Executor() if jobs == 0 else ProcessExecutor(jobs or processors())
 
 
@@ -187,13 +187,13 @@ class _Comparing:
         self.progress, self.notes = progress, list[str]()
         self.work = Run(plan.store, executor, progress, options.blender or "")
         self.page = False
-        """True if there is one of this run."""
+        """Whether this run has a page."""
 
     def run(self) -> int:
-        """Read the recordings, see what there is to do, do it, and say what it came to."""
+        """Read the recordings, plan the tasks, do them, and print the outcome; return the exit code."""
         report(summary="Stopped. There is no new report yet; the same command continues from here.")
         if not self.options.only or self.options.only == "read":
-            self._do("Reading", self.plan.reading)
+            self._do_tasks("Reading", self.plan.reading)
             if self.work.interrupted or self.work.problem or self.options.only:
                 return self._end()
         notes = self.plan.inspect_clips()
@@ -210,34 +210,34 @@ class _Comparing:
         if self.options.only:
             if self.options.only in DRAWING_STAGES:
                 self.plan.conclude()
-            self._do(self.options.only.capitalize(), self.plan.tasks)
+            self._do_tasks(self.options.only.capitalize(), self.plan.tasks)
             if self.options.only == "report":
-                self._name_missing()
+                self._report_missing()
             return self._end()
         self._require_tolerances()
         note_recordings(self.store, self.options.inputs)
-        # What an earlier run found is no finding of this.
+        # Tables of an earlier run are no results of this one.
         self.store.withdraw(TABLES.keys() - self.plan.tables)
-        self._do("Measuring", self.plan.measuring)
+        self._do_tasks("Measuring", self.plan.measuring)
         if self.work.interrupted or self.work.problem:
             return self._end()
         self.plan.conclude()
         self._show_numbers()
         films = (task.name for task in self.plan.tasks() if isinstance(task.step, steps.Encode))
         if not survey(self.plan.tasks, self.store)[0].keys().isdisjoint(films):
-            # Pages take seconds, and films minutes: nobody has to wait for the one to see the other.
-            self._do("Reporting", lambda: self.plan.tasks(films=False))
+            # Pages take seconds and films minutes: show the pages first.
+            self._do_tasks("Reporting", lambda: self.plan.tasks(films=False))
             if self.work.interrupted or self.work.problem:
                 return self._end()
             report(summary="Stopped. The report holds what was ready; the same command continues from here.")
             report(written=os.fspath(self.store.output / steps.PAGE))
             self._note(f"All numbers are there, and films come as they are made: {self.store.output / steps.PAGE}")
-            self._do("Filming", self.plan.tasks)
+            self._do_tasks("Filming", self.plan.tasks)
         else:
-            self._do("Reporting", self.plan.tasks)
+            self._do_tasks("Reporting", self.plan.tasks)
         return self._end()
 
-    def _do(self, title: str, tasks: Plan) -> None:
+    def _do_tasks(self, title: str, tasks: Plan) -> None:
         self.work.do(lambda: share_of(tasks, self.options.only or "", *self.options.part), title)
         self.page |= tasks != self.plan.measuring and bool(self.plan.studies) and not self.work.interrupted
 
@@ -254,8 +254,8 @@ class _Comparing:
             higher = "--budget" if self.options.budget else "--rates"
             complain(PROGRAM, f"every clip is too short for two keys at these rates; give higher {higher}")
 
-    def _name_missing(self) -> None:
-        """Name what the stages before the report have not done."""
+    def _report_missing(self) -> None:
+        """Report the tasks that the stages before the report have not done."""
         tasks = (task for task in chain(self.plan.reading(), self.plan.tasks()) if task.step.stage != "report")
         for task in tasks:
             if not self.store.index_of(task.key):
@@ -263,7 +263,7 @@ class _Comparing:
                 complain(PROGRAM, f"{task.name}: {self.work.failures[task.name]}")
 
     def _require_tolerances(self) -> None:
-        """Raise RunError where a tolerance is larger than the motion of every clip."""
+        """Raise RunError if a tolerance is larger than the motion of every clip."""
         radius = self.plan.comparison.radii.rigid
         for choice in self.plan.comparison.choices:
             clips = map(self.plan.read, self.plan.studies)
@@ -292,7 +292,7 @@ class _Comparing:
             )
 
     def _end(self) -> int:
-        """Say what came of it, and last the path of the report; the exit code."""
+        """Print the outcome, and the path of the report last; return the exit code."""
         outcome, page = self.work, self.store.output / steps.PAGE
         there = self.page and page.exists() and not self.options.only
         report(ended=True)
@@ -303,7 +303,7 @@ class _Comparing:
         if outcome.interrupted:
             holds = "The report holds what was ready" if there else "There is no new report yet"
             print(f"Stopped. {holds}; the same command continues from here.", file=sys.stderr)
-        # After a failure a farm would not begin the stages behind it: what is missing is the report's to say.
+        # After a failure, a farm would not begin the next stages: the report stage reports what is missing.
         failed = outcome.failures and not (os.environ.get(FARM_VARIABLE) == "openjd" and self.options.only != "report")
         code = 130 if outcome.interrupted else 2 if outcome.problem else int(bool(failed))
         if self.options.json:

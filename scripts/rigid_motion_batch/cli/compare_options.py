@@ -1,4 +1,4 @@
-"""The options of a comparison: what compare.py and job_bundle.py take, and what their help says."""
+"""The options of a comparison, for compare.py and job_bundle.py, with their help texts."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ side by side. Without INPUT it compares the recordings in assets/.
 """
 
 RATES = "5,10,15,20"
-"""Keys a second where none are asked for."""
+"""Default rates, in keys per second."""
 
 STREAM_MODES = tuple(mode for mode in MODES if mode not in COMPARED)
 
 SPOKEN_OF = "verdict"
-"""Stands for films of the choice of keys that the verdict speaks of."""
+"""The value of --films for films of the choice of keys that the verdict is about."""
 
 ALL, DISTINCT = "all", "distinct"
-"""Stand for `COMPARED`, with a lane in the film for each, or for each motion that comes out."""
+"""The values of --modes for `COMPARED`, with a film lane for each mode, or for each distinct motion."""
 
 SCRIPT = "compare.py"
 
@@ -84,7 +84,7 @@ stopped by Ctrl-C, and 143 by SIGTERM.
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
-    """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    """Return the options; a wrong option ends the program with exit code 2 and one line of explanation."""
     parser = parser_of(SCRIPT, DESCRIPTION, EPILOG)
     parser.add_argument("inputs", nargs="*", metavar="INPUT", help="recordings (those in assets/)")
     parser.add_argument(
@@ -246,7 +246,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def without(arguments: list[str], *options: str) -> list[str]:
-    """Return arguments of a comparison but for some options and their values."""
+    """Return the arguments of a comparison without some options and their values."""
     parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     for option in options:
         parser.add_argument(option)
@@ -254,7 +254,7 @@ def without(arguments: list[str], *options: str) -> list[str]:
 
 
 def own_recordings() -> list[str]:
-    """Return those that come with the program."""
+    """Return the recordings that come with the program."""
     return [f"{path}:*" for path in sorted(from_here(ASSETS).glob("*.csv"))]
 
 
@@ -269,7 +269,7 @@ def _choices(options: argparse.Namespace) -> list[Choice]:
 
 
 def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
-    """Return how a list of amounts is read: each as a choice of that kind."""
+    """Return a parser for a list of amounts, each a choice of this kind."""
 
     def parse_amounts(text: str) -> list[Choice]:
         return distinct(map(kind, [part.strip() for part in text.split(",") if part.strip()] or [text]))
@@ -278,7 +278,7 @@ def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
 
 
 def _modes(text: str) -> tuple[tuple[str, ...], bool]:
-    """Return the modes of a run, and whether those that are one motion share a lane."""
+    """Return the modes of a run, and whether modes that are one motion share a lane."""
     written = [part.strip() for part in text.split(",") if part.strip()]
     modes = tuple(dict.fromkeys(m for part in written for m in (COMPARED if part in (ALL, DISTINCT) else (part,))))
     if wrong := next((mode for mode in modes if mode not in MODES), "" if modes else text):
@@ -289,18 +289,18 @@ def _modes(text: str) -> tuple[tuple[str, ...], bool]:
 
 
 def _part(text: str) -> tuple[int, int]:
-    part, of = _two(text, "/", "share; give one such as 1/8")
+    part, of = _two_numbers(text, "/", "share; give one such as 1/8")
     if not 1 <= part <= of:
         raise ValueError(f"{text!r} is not a share; give one such as 1/8")
     return part, of
 
 
 def _resolution(text: str) -> tuple[int, int]:
-    return _two(text, "x", "resolution; give one such as 1280x720")
+    return _two_numbers(text, "x", "resolution; give one such as 1280x720")
 
 
-def _two(text: str, between: str, what: str) -> tuple[int, int]:
-    """Return two whole numbers."""
+def _two_numbers(text: str, between: str, what: str) -> tuple[int, int]:
+    """Return the two whole numbers in a text."""
     if not (numbers := re.fullmatch(rf"(\d{{1,6}}){between}(\d{{1,6}})", text, re.ASCII)):
         raise ValueError(f"{text!r} is not a {what}")
     return int(numbers[1]), int(numbers[2])

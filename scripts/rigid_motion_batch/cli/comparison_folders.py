@@ -1,4 +1,4 @@
-"""The folder of a comparison: which is free, and which holds the comparison of other recordings."""
+"""The output folder of a comparison: find a free folder, and recognize a folder that compares other recordings."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from rigid_motion_batch.recordings.reading import split_source
 from .compare_options import own_recordings
 
 RECORD = "comparison.json"
-"""The file that says what a folder is the comparison of, among the files of the store: its recordings,
-as they count from there."""
+"""The file in the store that names the recordings of a comparison, by paths relative to the output folder."""
 
 
 def free_folder(sources: list[str]) -> Path:
-    """Return `renders/NAME`, by the first recording, with a number where that holds another comparison
-    or anything else.
+    """Return `renders/NAME`, named after the first recording.
+
+    The name gets a number if that folder holds another comparison or anything else.
     """
     if sources == own_recordings():
         name = "comparison"
@@ -40,25 +40,25 @@ def _is_free(folder: Path) -> bool:
 
 
 def _is_same(folder: Path, sources: list[str]) -> bool:
-    """Return whether a folder holds the comparison of some of these recordings."""
-    held = _held(folder)
-    return held is not None and (not held or not held.keys().isdisjoint(_places(sources, folder)))
+    """Return whether a folder holds a comparison of any of these recordings."""
+    held = _recordings_of(folder)
+    return held is not None and (not held or not held.keys().isdisjoint(_relative_to(sources, folder)))
 
 
-def _held(folder: Path) -> dict[str, str] | None:
-    """Return the recordings that a folder holds the comparison of, and their digests; None where it holds none."""
+def _recordings_of(folder: Path) -> dict[str, str] | None:
+    """Return the recordings of the comparison in a folder, with their digests; None if it holds no comparison."""
     return Store(folder).noted(RECORD) if (folder / OWN_FOLDER).is_dir() else None
 
 
-def _places(sources: list[str], folder: Path) -> list[str]:
-    """Return the sources as they count from a folder, so that both can be moved."""
+def _relative_to(sources: list[str], folder: Path) -> list[str]:
+    """Return the sources relative to a folder, so that both can be moved together."""
     here = os.path.abspath(folder)
     return [os.path.relpath(source, here) if Path(source).drive == folder.drive else source for source in sources]
 
 
 def require_same_comparison(output: Path, sources: list[str]) -> None:
-    """Raise RunError where a folder holds the comparison of other recordings."""
-    held = _held(output)
+    """Raise RunError if a folder holds a comparison of other recordings."""
+    held = _recordings_of(output)
     if held and not _is_same(output, sources) and not {*held.values()} & {*_digests(sources, Store(output)).values()}:
         names = ", ".join(sorted(Path(item).name for item in held)[:3]) + (" and more" if len(held) > 3 else "")
         raise RunError(
@@ -68,13 +68,13 @@ def require_same_comparison(output: Path, sources: list[str]) -> None:
 
 
 def _short(path: Path) -> str:
-    """Return a path as one would type it here."""
+    """Return a path as a user would type it here."""
     path, here = path.absolute(), Path.cwd()
     return os.fspath(path.relative_to(here) if path.is_relative_to(here) else path)
 
 
 def _digests(sources: list[str], store: Store) -> dict[str, str]:
-    """Return the digest of the file of each source, of those that are there."""
+    """Return the digest of the file of each source that exists."""
     result = {}
     for source in sources:
         with suppress(TrajectoryError):
@@ -83,6 +83,6 @@ def _digests(sources: list[str], store: Store) -> dict[str, str]:
 
 
 def note_recordings(store: Store, sources: list[str]) -> None:
-    """Keep in a folder what it is the comparison of."""
+    """Record in a folder which recordings it compares."""
     digests = _digests(sources, store)
-    store.note(RECORD, dict(zip(_places([*digests], store.output), digests.values(), strict=True)))
+    store.note(RECORD, dict(zip(_relative_to([*digests], store.output), digests.values(), strict=True)))

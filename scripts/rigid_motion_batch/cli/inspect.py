@@ -21,10 +21,10 @@ from rigid_motion_batch.recordings.options import add_reading_options, reading_o
 PROGRAM = f"{'python scripts/bootstrap.py' if CHECKOUT else INSTALLED} inspect"
 
 MAX_LISTED_NAMES = 12
-"""Names of bodies or joints in a line."""
+"""Names of bodies or joints in one line, at most."""
 
 LINE_CHARACTERS = 100
-"""Characters of a line."""
+"""Width of a line, in characters."""
 
 EPILOG = f"""
 examples:
@@ -40,7 +40,7 @@ Exit code: 0 all could be read, 1 some could not, 2 none could, or a wrong optio
 
 
 def main(arguments: list[str]) -> int:
-    """Look into the recordings, and return the exit code."""
+    """Inspect the recordings, and return the exit code."""
     options = _parse(arguments)
     result, failures = [], 0
     for source in (file for given in options.inputs for file in files_of(given)):
@@ -76,7 +76,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def _lines(result: Inspection) -> Iterator[str]:
-    """Yield what is in a recording, as text."""
+    """Yield the contents of a recording as lines of text."""
     size = f"{result.bytes / 1e6:.1f} MB" if result.bytes >= 1e6 else f"{result.bytes / 1e3:.1f} KB"
     yield printable(f"{result.source}: {result.format}, {size}")
     if len(result.bodies) > 1:
@@ -87,14 +87,14 @@ def _lines(result: Inspection) -> Iterator[str]:
     yield from _row("axes", axes)
     for body in result.contents:
         yield from _row("body", printable(body.name))
-        yield from _body(body)
+        yield from _body_lines(body)
     for name, problem in result.unreadable:
         yield from _row("body", f"{printable(name)}: {problem}")
     if result.note:
         yield from _row("note", result.note)
 
 
-def _body(body: Contents) -> Iterator[str]:
+def _body_lines(body: Contents) -> Iterator[str]:
     timing, size = body.timing, body.size
     if body.joints:
         yield from _row("  joints", f"{listed(body.joints, MAX_LISTED_NAMES)} ({len(body.joints)})")

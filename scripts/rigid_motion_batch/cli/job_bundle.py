@@ -27,19 +27,19 @@ SCRIPT = "job_bundle.py"
 PROGRAM = program_of(SCRIPT)
 
 DEFAULT_TASKS = 16
-"""Tasks that a stage is split into, unless requested otherwise."""
+"""Default number of tasks per stage."""
 
 MOST_PARTS = 1024
-"""Values of a parameter, in Open Job Description."""
+"""Limit of Open Job Description for the values of a parameter."""
 
 FILM_STAGES = ("build", "render", "encode")
-"""The stages at the end of which there are films."""
+"""The stages that make films."""
 
 WHOLE_STAGES = ("slip", "report")
-"""The stages that are not split."""
+"""The stages that are not split into tasks."""
 
 INPUTS = "{{Param.Inputs}}"
-"""The job's folder of inputs, in arguments."""
+"""The job's input folder, as it appears in arguments."""
 
 EPILOG = """
 It writes a folder with template.json (jobtemplate-2023-09) and parameter_values.json. The last line printed is a
@@ -79,10 +79,10 @@ def main(arguments: list[str]) -> int:
 def write_bundle(
     folder: Path, arguments: Sequence[str], inputs: Path, output: Path, parts: Mapping[str, int]
 ) -> dict[str, str]:
-    """Write the files of a bundle, and return the parameters of the job for a farm on which all is where it is here.
+    """Write the files of a bundle; return the job's parameters for a farm where all paths are as on this machine.
 
-    `arguments` are those of the comparison but for `--output`, with files as in `INPUTS`; `parts` has for each stage
-    how many tasks it is split into. There is no list of tasks: each plans the comparison anew, and does its share.
+    `arguments` are those of the comparison without `--output`, with files relative to `INPUTS`. `parts` maps each stage
+    to its number of tasks. The bundle has no list of tasks: each task plans the comparison anew, and does its share.
     """
     template = json.loads(Path(__file__).with_name("job_template.json").read_text(encoding="utf-8"))
     template["name"] = output.name
@@ -104,10 +104,11 @@ def write_bundle(
 
 
 def below_inputs(arguments: Sequence[str]) -> tuple[list[str], Path]:
-    """Return arguments with their files, FILE, FILE:BODY or --option=FILE, as the job finds them, and where.
+    """Return arguments with their files as the job finds them, below `INPUTS`, and the folder of the inputs.
 
-    The program of `--blender` is none of the inputs. Raises ValueError where an argument would be taken for an
-    expression of the template, or no folder has all inputs, on Windows.
+    A file may be given as FILE, FILE:BODY or --option=FILE. The program of `--blender` is not an input. Raises
+    ValueError if an argument contains "{{", which a template would take for an expression, or if no folder contains all
+    inputs (on Windows).
     """
     if braced := next((argument for argument in arguments if "{{" in argument), None):
         raise ValueError(f"{braced!r}: a job cannot have this name, for its braces; rename it")
@@ -122,9 +123,9 @@ def below_inputs(arguments: Sequence[str]) -> tuple[list[str], Path]:
 
 
 def _file_in(argument: str, before: str) -> tuple[str, str, str]:
-    """Return what stands before the file in an argument, the file or folder, and what is behind it; "" for none."""
+    """Return the text before the file in an argument, the file or folder, and the text after it; "" for none."""
     option, equals, value = argument.partition("=") if argument.startswith("-") else ("", "", argument)
-    # A number is no file, whatever lies in the current folder.
+    # A number is not a file, even if the current folder has a file of that name.
     if "--blender" in (option, before) or "\0" in value or value.replace(".", "").isdigit():
         return argument, "", ""
     ends = [len(value), *(place for place in range(len(value) - 1, 0, -1) if value[place] == ":")]

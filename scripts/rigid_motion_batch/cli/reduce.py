@@ -37,14 +37,14 @@ from rigid_motion_batch.recordings.options import add_clean_option, add_reading_
 from rigid_motion_batch.recordings.reading import JSON, TEXT
 
 IN_FOLDERS = (".blend", ".bvh", ".csv", ".fbx", *GLTF, ".tsv", ".tum")
-"""Endings of the files that are taken of a folder. What else it reads may be anything: .json, .txt."""
+"""Extensions of the files that are taken from a folder. Other readable files may be anything: .json, .txt."""
 
 MODE = "motor_spline"
 
 PAGE = "report.html"
 
 MAX_KEYS = 1000000
-"""Keys that can be asked for: Blender's last frame."""
+"""The largest number of keys that can be requested: Blender's last frame."""
 
 EPILOG = """
 examples:
@@ -93,7 +93,7 @@ what is written:
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
-    """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    """Return the options; a wrong option ends the program with exit code 2 and one line of explanation."""
     parser = parser_of(SCRIPT, __doc__, EPILOG + EXIT_CODES)
     parser.add_argument(
         "inputs",
@@ -196,7 +196,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         options.report = _place_of_page(options)
         options.work = Reduce.of(options, how=Reductions(**how | {"mode": options.mode or MODE}))
         options.todo = _planned(options)
-        _refuse_odd(options)
+        _refuse_wrong_options(options)
     except ValueError as error:
         parser.error(str(error))
     return options
@@ -216,7 +216,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _page(options: argparse.Namespace, command: str) -> Callable[[Sequence[Outcome]], Path]:
-    """Return what writes the page of a run; ends the program with code 2 where it is not to be written."""
+    """Return a function that writes the page of a run; end the program with code 2 if the page must not be replaced."""
     from rigid_motion_batch.keying.views import place_of_views, read_views
     from rigid_motion_batch.report.reduced import write_reduced
 
@@ -243,7 +243,7 @@ def _page(options: argparse.Namespace, command: str) -> Callable[[Sequence[Outco
 
 @dataclass(frozen=True)
 class Reduce(Work):
-    """Keeping few keys."""
+    """Reducing keys."""
 
     doing, done = "Reducing", "reduced"
     how: Reductions
@@ -272,10 +272,10 @@ class Reduce(Work):
 
 
 def _planned(options: argparse.Namespace) -> list[InputJob]:
-    """Return what is to be done: a body of a file is a recording,
-    and so is a glTF file of which a .blend file is to be made.
+    """Return the jobs.
 
-    An FBX file is none where it becomes a GLB file with all that is in it.
+    A body of a file is a recording, and so is a glTF file that becomes a .blend file. An FBX file is not a recording if
+    it becomes a GLB file with all its contents.
     """
     whole = (".blend", *(() if options.blend else GLTF), *((".fbx",) if options.glb else ()))
 
@@ -304,8 +304,8 @@ def _planned(options: argparse.Namespace) -> list[InputJob]:
     return planned(options.inputs, None if named else options.output, IN_FOLDERS, _is_result, job_of)
 
 
-def _refuse_odd(options: argparse.Namespace) -> None:
-    """Raise ValueError for options that say nothing of the inputs."""
+def _refuse_wrong_options(options: argparse.Namespace) -> None:
+    """Raise ValueError for options that do not apply to the inputs, or exclude each other."""
     jobs = [job for job in options.todo if not job.problem]
     recorded = [job for job in jobs if job.is_recording]
     gltf = [job for job in jobs if not job.is_recording and _is_gltf(job.file)]
@@ -333,7 +333,7 @@ def _refuse_odd(options: argparse.Namespace) -> None:
 
 
 def _refuse_beside_glb(options: argparse.Namespace, jobs: list[InputJob]) -> None:
-    """Raise ValueError for options that say nothing of GLB files."""
+    """Raise ValueError for options that do not apply to GLB files."""
     for option in ("--mode", "--blend", "--in-place", "--objects", "--discard"):
         if getattr(options, option[2:].replace("-", "_")):
             raise ValueError(f"{option} is for .blend files, and --glb writes others: leave one of them out")
@@ -347,7 +347,7 @@ def _refuse_beside_glb(options: argparse.Namespace, jobs: list[InputJob]) -> Non
 
 
 def _place_of_page(options: argparse.Namespace) -> Path | None:
-    """Return where the page goes; None without one. Raises ValueError where nothing is written."""
+    """Return the path of the page; None without one. Raises ValueError if nothing is written."""
     if options.report and options.dry_run:
         raise ValueError("--report describes written files, and --dry-run writes none: leave one of them out")
     first = file_and_body(options.inputs[0])[0]
