@@ -31,17 +31,17 @@ from . import stream_measure
 from .stream_options import DEFAULT_DELAY_S, PROGRAM, parse
 
 ROUTER_LOOK_S = 0.2
-"""Seconds after which a router looks up."""
+"""Seconds between two checks of a router whether to end."""
 
 PERFORMER_LOOK_S = 0.01
-"""Seconds after which what another program performs is looked at."""
+"""Seconds between two looks at motion from another program."""
 
 DUE_INTERVAL_RATIO = 0.9
-"""Part of the interval of an even stream after which a key is due."""
+"""Fraction of the interval of an even stream after which a key is due."""
 
 
 def main(arguments: list[str]) -> int:
-    """Do a command, and return the exit code."""
+    """Run a command, and return the exit code."""
     options = parse(arguments)
     command = {"send": send, "receive": receive, "router": router, "measure": stream_measure.run}[options.command]
     stopped: list[int] = []
@@ -61,7 +61,7 @@ def main(arguments: list[str]) -> int:
 
 
 def send(options: argparse.Namespace, stopped: list[int]) -> None:
-    """Play recordings. Raises what says why they could not be."""
+    """Play recordings. Raises an exception that says why they cannot be played."""
     if options.from_vmc is not None:
         send_performer(options, stopped)
         return
@@ -104,7 +104,7 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
 
 
 def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
-    """Send what another program performs until that is to end. Raises what says why it could not be."""
+    """Send the motion of another program until stopped. Raises an exception that says why it cannot be sent."""
     tolerance, delay = options.tolerance.metres(1.0), options.delay or DEFAULT_DELAY_S
     sending: RoomSending | None = None
     receiver = Receiver()
@@ -116,7 +116,7 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
                 ahead = float(keys.moments[-1]) - time.monotonic()
                 if sending is None:
                     sending = RoomSending(room, options.user, Sender(keys.bodies, tolerance, delay), ahead)
-                elif keys.bodies is not sent:  # Bones or trackers came that were not there before.
+                elif keys.bodies is not sent:  # New bones or trackers appeared.
                     sending.sender = Sender(keys.bodies, tolerance, delay)
                     sending.say(sending.sender.join())
                 sent, sending.ahead = keys.bodies, ahead
@@ -134,7 +134,7 @@ def send_performer(options: argparse.Namespace, stopped: list[int]) -> None:
 
 
 def receive(options: argparse.Namespace, stopped: list[int]) -> None:
-    """Show what comes. Raises what says why there is nothing."""
+    """Show the received motion. Raises an exception that says why there is none."""
     truth = _read([options.truth], options)[0] if options.truth else None
     tracks = Tracks()
     with (
@@ -177,7 +177,7 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
 
 
 def router(options: argparse.Namespace, stopped: list[int]) -> None:
-    """Bring together all who come."""
+    """Run a router that connects all participants."""
     session = opened("router", options.at, options.network, options.config)
     try:
         _say(f"Router at {options.at or options.config or (ANY_ADDRESS if options.network else LOOPBACK_ADDRESS)}")
@@ -193,7 +193,7 @@ def router(options: argparse.Namespace, stopped: list[int]) -> None:
 
 @contextmanager
 def stopping() -> Iterator[list[int]]:
-    """Yield a list that signals which ask for an end come into; the second of them ends the program as ever."""
+    """Yield a list that collects the signals to stop; after the first, a second signal ends the program as usual."""
     received: list[int] = []
 
     def handle(which: int, _: object) -> None:
@@ -224,7 +224,7 @@ def _read(recordings: list[str], options: argparse.Namespace) -> list[Clip]:
 
 
 def _error(motion: ReceivedMotion, truth: Clip | None) -> str:
-    """Return how far off a motion is, as text; nothing where the truth has other joints."""
+    """Return the error of a motion as text; "" without a truth, and a remark if the truth does not fit."""
     if truth is None:
         return ""
     times, poses = samples_of(truth)

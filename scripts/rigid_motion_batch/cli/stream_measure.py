@@ -46,7 +46,7 @@ _share = bounded("part of all", 0.0, 0.99)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options beside those of reading."""
+    """Add the options of this command, without those of reading."""
     help = "a recording of a body; FILE:BODY for one of several; with --held everything with these two"
     parser.add_argument("recordings", nargs="+", metavar="RECORDING", help=help)
     help = "measure how far a body slips in its hand, by their names; HAND:JOINT is a joint of a skeleton"
@@ -62,7 +62,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, _stopped: list[int]) -> None:
-    """Measure, print and write. Raises TrajectoryError, OSError, RuntimeError or ValueError with what went wrong."""
+    """Measure, print and write. Raises TrajectoryError, OSError, RuntimeError or ValueError with the problem."""
     clips, _ = read_clips(options.recordings, options.axes, options.reading)
     if options.held:
         run_held(options, clips)
@@ -89,7 +89,7 @@ def run(options: argparse.Namespace, _stopped: list[int]) -> None:
 
 
 def run_held(options: argparse.Namespace, clips: list[Clip]) -> None:
-    """Measure a tool in a hand, and print it."""
+    """Measure how far a tool slips in a hand, and print the result."""
     if options.output:
         raise ValueError("--held writes no file; leave --output out")
     bodies, times, poses = together(clips, radius=options.radius)
@@ -105,7 +105,7 @@ def run_held(options: argparse.Namespace, clips: list[Clip]) -> None:
 
 
 def write(path: Path, clip: Clip, body: StreamBody, times: np.ndarray, shown: Poses) -> None:
-    """Write what was shown in the units and axes of the recording."""
+    """Write the shown motion in the units and axes of the recording."""
     there = from_blender(shown, clip.axes)
     there = Poses(there.positions / clip.metres_per_unit, there.quaternions)
     if clip.rest_body is None:
@@ -116,7 +116,7 @@ def write(path: Path, clip: Clip, body: StreamBody, times: np.ndarray, shown: Po
 
 
 def lines(cost: dict[str, float], tolerance: float) -> list[str]:
-    """Return the numbers as text."""
+    """Return the numbers as lines of text."""
     alone, whole = cost["bytes_a_second"], cost["bytes_a_second_with_headers"]
     return [
         f"{whole:.0f} bytes a second with headers, {alone:.0f} without",

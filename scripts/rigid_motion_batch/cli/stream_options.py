@@ -1,4 +1,4 @@
-"""The options of `stream`, and what does not go together."""
+"""The options of `stream`, and checks of their combinations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rigid_motion_batch.streaming.rooms import LOOPBACK_ADDRESS, ROOM, ROUTER_PO
 from . import stream_measure
 
 DEFAULT_DELAY_S = 0.1
-"""Seconds, unless they are given."""
+"""Delay in seconds, by default."""
 
 ENDINGS = (".csv", ".bvh")
 
@@ -82,7 +82,7 @@ It runs until Ctrl-C, or for --seconds.
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
-    """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    """Return the options; a wrong option ends the program with exit code 2 and one line of explanation."""
     style: dict[str, Any] = {"formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = Parser(prog=PROGRAM, description=DESCRIPTION, epilog=as_called(EPILOG, SCRIPT), **style)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -152,7 +152,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Look at what options mean together. Raises ValueError for those that do not go together."""
+    """Check combinations of options. Raises ValueError for options that do not go together."""
     if options.command == "router":
         return
     options.reading = reading_options(options)

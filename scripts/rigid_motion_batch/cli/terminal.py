@@ -1,6 +1,6 @@
-"""What a comparison comes to, in a terminal: a table of modes and errors, one sentence, the path of the report.
+"""The result of a comparison in a terminal: a table of modes and errors, one sentence, the path of the report.
 
-The numbers are those of the report. In a pipe the table is plain text without colours; `--json` has it as data.
+The numbers are those of the report. In a pipe the table is plain text without colours; `--json` prints it as data.
 """
 
 from __future__ import annotations
@@ -19,43 +19,43 @@ from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.report.numbers import MEASURES, RMS_IS, Numbers, digits, listed, who_else
 
 RMS, WORST, KEYS = "rms_shell_m", "max_shell_m", "keys_per_s"
-"""The measures that are shown."""
+"""The measures in the table."""
 
 PLACES = {measure.metric: place for place, measure in enumerate(MEASURES)}
-"""Of measures among the numbers."""
+"""Index of each measure in the numbers."""
 
 DEFAULT_COLUMNS = 120
-"""Columns of what is no terminal."""
+"""Width of output that is not a terminal, in characters."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """A motion under a choice of keys."""
+    """A line of the table: a motion under a choice of keys."""
 
     choice: str
-    """As a heading: "5 keys/s"."""
+    """The choice as a heading: "5 keys/s"."""
 
     modes: tuple[str, ...]
-    """The ids of those that are this motion."""
+    """The ids of the modes that give this motion."""
 
     name: str
-    """That of the first of them."""
+    """The name of the first of these modes."""
 
     rms_mm: float
-    """The RMS shell error, over several clips the geometric mean."""
+    """The RMS shell error; over several clips their geometric mean."""
 
     worst_mm: float
     """The largest error of all clips."""
 
     keys_per_s: float | None
-    """None of somebody else's motion, whose keys are not known."""
+    """None for a motion from --against: its keys are unknown."""
 
     best: bool
-    """True if no other motion has fewer errors, or fewer keys where a tolerance limits the errors."""
+    """Whether no other motion has a smaller error, or fewer keys if the choice is a tolerance."""
 
 
 def lines_of(numbers: Numbers) -> list[Line]:
-    """Return the table: choices from the fewest keys to the most, motions in the order of the modes."""
+    """Return the lines of the table: choices from the fewest keys to the most, motions in the order of the modes."""
     mean, groups = numbers.mean(), numbers.groups()
     columns = [numbers.modes.index(group[0]) for group in groups]
     worst = np.nanmax(np.where(np.isnan(numbers.values[PLACES[WORST]]), -np.inf, numbers.values[PLACES[WORST]]), axis=0)
@@ -63,7 +63,7 @@ def lines_of(numbers: Numbers) -> list[Line]:
     for row, choice in enumerate(numbers.choices):
         rms, keys = mean[PLACES[RMS], row, columns], mean[PLACES[KEYS], row, columns]
         decide = keys if isinstance(choice, Tolerance) else rms
-        # What is shown as the same is as good.
+        # Values that are shown as equal are equally good.
         shown = [digits(value) for value in decide.tolist()]
         least = shown[int(np.nanargmin(decide))]
         lines += [
@@ -82,7 +82,7 @@ def lines_of(numbers: Numbers) -> list[Line]:
 
 
 def also(numbers: Numbers) -> list[str]:
-    """Return what the table does not say: which modes are one motion, who goes straight, and what its numbers are."""
+    """Return notes below the table: modes that are one motion, modes that go straight, and what the numbers mean."""
     groups = [[numbers.label(mode) for mode in group] for group in numbers.groups()]
     result = [f"{first} is also the motion of {listed(others)}." for first, *others in groups if others]
     return [*result, *filter(None, [who_else(numbers)]), RMS_IS]
@@ -113,7 +113,7 @@ def table_of(lines: Sequence[Line]) -> Table:
 
 
 def show(*what: Table | str) -> None:
-    """Print tables and lines; without colours where the stream is no terminal, or NO_COLOR is set."""
+    """Print tables and lines; without colours if the stream is no terminal, or NO_COLOR is set."""
     stream = sys.stdout
     console = Console(file=stream, highlight=False, width=None if stream.isatty() else DEFAULT_COLUMNS)
     with console.capture() as captured:

@@ -1,4 +1,4 @@
-"""The pipeline: steps whose results are kept, and who does them.
+"""The pipeline: steps whose results are kept, and the executors that do them.
 
     with Store(Path("renders/hand")) as store, ProcessExecutor(2) as executor, Progress() as progress:
 
@@ -8,6 +8,6 @@
 
         Run(store, executor, progress).do(plan)
 
-A result is kept under a digest of all that it depends on, so a second run does only what is missing or has changed,
-and whatever is killed, the same call goes on from there.
+A result is stored under a digest of everything that it depends on, so a second run does only what is missing or has
+changed. If a run is killed, the same call continues from there.
 """

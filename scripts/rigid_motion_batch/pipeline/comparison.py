@@ -1,7 +1,7 @@
-"""The plan of a comparison: the tasks that make it, clip by clip.
+"""The plan of a comparison: its tasks, clip by clip.
 
-There are three plans, for what recordings hold is known only when they are read, and what films are to show only when
-all is measured: `reading` and `look_into`, `measuring` and `conclude`, then `tasks`, which are all of them.
+There are three plans in turn, since the clips are known only after reading, and the choice of keys to film only after
+measuring: `reading` and `inspect_clips`, `measuring` and `conclude`, then `tasks`, which yields all tasks.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ METRICS, JOINT_METRICS, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "keys
 SLIPS = "slip.csv"
 
 ON_ONE_PAGE = 24
-"""Number of clips up to which all are on one page; more have a page each."""
+"""The largest number of clips on one page; with more, each has a page of its own."""
 
 MAX_PIECE_FRAMES = 60
-"""Frames of a film that are rendered by one task at most: a long film keeps many processors busy, and little is lost
-where one is interrupted."""
+"""The largest number of frames of a film that one task renders. Short pieces keep many processors busy with a long
+film, and lose little if one is interrupted."""
 
 TABLES = {
     METRICS: ("measure", steps.ROWS),
@@ -50,23 +50,23 @@ TABLES = {
     KEYS_NEEDED: ("count_keys", steps.ROWS),
     SLIPS: ("slips", steps.ROWS),
 }
-"""Tables of all clips: what each is put together of, as `Part` names it, and the name of its rows there."""
+"""Tables of all clips: name to the kind of results that it joins, as in `Part.what`, and the name of their rows."""
 
 IN_BLENDER = (".blend", ".fbx")
-"""Recordings that Blender reads."""
+"""Extensions of recordings that Blender reads."""
 
 
 class ComparisonPlan:
-    """The tasks of a comparison in an opened store."""
+    """The tasks of a comparison in an open store."""
 
     def __init__(self, comparison: Comparison, store: Store) -> None:
         self.comparison, self.store = comparison, store
         self.studies: list[Study] = []
-        """The clips to compare, after `look_into`."""
+        """The clips to compare, after `inspect_clips`."""
         self.held: list[tuple[Study, Study]] = []
-        """Pairs of them, one that holds another and that."""
+        """Pairs of clips (holder, held)."""
         self.found = Findings()
-        """What was measured, after `conclude`."""
+        """The measured results, after `conclude`."""
 
     # -- reading ------------------------------------------------------------------------------------------------------
 
@@ -76,14 +76,14 @@ class ComparisonPlan:
 
     @cached_property
     def _readers(self) -> list[Task]:
-        """The tasks that read the sources, in their order; for a source that is named twice the same task twice."""
+        """The tasks that read the sources, in order; a source that is named twice has the same task twice."""
         return [*map(self._reader, self.comparison.sources)]
 
     def _reader(self, source: str) -> Task:
         comparison = self.comparison
         inputs: dict[str, str] = {}
         kind, called = steps.Read, ""
-        with suppress(TrajectoryError):  # Whoever reads it will say that there is no such file.
+        with suppress(TrajectoryError):  # The task that reads it reports the missing file.
             paths = [split_source(item)[0] for item in (source, comparison.against) if item]
             called = name_of_other(paths[-1].stem) if comparison.against else ""
             inputs = self.store.inputs(*paths)
@@ -93,9 +93,9 @@ class ComparisonPlan:
         return Task(step, f"read {source}", inputs=inputs, seconds=0.3)
 
     def inspect_clips(self) -> list[str]:
-        """See what clips there are in the recordings that were read, and return what the user should know of them.
+        """Find the clips in the recordings that were read, and return notes for the user.
 
-        Raises RunError where a pair that is said to be held is none.
+        Raises RunError for a pair in --held that cannot hold.
         """
         comparison = self.comparison
         keys = [task.key for task in self._readers if self.store.index_of(task.key)]
@@ -118,7 +118,7 @@ class ComparisonPlan:
             of_clips += [f"{name}: {note}" for note in rates_above(times, comparison.choices)]
             if enough:
                 self.studies.append(Study(ClipOf(name, body), key, facts, enough))
-                of_clips += self._left_out(self.studies[-1])
+                of_clips += self._notes_on_left_out_films(self.studies[-1])
         if self._shows_object and not comparison.blender:
             notes.append(f"the report shows a drill, since no Blender here can read {comparison.subject}")
         self.held = held_pairs(self.studies, comparison, self.read)
@@ -130,12 +130,12 @@ class ComparisonPlan:
 
     @property
     def _shows_object(self) -> bool:
-        """Return whether pages show another object than the one that needs no Blender."""
+        """Return whether pages show an object other than the default, which needs no Blender."""
         rigid = any(not study.facts.joints for study in self.studies)
         return rigid and self.comparison.subject != Comparison.subject
 
-    def _left_out(self, study: Study) -> Iterator[str]:
-        """Yield what is not made of a clip because it is too much, for the user."""
+    def _notes_on_left_out_films(self, study: Study) -> Iterator[str]:
+        """Yield messages about films that are left out because they would be too long."""
         stage = self.comparison.stage
         if stage and (frames := max(study.frames(choice, stage) for choice in study.choices)) > study.most_frames:
             start, end = next(iter(study.choices.values()))
@@ -148,11 +148,11 @@ class ComparisonPlan:
     # -- measuring ----------------------------------------------------------------------------------------------------
 
     def measuring(self) -> Iterator[Task]:
-        """Yield the tasks of all numbers: they take seconds, and are there whatever becomes of the videos."""
+        """Yield the tasks that measure all numbers. They take seconds, and do not depend on the videos."""
         return self._measuring({})
 
     def conclude(self) -> None:
-        """See what the measured numbers come to: which choices of keys films are to show."""
+        """Read the measured numbers, and decide which choices of keys to film."""
         reference, alone = self.comparison.reference, self._has_overview
         self.found = Findings.of(self.store, self.measuring(), reference, alone=alone)
 
@@ -161,12 +161,12 @@ class ComparisonPlan:
         return len(self.studies) > ON_ONE_PAGE
 
     def _measuring(self, keys: dict[Part, str]) -> Iterator[Task]:
-        """Yield the tasks of all numbers, and note the keys of those whose results pages show."""
+        """Yield the tasks of all numbers, and enter the keys of results for pages into `keys`."""
         read = {study.reader for study in self.studies}
         yield from (task for task in self.reading() if task.key in read)
         for study in self.studies:
             keys[Part("read", study.clip)] = study.reader
-            for part, task in self._numbers(study):
+            for part, task in self._measuring_tasks(study):
                 yield task
                 keys[part] = task.key
         for holder, held in self.held:
@@ -185,7 +185,7 @@ class ComparisonPlan:
 
     @property
     def tables(self) -> list[str]:
-        """The tables that there will be; of others those of earlier runs are to be withdrawn."""
+        """The tables that this run writes; other tables of earlier runs must be withdrawn."""
         there = {
             METRICS: True,
             KEYS_NEEDED: self.comparison.count_keys,
@@ -194,8 +194,8 @@ class ComparisonPlan:
         }
         return [table for table in TABLES if there[table]]
 
-    def _numbers(self, study: Study) -> Iterator[tuple[Part, Task]]:
-        """Yield the tasks of a clip's numbers, and what they are to pages."""
+    def _measuring_tasks(self, study: Study) -> Iterator[tuple[Part, Task]]:
+        """Yield the tasks of a clip's numbers, each with its part of a page."""
         comparison, clip, name, after = self.comparison, study.clip, study.name, (study.reader,)
         joints, size = study.facts.joints, study.facts.samples * max(study.facts.joints, 1)
         modes = comparison.modes
@@ -220,7 +220,7 @@ class ComparisonPlan:
     # -- drawing ------------------------------------------------------------------------------------------------------
 
     def tasks(self, *, films: bool = True) -> Iterator[Task]:
-        """Yield all tasks: of numbers, films and pages; without `films` pages leave room for them."""
+        """Yield all tasks: numbers, films and pages; without `films`, pages leave room for the films."""
         keys: dict[Part, str] = {}
         yield from self._measuring(keys)
         slips: dict[ClipOf, list[str]] = {}
@@ -240,7 +240,7 @@ class ComparisonPlan:
             yield from self._pages(keys, filmed, films)
 
     def filmed(self, study: Study) -> list[Choice]:
-        """Return the choices that there are films of: that of the verdict, unless all are requested."""
+        """Return the choices to film: the one that the verdict is about, unless all are requested."""
         stage, own = self.comparison.stage, study.choices
         spoken_of = self.found.spoken_of.get(study.name)
         one = [spoken_of] if spoken_of in own else fewest_keys(own)[:1]
@@ -248,7 +248,7 @@ class ComparisonPlan:
         return [choice for choice in choices if stage and study.frames(choice, stage) <= study.most_frames]
 
     def _film(self, study: Study, choice: Choice, before: tuple[str, ...]) -> Iterator[Task]:
-        """Yield the tasks of a film of what was measured before; the last one makes it."""
+        """Yield the tasks of a film from results that were measured before; the last task makes the film."""
         comparison, stage = self.comparison, cast(SceneSettings, self.comparison.stage)
         seconds = 0.03 + 4e-7 * stage.resolution[0] * stage.resolution[1]
         folder, title = f"{study.name}/{choice.name}", f"{study.name} {choice.phrase}"
@@ -286,7 +286,7 @@ class ComparisonPlan:
     # -- pages --------------------------------------------------------------------------------------------------------
 
     def _pages(self, keys: dict[Part, str], filmed: dict[Part, str], films: bool) -> Iterator[Task]:
-        """Yield the page of a few clips, or a page for each of many and one that leads to them."""
+        """Yield one page of a few clips, or a page for each of many clips and an overview with links to them."""
         comparison, subject = self.comparison, self.comparison.subject
         if comparison.blender and self._shows_object:
             step = steps.Subject(subject, comparison.blender)

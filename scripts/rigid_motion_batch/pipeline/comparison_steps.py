@@ -1,7 +1,7 @@
 """The steps of a comparison: from recordings to clips, from clips to numbers, from numbers to films and pages.
 
-What passes between them are the values of `recordings` and `analysis` themselves, written by `values`. Those that need
-Blender load nothing but NumPy and bpy. Every step imports what it needs when it is done.
+Steps pass on the values of `recordings` and `analysis`, written by `values`. Steps that need Blender load nothing but
+NumPy and bpy. Every step imports the modules that it needs when it runs.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 
 STAGES = ("read", "measure", "slip", "build", "render", "encode", "report")
-"""Stages of a comparison; each begins when all before it have ended."""
+"""Stages of a comparison; each begins when all stages before it have ended."""
 
 RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py")
 ANALYSIS = (*RECORDINGS, "analysis")
@@ -37,12 +37,12 @@ REPORT = (*ANALYSIS, "report", "palette.py")
 ROWS, JOINT_ROWS, FILM, BLEND, PAGE = "rows.csv", "joints.csv", "comparison.mp4", "comparison.blend", "report.html"
 PIECE, MESH = "piece.mkv", "mesh.npz"
 PAGE_DATA = "report_data/"
-"""The folder of what is too large for a page."""
+"""The folder of data that is too large for a page."""
 
 
 @contextmanager
 def _raising_task_errors(what: str) -> Iterator[None]:
-    """Raise what Blender cannot do as an error of the task."""
+    """Raise Blender's errors as errors of the task."""
     try:
         yield
     except (RuntimeError, SubjectError) as error:
@@ -64,7 +64,7 @@ class Read(Step, rooms=RECORDINGS, stage="read"):
     """The version of Blender, for formats that it reads."""
 
     against: str = ""
-    """Another motion of the same, as a source."""
+    """The source of another motion of the same clip, to compare with."""
 
     called: str = ""
     """The name of that motion."""
@@ -91,12 +91,12 @@ class Read(Step, rooms=RECORDINGS, stage="read"):
 
 
 class ReadInBlender(Read, rooms=(*RECORDINGS, "rigid_motion/animation"), blender=True):
-    """Read a source that Blender reads."""
+    """Read a source that needs Blender."""
 
 
 @dataclass(frozen=True)
 class ClipOf:
-    """A clip of a source that was read."""
+    """A clip of a source, by name and body."""
 
     name: str
     """The name of the clip in this run."""
@@ -112,7 +112,7 @@ class ClipOf:
 
 
 class Measure(Step, rooms=ANALYSIS, stage="measure"):
-    """Choose keys of a clip, let the modes fill them in, and measure what was lost. Before: the recording."""
+    """Choose keys of a clip, let the modes fill in the rest, and measure the errors. Before: the recording."""
 
     clip: ClipOf
     choice: Choice
@@ -146,7 +146,7 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
     radii: Radii
     fit: bool
     reference: str
-    """The mode that the others are to be as good as."""
+    """The mode that sets the error to match."""
 
     def make(self, job: StepJob) -> None:
         from rigid_motion_batch.analysis import needed
@@ -163,10 +163,9 @@ class CountKeys(Step, rooms=ANALYSIS, stage="measure"):
 
 
 class MeasureSlips(Step, rooms=ANALYSIS, stage="slip", partial=True):
-    """Measure how far a body slips in the one that holds it. Before: both recordings, and in turn what was measured of
-    them under each choice.
+    """Measure how far a held body slips. Before: both recordings, then for each choice both measured results.
 
-    It has a stage of its own, where what all shares of a farm have measured is there.
+    This is a stage of its own, so that the measurements of all shares of a farm are available.
     """
 
     holder: ClipOf
@@ -200,7 +199,7 @@ class Tabulate(Step, rooms=("analysis", "files.py"), stage="report", partial=Tru
     """Write the table of all clips. Before: its parts."""
 
     rows: str
-    """The name of the part of the table in every result."""
+    """The file name of the rows in every result."""
 
     def make(self, job: StepJob) -> None:
         from rigid_motion_batch.analysis.metrics import join_tables
@@ -218,9 +217,7 @@ def result_in(folder: Path) -> ChoiceResult:
 
 
 class Build(Step, rooms=SCENES, stage="build", blender=True):
-    """Build the scene of a film, and save it. Before: the recording, what was measured, and how far it slips in bodies
-    that hold it.
-    """
+    """Build the scene of a film, and save it. Before: the recording, its measured result, its slips in holders."""
 
     clip: ClipOf
     radii: Radii
@@ -280,7 +277,7 @@ class Encode(Render, stage="encode"):
 
 
 class Subject(Step, rooms=SCENES, stage="report", blender=True):
-    """Read the object that rigid bodies move, simple enough for a page."""
+    """Read the object that rigid bodies move, simplified for a page."""
 
     requested: str
     version: str
@@ -297,33 +294,33 @@ class Subject(Step, rooms=SCENES, stage="report", blender=True):
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """The result of a task before a page."""
+    """The result of a task that a page shows."""
 
     what: str
-    """What it is: "read", "measure", "count_keys", "slips", "encode" or "subject"."""
+    """The kind of result: "read", "measure", "count_keys", "slips", "encode" or "subject"."""
 
     clip: ClipOf = ClipOf("")
-    """Of slips the one that is held."""
+    """The clip; for slips, the held one."""
 
     choice: str = ""
-    """The name of the choice of keys; of slips that of the clip which holds the other."""
+    """The name of the choice of keys; for slips, the name of the holder's clip."""
 
 
 class Page(Step, rooms=REPORT, stage="report", partial=True):
-    """Write a page of some clips. Before: what `parts` says."""
+    """Write a page of some clips. Before: the results of `parts`."""
 
     parts: tuple[Part, ...]
-    """Parts of the tasks before it, clip by clip, and the films last; these may be still to come."""
+    """The parts of the tasks before it, clip by clip, with the films last: films may be still to come."""
 
     settings: PageSettings
     coming: bool = False
-    """True if films are still being made."""
+    """Whether films are still being made."""
 
     overview: str = ""
-    """The way to the page of all clips."""
+    """The relative path of the page of all clips."""
 
     folder: str = ""
-    """The folder of the page, in the output folder."""
+    """The folder of the page in the output folder."""
 
     @property
     def clips(self) -> list[str]:
@@ -350,13 +347,13 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
             films,
             folder=Path(self.folder),
             mesh=mesh,
-            slips=self._slips(job),
+            slips=self._read_slips(job),
             overview=self.overview,
-            advance=self._counted(job),
+            advance=self._progress_by_clip(job),
         )
 
     def _results(self, job: StepJob) -> Iterator[ClipResult]:
-        """Yield the results before a page, one clip in memory at a time, without those that could not be made."""
+        """Yield the results for a page, with one clip in memory at a time; skip results that could not be made."""
         from rigid_motion_batch.analysis.needed import KeysNeeded
         from rigid_motion_batch.analysis.results import clip_result
 
@@ -369,23 +366,23 @@ class Page(Step, rooms=REPORT, stage="report", partial=True):
                 keys = values.read(KeysNeeded, needed / "needed") if needed else None
                 yield clip_result(clip.read(recording), result, keys)
 
-    def _slips(self, job: StepJob) -> list[PairSlips]:
-        """Return what was found of the pairs before a page."""
+    def _read_slips(self, job: StepJob) -> list[PairSlips]:
+        """Return the slips of all pairs for a page."""
         from rigid_motion_batch.analysis.held import PairSlips
 
         before = zip(self.parts, job.before, strict=False)
         folders = [folder for part, folder in before if part.what == "slips" and folder]
         return [values.read(PairSlips, folder / "slips") for folder in folders]
 
-    def _counted(self, job: StepJob) -> Callable[[], None]:
-        """Return a function that reports of every clip that it is on the page."""
+    def _progress_by_clip(self, job: StepJob) -> Callable[[], None]:
+        """Return a function that reports one more clip on the page as progress."""
         total = len(self.clips)
         done = iter(range(1, total + 1))
         return lambda: job.progress(next(done), total)
 
 
 class Overview(Page):
-    """Write the page of many clips. Before: what `parts` says, and then their pages."""
+    """Write the page of many clips. Before: the results of `parts`, and then the pages of the clips."""
 
     def make(self, job: StepJob) -> None:
         from rigid_motion_batch.report.pages import write_overview
@@ -397,6 +394,6 @@ class Overview(Page):
             self._results(job),
             self.settings,
             pages,
-            slips=self._slips(job),
-            advance=self._counted(job),
+            slips=self._read_slips(job),
+            advance=self._progress_by_clip(job),
         )

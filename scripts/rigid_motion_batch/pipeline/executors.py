@@ -1,8 +1,8 @@
-"""Executors of jobs: at once in this process, or in worker processes, where whatever kills one costs its job alone.
+"""Executors of jobs: in this process, or in worker processes, where a crash costs only the job of that worker.
 
-Of a job comes a folder with files, or a `TaskError`. Nothing here touches a store, so it does not matter where it
-happens or how it ends: here, in a worker, or in a Blender of the user's, a program for each job, which has the standard
-library, NumPy and bpy. Jobs and what comes of them are pickled.
+A job results in a folder with files, or in a `TaskError`. Nothing here touches a store, so a job can run and end
+anywhere: here, in a worker, or in a Blender of the user's, one program per job, which has the standard library, NumPy
+and bpy. Jobs and their results are pickled.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from rigid_motion_batch.supervising import death, end_with_parent, held_back, jo
 from .steps import StepJob, TaskError, sha256_in, sha256_of
 
 Made = dict[str, Any]
-"""The `folder` that a job has made, its `files` with size, time of change and digest, and `facts` that its step has
+"""The result of a job: its `folder`, its `files` with size, modification time and digest, and the `facts` that its step
 returned."""
 
 FULL_OR_FORBIDDEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM})
-"""Errors at writing that the next task will have as well."""
+"""Errors of writing that would also fail the next task."""
 
 PROGRAM = """import sys
 place, *path = sys.argv[sys.argv.index("--") + 1 :]
@@ -44,13 +44,13 @@ perform_in_blender(place)"""
 
 
 class Executor(AbstractContextManager["Executor"]):
-    """Executor of jobs: this class at once, in this process. A context; may be used again after `stop`."""
+    """Executor of jobs: this class runs each at once, in this process. A context; can be used again after `stop`."""
 
     capacity = 1
-    """Number of jobs that it takes at a time."""
+    """The number of jobs that it takes at a time."""
 
     def submit(self, job: StepJob) -> Future[Made]:
-        """Begin a job. Its future raises TaskError where it failed, and others where who did it is gone: see `loss`."""
+        """Start a job. Its future raises TaskError if the job failed, another error if its process died: see `loss`."""
         future: Future[Made] = Future()
         try:
             future.set_result(perform(job))
@@ -59,31 +59,33 @@ class Executor(AbstractContextManager["Executor"]):
         return future
 
     def stop(self) -> None:
-        """End what is at work, within a second."""
+        """Stop all running jobs, within a second."""
 
     def __exit__(self, *_: object) -> None:
         self.stop()
 
 
 class ProcessExecutor(Executor):
-    """Does so many jobs at a time, in processes that are started when there is work for them.
+    """Executor that runs several jobs at a time, in processes that are started when there is work for them.
 
-    In a process jobs run in the main thread, as Blender wants it. Each has a pool of `pebble` for itself: a larger one
-    may lose the job of a process that is killed as it takes it. Raises ImportError without `pebble`.
+    Jobs run in the main thread of a process, as Blender requires. Each process has a `pebble` pool of its own: a larger
+    pool may lose a job if its process is killed while taking it. Raises ImportError without `pebble`.
     """
 
     def __init__(self, jobs: int) -> None:
         import pebble
 
-        pebble.CONSTS.term_timeout = 0.05  # Blender at work does not listen: it is killed.
+        pebble.CONSTS.term_timeout = 0.05  # Blender does not react while it works, so it is killed.
         self.capacity = max(1, jobs)
         spawn = multiprocessing.get_context("spawn")
-        self._new_pool = partial(pebble.ProcessPool, 1, initializer=_begin, initargs=(session(),), context=spawn)
+        self._new_pool = partial(
+            pebble.ProcessPool, 1, initializer=_initialize_worker, initargs=(session(),), context=spawn
+        )
         self._pools: dict[Any, Future[Made]] = {}
         """The last job of each pool."""
 
     def submit(self, job: StepJob) -> Future[Made]:
-        with held_back({signal.SIGINT}):  # Ctrl-C reaches this process alone, which decides what comes of it.
+        with held_back({signal.SIGINT}):  # Ctrl-C reaches this process only, which decides what to do.
             idle = (pool for pool, last in self._pools.items() if last.done() and pool.active)
             pool = next(idle, None) or self._new_pool()
             self._pools[pool] = pool.schedule(_perform, (job,))
@@ -103,7 +105,7 @@ def processors() -> int:
 
 
 def loss(error: BaseException, job: StepJob) -> str:
-    """Return how it came that a job has no result, and no error of its own: it may be tried again."""
+    """Return why a job has neither a result nor an error of its own; the job may be tried again."""
     code = getattr(error, "exitcode", None) or getattr(error, "returncode", None)
     how = f"died ({death(code)})" if code else f"failed: {type(error).__name__}: {error}"
     log = job.place / "log"
@@ -112,21 +114,21 @@ def loss(error: BaseException, job: StepJob) -> str:
 
 
 def perform(job: StepJob) -> Made:
-    """Do a job. Raises TaskError, and CalledProcessError where a Blender died."""
+    """Do a job. Raises TaskError, or CalledProcessError if a Blender died."""
     if job.blender and job.task.step.blender:
         return _made_by_blender(job)
     try:
-        return _make(job)
+        return _write_result(job)
     except Exception as error:
-        problem = _problem(error, job)
-        with suppress(OSError):  # Blender says little where a disk is full.
+        problem = _as_task_error(error, job)
+        with suppress(OSError):  # Blender's messages about a full disk say little.
             if not problem.fatal and shutil.disk_usage(job.output).free < 1 << 20:
                 problem.args, problem.fatal = (f"{os.strerror(errno.ENOSPC)} ({problem})",), True
         raise problem from None
 
 
-def _make(job: StepJob) -> Made:
-    """Have the files of a job written."""
+def _write_result(job: StepJob) -> Made:
+    """Write the files of a job, and return its result."""
     task = job.task
     job.folder.mkdir(parents=True)
     facts = task.step.make(job)
@@ -144,14 +146,14 @@ def _make(job: StepJob) -> Made:
     return {"folder": job.folder, "files": files, "facts": facts or {}}
 
 
-def _problem(error: Exception, job: StepJob) -> TaskError:
-    """Return an error as one of the task, with its place in the program where nobody foresaw it."""
+def _as_task_error(error: Exception, job: StepJob) -> TaskError:
+    """Return an error as one of the task, with a traceback if it was unexpected."""
     if isinstance(error, TaskError):
         return error
     problem = TaskError(f"{type(error).__name__}: {error}")
     if isinstance(error, OSError):
         path = str(error.filename or "")
-        # The user knows where files will be, and not the folder of a task at work.
+        # Show the place where the file will be published: the user does not know the folder of a running task.
         known = job.task.publish.get(path.removeprefix(f"{job.folder}{os.sep}").replace(os.sep, "/"))
         shown = os.fspath(job.output / known) if known else path.replace(str(job.folder), str(job.output))
         problem = TaskError(": ".join(filter(None, (shown, error.strerror or str(error)))))
@@ -164,17 +166,17 @@ def _problem(error: Exception, job: StepJob) -> TaskError:
 # -- in a process of its own ------------------------------------------------------------------------------------------
 
 
-def _begin(command: str) -> None:
-    """Begin a worker: it ends with its parent, and no one sees what libraries print in it."""
+def _initialize_worker(command: str) -> None:
+    """Initialize a worker: it ends with its parent, and output of libraries is discarded."""
     end_with_parent()
     join_session(command)
-    # Where Blender is loaded in the parent, its own modules hide what brings them.
+    # If the parent has loaded Blender, Blender's modules hide the package that contains them.
     sys.path[:] = [folder for folder in sys.path if not Path(folder, "addon_utils.py").exists()]
     _print_to(os.devnull)
 
 
 def _perform(job: StepJob) -> Made:
-    """Do a job in a worker. What is printed meanwhile is kept: of a worker that dies these are the last words."""
+    """Do a job in a worker. Printed output goes into a log, which is read if the worker dies."""
     with suppress(OSError):
         os.chdir(job.here)
     job.place.mkdir(parents=True, exist_ok=True)
@@ -196,15 +198,15 @@ def _print_to(path: str | Path) -> None:
 
 
 def _made_by_blender(job: StepJob) -> Made:
-    """Have a job done by a Blender of its own."""
+    """Do a job in a Blender process of its own."""
     job.place.mkdir(parents=True, exist_ok=True)
     (job.place / "job").write_bytes(pickle.dumps(replace(job, blender="")))
-    module = sys.modules[type(job.task.step).__module__]  # It may be outside this package.
+    module = sys.modules[type(job.task.step).__module__]  # The module may be outside this package.
     root = Path(cast(str, module.__file__)).resolve().parents[module.__name__.count(".")]
     command = [job.blender, "--background", "--factory-startup", "--python-exit-code", "1", "--python-expr", PROGRAM]
     command += ["--", *map(os.fspath, (job.place.absolute(), PACKAGE.parent, EXTENSION.parent, root))]
     with (job.place / "log").open("ab") as log:
-        parent = subprocess.PIPE  # Whose end tells it that nobody waits any more.
+        parent = subprocess.PIPE  # Its end tells Blender that this process is gone.
         before = end_with_parent if sys.platform == "linux" else None
         subprocess.check_call(command, stdin=parent, stdout=log, stderr=log, preexec_fn=before)
     answer = pickle.loads((job.place / "answer").read_bytes())
@@ -214,9 +216,9 @@ def _made_by_blender(job: StepJob) -> Made:
 
 
 def perform_in_blender(place: str) -> None:
-    """Do the job that lies in a folder, in a Blender that was started for it."""
+    """Do the job in a folder, inside the Blender that was started for it."""
     threading.Thread(target=lambda: (sys.stdin.buffer.read(), os._exit(1)), daemon=True).start()
     done = Executor().submit(pickle.loads(Path(place, "job").read_bytes()))
     Path(place, "answer").write_bytes(pickle.dumps(done.exception() or done.result()))
-    # Not sys.exit: Blender can wait for long while it is taken down.
+    # Not sys.exit: Blender can take long to shut down.
     os._exit(0)

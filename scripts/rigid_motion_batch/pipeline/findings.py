@@ -1,6 +1,6 @@
-"""What the tasks of a comparison have found so far, read from the store without its arrays.
+"""Findings of a comparison: the results of its tasks so far, read from the store without arrays.
 
-Films are of what the verdict speaks of, so they are planned by it.
+The films depend on the choice of keys in the verdict, so they are planned by these findings.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from .store import Store
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What was found; what could not be made is left out."""
+    """The results so far; results that could not be made are left out."""
 
     numbers: Numbers | None = None
-    """None where nothing was measured."""
+    """None if nothing was measured."""
 
     verdict: Verdict | None = None
     slips: tuple[PairSlips, ...] = ()
     spoken_of: Mapping[str, Choice | None] = field(default_factory=dict)
-    """Clip name to the choice of keys that the verdict of its page speaks of."""
+    """Clip name to the choice of keys that the verdict on its page is about."""
 
     @classmethod
     def of(cls, store: Store, tasks: Iterable[Task], reference: str, *, alone: bool) -> Findings:
-        """Read what these tasks have found. Where clips are `alone` each has a page, and so a verdict, of its own."""
+        """Read the results of these tasks. If clips are `alone`, each has its own page and so its own verdict."""
         everything, needed, slips = Gathering(reference), list[KeysNeeded](), list[PairSlips]()
         spoken_of: dict[str, Choice | None] = {}
         measuring = (
@@ -71,7 +71,7 @@ def _clip_of(task: Task) -> str:
 
 
 def _own_choice(reference: str, name: str, choices: list[ChoiceNumbers], counted: list[KeysNeeded]) -> Choice | None:
-    """Return the choice of keys that the verdict on a single clip speaks of."""
+    """Return the choice of keys that the verdict on a single clip is about."""
     alone = Gathering(reference)
     alone.add(name, choices)
     return verdict(alone.numbers(), counted).choice
