@@ -1,4 +1,4 @@
-"""`python -m rigid_motion_batch COMMAND ...`, where there is no `rigid-motion` on the path."""
+"""The command `python -m rigid_motion_batch COMMAND ...`, for systems without `rigid-motion` on the path."""
 
 import sys
 

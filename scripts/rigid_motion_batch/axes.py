@@ -1,8 +1,8 @@
-"""Conventions of axes, and how a recording's poses become Blender's: right-handed, z up, y forward, x right.
+"""Axis conventions, and conversion of poses to Blender's axes: right-handed, z up, y forward, x right.
 
 Each convention is a matrix C of shape (3, 3) that takes a point of the recording to Blender. A rotation R becomes
-C R C^T: the body's own axes change convention together with the world's. So what a device or a camera faces is y of
-the object in Blender, and what is above it z.
+C R C^T: the body's own axes change convention together with the world's. So the direction that a device or a camera
+faces becomes y of the object in Blender, and its up direction becomes z.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ AXES: dict[str, np.ndarray] = {
 }
 
 NERF = "nerf"
-"""The axes of NeRF's transforms.json: those of Blender in the world, and of its cameras, which are those of OpenGL."""
+"""The axes of NeRF's transforms.json: Blender's axes for the world, OpenGL's axes for its cameras."""
 
 DESCRIBED = {
     "blender": "z up, y forward",
@@ -40,10 +40,10 @@ DESCRIBED = {
     "opencv": "y down, z forward",
     NERF: "z up; cameras y up, -z forward",
 }
-"""What each convention is, in words."""
+"""Descriptions of the conventions."""
 
 _Z_UP_TO_OPENGL = np.sqrt(0.5) * np.array((1.0, -1.0, 0.0, 0.0))
-"""The turn of a body that has z for up and y for forward, to those of OpenGL."""
+"""The rotation from a body with z up and y forward to one with OpenGL's axes."""
 
 
 def to_blender(poses: Poses, axes: str) -> Poses:
@@ -53,12 +53,12 @@ def to_blender(poses: Poses, axes: str) -> Poses:
     ----------
     poses : Poses, shape (..., n)
     axes : str
-        The convention that `poses` are in: a name in `AXES`; or `NERF`, for poses in the world.
+        The convention of `poses`: a name in `AXES`; or `NERF`, for poses in the world.
 
     Raises
     ------
     ValueError
-        Where there is no such convention.
+        If there is no such convention.
     """
     if axes == NERF:
         return Poses(poses.positions, multiply(poses.quaternions, _Z_UP_TO_OPENGL), poses.scales)

@@ -1,4 +1,4 @@
-"""What command lines have in common, in Python and in Blender."""
+"""Command-line tools that all commands share, in Python and in Blender: parsers, argument types, messages."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ INSTALLED = "rigid-motion"
 """The command that pip installs."""
 
 MOST_INPUTS = 12
-"""Inputs of a command that are worth being read again."""
+"""The number of inputs after which a typed command is cut short."""
 
 BREAK_LINES = ("Cc", "Cs", "Zl", "Zp")
-"""Categories of Unicode: control characters, bytes that are no text, and what separates lines and paragraphs."""
+"""Unicode categories of control characters, surrogates, and separators of lines and paragraphs."""
 
 
 def own_arguments(script: str) -> list[str]:
     """Return the arguments that are meant for a script, given its `__file__`.
 
-    In Blender (`blender --background --python SCRIPT -- ARGUMENTS`) what is behind the "--", in Python everything.
+    In Blender (`blender --background --python SCRIPT -- ARGUMENTS`), these are the arguments after "--"; in Python,
+    all.
     """
     if Path(sys.argv[0]).name == Path(script).name:
         return sys.argv[1:]
@@ -35,13 +36,13 @@ def own_arguments(script: str) -> list[str]:
 
 
 def program_of(script: str) -> str:
-    """Return what users call a command: its script, "bake.py", or "rigid-motion bake" where they have started it so."""
+    """Return the name of a command as it was started: its script, such as "bake.py", or "rigid-motion bake"."""
     called = Path(sys.argv[0]).name if sys.argv else ""
     return called if called.startswith(f"{INSTALLED} ") else script
 
 
 def as_called(text: str, script: str) -> str:
-    """Return a text with examples of `python scripts/...`, in the way in which users have started the command."""
+    """Return a text with its examples of `python scripts/...` in the form in which the user started the command."""
     program = program_of(script)
     if program == script:
         return text
@@ -50,7 +51,7 @@ def as_called(text: str, script: str) -> str:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose complaints are two lines, whatever was typed, and say what may have been meant."""
+    """A parser whose errors are two lines, for any input, and suggest what the user may have meant."""
 
     def error(self, message: str) -> NoReturn:
         names = [
@@ -70,7 +71,7 @@ class Parser(argparse.ArgumentParser):
         return options
 
     def _all_options(self) -> list[str]:
-        """Return the options of this parser, and of its commands."""
+        """Return the options of this parser, and of its subcommands."""
         below = [action.choices.values() for action in self._actions if isinstance(action, argparse._SubParsersAction)]
         return [
             *self._option_string_actions,
@@ -80,7 +81,7 @@ class Parser(argparse.ArgumentParser):
     def _get_value(self, action: argparse.Action, text: str) -> Any:
         try:
             value = self._registry_get("type", action.type, action.type)(text)
-        except ValueError as error:  # It says what is wrong, where that of argparse names the type.
+        except ValueError as error:  # Its message says what is wrong; argparse would name the type.
             raise argparse.ArgumentError(action, str(error)) from None
         if action.choices is None or isinstance(action, argparse._SubParsersAction) or not isinstance(value, str):
             return value
@@ -95,15 +96,16 @@ class Parser(argparse.ArgumentParser):
 
 
 def did_you_mean(word: str, words: Iterable[str]) -> str:
-    """Return what may have been meant by a word, as the end of a complaint; empty where none of these is near."""
+    """Return the nearest of some words as the end of an error message; empty if none is near."""
     known = {name.lower().lstrip("-"): name for name in words}
     near = difflib.get_close_matches(word.lower().lstrip("-"), known, n=1, cutoff=0.7)
     return f": did you mean {known[near[0]]}?" if near else ""
 
 
 def parser_of(script: str, description: str, epilog: str = "", **options: Any) -> Parser:
-    """Return the parser of a command. Its help has these texts as they are written,
-    and examples as they are typed here.
+    """Return the parser of a command.
+
+    Its help shows these texts as they are written, with examples as the user types commands.
     """
     return Parser(
         prog=program_of(script),
@@ -115,7 +117,7 @@ def parser_of(script: str, description: str, epilog: str = "", **options: Any) -
 
 
 def as_typed(program: str, arguments: Sequence[str], inputs: Sequence[str]) -> str:
-    """Return a command as one would type it: of very many inputs the first few, and how many more there were."""
+    """Return a command as one would type it; of many inputs, only the first few and the number of others."""
     left_out = set(inputs[MOST_INPUTS:]) - set(inputs[:MOST_INPUTS])
     typed = shlex.join([*program.split(), *(argument for argument in arguments if argument not in left_out)])
     return f"{typed} # and {len(left_out)} more" if left_out else typed
@@ -125,7 +127,7 @@ def as_typed(program: str, arguments: Sequence[str], inputs: Sequence[str]) -> s
 
 
 def number(text: str) -> float:
-    """Return the number that an option says; NaN, which is within no bounds, where it is none."""
+    """Return the number in an option; NaN, which is within no bounds, if it is no number."""
     try:
         return float(text)
     except ValueError:
@@ -133,7 +135,7 @@ def number(text: str) -> float:
 
 
 def bounded(what: str, least: float, most: float, above: bool = False) -> Callable[[str], float]:
-    """Return a type of argument: a number from the least to the most, or above the least."""
+    """Return an argument type: a number from `least` to `most`, or above `least`."""
 
     def parse_number(text: str) -> float:
         value = number(text)
@@ -145,7 +147,7 @@ def bounded(what: str, least: float, most: float, above: bool = False) -> Callab
 
 
 def whole(what: str, least: int, most: int) -> Callable[[str], int]:
-    """Return a type of argument: a whole number from the least to the most."""
+    """Return an argument type: a whole number from `least` to `most`."""
 
     def parse_whole(text: str) -> int:
         if not (text.isascii() and text.isdecimal() and least <= float(text) <= most):
@@ -156,34 +158,35 @@ def whole(what: str, least: int, most: int) -> Callable[[str], int]:
 
 
 def folder_path(text: str) -> Path:
-    """Return the folder that an option says."""
+    """Return the folder that an option names."""
     if not text.strip() or "\0" in text:
         raise ValueError(f"{text!r} is not a folder; give one such as renders/hand, or . for this one")
     return Path(text)
 
 
 def not_empty(text: str) -> str:
-    """Return the file that an argument says."""
+    """Return the file that an argument names."""
     if not text.strip():
         raise ValueError(f"{text!r} is not a file: a variable of a script may be empty")
     return text
 
 
 def printable(text: str) -> str:
-    r"""Return the text in one line, with control characters and the like as Python writes them: a line break as \n."""
+    r"""Return the text in one line, with control characters escaped as in Python: a line break becomes \n."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def complain(program: str, problem: object, place: object = "") -> None:
-    """Say on the standard error what is wrong, in a line: of an error of the system with its file, or else a place."""
+    """Print an error in one line on standard error: for an OSError its file, or else `place`, and the reason."""
     if isinstance(problem, OSError):
         problem = f"{problem.filename or place}: {problem.strerror or problem}"
     print(f"{program}: {printable(str(problem))}", file=sys.stderr)
 
 
 def path_line(path: str | os.PathLike[str]) -> str:
-    """Return a path as a line of output: as it is, or as JSON where that would break the line or reach
-    into a terminal.
+    """Return a path as a line of output.
+
+    A path that would break the line, or contains control characters of terminals, is written as JSON.
     """
     text = os.fspath(path)
     odd = text.startswith('"') or any(unicodedata.category(c) in BREAK_LINES for c in text)
@@ -191,7 +194,7 @@ def path_line(path: str | os.PathLike[str]) -> str:
 
 
 def listed(names: Iterable[str], limit: int = 30, more: int = 0) -> str:
-    """Return the names with commas, cut off where they become too many to read; `more` are not among them."""
+    """Return the names separated by commas, cut off after `limit`; `more` further names are not among them."""
     names = [*names]
     left = max(len(names) - limit, 0) + more
     return ", ".join(names[:limit]) + (f" and {left} more" if left else "")

@@ -1,4 +1,4 @@
-"""Where the program's own files are: in a checkout, or where pip has put them."""
+"""Paths of the program's own files: in a checkout, or where pip installed them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PACKAGE = Path(__file__).resolve().parent
 
 _ROOT = PACKAGE.parents[1]
 CHECKOUT = _ROOT if (_ROOT / "addon" / "rigid_motion" / "__init__.py").is_file() else None
-"""The root of the checkout that this is in; None where pip has installed it."""
+"""The root of the checkout that contains this file; None if pip installed it."""
 
 EXTENSION = CHECKOUT / "addon" / "rigid_motion" if CHECKOUT else PACKAGE.with_name("rigid_motion")
 ASSETS = CHECKOUT / "assets" if CHECKOUT else PACKAGE / "assets"
@@ -20,33 +20,30 @@ LICENSE = (CHECKOUT or EXTENSION) / "LICENSE"
 
 
 def brings(extra: str, command: str) -> str:
-    """Return what installs an extra: in a checkout a command does by itself, and elsewhere pip."""
+    """Return the command that installs an extra: bootstrap.py in a checkout, otherwise pip."""
     return f"`python scripts/bootstrap.py {command}`" if CHECKOUT else f"`pip install 'rigid-motion[{extra}]'`"
 
 
 def output_folder(name: str) -> Path:
-    """Return where a command writes unless requested otherwise: `renders/` of the checkout,
-    or of the current folder.
-    """
+    """Return the default output folder of a command: in `renders/` of the checkout, or of the current folder."""
     return (CHECKOUT or Path.cwd()) / "renders" / name
 
 
 def from_here(place: Path) -> Path:
-    """Return a path as it counts from the root of the checkout, where that is the current folder;
-    otherwise the path itself.
+    """Return a path relative to the checkout's root, if that is the current folder; otherwise the path itself.
 
-    What is kept by such names serves a checkout that was moved.
+    Records with relative names stay valid if the checkout is moved.
     """
     here = Path.cwd()
     return place.relative_to(here) if here == CHECKOUT and place.is_relative_to(here) else place
 
 
 def place_of(name: str) -> Path:
-    """Return the file or folder of a part of the program: "rigid_motion/motion", or "analysis" of this package."""
+    """Return the file or folder of a part of the program: "rigid_motion/motion", or "analysis" in this package."""
     return EXTENSION.parent / name if name.startswith(f"{EXTENSION.name}/") else PACKAGE / name
 
 
 @cache
 def manifest() -> dict[str, Any]:
-    """Return what the extension's manifest says: its name, its version."""
+    """Return the content of the extension's manifest: its name, its version."""
     return tomllib.loads(MANIFEST.read_text(encoding="utf-8"))

@@ -1,6 +1,6 @@
-"""How far a command is: on a terminal a bar, drawn by rich; elsewhere, as in a log, a plain line now and then.
+"""Progress of a command: a bar drawn by rich on a terminal; elsewhere, as in a log, a plain line now and then.
 
-Blender's own Python has no rich, and shows plain lines on a terminal, too. Seconds throughout.
+Blender's own Python lacks rich, and prints plain lines on a terminal too. Times are in seconds.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any, Self, TextIO, cast
 from rigid_motion_batch.command_line import printable
 
 FARM_VARIABLE = "RIGID_MOTION_PROGRESS"
-"""A variable of the environment: "openjd" where a farm listens, to the lines that Open Job Description knows."""
+"""Environment variable: "openjd" if a render farm reads the progress lines of Open Job Description."""
 
 BAR_COLUMNS = 24
 
@@ -24,7 +24,7 @@ LINE_INTERVAL_S = 10.0
 
 
 class Stage:
-    """A part of the work, of `total` steps. Made by `Progress.stage`."""
+    """A part of the work, of `total` steps. Created by `Progress.stage`."""
 
     def __init__(self, title: str, total: float, redraw: Callable[[], None]) -> None:
         self.title, self.total = title, total
@@ -34,39 +34,39 @@ class Stage:
 
     @property
     def fraction(self) -> float:
-        """Share that is done, 0 to 1."""
+        """Fraction that is done, 0 to 1."""
         return min(self.done / self.total, 1.0) if self.total else 1.0
 
     def advance(self, steps: float = 1.0, doing: str | None = None) -> None:
-        """Count steps as done, and say what comes next."""
+        """Count steps as done, and show what comes next."""
         self.reach(self.done + steps, doing)
 
     def reach(self, done: float, doing: str | None = None) -> None:
-        """Count so many steps as done in all, also fewer than before: work was lost, and is done again."""
+        """Set the number of steps done, also to fewer than before if work was lost and is done again."""
         self.done = min(done, self.total)
         self.say(self.doing if doing is None else doing)
 
     def say(self, doing: str) -> None:
-        """Say what is being done within the stage: "frame 17 of 120"."""
+        """Show what is being done within the stage: "frame 17 of 120"."""
         self.doing = doing
         self._redraw()
 
 
 class Progress:
-    """The bar, as a context: `with Progress() as progress, progress.stage("Rendering", 120) as stage: ...`.
+    """The progress bar, as a context: `with Progress() as progress, progress.stage("Rendering", 120) as stage: ...`.
 
-    It goes when a stage ends, so that what is said at the end stands alone; after Ctrl-C it stays as it was.
+    The bar disappears when a stage ends, so that final messages stand alone; after Ctrl-C it stays as it was.
 
     Parameters
     ----------
     stream : text stream, optional
-        The standard error unless given. Where Python has none, as in a windowed program, nothing is shown.
+        Standard error by default. If Python has none, as in a windowed program, nothing is shown.
     quiet : bool
-        Whether to show only what has a style: warnings and errors.
+        Whether to show only lines with a style: warnings and errors.
     program : str
-        What lines about errors begin with.
+        The start of lines about errors.
     clock : callable
-        Seconds that never run backwards.
+        Monotonic seconds.
     """
 
     def __init__(
@@ -117,17 +117,17 @@ class Progress:
             self._bar = self._stage = None
 
     def note(self, text: str, style: str = "") -> None:
-        """Write a line of its own, above the bar; on a terminal in a style of rich, such as "red"."""
+        """Write a line above the bar; on a terminal in a style of rich, such as "red"."""
         if self._quiet and not style:
             return
         if self._bar:
-            self._bar.console.print(_fitting(text, self._stream), markup=False, style=style)
+            self._bar.console.print(_escaped_line(text, self._stream), markup=False, style=style)
         elif self._stream is not None:
-            self._stream.write(_fitting(text, self._stream) + "\n")
+            self._stream.write(_escaped_line(text, self._stream) + "\n")
             self._stream.flush()
 
     def error(self, text: str) -> None:
-        """Write what is wrong, in a line."""
+        """Write an error message in one line."""
         self.note(": ".join(filter(None, (self._program, text))), "red")
 
     def _redraw(self, now: bool = False) -> None:
@@ -136,7 +136,7 @@ class Progress:
             self._bar.update(self._bar.task_ids[0], completed=stage.fraction)
         elif self._on_farm:
             done, words = 100.0 * stage.fraction, stage.doing or stage.title
-            self._stream.write(f"openjd_progress: {done:.1f}\nopenjd_status: {_fitting(words, self._stream)}\n")
+            self._stream.write(f"openjd_progress: {done:.1f}\nopenjd_status: {_escaped_line(words, self._stream)}\n")
             self._stream.flush()
         elif not self._quiet and (now or self._clock() - self._shown_at >= LINE_INTERVAL_S):
             self._shown_at, self._shown = self._clock(), stage.fraction
@@ -144,7 +144,7 @@ class Progress:
             self._stream.flush()
 
     def _line(self) -> str:
-        """Return how long it has taken and will take, and what is being done."""
+        """Return the elapsed and remaining time, and the current work."""
         stage = self._stage
         if stage is None:
             return ""
@@ -156,18 +156,18 @@ class Progress:
             times = duration(elapsed)
         else:
             times = f"{duration(elapsed)}, {duration(elapsed / fraction - elapsed)} left"
-        return f"{times}  {_fitting(words, self._stream)}"
+        return f"{times}  {_escaped_line(words, self._stream)}"
 
 
 def duration(seconds: float) -> str:
-    """Return a time as clocks show it: "1:05" for a minute and five seconds."""
+    """Return a time in clock format: "1:05" for a minute and five seconds."""
     minutes, seconds = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
 
 
 def _bar(stream: TextIO, line: Callable[[], str]) -> Any:
-    """Return a bar of rich with a line behind it, where the stream is a terminal that can show one; otherwise None."""
+    """Return a rich progress bar followed by a line; None if the stream is no terminal that can show it."""
     if not stream.isatty() or os.environ.get("TERM") == "dumb":
         return None
     try:
@@ -179,7 +179,7 @@ def _bar(stream: TextIO, line: Callable[[], str]) -> Any:
         return None
 
     class Line(ProgressColumn):
-        """Made anew whenever it is drawn, so that the clock goes on."""
+        """The line after the bar, made anew at each redraw so that the clock continues."""
 
         max_refresh = 0.5
 
@@ -187,14 +187,14 @@ def _bar(stream: TextIO, line: Callable[[], str]) -> Any:
             return Text(line(), overflow="crop", no_wrap=True)
 
     console = Console(file=stream, soft_wrap=True, highlight=False)
-    # Room for what a terminal shows of Ctrl-C; after the last column it would begin another line.
+    # Leave room for the terminal's echo of Ctrl-C, which would wrap after the last column.
     most = max(1, console.width - BAR_COLUMNS - 10)
     columns = (TaskProgressColumn(), BarColumn(BAR_COLUMNS), Line(Column(no_wrap=True, max_width=most)))
     bar = Progress(
         *columns,
         console=console,
         transient=True,
-        # What is printed meanwhile stands above the bar, unless it goes elsewhere.
+        # Printed text appears above the bar, unless it goes elsewhere.
         redirect_stdout=sys.stdout is not None and sys.stdout.isatty(),
         redirect_stderr=sys.stderr is stream,
     )
@@ -202,7 +202,7 @@ def _bar(stream: TextIO, line: Callable[[], str]) -> Any:
     return bar
 
 
-def _fitting(text: str, stream: TextIO) -> str:
-    """Return the text in one line, with what a terminal must not get or cannot show escaped."""
+def _escaped_line(text: str, stream: TextIO) -> str:
+    """Return the text in one line; escape control characters, and characters that the stream cannot encode."""
     encoding = getattr(stream, "encoding", None) or "ascii"
     return printable(text).encode(encoding, "backslashreplace").decode(encoding)

@@ -1,4 +1,4 @@
-"""Blender's own words, kept off the streams: it writes of every file and frame, by Python and by C."""
+"""Silencing of Blender's messages: it prints lines for every file and frame, from Python and from C."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 
 OUTPUT_DESCRIPTOR, ERRORS_DESCRIPTOR = 1, 2
-"""The descriptors of the standard streams."""
+"""The file descriptors of the standard streams."""
 
 
 @contextmanager
 def silenced(*, errors: bool = False) -> Iterator[None]:
-    """Keep what is written meanwhile off the standard output, and off the standard error where `errors` is set.
+    """Discard output to standard output within the block, and to standard error if `errors` is set.
 
-    Otherwise that stays open: where Blender has to abort, its last words are there.
+    Standard error stays open by default: if Blender aborts, its last message is there.
     """
     _flush()
     streams = (OUTPUT_DESCRIPTOR, ERRORS_DESCRIPTOR) if errors else (OUTPUT_DESCRIPTOR,)
@@ -40,8 +40,8 @@ def silenced(*, errors: bool = False) -> Iterator[None]:
 
 
 def _flush() -> None:
-    """Write out what Python and C have been holding back."""
+    """Write out the buffers of Python and of C."""
     for stream in (sys.stdout, sys.stderr):
-        if stream is not None:  # A windowed Python has none.
+        if stream is not None:  # A windowed Python has no streams.
             stream.flush()
     (ctypes.CDLL("ucrtbase") if os.name == "nt" else ctypes.CDLL(None)).fflush(None)

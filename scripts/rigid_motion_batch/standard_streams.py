@@ -1,6 +1,6 @@
-"""The standard streams of a command, which may be closed, full, read by nobody, or unable to show a letter.
+"""Robust standard streams of a command: they may be closed, full, unread, or unable to show a character.
 
-None of that keeps a command from its work, and nothing of it is a traceback.
+None of these cases stops a command's work or shows a traceback.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from contextlib import suppress
 from typing import Any, TextIO
 
 READER_GONE = {errno.EPIPE, errno.ECONNRESET, *([errno.EINVAL] if os.name == "nt" else [])}
-"""Errors of a pipe whose reader has gone, as `head` does when it has its lines."""
+"""Errors of a pipe whose reader is gone, as `head` is once it has its lines."""
 
 
 class _Descriptor(io.FileIO):
-    """A descriptor that takes all there is: what cannot be written is lost, and the first error is kept."""
+    """A descriptor that accepts everything: data that cannot be written is lost, and the first error is kept."""
 
     error: OSError | None = None
 
@@ -31,22 +31,22 @@ class _Descriptor(io.FileIO):
 
 
 def prepare() -> None:
-    """Set up the standard streams of this process, and of those that it starts."""
+    """Set up the standard streams of this process, and of processes that it starts."""
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            # Closed. Otherwise the next file that is opened gets its number, and all that is printed.
+            # The stream is closed. Otherwise the next file that is opened would get its number, and all printed text.
             os.open(os.devnull, os.O_RDWR)
             if number:
                 os.set_inheritable(number, True)
-    sys.stdout, sys.stderr = _prepared(sys.stdout, 1), _prepared(sys.stderr, 2)
+    sys.stdout, sys.stderr = _robust_stream(sys.stdout, 1), _robust_stream(sys.stderr, 2)
 
 
 def finish(program: str, code: int) -> int:
-    """Write out what is held back, and return the exit code: 1 where it was 0 and output was lost.
+    """Flush the streams, and return the exit code: 1 if it was 0 and output was lost.
 
-    Nothing is said where nobody reads any more, who has had enough.
+    A reader that is gone has had enough: then there is no message.
     """
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):
@@ -59,17 +59,17 @@ def finish(program: str, code: int) -> int:
     return code or 1
 
 
-def _prepared(stream: TextIO | None, number: int) -> TextIO:
-    """Return a stream that shows every letter, escaped if need be, and never fails."""
+def _robust_stream(stream: TextIO | None, number: int) -> TextIO:
+    """Return a stream that shows every character, escaped if necessary, and never fails."""
     if stream is None:
-        return _text(number, encoding="utf-8")
+        return _text_stream(number, encoding="utf-8")
     if not isinstance(stream, io.TextIOWrapper) or stream.fileno() != number:
         return stream
     stream.flush()
-    if os.name == "nt" and stream.isatty():  # A console has letters of its own.
+    if os.name == "nt" and stream.isatty():  # A console has an encoding of its own.
         stream.reconfigure(errors="backslashreplace")
         return stream
-    return _text(
+    return _text_stream(
         number,
         encoding=stream.encoding,
         line_buffering=stream.line_buffering,
@@ -77,6 +77,6 @@ def _prepared(stream: TextIO | None, number: int) -> TextIO:
     )
 
 
-def _text(number: int, **options: Any) -> io.TextIOWrapper:
+def _text_stream(number: int, **options: Any) -> io.TextIOWrapper:
     buffer = io.BufferedWriter(_Descriptor(number, "w", closefd=False))
     return io.TextIOWrapper(buffer, errors="backslashreplace", **options)

@@ -1,8 +1,8 @@
-"""Running plans: what is missing is given to an executor, in order, kept, and published.
+"""Running of plans: missing tasks go to an executor in order, and their results are stored and published.
 
-A plan is a function that returns its tasks one by one, each after those that it reads from. So of ten thousand clips
-only those are in memory that are at work. Where a task fails those that need it are skipped, and all others are done.
-What ends a run is Ctrl-C, and a disk that is full or must not be written. Nothing is printed here.
+A plan is a function that yields its tasks one by one, each after the tasks whose results it reads. So of ten thousand
+clips, only those in progress are in memory. If a task fails, the tasks that need it are skipped, and all others are
+done. Only Ctrl-C ends a run early, or a disk that is full or read-only. Nothing is printed here.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from .store import Store
 Plan = Callable[[], Iterable[Task]]
 
 MAX_ATTEMPTS = 3
-"""Number of times that a task is begun whose process dies."""
+"""The number of times that a task is started if its process dies."""
 
 STATES = "done", "up to date", "failed", "skipped", "not begun or stopped"
 DONE, UP_TO_DATE, FAILED, SKIPPED, STOPPED = STATES
-"""States of a task, for people. It is skipped where a task before it failed."""
+"""States of a task, in words for the user. A task is skipped if a task before it failed."""
 
 
 def share_of(plan: Plan, stage: str = "", number: int = 1, of: int = 1) -> Iterator[Task]:
-    """Yield the tasks of a stage, or of all, that are one of several equal shares; a task goes with what it reads."""
+    """Yield one of several equal shares of the tasks of a stage, or of all; a task stays with the tasks it reads."""
     shares: dict[str, int] = {}
     turn = itertools.cycle(range(of))
     for task in plan():
@@ -44,9 +44,9 @@ def share_of(plan: Plan, stage: str = "", number: int = 1, of: int = 1) -> Itera
 
 
 def survey(plan: Plan, store: Store) -> tuple[dict[str, float], int]:
-    """Return the names of the tasks of a plan that are to be done, with their seconds, and how many are done.
+    """Return the names of the tasks still to do, with their seconds, and the number of tasks already done.
 
-    Raises RunError where something would be replaced that must not be.
+    Raises RunError if a file would be replaced that must stay.
     """
     left: dict[str, float] = {}
     done = 0
@@ -63,12 +63,12 @@ def survey(plan: Plan, store: Store) -> tuple[dict[str, float], int]:
 
 @dataclass(eq=False)
 class Run:
-    """A run in an opened store, by an opened executor: of one plan, or of several of the same work.
+    """A run of one plan, or of several plans of the same work, in an open store with an open executor.
 
-    `progress` gets a stage for each plan, and what is said of tasks; `blender` is the program for steps that need it,
-    if it is not to be this one. `counts` says how many tasks are in which of the `STATES`, `failures` what was wrong
-    with a task, in one line, and `noted` that with what Python said of it. Where it was `interrupted` by Ctrl-C,
-    nothing is at work any more; where nothing more could be done, `problem` says why, in one line.
+    `progress` gets a stage for each plan, and messages about tasks. `blender` is the program for steps that need
+    Blender, if it is not this one. `counts` maps each of the `STATES` to its number of tasks, `failures` a task to its
+    error in one line, `noted` a task to that message with Python's traceback. If the run was `interrupted` by Ctrl-C,
+    no task is running any more. If the run cannot continue, `problem` says why, in one line.
     """
 
     store: Store
@@ -82,27 +82,27 @@ class Run:
     problem: str = ""
 
     def do(self, plan: Plan, title: str = "") -> None:
-        """Do what is missing of a plan, which yields the same tasks each time.
+        """Do the missing tasks of a plan, which yields the same tasks each time.
 
-        Raises RunError before anything is done, where something would be replaced that must not be.
+        Raises RunError before anything is done if a file would be replaced that must stay.
         """
         self._settled: dict[str, str | None] = {}
-        """Key of a task to that of its result; None where it has none."""
+        """Key of a task to the key of its result; None if it has none."""
         self._open: set[str] = set()
-        """The keys of tasks that are met, and not settled."""
+        """The keys of tasks that were reached and are not settled."""
         self._waiting: list[Task] = []
         self._at_work: dict[Future[Made], tuple[Task, StepJob]] = {}
         self._losses: Counter[str] = Counter()
         self._done = 0.0
-        """Seconds of tasks that have come to their end."""
+        """Seconds of the tasks that have ended."""
         with self.progress.stage(title, 1.0) as self._stage:
             self._left, up_to_date = survey(plan, self.store)
             self._stage.total = sum(self._left.values())
-            # What an earlier plan did is found up to date by this one.
+            # This plan finds the results of an earlier plan up to date.
             self.counts = Counter({DONE: (done := self.counts[DONE]), UP_TO_DATE: up_to_date - done})
             try:
                 if self._left:
-                    self._work(iter(plan()))
+                    self._run_tasks(iter(plan()))
             except RunError as error:
                 self.problem = str(error)
             except KeyboardInterrupt:
@@ -114,8 +114,8 @@ class Run:
             with suppress(OSError):
                 self.store.note("failures.json", self.noted)
 
-    def _work(self, rest: Iterator[Task]) -> None:
-        """Do tasks, each when those before it are settled. Raises RunError where nothing more can be done."""
+    def _run_tasks(self, rest: Iterator[Task]) -> None:
+        """Do tasks, each once all tasks before it are settled. Raises RunError if the run cannot continue."""
         while True:
             ready = [task for task in self._waiting if self._open.isdisjoint(task.after)]
             while len(ready) < self.executor.capacity and (task := next(rest, None)):
@@ -129,25 +129,25 @@ class Run:
                 break
             for task in ready[: self.executor.capacity - len(self._at_work)]:
                 self._waiting.remove(task)
-                self._begin(task)
+                self._start(task)
             ended = wait(self._at_work, LOOK_INTERVAL_S, FIRST_COMPLETED).done
             for future in ended:
                 self._end(future, *self._at_work.pop(future))
             if self._at_work and not ended:
-                self._show(next(iter(self._at_work.values()))[0])
+                self._show_progress(next(iter(self._at_work.values()))[0])
         if self.store.alone and not self.failures:
             self.store.sweep({*self._settled.values()})
 
-    def _before(self, task: Task) -> list[str | None]:
-        """Return the keys of the results of the tasks before one, also of earlier plans; None where there is none."""
+    def _keys_before(self, task: Task) -> list[str | None]:
+        """Return the keys of the results before a task, also of earlier plans; None for missing ones."""
         for key in task.after:
             if key not in self._settled:
                 self._settled[key] = key if self.store.index_of(key) else None
         return [self._settled[key] for key in task.after]
 
-    def _begin(self, task: Task) -> None:
-        """Begin a task whose predecessors are settled, or settle it if there is nothing to do."""
-        before = self._before(task)
+    def _start(self, task: Task) -> None:
+        """Start a task whose predecessors are settled, or settle it if there is nothing to do."""
+        before = self._keys_before(task)
         if self.store.index_of(task.key_after(before)):
             self._settle(task)
         elif None in before and not (task.step.partial and any(before)):
@@ -155,15 +155,15 @@ class Run:
         else:
             folders = [self.store.results / key if key else None for key in before]
             job = StepJob(task, self.store.new_scratch(), self.store.output, folders, self.blender)
-            self._show(task)
+            self._show_progress(task)
             self._at_work[self.executor.submit(job)] = task, job
 
     def _end(self, future: Future[Made], task: Task, job: StepJob) -> None:
-        """Take what came of a job."""
+        """Take the result of a job, or its error."""
         try:
             made = future.result()
         except TaskError as error:
-            # An error that nobody foresaw does not say by itself what it is about.
+            # An unexpected error does not name its task.
             said = f"{task.name}: {error}" if error.details else str(error)
             self._fail(task, said, error.details, fatal=error.fatal)
         except Exception as error:
@@ -179,8 +179,8 @@ class Run:
         shutil.rmtree(job.place, ignore_errors=True)
 
     def _settle(self, task: Task, made: Made | None = None) -> None:
-        """Keep what was made, unless it is there, and put its files in place."""
-        key = task.key_after(self._before(task))
+        """Store a result, unless it exists, and publish its files."""
+        key = task.key_after(self._keys_before(task))
         try:
             if made:
                 self.store.keep(task, key, made)
@@ -203,16 +203,16 @@ class Run:
             raise RunError(said)
 
     def _close(self, task: Task, state: str, key: str | None = None) -> None:
-        """Take it that a task has come to its end, with a result of this key: those after it may begin."""
+        """Record that a task has ended with a result of this key, or None: the tasks after it may start."""
         self._open.discard(task.key)
         self._settled[task.key] = key
         self.counts[state] += 1
         self._done += self._left.pop(task.name)
         if key is None:
-            self.store.withdraw(task.publish.values())  # What is there under its name was made of something else.
-        self._show(task)
+            self.store.withdraw(task.publish.values())  # The file under this name was made from an older state.
+        self._show_progress(task)
 
-    def _show(self, task: Task) -> None:
-        """Report how far the whole is, and a task."""
+    def _show_progress(self, task: Task) -> None:
+        """Show the progress of the whole run, and the name of a task."""
         at_work = sum(job.reached() * begun.seconds for begun, job in self._at_work.values())
         self._stage.reach(self._done + at_work, task.name)

@@ -1,8 +1,8 @@
-"""Steps and tasks: what can be done, and what is to be done, of what.
+"""Steps and tasks: a step is a kind of work, a task is a step with its inputs and a key.
 
-A step writes the files of a result, from results of other tasks and from files; its fields are its parameters. A task
-is a step with all of these, and has a key, a digest of everything its result depends on. So all keys are known before
-anything is done, and equal tasks have one result. Standard library alone: Blender's own Python loads this.
+A step writes the files of a result, from results of other tasks and from files; its fields are its parameters. The key
+of a task is a digest of everything that its result depends on. So all keys are known before any work, and equal tasks
+share one result. Standard library only: Blender's own Python loads this.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from rigid_motion_batch import places
 from .values import plain
 
 OWN_FOLDER = ".rigid-motion"
-"""The folder in an output folder where the pipeline keeps its own files."""
+"""The folder inside an output folder where the pipeline keeps its own files."""
 
 VERSION_VARIABLE = "RIGID_MOTION_VERSION"
-"""A variable of the environment: the version that this program is to have, of those at work at one plan."""
+"""Environment variable with the version that this program must have, the same for all machines that work on a plan."""
 
 LOOK_INTERVAL_S = 0.2
-"""Seconds between two looks at tasks that are being done."""
+"""Seconds between two checks of running tasks."""
 
 
 class RunError(Exception):
-    """Error that says why a run cannot begin or go on, and the way out, in one line."""
+    """Error that says why a run cannot begin or continue, and what to do, in one line."""
 
 
 class TaskError(Exception):
-    """Error that says why a task cannot be done, and what to do about it, in one line.
+    """Error that says why a task cannot be done, and what to do, in one line.
 
-    `details` say where in the program, for an error that nobody foresaw; one is `fatal` where other tasks will fail for
-    the same reason: the disk is full.
+    `details` is the traceback of an unexpected error. An error is `fatal` if other tasks will fail for the same reason,
+    such as a full disk.
     """
 
     details = ""
@@ -50,11 +50,11 @@ class TaskError(Exception):
 
 @dataclass_transform(frozen_default=True)
 class Step:
-    """What can be done: each is a frozen dataclass of values, and `class Read(Step, stage="read")` says what it is.
+    """A kind of work: each is a frozen dataclass of values, with class arguments: `class Read(Step, stage="read")`.
 
-    A step may use some `rooms`, files and folders of the program as `places.place_of` names them. It belongs to a
-    `stage` of the work, for `--only`. A `partial` one goes on with what there is where some of the tasks before it
-    failed. One of `blender` needs bpy: it is done by the Blender that the user names, if any.
+    A step depends on some `rooms`: files and folders of the program, named as in `places.place_of`. It belongs to a
+    `stage` of the work, for `--only`. A `partial` step continues with the available results if some tasks before it
+    failed. A `blender` step needs bpy: it runs in the Blender that the user names, if any.
     """
 
     rooms: ClassVar[tuple[str, ...]] = ()
@@ -74,13 +74,13 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Something to do once, unless its result is there.
+    """Work to do once, unless its result exists.
 
-    Its `name` is its subject, for people and from one plan to the next: "measure hand/10". It comes `after` tasks whose
-    results it reads, given by their keys, and reads `inputs`, files with their digests when the work was planned (empty
-    for one that cannot be read). It `spends` those results that are for it alone: they are deleted when it is done.
-    `publish` has files of the result and where they go in the output folder, with slashes; "FOLDER/" stands for all
-    files below. It takes `seconds`, roughly.
+    Its `name` says what it does, for people, and is the same in the next plan: "measure hand/10". It comes `after`
+    tasks whose results it reads, given by their keys, and reads `inputs`: files with their digests at planning time (""
+    for a file that cannot be read). It `spends` results that only it needs: they are deleted when it is done. `publish`
+    maps files of the result to their places in the output folder, with slashes; "FOLDER/" means all files below. It
+    takes roughly `seconds`.
     """
 
     step: Step
@@ -93,24 +93,24 @@ class Task:
 
     @cached_property
     def key(self) -> str:
-        """The digest of what its result depends on, wherever its inputs are."""
+        """The digest of everything that the result depends on, except the location of inputs."""
         return self.key_after(self.after)
 
     def key_after(self, after: Iterable[str | None]) -> str:
-        """Return its key where the tasks before it had these keys; None for one that failed."""
+        """Return the task's key if the tasks before it had these keys; None for a failed task."""
         kind: Any = type(self.step)
-        # 128 bits, and short enough for the paths of Windows.
+        # 128 bits, short enough for the paths of Windows.
         return _digest([versions_of(kind), self.step, [*self.inputs.values()], list(after)])[:32]
 
 
 @dataclass
 class StepJob:
-    """A task that is done somewhere, with its files: what goes to a worker, and what its step is given.
+    """A task that runs somewhere, with its files: sent to a worker, and given to its step.
 
-    All that is written meanwhile is below `place`, which may be missing; the result's files go into `folder`, which is
-    there, and empty, while it is done. `before` are the folders of the results of the tasks before it, None for those
-    that failed, in partial steps alone. A step that needs Blender is done by the program `blender`, if that is not to
-    be this one. Relative paths start `here`.
+    Everything is written below `place`, which may not exist yet. The files of the result go into `folder`, which exists
+    and is empty when the step starts. `before` are the folders of the results before this task; None for failed tasks,
+    which only partial steps get. The program `blender` runs steps that need Blender, if it is not this one. Relative
+    paths start at `here`.
     """
 
     task: Task
@@ -126,24 +126,24 @@ class StepJob:
 
     @property
     def results(self) -> list[Path]:
-        """The folders of the results before it that there are, which are all but in partial steps."""
+        """The folders of the results before this task that exist: all of them, except in partial steps."""
         return [folder for folder in self.before if folder]
 
     def progress(self, done: float, total: float) -> None:
-        """Say how far it is."""
+        """Report the progress of the step."""
         with suppress(OSError):
             (self.place / "progress").write_text(f"{done / total}", encoding="utf-8")
 
     def reached(self) -> float:
-        """Return how far it is, wherever it is done, from 0 to 1."""
-        with suppress(OSError, ValueError):  # It has said nothing yet.
+        """Return the progress of the step, from 0 to 1, wherever it runs."""
+        with suppress(OSError, ValueError):  # The step has not reported yet.
             return float((self.place / "progress").read_text(encoding="utf-8"))
         return 0.0
 
 
 @cache
 def versions_of(kind: type[Step]) -> dict[str, str]:
-    """Return the versions of the program, and in a checkout of what a step may use and of its own module."""
+    """Return the version of the program; in a checkout also digests of the step's rooms and of its own module."""
     result = {"program": places.manifest()["version"]}
     if places.CHECKOUT:
         result |= {room: digest_of(places.place_of(room)) for room in kind.rooms}
@@ -153,14 +153,14 @@ def versions_of(kind: type[Step]) -> dict[str, str]:
 
 @cache
 def digest_of(place: Path) -> str:
-    """Return the digest of the content of a file, or of all files of a folder, once in the life of this process."""
+    """Return the digest of a file, or of all files of a folder, computed once in the life of this process."""
     files = sorted(path for path in place.rglob("[!.]*") if path.is_file()) if place.is_dir() else [place]
     files = [path for path in files if path.suffix != ".pyc"]
     return _digest([[path.relative_to(place).as_posix(), sha256_of(path)] for path in files])[:12]
 
 
 def version_here() -> str:
-    """Return the version that all who work at one plan must have, as it was when this process asked first."""
+    """Return the version that all machines working on a plan must share, as of the first call in this process."""
     result = [f"program {places.manifest()['version']} {digest_of(places.PACKAGE)} {digest_of(places.EXTENSION)}"]
     for module in ("numpy", "bpy"):
         with suppress(importlib.metadata.PackageNotFoundError):
@@ -169,7 +169,7 @@ def version_here() -> str:
 
 
 def sha256_in(path: Path | str) -> str:
-    """Return the digest of a file; empty where there is no file that can be read."""
+    """Return the digest of a file; empty if it is no readable file."""
     try:
         return sha256_of(path) if os.path.isfile(path) else ""
     except (OSError, ValueError):

@@ -1,15 +1,15 @@
-"""An output folder: results by key, the files that are published from them, and a record of whose a file is.
+"""The output folder: results stored by key, files published from them, and a record of which files the program wrote.
 
 Below `.rigid-motion/` of the folder:
 
-    results/KEY/        what a task made, with an index of its files; there if and only if the task is done
-    scratch/SESSION/    what is being made, by one process
-    published/          what this program has put into the output folder: lines of JSON, a file for each folder
-    inputs.json         digests of inputs, by size and times of change
+    results/KEY/        the result of a task, with an index of its files; exists if and only if the task is done
+    scratch/SESSION/    files being written by one process
+    published/          files that this program put into the output folder: lines of JSON, one file per folder
+    inputs.json         digests of inputs, by size and modification times
     lock                held by a run that has the folder for itself
 
-Whatever is written is written beside its place and moved there. So any process may be killed at any moment, and any
-number may write at the same time.
+Every file is written next to its place and moved there. So any process may be killed at any moment, and any number may
+write at the same time.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ from .executors import Made
 from .steps import OWN_FOLDER, RunError, Task, sha256_in, sha256_of
 
 INDEX = ".index.json"
-"""Index of a result: its files with size, time of change and digest; of which task it is, and in how long."""
+"""Index of a result: its files with size, modification time and digest, and the name of its task."""
 
 KEPT_S = 7 * 86400.0
-"""Seconds that a result is kept that the last plan did not ask for, and what a process was making that was killed."""
+"""Seconds for which results are kept that the last plan did not need, and scratch files of a killed process."""
 
 UNREADABLE = (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError)
-"""Errors of a file of the store that is missing or damaged."""
+"""Errors from a file of the store that is missing or damaged."""
 
 
 class Store:
-    """An output folder, as a context: made where it is missing, and taken away again where nothing came of it.
+    """An output folder, as a context: created if missing, and removed again if it stays empty.
 
-    `alone`, no other run may have the folder meanwhile; workers that do a part each are not. With `overwrite`, files
-    may be replaced that this program has not written; inputs and folders never are. Raises RunError or OSError on
-    entering, where another run has the folder, or there can be none.
+    With `alone`, no other run may use the folder at the same time; workers that do a part each are not alone. With
+    `overwrite`, files of other programs may be replaced, but never inputs or folders. Entering raises RunError or
+    OSError if another run has the folder, or it cannot be created.
     """
 
     def __init__(self, output: Path, *, alone: bool = True, overwrite: bool = False) -> None:
@@ -58,9 +58,9 @@ class Store:
         self._lock = FileLock(self.own / "lock", blocking=False)
         self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
         self._digests = self.noted("inputs.json")
-        """Path of an input to what was seen of it when it was hashed, and its digest."""
+        """Path of an input to its size and times when it was hashed, and its digest."""
         self._inputs: dict[tuple[int, int], str] = {}
-        """Identities of inputs in the file system, to their paths."""
+        """File-system identity (device, inode) of an input to its path."""
         self._scratch = self._scratches / ("run" if alone else uuid.uuid4().hex[:8])
 
     # -- opening and closing ------------------------------------------------------------------------------------------
@@ -74,7 +74,7 @@ class Store:
             raise RunError(
                 f"{self.output}: another run is at work in this folder; wait for it, or choose another with --output"
             ) from None
-        for session in (self._scratch, *_old(self._scratches)):
+        for session in (self._scratch, *_expired(self._scratches)):
             shutil.rmtree(session, ignore_errors=True)
         self._scratch.mkdir(parents=True)
         return self
@@ -86,20 +86,20 @@ class Store:
         if self.alone and not any(self.own.glob("*/*")):
             shutil.rmtree(self.own, ignore_errors=True)
         self._lock.release()
-        for folder in (self.own, *self._missing):  # Windows deletes no lock that is held.
-            with suppress(OSError):  # There is something in it.
+        for folder in (self.own, *self._missing):  # Windows cannot delete a lock that is held.
+            with suppress(OSError):  # The folder is not empty.
                 folder.rmdir()
 
     def new_scratch(self) -> Path:
-        """Return a path for what is being made; nothing is there."""
+        """Return a new path for files being written; nothing exists there."""
         return self._scratch / uuid.uuid4().hex[:8]
 
     def note(self, name: str, content: Mapping[str, Any]) -> None:
-        """Write a file of the store's own, of JSON."""
+        """Write a file of the store's own, as JSON."""
         write_text(self.own / name, json.dumps(content, indent=1))
 
     def noted(self, name: str) -> dict[str, Any]:
-        """Return what is in a file of the store's own; empty where it is missing or damaged."""
+        """Return the content of a file of the store's own; empty if it is missing or damaged."""
         with suppress(*UNREADABLE):
             return dict(json.loads((self.own / name).read_bytes()))
         return {}
@@ -107,9 +107,9 @@ class Store:
     # -- inputs -------------------------------------------------------------------------------------------------------
 
     def inputs(self, *paths: Path | str) -> dict[str, str]:
-        """Return files as they are now, with their digests; an empty one for what is no file that can be read.
+        """Return the digests of files as they are now; "" for a file that cannot be read.
 
-        Raises RunError where this program has written one into this folder.
+        Raises RunError if this program has written one of them into this folder.
         """
         return {os.fspath(path): self._digest_of(os.fspath(path)) for path in paths}
 
@@ -131,12 +131,12 @@ class Store:
     # -- results ------------------------------------------------------------------------------------------------------
 
     def index_of(self, key: str) -> Mapping[str, Any] | None:
-        """Return the index of the result of a key; None where it is not there, or a file of it was changed."""
+        """Return the index of the result of a key; None if the result is missing, or one of its files was changed."""
         try:
             index = json.loads((self.results / key / INDEX).read_bytes())
             for name, (size, mtime, digest) in index["files"].items():
                 path = f"{self.results}/{key}/{name}"
-                seen = _seen(path)
+                seen = _size_and_time(path)
                 if seen[0] != size or (seen[1] != mtime and sha256_of(path) != digest):
                     return None
         except UNREADABLE:
@@ -144,13 +144,13 @@ class Store:
         return index
 
     def keep(self, task: Task, key: str, made: Made) -> None:
-        """Take what was made as the result of a task. Raises OSError where that cannot be."""
+        """Store the files of a job as the result of a task. Raises OSError if that fails."""
         folder, index = made["folder"], {"name": task.name, "files": made["files"]}
         (folder / INDEX).write_text(json.dumps(index), encoding="utf-8")
         try:
             folder.rename(self.results / key)
         except OSError:
-            if not self.index_of(key):  # Otherwise another worker was quicker.
+            if not self.index_of(key):  # Otherwise another worker was faster.
                 self.discard(key)
                 folder.rename(self.results / key)
 
@@ -159,8 +159,8 @@ class Store:
         shutil.rmtree(self.results / key, ignore_errors=True)
 
     def sweep(self, requested: Container[str | None]) -> None:
-        """Delete results that are not among these, and older than a week."""
-        for folder in _old(self.results):
+        """Delete results that are older than a week, except these."""
+        for folder in _expired(self.results):
             if folder.name not in requested:
                 self.discard(folder.name)
 
@@ -172,13 +172,13 @@ class Store:
         for name, path in task.publish.items():
             for file in [file for file in files if file.startswith(name)] if name.endswith("/") else [name]:
                 place = path + file.removeprefix(name)
-                # A link or a copy has the size and the time of change of what it is of.
-                if file not in files or _seen(f"{self.output}/{place}") != files[file][:2]:
+                # A link or a copy has the size and modification time of the original.
+                if file not in files or _size_and_time(f"{self.output}/{place}") != files[file][:2]:
                     result.append((file, place))
         return result
 
     def refuse(self, unpublished: Iterable[tuple[str, str]]) -> None:
-        """Raise RunError where such files would replace what is not the program's own, unless that may be replaced."""
+        """Raise RunError if such files would replace files of other programs without `overwrite`."""
         foreign = [path for _, path in unpublished if not self.is_own(path)]
         if foreign and not self.overwrite:
             named = listed((os.fspath(self.output / path) for path in foreign), 3)
@@ -188,9 +188,9 @@ class Store:
             )
 
     def publish(self, task: Task, key: str) -> bool:
-        """Put files of a result where they belong, and return whether there were any that were not there.
+        """Put the files of a result in place, and return whether any were missing.
 
-        Raises OSError, and RunError where something is there that must not be replaced; files before that stay.
+        Raises OSError, or RunError if a file is in the way that must stay; files published before the error stay.
         """
         index = self.index_of(key) or {}
         missing = self.unpublished(task, index)
@@ -200,17 +200,17 @@ class Store:
             if not Path(os.path.realpath(target.parent)).is_relative_to(os.path.realpath(self.output)):
                 raise RunError(f"{target.parent}: this leads out of the output folder; choose another with --output")
             target.parent.mkdir(parents=True, exist_ok=True)
-            # Killed from here on, what was moved is known to be the program's own.
+            # From here on, a moved file is known as the program's own, even if the process is killed.
             append_lines(self._record_of(path), [{"path": path, "sha256": index["files"][name][-1]}])
             try:
                 os.link(self.results / key / name, beside)
-            except OSError:  # This file system has no links.
+            except OSError:  # This file system has no hard links.
                 shutil.copy2(self.results / key / name, beside)
             beside.replace(target)
         return bool(missing)
 
     def withdraw(self, paths: Iterable[str]) -> None:
-        """Delete files of this program that are needed no more, and folders that are empty then."""
+        """Delete files of this program that are no longer needed, and folders that become empty."""
         for path in paths:
             with suppress(OSError, RunError):
                 if self.is_own(path):
@@ -218,7 +218,7 @@ class Store:
                     os.removedirs((self.output / path).parent)
 
     def is_own(self, path: str) -> bool:
-        """Return whether a path has nothing, or what this program wrote. Raises RunError for what always stays."""
+        """Return whether a path is free, or holds a file of this program. Raises RunError for inputs and folders."""
         target, another = f"{self.output}/{path}", "choose another folder with --output"
         try:
             status = os.lstat(target)
@@ -233,27 +233,27 @@ class Store:
         return stat.S_ISREG(status.st_mode) and sha256_of(target) in self._digests_at(path)
 
     def _record_of(self, path: str) -> Path:
-        """Return the file of the record of what was published into the same folder."""
+        """Return the record file for files published into the same folder."""
         folder = path.rpartition("/")[0].casefold()
         return self._published / f"{uuid.uuid5(uuid.NAMESPACE_URL, folder).hex[:16]}.jsonl"
 
     def _digests_at(self, path: str) -> set[str]:
-        """Return digests of all that was put at a path, or one that differs in case, which file systems may ignore."""
+        """Return the digests of all files that were published at a path, ignoring case, as some file systems do."""
         lines = lines_of(self._record_of(path))
         return {str(line.get("sha256")) for line in lines if str(line.get("path")).casefold() == path.casefold()}
 
 
-def _seen(path: str) -> list[int]:
-    """Return size and time of change of a file; nothing that any has where it is none, or is not there."""
+def _size_and_time(path: str) -> list[int]:
+    """Return the size and modification time of a file; [-1], which no file has, if there is no regular file."""
     with suppress(OSError):
         status = os.lstat(path)
         return [status.st_size, status.st_mtime_ns] if stat.S_ISREG(status.st_mode) else [-1]
     return [-1]
 
 
-def _old(folder: Path) -> Iterator[Path]:
-    """Yield what was made in a folder before so long a time that it is kept no more."""
+def _expired(folder: Path) -> Iterator[Path]:
+    """Yield the paths in a folder that are too old to be kept."""
     for path in folder.glob("*"):
-        with suppress(FileNotFoundError):  # Another process has ended.
+        with suppress(FileNotFoundError):  # Another process has removed it.
             if time.time() - path.lstat().st_mtime > KEPT_S:
                 yield path

@@ -1,4 +1,4 @@
-"""What is compared: what is requested, as one value, and the clips that were found in the recordings."""
+"""The subject of a comparison: the request as one value, and the clips that were found in the recordings."""
 
 from __future__ import annotations
 
@@ -22,18 +22,19 @@ from .comparison_steps import ClipOf
 from .steps import RunError
 
 MOST_FRAMES = 216_000
-"""Frames of a film at most: an hour at 60 frames a second."""
+"""The largest number of frames of a film: an hour at 60 frames per second."""
 
 MOST_POSES = 600_000
-"""Frames times joints of a film of a body, whose rigs take half a kilobyte for each in every lane."""
+"""The largest number of frames times joints of a film of a body: a rig takes half a kilobyte for each, in every
+lane."""
 
 RATE_MARGIN = 0.01
-"""Share by which a rate may be above that of a recording: 90 Hz are often 89.9 in truth."""
+"""Fraction by which a rate may exceed that of the recording: a nominal 90 Hz is often 89.9."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Recordings to compare, and what is requested of them."""
+    """The recordings to compare, and all settings of the comparison."""
 
     sources: tuple[str, ...]
     """Sources as the user gave them: FILE, FILE:BODY, FILE:*."""
@@ -41,52 +42,52 @@ class Comparison:
     choices: tuple[Choice, ...]
     modes: tuple[str, ...]
     against: str = ""
-    """The source of a motion that is shown beside the modes: somebody else's, of the one clip that there is then."""
+    """The source of another motion to show next to the modes, if there is only one clip."""
 
     reference: str = REFERENCE
-    """The mode that the others are held against."""
+    """The mode that the others are compared with."""
 
     axes: str | None = None
     """A name in `axes.AXES`; None for the axes of each format."""
 
     held: tuple[tuple[str, str], ...] = ()
-    """Names of clips, one that is held and its holder: pairs whose slip is measured beside those that are found."""
+    """Pairs of clip names (held, holder) whose slip is measured in addition to the pairs that are found."""
 
     reading: ReadingOptions = AS_THE_FILE_SAYS
     radii: Radii = EVERYWHERE
     shared: bool = False
-    """True if the joints of a body have their keys at the same samples where the motion chooses them."""
+    """Whether adaptive keys of a body are at the same samples for all joints."""
 
     count_keys: bool = False
-    """True to find how many keys every mode needs."""
+    """Whether to find how many keys every mode needs."""
 
     fit: bool = False
-    """True to find, too, how many keys are needed where they may be fitted."""
+    """Whether to find also how many keys are needed if keys may be fitted."""
 
     stage: SceneSettings | None = None
     """The stage of the films; None for a run without films."""
 
     every_film: bool = False
-    """True if there is a film of every choice of keys, otherwise only of the one that the verdict speaks of."""
+    """Whether every choice of keys gets a film, or only the choice that the verdict is about."""
 
     about: PageSettings | None = None
     """Facts of the run that pages show; None for a run without pages."""
 
     subject: str = next(iter(MODELS))
-    """The object that rigid bodies move, as `place_of_subject` takes it; on pages the first of `MODELS` without
-    Blender."""
+    """The object that rigid bodies move, as for `place_of_subject`. Pages without Blender show the first of
+    `MODELS`."""
 
     blender: str = ""
-    """The version of the Blender that films and reads; empty where there is none."""
+    """The version of the Blender that films and reads; empty if there is none."""
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """A clip, with the choices of keys that it is long enough for."""
+    """A clip, with the choices of keys for which it is long enough."""
 
     clip: ClipOf
     reader: str
-    """The key of the task that reads it."""
+    """The key of the task that reads the clip."""
 
     facts: ClipFacts = field(repr=False)
     choices: dict[Choice, tuple[float, float]]
@@ -108,9 +109,9 @@ class Study:
 def held_pairs(
     studies: Sequence[Study], comparison: Comparison, read: Callable[[Study], Clip]
 ) -> list[tuple[Study, Study]]:
-    """Return the pairs of which one holds the other: those that the user names, and those that are found in a file.
+    """Return the pairs (holder, held): pairs that the user names, and pairs that are found in a file.
 
-    Raises RunError where a pair that is named is none.
+    Raises RunError if a named pair is not valid.
     """
     known = {study.name: study for study in studies}
     result: dict[frozenset[str], tuple[Study, Study]] = {}
@@ -146,7 +147,7 @@ def held_pairs(
 
 
 def rates_above(times: np.ndarray, choices: Iterable[Choice]) -> list[str]:
-    """Return what to say of rates that are above that of a recording with these times, shape (n,)."""
+    """Return warnings about rates above that of a recording with these times, shape (n,)."""
     rate = 1.0 / float(np.median(np.diff(times)))
     above = [choice.rate for choice in choices if choice.rate and float(choice.rate) > rate * (1.0 + RATE_MARGIN)]
     return (

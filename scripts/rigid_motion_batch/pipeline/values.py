@@ -1,6 +1,6 @@
-"""Values as JSON and arrays, and back: dataclasses of numbers, text, tuples, mappings, arrays and one another.
+"""Values as JSON and arrays, and back: dataclasses of numbers, text, tuples, mappings, arrays and other dataclasses.
 
-A dataclass becomes an object with its module and name under "$". Arrays go into an .npz beside the JSON.
+A dataclass becomes an object with its module and name under "$". Arrays go into an .npz next to the JSON.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ CLASS, ARRAY = "$", "array"
 
 
 def plain(value: Any, arrays: MutableMapping[str, Any] | None = None) -> Any:
-    """Return a dataclass or a number of NumPy for JSON, as `json.dumps(..., default=plain)` asks for it.
+    """Return a dataclass or NumPy number as plain data, for `json.dumps(..., default=plain)`.
 
-    NumPy arrays go into `arrays`, each under a number; without it there may be none.
+    NumPy arrays go into `arrays`, each under a number; without `arrays`, an array raises TypeError.
     """
     if is_dataclass(value):
         kind: type = type(value)
@@ -39,7 +39,7 @@ def plain(value: Any, arrays: MutableMapping[str, Any] | None = None) -> Any:
 
 
 def write(stem: Path, value: Any) -> None:
-    """Write a value to STEM.json, and its arrays, if it has any, to STEM.npz."""
+    """Write a value to STEM.json, and its arrays, if any, to STEM.npz."""
     arrays: dict[str, Any] = {}
     stem.with_suffix(".json").write_text(json.dumps(value, default=partial(plain, arrays=arrays)), encoding="utf-8")
     if arrays:
@@ -47,9 +47,9 @@ def write(stem: Path, value: Any) -> None:
 
 
 def read(kind: type[T], stem: Path) -> T:
-    """Read a value of this type that was written, lists as tuples.
+    """Read a value of this type that `write` has written, with lists as tuples.
 
-    Raises OSError, ValueError or KeyError where it is damaged, or of a class that is not loaded, or no dataclass.
+    Raises OSError, ValueError or KeyError if the file is damaged, or names a class that is not loaded or no dataclass.
     """
     arrays: dict[str, Any] = {}
     if stem.with_suffix(".npz").exists():
@@ -62,7 +62,7 @@ def read(kind: type[T], stem: Path) -> T:
 
 
 def _value(content: Any, arrays: Mapping[str, Any]) -> Any:
-    """Return the value of what was read from JSON."""
+    """Return the value of content read from JSON."""
     if isinstance(content, list):
         return tuple(_value(item, arrays) for item in content)
     if not isinstance(content, dict):
@@ -73,7 +73,7 @@ def _value(content: Any, arrays: Mapping[str, Any]) -> Any:
     if CLASS not in content:
         return content
     module, _, name = content.pop(CLASS).partition(":")
-    kind = getattr(sys.modules.get(module), name, None)  # A file loads no module: who reads has loaded it.
+    kind = getattr(sys.modules.get(module), name, None)  # Reading loads no modules: the reader has loaded the class.
     if not (isinstance(kind, type) and is_dataclass(kind)):
         raise ValueError(f"{module}:{name} is not a class of values")
     return kind(**content)
