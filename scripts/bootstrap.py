@@ -60,37 +60,37 @@ COMMANDS = {
     "docs": ([ROOT / "scripts" / "build_site.py"], ("benchmark", "docs")),
     "types": (["-m", "mypy"], ("types",)),
 }
-"""Command to what Python runs for it, and the dependency groups of pyproject.toml that it needs."""
+"""Command to the arguments of Python, and the dependency groups of pyproject.toml that it needs."""
 
 ENVIRONMENT = "environment"
-"""Sets up all but Blender, and prints the folder."""
+"""The command that sets up everything except Blender, and prints the folder."""
 
 WITHOUT_BLENDER = ("inspect", "clean", "stream", "openjd", "types")
-"""Need no Blender."""
+"""Commands that need no Blender."""
 
 IN_ROOT = ("test", "types")
-"""Run in the folder of the project."""
+"""Commands that run in the folder of the project."""
 
 FILMING = ("compare", "bundle")
 NOT_FILMING = {"--no-video", "--blender"}
-"""Commands that need none with one of these options."""
+"""Commands that need no Blender with one of these options."""
 
 TESTED_ALONE = "not blender"
-"""How the marks begin that choose tests which need none, so they run where there is none."""
+"""The start of a `-m` expression of pytest that selects tests without Blender."""
 
 DRAWING = "paper"
-"""Needs Blender for its --help too."""
+"""The command that needs Blender even for its --help."""
 
 GLTF = (".glb", ".gltf", ".vrm", ".vrma")
 TABLES = (".csv", ".tsv", ".txt", ".tum", ".chan", ".g2o", ".json")
-"""Endings of the inputs that reduce needs none for, of tables only where no other files are made of them."""
+"""Extensions of inputs for which reduce needs no Blender; for tables only if they become tables."""
 
 IN_BLENDER = (".blend", ".bvh", ".fbx")
-"""Endings of those that it needs one for, and takes of folders."""
+"""Extensions of inputs for which reduce needs Blender, and which it takes from folders."""
 
 
 def main(arguments: list[str]) -> int:
-    """Set up, run, and pass on the exit code."""
+    """Set up an environment, run the command in it, and return its exit code."""
     if not arguments or arguments[0] in ("-h", "--help"):
         print(__doc__.strip())
         return 0
@@ -99,7 +99,7 @@ def main(arguments: list[str]) -> int:
         near = difflib.get_close_matches(command, (*COMMANDS, ENVIRONMENT), n=1)
         meant = f": did you mean {near[0]}?" if near else ""
         return _fail(f"there is no command {command!r}{meant}\nThe commands are {', '.join(COMMANDS)}.")
-    if sys.version_info < (3, 11):  # noqa: UP036 - whoever starts it with another Python is to read why
+    if sys.version_info < (3, 11):  # noqa: UP036 - users of an older Python should read this
         return _fail(f"Python {PYTHON} is too old: run this with Python 3.11 or 3.13")
     project = _project()
     if command == ENVIRONMENT:
@@ -127,13 +127,13 @@ def main(arguments: list[str]) -> int:
         return _fail(f"Blender has no wheel for Python {PYTHON}: run this with Python {fitting}{without}")
     run, groups = COMMANDS[command]
     if command == "types":
-        # The types of Blender's modules would be imported in place of those.
+        # Otherwise Blender's modules would be imported for their types, instead of the stubs.
         python = install(None, _requirements(project, None, groups), ROOT / ".venv" / f"types-python-{PYTHON}")
     else:
         python = install(blender, _requirements(project, blender, groups))
     if python is None or (needed and not _blender_starts(python)):
         return 1
-    # Paths that a user gives count from where the user is; those of pytest and mypy from where their configuration is.
+    # Paths from the user are relative to the current folder; paths of pytest and mypy to their configuration.
     folder = ROOT if command in IN_ROOT else None
     variables = environment(os.environ)
     if run[0] == "-m" and command not in IN_ROOT:
@@ -142,7 +142,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _become(command: list, folder: Path | None, variables: Mapping[str, str]) -> int:
-    """Run a command in the place of this process, so that signals reach it, or wait for it where that is not known."""
+    """Replace this process by a command, so that signals reach it; on Windows, run it and wait."""
     if os.name != "nt":
         os.chdir(folder or ".")
         os.execve(command[0], list(map(str, command)), variables)
@@ -150,9 +150,9 @@ def _become(command: list, folder: Path | None, variables: Mapping[str, str]) ->
 
 
 def environment(environ: Mapping[str, str]) -> dict[str, str]:
-    """Return what programs run in: as here, but where Python is to leave no bytecode in folders, it goes into .venv/.
+    """Return the environment for programs: as here, but bytecode goes into .venv/ if it may not go into folders.
 
-    Without any, every process compiles all of the program again, and pytest all that it asserts with.
+    Without bytecode, every process would compile the whole program again, and pytest all modules with assertions.
     """
     ours = dict(environ)
     if ours.pop("PYTHONDONTWRITEBYTECODE", ""):
@@ -161,16 +161,16 @@ def environment(environ: Mapping[str, str]) -> dict[str, str]:
 
 
 def _is_program(arguments: list[str]) -> bool:
-    """Whether --blender names a program to film with, and no version."""
+    """Whether --blender names a program for filming, not a version."""
     named = arguments[arguments.index("--blender") + 1 :][:1]
     return bool(named) and not named[0].replace(".", "").isdecimal()
 
 
 def _is_without_blender(arguments: list[str]) -> bool:
-    """Return whether all inputs of reduce are glTF files that stay such, or tables that become tables.
+    """Return whether all inputs of reduce are glTF files that stay glTF, or tables that become tables.
 
-    What follows an option is its value, unless it is there as a file: better a Blender too many than one too few. Of
-    folders what is in them counts.
+    An argument after an option counts as its value, unless a file of that name exists: an unneeded Blender does less
+    harm than a missing one. For folders, their contents count.
     """
     inputs = [
         argument
@@ -184,13 +184,13 @@ def _is_without_blender(arguments: list[str]) -> bool:
 
 
 def _in_folder(folder: str) -> list[str]:
-    """Return the names of the files in a folder and below it that reduce takes."""
+    """Return the names of the files that reduce takes from a folder and below it."""
     endings = (*GLTF, *IN_BLENDER, *TABLES)
     return [name for _, _, names in os.walk(folder) for name in names if name.lower().endswith(endings)]
 
 
 def _is_there(source: str) -> bool:
-    """Return whether a file is there, or one of which a body is named behind a colon."""
+    """Return whether a file exists, also if a body is named after a colon."""
     return os.path.exists(source) or os.path.exists(source.rpartition(":")[0])
 
 
@@ -199,9 +199,9 @@ def _folder(blender: str | None) -> Path:
 
 
 def install(blender: str | None, requirements: list[str], folder: Path | None = None) -> Path | None:
-    """Return the Python of an environment with these requirements, made or completed where need be; None on failure.
+    """Return the Python of an environment with these requirements, set up if necessary; None on failure.
 
-    It is in `.venv/` unless a folder is given.
+    The environment is in `.venv/` unless a folder is given.
     """
     folder = folder.absolute() if folder else _folder(blender)
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
@@ -218,14 +218,14 @@ def install(blender: str | None, requirements: list[str], folder: Path | None = 
             return None
         shutil.rmtree(folder, ignore_errors=True)
         try:
-            import ensurepip  # noqa: F401 - Debian has it in a package of its own
+            import ensurepip  # noqa: F401 - a separate package in Debian
             import venv
 
             venv.create(folder, with_pip=True)
         except (ImportError, subprocess.CalledProcessError) as error:
             _fail(f"this Python cannot make an environment ({error}): install its modules venv and ensurepip")
             return None
-    # Standard output is for what the command prints.
+    # Standard output is for the command's own output.
     pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *requirements]
     if subprocess.call(pip, cwd=ROOT, stdout=sys.stderr) != 0:
         _fail("the packages above could not be installed; with the network back, the same command continues")
@@ -235,14 +235,14 @@ def install(blender: str | None, requirements: list[str], folder: Path | None = 
 
 
 def _project() -> dict:
-    # Python 3.11 brought it; older ones are to get this far, and be told.
+    # tomllib came with Python 3.11; users of an older Python should get the message first.
     import tomllib
 
     return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
 def _requirements(project: dict, blender: str | None, groups: tuple[str, ...]) -> list[str]:
-    """Return the pinned packages of pyproject.toml, with this Blender."""
+    """Return the pinned packages of pyproject.toml, with this version of Blender."""
     pins = project["tool"]["rigid-motion"]["numpy"]
     numpy = pins.get(PYTHON) or [*pins.values()][-1]
     listed = [*([f"bpy=={blender}"] if blender else []), f"numpy=={numpy}"]

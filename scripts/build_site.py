@@ -18,7 +18,7 @@ from rigid_motion_batch.command_line import parser_of
 ROOT = Path(__file__).resolve().parents[1]
 
 OTHER_PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "assets/README.md", "examples")
-"""What pages show or link to that is not in docs/."""
+"""Files and folders outside docs/ that pages show or link to."""
 
 EPILOG = """
 examples:
@@ -32,7 +32,7 @@ Exit code: 0 done, 1 Sphinx warned of something, 2 it could not be built.
 
 
 class SiteError(Exception):
-    """Why there is no site, in words for whoever asked for it."""
+    """The reason why there is no site, as a message for the user."""
 
 
 def build(folder: Path) -> Path:
@@ -41,11 +41,11 @@ def build(folder: Path) -> Path:
     Raises
     ------
     SiteError
-        Where Sphinx is missing or the folder is something else than a site. The message says the way out.
+        If Sphinx is missing, or the folder exists and is no site. The message says what to do.
     subprocess.CalledProcessError
-        Where Sphinx warns of something, which it has printed then. The folder is as it was.
+        If Sphinx printed a warning. The folder does not change.
     OSError
-        Where the folder cannot be written.
+        If the folder cannot be written.
     """
     if find_spec("sphinx") is None:
         raise SiteError("Sphinx is missing: run `python scripts/bootstrap.py docs`, which brings it")
@@ -66,7 +66,7 @@ def build(folder: Path) -> Path:
 
 
 def stage(folder: Path) -> Path:
-    """Copy all that pages are made of, and return the copy of docs/: Sphinx adds a page for each public name to it."""
+    """Copy all sources of pages, and return the copy of docs/: Sphinx adds a page for each public name to it."""
     pages = folder / "docs"
     shutil.copytree(ROOT / "docs", pages, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     for name in OTHER_PAGES:
@@ -77,7 +77,7 @@ def stage(folder: Path) -> Path:
 
 
 def is_site(folder: Path) -> bool:
-    """Whether a folder is what `build` leaves."""
+    """Whether a folder is a site made by `build`."""
     return (folder / "index.html").is_file() and (folder / ".buildinfo").is_file()
 
 

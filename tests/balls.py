@@ -1,14 +1,14 @@
-"""The largest displacement of any point of a ball, by singular values: apart from the program's own formula."""
+"""The largest displacement of any point of a ball, by singular values: independent of the program's own formula."""
 
 import numpy as np
 
 
 def largest_displacements(offsets: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """By how much the farthest points move, shape (...), of balls that move by offsets (..., 3) and turn and grow.
+    """Return how far the farthest points move, shape (...), of balls that move by offsets (..., 3), turn and scale.
 
-    `turns` (..., 3, 3) are differences of two matrices, times the radius: they make an ellipsoid of the ball, with an
-    axis of symmetry, the shortest one. The point that gets furthest is in the plane of that axis and the displacement
-    of the centre; it is searched for.
+    `turns` (..., 3, 3) are differences of two matrices, times the radius: they map the ball to an ellipsoid with an
+    axis of symmetry, its shortest axis. The farthest point is in the plane of that axis and the displacement of the
+    centre; it is found by search.
     """
     axes, sizes, _ = np.linalg.svd(turns)
     moved = np.abs(np.einsum("...ij,...i->...j", axes, offsets))

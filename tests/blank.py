@@ -1,18 +1,18 @@
-"""A new file without objects at factory settings, as often as tests ask for one."""
+"""New empty files at factory settings, cheap enough for every test."""
 
 import bpy
 
 Settings = list[tuple[str, str, object]]
 
 _factory: Settings = []
-"""Blender's preferences as it comes, once they were asked for."""
+"""Blender's factory preferences, once they have been read."""
 
 
 def blank() -> bpy.types.Context:
-    """Begin a new file without objects, at factory settings.
+    """Start a new file without objects, at factory settings.
 
-    Blender loads all of its add-ons anew with factory settings, six times the work of a new file: that is done only
-    where the preferences are no longer as they come.
+    With factory settings, Blender loads all of its add-ons again, which takes six times as long as a new file: that
+    happens only if the preferences have changed.
     """
     if _factory and _preferences() == _factory:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -23,7 +23,7 @@ def blank() -> bpy.types.Context:
 
 
 def _preferences() -> Settings:
-    """Every preference that is one value or a list of values, but for colours; and which add-ons are on."""
+    """Return every preference that is one value or a list of values, except colours, and the enabled add-ons."""
     preferences = bpy.context.preferences
     result: Settings = [("addons", entry.module, True) for entry in preferences.addons]
     for part in preferences.bl_rna.properties:

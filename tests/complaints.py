@@ -1,4 +1,4 @@
-"""What the program logs as an error where it must not raise one, as in handlers: Blender would swallow it."""
+"""Errors that the program logs where it must not raise them, as in handlers: Blender would swallow an exception."""
 
 import logging
 
@@ -6,6 +6,6 @@ import pytest
 
 
 def complaints(caplog: pytest.LogCaptureFixture) -> list[str]:
-    """The errors of a test so far, in all its phases; `caplog.records` begins anew with each of them."""
+    """Return the errors of a test so far, in all its phases; `caplog.records` starts again with each phase."""
     records = [record for phase in ("setup", "call", "teardown") for record in caplog.get_records(phase)]
     return [record.getMessage() for record in records if record.levelno >= logging.ERROR]

@@ -1,7 +1,7 @@
-"""How all tests run: markers, libraries that are not installed, and several files side by side.
+"""Configuration of all tests: markers, missing libraries, and parallel runs of several files.
 
-Nothing here needs Blender: `tests/motion` runs with NumPy and pytest alone. What tests in Blender share is in
-`tests/in_blender.py`. More than one file of tests runs side by side, in a process for each processor; see
+Nothing here needs Blender: `tests/motion` runs with NumPy and pytest alone. Fixtures for tests in Blender are in
+`tests/in_blender.py`. If more than one test file is run, they run in parallel, one process per processor; see
 `pytest_cmdline_main`.
 """
 
@@ -21,21 +21,21 @@ pytest_plugins = ["tests.in_blender"] if find_spec("bpy") else []
 
 ROOT = Path(__file__).resolve().parents[1]
 os.environ["PYTHONPATH"] = os.pathsep.join(str(ROOT / folder) for folder in ("", "addon", "scripts"))
-"""Processes that tests start find what the tests find; pytest has put these on the path of its own alone."""
+"""Lets processes started by tests import the same modules as the tests: pytest extends only its own path."""
 
 EVERY_TEST, THOROUGH, QUICK = "RIGID_MOTION_EVERY_TEST", "RIGID_MOTION_THOROUGH", "RIGID_MOTION_QUICK"
 
 WORKERS = 8
-"""The most that are started: each is a Blender of half a gigabyte, which first collects all tests."""
+"""The largest number of workers: each is a Blender of half a gigabyte, which first collects all tests."""
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LP_NUM_THREADS")
-"""How many NumPy takes, and OpenGL in software."""
+"""Variables for the number of threads of NumPy, and of OpenGL in software."""
 
 BLENDERS_OWN = ("OCIO", "SYCL_UR_USE_LEVEL_ZERO_V2")
-"""What Blender 5.2 puts into the environment of its process, past `os.environ`; another Blender complains of it."""
+"""Variables that Blender 5.2 sets in its process, bypassing `os.environ`; another Blender complains about them."""
 
-OURS = {"assets", "examples", "research", "rigid_motion", "rigid_motion_batch", "tests"}
-"""A part of these that is not there is a fault, and no missing library."""
+OWN_PACKAGES = {"assets", "examples", "research", "rigid_motion", "rigid_motion_batch", "tests"}
+"""The project's own packages: a missing module of theirs is an error, not a missing library."""
 
 IN_BLENDER = {"empty_file", "human", "extension_zip", "models"}
 """Fixtures that need Blender's module."""
@@ -44,10 +44,10 @@ NEEDS_BLENDER = re.compile(
     r"""^(import|from) (bpy|mathutils)|^\w+ = pytest\.importorskip\("bpy|^pytestmark = \[?\s*pytest\.mark\.blender""",
     re.MULTILINE,
 )
-"""How a file of tests, or the `conftest.py` of a folder, says that all of it needs Blender's module."""
+"""A line that marks a test file, or the `conftest.py` of a folder, as needing Blender's module throughout."""
 
 LOST = pytest.StashKey[bool]()
-"""Whether a worker ended before its time."""
+"""Whether a worker ended too early."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -56,17 +56,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_cmdline_main(config: pytest.Config) -> None:
-    """Have more than one file of tests run by workers side by side.
+    """Run tests in parallel workers if more than one file is to run.
 
-    One file runs in this process, where it begins sooner, and so does what is to be seen or stopped while it runs. `-n`
-    says how many workers it shall be in any case, `-n 0` that there shall be none.
+    A single file runs in this process, where it starts sooner. So do tests that are watched or debugged while they run.
+    `-n` sets the number of workers in any case; `-n 0` means none.
     """
     option = config.option
     at_liberty = getattr(option, "numprocesses", 0) is None and not hasattr(config, "workerinput")
     watched = option.usepdb or option.trace or option.capture == "no"
     if at_liberty and not watched and _has_several_files(config):
         option.numprocesses = "auto"
-        # A worker begins with neighbouring tests, which share what a module sets up, and helps others when it is done.
+        # Each worker starts with neighbouring tests, which share fixtures of a module, and helps others when done.
         option.dist = "worksteal" if option.dist == "no" else option.dist
 
 
@@ -84,7 +84,7 @@ def pytest_xdist_auto_num_workers() -> int:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_setupnodes(specs: list) -> None:
-    """Start workers in an environment as if no Blender was here, each with its share of the processors."""
+    """Start workers in an environment without Blender's own variables, each with its share of the processors."""
     for name in BLENDERS_OWN:
         if name not in os.environ:
             os.unsetenv(name)
@@ -96,7 +96,7 @@ def pytest_xdist_setupnodes(specs: list) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: object, error: object | None) -> None:
-    """A worker that crashed between two tests has lost none, and would be missed by nobody."""
+    """Record a worker that crashed between two tests: no test fails from that, so the crash would go unnoticed."""
     if error:
         node.config.stash[LOST] = True
 
@@ -107,7 +107,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Begin: a shell lets what it runs in the background ignore Ctrl-C, and all that is started from there."""
+    """Restore Ctrl-C, which shells let background processes and their children ignore."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if config.option.quick:
         os.environ[QUICK] = "1"
@@ -121,12 +121,12 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_make_collect_report(collector: pytest.Collector):
-    """Skip a file of tests that needs a library which is not installed, unless every test has to run."""
+    """Skip a test file that needs a library that is not installed, unless every test has to run."""
     report = yield
     error = report.call.excinfo.value.__cause__ if report.failed else None
     if (
         isinstance(error, ModuleNotFoundError)
-        and error.name.split(".")[0] not in OURS
+        and error.name.split(".")[0] not in OWN_PACKAGES
         and not os.environ.get(EVERY_TEST)
     ):
         report.outcome = "skipped"
@@ -135,7 +135,7 @@ def pytest_make_collect_report(collector: pytest.Collector):
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave files alone that need Blender where those are asked for that need none, and the other way round."""
+    """Ignore files that need Blender if tests without Blender are selected, and the other way round."""
     expression = config.option.markexpr
     if "not blender" in expression:
         return needs_blender(collection_path) or None
@@ -144,24 +144,24 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def may_need_blender(path: Path) -> bool:
-    """Return whether any test of a file may need Blender's module: all of it, or one by a mark or a fixture."""
+    """Return whether any test of a file may need Blender's module: the whole file, or a test with a mark or fixture."""
     asks = re.compile("|".join(("mark.blender", *IN_BLENDER)))
     return needs_blender(path) or bool(asks.search(path.read_text(encoding="utf-8")))
 
 
 @functools.cache
 def needs_blender(path: Path) -> bool:
-    """Return whether a file of tests needs Blender's module, or a folder, whose `conftest.py` says it for all in it."""
+    """Return whether a test file needs Blender's module, or a folder, by its `conftest.py`."""
     file = path / "conftest.py" if path.is_dir() else path
     says = file.suffix == ".py" and file.is_file() and NEEDS_BLENDER.search(file.read_text(encoding="utf-8"))
     return bool(says) or (path != ROOT and ROOT in path.parents and needs_blender(path.parent))
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what needs Blender, and what opens windows of it; leave out what is slow.
+    """Mark tests that need Blender, and tests that open its windows; deselect slow ones.
 
-    Slow tests run where every test has to, in thorough runs, where `-m` chooses, and where their file is named alone.
-    A quick run takes the first test of each file that is not slow, nor is once enough.
+    Slow tests run if every test has to run, in thorough runs, if `-m` selects them, and if their file is run alone. A
+    quick run takes the first test of each file that is marked neither slow nor once.
     """
     for item in items:
         if needs_blender(item.path) or IN_BLENDER & {*item.fixturenames}:
@@ -174,7 +174,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         left_out = {"slow", "once"}
     kept = [item for item in items if not any(map(item.get_closest_marker, left_out))]
     if config.option.quick:
-        # Random edits take their time however few they are.
+        # Tests of random edits take long even with few examples.
         kept = [item for item in kept if not (item.cls and issubclass(item.cls, unittest.TestCase))]
         kept = [*{item.path: item for item in reversed(kept)}.values()][::-1]
     config.hook.pytest_deselected(items=[*{*items} - {*kept}])
@@ -188,9 +188,9 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item):
-    """Where every test has to run, as in continuous integration, one that was skipped has failed.
+    """Turn skipped tests into failures if every test has to run, as in continuous integration.
 
-    But for those that need recordings, which a checkout need not have beside it.
+    Tests that need recordings are exempt: a checkout need not have the recordings next to it.
     """
     report = yield
     excused = hasattr(report, "wasxfail") or item.get_closest_marker("recordings")

@@ -1,4 +1,4 @@
-"""A disk that gets full."""
+"""A simulated full disk."""
 
 import resource
 from collections.abc import Iterator
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def disk_full_after(size: int) -> Iterator[None]:
-    """Let no file grow larger than so many bytes: Blender's writing ends there, as on a full disk."""
+    """Limit files to `size` bytes within the block: Blender's writing fails there, as on a full disk."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:

@@ -1,4 +1,4 @@
-"""What tests in Blender share: `bpy` is imported first, since `mathutils` comes with it. A plugin of pytest."""
+"""Fixtures for tests in Blender, as a pytest plugin: it imports `bpy` first, since `mathutils` comes with it."""
 
 import os
 import sys
@@ -14,7 +14,7 @@ from tests.blank import blank
 from tests.rigs import human as rigify
 
 STATUS = pytest.StashKey[int]()
-"""How the session ended."""
+"""The exit status of the session."""
 
 
 @pytest.hookimpl(wrapper=True)
@@ -26,7 +26,7 @@ def pytest_sessionfinish(session: pytest.Session):
 
 @pytest.hookimpl(trylast=True)
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Leave without taking Blender 4.5's module down, which can wait forever long after the last test."""
+    """Exit without shutting down Blender 4.5's module, which can hang forever after the last test."""
     status = config.stash.get(STATUS, None)
     if bpy.app.version < (5, 0) and status is not None:
         sys.stdout.flush()
@@ -42,7 +42,7 @@ def empty_file() -> bpy.types.Context:
 
 @pytest.fixture
 def extension(empty_file: bpy.types.Context) -> Iterator[bpy.types.Context]:
-    """A new file, and the extension as it is when Blender has switched it on."""
+    """A new file with the extension registered, as if Blender had enabled it."""
     rigid_motion.register()
     try:
         yield empty_file
@@ -61,5 +61,5 @@ def human(empty_file: bpy.types.Context) -> bpy.types.Object:
 
 @pytest.fixture(scope="session")
 def extension_zip(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What users install, built from this checkout."""
+    """The zip that users install, built from this checkout."""
     return build(tmp_path_factory.mktemp("dist"))

@@ -1,4 +1,4 @@
-"""Other people's recordings, which are not part of the project, and beside the checkout where they are kept at all."""
+"""Recordings of others, which are not part of the project; they may exist next to the checkout."""
 
 from pathlib import Path
 

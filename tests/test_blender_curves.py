@@ -1,4 +1,4 @@
-"""`bezier` is what Blender makes of the same keys: evaluated by Blender itself, on recordings and random keys."""
+"""Tests of `bezier` against Blender: the same keys evaluated by Blender itself, on recordings and random keys."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from tests.recordings import RECORDINGS
 PATHS = {"location": 3, "rotation_quaternion": 4, "scale": 3}
 
 EVERY = 0.125
-"""Frames are looked at so far apart: in single precision they are what they are."""
+"""Frames between compared samples: exact in single precision."""
 
 
 def shown_by_blender(frames: np.ndarray, keys: Poses, at: np.ndarray) -> Poses:
-    """Return the poses that Blender shows between keys as it inserts them by default."""
+    """Return the poses that Blender shows between keys that are inserted with its defaults."""
     blank()
     obj = bpy.data.objects.new("Tool", None)
     obj.rotation_mode = "QUATERNION"
@@ -56,7 +56,7 @@ def assert_same(frames: np.ndarray, keys: Poses) -> None:
 def test_random_keys(seed):
     random = np.random.default_rng(seed)
     count = int(random.integers(2, 24))
-    # Handles are a third of the way, which single precision has to a part of a millionth of the frame.
+    # Handles are a third of a segment away; single precision rounds them to less than a millionth of a frame.
     frames = np.cumsum(random.integers(1, 9, count)).astype(float)
     positions = random.normal(size=(count, 3)).round(1 if seed % 3 else 9)
     quaternions = align_signs(normalise(random.normal(size=(count, 4))))
@@ -67,11 +67,11 @@ def test_random_keys(seed):
 FOLDERS = (ASSETS, RECORDINGS, RECORDINGS.parent / "rigs")
 
 FROM_SKELETONS = ("hips", "head", "lefthand", "rightfoot")
-"""Joints of whole bodies that are tracks of their own, by where each is in the space of the roots."""
+"""Joints of whole bodies that are used as tracks, by their motion in the space of the roots."""
 
 
 def tracks() -> list[tuple[Path, str]]:
-    """Return the devices and the joints that there are: in assets/, and in the recordings of others where those are."""
+    """Return all tracks as (path, name): devices and joints in assets/, and in other recordings if they exist."""
     result = []
     for folder in FOLDERS:
         tables = sorted(path for path in folder.glob("*") if path.suffix in (".csv", ".tum"))
@@ -81,7 +81,7 @@ def tracks() -> list[tuple[Path, str]]:
 
 
 def poses_of(path: Path, name: str) -> tuple[np.ndarray, Poses]:
-    """Return times (n,) in seconds and poses (n,) in metres of a track."""
+    """Return the times (n,) in seconds and the poses (n,) in metres of a track."""
     skeleton = path.suffix == ".bvh"
     clip = read_clips([f"{path}:{name}" if name and not skeleton else str(path)], "blender")[0][0]
     poses = clip.in_metres(clip.poses)
@@ -105,7 +105,7 @@ def test_recordings(path, name, rate):
     times, poses = poses_of(path, name)
     times = 24.0 * times
     kept = decimate(times, rate / 24.0)
-    # As Blender has keys: frames that single precision knows, apart from one another, and not so far that it rounds.
+    # Frames as Blender stores keys: exact in single precision, distinct, and small enough not to be rounded.
     kept = kept[times[kept] < 250.0]
     frames = np.round(times[kept] / EVERY) * EVERY
     kept, frames = kept[np.diff(frames, prepend=-1.0) > 0.0], frames[np.diff(frames, prepend=-1.0) > 0.0]

@@ -1,4 +1,4 @@
-"""The drawings in docs/ are what their scripts draw today."""
+"""Tests that the drawings in docs/ are up to date with their scripts."""
 
 import runpy
 import sys

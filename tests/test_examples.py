@@ -1,4 +1,4 @@
-"""The examples: what their READMEs say is typed as it stands there, and what it makes is measured."""
+"""Tests of the examples: the commands in their READMEs are run as written, and their results are measured."""
 
 import csv
 import re
@@ -22,12 +22,12 @@ from tests.scripts.comparing import outputs
 EXAMPLES = Path(make_examples.__file__).parent
 
 SINGLE = 1e-5
-"""Metres: what the single precision of Blender's matrices leaves."""
+"""Allowed rounding in metres: Blender's matrices are in single precision."""
 
 
 @pytest.fixture
 def make(tmp_path: Path) -> Callable[[str], str]:
-    """Run all that a README says in a copy of the examples, and return what it prints."""
+    """Return a function that runs all commands of a README in a copy of the examples, and returns their output."""
     make_examples.copy_to(tmp_path)
     return lambda name: make_examples.run_readme(name, tmp_path)
 
@@ -37,13 +37,13 @@ def readme(name: str) -> str:
 
 
 def table(name: str) -> list[list[str]]:
-    """The rows of the table in a README, the head first."""
+    """Return the rows of the table in a README, the header first."""
     rows = [line.strip("|").split("|") for line in readme(name).splitlines() if line.startswith("| ")]
     return [[cell.strip() for cell in row] for row in rows]
 
 
 def claims(name: str) -> list[str]:
-    """The lines that a README says are printed."""
+    """Return the lines that a README says are printed."""
     return [line[4:] for line in re.findall(r"^ {4}\S.*$", readme(name), re.M) if "bootstrap.py" not in line]
 
 
@@ -53,7 +53,7 @@ def measured(path: Path) -> list[dict[str, str]]:
 
 
 def play(blend: Path, look: Callable[[bpy.types.Depsgraph], Sequence]) -> np.ndarray:
-    """What is seen on each frame of a file, without the extension, shape (frames, ...)."""
+    """Return what `look` sees on each frame of a file without the extension, shape (frames, ...)."""
     bpy.ops.wm.open_mainfile(filepath=str(blend), use_scripts=False)
     scene, result = bpy.context.scene, []
     for frame in range(scene.frame_start, scene.frame_end + 1):
@@ -67,7 +67,7 @@ def matrix(depsgraph: bpy.types.Depsgraph, name: str) -> object:
 
 
 def keys_of(name: str) -> int:
-    """How many frames an object has keys of location on."""
+    """Return the number of frames on which an object has location keys."""
     moved = bpy.data.objects[name].animation_data
     curve = moved.action.layers[0].strips[0].channelbag(moved.action_slot).fcurves.find("location")
     return len(curve.keyframe_points)

@@ -1,4 +1,4 @@
-"""The glossary lists what it explains, and links between the pages of the checkout lead somewhere."""
+"""Tests of the glossary's list of entries, and of links between the pages of the checkout."""
 
 import re
 from pathlib import Path
@@ -13,13 +13,13 @@ PAGES = sorted(page for folder in (".", "docs", "assets", "examples/*") for page
 
 
 def anchors(page: str) -> list[str]:
-    """Of the headings of a page, as GitHub and MyST make them."""
+    """Return the anchors of the headings of a page, as GitHub and MyST make them."""
     headings = re.findall(r"^#+ (.+)$", page, re.MULTILINE)
     return [re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings]
 
 
 def links(page: str) -> list[str]:
-    """Of a page to others of the checkout, or to places on it."""
+    """Return the links of a page to other pages of the checkout, or to places on it."""
     result = re.findall(r"\]\(([^)\s]+)\)", page)
     return [link for link in result if not re.match(r"[a-z]+:", link)]
 

@@ -1,4 +1,4 @@
-"""What holds for the whole checkout: one style, one version, a manifest that Blender takes, one way to the network."""
+"""Tests of the whole checkout: one style, one version, a valid manifest, and layered imports."""
 
 import ast
 import itertools
@@ -31,14 +31,14 @@ FLOORS = {
     "ui": {"numpy", *BLENDER, "addon_utils", "blf", "gpu", "gpu_extras", "rna_keymap_ui"},
     "translations": BLENDER,
 }
-"""What each floor of the extension may import beside the standard library and the floors below."""
+"""The modules that each layer of the extension may import, besides the standard library and the layers below."""
 
 GROUND = {"blender", "handlers"}
-"""Modules below all floors, which import none of them."""
+"""Modules below all layers, which import none of them."""
 
 
 def imported(path: Path) -> set[str]:
-    """The top-level names of all modules that a file imports, "." for its own package."""
+    """Return the top-level names of all modules that a file imports, "." for its own package."""
     result = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -111,7 +111,7 @@ def test_a_tag_is_released_with_what_the_changelog_says_of_it_or_refused(tag, ch
 def test_the_extension_imports_downwards_and_nothing_else(floor):
     below = {*GROUND, *itertools.takewhile(lambda name: name != floor, FLOORS)}
     for path in (PACKAGE / floor).rglob("*.py"):
-        # So many dots are the floor itself; one more leads out of it.
+        # This number of dots is the layer itself; one more leads out of it.
         depth = len(path.relative_to(PACKAGE / floor).parts)
         for name in imported(path):
             known = name in FLOORS[floor] or name in sys.stdlib_module_names
@@ -122,7 +122,7 @@ def test_the_extension_imports_downwards_and_nothing_else(floor):
 
 
 ROOMS_OF_NUMBERS = {"fcurves", "evaluation"}
-"""Those of `animation` that need no Blender, as `motion` does not."""
+"""The packages of `animation` that need no Blender, like `motion`."""
 
 
 @pytest.mark.once
@@ -137,7 +137,7 @@ def test_rooms_import_one_another_in_no_ring_and_those_of_numbers_need_no_blende
 
 
 def is_numeric(value: ast.expr) -> bool:
-    """Return whether an expression is a number, or an array or tuple of numbers, as far as can be told from itself."""
+    """Return whether an expression is a number, or an array or tuple of numbers, as far as its syntax tells."""
     calls = [ast.unparse(part.func) for part in ast.walk(value) if isinstance(part, ast.Call)]
     of_numbers = all(re.match(r"(np|math)\.|(float|int|len|max|min|range|round|tuple)$", call) for call in calls)
     others = ast.Subscript, ast.Dict, ast.JoinedStr, ast.comprehension

@@ -1,4 +1,4 @@
-"""Tests in workers, where every test has to run: slow ones do, and what goes wrong makes the whole run red."""
+"""Tests of parallel test runs in which every test must run: slow tests run, and any problem fails the whole run."""
 
 import os
 import subprocess
@@ -22,11 +22,11 @@ def pytest_sessionfinish(session):
 
 
 def run(folder: Path, files: dict[str, str], *options: str) -> subprocess.CompletedProcess:
-    """These files of tests, run from a folder of their own as those of this checkout are."""
+    """Run these test files in a folder of their own, the way the files of this checkout are run."""
     for name, content in {"conftest.py": "from tests.conftest import *", **files}.items():
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(content, encoding="utf-8")
-    # Nothing of these asserts, so no module has to be made ready for that.
+    # These tests contain no assertions, so no module needs rewriting for them.
     options = ("-p", "no:cacheprovider", "--assert", "plain", *options)
     command = [sys.executable, "-m", "pytest", "--rootdir", folder, *options, folder]
     environment = os.environ | {EVERY_TEST: "1"}

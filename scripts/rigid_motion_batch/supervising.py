@@ -1,12 +1,12 @@
-"""A command as two processes: a small one, which stops in time, and its child, which does the work.
+"""Supervision of a command by two processes: a small parent that can always stop, and a child that does the work.
 
 Python cannot interrupt an importer of Blender, the opening of a large file, or a long computation in NumPy. So the
-process that was started runs its own command line once more as a child, in the same terminal and with the same
-streams. It passes signals on, gives the child a moment to end between two steps, then kills it, removes what it has
-half written, and says what is complete. It imports neither Blender nor NumPy.
+started process runs its own command line again as a child, in the same terminal and with the same streams. It passes
+signals on, gives the child a moment to end between two steps, then kills it, removes its half-written files, and prints
+which files are complete. The parent imports neither Blender nor NumPy.
 
-The child reports in a journal, a file in a temporary folder that both share: see `report`. The folder goes with the
-command, and with it what Blender keeps in temporary files.
+The child reports in a journal, a file in a temporary folder that both share: see `report`. The folder is deleted with
+all of Blender's temporary files when the command ends.
 """
 
 from __future__ import annotations
@@ -30,31 +30,32 @@ from typing import Any
 from .command_line import path_line, printable
 
 SESSION_VARIABLE = "RIGID_MOTION_SESSION"
-"""A variable of the environment: the temporary folder of a child; empty where none could be made."""
+"""Environment variable with the temporary folder of a child; empty if none could be created."""
 
 JOURNAL = "journal"
 
 GRACE_S = 1.2
-"""Seconds that the child has after a signal to end by itself."""
+"""Seconds that the child has to end by itself after a signal."""
 
 LAST_WAIT_S = 1.7
-"""Seconds after which nothing waits for it, although killed: the system may be reading from a disk that is gone."""
+"""Seconds after which the parent stops waiting for a killed child: the system may be reading from a disk that is
+gone."""
 
 LOOK_S = 0.1
-"""Seconds between two looks at the clock."""
+"""Seconds between two checks of the child."""
 
 STOPPED_TEXT = "Stopped. What was written by then is complete."
-"""The message where the child had nothing better to say."""
+"""The message if the child left no better one."""
 
 SHOW_CURSOR = "\x1b[?25h"
-"""The text that has a terminal show its cursor."""
+"""The escape sequence that shows a terminal's cursor."""
 
 PR_SET_PDEATHSIG = 1
 """See prctl(2)."""
 
 ASK_SIGNAL = getattr(signal, "SIGUSR1", None)
-"""The signal by which the parent asks its child to end. Any other signal may come to both of them, from a terminal or a
-farm, and would ask twice. On Windows, where there is none, the console sends Ctrl-C to both, and the parent waits."""
+"""The signal with which the parent asks its child to end. Any other signal may reach both processes from a terminal or
+a farm, and would ask twice. Windows lacks it: there the console sends Ctrl-C to both, and the parent waits."""
 
 _session = ""
 _journal: int | None = None
@@ -62,7 +63,7 @@ _is_child = False
 
 
 def stop_signals() -> list[signal.Signals]:
-    """Return the signals that stop this process. Those that are ignored, as by nohup, go on being ignored."""
+    """Return the signals that stop this process, without signals that are already ignored, as under nohup."""
     if _is_child and ASK_SIGNAL:
         return [ASK_SIGNAL]
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
@@ -72,7 +73,7 @@ def stop_signals() -> list[signal.Signals]:
 
 @contextmanager
 def ended_at_once() -> Iterator[None]:
-    """Have the signals that stop a command end the process at once: modules that are half loaded do not bear more."""
+    """Let stop signals end the process at once within the block: half-loaded modules cannot handle an exception."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -85,7 +86,7 @@ def ended_at_once() -> Iterator[None]:
 
 
 def supervise(program: str) -> int:
-    """Run this command line once more as a child, and return its exit code, or 128 and the signal that stopped it."""
+    """Run this command line again as a child, and return its exit code, or 128 plus the signal that stopped it."""
     folder = _temporary_folder()
     received: list[tuple[int, float]] = []
     child: subprocess.Popen | None = None
@@ -114,7 +115,7 @@ def supervise(program: str) -> int:
         journal = _Journal(folder)
         by = received[0][0] if received else -code if -code in before else 0
         stopped = bool(by) and code != 0
-        journal.remove_half_written()  # Also of workers that were killed.
+        journal.remove_half_written()  # Workers that were killed may have left some, too.
         if code < 0 or (stopped and not journal.ended):
             journal.say_last_words(None if stopped else f"{program}: {_crash(code, journal.at)}")
         return 128 + by if stopped else 1 if code < 0 else code
@@ -122,12 +123,12 @@ def supervise(program: str) -> int:
         if folder is not None:
             shutil.rmtree(folder, ignore_errors=True)
         for one, handler in before.items():
-            # Who asks once more while it ends does not get another exit code.
+            # A second signal must not change the exit code while the process ends.
             signal.signal(one, signal.SIG_IGN if received else signal.SIG_DFL if handler is None else handler)
 
 
 def death(code: int) -> str:
-    """Return how a process ended, by its exit code."""
+    """Return how a process ended, given its exit code."""
     if -code not in {*signal.Signals}:
         return f"exit code {code}"
     name = signal.Signals(-code).name
@@ -136,7 +137,7 @@ def death(code: int) -> str:
 
 @contextmanager
 def held_back(signals: Iterable[int]) -> Iterator[None]:
-    """Hold signals back meanwhile, and in processes that are started meanwhile until these let them through."""
+    """Block signals within the block, and in processes started there until they unblock them."""
     if ASK_SIGNAL:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     try:
@@ -147,12 +148,12 @@ def held_back(signals: Iterable[int]) -> Iterator[None]:
 
 
 def begin_child() -> bool:
-    """Begin as a child, and return whether this process is one.
+    """Set up this process as a child if it is one, and return whether it is.
 
-    It then reports in the journal, leaves what becomes of signals to its parent, and does not outlive that.
+    A child reports in the journal, relays signals to its parent, and does not outlive its parent.
     """
     global _is_child
-    # Programs that the child starts are not to take themselves for children.
+    # Programs that the child starts must not take themselves for children.
     folder = os.environ.pop(SESSION_VARIABLE, None)
     if folder is None:
         return False
@@ -168,24 +169,24 @@ def begin_child() -> bool:
         for item in signals:
             signal.signal(item, relay)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
-    # Where this process is killed, the tracker of shared memory outlives it, and would speak after the last words.
+    # If this process is killed, the tracker of shared memory outlives it, and would print after the last message.
     sys.warnoptions.append("ignore:resource_tracker")
     _is_child = True
     return True
 
 
 def blender_program() -> str:
-    """Return the Blender that this process is; empty in a Python, with or without bpy."""
+    """Return the path of the Blender program that runs this; empty in plain Python, with or without bpy."""
     return getattr(getattr(sys.modules.get("bpy"), "app", None), "binary_path", "")
 
 
 def session() -> str:
-    """Return the temporary folder of this command, for `join_session`; empty where there is none."""
+    """Return the temporary folder of this command, for `join_session`; empty if there is none."""
     return _session
 
 
 def join_session(folder: str) -> None:
-    """Have this process report in the journal of a command: the child does so, and workers that it has started."""
+    """Let this process report in the journal of a command, as the child and its workers do."""
     global _session, _journal
     if folder:
         with suppress(OSError):
@@ -194,7 +195,7 @@ def join_session(folder: str) -> None:
 
 
 def end_with_parent() -> None:
-    """Have this process killed when its parent ends, however that ends, where the system can (Linux)."""
+    """Have the system kill this process when its parent ends in any way, where it can (Linux)."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
 
@@ -205,17 +206,17 @@ def report(**facts: Any) -> None:
     Parameters
     ----------
     at : str
-        The input that is done next.
+        The next input.
     making : str
-        A file that is being written, or a folder that was made for one; it is removed if the process is killed.
+        A file that is being written, or a folder created for one; it is removed if the process is killed.
     written : str
-        A file that is complete, and to be printed at the end.
+        A complete file, whose path is printed at the end.
     prints_paths : bool
-        Whether standard output is for the paths of what is complete.
+        Whether standard output is for the paths of complete files.
     summary : str
-        What would be said if the process were stopped now.
+        The message if the process were stopped now.
     ended : bool
-        Whether all of that was printed.
+        Whether all of this was printed.
     """
     if _journal is not None:
         with suppress(OSError):
@@ -223,7 +224,7 @@ def report(**facts: Any) -> None:
 
 
 class _Journal:
-    """What the child reported."""
+    """The reports of the child."""
 
     def __init__(self, folder: str | None) -> None:
         self.at = ""
@@ -237,7 +238,7 @@ class _Journal:
         except OSError:
             return
         for line in lines:
-            with suppress(ValueError):  # The last one may be cut off.
+            with suppress(ValueError):  # The last line may be cut off.
                 facts = json.loads(line)
                 self.at = facts.get("at", self.at)
                 self.summary = facts.get("summary", self.summary)
@@ -247,23 +248,23 @@ class _Journal:
                 self._making += [Path(facts["making"])] if "making" in facts else []
 
     def remove_half_written(self) -> None:
-        """Remove what was being written, and folders that were made for it and are empty."""
+        """Remove files that were being written, and empty folders that were created for them."""
         for place in reversed(self._making):
             with suppress(OSError):
                 if place.is_dir():
                     place.rmdir()
                     continue
-                # Blender writes beside it again, to NAME@.
+                # Blender itself writes to NAME@ first.
                 place.with_name(f"{place.name}@").unlink(missing_ok=True)
                 place.unlink(missing_ok=True)
 
     def say_last_words(self, crash: str | None) -> None:
-        """Print what the child can no longer say."""
+        """Print the messages that the child can no longer print."""
         if self.ended:
             return
         errors = _writable(sys.stderr)
         if errors and sys.stderr.isatty():
-            print(SHOW_CURSOR, file=sys.stderr, flush=True)  # It is behind the progress bar, which has hidden it.
+            print(SHOW_CURSOR, file=sys.stderr, flush=True)  # The progress bar has hidden the cursor.
         if self.prints_paths and _writable(sys.stdout):
             for path in self.written:
                 print(path_line(path), flush=True)
@@ -275,31 +276,31 @@ class _Journal:
 def _temporary_folder() -> str | None:
     try:
         return tempfile.mkdtemp(prefix="rigid-motion-")
-    except OSError:  # Without one, Blender says itself what it cannot do.
+    except OSError:  # Without it, Blender reports its own errors.
         return None
 
 
 def _environment(folder: str | None) -> dict[str, str]:
     temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder) if folder else {}
-    # Matrices are small here: threads of NumPy's library would wait for one another, and for those of other workers.
+    # Matrices are small here: threads of NumPy's library would only wait for each other, and for other workers.
     return {"OPENBLAS_NUM_THREADS": "1", **os.environ, **temporary, SESSION_VARIABLE: folder or ""}
 
 
 def _this_command() -> Sequence[str]:
-    """Return what this process was started with: Python, or a Blender that runs a script."""
+    """Return the command line of this process: Python, or a Blender that runs a script."""
     blender = blender_program()
     return [blender, *sys.argv[1:]] if blender else [sys.executable, *sys.orig_argv[1:]]
 
 
 def _crash(code: int, at: str) -> str:
-    """Return how a child ended that was not stopped, and the way out."""
+    """Return a message about a child that crashed, with what to do."""
     if not at:
         return f"the process died ({death(code)}) before it had done anything"
     return f"the process died ({death(code)}) at {printable(at)}: leave that out, or see whether Blender opens it"
 
 
 def _writable(stream: Any) -> bool:
-    """Return whether a stream takes a line now: who reads a pipe may have stopped to."""
+    """Return whether a stream accepts a line now: the reader of a pipe may have stopped."""
     if stream is None:
         return False
     if os.name == "nt":

@@ -1,4 +1,4 @@
-"""The libraries that Blender's wheel takes from a Linux system, and what to say where they are missing."""
+"""System libraries that Blender's wheel needs on Linux, and messages for missing ones."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from rigid_motion_batch.silencing import silenced
 from rigid_motion_batch.supervising import ended_at_once
 
 DEBIAN = "libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1 libgl1-mesa-dri"
-"""Packages of Debian and Ubuntu."""
+"""Package names in Debian and Ubuntu."""
 
 FEDORA = "libX11 libXrender libXfixes libXi libxkbcommon libSM libICE mesa-libGL mesa-libEGL mesa-dri-drivers"
-"""Packages of Fedora and its relatives."""
+"""Package names in Fedora and its relatives."""
 
 BLENDER_PYTHONS = ("3.11", "3.13")
-"""The versions of Python that there are wheels of Blender for."""
+"""The versions of Python for which there are wheels of Blender."""
 
 LOADED_LATE = ("libEGL.so.1", "libGL.so.1")
-"""Libraries that Blender loads only when it renders. It aborts the whole process where it cannot."""
+"""Libraries that Blender loads only when it renders. If it cannot, it aborts the whole process."""
 
 
 def missing_for_rendering() -> str | None:
-    """Return the message of the dynamic linker about the first library that is not here; None where all of them are."""
+    """Return the dynamic linker's message about the first missing library; None if none is missing."""
     if sys.platform != "linux":
         return None
     for library in LOADED_LATE:
@@ -37,16 +37,16 @@ def missing_for_rendering() -> str | None:
 
 
 def require_blender(script: str) -> None:
-    """Load Blender, or end the command of a script with code 2 and what to do about it."""
+    """Load Blender, or end the command with exit code 2 and a message with what to do."""
     if problem := blender_problem(script):
         print(f"{program_of(script)}: {problem}", file=sys.stderr)
         sys.exit(2)
 
 
 def blender_problem(script: str) -> str:
-    """Load Blender, and return why that fails in a script and what to do about it; empty where it does not."""
+    """Load Blender, and return why that failed in a script and what to do; empty if it worked."""
     try:
-        with ended_at_once(), silenced():  # Where OCIO is set, it says so.
+        with ended_at_once(), silenced():  # If OCIO is set, Blender prints that.
             import bpy  # noqa: F401
     except ImportError as error:
         return problem_of(error, script)
@@ -54,7 +54,7 @@ def blender_problem(script: str) -> str:
 
 
 def problem_of(error: ImportError, script: str = "compare.py") -> str:
-    """Return what is missing and what brings it: a line where pip has installed the program, a few in a checkout."""
+    """Return which module is missing and how to install it: one line in an installation by pip, a few in a checkout."""
     if CHECKOUT or not isinstance(error, ModuleNotFoundError):
         return f"{error}\n{way_out(str(error), script)}"
     if error.name != "bpy":
@@ -65,7 +65,7 @@ def problem_of(error: ImportError, script: str = "compare.py") -> str:
 
 
 def way_out(error: str, script: str = "compare.py") -> str:
-    """Return what to do about the message that `import bpy` failed with in a script, in a few lines."""
+    """Return what to do about an error message of `import bpy` in a script, in a few lines."""
     missing = re.search(r"(\S+): cannot open shared object file", error)
     if missing:
         return (
@@ -87,7 +87,7 @@ def way_out(error: str, script: str = "compare.py") -> str:
 
 
 def without_blender(what: str, *, films: bool) -> str:
-    """Return what to say where a comparison needs Blender ("Videos are made by") and there is none, in a few lines."""
+    """Return the message for a comparison that needs Blender without having it, in a few lines; `what` begins it."""
     here = ".".join(map(str, sys.version_info[:2]))
     fits = here in BLENDER_PYTHONS
     where = "" if fits else f" with Python {' or '.join(BLENDER_PYTHONS)}"
