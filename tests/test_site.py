@@ -1,4 +1,4 @@
-"""The documentation site: it builds without a warning, is complete in itself, and opens without a network."""
+"""Tests of the documentation site: it builds without a warning, its links lead somewhere, and it works offline."""
 
 import json
 import re
@@ -17,12 +17,12 @@ from scripts import build_site
 pytestmark = pytest.mark.once
 
 LOADING = ("src", "data", "poster")
-"""Attributes of what a browser fetches when it opens a page, beside stylesheets and icons."""
+"""Attributes of files that a browser loads with a page, besides stylesheets and icons."""
 
 
 @dataclass(repr=False)
 class Page(HTMLParser):
-    """What a page links to, what it loads, and the places in it that links may lead to."""
+    """The links of a page, the files that it loads, and its anchors."""
 
     path: Path
     links: list[str] = field(default_factory=list)
@@ -63,7 +63,7 @@ def pages(site: Path) -> dict[Path, Page]:
 
 
 def target_of(page: Page, link: str) -> tuple[Path, str]:
-    """The file and the place in it that a link of a page leads to."""
+    """Return the file, and the anchor in it, that a link of a page leads to."""
     parts = urlsplit(link)
     path = page.path if not parts.path else (page.path.parent / unquote(parts.path)).resolve()
     return path, unquote(parts.fragment)
@@ -115,7 +115,7 @@ def test_every_mode_has_its_film_its_picture_its_formula_and_what_the_table_says
     place = f"mode-{mode.replace('_', '-')}"
     told = (loops, details)
     if motion.MODES[mode].is_reference:
-        # What all films show in grey.
+        # All films show the reference in grey.
         told = (details,)
     else:
         assert f"loop-{place}" in loops.anchors

@@ -1,4 +1,4 @@
-"""What pip installs: one wheel, in an environment that has nothing of the checkout."""
+"""Tests of the wheel that pip installs, in an environment without anything from the checkout."""
 
 import os
 import subprocess
@@ -21,7 +21,7 @@ BESIDES = (
     *("bpy", "filelock", "jinja2", "markdown-it-py", "markupsafe", "mdurl", "numpy", "pebble", "pygments", "rich"),
     "vl-convert-python",
 )
-"""What the extra `blender` brings along, and the dependencies. The environment of these tests lends it."""
+"""Packages of the extra `blender` and dependencies, linked from the environment of these tests."""
 
 
 @pytest.fixture(scope="module")
@@ -36,18 +36,18 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The command of an environment with the wheel, what it depends on, and Blender."""
+    """The command in an environment with the wheel, its dependencies, and Blender."""
     return command_of(tmp_path_factory.mktemp("environment"), wheel, BESIDES)
 
 
 @pytest.fixture(scope="module")
 def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The command of an environment with the wheel and NumPy alone."""
+    """The command in an environment with only the wheel and NumPy."""
     return command_of(tmp_path_factory.mktemp("bare"), wheel, ("numpy",))
 
 
 def command_of(folder: Path, wheel: Path, besides: tuple[str, ...]) -> Path:
-    """The command `rigid-motion` of an environment that is made in a folder, with these packages beside the wheel."""
+    """Return the command `rigid-motion` of a new environment in a folder, with these packages besides the wheel."""
     made = venv.EnvBuilder(with_pip=False).ensure_directories(folder)
     venv.create(folder, with_pip=False)
     to = Path(made.env_dir) / "lib" / f"python{sys.version_info.major}.{sys.version_info.minor}" / "site-packages"
@@ -60,7 +60,7 @@ def command_of(folder: Path, wheel: Path, besides: tuple[str, ...]) -> Path:
 
 
 def lend(name: str, to: Path) -> None:
-    """Link a package, and what says of which version it is, from the environment of these tests."""
+    """Link a package and its metadata from the environment of these tests."""
     for part in {Path(file).parts[0] for file in distribution(name).files} - {"..", "__pycache__"}:
         (to / part).symlink_to(distribution(name).locate_file(part))
 

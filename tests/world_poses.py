@@ -1,4 +1,4 @@
-"""Where objects are in the world, frame by frame, as Blender shows them."""
+"""World poses of objects, frame by frame, as Blender evaluates them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from rigid_motion.motion import Poses
 
 
 def read_poses(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
-    """Return the world poses of `obj` as the scene evaluates them: parents, constraints, drivers, deltas and all.
+    """Return the world poses of `obj` as the scene evaluates them, with parents, constraints, drivers and deltas.
 
-    The scene steps through `frames` (shape (n,), sub-frames allowed) and returns to the frame it was on. Scales are
-    kept where the object is not of its own size; they are the mean of the three axes.
+    The scene steps through `frames` (shape (n,), sub-frames allowed) and returns to its previous frame. Scales are kept
+    if the object is scaled; they are the mean of the three axes.
     """
     scene = bpy.context.scene
     assert scene is not None

@@ -1,4 +1,4 @@
-"""What the tests of bake.py share: running it, and files to run it on."""
+"""Helpers for tests of bake.py: running it, and files to run it on."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,7 +14,7 @@ from tests.animation.scenes import key, new_object
 from tests.blank import blank
 
 LAST = 103
-"""The last frame of the scenes: after the last key and the last strip."""
+"""The last frame of the scenes: after the last key and the last NLA strip."""
 
 
 def run(*arguments: object) -> int:
@@ -23,7 +23,7 @@ def run(*arguments: object) -> int:
 
 @contextmanager
 def extension() -> Iterator[None]:
-    """The extension switched on, as an animator has it; bake.py switches on its own."""
+    """Register the extension within the block, as an animator has it; bake.py registers its own."""
     animation.register()
     try:
         yield
@@ -46,7 +46,7 @@ def open_again(path: Path) -> None:
 
 
 def one_object_file(path: Path, edit: Callable[[bpy.types.Object], object] = lambda obj: None, **options) -> Path:
-    """A file with one live object, and what is done to it."""
+    """Save a file with one live object, edited by `edit`."""
     with extension():
         new_file()
         obj = key(new_object("Tool"))
@@ -64,7 +64,7 @@ def frames_of_keys(obj: bpy.types.Object) -> list[float]:
 
 
 def with_version(path: Path, old_style: str, new_style: str) -> None:
-    """Let a file say that another Blender saved it: until 5.0 as in v405, and then as in v0500."""
+    """Make a file say that another Blender saved it: up to 5.0 as in v405, later as in v0500."""
     content = path.read_bytes()
     place = content.index(b"v") + 1
     version = (old_style if content[7:9] == b"-v" else new_style).encode()

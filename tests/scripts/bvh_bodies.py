@@ -1,4 +1,4 @@
-"""A small body as a file, BVH, for tests of programs that read it."""
+"""A small body as a BVH file, for tests of programs that read it."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ TIMES = np.arange(61) / 30.0
 
 
 def angles_at(times: np.ndarray) -> dict[str, np.ndarray]:
-    """Euler angles ZXY of each joint, in degrees, shape (n, 3)."""
+    """Return the Euler angles ZXY of each joint, in degrees, shape (n, 3)."""
     return {
         name: 30.0 * np.sin(np.outer(times, (3.0, 2.0 + joint, 4.0)) + np.arange(3.0) + joint)
         for joint, name in enumerate(PLACES)
@@ -31,7 +31,7 @@ def write_body(
     unit: float = 1.0,
     moves: bool = True,
 ) -> Path:
-    """A root with two joints in this order, with the motion at these times, in a unit of which a metre has so many."""
+    """Write a root with two joints in this order, with the motion at these times. `unit` is the units per metre."""
 
     def offset(name: str) -> str:
         return "OFFSET " + " ".join(f"{unit * value:.9f}" for value in PLACES[name])

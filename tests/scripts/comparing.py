@@ -1,4 +1,4 @@
-"""Runs of compare.py in tests: a recording that is done in no time, and what two output folders must have in common."""
+"""Helpers for tests of compare.py: quick recordings, and comparison of output folders."""
 
 import csv
 from pathlib import Path
@@ -21,12 +21,12 @@ SMALL = ["--resolution", "160x90", "--fps", "6"]
 
 
 def run(*arguments: object) -> int:
-    """Run the program in this process, which is quicker for a little work."""
+    """Run the program in this process, which is faster for little work."""
     return compare.main(["--jobs", "0", *map(str, arguments)])
 
 
 def shown(folder: Path) -> list[Path]:
-    """What lies in an output folder for people."""
+    """Return the contents of an output folder, without the pipeline's own folder."""
     return sorted(path for path in folder.iterdir() if path.name != OWN_FOLDER)
 
 
@@ -47,7 +47,7 @@ def poses_of(columns: dict[str, np.ndarray]) -> Poses:
 
 
 def write_toss(path: Path, samples: int = 60) -> Path:
-    """Write a piece of a generated motion, 90 samples a second."""
+    """Write a piece of a generated motion, 90 samples per second."""
     lines = (ROOT / "assets" / "throw.csv").read_text().splitlines()
     path.parent.mkdir(exist_ok=True)
     path.write_text("\n".join(lines[:1] + lines[90 : 91 + samples]))
@@ -55,7 +55,7 @@ def write_toss(path: Path, samples: int = 60) -> Path:
 
 
 def outputs(folder: Path) -> dict[str, bytes]:
-    """All that is the same each time: a report has its date, and a .blend has addresses of memory in it."""
+    """Return all files by path, with contents if those never vary: reports have dates, .blend files addresses."""
     return {
         path.relative_to(folder).as_posix(): path.read_bytes() if path.suffix in (".csv", ".mp4") else b""
         for path in folder.rglob("*")

@@ -1,4 +1,4 @@
-"""What the tests of reduce.py share: running it, what to run it on, and how far what it made is off."""
+"""Helpers for tests of reduce.py: running it, input files, and errors of the results."""
 
 from pathlib import Path
 
@@ -20,28 +20,28 @@ from tests.scripts.bvh_bodies import write_body
 from tests.scripts.recordings.blends import rig
 
 WALK = RECORDINGS.parent / "rigs" / "pab_walk.fbx"
-"""Other people's."""
+"""A recording of others, next to the checkout."""
 
 FRAMES = np.arange(1.0, 62.0)
-"""Of the dense keys in the scenes."""
+"""Frames of the dense keys in the scenes."""
 
 RADIUS = 0.1
-"""Metres: what is looked at around an origin, where the size of a thing does not say."""
+"""Radius in metres around an origin within which errors are measured, if the object has no size of its own."""
 
 ROUNDING = 2e-5
-"""Metres: single precision of matrices, through a chain of bones."""
+"""Allowed rounding in metres: matrices in single precision, through a chain of bones."""
 
 BALL = RADIUS * normalise(np.random.default_rng(5).normal(size=(64, 3)))
-"""Points that far from an origin, in all directions."""
+"""Points at that distance from an origin, in all directions."""
 
 
 def run(*arguments: object) -> int:
-    """The exit code, all of it being done in this process."""
+    """Run the program in this process, and return the exit code."""
     return reduce.main([*map(str, arguments), "--jobs", "0"])
 
 
 def swing(count: int, seed: int = 0, whole: float = 90.0) -> Poses:
-    """A smooth motion, of which the whole goes through half a metre and a turn, faster and slower by turns."""
+    """Return a smooth motion of `count` poses through half a metre and a turn, with changing speed."""
     random, parts = np.random.default_rng(seed), np.arange(count) / whole
     phases = 5.0 * parts[:, None] * random.uniform(0.5, 1.5, 3) + random.uniform(0.0, 6.0, 3)
     angles = 3.0 * parts + 0.2 * np.sin(12.0 * parts)
@@ -51,7 +51,7 @@ def swing(count: int, seed: int = 0, whole: float = 90.0) -> Poses:
 
 
 def key_densely(carrier: bpy.types.Object | bpy.types.PoseBone, poses: Poses, frames: np.ndarray = FRAMES) -> None:
-    """A key of location and rotation on every frame, as a simulation or motion capture leaves them."""
+    """Insert a key of location and rotation on every frame, as simulations and motion capture do."""
     carrier.rotation_mode = "QUATERNION"
     animated = carrier.id_data
     prefix = "" if carrier == animated else f"{carrier.path_from_id()}."
@@ -60,7 +60,7 @@ def key_densely(carrier: bpy.types.Object | bpy.types.PoseBone, poses: Poses, fr
 
 
 def object_file(path: Path, *names: str) -> Path:
-    """A file with objects that have a key on every frame, saved by a Blender without the extension."""
+    """Save a file of objects with a key on every frame, from a Blender without the extension."""
     new_file()
     for seed, name in enumerate(names or ("Tool",)):
         obj = new_object(name)
@@ -71,7 +71,7 @@ def object_file(path: Path, *names: str) -> Path:
 
 
 def rig_file(path: Path) -> Path:
-    """A file with a chain of three bones that turn on every frame, and an empty at the end of each: "at BONE"."""
+    """Save a file with a chain of three bones keyed on every frame, and an empty at the end of each: "at BONE"."""
     new_file()
     bones = {
         "Root": ((0.0, 0.0, 0.0), (0.0, 0.0, 0.3), None),
@@ -87,7 +87,7 @@ def rig_file(path: Path) -> Path:
 
 
 def listed(folder: Path) -> list[str]:
-    """The names in a folder, but for where the program keeps its own files."""
+    """Return the names in a folder, without the program's own folder."""
     return sorted({path.name for path in folder.iterdir()} - {OWN_FOLDER})
 
 
@@ -96,12 +96,12 @@ def reduced_name(path: Path) -> Path:
 
 
 def played(path: Path, *names: str) -> np.ndarray:
-    """World matrices on all frames (objects, n, 4, 4), in a Blender that has never heard of the extension."""
+    """Return world matrices on all frames, (objects, n, 4, 4), in a Blender without the extension."""
     return played_on_a_farm(path, names, FRAMES)[1]
 
 
 def displacement(worlds: np.ndarray, truth: np.ndarray, points: np.ndarray = BALL) -> float:
-    """How far any of these points of an object is from where it was, on any frame."""
+    """Return the farthest that any of these points of an object is from its true place, on any frame."""
     offset = (worlds - truth)[..., :3, :]
     return float(np.linalg.norm(points @ offset[..., :3].swapaxes(-1, -2) + offset[..., None, :, 3], axis=-1).max())
 
@@ -111,7 +111,7 @@ def count_keys(carrier: bpy.types.Object | bpy.types.PoseBone) -> int:
 
 
 def write_csv(path: Path, seconds: float = 1.0, rate: float = 90.0) -> tuple[np.ndarray, Poses]:
-    """A recording in Blender's axes and metres, and what it is of."""
+    """Write a recording in Blender's axes and metres, and return its times and poses."""
     times = np.arange(round(seconds * rate) + 1) / rate
     poses = swing(len(times), 3, 2.0 * rate)
     rows = np.column_stack((times, poses.positions, poses.quaternions)).tolist()
@@ -128,7 +128,7 @@ def read_table(path: Path) -> tuple[np.ndarray, Poses]:
 
 
 def worlds_of(poses: Poses) -> np.ndarray:
-    """Matrices (n, 4, 4), by the formula of unit quaternions and not by this program."""
+    """Return matrices (n, 4, 4) by the formula of unit quaternions, independent of this program."""
     w, x, y, z = poses.quaternions.T
     worlds = np.zeros((len(w), 4, 4))
     worlds[:, 3, 3], worlds[:, :3, 3] = 1.0, poses.positions
@@ -142,7 +142,7 @@ def worlds_of(poses: Poses) -> np.ndarray:
 
 
 def joints_in_metres(clip: Clip) -> np.ndarray:
-    """Where the joints of a whole body are, shape (joints, n, 3), by matrices."""
+    """Return the positions of a whole body's joints, shape (joints, n, 3), by matrices."""
     result: list[np.ndarray] = []
     for joint, parent in enumerate(clip.rest_body.parents):
         local = worlds_of(clip.poses[joint])
@@ -169,7 +169,7 @@ np.save(found, np.array(rows))
 
 
 def heads_at(made: Path, times: np.ndarray) -> np.ndarray:
-    """Where the bones of a reduced recording begin at some seconds of it, by their names, shape (bones, times, 3)."""
+    """Return the heads of a reduced recording's bones at times in seconds, sorted by name, shape (bones, times, 3)."""
     result = made.with_suffix(".npy")
     np.save(result, times)
     on_a_farm(HEADS_AT, made, result)

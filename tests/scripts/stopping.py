@@ -1,4 +1,4 @@
-"""What the tests of stopped commands share: starting one that gets stuck where Python cannot interrupt it."""
+"""Helpers for tests of stopped commands: starting a command that gets stuck where Python cannot interrupt it."""
 
 import os
 import subprocess
@@ -31,24 +31,24 @@ def stick_and_link(source, target, **options):
 
 io.open, os.link = open_and_stick, stick_and_link
 """
-"""A sitecustomize.py: the process is stuck as soon as a file of that name is opened, or moved into place."""
+"""A sitecustomize.py: the process gets stuck when a file of that name is opened, or moved into place."""
 
 HANG = "lock, mutex = ctypes.PyDLL(None).pthread_mutex_lock, ctypes.create_string_buffer(64); lock(mutex); lock(mutex)"
-"""As Blender at work: it keeps the interpreter's lock, and no signal wakes it."""
+"""Hangs like a busy Blender: it keeps the interpreter's lock, and no signal wakes it."""
 
 CRASH = "signal.signal(signal.SIGSEGV, signal.SIG_DFL); os.kill(os.getpid(), signal.SIGSEGV)"
 
 
 @dataclass
 class Started:
-    """A command at work."""
+    """A running command."""
 
     process: subprocess.Popen
     temporary: Path
-    """Its folder for temporary files."""
+    """The command's folder for temporary files."""
 
     marker: Path
-    """There once it is stuck."""
+    """A file that exists once the command is stuck."""
 
     def wait_until_stuck(self) -> None:
         deadline = time.monotonic() + 60.0
@@ -58,14 +58,14 @@ class Started:
             time.sleep(0.01)
 
     def end(self) -> tuple[str, str, float]:
-        """What it printed and said, and the seconds until its end."""
+        """Return its standard output and standard error, and the seconds until it ended."""
         started = time.monotonic()
         printed, said = self.process.communicate(timeout=60)
         return printed, said, time.monotonic() - started
 
 
 def start(folder: Path, command: str, *arguments: object, where: str, act: str = HANG, **options: object) -> Started:
-    """Start a script that is stuck where it opens a file, or moves one into place, with `where` in its name."""
+    """Start a script that gets stuck when it opens a file, or moves one into place, with `where` in its name."""
     own = folder / "stuck"
     temporary, marker = own / "temporary", own / "marker"
     temporary.mkdir(parents=True)
@@ -79,7 +79,7 @@ def start(folder: Path, command: str, *arguments: object, where: str, act: str =
 
 
 def descendants(process: int) -> list[int]:
-    """The processes that a process has started, and that these have."""
+    """Return the processes that a process has started, and their descendants."""
     texts = []
     with suppress(FileNotFoundError, ProcessLookupError):
         texts = [path.read_text() for path in Path(f"/proc/{process}/task").glob("*/children")]

@@ -1,4 +1,4 @@
-"""Recordings of other conventions in Blender's axes, against rotation matrices."""
+"""Tests of conversions between axis conventions and Blender's axes, against rotation matrices."""
 
 import numpy as np
 import pytest

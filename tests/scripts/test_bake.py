@@ -1,4 +1,4 @@
-"""bake.py as people run it: what the files it writes play, what it leaves alone, what it says, how it ends."""
+"""Tests of bake.py as users run it: its results, the files that it leaves alone, its messages and exit codes."""
 
 import json
 import os
@@ -36,7 +36,7 @@ from tests.scripts.reducing import listed
 ROOT = Path(__file__).resolve().parents[2]
 
 PLAYED = np.arange(0.0, LAST + 1.0)
-"""All frames of the scenes: from before the first key until after the last strip."""
+"""All frames of the scenes: from before the first key until after the last NLA strip."""
 
 BAKED = ("Arm", "Axis", "Camera", "Noisy", "Own", "Strips", "Tool", "Wheel")
 REFUSED = {
@@ -46,11 +46,11 @@ REFUSED = {
     "Huge": "key 2 of Location X has an invalid frame, value, handle or easing",
     "Prop": "it is linked from //library.blend: use --in-place on that file, or make it local",
 }
-"""Objects of the shot that cannot be baked, and what is said of them."""
+"""Objects of the shot that cannot be baked, with the reasons."""
 
 
 def fill_shot() -> None:
-    """Objects of every kind that can be baked, and of some that cannot."""
+    """Add objects of every kind that can be baked, and some that cannot."""
     set_mode(key(new_object("Axis", "AXIS_ANGLE"), seed=8), "dq_sclerp")
     noisy = key(new_object("Noisy"), seed=7)
     set_mode(noisy, "dq_sclerp")
@@ -125,7 +125,7 @@ def assert_same(worlds: np.ndarray, expected: list[np.ndarray]) -> None:
 
 
 def live_worlds(path: Path, names: tuple[str, ...]) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """What a live file shows with the extension, as it is opened and on all frames."""
+    """Return the world matrices that a live file shows with the extension, as opened and on all frames."""
     with extension():
         open_again(path)
         graph = bpy.context.evaluated_depsgraph_get()
@@ -134,7 +134,7 @@ def live_worlds(path: Path, names: tuple[str, ...]) -> tuple[list[np.ndarray], l
 
 
 def test_a_baked_file_plays_in_any_blender_as_the_live_one_does_with_the_extension(shot, baked):
-    moved = (name for name in REFUSED if name != "Huge")  # That one is nowhere, with or without the extension.
+    moved = (name for name in REFUSED if name != "Huge")  # "Huge" has no valid place, with or without the extension.
     names = (*BAKED, *moved, "Still", "Plain")
     opened, shown = live_worlds(shot, names)
     opened_there, shown_there, *_ = played_on_a_farm(baked, names, PLAYED)

@@ -1,4 +1,4 @@
-"""bake.py on rigs: bones are baked and given back beside objects, chosen by name, and told of rig by rig."""
+"""Tests of bake.py on rigs: bones are baked and restored like objects, chosen by name, and reported rig by rig."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,14 +16,14 @@ from tests.scripts.baking import extension, new_file, open_again, run, save
 from tests.scripts.recordings.blends import rig
 
 PLAYED = np.arange(0.0, 46.0)
-"""From before the first key until after the last."""
+"""Frames from before the first key until after the last."""
 
 NAMES = ("Root", "Arm", "Hand", "Thumb", "Index")
-"""Each the child of the one before, and the fingers both of the hand."""
+"""Bones: each is the child of the one before, but both fingers are children of the hand."""
 
 
 def new_rig() -> bpy.types.Object:
-    """An armature with keyed bones, and an empty at the end of each, called Rig at BONE, that shows where it is."""
+    """Return an armature with keyed bones, and an empty at the end of each, "Rig at BONE", that shows its place."""
     parents = (None, "Root", "Arm", "Hand", "Hand")
     places = [((0.0, 0.1 * number, number), (0.0, 0.1 * number, number + 1.0)) for number in range(len(NAMES))]
     bones = {name: (*place, parent) for name, place, parent in zip(NAMES, places, parents, strict=True)}
@@ -43,7 +43,7 @@ def new_rig() -> bpy.types.Object:
 
 
 def rig_file(path: Path, edit: Callable[[bpy.types.Object], object] = lambda rig: None) -> Path:
-    """A file with a rig that moves itself too; all bones but one have a mode, one of them another in one segment."""
+    """Save a file with a moving rig; all bones but one have a mode, one bone a different mode in one segment."""
     with extension():
         new_file()
         rig = new_rig()
@@ -57,7 +57,7 @@ def rig_file(path: Path, edit: Callable[[bpy.types.Object], object] = lambda rig
 
 @pytest.fixture(scope="module")
 def shot(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A file with a rig of which nothing is edited."""
+    """A file with an unedited rig."""
     return rig_file(tmp_path_factory.mktemp("shot") / "shot.blend")
 
 

@@ -1,4 +1,4 @@
-"""bake.py on files that link to others: what is missing is named and counts, what is there is found again."""
+"""Tests of bake.py on files that link to others: missing libraries are named and counted, existing ones found again."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +14,7 @@ WAY_OUT = "tell the file where it is now (Outliner, Blender File, right-click: R
 
 
 def make_library(path: Path) -> Path:
-    """A library with a live object in a collection, and a mesh."""
+    """Save a library with a live object in a collection, and a mesh."""
     with extension():
         new_file()
         prop = set_up(new_object("Prop", data=bpy.data.meshes.new("Box")))
@@ -63,7 +63,7 @@ def link_mesh(library: Path) -> None:
 
 
 def shot_with(path: Path, link: Callable[[Path], object], library: Path) -> Path:
-    """A file with a live object of its own, and what is linked from a library; by a relative path, as Blender saves."""
+    """Save a file with a live object of its own, and data linked from a library by a relative path."""
     with extension():
         new_file()
         set_up(new_object("Tool"))

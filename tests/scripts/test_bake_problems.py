@@ -1,4 +1,4 @@
-"""bake.py when something is wrong: broken files, places that cannot be written, an end half-way."""
+"""Tests of bake.py on problems: broken files, paths that cannot be written, and interruption."""
 
 import ctypes
 import os
@@ -18,11 +18,11 @@ ROOT = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, ROOT / "scripts" / "bake.py"]
 
 PR_CAPBSET_DROP, CAPABILITIES = 24, (1, 2)
-"""See prctl(2) and capabilities(7): that permissions of files do not count, as for root on Linux."""
+"""See prctl(2) and capabilities(7): the capabilities by which root on Linux ignores file permissions."""
 
 
 def run_without_privileges(*arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run bake.py as a user whom permissions of files concern, also where the tests are run by root."""
+    """Run bake.py as a user who is bound by file permissions, even if root runs the tests."""
 
     def give_up() -> None:
         if os.geteuid() == 0:
@@ -95,7 +95,7 @@ def test_a_read_only_folder_is_named_by_its_own_name_and_before_the_work(tmp_pat
 @pytest.mark.parametrize("options", [(), ("--in-place",)])
 def test_a_name_that_is_too_long_for_the_result_is_told(tmp_path, capsys, options):
     made = one_object_file(tmp_path / "shot.blend")
-    path = made.rename(tmp_path / f"{'ü' * 124}x.blend")  # With -baked or a 1 behind it is too long.
+    path = made.rename(tmp_path / f"{'ü' * 124}x.blend")  # With -baked or a 1 appended, the name is too long.
     assert len(os.fsencode(path.name)) == 255
     capsys.readouterr()
     assert run(path, *options) == 1

@@ -1,4 +1,4 @@
-"""The set-up in one command: what it installs, and what it says where it cannot."""
+"""Tests of bootstrap.py: the packages that it installs, and its messages if it cannot."""
 
 import os
 import re
@@ -59,7 +59,7 @@ def test_the_blender_that_is_asked_for_is_the_only_one():
 
 @pytest.fixture
 def installed(monkeypatch, tmp_path) -> list[str | None]:
-    """The Blenders that are set up, in a checkout where there is none yet; nothing is installed or run."""
+    """The versions of Blender that are set up, in a checkout without any; nothing is installed or run."""
     blenders: list[str | None] = []
 
     def install(blender: str | None, *_: object) -> Path:

@@ -1,4 +1,4 @@
-"""The zip that users install: what is in it, and that every Blender takes it, runs it and gives it back."""
+"""Tests of the zip that users install: its contents, and its installation, use and removal in every Blender."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""clean: recordings without their trembling, in their own format, within what was allowed."""
+"""Tests of the command clean: recordings lose their jitter, keep their format, and stay within the tolerance."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SPIKES = [80, 81, 200]
 
 @pytest.fixture
 def shaky(tmp_path) -> Path:
-    """A recording in millimetres with a column of its own, spikes, and w of its quaternions last."""
+    """A recording in millimetres with a comment column, spikes, and w last in its quaternions."""
     poses = shaken(TRUTH, 3)
     positions = poses.positions.copy()
     positions[SPIKES] += (0.1, 0.0, 0.05)
@@ -99,7 +99,7 @@ def test_a_body_comes_back_with_its_hierarchy_and_is_bounded_in_the_world(tmp_pa
 
 def test_feet_that_stand_are_held_and_it_says_how_often_they_do(tmp_path, capsys):
     random, steps = np.random.default_rng(2), np.arange(300) / 60.0
-    # A hip that trembles above a foot that stands, as by inverse kinematics, and steps.
+    # A hip jitters above a foot that stands, as with inverse kinematics, and then steps.
     hip = 20.0 * steps + 0.2 * random.normal(size=300)
     foot = 20.0 * (np.floor(steps) + np.clip(5.0 * np.mod(steps, 1.0) - 4.0, 0.0, 1.0)) + 10.0
     lean = np.degrees(np.arcsin((foot - hip) / 80.0))

@@ -1,4 +1,4 @@
-"""The arguments that are meant for a script, whoever runs it, and the command that they make."""
+"""Tests of the arguments of a script, in Python and in Blender, and of the command that a report shows."""
 
 import sys
 

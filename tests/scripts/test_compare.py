@@ -1,4 +1,4 @@
-"""compare.py as people run it: what it writes, what it prints, how it ends."""
+"""Tests of compare.py as users run it: its files, its output, its exit codes."""
 
 import json
 import os
@@ -47,7 +47,7 @@ def measured(tmp_path_factory) -> Path:
 
 
 def recordings_in_assets() -> dict[str, dict[str, np.ndarray]]:
-    """The columns of each body of each file, by the names of the clips."""
+    """Return the columns of each body of each file, by clip name."""
     bodies: dict[str, list[dict[str, str]]] = {}
     for path in (ROOT / "assets").glob("*.csv"):
         for row in rows_of(path):
@@ -59,7 +59,7 @@ def recordings_in_assets() -> dict[str, dict[str, np.ndarray]]:
 
 
 def errors_of(filled: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """By SciPy: offsets of the origin (n, 3), turns in radians (n,) and shell errors (n,) between two tables."""
+    """Return errors between two tables by SciPy: origin offsets (n, 3), turns in radians (n,) and shell errors (n,)."""
     offset = poses_of(filled).positions - poses_of(truth).positions
     turns = [Rotation.from_quat(poses_of(columns).quaternions, scalar_first=True) for columns in (filled, truth)]
     return {
@@ -159,7 +159,7 @@ def test_a_clip_too_short_for_a_rate_is_left_out_and_for_every_rate_refused(shor
 
 
 def rendering(output: Path) -> bool:
-    """Whether a piece of a film is being rendered."""
+    """Return whether a piece of a film is being rendered."""
     return any(name.endswith(".mkv") for _, _, names in os.walk(output / OWN_FOLDER / "scratch") for name in names)
 
 

@@ -1,4 +1,4 @@
-"""compare --against: somebody else's motion of a clip, in all that a comparison shows."""
+"""Tests of compare --against: another motion of the same clip, in all outputs of a comparison."""
 
 import json
 import re
@@ -34,7 +34,7 @@ def toss(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def mine(toss: Path) -> Path:
-    """Every fourth pose of the recording but for its ends, at other moments and a little elsewhere."""
+    """Every fourth pose of the recording without its ends, at other times and slightly displaced."""
     columns = {name: column[5:-7:4].copy() for name, column in table(toss).items()}
     columns["t"] += 0.003
     columns["x"] += 0.01 * np.sin(np.arange(len(columns["t"])))
@@ -63,7 +63,7 @@ def compared(toss: Path, mine: Path, tmp_path_factory: pytest.TempPathFactory) -
 
 
 def by_scipy(mine: Path, times: np.ndarray) -> tuple[np.ndarray, Rotation]:
-    """Positions on straight lines between the samples of a table, and rotations by SLERP."""
+    """Return positions on straight lines between the samples of a table, and rotations by SLERP."""
     own = table(mine)
     turns = Slerp(own["t"], Rotation.from_quat(poses_of(own).quaternions, scalar_first=True))
     return np.stack([np.interp(times, own["t"], own[name]) for name in "xyz"], axis=-1), turns(times)

@@ -1,4 +1,4 @@
-"""What compare.py writes of whole bodies."""
+"""Tests of compare.py on whole bodies."""
 
 import pytest
 
@@ -12,7 +12,7 @@ QUICK = ("--no-video", "--modes", ",".join(MODES))
 
 @pytest.fixture(scope="module")
 def rows(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, str]]:
-    """The table of a body and a single rigid one."""
+    """The metrics of a whole body and a single rigid body."""
     folder = tmp_path_factory.mktemp("bodies")
     walk, toss, output = (
         write_body(folder / "walk.bvh", TIMES[:21]),

@@ -1,4 +1,4 @@
-"""compare on bodies that hold one another: the table, the terminal, the page, and pairs that the user names."""
+"""Tests of compare.py on held bodies: the table, the terminal, the page, and pairs that the user names."""
 
 from pathlib import Path
 

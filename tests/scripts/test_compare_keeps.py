@@ -1,4 +1,4 @@
-"""compare.py replaces nothing but what it has written: no input, no file of another program, no other comparison."""
+"""Tests that compare.py replaces only its own files: no inputs, no files of other programs, no other comparison."""
 
 import contextlib
 import shutil
@@ -19,7 +19,7 @@ def run(*arguments: object) -> int:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """All files but the program's own."""
+    """Return all files except the program's own folder."""
     result = (path for path in folder.rglob("*") if path.is_file() and OWN_FOLDER not in path.parts)
     return {str(path.relative_to(folder)): path.read_bytes() for path in result}
 
@@ -36,14 +36,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of that."""
+    """A copy of the folder `made`."""
     shutil.copytree(made, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
 def refused(capsys: pytest.CaptureFixture, *arguments: object) -> str:
-    """What is said by a run that writes nothing."""
+    """Return the message of a run that writes nothing."""
     before = files(Path.cwd())
     capsys.readouterr()
     assert run(*arguments) == 2
@@ -88,7 +88,7 @@ def test_the_same_recordings_and_more_of_them_go_on(folder: Path, arguments: tup
 
 @pytest.fixture
 def free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder to work in, with a recording, and nothing else."""
+    """A folder to work in, with only a recording."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(places, "CHECKOUT", None)
     write_toss(tmp_path / "toss.csv")
@@ -96,7 +96,7 @@ def free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def printed(capsys: pytest.CaptureFixture, *arguments: object) -> str:
-    """The folder of the report that a quiet run prints."""
+    """Return the name of the report's folder that a quiet run prints."""
     capsys.readouterr()
     assert run(*arguments, "--quiet") == 0
     (line,) = capsys.readouterr().out.splitlines()

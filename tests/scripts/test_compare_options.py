@@ -1,4 +1,4 @@
-"""Options of compare.py, its help and its examples."""
+"""Tests of the options of compare.py, its help and its examples."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""Files and bodies with hostile names: all they can do is be called so, in the output folder and in the report."""
+"""Tests of hostile names of files and bodies: they do no harm in the output folder or in the report."""
 
 import re
 import unicodedata
@@ -11,7 +11,7 @@ from rigid_motion_batch.recordings.clip_reading import DEVICES, NOT_FOLDERS, fol
 from tests.scripts.recordings.written_layouts import PLAIN
 
 FORMULAS = "=+-@\t\r"
-"""What spreadsheets take for the beginning of a formula."""
+"""Characters that spreadsheets take for the start of a formula."""
 
 PLAIN_NAMES = r"""
 .. . ../../../../escaped ..\..\escaped /etc/escaped C:\escaped \\host\escaped a/../b <script>alert(1)</script>
@@ -31,7 +31,7 @@ NAMES = (
 FILE_NAMES = tuple(
     name for name in NAMES if name and not set(name) & set("/\0") and len(name.encode(errors="replace")) <= 240
 )
-"""Those that Linux allows for files."""
+"""The names that Linux allows for files."""
 
 
 def test_names_of_folders_are_legal_and_different_everywhere() -> None:

@@ -1,4 +1,4 @@
-"""job_bundle.py: a comparison as a job of a render farm."""
+"""Tests of job_bundle.py: a comparison as a job for a render farm."""
 
 import json
 import shlex

@@ -1,4 +1,4 @@
-"""The zip, by what reviewers of extensions.blender.org send back.
+"""Tests of the zip against the rules of reviewers of extensions.blender.org.
 
 Source: "Guidelines" and "Canned Responses" of the moderators, https://developer.blender.org/docs/features/extensions/,
 and Blender's manual, "Creating Extensions".
@@ -17,10 +17,10 @@ from rigid_motion_batch.places import MANIFEST
 pytestmark = pytest.mark.any_blender
 
 LARGEST = 1_000_000
-"""Bytes: it is code, and no more."""
+"""The largest size in bytes: the zip contains only code."""
 
 OF_BLENDER = {*("addon_utils", "blf", "bpy", "bpy_extras", "gpu", "gpu_extras", "mathutils", "numpy", "rna_keymap_ui")}
-"""Modules that come with Blender, beside Python's own."""
+"""Modules that come with Blender, besides Python's own."""
 
 UNWANTED = {
     *("asyncio", "ftplib", "http", "imaplib", "requests", "smtplib", "socketserver", "ssl", "urllib"),
@@ -28,7 +28,7 @@ UNWANTED = {
     *("ensurepip", "imp", "importlib", "pip", "pkgutil", "runpy", "site", "zipimport"),
     *("cProfile", "code", "debugpy", "faulthandler", "pdb", "profile", "trace", "tracemalloc"),
 }
-"""Python's own for networks, processes, loading other code, and debugging."""
+"""Python's own modules for networks, processes, loading code, and debugging."""
 
 FORBIDDEN = {
     "starts a thread": r"\bThread\(|\bTimer\(",
@@ -40,10 +40,10 @@ FORBIDDEN = {
     "is named by something else than its package": r"(?<!\.)\b__name__\b|\bbl_info\b",
     "has letters that are not English": r"[^\W\d_a-zA-Z]",
 }
-"""What is wrong with a line of code, outside of texts."""
+"""Problem to a pattern that finds it in code, outside of strings."""
 
 KINDS = {"Operator": "OT", "Menu": "MT", "Panel": "PT", "UIList": "UL"}
-"""What stands in names of classes, so that nothing of others is replaced by accident."""
+"""Infixes of class names by base class, which avoid replacing classes of others by accident."""
 
 PAIRS = {
     "register_class(": "unregister_class(",
@@ -52,7 +52,7 @@ PAIRS = {
     "draw_handler_add(": "draw_handler_remove(",
     "def register(": "def unregister(",
 }
-"""What Blender is given in a module, and what takes it back there."""
+"""Calls that register something in Blender, and the calls in the same module that undo them."""
 
 
 @pytest.fixture(scope="module")
@@ -62,14 +62,14 @@ def files(extension_zip) -> dict[str, str]:
 
 
 def may_be_imported(module: str) -> bool:
-    if module in ("importlib.resources", "urllib.parse"):  # files of a package, no code; words, no network
+    if module in ("importlib.resources", "urllib.parse"):  # files of a package, not code; words, no network
         return True
     module = module.partition(".")[0]
     return module in OF_BLENDER or (module in sys.stdlib_module_names and module not in UNWANTED)
 
 
 def complaints(content: str) -> list[str]:
-    """What a reviewer would send back of a module."""
+    """Return the problems for which a reviewer would send back a module."""
     tree, result = ast.parse(content), []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -83,7 +83,7 @@ def complaints(content: str) -> list[str]:
             starts = [f"RIGID_MOTION_{KINDS[kind]}_" for kind in kinds] or [
                 f"RIGID_MOTION_{k}_" for k in KINDS.values()
             ]
-            # What is private or has no label is a base of others, which Blender is not given; lists have none.
+            # Classes that are private or lack a label are bases, which are not registered; lists have no label.
             is_given = "UIList" in kinds or "bl_label =" in ast.unparse(node)
             if is_given and not node.name.startswith((*starts, "_")):
                 result.append(f"names {node.name}")

@@ -6,7 +6,7 @@ import pytest
 from rigid_motion.motion import MODES
 from rigid_motion_batch import palette
 
-# Machado, Oliveira, Fernandes 2009, severity 1: what people with one kind of cone missing see, in linear RGB.
+# Machado, Oliveira, Fernandes 2009, severity 1: the colours seen with one kind of cone missing, in linear RGB.
 VISION = {
     "all cones": np.eye(3),
     "protanopia": np.array(

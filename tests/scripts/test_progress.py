@@ -1,4 +1,4 @@
-"""The bar on a terminal, and the lines in a log."""
+"""Tests of progress: the bar on a terminal, and plain lines in a log."""
 
 import contextlib
 import io
@@ -17,7 +17,7 @@ class Clock:
 
 
 class Terminal(io.StringIO):
-    """A stream that is a terminal."""
+    """A stream that says it is a terminal."""
 
     encoding = "utf-8"
 
@@ -34,7 +34,7 @@ def plain(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def interrupted(parts: int, doing: str) -> list[str]:
-    """The two lines that were drawn last, where Ctrl-C has ended one stage after half a minute."""
+    """Return the last two lines drawn when Ctrl-C ends a stage after half a minute."""
     clock, terminal = Clock(), Terminal()
     begun = Progress(terminal, clock=clock)
     with contextlib.suppress(KeyboardInterrupt), begun as progress, progress.stage("Rendering", parts) as stage:

@@ -1,4 +1,4 @@
-"""reduce.py on .blend files, as people run it: what it plays, what it leaves alone, what it says."""
+"""Tests of reduce.py on .blend files, as users run it: its results, the files that it leaves alone, its messages."""
 
 import json
 from pathlib import Path

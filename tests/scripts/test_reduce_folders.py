@@ -1,4 +1,4 @@
-"""reduce.py on folders and many files: which are done, by how many processes, and what is left when it is run again."""
+"""Tests of reduce.py on folders and many files: selection of files, parallel processes, and repeated runs."""
 
 import re
 import subprocess
@@ -225,7 +225,7 @@ def test_blenders_own_python_does_one_after_the_other(tmp_path, capsys, monkeypa
 def test_a_killed_worker_costs_its_file_alone(tmp_path):
     for name in ("a", "slow", "z"):
         glb(tmp_path / f"{name}.glb")
-    # Killed where the result is moved into place: a part of it is there already.
+    # Killed while the result is moved into place: part of it exists already.
     run = start(tmp_path, "reduce.py", ".", "--jobs", "2", where="slow-reduced.glb", act=KILL)
     printed, said, _ = run.end()
     assert run.process.returncode == 1, said

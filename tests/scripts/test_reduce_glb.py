@@ -1,4 +1,4 @@
-"""`reduce.py --glb`: .blend files, FBX files and recordings as GLB files, by Blender's exporter and then reduced."""
+"""Tests of `reduce.py --glb`: .blend files, FBX files and recordings, exported as GLB by Blender and then reduced."""
 
 import shutil
 from pathlib import Path
@@ -17,12 +17,12 @@ pytestmark = pytest.mark.blender
 MM = 1e-3
 
 SINGLE = 2e-5
-"""Metres: what the single precision of GLB files and of Blender's matrices comes to."""
+"""Allowed rounding in metres: GLB files and Blender's matrices are in single precision."""
 
 
 @pytest.fixture
 def exported(monkeypatch, tmp_path) -> Path:
-    """A copy of what Blender's exporter wrote last."""
+    """A copy of the last file that Blender's exporter wrote."""
     copy, export = tmp_path / "exported" / "sampled.glb", exporting.export_glb
     copy.parent.mkdir()
 
@@ -40,7 +40,7 @@ def node_of(file: File, name: str) -> int:
 
 
 def require_joints(source: Path, made: Path, tolerance: float, *, fps: float) -> None:
-    """The joints are where the reader of recordings has them; glTF has the axes of BVH, and frame 1 is first."""
+    """Check the joints against the recording's reader; glTF has the axes of BVH, and frame 1 comes first."""
     ((clip,), _), file = read_source(str(source), None), File(made)
     worlds = file.worlds(0, clip.times - clip.times[0] + 1.0 / fps)
     nodes = [node_of(file, joint) for joint in clip.rest_body.joints]
@@ -49,7 +49,7 @@ def require_joints(source: Path, made: Path, tolerance: float, *, fps: float) ->
 
 
 def require_near_export(made: Path, exported: Path, tolerance: float, radius: float) -> None:
-    """At eighths of the keys of both; and every clip that was exported is there."""
+    """Check the error at eighths between the keys of both files, and that no exported clip is missing."""
     sampled, file = File(exported), File(made)
     assert len(sampled.json["animations"]) == len(file.json["animations"])
     for clip in range(len(sampled.json["animations"])):

@@ -1,4 +1,4 @@
-"""`reduce.py` gives glTF files back as they are, with fewer keys, and needs no Blender for that."""
+"""Tests of `reduce.py` on glTF files: it returns them with fewer keys, otherwise unchanged, and without Blender."""
 
 import json
 import os
@@ -33,7 +33,7 @@ sys.exit(reduce.main(sys.argv[1:]))
 
 @pytest.fixture
 def report(monkeypatch):
-    """Has files reduced as ever, and says something else of them; returns the options that were given."""
+    """A function that alters the reports of reduced files; it returns a list that collects the options given."""
 
     def alter(changed: Callable[[Report], dict[str, Any]]) -> list[Options]:
         given: list[Options] = []

@@ -1,4 +1,4 @@
-"""reduce.py on recordings: how near tables, objects and rigs are to what was recorded."""
+"""Tests of reduce.py on recordings: errors of the resulting tables, objects and rigs."""
 
 import re
 

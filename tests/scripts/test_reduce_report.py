@@ -1,4 +1,4 @@
-"""`reduce.py --report`: a page of all files, with glTF files before and after as they play."""
+"""Tests of `reduce.py --report`: a page of all files, in which glTF files play before and after."""
 
 import json
 import re
@@ -26,13 +26,13 @@ HOSTILE_FILE = HOSTILE.replace("/", "\N{DIVISION SLASH}")
 
 
 def clips_in(page: Path) -> list[dict[str, Any]]:
-    """What the page has of the clips that can be played."""
+    """Return the data of the clips that a page can play."""
     text = page.read_text(encoding="utf-8")
     return [json.loads(data) for data in re.findall(r'id="clip-\d+">(.*)</script>', text)]
 
 
 def played(clip: dict[str, Any]) -> dict[str, Any]:
-    """A clip as the viewer reads it: times, errors, keys, and where points are before and after."""
+    """Return a clip as the viewer reads it: times, errors, keys, and positions of points before and after."""
     expression = f"""(async (clip) => {{
         const recording = await readRecording(clip.recording), choice = await readChoice(clip.choices[0], recording);
         const at = (motion) => [...choice.moments].map((t) => poseAt(recording, choice, t, motion, 1).places);
@@ -46,7 +46,7 @@ def played(clip: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Clips, of which one cannot be read and one does not move."""
+    """A folder of clips, one of them unreadable and one without motion."""
     clips = tmp_path / "clips"
     (clips / "more").mkdir(parents=True)
     walk(joints=8).write(clips / "walk.glb")

@@ -1,4 +1,4 @@
-"""What the rooms that a worker in Blender uses may import."""
+"""Tests of imports: the packages that a worker in Blender uses may import only NumPy and Blender's modules."""
 
 import subprocess
 import sys
@@ -20,7 +20,7 @@ ALLOWED = {"numpy", "bpy_extras", "rigid_motion", "rigid_motion_batch"}
 
 
 def imported(room: str) -> tuple[set[str], set[str]]:
-    """The packages, beside those of Python, that all modules of a room bring, and the parts of the batch half."""
+    """Return the packages outside Python that all modules of a package import, and the parts of the batch half."""
     bpy = "" if room == "analysis" else "import bpy"
     code = IMPORTING.format(room=room, bpy=bpy)
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)

@@ -1,4 +1,4 @@
-"""What is written by Python, by the system and by C is kept off the streams, and nothing else."""
+"""Tests that output of Python, of the system and of C is silenced, and nothing else."""
 
 import ctypes
 import os
@@ -10,7 +10,7 @@ from rigid_motion_batch.silencing import silenced
 
 
 def speak(words: str) -> None:
-    """On both streams by Python and by the system, and on the output by C, which holds it back."""
+    """Write to both streams by Python and by the system, and to standard output by C, which buffers it."""
     for stream, descriptor in ((sys.stdout, 1), (sys.stderr, 2)):
         print(f"{words} by Python", file=stream)
         os.write(descriptor, f"{words} by the system\n".encode())

@@ -1,4 +1,4 @@
-"""Commands whose output nobody reads, has no place, or cannot be shown: one line or silence, and no traceback."""
+"""Tests of commands whose output is unread, has no space, or cannot be shown: one line or silence, and no traceback."""
 
 import json
 import os
@@ -20,11 +20,11 @@ pytestmark = [
 ]
 
 ODD = "a\nb\t\x1b[2J \u00fc\u624b.csv"
-"""What a file may be called."""
+"""An odd but possible file name."""
 
 
 def shell(line: str, folder: Path, **variables: str) -> subprocess.CompletedProcess[str]:
-    """Run a line of Bash, in which `reduce` and `rigid-motion` are commands."""
+    """Run a line of Bash in which `reduce`, `compare` and `program` are commands."""
     package = f"PYTHONPATH={ROOT / 'scripts'} {sys.executable} -m rigid_motion_batch"
     reduce, compare = (f"{sys.executable} {ROOT / 'scripts'}/{name}.py" for name in ("reduce", "compare"))
     functions = f'reduce() {{ {reduce} "$@"; }}; compare() {{ {compare} "$@"; }}; program() {{ {package} "$@"; }}'

@@ -1,4 +1,4 @@
-"""`stream measure`: what a recording costs, and what was shown of it, by another process."""
+"""Tests of `stream measure`: the cost of a recording, and the motion that another process shows."""
 
 import json
 from pathlib import Path
@@ -30,7 +30,7 @@ def test_a_body(walk: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -
     assert result["bytes_a_second_with_headers"] == pytest.approx(
         result["bytes_a_second"] + 28 * (result["datagrams"] - 1) / result["seconds"]
     )
-    # Anybody can check it by the file.
+    # The written file confirms the numbers.
     (before, after) = (read_clips([str(path)])[0][0] for path in (walk, shown))
     true, there = (clip.rest_body.skeleton.in_root_space(clip.poses).positions for clip in (before, after))
     assert true.shape == there.shape
@@ -58,7 +58,7 @@ def test_a_tool_slips_least_in_the_space_of_the_hand(capfd: pytest.CaptureFixtur
     assert in_hand["slip_mm"] <= 3.0
     cost = "bytes_a_second_with_headers"
     assert in_hand[cost] < min(in_world[cost], apart[cost])
-    # A datagram more or less is ten bytes a second of so short a recording.
+    # One datagram more or less is ten bytes per second for such a short recording.
     assert in_hand[cost] <= alone[cost] + 20.0
 
 

@@ -1,4 +1,4 @@
-"""Commands that are stopped, or crash, while something is at work that Python cannot interrupt."""
+"""Tests of commands that are stopped, or crash, during work that Python cannot interrupt."""
 
 import os
 import signal
@@ -14,7 +14,7 @@ from tests.scripts.reducing import listed, write_csv
 from tests.scripts.stopping import CRASH, alive, descendants, start
 
 SOON = 5.0
-"""Seconds: on a machine with nothing else to do it is 1.3."""
+"""Allowed seconds until a stopped command ends: on an idle machine it takes 1.3."""
 
 pytestmark = [
     pytest.mark.blender,
@@ -47,7 +47,7 @@ def test_a_reader_at_work_does_not_keep_a_command_from_its_end(tmp_path, command
     processes = descendants(run.process.pid)
     started = time.monotonic()
     while run.process.poll() is None and time.monotonic() < started + SOON:
-        # As a terminal does at Ctrl-C, pressed again and again: all processes get it.
+        # Like a terminal when Ctrl-C is pressed again and again: all processes get the signal.
         os.killpg(run.process.pid, by)
         time.sleep(0.002)
     seconds = time.monotonic() - started
@@ -118,7 +118,7 @@ def test_the_last_words_are_of_the_command_where_its_child_is_killed(tmp_path):
 
 
 def test_ctrl_c_within_an_importer_or_exporter_is_no_fault_of_the_file(tmp_path):
-    # As bpy.ops puts it.
+    # In the form that bpy.ops raises.
     interrupted = RuntimeError("Error: Python: Traceback (most recent call last):\n  File ...\nKeyboardInterrupt\n")
 
     def importer() -> None:
@@ -138,7 +138,7 @@ def test_ctrl_c_at_the_very_beginning_is_no_traceback(tmp_path, moment):
     assert printed == ""
     assert seconds < SOON
     assert files(tmp_path) == ["slow.csv"]
-    # Before the program had begun, Python ends as it does: by the signal, or saying where it was itself.
+    # Before the program has started, Python ends in its own way: by the signal, or with its own traceback.
     if run.process.returncode != -signal.SIGINT and "init_import_site" not in said:
         assert run.process.returncode == 130
         assert said.splitlines()[-1].startswith("Stopped. ")

@@ -1,4 +1,4 @@
-"""What no command line can mean is refused by a line that says what to give instead, and ends with code 2."""
+"""Tests of wrong options: each is refused by a line that says what to give instead, with exit code 2."""
 
 from importlib import import_module
 
@@ -53,7 +53,7 @@ REFUSED = {
         (["a.blend", "b.blend", "--output", __file__], "is a file, and there may be several results: give a folder"),
     ],
 }
-"""By command: arguments, and what the line has to say."""
+"""Command to pairs of arguments and required text of the message."""
 
 
 @pytest.mark.parametrize(
