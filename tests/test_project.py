@@ -1,4 +1,4 @@
-"""Tests of the whole checkout: one style, one version, a valid manifest, and layered imports."""
+"""Tests of the whole checkout: one style, one version everywhere, release notes of tags, and layered imports."""
 
 import ast
 import itertools

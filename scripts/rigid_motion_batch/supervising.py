@@ -73,7 +73,7 @@ def stop_signals() -> list[signal.Signals]:
 
 @contextmanager
 def ended_at_once() -> Iterator[None]:
-    """Let stop signals end the process at once within the block: half-loaded modules cannot handle an exception."""
+    """Let stop signals end the process at once within the block: half-loaded modules could not end it properly."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -231,7 +231,7 @@ def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, cap
     assert listed(tmp_path) == ["a.blend", "b-baked.blend", "b.blend"]
 
 
-# What is left alone, and what is kept
+# Files that are left alone, and files that are kept
 
 
 def test_textures_and_libraries_are_found_from_another_folder(tmp_path):

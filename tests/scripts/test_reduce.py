@@ -154,7 +154,7 @@ def test_a_dry_run_says_all_also_as_json_and_writes_nothing(tmp_path, capsys):
     assert f"to be reduced; at most {1e3 * worst:.3g} mm off (" in said.err.splitlines()[-1]
 
 
-# What is left alone, and how it ends
+# Files that are left alone, and exit codes
 
 
 @pytest.mark.any_blender

@@ -53,7 +53,7 @@ what is run:
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
-    """Return the options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    """Return the options; a wrong option ends the program with exit code 2 and one line of explanation."""
     parser = parser_of(SCRIPT, __doc__, EPILOG + EXIT_CODES)
     parser.add_argument("files", nargs="+", type=not_empty, metavar="FILE.blend", help="files to bake, folders")
     parser.add_argument("--unbake", action="store_true", help="restore the original keys of baked objects and bones")

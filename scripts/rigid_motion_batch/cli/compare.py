@@ -116,7 +116,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
     )
 
 
-# -- what it needs ----------------------------------------------------------------------------------------------------
+# -- requirements -----------------------------------------------------------------------------------------------------
 
 
 def _blender(options: argparse.Namespace) -> str:
@@ -174,7 +174,7 @@ def _executor(jobs: int | None) -> Executor:
     return Executor() if jobs == 0 else ProcessExecutor(jobs or processors())
 
 
-# -- doing it ---------------------------------------------------------------------------------------------------------
+# -- running ----------------------------------------------------------------------------------------------------------
 
 
 class _Comparing:
@@ -271,7 +271,7 @@ class _Comparing:
             if isinstance(choice, Tolerance) and all(problem := choice.problem_with(clip, radius) for clip in clips):
                 raise RunError(problem)
 
-    # -- saying it ----------------------------------------------------------------------------------------------------
+    # -- output -------------------------------------------------------------------------------------------------------
 
     def _show_numbers(self) -> None:
         if self.options.quiet or self.options.json:

@@ -188,7 +188,7 @@ def router(options: argparse.Namespace, stopped: list[int]) -> None:
         session.close()
 
 
-# What they have in common
+# Shared helpers
 
 
 @contextmanager

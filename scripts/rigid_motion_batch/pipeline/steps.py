@@ -2,7 +2,7 @@
 
 A step writes the files of a result, from results of other tasks and from files; its fields are its parameters. The key
 of a task is a digest of everything that its result depends on. So all keys are known before any work, and equal tasks
-share one result. Standard library only: Blender's own Python loads this.
+share one result. Standard library and NumPy only: Blender's own Python loads this.
 """
 
 from __future__ import annotations
