@@ -1,18 +1,18 @@
-"""Blender's side of a motion: Actions, slots, channels, keys, and the in-betweens that go into them. No user interface.
+"""Animation in Blender: Actions, slots, channels, keys, and the in-betweens written to them. No user interface.
 
-fcurves     F-curves as arrays, evaluated; NumPy alone
-evaluation  from what is keyed, as arrays, to the values that channels are to have; NumPy alone
-transforms  what is moved: objects and pose bones
-actions     what is keyed: slots, channels, modes; read into sources
-terms       what is added to channels: planned, compared with what is there, written
-holds       what things are held in: constraints, keyed
-queries     what is asked of motions: keys, segments, problems
-following   following edits: handlers, refresh, keys that are inserted in between
-edits       what is done to motions: choosing modes, turns, breakdowns
+fcurves     F-curves as arrays, and their evaluation; NumPy alone
+evaluation  computes channel values from keys, both as arrays; NumPy alone
+transforms  the things that move: objects and pose bones
+actions     keyed data: slots, channels, modes; read into sources
+terms       values added to channels: planned, compared with the present ones, written
+holds       holders of objects and bones: keyed constraints
+queries     read-only questions about motions: keys, segments, problems
+following   reacts to edits: handlers, refresh, keys inserted in between
+edits       edits of motions: choosing modes, turns, breakdowns
 baking      other keys for the same motion
-properties  what is kept in files
+properties  properties stored in files
 
-Data flows from Blender through actions, evaluation and terms back to Blender. Each room imports only those above it.
+Data flows from Blender through actions, evaluation and terms back to Blender. Each package imports only those above it.
 """
 
 from . import properties

@@ -1,7 +1,7 @@
-"""What is kept in the file, on objects and bones. Without the extension all of it is inert, and stays in the file.
+"""Properties of objects and bones that files store. Without the extension they do nothing, but stay in the file.
 
-What happens between keys is in the keys themselves, see `actions.marks`; an object or a pose bone shows it, to be
-chosen from Python and by a button.
+The keys themselves store the modes, see `actions.marks`. An object or a pose bone shows its mode as a property, which
+Python and a button can set.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from .queries.keyed import mode_shown
 from .transforms import MOTION_PROPERTY, OWN_WORDS, Refused, Transform, transform_of
 
 FIRST_MODES = ("motor_spline", "dq_sclerp")
-"""The modes that menus show first: those to take where nothing speaks for another."""
+"""The modes that menus list first: the recommended ones."""
 
 MODE_ITEMS = [
     ("BLENDER", "Blender", "Blender's own in-betweens: each channel separately", 0),
@@ -41,7 +41,7 @@ MODE_ITEMS = [
         for name, mode in sorted(KEYFRAME_MODES.items(), key=lambda item: (*FIRST_MODES, item[0]).index(item[0]))
     ),
 ]
-"""The modes as items of an enumeration. Files have the numbers."""
+"""The modes as enum items. Files store their numbers."""
 
 TURN_AXIS_ITEMS = [
     (
@@ -53,7 +53,7 @@ TURN_AXIS_ITEMS = [
     ("Y", "Y", "Always about the local Y axis"),
     ("Z", "Z", "Always about the local Z axis"),
 ]
-"""The axes that turns are about."""
+"""The axes for extra turns, as enum items."""
 
 
 @with_properties
@@ -71,10 +71,10 @@ class ChangedKeys(bpy.types.PropertyGroup):
     # The slot with these keys.
     changed: bpy.types.Action | None = PointerProperty(type=bpy.types.Action)
     handle: int = IntProperty(options={"HIDDEN"})
-    # What has those from before, and what their data paths begin with there.
+    # The Action with the earlier keys, and the prefix of their data paths there.
     original: bpy.types.Action | None = PointerProperty(type=bpy.types.Action)
     kept_as: str = StringProperty(options={"HIDDEN"})
-    # What became of its keys where they were reduced: a `Reduction` as JSON.
+    # For reduced keys, the result: a `Reduction` as JSON.
     reduction: str = StringProperty(options={"HIDDEN"})
 
 
@@ -83,20 +83,20 @@ def _get_mode(motion: RigidMotion) -> int:
 
 
 def _set_mode(motion: RigidMotion, number: int) -> None:
-    # What refuses says so in the panel.
+    # The panel shows why a transform refuses.
     with suppress(Refused):
         mode_keys.set_mode(_transform_with(motion), MODE_NAMES[number])
 
 
 def _on_turns(motion: RigidMotion, _context: bpy.types.Context) -> None:
     if not follower.follower.busy:
-        # What refuses to turn says so in the panel.
+        # The panel shows why a transform refuses to turn.
         with suppress(Refused):
             mode_keys.on_turns(_transform_with(motion))
 
 
 def _transform_with(motion: RigidMotion) -> Transform:
-    """Return what has these properties: Blender has no way from them to their bone."""
+    """Return the object or bone with these properties. Blender has no direct way from properties to their bone."""
     obj = cast(bpy.types.Object, motion.id_data)
     carriers = (obj, *(() if obj.pose is None else obj.pose.bones))
     return next(transform for transform in map(transform_of, carriers) if motion == cast(object, transform.motion))
@@ -137,9 +137,9 @@ class RigidMotion(bpy.types.PropertyGroup):
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
-    # The mode that was chosen before there was an Action to keep it.
+    # The mode chosen before there was an Action to store it.
     awaited: str = EnumProperty(items=MODE_ITEMS, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"})
-    # What has its motion below an offset layer: see `baking.layers`.
+    # The Empty with the motion below an offset layer: see `baking.layers`.
     base: bpy.types.Object | None = PointerProperty(
         type=bpy.types.Object, options={"HIDDEN"}, override={"LIBRARY_OVERRIDABLE"}
     )

@@ -1,20 +1,20 @@
-"""Other keys for the same motion, and the way back.
+"""Baking, reducing and cleaning keys: other keys for the same motion, and the way back.
 
-originals      what there was before keys were baked, reduced or cleaned
-motions        how objects and bones move with any keys, and how far off that is
-worlds         where things are in the world, frame by frame
+originals      the channels from before keys were baked, reduced or cleaned
+motions        the motion of objects and bones for given keys, and its error
+worlds         world matrices, frame by frame
 bake           real keys for every frame
-resting        where a body is at rest in something
+resting        stretches on which a body is at rest relative to another
 fewer_keys     sources with fewer keys
 native_curves  fewer Bezier keys, and their handles
-search         the few keys that an object, or the bones of a rig together, need
-held_keys      fewer keys of what is held, run by run
-kept_keys      keys that stay on their frames, and more where these are not enough
-reducing       the few keys that a recording needs, and the way back
-cleaning       dense keys without their trembling
+search         the few keys that an object, or all bones of a rig, need
+held_keys      fewer keys for held objects, hold by hold
+kept_keys      keys that stay on their frames, and extra keys where these are not enough
+reducing       few keys from a recording, and the way back
+cleaning       dense keys without jitter
 layers         an offset on top of a motion
-merging_layers both as keys again
-into_holds     dense keys in the world to few in the hands that held something
+merging_layers a motion and its offset as one set of keys again
+into_holds     dense world-space keys reduced to a few keys in the hands that held a prop
 
 Each module imports only those above it.
 """

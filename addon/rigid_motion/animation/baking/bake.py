@@ -1,8 +1,8 @@
 """Baking: poses written as real keys on an object's own channels, which any Blender plays without this extension.
 
-`bake_poses` writes a motion that comes from elsewhere. `bake` puts the in-betweens of an object's keys on its channels,
-which are in the spaces of what holds it; `bake_to_world` has them be in that of its parent alone. `unbake` gives back
-the keys that there were.
+`bake_poses` writes a motion from elsewhere. `bake` writes the in-betweens of an object's keys to its channels, in the
+spaces of its holders; `bake_to_world` writes them in the space of its parent alone. `unbake` restores the previous
+keys.
 """
 
 from __future__ import annotations
@@ -45,22 +45,22 @@ from .worlds import alone_in, arrivals, say_holds, seen_range, worlds_of
 NOT_HELD = n_("{name} is not held: Bake without To World makes keys for its in-betweens")
 
 MAX_SCALE_ROUNDING = 1e-5
-"""Scales that differ by less are the same."""
+"""Scales that differ by less count as equal."""
 
 Planned = tuple[Binding, KeyedTransform, np.ndarray, np.ndarray, list[Switch]]
-"""What is baked: a binding, what is keyed in it, the frames (m,) of the keys, what channels have there (10, m), and the
+"""One planned bake: a binding, its source, the frames (m,) of the keys, the channel values there (10, m), and the
 passes that become keys.
 """
 
 POINT_ATTRIBUTES = ("co", "handle_left", "handle_right")
-"""What a key has of frame and value."""
+"""The attributes of a key that store a frame and a value."""
 
 
 def bake_poses(obj: bpy.types.Object, frames: np.ndarray, poses: Poses, *, key_type: str = "GENERATED") -> None:
-    """Key `obj` with one pose per frame, straight lines between them.
+    """Key `obj` with one pose per frame, with linear interpolation between them.
 
-    Its location, rotation and (where poses have scales) scale channels are replaced. Frames (n,) rise, poses (n,) are
-    those of the channels. A ValueError says where they differ in number.
+    This replaces its location, rotation and (if the poses have scales) scale channels. Frames (n,) rise; poses (n,) are
+    in the space of the channels. Raises ValueError if their numbers differ.
     """
     if poses.shape != np.shape(frames):
         raise ValueError(f"{obj.name}: {np.shape(frames)} frames do not fit poses of shape {poses.shape}")
@@ -76,25 +76,26 @@ def bake_poses(obj: bpy.types.Object, frames: np.ndarray, poses: Poses, *, key_t
 def bake(
     targets: Targets, *, step: float = 1.0, interpolation: str = "LINEAR", refused: list[Refused] | None = None
 ) -> tuple[float, float]:
-    """Put in-betweens on the channels that they are between, as real keys, and return the first and the last frame.
+    """Write in-betweens to their channels as real keys, and return the first and the last frame.
 
-    The animator's keys stay where they are; the others are of type GENERATED, and straight lines or holds run between
-    all of them. As with Blender's own commands that change keys, all that moves by the same Action has them. What there
-    was stays in the file, for `unbake`.
+    The animator's keys stay where they are; the new keys are of type GENERATED. Between all keys the interpolation is
+    linear or constant. As with Blender's own commands for keys, this affects everything that uses the same Action. The
+    previous keys stay in the file, for `unbake`.
 
-    What is held stays so by its baked keys, and is passed on. But where it moves as it arrives, as by a throw, these
-    cannot say how it would have come: there it gets keys for the pass as it is now, in what held it before.
+    Baked keys of a held object stay in its holders, and it still passes from one to the next. But if the object moves
+    as it arrives, for example when thrown, baked keys cannot show how it would have come. That pass gets keys as it is
+    now, in the space of the previous holder.
 
     Parameters
     ----------
     targets, refused
         See `edits.apply`.
     step : float
-        Frames from key to key, counted from the first. The animator's own keys are kept whatever the step.
+        Frames from key to key, counted from the first. The animator's own keys stay for any step.
     interpolation : str
-        LINEAR, or CONSTANT to hold each pose until the next key: with a step of 2 the motion is on twos.
+        LINEAR, or CONSTANT to hold each pose until the next key: with a step of 2, animation on twos.
     """
-    _refuse_wishes(step, interpolation)
+    _refuse_options(step, interpolation)
     originals = Originals(BAKED)
 
     def plan(transform: Transform, readings: Readings) -> list[Planned]:
@@ -116,7 +117,7 @@ def bake(
     def act(transform: Transform, planned: list[Planned]) -> list[float]:
         for place in planned:
             if originals.keep(place[0]):
-                _bake_place(transform, *place, interpolation)
+                _bake_binding(transform, *place, interpolation)
         return [float(frame) for _, _, frames, *_ in planned for frame in frames[[0, -1]]]
 
     ends = [frame for of_target in apply_edit(targets, plan, act, refused).values() for frame in of_target]
@@ -126,12 +127,12 @@ def bake(
 def bake_to_world(
     targets: Targets, *, step: float = 1.0, interpolation: str = "LINEAR", refused: list[Refused] | None = None
 ) -> tuple[float, float]:
-    """Put keys on the channels of what is held that show the same in the world, as if nothing held it.
+    """Write keys to a held object that show the same world-space motion without its holders.
 
-    They are in the space of its parent, where it has one. What holds it no longer does: it goes nowhere else when that
-    is edited. `unbake` has it be held again. For what else there is to it see `bake`.
+    The keys are in the space of its parent, if it has one. Its holders no longer hold it, so editing them does not move
+    it. `unbake` makes them hold it again. For all else see `bake`.
     """
-    _refuse_wishes(step, interpolation)
+    _refuse_options(step, interpolation)
     originals = Originals(BAKED)
 
     def plan(transform: Transform, readings: Readings) -> Planned:
@@ -163,7 +164,7 @@ def bake_to_world(
     return min(ends, default=0.0), max(ends, default=0.0)
 
 
-def _refuse_wishes(step: float, interpolation: str) -> None:
+def _refuse_options(step: float, interpolation: str) -> None:
     if interpolation not in ("LINEAR", "CONSTANT"):
         raise ValueError(f"interpolation: LINEAR or CONSTANT, not {interpolation!r}")
     if not step > 0.0:
@@ -171,7 +172,7 @@ def _refuse_wishes(step: float, interpolation: str) -> None:
 
 
 def unbake(targets: Targets, *, refused: list[Refused] | None = None) -> None:
-    """Give the keys back that there were before baking, to the last handle. For targets see `edits.apply`."""
+    """Restore the keys from before baking exactly, handles included. For targets see `edits.apply`."""
     go_back(targets, (BAKED,), refused)
 
 
@@ -181,9 +182,10 @@ def go_back(
     refused: list[Refused] | None,
     by: Callable[[Transform, str, Iterable[Binding]], None] = put_back,
 ) -> None:
-    """Give targets, and all that moves by the same Actions, the keys back from before they were changed last.
+    """Restore the keys from before the last change, for targets and all other users of the same Actions.
 
-    Kinds are the ways in which that may have been. Or do something else to what is kept of these, `by` a function.
+    `kinds` are the changes that may be undone. `by` is the function called for each target; the default restores the
+    kept keys.
     """
 
     def plan(transform: Transform, readings: Readings) -> tuple[str, list[Binding]]:
@@ -197,15 +199,15 @@ def go_back(
 
 
 def is_baked(target: Target) -> bool:
-    """Return whether something moves by baked keys, and those from before are still in the file."""
+    """Return whether the target has baked keys and the keys from before are still in the file."""
     return last_change(transform_of(target)) == BAKED
 
 
 def _range(transform: Transform, binding: Binding, source: KeyedTransform) -> tuple[float, float]:
-    """Return the first and the last frame to bake: of the keys, or of all that is seen where anything goes on."""
+    """Return the first and the last frame to bake: those of the keys, or of the visible range if the motion goes on."""
     modifiers = _modifiers(transform, binding, source)
     if source.cyclic is not None and not modifiers:
-        # Cycles go on from the outermost keys.
+        # Cycles continue from the outermost keys.
         begin, end = source.cyclic.times[[0, -1]].tolist()
         return begin, end
     begin, end = source.keyed_range
@@ -215,20 +217,20 @@ def _range(transform: Transform, binding: Binding, source: KeyedTransform) -> tu
 
 
 def _modifiers(transform: Transform, binding: Binding, source: KeyedTransform) -> list[bpy.types.FModifier]:
-    """Return the modifiers of the animator's that are baked along with keys."""
+    """Return the animator's own modifiers, which are baked along with the keys."""
     curves = map(binding.curves.get, _channels(transform, source).values())
     return [modifier for fcurve in curves if fcurve is not None for modifier in on_top(fcurve)]
 
 
 def _channels(transform: Transform, source: KeyedTransform) -> dict[int, Channel]:
-    """Return the channels that are baked, by their rows: what is muted or driven stays, and what no mode changes."""
+    """Return the channels to bake, by their rows: not muted or driven ones, nor those that no mode changes."""
     parts = source.keyed - (frozenset() if source.uniform_scale else {SCALE})
     channels = transform.channels.items()
     return {row: channel for row, channel in channels if PART_OF[row] in parts and row not in source.driven}
 
 
 def _frames(source: KeyedTransform, begin: float, end: float, step: float, passes: Iterable[Switch] = ()) -> np.ndarray:
-    """Return every step from begin to end, and the keys in between; and all frames of passes that become keys."""
+    """Return the frames of every step from begin to end, the keys in between, and all frames of passes to be keyed."""
     keys = distinct(source.keyed_frames)
     passing = (np.arange(np.floor(switch.begin) + 1.0, switch.frame) for switch in passes)
     keys = np.union1d(keys, without(np.concatenate([np.empty(0), *passing]), keys))
@@ -239,10 +241,10 @@ def _frames(source: KeyedTransform, begin: float, end: float, step: float, passe
 def _values(
     transform: Transform, binding: Binding, source: KeyedTransform, frames: np.ndarray, passes: Iterable[Switch]
 ) -> np.ndarray:
-    """Return what channels are to have on frames (m,), shape (10, m)."""
+    """Return the channel values to bake on frames (m,), shape (10, m)."""
     values = continuous_values(source, frames, added_values(binding, transform, source, frames))
     if _cycles(transform, binding, source) is not None:
-        # The next round goes on from the animator's values, whatever sign or turn they are in.
+        # The next cycle continues from the animator's values, with their sign and turn.
         values[:, -1] = source.values_at(frames[-1:])[:, 0]
     for switch in passes:
         _show_pass(transform, switch, frames, values)
@@ -250,11 +252,11 @@ def _values(
 
 
 def _cycles(transform: Transform, binding: Binding, source: KeyedTransform) -> Cycles | None:
-    """Return the cycles that go on behind baked keys; None where all rounds are baked."""
+    """Return the cycles that continue after the baked keys; None if all rounds are baked."""
     return None if source.cyclic is None or _modifiers(transform, binding, source) else source.cyclic.cycles
 
 
-def _bake_place(
+def _bake_binding(
     transform: Transform,
     binding: Binding,
     source: KeyedTransform,
@@ -277,7 +279,7 @@ def _bake_place(
 
 
 def _show_pass(transform: Transform, switch: Switch, frames: np.ndarray, values: np.ndarray) -> None:
-    """Have values (10, m) of channels on frames (m,) show how something passes, in what it passes from."""
+    """Overwrite channel values (10, m) on frames (m,) with the pass, in the space of the holder it passes from."""
     at = np.flatnonzero((frames > switch.begin + SAME_FRAME) & (frames < switch.frame - SAME_FRAME))
     if len(at):
         holder = next((holder for holder in holders_of(transform) if holder.number == switch.before), None)
@@ -290,7 +292,7 @@ def _show_pass(transform: Transform, switch: Switch, frames: np.ndarray, values:
 
 
 def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray, interpolation: str) -> None:
-    """Put keys on these frames, all of this interpolation, beside those that there are."""
+    """Add keys on these frames to the existing ones, and give all keys this interpolation."""
     old = key_fields(fcurve.keyframe_points)
     fields = merged_keys(old, new_key_fields(without(frames, old["co"][:, 0]), 0.0, key_type="GENERATED"))
     fields["interpolation"][:] = code_of("interpolation", interpolation)

@@ -1,7 +1,7 @@
-"""Cleaning dense keys: a recording without its trembling, in the keys that it has, and the way back.
+"""Cleaning dense keys: removes jitter and spikes from a recording while its keys stay, and the way back.
 
-What is cleaned are the poses that channels say, each bone's in the space of its parent; how far anything is moved by
-that is measured in the scene, through all that it hangs on. Frames are those of the Action, lengths the scene's units.
+Cleaning works on the poses of the channels, each bone's in the space of its parent. The distance that anything moves
+by that is measured in the scene, through all its parents. Frames are those of the Action, lengths the scene's units.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ from .motions import BodyMotion, continuous_values
 from .originals import CLEANED, Originals
 
 MAX_MOVE_PER_NOISE = 3.0
-"""By how many times of its trembling something may be moved: hardly any noise is more."""
+"""How far a point may be moved, as a multiple of its jitter: noise hardly ever exceeds this."""
 
 MIN_NOISE_KEYS, MAX_KEY_SPACING_FRAMES = DIFFERENCE_ORDERS[-1] + 2, 2.0
-"""The fewest keys that say how much something trembles, and the most frames from one to the next."""
+"""The fewest keys from which jitter can be measured, and the largest number of frames between them."""
 
 TRANSITION_KEYS = 8
-"""Keys over which what is cleaned goes over into what is not."""
+"""The number of keys over which cleaned keys blend into uncleaned ones."""
 
 MAX_DRAW_BACK_ROUNDS = 24
-"""In which the keys on a frame are drawn back together where something is moved too far: half of them to none."""
+"""Rounds of pulling back all keys of a frame where something moved too far: in the second half completely."""
 
 USED_TOLERANCE_RATIO = 0.999
-"""The part of the tolerance that is used: keys are rounded."""
+"""The fraction of the tolerance that is used, as keys are rounded."""
 
 _LOOKS = Looks()
-"""What was found, while a slider is drawn."""
+"""Cached results, for while a slider is dragged."""
 
 TOO_FEW = n_(
     "{name} has {count} keys of location and rotation: at least {least} are needed to distinguish jitter from motion"
@@ -61,39 +61,39 @@ NO_KEY_SELECTED = n_("{name}: no key of location, rotation or scale is selected"
 
 
 class Cleaning(NamedTuple):
-    """What became of an object, or of the bones of a rig together."""
+    """The result of cleaning an object, or all bones of a rig together."""
 
     transforms: Sequence[Transform]
     trembling: float
-    """How far any point within the radius is off, by the root mean square: of a rig what trembles most."""
+    """The root mean square jitter of any point within the radius; for a rig, of the point with the most jitter."""
 
     moved: float
-    """How far any point was moved at most, but by spikes."""
+    """The largest distance that any point moved, not counting spikes."""
 
     spikes: int
-    """How many keys were off for a moment. They are where the motion around them leads."""
+    """The number of keys that were off for a moment. Now they follow the motion around them."""
 
     repeats: int
-    """How many keys were the same as the one before while the thing went on."""
+    """The number of keys that repeated the one before while the motion went on."""
 
     alone: float
-    """The part of the keys that were left as they are, as motion cannot be told from noise there."""
+    """The fraction of keys left as they are, because motion cannot be told from noise there."""
 
     contacts: tuple[int, float, float] | None
-    """How many times bones stand, and how far they slide there now and did, at most; None of what is no rig."""
+    """The number of times bones stand, and the largest slide there, now and before; None if the object is no rig."""
 
     before: np.ndarray
-    """Where each of the transforms was in the world on each key, shape (t, m, 3): bones where they end, and cameras
-    that only turn where they look."""
+    """The world position of each transform on each key before, shape (t, m, 3): for a bone its tail, for a camera that
+    only turns a point it looks at."""
 
     after: np.ndarray
     bridged: np.ndarray
-    """Which of these were spikes or repeats, shape (t, m)."""
+    """True for spikes and repeats, shape (t, m)."""
 
 
 Planned = tuple[Binding, KeyedTransform, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""What the keys of a slot are to be: those of a source, on frames (m,), which are to be at others (m,); components
-(10, m), and which of them were bridged (m,).
+"""The planned keys of a slot: its binding and source, their frames (m,) now and afterwards (m,), their components
+(10, m), and which keys were bridged (m,).
 """
 
 
@@ -107,7 +107,7 @@ def clean_motion(
     select_spikes: bool = True,
     refused: list[Refused] | None = None,
 ) -> list[Cleaning]:
-    """Take the trembling and the spikes out of dense keys. Frames, handles and all else of the keys stay.
+    """Remove jitter and spikes from dense keys. Handles and all else of the keys stay.
 
     Bones of one rig are cleaned together, each in the space of its parent. Scale stays as it is. The keys from before
     are kept, for `restore_keys`.
@@ -117,16 +117,17 @@ def clean_motion(
     targets, refused
         See `edits.apply`.
     strength : float
-        By how many times of its trembling any point within the radius may be moved, but by spikes. Of bones that is so
-        in the rig's space, for all that hangs on them, too. Bones that stand slide no further, or by a quarter of that.
+        How far any point within the radius may be moved, as a multiple of its jitter; spikes do not count. For bones
+        this holds in the rig's space and for all their children. Bones that stand slide no further than before, or than
+        a quarter of that distance.
     radius : float, optional
-        In the scene's units. As far as each target reaches, otherwise.
+        In the scene's units. The default is the reach of each target.
     nearest : float, optional
-        The radius of cameras: the distance of the nearest thing that they look at; that of the focus, otherwise.
+        The radius for cameras: the distance of the nearest thing they look at. The default is the focus distance.
     selected : bool
-        Clean from the first to the last of the selected keys alone. What is cleaned joins what is not.
+        Clean only from the first to the last selected key. Cleaned keys blend into the others.
     select_spikes : bool
-        Select the keys that were spikes or repeats, and no others, if there are any.
+        Select the keys that were spikes or repeats, and no others, if there were any.
 
     Returns
     -------
@@ -154,7 +155,7 @@ def clean_motion(
         for (obj, *_), members in together.items():
             around = (nearest or focus_of(obj)) if obj.type == "CAMERA" else radius
             try:
-                cleaning, planned = _cleaned(obj, members, strength, around, selected=selected)
+                cleaning, planned = _plan_cleaning(obj, members, strength, around, selected=selected)
             except Refused as refusal:
                 plans.update(dict.fromkeys(members, refusal))
                 continue
@@ -175,7 +176,7 @@ def clean_motion(
 
 
 def focus_of(camera: Any) -> float:
-    """Return how far away the focus of a camera, an object, is."""
+    """Return the focus distance of a camera object."""
     dof = camera.data.dof
     if dof.focus_object is None:
         return dof.focus_distance
@@ -183,8 +184,8 @@ def focus_of(camera: Any) -> float:
 
 
 def pixels_of(camera: Any, nearest: float) -> float:
-    """Return by how many pixels anything in the picture of a camera, an object, moves at most for each unit of length
-    that a point so far away does.
+    """Return how many pixels anything in a camera object's picture moves, at most, for each unit of length that a point
+    at the distance `nearest` moves.
     """
     scene: Any = bpy.context.scene
     corners = np.array(camera.data.view_frame(scene=scene))
@@ -192,12 +193,12 @@ def pixels_of(camera: Any, nearest: float) -> float:
     if camera.data.type == "ORTHO":
         return float(pixels)
     depth = abs(corners[0, 2])
-    # In a corner a turn moves the picture by more.
+    # A rotation moves the corners of the picture more than its center.
     return float(pixels * depth / nearest * (1.0 + (corners[:, :2] ** 2).sum(axis=1).max() / depth**2))
 
 
 def _check(transform: Transform, binding: Binding, source: KeyedTransform) -> None:
-    """Raise `Refused` where there is nothing dense to clean, or keys do not say where something is."""
+    """Raise `Refused` if the keys are not dense, or do not alone decide where the transform is."""
     if source.held is not None:
         raise Refused(n_("{name} is held: Bake to World first, and clean that"), name=transform.name)
     refuse_linked(transform, binding)
@@ -211,7 +212,7 @@ def _check(transform: Transform, binding: Binding, source: KeyedTransform) -> No
         raise Refused(text, name=transform.name, step=step)
 
 
-def _cleaned(
+def _plan_cleaning(
     obj: bpy.types.Object,
     members: Mapping[Transform, tuple[Binding, KeyedTransform]],
     strength: float,
@@ -219,18 +220,22 @@ def _cleaned(
     *,
     selected: bool,
 ) -> tuple[Cleaning, dict[Transform, Planned]]:
-    """Return what becomes of those that one slot of an object moves, and what their keys are to be."""
+    """Return the result for all that one slot of an object moves, and their planned keys."""
     bones = cast(Any, obj.pose).bones if any(transform.is_part for transform in members) else ()
     joints = [transform_of(obj), *map(transform_of, bones)]
     sources = {number: members[joint][1] for number, joint in enumerate(joints) if joint in members}
     frames = united(source.keyed_frames for source in sources.values())
-    inside = _inside(obj, frames, [binding for binding, _ in members.values()]) if selected else np.ones(len(frames))
+    inside = (
+        _correction_shares(obj, frames, [binding for binding, _ in members.values()])
+        if selected
+        else np.ones(len(frames))
+    )
     motion = BodyMotion(joints, next(iter(members.values()))[0].slot, sources, frames, radius)
     parents, poses, _ = motion.as_chains()
     stands, render = np.zeros((len(joints), len(frames)), dtype=bool), scene().render
     if bones:
         stands[1:] = standing(frames * render.fps_base / render.fps, motion.truth.origins[1:], shaky=True)
-    # The object, targets and what stands, and all that these hang on; what is no target is at rest.
+    # The object, targets and standing bones, and all their parents. Everything that is no target is at rest.
     wanted = *sources, *np.flatnonzero(stands.any(axis=1)).tolist()
     taking = np.array(sorted({0, *(above for number in wanted for above in motion.above(number))}))
     chain, resting = poses[taking], np.array([number not in sources for number in taking.tolist()])
@@ -239,7 +244,7 @@ def _cleaned(
     chain = Poses(positions, quaternions, chain.scales)
     skeleton = Skeleton(np.where(parents[taking] < 0, -1, np.searchsorted(taking, parents[taking])))
     reaches = np.array([motion.reach(number) for number in taking.tolist()])
-    floor = _floor(frames, chain, reaches, skeleton)
+    floor = _noise_floor(frames, chain, reaches, skeleton)
     radii = np.where((skeleton.sizes > 1) & (motion.radii[taking] > 0.0), motion.radii[taking], reaches)
     if floor * motion.unit <= motion.rounding:
         floor = 0.0
@@ -254,7 +259,7 @@ def _cleaned(
     corrections = {}
     for at, number in enumerate(taking.tolist()):
         if number in sources:
-            # From the parent's axes to those of the channels.
+            # From the parent's axes to the axes of the channels.
             axes = multiply(motion.poses[number].quaternions[0], conjugate(poses.quaternions[number, 0]))
             size = 1.0 if number else float(cast(np.ndarray, motion.poses[0].scales)[0]) or 1.0
             slides = size * rotate(axes, result.poses.positions[at] - chain.positions[at])
@@ -282,9 +287,9 @@ def _cleaned(
         share = np.where(over > 1.0, drawn, share)
     numbers = list(sources)
     world = np.array(channel_space(joints[0], bpy.context.evaluated_depsgraph_get()).translation)
-    # What only turns is seen where a bone ends, and where a camera looks.
+    # Rotation alone shows at the tail of a bone, and where a camera looks.
     turns_alone = np.ptp(motion.truth.origins[0], axis=0).max() < tolerance
-    ends = np.array([_end(joints[number], turns_alone * float(motion.radii[number])) for number in numbers])
+    ends = np.array([_tracked_point(joints[number], turns_alone * float(motion.radii[number])) for number in numbers])
     before, after = (maps[numbers].at(ends[:, None]) + world for maps in (motion.truth, motion.now()))
     at_targets, of_targets = ~resting, inside > 0.0
     now, then = (slide(maps.origins, stands) for maps in (motion.now(), motion.truth))
@@ -306,15 +311,15 @@ def _cleaned(
     }
 
 
-def _end(transform: Transform, reach: float) -> tuple[float, float, float]:
+def _tracked_point(transform: Transform, reach: float) -> tuple[float, float, float]:
     carrier: Any = transform.carrier
     if transform.is_part:
         return 0.0, carrier.bone.length, 0.0
     return 0.0, 0.0, -reach if carrier.type == "CAMERA" else 0.0
 
 
-def _inside(obj: bpy.types.Object, frames: np.ndarray, bindings: Sequence[Binding]) -> np.ndarray:
-    """Return the parts (m,) of corrections that are made: all of them within the selected keys, none beyond."""
+def _correction_shares(obj: bpy.types.Object, frames: np.ndarray, bindings: Sequence[Binding]) -> np.ndarray:
+    """Return the fractions (m,) of corrections to apply: rising to 1 within the range of selected keys, 0 outside."""
     selected = united(frames_in(binding, selected=True) for binding in bindings)
     if not len(selected):
         raise Refused(NO_KEY_SELECTED, name=obj.name)
@@ -326,8 +331,8 @@ def _inside(obj: bpy.types.Object, frames: np.ndarray, bindings: Sequence[Bindin
     return part**2 * (3.0 - 2.0 * part)
 
 
-def _floor(frames: np.ndarray, poses: Poses, reaches: np.ndarray, skeleton: Skeleton) -> float:
-    """Return how far the point that trembles most is off, by the root mean square, of joints that reach so far."""
+def _noise_floor(frames: np.ndarray, poses: Poses, reaches: np.ndarray, skeleton: Skeleton) -> float:
+    """Return the root mean square jitter of the point with the most jitter, of joints with these reaches."""
     noises = [trembling(frames, poses[joint])[:2] for joint in range(len(skeleton))]
     squares = np.array(
         [(math.sqrt(3.0) * p + math.sqrt(2.0) * r * reach) ** 2 for (p, r), reach in zip(noises, reaches, strict=True)]
@@ -338,7 +343,7 @@ def _floor(frames: np.ndarray, poses: Poses, reaches: np.ndarray, skeleton: Skel
 
 
 def _values(transform: Transform, source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
-    """Return the components (10, m) of something on frames (m,): those without keys as they are now."""
+    """Return the components (10, m) of a transform on frames (m,). Components without keys are as they are now."""
     rows, rest = continuous_values(source, frames), transform.components()
     for part in ROWS.keys() - source.keyed:
         rows[ROWS[part]] = rest[ROWS[part], None]
@@ -353,8 +358,8 @@ def _corrected(
     slides: np.ndarray,
     turns: np.ndarray,
 ) -> np.ndarray:
-    """Return components (10, m) with a share (m, 1) of corrections made: slides and rotation vectors (m, 3) in the axes
-    of what is moved.
+    """Return components (10, m) with a fraction (m, 1) of the corrections applied: slides and rotation vectors (m, 3)
+    in the axes of the transform.
     """
     rows, along = start.copy(), transform.location_axes
     rows[ROWS[LOCATION]] += (share * (slides if along is None else slides @ along)).T
@@ -377,7 +382,7 @@ def _write(
     *,
     select: bool,
 ) -> None:
-    """Move the keys of location and rotation to their new values, with their handles."""
+    """Move the keys of location and rotation to their new frames and values, with their handles."""
     for row in (row for rows, _ in source.channels for row in rows if PART_OF[row] != SCALE):
         fcurve = binding.curves[transform.channels[row]]
         fields = key_fields(fcurve.keyframe_points)

@@ -1,7 +1,7 @@
-"""Sources with fewer keys, and the moments that are looked at for them.
+"""Sources with fewer keys, and the moments at which their error is checked.
 
-The few keys are poses: all channels have them on the same frames, with the values that the recording has there. Frames
-are those of the Action.
+The few keys are poses: all channels have keys on the same frames, with the values of the recording. Frames are those of
+the Action.
 """
 
 from __future__ import annotations
@@ -23,70 +23,70 @@ from .motions import SINGLE_PRECISION_RATIO, continuous_values
 
 
 class NeedsItsKeys(Refused):
-    """Something is as reduced as the tolerance allows."""
+    """Raised if no more keys can be removed within the tolerance."""
 
 
 @dataclass(frozen=True)
 class WholeRig:
-    """What became of all bones of a rig that were given fewer keys together. Lengths are in the scene's units."""
+    """The result for all bones of a rig that were reduced together. Lengths are in the scene's units."""
 
     frames: int
-    """On how many frames any of them has keys by now."""
+    """The number of frames on which any bone still has keys."""
 
     slide_before: float
-    """The distance that what stands on the ground slid there as it was recorded."""
+    """The distance that standing bones slid on the ground in the recording."""
 
     slide_after: float
     not_promised: Sequence[str]
-    """The names of the bones that the tolerance is not promised for."""
+    """The names of the bones for which the tolerance is not guaranteed."""
 
 
 class FewerKeys(NamedTuple):
-    """The keys that one slot is to have, and those that it has."""
+    """The planned fewer keys of one slot, and its present ones."""
 
     binding: Binding
     source: KeyedTransform
     fewer: KeyedTransform
     largest_error: float
-    """In the scene's units; of a rig that of all its bones, with and without keys, but for those not promised."""
+    """In the scene's units. For a rig, over all bones, with and without keys, except those not guaranteed."""
 
     rig: WholeRig | None = None
-    """The result for the rig that it is, or is a bone of."""
+    """The result for the whole rig, if the transform is a rig or one of its bones."""
 
     between: float = 0.0
-    """The largest error between frames, of curves that keep to a tolerance on frames alone."""
+    """The largest error between frames, for curves that keep to the tolerance only on frames."""
 
     @property
     def after(self) -> int:
-        """On how many frames there are keys then."""
+        """The number of frames with keys after the reduction."""
         return count_of(self.fewer)
 
 
 def count_of(source: KeyedTransform) -> int:
-    """Return on how many frames a source has keys."""
+    """Return the number of frames on which a source has keys."""
     return len(distinct(source.keyed_frames))
 
 
 def united(frames: Iterable[np.ndarray]) -> np.ndarray:
-    """Return all frames, those that are one to Blender once."""
+    """Return the union of all frames; frames so close that Blender takes them for one count once."""
     return distinct(np.unique(np.concatenate(list(frames))))
 
 
 def samples_of(source: KeyedTransform) -> np.ndarray:
-    """Return the frames that keys may be on: those of the source's, and whole ones between these."""
+    """Return the frames that keys may be on: those of the source's keys, and whole frames between them."""
     keys = distinct(source.keyed_frames)
     whole = np.arange(np.ceil(keys[0]), np.floor(keys[-1]) + 1.0)
     return np.union1d(keys, without(whole, keys))
 
 
 def seen_frames(frames: np.ndarray, sources: Sequence[KeyedTransform]) -> np.ndarray:
-    """Return these frames and all whole ones that are seen: between them, and outside of keys that go on."""
+    """Return these frames and all visible whole frames: between them, and outside of keys if motion goes on there."""
     first, last = min(source.seen_range[0] for source in sources), max(source.seen_range[1] for source in sources)
     return np.union1d(frames, np.arange(np.floor(first), np.ceil(last) + 1.0))
 
 
 def moments(frames: np.ndarray, sources: Sequence[KeyedTransform]) -> np.ndarray:
-    """Return these frames and the moments between them that are looked at: eighths, and those just before jumps."""
+    """Return these frames and the moments to check between them: eighths of frames, and moments just before jumps."""
     jumps = [
         keys.times[1:][(keys.interpolation[:, :-1] == CONSTANT).any(axis=0)] - 2.0 * SAME_FRAME
         for source in sources
@@ -98,7 +98,7 @@ def moments(frames: np.ndarray, sources: Sequence[KeyedTransform]) -> np.ndarray
 
 
 def values_on(transform: Transform, source: KeyedTransform, frames: np.ndarray) -> dict[int, np.ndarray]:
-    """Return what the channels that get other keys have on rising frames, each (n,), by the rows of components."""
+    """Return the values, each (n,), on rising frames of the channels to be re-keyed, by the rows of components."""
     values, keyed = continuous_values(source, frames), {row for rows, _ in source.channels for row in rows}
     rows = [row for row in transform.channels if PART_OF[row] in source.keyed]
     if has_uneven_scale(source):
@@ -107,20 +107,20 @@ def values_on(transform: Transform, source: KeyedTransform, frames: np.ndarray) 
 
 
 def has_uneven_scale(source: KeyedTransform) -> bool:
-    """Return whether a scale is keyed that differs from axis to axis as it changes."""
+    """Return whether the keyed scale changes and differs from axis to axis."""
     if SCALE not in source.keyed or source.uniform_scale:
         return False
     return not np.all(is_constant(source.values_at(source.keyed_frames)[ROWS[SCALE]].T))
 
 
 def is_constant(columns: np.ndarray) -> np.ndarray:
-    """Return whether values (n, ...) stay the same, shape (...)."""
+    """Return whether values (n, ...) stay constant, shape (...)."""
     return np.ptp(columns, axis=0) <= SINGLE_PRECISION_RATIO * np.maximum(np.abs(columns).max(axis=0), 1.0)
 
 
 def with_keys(source: KeyedTransform, frames: np.ndarray, values: dict[int, np.ndarray], mode: str) -> KeyedTransform:
-    """Return the source with these keys alone in the channels that have values: straight lines between them, and holds
-    where all channels held.
+    """Return the source with only these keys in the channels that have values. Interpolation is linear between them, or
+    constant where all channels were held.
     """
     codes = _interpolations(source, frames)
     old = {row: keys for keyed_rows, keys in source.channels for row in keyed_rows}
@@ -141,7 +141,7 @@ def with_keys(source: KeyedTransform, frames: np.ndarray, values: dict[int, np.n
 
 
 def _interpolations(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
-    """Return the codes of keys on these frames: whether all channels of the source hold until the next, shape (k,)."""
+    """Return interpolation codes for keys on these frames, shape (k,): CONSTANT if all channels hold until the next."""
     codes = np.full(len(frames), LINEAR, CODE)
     keys, moving = source.key_frames, np.append(0, np.cumsum(~source.holds))
     begins = np.searchsorted(keys, frames[:-1] + SAME_FRAME, side="right") - 1

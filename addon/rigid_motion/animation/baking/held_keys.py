@@ -1,7 +1,7 @@
-"""Fewer keys of what is held: run by run, each in the space of its holder.
+"""Fewer keys for held objects: run by run, each in the space of its holder.
 
-Holders are rigid, so what a run is off by in its holder it is off by in the world. The key at which something passes
-from one holder to the next stays, and so does how it passes.
+Holders are rigid, so an error in the holder's space is the same in the world. The key at which an object passes from
+one holder to the next stays, and so does the pass.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from .worlds import MAX_CHANNEL_ROUNDING, say_holds
 
 
 class FewerRuns(NamedTuple):
-    """The runs of something held that are to have fewer keys, and what it has now."""
+    """The planned fewer keys of a held object's runs, and its present keys."""
 
     binding: Binding
     source: KeyedTransform
     runs: Sequence[tuple[HoldRun, KeyedTransform]]
-    """Those that get fewer keys, and these."""
+    """The runs that get fewer keys, and those keys."""
 
     largest_error: float
     """In the scene's units."""
@@ -48,12 +48,12 @@ class FewerRuns(NamedTuple):
 
     @property
     def after(self) -> int:
-        """On how many frames there are keys then."""
+        """The number of frames with keys after the reduction."""
         return count_of(self.source) - sum(count_of(run.source) - count_of(fewer) for run, fewer in self.runs)
 
 
 def fewer_runs(transform: Transform, binding: Binding, source: KeyedTransform, wishes: Wishes) -> FewerRuns | None:
-    """Return the runs of something held that can have fewer keys, None where none can. For the rest `fewer_keys`."""
+    """Return the runs of a held object that can have fewer keys, None if none can. For all else see `fewer_keys`."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     alone = Wishes(wishes.mode, wishes.tolerance, _reach(transform, wishes.radius))
     spaces = {one.number: one.matrix(depsgraph) for one in holders_of(transform) if one.target is not None}
@@ -61,23 +61,23 @@ def fewer_runs(transform: Transform, binding: Binding, source: KeyedTransform, w
     begins = [source.keyed_range[0], *(switch.begin for switch in source.switches)]
     chosen, largest, between = [], 0.0, 0.0
     for run, begin in zip(source.runs, begins, strict=True):
-        if count_of(run.source) < 2 or _turns(source, run):
+        if count_of(run.source) < 2 or _has_extra_turns(source, run):
             continue
         first, last = run.source.keyed_range
         first, last = (begin if run.stretch.comes else first), (run.stretch.until if run.stretch.goes else last)
         shown = replace(run.source, seen=(int(np.floor(first)), int(np.ceil(last))))
         space = np.array(spaces.get(source.hold_at(run.stretch.first)[0], own))[:3, :3]
-        # One that goes on where fewer keys would not stays as it is.
+        # A run that continues beyond its keys, as fewer keys would not, stays as it is.
         with suppress(ValueError):
             members = {transform: (binding, shown)}
             for plan in fewer_keys(transform.animated, members, alone, space=space).values():
-                chosen.append((run, _begun(plan.fewer, run.stretch.first)))
+                chosen.append((run, _at_rest_from(plan.fewer, run.stretch.first)))
                 largest, between = max(largest, plan.largest_error), max(between, plan.between)
     return FewerRuns(binding, source, chosen, largest, between=between) if chosen else None
 
 
 def _reach(transform: Transform, radius: float | None) -> float:
-    """Return how far what is moved with something reaches, in the scene's units: of bones all that hang on it."""
+    """Return the reach of all that moves with a transform, in the scene's units: for a bone, with all its children."""
     if not transform.is_part:
         return radius or radius_of(transform.carrier)
     size = scale_in_scene(transform)
@@ -90,16 +90,16 @@ def _reach(transform: Transform, radius: float | None) -> float:
     return max(away) * size
 
 
-def _turns(source: KeyedTransform, run: HoldRun) -> bool:
-    """Return whether a run makes whole turns more, which fewer keys do not."""
+def _has_extra_turns(source: KeyedTransform, run: HoldRun) -> bool:
+    """Return whether a run has extra whole turns, which fewer keys cannot have."""
     if source.turns is None:
         return False
     inside = source.turns.times[(source.turns.times > run.stretch.first) & (source.turns.times < run.stretch.until)]
     return bool(turns_at(source.turns, np.append(run.stretch.first + SAME_FRAME, inside)).any())
 
 
-def _begun(source: KeyedTransform, first: float) -> KeyedTransform:
-    """Return a source with a single key on the frame on which its run begins, where it rests from there on."""
+def _at_rest_from(source: KeyedTransform, first: float) -> KeyedTransform:
+    """Return the source with a single key on the first frame of its run if it is at rest, otherwise unchanged."""
     if any(np.ptp(keys.values, axis=1).max() > MAX_CHANNEL_ROUNDING for keys in source.curves):
         return source
     rests = [(rows, keys.at(np.arange(len(keys.times)) == 0)) for rows, keys in source.channels]
@@ -109,7 +109,7 @@ def _begun(source: KeyedTransform, first: float) -> KeyedTransform:
 
 
 def write_runs(transform: Transform, fewer: FewerRuns, mode: str) -> None:
-    """Give the runs of something held their fewer keys. All other keys stay."""
+    """Write the fewer keys of a held object's runs. All other keys stay."""
     binding, source = fewer.binding, fewer.source
     chosen = {run.stretch.first: keys for run, keys in fewer.runs}
     written = {row for keys in (*chosen.values(), source) for rows, _ in keys.channels for row in rows}
@@ -126,7 +126,7 @@ def write_runs(transform: Transform, fewer: FewerRuns, mode: str) -> None:
             if new is None:
                 new = {name: numbers[there] for name, numbers in old.items()}
             if not len(new["co"]):
-                # What has no key in a run must not come to rest elsewhere.
+                # A channel without keys in a run must not rest at another run's value.
                 begin = np.array([run.stretch.first])
                 new = new_key_fields(begin, run.source.values_at(begin)[row], LINEAR)
             parts.append(new)
@@ -144,7 +144,7 @@ def write_runs(transform: Transform, fewer: FewerRuns, mode: str) -> None:
 
 
 def _keys_of(source: KeyedTransform | None, row: int) -> KeyFields | None:
-    """Return the keys of a component of a source, None where it has none."""
+    """Return the keys of a component of a source, None if it has none."""
     for rows, keys in () if source is None else source.channels:
         if row in rows:
             return fields_of(keys, rows.index(row))

@@ -1,7 +1,7 @@
-"""From dense keys of a prop in the world to few in the hands that held it, as recordings of both tell.
+"""Holds found in recordings: dense world-space keys of a prop reduced to a few keys in the hands that held it.
 
-A prop is held where it is at rest in a hand, and not in the world. There its keys become one: the grip with the
-smallest largest error. What is outside stays as it is. Frames are those of the Action, lengths are the scene's units.
+A prop is held where it is at rest relative to a hand, but not in the world. There one key replaces its keys: the grip
+with the smallest maximum error. Keys outside of holds stay. Frames are those of the Action, lengths the scene's units.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ from .resting import BodyPoses, RestStretch, relative
 from .worlds import alone_in, worlds_of
 
 DEFAULT_MIN_HOLD_FRAMES = 5
-"""The fewest frames on which something is held, where nothing else is said."""
+"""The default for the fewest frames of a hold."""
 
 DEFAULT_HAND_TOLERANCE = 0.005
-"""The tolerance where nothing else is said: recorded hands give way."""
+"""The default tolerance, in the scene's units: recorded hands are not rigid."""
 
 MIN_MOVE_PER_TOLERANCE = 4.0
-"""What is held moves in the world by more than so many tolerances, and by more than so many of its errors."""
+"""The least motion of a held prop in the world, as a multiple of the tolerance and of its own error."""
 
 MAX_GROWTH_RATIO = 1e-3
-"""The part of its size by which something may grow, and counts as rigid."""
+"""The largest change of size, as a fraction of the size, at which a thing still counts as rigid."""
 
 NOTHING_HELD = n_(
     "{name} is at rest in none of {count} bones and objects for {least} frames, to {tolerance:g}: allow a larger "
@@ -65,34 +65,34 @@ NO_KEYS = n_("{name} has no keys of location or rotation to reduce: bake its mot
 SCALE_REFUSAL = n_("{name} grows or shrinks, but held things have a constant size: remove the keys of its scale first")
 
 Offer = tuple[Node, RestStretch, float]
-"""What may hold something, when, and how far away it is."""
+"""A possible holder, the stretch on which the prop rests in it, and its distance."""
 
 Holders = Iterable[bpy.types.Object | bpy.types.PoseBone]
 
 
 @dataclass(frozen=True)
 class HeldSegment:
-    """Frames on which something is at rest in a holder."""
+    """Frames on which a prop is at rest in a holder."""
 
     holder: bpy.types.Object
     bone: str
-    """The name of the holder's bone that it is held in, "" for the holder itself."""
+    """The name of the holder's bone that holds the prop, "" for the holder itself."""
 
     first: float
     last: float
 
     largest: float
-    """The largest error of holding it still, in the scene's units."""
+    """The largest error of a constant grip, in the scene's units."""
 
     keys_before: int
-    """On how many of these frames it has keys."""
+    """The number of these frames on which the prop has keys."""
 
     grip: np.ndarray = field(repr=False, compare=False)
-    """Where it is in the holder, with what either is scaled by, shape (4, 4)."""
+    """The prop's matrix in the space of the holder, with the scales of both, shape (4, 4)."""
 
     @property
     def name(self) -> str:
-        """The name of what holds it."""
+        """The name of the holding bone or object."""
         return self.bone or self.holder.name
 
 
@@ -104,32 +104,34 @@ def held_segments(
     *,
     least: int = DEFAULT_MIN_HOLD_FRAMES,
 ) -> list[HeldSegment]:
-    """Return when something was held in what, as far as its keys tell: the longest and tightest first.
+    """Return the segments on which a prop was held, according to its keys: the longest and tightest first.
 
-    None of them overlap. Where it rests in the space of its channels as well, before and after, it is not held.
+    Segments do not overlap. Frames before and after on which the prop also rests in the space of its channels do not
+    count as held.
 
     Parameters
     ----------
     prop
         An object or a pose bone with keys.
     holders : iterable, optional
-        Objects and pose bones; of a rig all bones. All rigs of the scene, otherwise. What follows the prop is none.
+        Objects and pose bones; a rig stands for all its bones. The default is all rigs of the scene. Anything that
+        follows the prop is ignored.
     tolerance : float
         The largest shell error on any frame, in the scene's units.
     radius : float, optional
-        Of the shell. `radius_of` the prop, otherwise.
+        The radius of the shell. The default is `radius_of` the prop.
     least : int
-        The fewest frames.
+        The fewest frames of a segment.
 
     Raises
     ------
     Refused
-        Where the prop has no keys, or others than these move it.
+        If the prop has no keys, or anything besides its keys moves it.
     """
     found: list[HeldSegment] = []
 
     def survey(transform: Transform, readings: Readings) -> None:
-        found.extend(_found(transform, readings, holders, tolerance, radius, least))
+        found.extend(_find_segments(transform, readings, holders, tolerance, radius, least))
 
     apply_edit(prop, survey, lambda *_: None, None)
     return found
@@ -144,19 +146,19 @@ def reduce_into_holds(
     least: int = DEFAULT_MIN_HOLD_FRAMES,
     segments: Sequence[HeldSegment] | None = None,
 ) -> list[HeldSegment]:
-    """Hold something where its keys say that it was held, with a key for each time, and return these.
+    """Hold a prop where its keys show that it was held, with one key for each hold, and return the segments.
 
-    For all else see `held_segments`; `segments` are those of its result that are wanted, otherwise all of them.
-    `restore_keys` gives all keys back.
+    `segments` are the chosen results of `held_segments`, by default all of them; for all else see there. `restore_keys`
+    restores all keys.
     """
     originals = Originals(REDUCED)
 
     def plan(transform: Transform, readings: Readings) -> tuple[Binding, KeyedTransform, list[HeldSegment]]:
         found = segments
         if found is None:
-            found = _found(transform, readings, holders, tolerance, radius, least)
+            found = _find_segments(transform, readings, holders, tolerance, radius, least)
         if not found:
-            count = len(_nodes(transform, holders))
+            count = len(_possible_holders(transform, holders))
             raise Refused(NOTHING_HELD, name=transform.name, count=count, least=least, tolerance=tolerance)
         binding, source = _keyed(transform, readings)
         refuse_linked(transform, binding)
@@ -173,7 +175,7 @@ def reduce_into_holds(
 
 
 def _keyed(transform: Transform, readings: Readings) -> tuple[Binding, KeyedTransform]:
-    """Return what moves something, and what is keyed of it. `Refused` where it cannot be held as that says."""
+    """Return the binding and the source that move a prop. Raise `Refused` if holds cannot follow from its keys."""
     keyed = [(binding, source) for binding, source in readable(transform, readings) if source.channels]
     if not any({LOCATION, ROTATION} & source.keyed for _, source in keyed):
         raise Refused(NO_KEYS, name=transform.name)
@@ -185,8 +187,8 @@ def _keyed(transform: Transform, readings: Readings) -> tuple[Binding, KeyedTran
     return binding, source
 
 
-def _nodes(transform: Transform, holders: Holders | None) -> list[Node]:
-    """Return what may hold something, each once."""
+def _possible_holders(transform: Transform, holders: Holders | None) -> list[Node]:
+    """Return the possible holders of a prop, each once."""
     if holders is None:
         scene = cast(bpy.types.Scene, bpy.context.scene)
         holders = [obj for obj in scene.objects if obj.type == "ARMATURE"]
@@ -202,7 +204,7 @@ def _nodes(transform: Transform, holders: Holders | None) -> list[Node]:
     return [node for node in result if node != own and not follows(node, own)]
 
 
-def _found(
+def _find_segments(
     transform: Transform,
     readings: Readings,
     holders: Holders | None,
@@ -210,10 +212,10 @@ def _found(
     radius: float | None,
     least: int,
 ) -> list[HeldSegment]:
-    """Return `held_segments` of something that is keyed so."""
+    """Return `held_segments` of a transform with these readings."""
     refuse_tolerance(tolerance)
     binding, source = _keyed(transform, readings)
-    nodes = _nodes(transform, holders)
+    nodes = _possible_holders(transform, holders)
     if not nodes:
         raise Refused(NO_HANDS, name=transform.name)
     frames, radius = samples_of(source), radius or radius_of(transform.carrier)
@@ -221,17 +223,17 @@ def _found(
     prop, sizes = poses_of(worlds.prop)
     if np.ptp(sizes, axis=0).max() > MAX_GROWTH_RATIO * np.abs(sizes).max():
         raise Refused(SCALE_REFUSAL, name=transform.name)
-    # The space of the channels is where the prop would be with nothing on them.
+    # The space of the channels: where the prop would be with zero in all of them.
     own = BodyPoses(relative(poses_of(worlds.prop @ np.linalg.inv(worlds.local))[0], prop), radius)
     free = _free(source, frames)
-    # Where more is to be seen before and behind its keys it rests there.
+    # If the visible range extends beyond the keys, the prop rests there.
     free[[0, -1]] &= binding.slot.seen[0] >= frames[0], binding.slot.seen[1] <= frames[-1]
     lies, anyway = own.rests(tolerance, free, least), own.reached(tolerance, free)
     offers: list[Offer] = []
     scales: dict[Node, np.ndarray] = {}
     for node, places in zip(nodes, worlds.nodes, strict=True):
         holder, growth = poses_of(places)
-        # What is held by something that grows would grow with it.
+        # A prop held by a growing bone would grow with it.
         if np.ptp(growth, axis=0).max() > MAX_GROWTH_RATIO * np.abs(growth).max():
             continue
         there = BodyPoses(relative(holder, prop), radius)
@@ -243,12 +245,13 @@ def _found(
                 scales[node] = growth[0]
     keys = distinct(source.keyed_frames)
     return [
-        _segment(node, rest, frames, keys, (sizes[0], scales[node])) for node, rest in _best(offers, tolerance, least)
+        _segment(node, rest, frames, keys, (sizes[0], scales[node]))
+        for node, rest in _best_offers(offers, tolerance, least)
     ]
 
 
 def _free(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
-    """Return on which frames (m,) nothing holds something, nor is it passed on."""
+    """Return True for the frames (m,) on which nothing holds the prop and it is not passing to another holder."""
     free = np.ones(len(frames), dtype=bool)
     for run in source.runs:
         if source.hold_at(run.stretch.first)[0]:
@@ -259,7 +262,7 @@ def _free(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
 
 
 def _without(rest: RestStretch, others: Iterable[RestStretch]) -> RestStretch:
-    """Return what is left of a rest without the ends that are in others."""
+    """Return a rest without those of its ends that lie in other rests."""
     first, last = rest.first, rest.last
     for other in sorted(others):
         if other.first <= first <= other.last:
@@ -270,11 +273,11 @@ def _without(rest: RestStretch, others: Iterable[RestStretch]) -> RestStretch:
     return rest._replace(first=first, last=last)
 
 
-def _best(offers: list[Offer], tolerance: float, least: int) -> Iterator[tuple[Node, RestStretch]]:
-    """Yield the best of what is offered, none of them overlapping: nodes, rests, and how far away nodes are.
+def _best_offers(offers: list[Offer], tolerance: float, least: int) -> Iterator[tuple[Node, RestStretch]]:
+    """Yield the best offers that do not overlap, as nodes and rests.
 
-    The longest and tightest one is the best: no error at all is worth twice the length. Of those that are equally good,
-    as bones are that do not move against one another, it is the nearest, and of near ones the one that comes first.
+    The longest and tightest offer is the best: no error at all is worth twice the length. Among equal offers, as from
+    bones that do not move relative to each other, the nearest is the best, and among similarly near ones the first.
     """
 
     def quality(offer: Offer) -> tuple[float, float]:
@@ -284,12 +287,12 @@ def _best(offers: list[Offer], tolerance: float, least: int) -> Iterator[tuple[N
     while offers:
         node, best, _ = max(offers, key=quality)
         yield node, best
-        cut = [(other, _apart(rest, best), away) for other, rest, away in offers]
+        cut = [(other, _longer_remainder(rest, best), away) for other, rest, away in offers]
         offers = [offer for offer in cut if offer[1].frames >= least]
 
 
-def _apart(rest: RestStretch, taken: RestStretch) -> RestStretch:
-    """Return the longer part of a rest that is outside of another one."""
+def _longer_remainder(rest: RestStretch, taken: RestStretch) -> RestStretch:
+    """Return the longer of the two parts of a rest that are outside of another rest."""
     before = rest._replace(last=min(rest.last, taken.first - 1))
     after = rest._replace(first=max(rest.first, taken.last + 1))
     return max(before, after, key=lambda part: part.frames)
@@ -298,7 +301,7 @@ def _apart(rest: RestStretch, taken: RestStretch) -> RestStretch:
 def _segment(
     node: Node, rest: RestStretch, frames: np.ndarray, keys: np.ndarray, scales: tuple[np.ndarray, np.ndarray]
 ) -> HeldSegment:
-    """Return the segment of a rest. Scales (3,) are the prop's and the holder's in the world."""
+    """Return the segment for a rest. Scales (3,) are those of the prop and the holder in the world."""
     first, last = frames[[rest.first, rest.last]].tolist()
     inside = int(np.count_nonzero((keys > first - SAME_FRAME) & (keys < last + SAME_FRAME)))
     grip, (own, holder) = np.eye(4), scales
@@ -308,21 +311,21 @@ def _segment(
 
 
 def _refuse_sparse(transform: Transform, source: KeyedTransform, segments: Iterable[HeldSegment]) -> None:
-    """Raise `Refused` where in-betweens that are not straight lines depend on keys that are to go."""
+    """Raise `Refused` if in-betweens that are not straight lines depend on keys to be removed."""
     keys, frames = source.key_frames, samples_of(source)
     shaped = (source.modes != 0) | np.array([_is_shaped(source, frame) for frame in keys[:-1].tolist()], dtype=bool)
     shaped &= (np.diff(keys) > 1.0 + SAME_FRAME) & _free(source, keys[:-1])
     for segment in segments:
         behind = np.append(frames, np.inf)[np.searchsorted(frames, segment.last + SAME_FRAME)]
         first, until = np.searchsorted(keys, np.array((segment.first, behind)) - SAME_FRAME).tolist()
-        # That in which it is no longer, and the one beside it, whose tangent is another one then.
+        # The gap at each end of the hold, and the gap next to it, whose tangent changes.
         for place in (first - 2, first - 1, until - 1, until):
             if 0 <= place < len(shaped) and shaped[place]:
                 raise Refused(SPARSE_REFUSAL, name=transform.name, frame=keys[place])
 
 
 def _is_shaped(source: KeyedTransform, frame: float) -> bool:
-    """Return whether anything but straight lines and holds goes on from a key."""
+    """Return whether any interpolation from a key is neither linear nor constant."""
     return any(
         not np.isin(keys.interpolation[:, place], (LINEAR, CONSTANT)).all()
         for keys in source.curves
@@ -331,7 +334,7 @@ def _is_shaped(source: KeyedTransform, frame: float) -> bool:
 
 
 class _Switches:
-    """When something is held in which of its new holders, k times one behind the other."""
+    """The k successive holds of a prop: their frames and their new holders."""
 
     def __init__(self, source: KeyedTransform, segments: Sequence[HeldSegment], numbers: Sequence[int]) -> None:
         frames = samples_of(source)
@@ -339,21 +342,21 @@ class _Switches:
         self.begins = np.array([segment.first for segment in segments])
         behind = np.searchsorted(frames, [segment.last + SAME_FRAME for segment in segments])
         self.untils = np.append(frames, np.inf)[behind]
-        """The frames from which on it is not, shape (k,)."""
+        """The frames from which on the prop is no longer held, shape (k,)."""
         before = frames[np.clip(np.searchsorted(frames, self.begins - SAME_FRAME) - 1, 0, None)]
         before = before[before < self.begins - SAME_FRAME]
         self.rests = before[~self.are_held(before)]
-        """The last frames before it is, from which on it rests."""
+        """The last frames before holds begin, from which on the prop rests."""
         self.resumes = self.untils[np.isfinite(self.untils) & ~self.are_held(self.untils)]
-        """The frames on which nothing holds it again."""
+        """The frames on which the prop is free again."""
 
     def are_held(self, frames: np.ndarray) -> np.ndarray:
-        """Return on which of these frames (m,) it is held."""
+        """Return True for those of these frames (m,) on which the prop is held."""
         after = frames[:, None]
         return ((after > self.begins - SAME_FRAME) & (after < self.untils - SAME_FRAME)).any(axis=1)
 
     def holds_on(self, frames: np.ndarray) -> np.ndarray:
-        """Return what keys on these frames (m,) say: see `marks.hold`."""
+        """Return the hold codes for keys on these frames (m,): see `marks.hold`."""
         source = self.source
         old = np.zeros(len(frames), int) if source.held is None else source.held.at(frames + 0.5 * SAME_FRAME)
         old[near(frames, self.resumes)] = hold(0)
@@ -364,7 +367,7 @@ class _Switches:
 def _hold(
     transform: Transform, binding: Binding, source: KeyedTransform, segments: list[HeldSegment], originals: Originals
 ) -> None:
-    """Have something be held in these segments, in their order: a key where each begins, and one behind it."""
+    """Hold a prop in these segments, which are in order: a key where each begins, and one after it."""
     notes, before = originals.keep(binding), channel_keys(binding)
     numbers = [add_holder(binding, segment.holder, segment.bone) for segment in segments]
     switches, rest = _Switches(source, segments, numbers), transform.components()

@@ -1,4 +1,4 @@
-"""Keys that stay on their frames, with modes and handles, and more of them only where the motion needs them."""
+"""Keys that stay on their frames, with their modes and handles, plus extra keys only where the motion needs them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .fewer_keys import FewerKeys
 from .search import Members, SearchedBody
 
 Kept = tuple[np.ndarray, KeyedTransform | None]
-"""The frames (k,) of the keys that stay, and the base that has their modes and handles: None for Blender's own."""
+"""The frames (k,) of the keys that stay, and the base with their modes and handles: None for Blender's own."""
 
 
 def kept_keys(
@@ -27,10 +27,10 @@ def kept_keys(
     radius: float | None,
     places: np.ndarray,
 ) -> dict[Transform, FewerKeys]:
-    """Return plans with these keys, by members, and more where these are off, on `places`, frames (m,), alone.
+    """Return plans with these keys, by members, plus extra keys where the error is too large, only on `places`.
 
-    The tolerance is kept on places, and on all samples as far as keys on places can: `between` is what they are off.
-    Around keys that are added are Blender's own curves, whose handles are fitted to the samples.
+    Places are frames (m,). The tolerance is kept on places, and on all other samples as far as keys on places can;
+    `between` is the error there. Around added keys there are Blender's own curves, with handles fitted to the samples.
     """
     body = SearchedBody(obj, members, tolerance, radius, hold=False, space=None, places=places)
     curves, joints = body.curves(tolerance, every=True), body.motion.joints
@@ -58,7 +58,7 @@ def kept_keys(
 
 
 def _with_handles(rows: list[int], keys: Keys, base: KeyedTransform, at: np.ndarray) -> Keys:
-    """Return keys of rows whose segments of these numbers have the handles of the base, where that has both keys."""
+    """Return the keys of rows, with the base's handles for the segments numbered `at` if the base has both keys."""
     if keys.left is None or keys.right is None:
         return keys
     left, right, codes = keys.left.copy(), keys.right.copy(), keys.interpolation.copy()

@@ -1,9 +1,9 @@
-"""Offset layers: keys on top of a motion, so that what is seen is the motion times the offset, as of rigid bodies.
+"""Offset layers: keys on top of a motion; the visible motion is the motion times the offset, as rigid transforms.
 
-Blender's additive strips add locations along the axes of the parent. So what moves something goes to an Empty, its
-*base*, in the same space; the thing itself hangs on that, an object as its child and a bone by a *Child Of*, and its
-own channels are the offset, in an NLA strip whose influence is keyed. All of it is Blender's own, and plays without
-the extension. Merging writes what is seen as keys of the Action that there was before.
+Blender's additive strips add locations along the axes of the parent. So the motion goes to an Empty, the *base*, in the
+same space. The object becomes a child of the base, a bone follows it by a *Child Of*; its own channels are the offset,
+in an NLA strip whose influence is keyed. All of this is native to Blender and plays without the extension. Merging
+writes the visible motion as keys of the previous Action.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from .originals import remove_unused
 from .worlds import alone_in
 
 BELOW, LAYER = "Rigid Motion Base", "Rigid Motion Layer"
-"""The NLA tracks with what else the Action moves, and with the offset; and the constraint of a bone."""
+"""The names of the NLA tracks: for all else in the Action, and for the offset. Constraints of bones have the latter."""
 
 HELD = n_("{name} is held: Bake to Keys with To World first, or add the layer to what holds it")
 CONSTRAINED = n_("{name} has the constraint {constraint}: mute it, or bake it to keys first (Animation > Bake Action)")
@@ -48,7 +48,7 @@ OTHERWISE = n_(
 
 
 def strips_of(obj: bpy.types.Object) -> tuple[bpy.types.NlaStrip, bpy.types.NlaStrip] | None:
-    """Return the strip with what else moves an object, and that of its layer; None where they are not all it has."""
+    """Return the strip below an object's layer, and that of the layer; None if these are not all its animation."""
     data = obj.animation_data
     tracks = [] if data is None else [track for track in data.nla_tracks if track.strips]
     if data is None or [track.name for track in tracks] != [BELOW, LAYER] or (data.action and not data.use_tweak_mode):
@@ -57,8 +57,8 @@ def strips_of(obj: bpy.types.Object) -> tuple[bpy.types.NlaStrip, bpy.types.NlaS
 
 
 def is_plain(obj: bpy.types.Object) -> bool:
-    """Return whether the layer of an object is edited, with all that it has: its strips where the Actions have their
-    frames, and its influence 1 throughout.
+    """Return whether the layer of an object is in tweak mode and unaltered: its strips have the same frames as their
+    Actions, and its influence is 1 throughout.
     """
     strips = strips_of(obj)
     if strips is None or not existing(obj.animation_data).use_tweak_mode:
@@ -68,21 +68,21 @@ def is_plain(obj: bpy.types.Object) -> bool:
 
 
 def influence_of(layer: bpy.types.NlaStrip) -> np.ndarray:
-    """Return frame and value of the keys of a layer's influence, shape (n, 2)."""
+    """Return frames and values of the keys of a layer's influence, shape (n, 2)."""
     return key_points(existing(layer.fcurves.find("influence"))).astype(float)
 
 
 def layered(obj: bpy.types.Object) -> list[Transform]:
-    """Return what has a base of an object and its bones."""
+    """Return the transforms with a base: of the object and its bones."""
     carriers = (obj, *(() if obj.pose is None else obj.pose.bones))
     return [one for one in map(transform_of, carriers) if one.motion.base is not None]
 
 
 def add_layer(targets: Targets, *, refused: list[Refused] | None = None) -> None:
-    """Give targets an offset layer, which is at rest on the frame that is shown, and enter its strip.
+    """Give targets an offset layer, with no offset on the current frame, and enter its strip.
 
-    What moves each goes to an Empty, which is where the target was. Its scale goes along where that is keyed, the same
-    along all axes. Bones of one rig share a layer. For targets see `edits.apply`.
+    The motion of each target goes to an Empty in its place, with its scale if that is keyed and uniform. Bones of one
+    rig share a layer. For targets see `edits.apply`.
     """
 
     def plan(transform: Transform, readings: Readings) -> tuple[Binding, KeyedTransform]:
@@ -104,7 +104,7 @@ def add_layer(targets: Targets, *, refused: list[Refused] | None = None) -> None
         binding, source = planned
         mode = MODE_NAMES[int(source.modes_at(source.keyed_frames[:1])[0])] if source.channels else "BLENDER"
         parts = [LOCATION, ROTATION, *([SCALE] if source.uniform_scale else [])]
-        _hang(transform, _base(transform, binding, parts))
+        _attach_to_base(transform, _make_base(transform, binding, parts))
         _enter_layer(transform.animated, binding)
         key_components(transform, transform.components(), ("location", transform.rotation))
         set_mode_in(existing(active_binding(transform)), mode)
@@ -114,7 +114,7 @@ def add_layer(targets: Targets, *, refused: list[Refused] | None = None) -> None
 
 
 def _refuse_space(transform: Transform) -> None:
-    """Raise `Refused` where nothing can be where a transform is and carry it."""
+    """Raise `Refused` if no Empty could take the place of a transform and carry it."""
     if not transform.is_part:
         refuse_space(transform)
     else:
@@ -128,14 +128,14 @@ def _refuse_space(transform: Transform) -> None:
 
 
 def binding_below(transform: Transform, strips: tuple[bpy.types.NlaStrip, bpy.types.NlaStrip]) -> Binding:
-    """Return what else moves a transform than its layer."""
+    """Return the binding that moves a transform below its layer."""
     key = existing(strips[0].action), strips[0].action_slot_handle
     slot = next(slot for slot in slots_alone(transform.animated) if slot.key == key)
     return bindings_in_slot(slot, (transform.prefix,))[0]
 
 
-def _base(transform: Transform, binding: Binding, parts: Iterable[str]) -> bpy.types.Object:
-    """Return an Empty that moves as these parts of a transform did, in the same space; the transform is at rest."""
+def _make_base(transform: Transform, binding: Binding, parts: Iterable[str]) -> bpy.types.Object:
+    """Return a new Empty with the motion of these parts of a transform, in the same space. The transform loses it."""
     carrier, obj = transform.carrier, transform.animated
     base = bpy.data.objects.new(f"{carrier.name} Base", None)
     for collection in obj.users_collection:
@@ -153,7 +153,7 @@ def _base(transform: Transform, binding: Binding, parts: Iterable[str]) -> bpy.t
             copy_fcurve(fcurve, channelbag_of(base), path)
             binding.remove_curve(channel)
     if not transform.is_part:
-        _hang_alike(base, obj)
+        _copy_parenting(base, obj)
         return base
     bone, parent = transform.pose_bone.bone, transform.pose_bone.parent
     base.parent, base.matrix_parent_inverse, offset = obj, Matrix(), bone.matrix_local
@@ -164,14 +164,14 @@ def _base(transform: Transform, binding: Binding, parts: Iterable[str]) -> bpy.t
     return base
 
 
-def _hang(transform: Transform, base: bpy.types.Object) -> None:
-    """Have a transform hang on its base."""
+def _attach_to_base(transform: Transform, base: bpy.types.Object) -> None:
+    """Parent an object to its base, or constrain a bone to it."""
     transform.motion.base = base
     if transform.is_part:
         constraint = cast(Any, transform.pose_bone.constraints.new("CHILD_OF"))
         constraint.name = LAYER
         constraint.target, constraint.set_inverse_pending = base, False
-        # It is not converted back: so the bone is where its channels are in the base, whatever its parents do.
+        # Blender does not convert the result back, so the bone's channels are in the space of the base, not its parent.
         constraint.inverse_matrix, constraint.owner_space, constraint.target_space = Matrix(), "LOCAL", "WORLD"
     else:
         obj = transform.animated
@@ -179,14 +179,14 @@ def _hang(transform: Transform, base: bpy.types.Object) -> None:
 
 
 def _enter_layer(obj: bpy.types.Object, binding: Binding) -> None:
-    """Have the strip of a layer be edited, made where there is none, over all that the Action has besides."""
+    """Enter tweak mode for the strip of an object's layer. Create the strips first if there are none."""
     data = existing(obj.animation_data)
     if strips_of(obj) is None:
         action, slot = existing(data.action), data.action_slot
         data.action = None
         offset = bpy.data.actions.new(f"{obj.name} Layer")
         keyed = action.frame_range if any(True for _ in binding.slot.fcurves) else (np.inf, -np.inf)
-        # Outside of its strip a layer stays as it is at its ends, whatever is keyed there.
+        # Outside of its strip a layer keeps the values of its ends, even if there are keys.
         first = int(np.floor(min(scene().frame_start, scene().frame_current, keyed[0])))
         last = int(np.ceil(max(scene().frame_end, scene().frame_current, keyed[1])))
         for name, shown, of in ((BELOW, action, slot), (LAYER, offset, offset.slots.new("OBJECT", obj.name))):
@@ -195,7 +195,7 @@ def _enter_layer(obj: bpy.types.Object, binding: Binding) -> None:
             strip = track.strips.new(name, first, shown)
             strip.action_slot = of
             strip.action_frame_start, strip.action_frame_end = first, last
-        # While the strip is edited Blender reads its influence only within the range of the Action.
+        # In tweak mode Blender reads the strip's influence only within the range of the Action.
         offset.use_frame_range, offset.frame_start, offset.frame_end = True, first, last
         strip.blend_type, strip.use_animated_influence = "COMBINE", True
         existing(strip.fcurves.find("influence")).keyframe_points.insert(first, 1.0)
@@ -204,14 +204,14 @@ def _enter_layer(obj: bpy.types.Object, binding: Binding) -> None:
 
 
 def remove_base(transform: Transform) -> None:
-    """Have a transform hang on its base no longer, and remove that where nothing else does."""
+    """Detach a transform from its base, and remove the base if nothing else uses it."""
     base, carrier = existing(transform.motion.base), transform.carrier
     transform.motion.base = None
     if isinstance(carrier, bpy.types.PoseBone):
         for constraint in [one for one in carrier.constraints if getattr(one, "target", None) == base]:
             carrier.constraints.remove(constraint)
     else:
-        _hang_alike(carrier, base)
+        _copy_parenting(carrier, base)
     if not bpy.data.user_map(subset=[base], value_types={"OBJECT"})[base]:
         action = None if base.animation_data is None else base.animation_data.action
         bpy.data.objects.remove(base)
@@ -220,7 +220,7 @@ def remove_base(transform: Transform) -> None:
 
 
 def remove_layer(obj: bpy.types.Object) -> None:
-    """Give an object the Action back that its layer is on, without the layer."""
+    """Restore the Action below an object's layer, and remove the layer."""
     data, (below, layer) = existing(obj.animation_data), existing(strips_of(obj))
     data.use_tweak_mode = False
     action, slot, offset = below.action, below.action_slot, existing(layer.action)
@@ -230,7 +230,7 @@ def remove_layer(obj: bpy.types.Object) -> None:
     remove_unused(offset)
 
 
-def _hang_alike(obj: bpy.types.Object, model: bpy.types.Object) -> None:
-    """Have an object hang on what another one hangs on, and in the same way."""
+def _copy_parenting(obj: bpy.types.Object, model: bpy.types.Object) -> None:
+    """Give an object the same parent as another object, in the same way."""
     obj.parent, obj.parent_type, obj.parent_bone = model.parent, model.parent_type, model.parent_bone
     obj.matrix_parent_inverse = model.matrix_parent_inverse

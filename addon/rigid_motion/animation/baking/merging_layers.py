@@ -1,4 +1,4 @@
-"""Merging offset layers: what is seen as keys of the Action that there was before, within a tolerance."""
+"""Merging offset layers: writes the visible motion as keys of the previous Action, within a tolerance."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from .reducing import Reduction, write_fewer
 from .worlds import SEVERAL_REFUSAL, worlds_of
 
 SAMPLES_PER_FRAME = 4
-"""Moments of a frame on which what is seen is looked at."""
+"""The number of samples per frame of the visible motion."""
 
 MAX_SHEAR = 1e-4
-"""What matrices differ by from those of a rotation and a scale."""
+"""The largest difference of matrices from a rotation times a scale."""
 
 NO_LAYER = n_(
     "{name} has no layer alone: Add Layer first, or remove other strips and the Action on top of it (NLA Editor)"
@@ -45,33 +45,33 @@ SHEARED = n_("{name}: its scale differs from axis to axis as it turns: apply the
 
 
 Planned = tuple[FewerKeys, int]
-"""The keys that something is to have, and the number of frames with keys of its base, its layer and the influence."""
+"""The planned keys of a transform, and the number of frames with keys of its base, its layer and the influence."""
 
 
 def merge_layer(
     targets: Targets, tolerance: float = 0.001, radius: float | None = None, *, refused: list[Refused] | None = None
 ) -> Reduction | None:
-    """Write what is seen with a layer as keys of the Action that there was before, and remove the layer.
+    """Write the visible motion of a layer as keys of the previous Action, and remove the layer.
 
-    Keys are on the frames of those of the base, of the layer and of its influence, and on whole frames more where the
-    motion needs them. There it has Blender's own curves, and elsewhere the modes of the base. The layer is that of all
-    bones of a rig.
+    The keys are on the frames of those of the base, the layer and its influence. Extra keys are on whole frames where
+    the motion needs them; around these there are Blender's own curves, elsewhere the modes of the base. For a rig, the
+    layer of all its bones is merged.
 
     Parameters
     ----------
     targets, refused
         See `edits.apply`.
     tolerance : float
-        The largest shell error on any frame, in the scene's units; of bones through all that they hang on. Quarters of
-        frames keep to it as far as keys on whole ones can.
+        The largest shell error on any frame, in the scene's units; for bones, through all their parents. Quarters of
+        frames keep to it as far as keys on whole frames can.
     radius : float, optional
-        Of the shell, in the scene's units. `radius_of` each target, otherwise.
+        The radius of the shell, in the scene's units. The default is `radius_of` each target.
 
     Returns
     -------
     Reduction or None
-        Of the keys of all that did not refuse; None where all did. Errors are those on frames, and `between` those on
-        any quarter of one.
+        The result for all targets that did not refuse; None if all did. Errors are those on frames, and `between` is
+        the error on any quarter of a frame.
     """
     refuse_tolerance(tolerance)
 
@@ -80,7 +80,7 @@ def merge_layer(
         for obj in dict.fromkeys(transform.animated for transform in readings):
             members = {one: reading for one, reading in readings.items() if one.animated == obj}
             try:
-                plans.update(_planned(obj, members, tolerance, radius))
+                plans.update(_plan_merge(obj, members, tolerance, radius))
             except Refused as refusal:
                 plans.update(dict.fromkeys(members, refusal))
         return plans
@@ -99,10 +99,10 @@ def merge_layer(
     return Reduction(sum(before for _, before in done), sum(one.after for one, _ in done), errors, between=between)
 
 
-def _planned(
+def _plan_merge(
     obj: bpy.types.Object, members: Mapping[Transform, Readings], tolerance: float, radius: float | None
 ) -> dict[Transform, Planned]:
-    """Return what becomes of an object and its bones when their layer is merged."""
+    """Return the planned keys of an object and its bones for merging their layer."""
     strips = strips_of(obj)
     if strips is None or any(transform.motion.base is None for transform in members):
         raise Refused(NO_LAYER, name=next(iter(members)).name)
@@ -117,8 +117,8 @@ def _planned(
             raise Refused(LOST, name=obj.name, others=bone_name(prefix) or prop)
     blends, powers = influence_of(strips[1]).T
     bases = {one: source_of(existing(one.motion.base)) for one in members}
-    keys = {one: _keys_of(bases[one], keyed[one][offset][1], blends if np.ptp(powers) else ()) for one in members}
-    frames, seen = _seen(list(members), united(keys.values()))
+    keys = {one: _kept_frames(bases[one], keyed[one][offset][1], blends if np.ptp(powers) else ()) for one in members}
+    frames, seen = _sample_motion(list(members), united(keys.values()))
     chosen, dense = dict[Transform, Kept](), dict[Transform, tuple[Binding, KeyedTransform]]()
     for transform, worlds in zip(members, seen, strict=True):
         binding, _ = keyed[transform][below]
@@ -131,9 +131,9 @@ def _planned(
         rows = rows_of(*poses_of(worlds), transform, start)
         is_sheared = np.abs(matrices_of(rows, transform.order) - worlds).max() > MAX_SHEAR
         if transform.is_part and transform.pose_bone.bone.use_connect:
-            # It shows no location, but its modes know of keys of that.
+            # A connected bone shows no location, but its modes take keys of location into account.
             rows[ROWS[LOCATION]] = 0.0 if base is None else seen_values(base, frames)[ROWS[LOCATION]]
-        source = _dense(transform, base, keyed[transform][offset][1], frames[inside], rows[:, inside])
+        source = _dense_source(transform, base, keyed[transform][offset][1], frames[inside], rows[:, inside])
         if is_sheared or has_uneven_scale(source):
             raise Refused(SHEARED, name=transform.name)
         chosen[transform], dense[transform] = (at, base), (binding, source)
@@ -142,8 +142,8 @@ def _planned(
     return {one: (plans.get(one) or FewerKeys(*dense[one], dense[one][1], 0.0), len(chosen[one][0])) for one in members}
 
 
-def _keys_of(base: KeyedTransform | None, offset: KeyedTransform, blends: Sequence[float]) -> np.ndarray:
-    """Return the frames that keys are kept on, at least two."""
+def _kept_frames(base: KeyedTransform | None, offset: KeyedTransform, blends: Sequence[float]) -> np.ndarray:
+    """Return the frames on which keys stay, at least two."""
     frames = [np.array(blends), *(source.keyed_frames for source in (base, offset) if source is not None)]
     if base is not None and base.goes_on:
         frames.append(np.array(base.seen_range, dtype=float))
@@ -151,9 +151,9 @@ def _keys_of(base: KeyedTransform | None, offset: KeyedTransform, blends: Sequen
     return result if len(result) > 1 else np.arange(2.0) + (result if len(result) else 0.0)
 
 
-def _seen(transforms: list[Transform], keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the frames (m,) from the first to the last of these keys on which it is looked at, and where transforms
-    are seen there in the spaces of their bases' channels, shape (k, m, 4, 4).
+def _sample_motion(transforms: list[Transform], keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the sampled frames (m,) from the first to the last of these keys, and the visible matrices of transforms
+    there, in the spaces of their bases' channels, shape (k, m, 4, 4).
     """
     steps = np.arange(np.ceil(keys[0]), keys[-1], 1.0 / SAMPLES_PER_FRAME)
     frames = np.union1d(keys, without(steps, keys))
@@ -168,10 +168,10 @@ def _seen(transforms: list[Transform], keys: np.ndarray) -> tuple[np.ndarray, np
     return frames, result
 
 
-def _dense(
+def _dense_source(
     transform: Transform, base: KeyedTransform | None, offset: KeyedTransform, frames: np.ndarray, rows: np.ndarray
 ) -> KeyedTransform:
-    """Return a source with keys on frames (m,) of components (10, m), of scale only where it was keyed."""
+    """Return a source with keys on frames (m,) of components (10, m); scale only if it was keyed."""
     parts = frozenset((LOCATION, ROTATION)) | (offset.keyed if base is None else offset.keyed | base.keyed)
     kept = [row for row in transform.channels if PART_OF[row] in parts]
     points = np.empty((len(kept), len(frames), 2), np.float32)
@@ -181,7 +181,7 @@ def _dense(
 
 
 def _write(transform: Transform, fewer: FewerKeys) -> None:
-    """Give a transform these keys, and have it hang on its base no longer."""
+    """Write these keys to a transform, and detach it from its base."""
     binding = fewer.binding
     write_fewer(transform, fewer)
     for row in (row for rows, _ in fewer.fewer.channels for row in rows):

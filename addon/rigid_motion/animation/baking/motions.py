@@ -1,6 +1,6 @@
-"""How objects and their bones move as their channels say: poses for the search for keys, affine maps for its proof.
+"""Motion of objects and their bones from their channels: poses to search for keys, affine maps to prove the result.
 
-Constraints and drivers have no part in it: of the bones that follow these it is told which they are.
+Constraints and drivers are ignored; `not_promised` names the bones that follow them.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ from ..transforms.posing import Hierarchy
 from ..transforms.sizes import into_scene, radius_of, reaches_of, scale_in_scene
 
 MOVING_CHANNELS = {*WIDTHS, "rotation_mode"}
-"""Properties of bones that a driver moves them by."""
+"""The properties of a bone by which a driver can move it."""
 
 SINGLE_PRECISION_RATIO = 1e-6
-"""Errors of single precision, relative to how far something gets."""
+"""The error of single precision, relative to the largest distance."""
 
 LEAST_SCALE = 1e-6
-"""The scale that the search takes for one of zero."""
+"""The scale that the search uses instead of zero."""
 
 AT_ONCE = 2**17
-"""Transforms times frames that are worked out in one go."""
+"""The number of transforms times frames computed at once."""
 
 
 def not_promised(rig: bpy.types.Object) -> tuple[str, ...]:
-    """Return the names of the bones that a tolerance is not promised for: they follow constraints or drivers, or hang
-    on what does.
+    """Return the names of the bones for which a tolerance is not guaranteed: they, or their parents, follow constraints
+    or drivers.
     """
     drivers = () if rig.animation_data is None else list(rig.animation_data.drivers)
     driven = {driver.data_path for driver in drivers if not driver.mute}
@@ -59,7 +59,7 @@ def not_promised(rig: bpy.types.Object) -> tuple[str, ...]:
             if not animated.isdisjoint(switches) or (not constraint.mute and constraint.influence > 0.0):
                 followers.add(bone.name)
                 if isinstance(constraint, bpy.types.KinematicConstraint | bpy.types.SplineIKConstraint):
-                    # The bone itself is the last of a chain, unless that is to reach for its head.
+                    # The bone itself is the last of the chain, unless the chain reaches for its head.
                     count = constraint.chain_count - getattr(constraint, "use_tail", True)
                     above = bone.parent_recursive[:count] if constraint.chain_count else bone.parent_recursive
                     followers |= {parent.name for parent in above}
@@ -69,14 +69,14 @@ def not_promised(rig: bpy.types.Object) -> tuple[str, ...]:
 
 
 def shown(transform: Transform, source: KeyedTransform, frames: np.ndarray) -> tuple[Poses, AffineMaps]:
-    """Return how a source is seen on these frames (n,), with the object's own delta transforms, and what is not keyed.
+    """Return the visible motion of a source on these frames (n,), with delta transforms and the values without keys.
 
     Returns
     -------
     poses : Poses, shape (n,)
-        Along the axes of the body at rest. Where the scale is uneven, its geometric mean.
+        Along the axes of the body at rest. An uneven scale is replaced by its geometric mean.
     maps : AffineMaps, shape (n,)
-        Of the channels as Blender has them: location runs along its own axes, and scale may be uneven or negative.
+        The channels as Blender has them: location runs along its own axes, and scale may be uneven or negative.
     """
     (result,) = shown_together([transform], [source], frames)
     return result
@@ -85,7 +85,7 @@ def shown(transform: Transform, source: KeyedTransform, frames: np.ndarray) -> t
 def shown_together(
     transforms: Sequence[Transform], sources: Sequence[KeyedTransform], frames: np.ndarray
 ) -> Iterator[tuple[Poses, AffineMaps]]:
-    """Yield what `shown` returns for each of several transforms."""
+    """Yield the result of `shown` for each of several transforms."""
     step = max(1, AT_ONCE // len(frames))
     for first in range(0, len(sources), step):
         some = sources[first : first + step]
@@ -96,13 +96,13 @@ def shown_together(
             rest = transform.components()
             for part in ROWS.keys() - source.keyed:
                 rows[ROWS[part]] = rest[ROWS[part], None]
-            yield _placed(transform, rows, source.original)
+            yield _poses_and_maps(transform, rows, source.original)
 
 
 def evaluated(
     transform: Transform, curves: Mapping[Channel, bpy.types.FCurve], frames: np.ndarray
 ) -> tuple[Poses, AffineMaps]:
-    """Return what `shown` does as Blender evaluates F-curves, whatever these are."""
+    """Return the same as `shown`, from any F-curves as Blender evaluates them."""
     rest = transform.components()
     rows = np.tile(rest[:, None], (1, len(frames)))
     for row, channel in transform.channels.items():
@@ -110,11 +110,11 @@ def evaluated(
         if fcurve is not None and not fcurve.mute and not fcurve.is_empty:
             rows[row] = [fcurve.evaluate(frame) for frame in frames.tolist()]
     rows = np.where(np.abs(rows) < MAX_NUMBER, rows, rest[:, None])
-    return _placed(transform, rows, transform.original())
+    return _poses_and_maps(transform, rows, transform.original())
 
 
-def _placed(transform: Transform, rows: np.ndarray, delta: np.ndarray) -> tuple[Poses, AffineMaps]:
-    """Return what `shown` does for values of channels (10, n), which become quaternions, and delta transforms (10,)."""
+def _poses_and_maps(transform: Transform, rows: np.ndarray, delta: np.ndarray) -> tuple[Poses, AffineMaps]:
+    """Return the same as `shown`, from channel values (10, n), turned into quaternions in place, and deltas (10,)."""
     turn_into_quaternions(rows, transform.order)
     along, (positions, quaternions, scale) = transform.location_axes, (rows[part].T for part in ROWS.values())
     positions, scale = positions + delta[ROWS[LOCATION]], scale * delta[ROWS[SCALE]]
@@ -125,9 +125,9 @@ def _placed(transform: Transform, rows: np.ndarray, delta: np.ndarray) -> tuple[
 
 
 def continuous_values(source: KeyedTransform, frames: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
-    """Return what the channels of a source have on rising frames (m,), without jumps of rotation, shape (10, m).
+    """Return the channel values of a source on rising frames (m,), without jumps of rotation, shape (10, m).
 
-    `added` (10, m) is what is on top of that.
+    `added` (10, m) is added to the values of the source.
     """
     values = seen_values(source, frames) + added
     turned = values if source.order is None else values.copy()
@@ -138,24 +138,24 @@ def continuous_values(source: KeyedTransform, frames: np.ndarray, added: np.ndar
 
 
 class BodyMotion:
-    """An object and bones of it on frames (m,) of an Action, as they were recorded and as they are by now.
+    """An object and its bones on frames (m,) of an Action, as recorded and as they are now.
 
-    They are *joints*: the object is number 0, and carries the bones. Its parents are where they are now.
+    They are the *joints*: the object is number 0 and carries the bones. Its own parents are taken as they are now.
 
     Parameters
     ----------
     joints : sequence of Transform
         The object, alone or with all bones that it has.
     slot : Slot
-        What moves them.
+        The slot that moves them.
     sources : mapping
-        What is keyed of those that may get other keys, by their numbers.
+        The sources of the joints that may get other keys, by their numbers.
     frames : array, shape (m,)
     radius : float, optional
-        Of the ball around each bone's head, or around the origin of an object alone, in the scene's units. As far as
-        each of them reaches where None.
+        The radius of the ball around each bone's head, or around the origin of a single object, in the scene's units.
+        The default is the reach of each.
     space : array, shape (3, 3), optional
-        What takes the axes of the channels of a single joint, which may be a bone, to those of the scene.
+        For a single joint, which may be a bone: the map from the axes of its channels to those of the scene.
     """
 
     def __init__(
@@ -178,21 +178,21 @@ class BodyMotion:
             self.radii = np.array([(radius or radius_of(joints[0].carrier)) / size])
         self._curves = {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in slot.fcurves}
         self._parent = AffineMaps(into_scene(joints[0]) if space is None else space, np.zeros(3))
-        self.poses = self._look_at(frames)
+        self.poses = self._record(frames)
         """Poses of each joint's channels, each of shape (m,)."""
         scales = existing(self.poses[0].scales)
         sizes = np.maximum(scales / (scales[0] or 1.0), LEAST_SCALE)
         self.unit = float((np.linalg.norm(self.truth.axes[0], 2, axis=(-2, -1)) / sizes).max()) or 1.0
-        """The length of the unit of bones, and of an object at its first size, in the scene, at most."""
+        """The largest length in the scene of one unit of the bones, or of the object at its first size."""
         sizes = np.sqrt(np.einsum("...ij,...ij->...j", self.truth.axes, self.truth.axes).max(axis=-1))
         away = np.linalg.norm(self.truth.origins - self.truth.origins[0], axis=-1) + self.radii[:, None] * sizes
         self.extent = float(away.max()) / self.unit
-        """The distance that any ball gets from the object's origin, in that unit."""
+        """The largest distance of any ball's surface from the object's origin, in that unit."""
         moved = float(np.abs(self.truth.origins[0]).max()) if 0 in sources else 0.0
         self.rounding = SINGLE_PRECISION_RATIO * (moved + float(away.max()))
 
-    def _look_at(self, frames: np.ndarray) -> list[Poses]:
-        """Have all joints be as they were recorded on these frames, and return the poses of their channels."""
+    def _record(self, frames: np.ndarray) -> list[Poses]:
+        """Reset all joints to the recording on these frames, and return the poses of their channels."""
         self.frames = frames
         self._shown: dict[int, KeyedTransform | None] = {}
         keyed = shown_together([self.joints[number] for number in self._sources], [*self._sources.values()], frames)
@@ -203,20 +203,20 @@ class BodyMotion:
         self._channels, self._posed = self._recorded.copy(), self._recorded.copy()
         self._pose(range(len(result)))
         self.truth = self.now()
-        """Where the joints are in the scene as recorded, shape (joints, m)."""
+        """The maps of the joints in the scene as recorded, shape (joints, m)."""
         return [poses for poses, _ in result]
 
     def at(self, frames: np.ndarray) -> BodyMotion:
-        """Return the same joints on other frames, as they were recorded."""
+        """Return the same joints on other frames, as recorded."""
         result = copy(self)
-        result.poses = result._look_at(frames)
+        result.poses = result._record(frames)
         return result
 
     def as_chains(self) -> tuple[np.ndarray, Poses, float]:
-        """Return joints as the search has them, with even scale, in chains of bones that inherit all.
+        """Return joints for the search, with uniform scale, in chains of bones that inherit everything.
 
-        That is their parents (joints,), those of the first in chains being the object; their poses (joints, m); and the
-        part of the tolerance that each chain may take, which still moves with what it hangs on.
+        The result is their parents (joints,), where the first bone of each chain has the object as its parent; their
+        poses (joints, m); and the fraction of the tolerance for each chain, as it still moves with its real parent.
         """
         own, *of_bones = self.poses
         own_scales, *bone_scales = (cast(np.ndarray, poses.scales) for poses in self.poses)
@@ -243,13 +243,13 @@ class BodyMotion:
         return parents, Poses(positions, align_signs(quaternions), scales if grows else None), chains**-0.5
 
     def _pose(self, numbers: Collection[int]) -> None:
-        """Have these joints, and all that hang on them, be where their channels put them: bones in the rig's space."""
+        """Update these joints and all their children from their channels; bones are in the rig's space."""
         if 0 in numbers:
             self._posed[0] = self._parent @ self._channels[0]
         self.hierarchy.pose([number - 1 for number in numbers if number], self._channels[1:], self._posed[1:])
 
     def show(self, sources: Mapping[int, KeyedTransform | None]) -> None:
-        """Let joints be moved by other keys, or as they were where it is None."""
+        """Move joints by other keys, or by the recorded ones where the source is None."""
         changed = {number: source for number, source in sources.items() if source is not self._shown.get(number)}
         now = {number: source for number, source in changed.items() if source is not None}
         shown_now = shown_together([self.joints[number] for number in now], [*now.values()], self.frames)
@@ -260,37 +260,37 @@ class BodyMotion:
         self._pose(changed)
 
     def show_values(self, rows: Mapping[int, np.ndarray]) -> None:
-        """Let joints have these values of their channels (10, m)."""
+        """Move joints by these values of their channels (10, m)."""
         for number, values in rows.items():
             joint = self.joints[number]
-            self._channels[number] = _placed(joint, values.copy(), joint.original())[1]
+            self._channels[number] = _poses_and_maps(joint, values.copy(), joint.original())[1]
         self._pose(rows)
 
     def now(self) -> AffineMaps:
-        """Return where all joints are in the scene by now, shape (joints, m)."""
+        """Return the present maps of all joints in the scene, shape (joints, m)."""
         result = self._posed[0] @ self._posed
         result[0] = self._posed[0]
         return result
 
     def above(self, number: int) -> Iterator[int]:
-        """Yield a joint and all that it hangs on."""
+        """Yield a joint and all its parents."""
         while number >= 0:
             yield number
             number = int(self.parents[number])
 
     def below(self, number: int) -> np.ndarray:
-        """Return which joints are one or hang on it, shape (joints,)."""
+        """Return True for a joint and all its children, shape (joints,)."""
         return np.array([number in self.above(other) for other in range(len(self.joints))])
 
     def reach(self, number: int) -> float:
-        """Return how far from a joint anything gets that hangs on it, in the unit of bones."""
+        """Return the largest distance from a joint of itself and all its children, in the unit of bones."""
         others = np.flatnonzero(self.below(number))
         away = np.linalg.norm(self.truth.origins[others] - self.truth.origins[number], axis=-1).max(axis=1)
         counted = self.radii[others] > 0.0
         return float((away / self.unit + self.radii[others])[counted].max())
 
     def over(self, allowed: float, weights: np.ndarray) -> list[tuple[float, int, int]]:
-        """Return where errors are over what is allowed: weighted error, joint and moment, the largest first.
+        """Return the errors above the allowed one: weighted error, joint and moment, the largest first.
 
         `weights` are of shape (joints, m).
         """
@@ -306,7 +306,7 @@ class BodyMotion:
     def largest_errors(self, weights: np.ndarray | None = None) -> np.ndarray:
         """Return the largest displacement of any point in each joint's ball, in the scene's units, shape (joints,).
 
-        It is that times weights (joints, m) where they are given.
+        Displacements are multiplied by weights (joints, m) if these are given.
         """
         now, truth = self.now(), self.truth
         if weights is None:
@@ -314,31 +314,31 @@ class BodyMotion:
         return (self.displacements() * weights).max(axis=1)
 
     def displacements(self) -> np.ndarray:
-        """Return how far any point in each joint's ball is displaced, in the scene's units, shape (joints, m)."""
+        """Return the largest displacement of each joint's ball by moments, in the scene's units, shape (joints, m)."""
         now, balls = self.now(), (np.full(len(self.frames), radius) for radius in self.radii)
         return np.array([ball_displacement(now[n], self.truth[n], radii) for n, radii in enumerate(balls)])
 
     def to_blame(self, number: int, moment: int, among: Iterable[int], share: float) -> list[int]:
-        """Return which of these joints, as they were recorded, would take a joint's error at a moment to a share of it.
+        """Return those of these joints that reduce a joint's error at a moment to a fraction of it, if set as recorded.
 
-        They are few: that which helps most is the first, and so on. None where all of them would not.
+        They are few: the one that helps most is first, and so on. Empty if even all of them do not suffice.
         """
         chain, left, result = [*self.above(number)][::-1], list(among), []
-        least = share * self._displaced(number, moment, self._channels[chain, moment, None])[0]
+        least = share * self._errors_with(number, moment, self._channels[chain, moment, None])[0]
         while left:
             restored = np.array([np.isin(left, item) | (item in result) for item in chain])
             both = [maps[chain, moment, None] for maps in (self._recorded, self._channels)]
             axes = np.where(restored[..., None, None], both[0].axes, both[1].axes)
             channels = AffineMaps(axes, np.where(restored[..., None], both[0].origins, both[1].origins))
-            errors = self._displaced(number, moment, channels)
+            errors = self._errors_with(number, moment, channels)
             best = int(np.argmin(errors))
             result.append(left.pop(best))
             if errors[best] <= least:
                 return result
         return []
 
-    def _displaced(self, number: int, moment: int, channels: AffineMaps) -> np.ndarray:
-        """Return how far a joint is off at a moment (n,) with these channels of its chain (k, n), the object first."""
+    def _errors_with(self, number: int, moment: int, channels: AffineMaps) -> np.ndarray:
+        """Return a joint's errors (n,) at a moment for n variants of its chain's channels (k, n), the object first."""
         chain, above = [*self.above(number)][-2::-1], None
         for row, item in enumerate(chain, 1):
             above = self.hierarchy.placed(item - 1, channels[row], above)

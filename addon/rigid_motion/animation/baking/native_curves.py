@@ -1,8 +1,8 @@
-"""Blender's own Bezier keys for a motion: few, on its samples, with handles that need no mode between them.
+"""Native Bezier keys for a motion: few keys on its samples, with fitted handles instead of a mode.
 
-All channels of a part have their keys on the same frames. Handles are a third of the segment long, so that values are
-cubics in time, or as long as automatic ones are without smoothing, where something needs fewer keys then. They are
-those that Blender sets by the keys around wherever these do as well. Frames are those of the Action.
+All channels of a part have their keys on the same frames. Handles are a third of the segment long, so values are cubics
+in time; or as long as automatic handles without smoothing, if fewer keys are needed then. Handles are Blender's
+automatic ones wherever these are as good. Frames are those of the Action.
 """
 
 from __future__ import annotations
@@ -34,44 +34,44 @@ from ..transforms import Transform
 from .fewer_keys import is_constant, values_on
 
 NATIVE = "NATIVE_CURVES"
-"""What is asked for in place of a mode."""
+"""Requests native curves in place of a mode."""
 
 UNSMOOTHED_RATIO = 1.0 / 2.5614
-"""The length of automatic handles where Auto Handle Smoothing of F-curves is None, as in files of old."""
+"""The length of automatic handles, as a fraction of the segment, if Auto Handle Smoothing is None, as in old files."""
 
 MAX_KEYS_RATIO, MAX_ERROR_RATIO = 0.9, 0.25
-"""Handles are so long where that leaves no more than this share of the keys, or as many with a quarter of the error."""
+"""Unsmoothed handles must leave at most this fraction of the keys, or no more keys with this fraction of the error."""
 
 QUATERNION_LENGTH_WEIGHT = 1e-4
-"""The weight of a quaternion's length: handles are to look as if set by hand, and what is between frames stays near."""
+"""The weight of a quaternion's length: handles look as if set by hand, and values between frames stay near."""
 
 FIRST_TRIAL_CURVES = 5
-"""So many are tried first, to see whether any gains by that."""
+"""The number of joints tried first, to see whether any needs fewer keys with unsmoothed handles."""
 
 MAX_AUTOMATIC_TRIES = 8
-"""So often automatic handles are tried on fewer keys than before."""
+"""The most attempts with automatic handles, each on fewer keys than the one before."""
 
 MAX_COLLINEAR_SLOPE_RATIO = 1e-4
-"""Handles are in one line whose slopes differ by less, relative to the larger of them."""
+"""Two handles count as collinear if their slopes differ by less, relative to the larger slope."""
 
 SLOPE_ROUNDING_RATIO = 3e-3
-"""That of single precision, relative to the value, over `MAX_COLLINEAR_SLOPE_RATIO`."""
+"""Single-precision rounding relative to the value, divided by `MAX_COLLINEAR_SLOPE_RATIO`."""
 
 
 class JointCurves:
-    """What something needs to move by curves alone.
+    """The values and tolerances needed to fit native curves to a joint.
 
     Parameters
     ----------
     transform : Transform
     source : Source
-        Its dense keys.
+        The dense keys.
     frames : array, shape (m,)
         The samples that keys may be on.
     reach : float
-        How far away anything is that it turns.
+        The largest distance of anything that the joint rotates.
     allowed : array, shape (m,)
-        How far off that may be on each of them, in the same unit, which is that of its channels.
+        The allowed error on each frame, in the same unit, which is that of the channels.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class JointCurves:
         self.source, self.frames = source, frames
         self.values = values_on(transform, source, frames)
         self.parts: list[tuple[list[int], Samples]] = []
-        """The rows that change of each part, and their samples."""
+        """The changing rows of each part, and their samples."""
         for part in ROWS:
             rows = [row for row in self.values if PART_OF[row] == part]
             turns = part == ROTATION and source.order is None and len(rows) == 4
@@ -90,20 +90,20 @@ class JointCurves:
                 values = np.column_stack([self.values[row] for row in rows])
                 by = 1.0 if part == LOCATION else reach
                 if turns:
-                    # Half of their angle counts.
+                    # The distance of quaternions is half of their angle.
                     values, by = values / np.linalg.norm(values, axis=1, keepdims=True), 2.0 * reach
                 self.parts.append((rows, Samples(values, allowed / by, turns, lengths=QUATERNION_LENGTH_WEIGHT)))
 
     def scaled(self, scale: float) -> list[Samples]:
-        """Return the samples of all parts, which may be so many times as far off."""
+        """Return the samples of all parts, with the allowed errors times a scale."""
         return [_scaled(samples, scale) for _, samples in self.parts]
 
     def with_handles(self, length: float) -> None:
-        """Have handles be a share of the segment long."""
+        """Set the length of handles, as a fraction of the segment."""
         self.parts = [(rows, samples._replace(handles=length)) for rows, samples in self.parts]
 
     def fit(self, length: float) -> tuple[int, float]:
-        """Return how many keys it needs with handles so long, and how far off most segments are."""
+        """Return the number of keys needed with handles of this length, and the median error of segments."""
         self.with_handles(length)
         (keys,) = needed({0: self}, {0: 1.0}, shared=False).values()
         at = np.searchsorted(self.frames, keys)
@@ -111,7 +111,7 @@ class JointCurves:
         return len(keys), float(np.median(errors))
 
     def keyed(self, keys: np.ndarray, scale: float) -> KeyedTransform:
-        """Return the source with keys on these frames (k,) alone; what does not move has a single one."""
+        """Return the source with keys on only these frames (k,); channels that do not change have a single key."""
         at = np.searchsorted(self.frames, keys)
         channels = []
         for rows, samples in self.parts:
@@ -128,14 +128,14 @@ class JointCurves:
         return replace(self.source, channels=tuple(channels), rest=rest, mode=0, turns=None)
 
     def _with_handles(self, rows: Sequence[int], curves: CubicKeys, length: float) -> Keys:
-        """Return keys of rows with handles of this length, as a share of each segment."""
+        """Return keys of rows with handles of this length, as a fraction of each segment."""
         lengths, values = np.diff(curves.times)[:, None] * length, curves.values
         before, behind = np.concatenate((lengths[:1], lengths)), np.concatenate((lengths, lengths[-1:]))
-        # What goes on outside of its keys goes on as it leaves them.
+        # Linear extrapolation continues with the slope at the first and last key.
         leaving, arriving = curves.leaving.copy(), curves.arriving.copy()
         arriving[0], leaving[-1] = leaving[0], arriving[-1]
         times, kinds = curves.times[:, None], curves.kinds.copy()
-        # What is held is a curve as well, and no jump where its end is moved later.
+        # A segment that stays constant becomes a curve too, so it does not jump if its end is moved later.
         kinds[:-1][(kinds[:-1] == CONSTANT_KIND) & (values[1:] == values[:-1]).all(axis=1)] = CUBIC_KIND
         kinds[-1] = CUBIC_KIND
         points, left, right = (
@@ -157,9 +157,9 @@ class JointCurves:
         )
 
     def automatic(self, fewer: KeyedTransform, scale: float, scratch: bpy.types.FCurve) -> KeyedTransform:
-        """Return the source with the handles that Blender sets where the curves stay within so much with them.
+        """Return the source with Blender's automatic handles where curves keep to the scaled tolerance with them.
 
-        A scratch F-curve is needed for that.
+        The scratch F-curve is used to compute the handles.
         """
         channels = list(fewer.channels)
         for number, (_, samples) in enumerate(self.parts):
@@ -171,7 +171,7 @@ class JointCurves:
         begins = np.searchsorted(self.frames, keys.times)
         flags = np.ones(len(begins), dtype=bool)
         for _ in range(MAX_AUTOMATIC_TRIES):
-            tried = _shaped(
+            tried = _with_blender_handles(
                 replace(keys, automatic=np.broadcast_to(flags[:, None], (*keys.points.shape[:2], 2))), scratch
             )
             (shown,) = evaluate([tried], [self.frames])
@@ -186,9 +186,9 @@ class JointCurves:
 
 
 def needed(curves: Mapping[int, JointCurves], scales: Mapping[int, float], *, shared: bool) -> dict[int, np.ndarray]:
-    """Return the frames of the keys (k,) that joints need, all on the same samples or each its own.
+    """Return the frames of the keys (k,) that joints need: shared by all, or separate for each.
 
-    `scales` are what each may be off as a share of what it is allowed.
+    `scales` multiply the allowed error of each joint.
     """
     result = {number: joint.frames[:1] for number, joint in curves.items()}
     samples = {number: joint.scaled(scales[number]) for number, joint in curves.items() if joint.parts}
@@ -200,7 +200,7 @@ def needed(curves: Mapping[int, JointCurves], scales: Mapping[int, float], *, sh
 
 
 def choose_handles(curves: Mapping[int, JointCurves]) -> None:
-    """Have joints have handles of the length with which they need the fewest keys."""
+    """Set the handle length of each joint to the one that needs fewer keys."""
     count = len(curves)
     moving = [number for number, joint in curves.items() if joint.parts]
     first = moving[:: max(1, count // FIRST_TRIAL_CURVES)]
@@ -217,7 +217,7 @@ def choose_handles(curves: Mapping[int, JointCurves]) -> None:
 
 @contextmanager
 def scratch_curve() -> Iterator[bpy.types.FCurve]:
-    """Have an F-curve to try keys on, which moves nothing."""
+    """Provide a temporary F-curve to try keys on, which moves nothing."""
     action = bpy.data.actions.new("Scratch")
     try:
         strip = action.layers.new("Scratch").strips.new(type="KEYFRAME")
@@ -226,8 +226,8 @@ def scratch_curve() -> Iterator[bpy.types.FCurve]:
         bpy.data.actions.remove(action)
 
 
-def _shaped(keys: Keys, scratch: bpy.types.FCurve) -> Keys:
-    """Return keys with the handles that Blender gives those with automatic ones."""
+def _with_blender_handles(keys: Keys, scratch: bpy.types.FCurve) -> Keys:
+    """Return keys with their automatic handles as Blender sets them."""
     sides: list[list[np.ndarray]] = [[], []]
     for channel in range(len(keys.points)):
         write_keys(scratch, keys, channel)
@@ -238,7 +238,7 @@ def _shaped(keys: Keys, scratch: bpy.types.FCurve) -> Keys:
 
 
 def write_keys(fcurve: bpy.types.FCurve, keys: Keys, channel: int) -> None:
-    """Give an F-curve the keys of a channel, with the types of their handles where they have handles."""
+    """Write the keys of a channel to an F-curve, with the types of their handles if they have handles."""
     points = keys.points[channel]
     if keys.automatic is not None and keys.right is not None:
         longest = (keys.right[channel, :-1, 0] - points[:-1, 0]) / np.diff(points[:, 0])
@@ -247,13 +247,13 @@ def write_keys(fcurve: bpy.types.FCurve, keys: Keys, channel: int) -> None:
 
 
 def fields_of(keys: Keys, channel: int) -> KeyFields:
-    """Return all there is to the keys of a channel, with the types of their handles where they have handles."""
+    """Return all fields of the keys of a channel, with the types of their handles if they have handles."""
     fields = new_key_fields(keys.times, keys.values[channel], keys.interpolation[channel], selected=True)
     return fields | _handles_of(keys, channel)
 
 
 def _handles_of(keys: Keys, channel: int) -> KeyFields:
-    """Return the handles of n keys of a channel and their types, each of shape (n, width); nothing without handles."""
+    """Return the handles of n keys of a channel and their types, each of shape (n, width); {} without handles."""
     if keys.left is None or keys.right is None:
         return {}
     points, left, right = keys.points[channel], keys.left[channel], keys.right[channel]
@@ -269,5 +269,5 @@ def _handles_of(keys: Keys, channel: int) -> KeyFields:
 
 
 def _scaled(samples: Samples, scale: float) -> Samples:
-    """Return samples that may be so many times as far off."""
+    """Return samples with their allowed errors times a scale."""
     return samples._replace(allowed=samples.allowed * scale)

@@ -1,7 +1,7 @@
 """Reducing keys: from a recording with a key on every frame to the few that a mode, or Blender's own curves, need.
 
-A recording is whatever an object's channels say: imported mocap, a baked simulation, a solved camera. Its poses are
-those in the space of the channels, with the object's own delta transforms. The original keys stay in the file, for
+A recording is any motion in an object's channels: imported mocap, a baked simulation, a solved camera. Its poses are in
+the space of the channels, with the object's own delta transforms. The original keys stay in the file, for
 `restore_keys`. Frames are those of the Action, lengths are the scene's units.
 """
 
@@ -34,18 +34,18 @@ from .search import NO_FEWER, NOT_SO_MANY, NotFewer, Wishes, fewer_keys
 HELD_REFUSAL = n_("{name} is held, so each hold is reduced separately: by a tolerance, not to a number of keys")
 
 SMOOTH_MODE = "motor_spline"
-"""The mode that mostly needs the fewest keys."""
+"""The mode that usually needs the fewest keys."""
 
 FEWEST = "FEWEST"
-"""Asks for `NATIVE` or `SMOOTH_MODE`, whichever needs fewer keys, or a mode that needs fewer than both."""
+"""Requests `NATIVE` or `SMOOTH_MODE`, the one that needs fewer keys, or another mode that needs fewer than both."""
 
 Plans = dict[Transform, "list[FewerKeys | FewerRuns] | Refused"]
-"""The keys that targets are to have in each slot that moves them; or why they cannot."""
+"""The planned keys of targets in each slot that moves them, or why a target refuses."""
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """What became of keys: how many there were, how many are left, and the largest shell error."""
+    """The result of a reduction: the number of frames with keys before and after, and the largest shell error."""
 
     before: int
     after: int
@@ -53,22 +53,22 @@ class Reduction:
     """See `FewerKeys`."""
 
     rig: WholeRig | None = None
-    """The result for the rig, where it is a bone's."""
+    """The result for the whole rig, if this is the result for a bone."""
 
     channel_keys: tuple[int, int] = (0, 0)
-    """The keys of all channels together, before and after. There may be more: a pose has all channels."""
+    """The total keys of all channels, before and after. They may increase: a pose has keys in all channels."""
 
     between: float = 0.0
-    """The largest error between frames, where it is that on frames alone which keeps to the tolerance."""
+    """The largest error between frames, if only the error on frames keeps to the tolerance."""
 
     mode: str = ""
     """The mode of the keys, or `NATIVE`."""
 
     needed: Mapping[str, int] = field(default_factory=dict)
-    """How many keys of all that was reduced together would be left, by each mode that was tried."""
+    """The number of keys left for all targets together with each mode that was tried."""
 
     held: Sequence[Sequence] = ()
-    """What it is held in since, where its keys were reduced into holds: names, first and last frames, and how many keys
+    """If keys were reduced into holds: the names of the holders, first and last frames, and the number of keys that
     became one.
     """
 
@@ -84,41 +84,41 @@ def reduce_keys_of(
     count: int | None = None,
     refused: list[Refused] | None = None,
 ) -> Reduction | None:
-    """Leave only the keys that a mode, or curves of Blender's own, need to show the same motion.
+    """Leave only the keys that a mode, or Blender's own curves, need to show the same motion.
 
-    A key is a pose: location, rotation and, where it is even, scale have keys on the same frames, with the values that
-    the recording has there. A scale that differs from axis to axis as it changes keeps the keys it has, and so does
-    everything else in the Action. Bones of one rig are reduced together: what moves one moves all below it. But what is
-    held is reduced by itself, each time in the space of its holder; the keys at which it passes to another one stay.
-    Native curves are Bezier keys: location, rotation and scale are fitted each as it is keyed, on the same frames.
+    A key is a pose: location, rotation and, if it is uniform, scale have keys on the same frames, with the values of
+    the recording. A changing scale that differs from axis to axis keeps its keys, as does everything else in the
+    Action. Bones of one rig are reduced together, because a bone moves all its children. A held object is reduced
+    separately, each hold in the space of its holder; the keys at which it passes to another holder stay. Native curves
+    are Bezier keys: location, rotation and scale are fitted separately, as they are keyed, on the same frames.
 
     Parameters
     ----------
     targets, refused
         See `edits.apply`.
     mode : str
-        What fills in between the keys, one of `rigid_motion.motion.KEYFRAME_MODES`. It is that of all segments.
-        `NATIVE` is Blender's own curves, `FEWEST` whatever needs the fewest keys.
+        The mode of all segments, one of `rigid_motion.motion.KEYFRAME_MODES`. `NATIVE` stands for Blender's own curves,
+        `FEWEST` for the choice that needs the fewest keys.
     tolerance : float
-        The largest shell error at any moment, or with native curves on any frame, in the scene's units. Of bones it is
-        that in the rig's space, through all that they hang on, and holds for every bone that hangs on a target too.
+        The largest shell error at any moment, or with native curves on any frame, in the scene's units. For bones it is
+        measured in the rig's space, through all their parents, and also holds for all children of targets.
     radius : float, optional
-        Of the shell, in the scene's units. `radius_of` each target, otherwise.
+        The radius of the shell, in the scene's units. The default is `radius_of` each target.
     shared : bool
         Give all bones of a rig keys on the same frames: key poses.
     hold : bool
         Keep bones that stand on the ground to a quarter of the tolerance while they do.
     count : int, optional
-        So many keys of an object, or key poses of a rig, at least 2: those with the smallest largest error that is
-        found, whatever the tolerance. Bones that have fewer keys keep these.
+        The number of keys of an object, or of key poses of a rig, at least 2. The keys found with the smallest maximum
+        error are used, and the tolerance is ignored. Bones with fewer keys keep these.
 
     Returns
     -------
     Reduction or None
-        That of all targets which did not refuse, see `reduction_of`.
+        The result for all targets that did not refuse, see `reduction_of`.
     """
     modes: tuple[str, ...] = (mode,)
-    if mode == FEWEST:  # So many keys are so many with each.
+    if mode == FEWEST:  # With a count, every mode has the same number of keys.
         modes = (NATIVE, SMOOTH_MODE) if count else tuple(dict.fromkeys((NATIVE, SMOOTH_MODE, *KEYFRAME_MODES)))
     if mode not in (NATIVE, FEWEST) and mode not in KEYFRAME_MODES:
         raise Refused(no_such_mode(mode, KEYFRAME_MODES))
@@ -138,7 +138,7 @@ def reduce_keys_of(
         nonlocal mode
         mode = min(needed, key=lambda name: (needed[name], name in modes[2:], _error_of(found[name])))
         return {
-            transform: one or _no_fewer(transform, readable(transform, readings[transform]), count)
+            transform: one or _refusal_to_reduce(transform, readable(transform, readings[transform]), count)
             for transform, one in found[mode].items()
         }
 
@@ -151,9 +151,10 @@ def reduce_keys_of(
 
 
 def _plans(readings: Mapping[Transform, Readings], wishes: Wishes, below: float) -> Plans:
-    """Return plans for all targets, those together that one slot of an object moves: see `fewer_keys`.
+    """Return plans for all targets; those moved by the same slot of an object are planned together: see `fewer_keys`.
 
-    What is held moves with its holder, and so by itself. `NotFewer` where so many keys are left, or more.
+    Held objects move with their holders, so they are planned separately. Raises `NotFewer` if `below` keys or more are
+    left.
     """
     plans: Plans = {}
     together: dict[tuple, dict[Transform, tuple[Binding, KeyedTransform]]] = {}
@@ -191,7 +192,7 @@ def _plans(readings: Mapping[Transform, Readings], wishes: Wishes, below: float)
 
 
 def _keys_left(plans: Plans, readings: Mapping[Transform, Readings]) -> int:
-    """Return on how many frames targets have keys then, all together, those that refuse as well."""
+    """Return the total number of frames with keys of all targets after the reduction, including those that refuse."""
     count = 0
     for transform, plan in plans.items():
         fewer = {id(one.binding): one.after for one in plan} if isinstance(plan, list) else {}
@@ -207,16 +208,16 @@ def _error_of(plans: Plans) -> float:
 
 
 def reduction_of(targets: Targets) -> Reduction | None:
-    """Return what became of the keys of targets, all together, when they were reduced. None where none of them were."""
+    """Return the result of the last reduction for all targets together, None if none were reduced."""
     notes: dict[tuple, Note] = {}
-    # All that moves by the same keys counts once.
+    # Transforms that share keys count once.
     for transform, in_use in notes_of(transforms_of(targets)):
         for note in in_use:
             if note.kind == REDUCED:
                 notes.setdefault((transform.prefix, note.changed, note.handle), note)
     if not notes:
         return None
-    reductions = list(map(_noted_in, notes.values()))
+    reductions = list(map(_stored_reduction, notes.values()))
     rigs = [item.rig for item in reductions if item.rig is not None]
     return Reduction(
         sum(item.before for item in reductions),
@@ -231,23 +232,23 @@ def reduction_of(targets: Targets) -> Reduction | None:
     )
 
 
-def _noted_in(note: Note) -> Reduction:
+def _stored_reduction(note: Note) -> Reduction:
     noted = json.loads(note.reduction)
     return Reduction(**noted | {"rig": noted["rig"] and WholeRig(**noted["rig"])})
 
 
 def is_reduced(target: Target) -> bool:
-    """Return whether something moves by an Action with reduced keys, and its original is still in the file."""
+    """Return whether the target has reduced keys and its original is still in the file."""
     return last_change(transform_of(target)) == REDUCED
 
 
 def restore_keys(targets: Targets, *, refused: list[Refused] | None = None) -> None:
-    """Give all the keys back that there were before they were reduced or cleaned last, to the last handle."""
+    """Restore all keys from before they were last reduced or cleaned, handles included."""
     go_back(targets, (REDUCED, CLEANED), refused)
 
 
 def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None) -> None:
-    """Remove the keys from the file that `restore_keys` would give back. See `edits.apply`."""
+    """Remove the keys from the file that `restore_keys` would restore. See `edits.apply`."""
     go_back(targets, (REDUCED, CLEANED), refused, by=discard_originals)
 
 
@@ -271,7 +272,7 @@ def _write(
 
 
 def write_fewer(transform: Transform, fewer: FewerKeys) -> None:
-    """Give the channels of a transform their fewer keys, without a mode."""
+    """Write the fewer keys to the channels of a transform, without a mode."""
     binding = fewer.binding
     for rows, keys in fewer.fewer.channels:
         for channel, row in enumerate(rows):
@@ -283,11 +284,13 @@ def write_fewer(transform: Transform, fewer: FewerKeys) -> None:
 
 
 def channel_keys(binding: Binding) -> int:
-    """Return the number of keys of all channels of a binding."""
+    """Return the total number of keys in all channels of a binding."""
     return sum(len(fcurve.keyframe_points) for fcurve in binding.curves.values())
 
 
-def _no_fewer(transform: Transform, keyed: Sequence[tuple[Binding, KeyedTransform]], count: int | None) -> Refused:
+def _refusal_to_reduce(
+    transform: Transform, keyed: Sequence[tuple[Binding, KeyedTransform]], count: int | None
+) -> Refused:
     before = sum(count_of(source) for _, source in keyed if source.channels)
     if before <= 2:
         text = n_(

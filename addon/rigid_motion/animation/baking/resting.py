@@ -1,6 +1,6 @@
-"""Where a body is at rest in something: stretches of frames on which one pose is as good as those that it has there.
+"""Rests of a body relative to something: stretches of frames on which one pose can replace all its poses.
 
-Errors are shell errors, see `rigid_motion.motion.shell_error`. Places are those of frames, counted from 0.
+Errors are shell errors, see `rigid_motion.motion.shell_error`. Places are indices of frames, counted from 0.
 """
 
 from __future__ import annotations
@@ -14,57 +14,57 @@ from ...motion.poses import inverse, placed
 from ...motion.quaternions import from_matrices, matrices
 
 MINIMAX_STEPS = 48
-"""Steps towards the pose with the smallest largest error, which is then a few hundredths from the best one."""
+"""The number of steps towards the pose with the smallest maximum error, which is then a few percent from the best."""
 
 MAX_EXTENSION_ROUNDS = 6
-"""So often a stretch is made as long as the pose allows that is the best one of it."""
+"""The most rounds of extending a stretch as far as its best pose allows."""
 
 TIGHTER_ERROR_RATIO = 0.5
-"""The share of an error that is worth a few frames at the ends of a stretch."""
+"""Reducing the error to this fraction is worth losing a few frames at the ends of a stretch."""
 
 MAX_FRAMES_LOST_RATIO = 0.1
-"""The share of the frames that may be given up for that, and at least two."""
+"""The largest fraction of frames to lose for that; two frames may always be lost."""
 
 
 class RestStretch(NamedTuple):
-    """A stretch on which something is at rest."""
+    """A stretch on which a body is at rest."""
 
     first: int
     last: int
     pose: Poses
-    """The one that it has instead, shape ()."""
+    """The pose that replaces its poses, shape ()."""
 
     largest: float
-    """The largest error of that on any frame."""
+    """The largest error of that pose on any frame."""
 
     @property
     def frames(self) -> int:
-        """On how many frames that is."""
+        """The number of frames."""
         return self.last - self.first + 1
 
 
 class BodyPoses:
-    """A body with poses (m,) in something.
+    """A body with poses (m,) relative to something.
 
-    Each pose is also a point: its origin, and its axes as long as the radius over the root of two. The distance of two
-    points is at most their shell error, and that is at most the root of two times as large.
+    Each pose is also a point: its origin, and its axes with the length of the radius over the square root of 2. The
+    distance of two points is at most their shell error, which is at most the square root of 2 times as large.
     """
 
     def __init__(self, poses: Poses, radius: float) -> None:
         self.poses, self.radius = poses, radius
         axes = np.moveaxis(matrices(poses.quaternions), -1, 0).reshape(-1, 9)
-        self._long = radius / np.sqrt(2.0)
-        self.points = np.column_stack((poses.positions, axes * self._long))
+        self._axis_length = radius / np.sqrt(2.0)
+        self.points = np.column_stack((poses.positions, axes * self._axis_length))
 
     def errors(self, first: int, last: int, pose: Poses) -> np.ndarray:
-        """Return by how much a pose () is off from those that it has from a place to another one, shape (n,)."""
+        """Return the errors of a pose () against the body's poses from one place to another, shape (n,)."""
         return shell_error(self.poses[first : last + 1], pose, self.radius)
 
     def best_pose(self, first: int, last: int) -> Poses:
-        """Return the pose () with the smallest largest error there, as far as distances of points tell: nearly.
+        """Return the pose () with nearly the smallest maximum error there, measured by distances of points.
 
-        Source: Bădoiu and Clarkson, "Smaller core-sets for balls", 2003: from the middle towards what is farthest, by
-        less and less.
+        Source: Bădoiu and Clarkson, "Smaller core-sets for balls", 2003: from the middle, ever smaller steps towards
+        the farthest point.
         """
         points = self.points[first : last + 1]
         center = (points.min(axis=0) + points.max(axis=0)) / 2.0
@@ -83,10 +83,10 @@ class BodyPoses:
     def rests(
         self, tolerance: float, free: np.ndarray, least: int, anyway: np.ndarray | None = None
     ) -> list[RestStretch]:
-        """Return the stretches of at least so many free frames (m,) on which it is at rest, the longest first.
+        """Return the stretches of at least `least` free frames (m,) on which the body is at rest, the longest first.
 
-        None of them overlap. Each is as tight as it may be for a few frames less. None is within those from each frame
-        to the last one that it may rest to anyway, in something else (m,): see `reached`.
+        Stretches do not overlap. Each may lose a few frames at its ends for a smaller error. `anyway` (m,) are the last
+        places up to which the body rests in something else, see `reached`; only longer stretches are tried.
         """
         last = self.reached(tolerance, free)
         starts = np.arange(len(last))
@@ -104,12 +104,12 @@ class BodyPoses:
         return result
 
     def reached(self, tolerance: float, free: np.ndarray) -> np.ndarray:
-        """Return the last place (m,) up to which it may be at rest from each place on, on free frames (m,).
+        """Return the last place (m,) up to which the body may be at rest from each place on, on free frames (m,).
 
-        Two poses that are within the tolerance of a third one differ by twice as much at most, in each number of their
+        Two poses within the tolerance of a third pose differ by at most twice the tolerance in each number of their
         points.
         """
-        # A frame that is not free is farther away than anything, and so is all that is behind it.
+        # This places a frame that is not free, and all later frames, too far away.
         points = np.column_stack((self.points, 4.0 * tolerance * np.cumsum(~free)))
         count, lows, highs = len(points), [points], [points]
         while 2 ** len(lows) <= count:
@@ -118,7 +118,7 @@ class BodyPoses:
             highs.append(np.maximum(highs[-1][:-step], highs[-1][step:]))
         at, low, high = np.arange(count), points.copy(), points.copy()
         for level in range(len(lows) - 1, -1, -1):
-            # As many places more as two to the power of the level.
+            # Try to extend by two to the power of the level.
             place = np.minimum(at + 1, len(lows[level]) - 1)
             lower, higher = np.minimum(low, lows[level][place]), np.maximum(high, highs[level][place])
             fits = (at + 1 + 2**level <= count) & (higher - lower <= 2.0 * tolerance).all(axis=1)
@@ -127,19 +127,19 @@ class BodyPoses:
         return at
 
     def _rest_within(self, first: int, last: int, tolerance: float, least: int) -> RestStretch | None:
-        """Return a long stretch of these places on which it is at rest; None where none is long enough."""
-        rest = self._longest(first, last, tolerance)
+        """Return a long stretch of these places on which the body is at rest; None if none is long enough."""
+        rest = self._longest_rest(first, last, tolerance)
         if rest.frames < least:
             return None
         while rest.largest > 0.0:
-            tighter = self._longest(rest.first, rest.last, TIGHTER_ERROR_RATIO * rest.largest)
+            tighter = self._longest_rest(rest.first, rest.last, TIGHTER_ERROR_RATIO * rest.largest)
             if tighter.frames < max(least, rest.frames - max(2, int(MAX_FRAMES_LOST_RATIO * rest.frames))):
                 break
             rest = tighter
         return rest
 
-    def _longest(self, first: int, last: int, tolerance: float) -> RestStretch:
-        """Return the longest stretch of these places that is found to be at rest, which may be a single frame."""
+    def _longest_rest(self, first: int, last: int, tolerance: float) -> RestStretch:
+        """Return the longest stretch found in these places on which the body is at rest. It may be a single frame."""
         begin, end = first, last
         found = RestStretch(first, first, self.poses[first], 0.0)
         for _ in range(MAX_EXTENSION_ROUNDS):
@@ -147,7 +147,7 @@ class BodyPoses:
             errors = self.errors(first, last, pose)
             edges = np.flatnonzero(np.diff(np.concatenate(([False], errors <= tolerance, [False]))))
             if not len(edges):
-                # Not even a frame of them: the middle may do better.
+                # Not a single frame fits: try the middle of the stretch.
                 begin, end = begin + (end - begin) // 4, end - (end - begin) // 4
                 continue
             begins, ends = edges[::2], edges[1::2] - 1
@@ -161,11 +161,11 @@ class BodyPoses:
         return found
 
     def moves(self, rest: RestStretch, distance: float) -> bool:
-        """Return whether it moves by more than a distance here while it is at rest in something else."""
+        """Return whether the body moves by more than a distance here during its rest in something else."""
         pose = self.best_pose(rest.first, rest.last)
         return bool(self.errors(rest.first, rest.last, pose).max() > distance)
 
 
 def relative(holder: Poses, poses: Poses) -> Poses:
-    """Return where poses (m,) are in what is at others (m,)."""
+    """Return poses (m,) relative to those of a holder (m,)."""
     return placed(inverse(holder), poses)

@@ -1,8 +1,8 @@
-"""Which keys an object, or a rig and its bones, can do without: one plan for all that one slot moves together.
+"""Search for the few keys that an object, or a rig and its bones, need: one plan for everything that one slot moves.
 
-Keys are searched for as if all were rigid, and proven in what Blender makes of them, between keys as well: the
-tolerance is kept at every bone, whether it gets fewer keys itself or only hangs on what does. Poses are those that the
-channels give, without constraints and drivers. Lengths are the scene's units.
+The search treats all joints as rigid. Its result is then proven in the motion that Blender plays, between keys too: the
+tolerance is kept at every bone, whether it gets fewer keys itself or only follows a bone that does. Poses are those of
+the channels, without constraints and drivers. Lengths are the scene's units.
 """
 
 from __future__ import annotations
@@ -42,34 +42,34 @@ NO_FEWER = n_("{name} needs its {count} keys to stay within the tolerance: allow
 NOT_SO_MANY = n_("{name} has {count} keys: ask for fewer")
 
 CONTACT_WEIGHT = 4.0
-"""The weight of the error of what stands on the ground."""
+"""The weight of errors of bones that stand on the ground."""
 
 MIN_MEND_SPACING_FRAMES = 4
-"""Frames between places that are mended at once."""
+"""The least number of frames between places where keys are added in the same round."""
 
 AT_ONCE = 2**18
-"""Joints times moments that are looked at in one go."""
+"""The number of joints times moments checked at once."""
 
 MAX_CURVE_TRIES, TIGHTENING_POWER, MAX_TIGHTENING = 3, 0.8, 3.0
-"""So often curves are searched for, each time within less of the tolerance by this power of what they were over it, and
-by no more than this."""
+"""The most searches for curves; the power of the excess error by which each next search reduces the tolerance; and the
+largest excess that counts."""
 
 MAX_BUDGET_HALVINGS = 24
-"""The most steps towards the tolerance with which there are so many keys."""
+"""The most steps of searching the tolerance that gives the requested number of keys."""
 
 Members = Mapping[Transform, tuple[Binding, KeyedTransform]]
-"""What one slot moves of an object and its bones, and is to have fewer keys: by what it moves, and what is keyed."""
+"""The transforms of an object and its bones that one slot moves and that are reduced, with binding and source."""
 
 Keyed = Callable[[int, np.ndarray], KeyedTransform]
-"""Returns the source of a joint, by its number, with keys on frames (k,) alone."""
+"""Returns the source of a joint, by its number, with keys on only these frames (k,)."""
 
 Over = list[tuple[float, int, int]]
-"""What is over the tolerance, see `BodyMotion.over`."""
+"""Errors above the tolerance, see `BodyMotion.over`."""
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """What is wanted of fewer keys: see `reduce_keys_of`. With a count it is so many, whatever the tolerance."""
+    """The options of a reduction: see `reduce_keys_of`. A count overrides the tolerance."""
 
     mode: str
     tolerance: float
@@ -80,7 +80,7 @@ class Wishes:
 
 
 class NotFewer(Exception):
-    """As many keys are needed as something else needs, or more."""
+    """Raised if a mode needs as many keys as another one, or more."""
 
 
 def fewer_keys(
@@ -93,8 +93,8 @@ def fewer_keys(
 ) -> dict[Transform, FewerKeys]:
     """Return the plans for those of an object and its bones that can have fewer keys.
 
-    `Refused` where none of several can have fewer. With a `space`, see `BodyMotion`, the only member
-    is looked at by itself. `NotFewer` where a mode needs so many keys, `below`, even before they are proven.
+    Raises `Refused` if none of several members can have fewer, and `NotFewer` if a mode needs `below` keys or more even
+    before they are proven. With a `space`, see `BodyMotion`, the only member is treated by itself.
     """
     mode, count = wishes.mode, wishes.count
     tolerance = wishes.tolerance if count is None else math.inf
@@ -114,7 +114,7 @@ def fewer_keys(
 
 
 class SearchedBody:
-    """An object and its bones as one slot moves them: those that are to have fewer keys, and all others as they are."""
+    """An object and its bones as one slot moves them: the joints to be reduced, and all others unchanged."""
 
     def __init__(
         self,
@@ -135,7 +135,7 @@ class SearchedBody:
         self.frames = seen_frames(samples, list(self.sources.values()))
         self.sampled = np.isin(self.frames, samples if places is None else places)
         """True for the moments that keys may be on."""
-        # Handles are fitted to all moments where keys are on some of them alone.
+        # If keys may be only on some moments, handles are still fitted to all of them.
         self._fitted = self.sampled if places is None else np.ones(len(self.frames), dtype=bool)
         slot = next(binding.slot for binding, _ in members.values())
         self.motion = BodyMotion(joints, slot, self.sources, self.frames, radius, space)
@@ -148,18 +148,18 @@ class SearchedBody:
             self.stands[1:] = standing(seconds, self.motion.truth.origins[1:])
         self.weights = np.where(self.stands, CONTACT_WEIGHT, 1.0) if hold else np.ones(self.stands.shape)
         self.errors: np.ndarray = np.zeros(len(joints))
-        """The largest displacement of any point in each joint's ball, as was proven last, shape (joints,)."""
+        """The largest displacement of any point in each joint's ball, from the last proof, shape (joints,)."""
         self.between: np.ndarray = np.zeros(len(joints))
-        """The largest displacement at any moment, where errors are those on frames; or nothing, shape (joints,)."""
+        """The largest displacement at any moment if `errors` are those on frames, otherwise 0; shape (joints,)."""
         self.stretches = self.split(moments(self.frames, list(self.sources.values())))
 
     def split(self, frames: np.ndarray) -> list[np.ndarray]:
-        """Return frames in stretches that are looked at in one go."""
+        """Return frames in stretches that are checked at once."""
         step = max(1, AT_ONCE // len(self.motion.joints))
         return [frames[first : first + step] for first in range(0, len(frames), step)]
 
     def searched(self, mode: str, count: int | None, *, shared: bool) -> dict[int, np.ndarray]:
-        """Return the frames of the keys that joints need if all of them are rigid, by their numbers."""
+        """Return the frames of the keys that joints need if all of them are rigid, by joint number."""
         motion, at = self.motion, np.flatnonzero(self.sampled)
         fixed = [number not in self.sources for number in range(len(motion.joints))]
         parents, poses, share = motion.as_chains()
@@ -177,13 +177,13 @@ class SearchedBody:
         }
 
     def curved(self, count: int | None, *, shared: bool) -> dict[int, KeyedTransform]:
-        """Return the joints that get fewer keys, and these, with curves of Blender's own: see `proven`.
+        """Return the joints that get fewer keys, with these as Blender's own curves: see `proven`.
 
-        They keep to the tolerance on frames. `between` becomes how far off joints are at all moments.
+        Joints keep to the tolerance on frames. `between` is set to their errors at all moments.
         """
         every, self.stretches = self.stretches, self.split(self.frames)
         curves = self.curves(every=shared, tolerance=self.motion.extent * self.motion.unit if count else self.tolerance)
-        fewer, scales = self._so_many(curves, count) if count else self._fewest(curves, shared=shared)
+        fewer, scales = self._with_key_count(curves, count) if count else self._fewest(curves, shared=shared)
         fewer = self.automatic(curves, fewer, scales)
         on_frames, self.stretches = self.stretches, every
         self.keep_to(math.inf, fewer)
@@ -192,7 +192,7 @@ class SearchedBody:
         return fewer
 
     def curves(self, tolerance: float, *, every: bool) -> dict[int, JointCurves]:
-        """Return the curves that joints need, by their numbers: with keys between their ends, or on every sample."""
+        """Return the curves to fit for joints, by number: on samples between each joint's outer keys, or on `every`."""
         samples, motion = self.frames[self._fitted], self.motion
         result = {}
         for number, source in self.sources.items():
@@ -206,13 +206,13 @@ class SearchedBody:
     def _fewest(
         self, curves: dict[int, JointCurves], *, shared: bool
     ) -> tuple[dict[int, KeyedTransform], dict[int, float]]:
-        """Return the fewest keys that are found for all joints, and by how much of what is allowed each is off."""
+        """Return the fewest keys found for all joints, and the scale of each joint's allowed error."""
         choose_handles(curves)
         scales, best, fewest = dict.fromkeys(curves, 1.0), (dict[int, KeyedTransform](), dict[int, float]()), math.inf
         for _ in range(MAX_CURVE_TRIES):
             chosen, keyed = needed(curves, scales, shared=shared), _keyed(curves, scales)
             self.motion.show({number: keyed(number, keys) for number, keys in chosen.items()})
-            # Errors of what hangs on one another add up.
+            # Errors add up from parents to children.
             errors = self.motion.largest_errors(self.weights) / self.allowed
             excess = {number: max(1.0, errors[self.motion.below(number)].max()) for number in curves}
             fewer = self.proven(chosen, keyed, shared=shared)
@@ -227,10 +227,10 @@ class SearchedBody:
             }
         return best
 
-    def _so_many(
+    def _with_key_count(
         self, curves: dict[int, JointCurves], count: int
     ) -> tuple[dict[int, KeyedTransform], dict[int, float]]:
-        """Return so many keys on the same frames for all joints, and by how much of what is allowed each is off."""
+        """Return this number of keys on the same frames for all joints, and the scale of each joint's allowed error."""
         low, high, keys = 0.0, 1.0, self.frames[self.sampled][[0, -1]]
         for _ in range(MAX_BUDGET_HALVINGS):
             scale = math.sqrt(low * high) or high / MAX_TIGHTENING**2
@@ -244,7 +244,7 @@ class SearchedBody:
             fewer = {number: keyed(number, keys) for number in able}
             if len(keys) >= count or not able:
                 return fewer, scales
-            # Where there are as many at once as with a little less of an error, keys go where that is the largest.
+            # No tolerance gives exactly this number of keys: add the rest where the error is largest.
             self.motion.show({number: fewer.get(number) for number in self.sources})
             off = (self.frames[moment] for _, _, moment in self.motion.over(0.0, self.weights))
             left = np.setdiff1d(self.frames[self.sampled], keys)
@@ -253,7 +253,7 @@ class SearchedBody:
     def automatic(
         self, curves: dict[int, JointCurves], fewer: dict[int, KeyedTransform], scales: dict[int, float]
     ) -> dict[int, KeyedTransform]:
-        """Return the joints with the handles that Blender sets wherever all stays within the tolerance with them."""
+        """Return the joints with Blender's automatic handles wherever everything keeps to the tolerance with them."""
         result = dict(fewer)
         with scratch_curve() as scratch:
             for number, source in fewer.items():
@@ -269,12 +269,12 @@ class SearchedBody:
         return result
 
     def plans(self, fewer: Mapping[int, KeyedTransform]) -> dict[Transform, FewerKeys]:
-        """Return the plans for joints that have fewer keys by now."""
+        """Return the plans for the joints that now have fewer keys."""
         joints, motion, whole = self.motion.joints, self.motion, None
         counted = np.ones(len(joints), dtype=bool)
         if fewer and len(joints) > 1:
             excepted = not_promised(self.obj)
-            # Of what is not promised, that counts which has fewer keys.
+            # Bones without a guarantee count only if they have fewer keys.
             counted[:] = [n in fewer or joint.carrier.name not in excepted for n, joint in enumerate(joints)]
             motion.show(fewer)
             before, after = (slide(maps.origins, self.stands) for maps in (motion.truth, motion.now()))
@@ -287,18 +287,18 @@ class SearchedBody:
         }
 
     def _within_its_keys(self, keys: np.ndarray, number: int) -> np.ndarray:
-        """Return the frames of a joint's keys, none of them outside of those that it has: there it holds."""
+        """Return a joint's key frames, limited to the range of its present keys, outside of which it holds."""
         first, last = self._ends(number)
         inside = keys[(keys > first) & (keys < last)]
         return keys if len(keys) == 1 else np.union1d(inside, (first, last))
 
     def _ends(self, number: int) -> np.ndarray:
-        """Return the frames of the first and the last key that a joint has."""
+        """Return the frames of a joint's first and last key."""
         ends = distinct(self.sources[number].keyed_frames)[[0, -1]]
         return self.frames[np.searchsorted(self.frames, ends - SAME_FRAME)]
 
     def with_mode(self, mode: str) -> Keyed:
-        """Return what gives a joint keys on frames alone, with a mode."""
+        """Return the function that gives a joint keys on only these frames, with a mode."""
 
         def keyed(number: int, keys: np.ndarray) -> KeyedTransform:
             source, every = self.sources[number], np.union1d(self.frames, keys)
@@ -309,14 +309,14 @@ class SearchedBody:
         return keyed
 
     def proven(self, chosen: dict[int, np.ndarray], keyed: Keyed, *, shared: bool) -> dict[int, KeyedTransform]:
-        """Return the joints that get fewer keys, and these, so that all of the body keeps to the tolerance.
+        """Return the joints that get fewer keys, with these, such that the whole body keeps to the tolerance.
 
-        Keys are put back in `chosen`, the frames of each joint's, where the motion of the channels is off after all.
-        What would not have fewer keys than before stays as it is.
+        Keys are put back in `chosen`, the key frames of each joint, where the actual motion has too large errors. A
+        joint that would not have fewer keys than before stays unchanged.
         """
         fewer: dict[int, KeyedTransform] = {}
 
-        def have(numbers: Iterable[int]) -> None:
+        def update_fewer(numbers: Iterable[int]) -> None:
             for number in numbers:
                 fewer[number] = keyed(number, chosen[number])
                 if count_of(fewer[number]) >= count_of(self.sources[number]):
@@ -324,19 +324,19 @@ class SearchedBody:
 
         def mend(over: Over, motion: BodyMotion) -> bool:
             changed = self._put_back(over, motion, chosen, shared=shared)
-            have(changed)
+            update_fewer(changed)
             return bool(changed)
 
-        have(list(chosen))
+        update_fewer(list(chosen))
         self.keep_to(self.allowed, fewer, mend)
         return fewer
 
     def keep_to(
         self, allowed: float, fewer: dict[int, KeyedTransform], mend: Callable[[Over, BodyMotion], bool] | None = None
     ) -> None:
-        """Have `fewer` mended, of which all is shown, until nothing is over what is allowed at any moment.
+        """Show `fewer` and call `mend` until no error is above the allowed one at any moment.
 
-        Of a long recording no more is looked at at once than a stretch of it.
+        Long recordings are checked one stretch at a time.
         """
         settled = False
         while not settled:
@@ -356,9 +356,9 @@ class SearchedBody:
                 self.errors = np.maximum(self.errors, motion.largest_errors())
 
     def _put_back(self, over: Over, motion: BodyMotion, chosen: dict[int, np.ndarray], *, shared: bool) -> set[int]:
-        """Put keys back where joints are off the most, and return those that got any."""
+        """Put keys back where errors are largest, and return the joints that got any."""
         changed: set[int] = set()
-        for error, number, moment in _apart(over, motion):
+        for error, number, moment in _worst_errors(over, motion):
             able = [item for item in motion.above(number) if item in chosen]
             blamed = motion.to_blame(number, moment, able, self.allowed / error)
             for those in (list(chosen),) if shared else (blamed, able):
@@ -379,12 +379,12 @@ class SearchedBody:
     def _with_keys_at(
         self, frame: float, numbers: Iterable[int], chosen: dict[int, np.ndarray]
     ) -> dict[int, np.ndarray]:
-        """Return the keys of those of these joints that get any more: on the samples around a frame, or else there."""
+        """Return the new keys of those of these joints that get any: on the samples around a frame, or else on it."""
         samples = self.frames[self.sampled]
         for around in (True, False) if self._fitted is self.sampled else (True,):
             added = {}
             for number in numbers:
-                # Before and behind its keys it stays where they leave it, or goes through them again.
+                # Outside of its keys a joint holds the outer pose, or repeats the keys.
                 first, last = self._ends(number)
                 folded = self.sources[number].folded(np.array((frame,)))
                 places = np.clip(folded, first, last)
@@ -392,7 +392,7 @@ class SearchedBody:
                     at = np.concatenate(
                         (np.searchsorted(samples, places, "right") - 1, np.searchsorted(samples, places))
                     )
-                    # How it goes on is that of the two keys at an end.
+                    # The two keys at an end decide how the motion continues beyond it.
                     at += np.where(folded < first, 1, 0) * (0, 1) - np.where(folded > last, 1, 0) * (1, 0)
                     places = np.clip(samples[np.clip(at, 0, len(samples) - 1)], first, last)
                 if len(more := without(places, chosen[number])):
@@ -403,15 +403,15 @@ class SearchedBody:
 
 
 def _keyed(curves: Mapping[int, JointCurves], scales: Mapping[int, float]) -> Keyed:
-    """Return what gives a joint curves with keys on frames alone, by as much off as these shares of what is allowed."""
+    """Return the function that gives a joint curves with keys on only these frames, with its allowed error scaled."""
     return lambda number, keys: curves[number].keyed(keys, scales[number])
 
 
-def _apart(over: Over, motion: BodyMotion) -> Iterator[tuple[float, int, int]]:
-    """Yield those of what is over that are the worst among all that hang together, for a few frames."""
+def _worst_errors(over: Over, motion: BodyMotion) -> Iterator[tuple[float, int, int]]:
+    """Yield the largest errors, each the worst within its chain of joints for a few frames."""
     taken: set[tuple[int, int]] = set()
     for error, number, moment in over:
-        # Once what it hangs on is put right, it may be, too.
+        # Mending a parent may mend this joint too.
         chain, span = [*motion.above(number)], int(motion.frames[moment] // MIN_MEND_SPACING_FRAMES)
         if taken.isdisjoint((item, near) for item in chain for near in (span - 1, span, span + 1)):
             taken.update((item, span) for item in chain)

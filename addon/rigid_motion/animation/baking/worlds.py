@@ -1,6 +1,6 @@
-"""Where things are in the world as Blender evaluates the scene: the one place that steps through frames.
+"""World matrices from evaluating the scene frame by frame: the only module that steps through frames.
 
-Matrices are (..., 4, 4) in double precision, frames those of the Action that the keys in the editors are in.
+Matrices are (..., 4, 4) in double precision, frames those of the Action whose keys the editors show.
 """
 
 from __future__ import annotations
@@ -33,27 +33,27 @@ SEVERAL_REFUSAL = n_(
 IN_STRIPS = n_("{name} moves by NLA strips: enter its only strip (NLA Editor, Tab), or bake the strips first")
 
 MAX_CHANNEL_ROUNDING = 1e-6
-"""Values of channels that differ by less stand still."""
+"""Channels whose values differ by less count as still."""
 
 STILLNESS_SAMPLES = 9
-"""So many moments tell whether something stands still."""
+"""The number of moments that are compared to find whether a transform is still."""
 
 
 class Worlds(NamedTuple):
-    """Where things are on m frames."""
+    """Matrices of a transform and other nodes on m frames."""
 
     prop: np.ndarray
-    """What was asked for, by its channels and by what holds it, shape (m, 4, 4)."""
+    """World matrices of the transform, from its channels and its holders, shape (m, 4, 4)."""
 
     local: np.ndarray
-    """The same as its channels have it where nothing holds it, shape (m, 4, 4)."""
+    """The same in the space of its channels without a holder, shape (m, 4, 4)."""
 
     nodes: np.ndarray
-    """Other things, k of them, shape (k, m, 4, 4)."""
+    """World matrices of k other nodes, shape (k, m, 4, 4)."""
 
 
 def alone_in(transform: Transform, bindings: Sequence[Binding]) -> Binding:
-    """Return what moves a transform, if nothing else moves by it. `Refused` where its place depends on more."""
+    """Return the only binding that moves a transform, if it moves nothing else. Otherwise raise `Refused`."""
     if len(bindings) != 1 or not bindings[0].slot.plays_in(transform.animated):
         raise Refused(IN_STRIPS, name=transform.name)
     if len(bindings[0].users) > 1:
@@ -62,9 +62,9 @@ def alone_in(transform: Transform, bindings: Sequence[Binding]) -> Binding:
 
 
 def worlds_of(transform: Transform, nodes: Sequence[Node], frames: np.ndarray) -> Worlds:
-    """Return where a transform and other things are on frames (m,) of its Action: the scene is evaluated once on each.
+    """Return matrices of a transform and other nodes on frames (m,) of its Action, evaluating the scene once on each.
 
-    Constraints of the animator's on the transform do nothing meanwhile: they come on top of its keys.
+    The animator's own constraints on the transform are muted for this, as they come on top of its keys.
     """
     result = Worlds(*(np.empty((*shape, len(frames), 4, 4)) for shape in ((), (), (len(nodes),))))
     scene, data = cast(bpy.types.Scene, bpy.context.scene), transform.animated.animation_data
@@ -79,18 +79,18 @@ def worlds_of(transform: Transform, nodes: Sequence[Node], frames: np.ndarray) -
             world, depsgraph = world_matrix(transform), bpy.context.evaluated_depsgraph_get()
             result.prop[column], result.local[column] = world, converted(transform, world, "WORLD", "LOCAL")
             for obj, rows in bones.items():
-                _look_at(obj.evaluated_get(depsgraph), rows, result.nodes[:, column])
+                _read_worlds(obj.evaluated_get(depsgraph), rows, result.nodes[:, column])
     return result
 
 
-def _look_at(obj: bpy.types.Object, rows: list[tuple[int, int]], worlds: np.ndarray) -> None:
-    """Put where an object and bones of it are, by their numbers or -1, into rows of matrices (k, 4, 4)."""
+def _read_worlds(obj: bpy.types.Object, rows: list[tuple[int, int]], worlds: np.ndarray) -> None:
+    """Write the world matrices of an object (-1) and its bones, by number, into rows of `worlds` (k, 4, 4)."""
     own = np.array(obj.matrix_world)
     bones = () if obj.pose is None else obj.pose.bones
     numbers = np.empty(16 * len(bones), np.float32)
     if bones:
         bones.foreach_get("matrix", numbers)
-    # Blender has columns one behind the other.
+    # Blender stores matrices column by column.
     posed = numbers.reshape(-1, 4, 4).transpose(0, 2, 1).astype(float)
     for row, bone in rows:
         worlds[row] = own @ posed[bone] if bone >= 0 else own
@@ -98,7 +98,7 @@ def _look_at(obj: bpy.types.Object, rows: list[tuple[int, int]], worlds: np.ndar
 
 @contextmanager
 def _as_keyed(transform: Transform) -> Iterator[None]:
-    """Have a transform be moved by its keys and its holders alone, and the frame be that which is shown afterwards."""
+    """Let only its keys and holders move a transform, and restore the current frame afterwards."""
     scene = cast(bpy.types.Scene, bpy.context.scene)
     frame, subframe = scene.frame_current, scene.frame_subframe
     others = [item for item in transform.carrier.constraints if not is_ours(item) and not item.mute]
@@ -112,7 +112,7 @@ def _as_keyed(transform: Transform) -> Iterator[None]:
 
 
 def seen_range(source: KeyedTransform, seen: tuple[int, int]) -> tuple[float, float]:
-    """Return the first and last frame on which keys or what holds something move it; `seen` is all there is to see."""
+    """Return the first and last frame on which keys or holders move a transform; `seen` is the visible range."""
     begin, end = source.keyed_range
     if source.goes_on or source.hold_at(begin)[0]:
         begin = min(begin, seen[0])
@@ -122,7 +122,10 @@ def seen_range(source: KeyedTransform, seen: tuple[int, int]) -> tuple[float, fl
 
 
 def arrivals(source: KeyedTransform, step: float) -> list[Switch]:
-    """Return the passes, longer than a step and a frame, to what something moves in as it arrives there."""
+    """Return the passes in which the object moves relative to the new holder as it arrives.
+
+    They are longer than a step or a frame, the shorter of the two.
+    """
     result = []
     for switch, run in zip(source.switches, source.runs[1:], strict=True):
         if switch.frame - switch.begin > min(step, 1.0) + SAME_FRAME:
@@ -133,7 +136,7 @@ def arrivals(source: KeyedTransform, step: float) -> list[Switch]:
 
 
 def say_holds(binding: Binding, held: Marks, at_once: Collection[float] = ()) -> None:
-    """Have all keys of a binding say what they are held in; those on some frames that they are so at once.
+    """Mark all keys of a binding with their holds; on the frames `at_once` without frames for the pass.
 
     Keys without a mode get Blender's own.
     """
