@@ -1,7 +1,7 @@
-"""What all that can be done to motions has in common: many targets at once, one look at the slots, one refresh.
+"""The frame of every edit: many targets at once, slots read once, one refresh.
 
-Every target says first whether it can be done. Where one cannot, `Refused` is raised, and nothing is changed; a list
-`refused` takes the refusals instead, and all other targets are done.
+Every target is planned first. If one refuses, `Refused` is raised and nothing changes. With a list `refused`, refusals
+are added to it instead, and all other targets are edited.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from ..queries.keyed import active_binding
 from ..transforms import WIDTHS, Channel, Refused, Transform, transform_of
 
 Target = bpy.types.Object | bpy.types.PoseBone | Transform
-"""Something to act on."""
+"""One target of an edit."""
 
 Targets = Target | Iterable[Target]
-"""One or several."""
+"""One or several targets."""
 
 Readings = list[tuple[Binding, KeyedTransform | Refused]]
-"""The bindings that move a target, and what is keyed in each of them as it has it; or why that cannot be filled in."""
+"""The bindings that move a target, each with its source, or the reason why there can be no in-betweens in it."""
 
 Plan = TypeVar("Plan")
 Result = TypeVar("Result")
@@ -48,9 +48,9 @@ def apply_edit(
     act: Callable[[Transform, Plan], Result],
     refused: list[Refused] | None,
 ) -> dict[Transform, Result]:
-    """Do something to each target, and return what `act` returned for each of those that did not refuse.
+    """Edit each target, and return the results of `act` for those that did not refuse.
 
-    `plan` says for one what there is to do, without doing any of it, and may raise `Refused`; `act` does it.
+    `plan` returns what to do for one target, without changing anything, and may raise `Refused`; `act` does it.
     """
 
     def plans(readings: Mapping[Transform, Readings]) -> dict[Transform, Plan | Refused]:
@@ -71,9 +71,9 @@ def apply_together(
     act: Callable[[Transform, Plan], Result],
     refused: list[Refused] | None,
 ) -> dict[Transform, Result]:
-    """Do what `apply_edit` does where what there is to do for one target depends on the others.
+    """Edit targets as `apply_edit` does, if the plan for one target depends on the others.
 
-    `plan` says for all of them what there is to do, or why not.
+    `plan` returns for all of them what to do, or why they refuse.
     """
     readings: dict[Transform, Readings] = {transform: [] for transform in transforms_of(targets)}
     bindings = bindings_of(readings)
@@ -98,7 +98,7 @@ def apply_together(
 
 
 def readable(transform: Transform, readings: Readings) -> list[tuple[Binding, KeyedTransform]]:
-    """Return what is keyed of a transform in all of its bindings. `Refused` where one of them cannot be filled in."""
+    """Return a transform's sources in all of its bindings. Raise `Refused` if one of them can have no in-betweens."""
     result = []
     for binding, source in readings:
         if isinstance(source, Refused):
@@ -109,7 +109,7 @@ def readable(transform: Transform, readings: Readings) -> list[tuple[Binding, Ke
 
 
 def editable_binding(transform: Transform, bindings: Iterable[Binding]) -> Binding:
-    """Return the slot whose keys the editors show. `Refused` where there is none, or it belongs to another file."""
+    """Return the slot whose keys the editors show. Raise `Refused` if there is none, or it belongs to another file."""
     binding = active_binding(transform, bindings)
     if binding is None:
         text = n_("{name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)")
@@ -119,15 +119,15 @@ def editable_binding(transform: Transform, bindings: Iterable[Binding]) -> Bindi
 
 
 def editable_keys(transform: Transform, readings: Readings) -> tuple[Binding, KeyedTransform]:
-    """Return the slot whose keys the editors show, and what is keyed in it. `Refused` where there is nothing to edit or
-    to fill in.
+    """Return the slot whose keys the editors show, and its source. Raise `Refused` if the slot cannot be edited or can
+    have no in-betweens.
     """
     binding = editable_binding(transform, [binding for binding, _ in readings])
     return binding, next(source for one, source in readable(transform, readings) if one is binding)
 
 
 class TriedEdit:
-    """A transform whose keys are edited again and again, each time from those that it had."""
+    """A transform whose keys are edited repeatedly, each time starting from its original keys."""
 
     def __init__(self, transform: Transform, binding: Binding, channels: Iterable[Channel]) -> None:
         self.transform, self.binding = transform, binding
@@ -136,10 +136,10 @@ class TriedEdit:
         self.keys: dict[Channel, KeyFields | None] = {
             channel: key_fields(curve.keyframe_points) if curve else None for channel, curve in curves.items()
         }
-        """The keys of these channels as they were; None where there is no channel."""
+        """The original keys of these channels; None for channels that did not exist."""
 
     def put_back(self) -> None:
-        """Give its channels the keys that they had."""
+        """Restore the original keys of its channels."""
         for channel, fields in self.keys.items():
             if fields is not None:
                 set_key_fields(self.binding.ensure_curve(channel), fields)
@@ -148,22 +148,23 @@ class TriedEdit:
 
 
 class TriedEdits:
-    """Edits of several transforms of which some are tried until one is good.
+    """Edits of several transforms, tried repeatedly until the user accepts one.
 
-    It is not generic: `typing` keeps what a generic class was made for, and Blender 4.5 never ends while it does.
+    The class is not generic: `typing` caches the parameters of generic classes, and Blender 4.5 never ends while it
+    does.
     """
 
     def __init__(
         self, targets: Targets, plan: Callable[[Transform, Readings], Any], refused: list[Refused] | None
     ) -> None:
         self.tried = list(apply_edit(targets, plan, lambda _, tried: tried, refused).values())
-        """A `TriedEdit` for each target that did not refuse: what `plan` returns."""
+        """The `TriedEdit` that `plan` returned for each target that did not refuse."""
 
     def __len__(self) -> int:
         return len(self.tried)
 
     def cancel(self) -> None:
-        """Let all be as it was, with the poses that had no key yet."""
+        """Restore the original keys and poses, including poses without keys."""
         with self.edit():
             pass
         for one in self.tried:
@@ -172,7 +173,7 @@ class TriedEdits:
 
     @contextmanager
     def edit(self) -> Iterator[None]:
-        """Give all their keys back, edit them, and refresh."""
+        """Restore all original keys, let the caller edit them, then refresh."""
         with follower.follower.own_edits():
             for one in self.tried:
                 one.put_back()
@@ -180,5 +181,5 @@ class TriedEdits:
             follower.refresh([one.transform for one in self.tried])
             for one in self.tried:
                 one.binding.slot.action.update_tag()
-            # All is up to date: the follower need not look through all that these Actions have.
+            # Everything is up to date, so this keeps the follower from checking all data of these Actions.
             view_layer().update()

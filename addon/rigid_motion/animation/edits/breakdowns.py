@@ -1,8 +1,7 @@
-"""Poses between the key before and the key after a frame, along the path of the mode, and keyed there.
+"""Breakdowns: poses between the key before and the key after a frame, along the path of the mode, keyed on the frame.
 
-As Blender's Breakdowner, Push and Relax, which go from channel to channel. A key on the frame itself is left out of
-account: it is what is made anew. Where a segment has Blender's own in-betweens, the pose is what Blender's Breakdowner
-makes of it.
+They correspond to Blender's Breakdowner, Push and Relax, which treat each channel separately. A key on the frame itself
+is ignored, as it is replaced. In a segment with Blender's own in-betweens, the pose is that of Blender's Breakdowner.
 """
 
 from __future__ import annotations
@@ -29,21 +28,21 @@ from ..transforms import Refused, Transform
 from .apply import Readings, Targets, TriedEdit, TriedEdits, editable_keys
 
 BREAKDOWN, PUSH, RELAX = KINDS = ("BREAKDOWN", "PUSH", "RELAX")
-"""From the key before to the key after; away from the in-between of the mode; towards it."""
+"""The kinds: between the keys before and after; away from the in-between of the mode; towards it."""
 
 
 def breakdown(
     targets: Targets, factor: float = 0.5, kind: str = BREAKDOWN, *, refused: list[Refused] | None = None
 ) -> None:
-    """Key a pose on the current frame that is a share of the way from the key before to the key after it.
+    """Key a pose on the current frame at a fraction of the way from the key before it to the key after it.
 
-    For targets, and what is refused, see `apply`.
+    For targets and refusals see `apply`.
 
     Parameters
     ----------
     factor : float
-        For BREAKDOWN 0 is the pose of the key before, 1 that of the key after, and beyond that the motion goes on. For
-        RELAX 0 is the pose that is seen and 1 the in-between of the mode; PUSH goes as far in the other direction.
+        For BREAKDOWN 0 is the pose of the key before, 1 that of the key after; beyond these the motion continues. For
+        RELAX 0 is the visible pose and 1 the in-between of the mode; PUSH goes as far in the other direction.
     kind : str
         One of `KINDS`.
     """
@@ -51,17 +50,17 @@ def breakdown(
 
 
 class _Between(TriedEdit):
-    """A transform, and what it is between on a frame of the scene. `Refused` where it is between no keys."""
+    """A transform between two keys on a frame of the scene. Raises `Refused` if there are no keys around the frame."""
 
     def __init__(self, transform: Transform, readings: Readings, frame: float) -> None:
         binding, whole = editable_keys(transform, readings)
         self.frame = frame = frame_in_action(transform.animated, frame)
         is_switch = any(abs(switch.frame - frame) < SAME_FRAME for switch in whole.switches)
-        self.source = _without(whole, frame)
+        self.source = _without_frame(whole, frame)
         """The keys without those of this frame."""
-        # Copies of keys in cycles are none to set others between.
+        # Copies of keys in cycles do not count as keys before or after.
         first, last = self.source.keyed_range if self.source.channels else (np.inf, -np.inf)
-        # Where something passes from one holder to the next the keys around are in different spaces.
+        # At a switch of holders the keys before and after are in different spaces.
         if is_switch or not first < frame < last:
             text = n_("{name} needs a key before and a key after frame {frame:g}: go to a frame between two keys")
             raise Refused(text, name=transform.name, frame=frame)
@@ -73,14 +72,14 @@ class _Between(TriedEdit):
         channels = [transform.channels[row] for row in rows]
         super().__init__(transform, binding, (*channels, transform.turns_channel))
         self.seen = self.posed - added_values(binding, transform, whole, np.array([frame]))[:, 0]
-        """Its components as it is seen, shape (10,)."""
+        """The visible components, shape (10,)."""
 
     @property
     def mode(self) -> str:
         return MODE_NAMES[self.source.mode_at(self.ends[0] + SAME_FRAME)]
 
     def pose(self, kind: str, factor: float) -> np.ndarray:
-        """Return the components to be keyed, shape (10,)."""
+        """Return the components to key, shape (10,)."""
         at = np.array([0.5 * sum(self.ends) if kind == BREAKDOWN else self.frame])
         if kind == BREAKDOWN:
             first, last = self.source.values_at(np.array(self.ends)).T
@@ -105,9 +104,9 @@ class _Between(TriedEdit):
         return _components_near(self.source, passed, straight)
 
     def key(self, kind: str, factor: float) -> None:
-        """Set a key of the pose in all channels that have keys, and share out the turns of the segment.
+        """Key the pose in all channels that have keys, and divide the turns of the segment.
 
-        Where another key would make another path, one that lies on the path is of type *Breakdown*, and leaves it.
+        If an ordinary key would change the path, a key on the path gets the type *Breakdown*, which keeps the path.
         """
         components, key_type = self.pose(kind, factor), scene().tool_settings.keyframe_type
         if kind == BREAKDOWN and MODE_NUMBERS[self.mode] in DEPENDS_ON_KEYS and not needs_turning(self.source):
@@ -124,7 +123,7 @@ class _Between(TriedEdit):
 
 
 class Breakdowns(TriedEdits):
-    """Targets with keys before and after the current frame, of which poses in between are tried until one is good."""
+    """Targets with keys before and after the current frame, for trying in-between poses until the user accepts one."""
 
     def __init__(self, targets: Targets, kind: str = BREAKDOWN, *, refused: list[Refused] | None = None) -> None:
         self.kind = kind
@@ -136,14 +135,14 @@ class Breakdowns(TriedEdits):
         super().__init__(targets, plan, refused)
 
     def apply(self, factor: float) -> None:
-        """Key the poses of this factor, in place of those of the factor before."""
+        """Key the poses for this factor, replacing those of the previous factor."""
         with self.edit():
             for between in self.tried:
                 between.key(self.kind, factor)
 
 
-def _without(source: KeyedTransform, frame: float) -> KeyedTransform:
-    """Return what is keyed but for this frame. A channel with no other key keeps its value."""
+def _without_frame(source: KeyedTransform, frame: float) -> KeyedTransform:
+    """Return the source without the keys on this frame. A channel with no other key keeps its value."""
     channels, rest = [], dict(source.rest)
     for rows, keys in source.channels:
         others = np.abs(keys.times - frame) >= SAME_FRAME
@@ -155,15 +154,15 @@ def _without(source: KeyedTransform, frame: float) -> KeyedTransform:
 
 
 def _components_near(source: KeyedTransform, pose: Poses, near: np.ndarray) -> np.ndarray:
-    """Return the components that show one pose (1,) with the own delta transforms, shape (10,).
+    """Return the components that show one pose (1,) with the object's delta transforms, shape (10,).
 
-    The rotation is in the sign and the turn that `near` (10,) has, and so is the scale that the modes leave to Blender.
+    The rotation has the sign and the turn of `near` (10,). A scale that the modes leave to Blender is that of `near`.
     """
     original, axes = source.original, source.location_axes
     moved = replace(pose, positions=pose.positions if axes is None else pose.positions @ axes)
     ends = np.stack((near, near))[..., None]
     result = channel_values(moved, np.array([1]), np.zeros(1), ends, original[:, None], source.order)[:, 0]
-    # What lies between two signs or axes has no length to speak of.
+    # A value between two opposite signs or axes may have nearly no length.
     turned = result[3 if source.order is None else 4 : 7]
     if source.order in (None, AXIS_ANGLE):
         turned /= np.linalg.norm(turned) or 1.0

@@ -1,6 +1,6 @@
-"""Holding things: in which space keys are, and over how many frames something passes from one holder to the next.
+"""Holding objects: sets the space of their keys, and the frames over which they pass from one holder to the next.
 
-For targets, and what is refused, see `apply`.
+For targets and refusals see `apply`.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from ..transforms import WIDTHS, Refused, Transform, transform_of
 from .apply import Readings, Target, apply_edit, editable_binding, editable_keys
 
 HAND_TO_HAND = 4
-"""Frames over which something passes from hand to hand, where nothing else is said. All else is at once."""
+"""The default number of frames of a pass from hand to hand. Picking up and letting go are immediate."""
 
 DEFAULT_MODE = "motor_spline"
-"""The mode of the keys of something that is held, where they have none."""
+"""The mode for keys of held objects that have none."""
 
 NOT_HELD_YET = n_("{name} is not passed on frame {frame:g} or later: hold it in something first (Hold In)")
 NOT_SHOWN = n_("{name} is hidden or excluded, so Blender does not know where it is: show it first")
@@ -48,28 +48,28 @@ FRAMES_REFUSAL = n_("{frames} is not a number of frames for a pass: give a whole
 
 @dataclass(frozen=True)
 class HoldFacts:
-    """What there is to tell of how something is held on the frame that is shown."""
+    """How an object is held on the current frame."""
 
     holders: tuple[Holder, ...]
-    """What it has been held in."""
+    """All holders that it has had."""
 
     now: Holder | None
-    """What holds it, None where nothing does."""
+    """The present holder, None if there is none."""
 
     switch: float | None
-    """The frame of the key at which it is passed on: on this frame, or the next one."""
+    """The frame of the next key at which it passes on, this frame included."""
 
     until: float | None
-    """The frame of the key behind this frame at which it is passed on; None where nothing comes of that kind."""
+    """The frame of the next key after this frame at which it passes on; None if there is none."""
 
     frames: int
-    """Over how many frames the switch is."""
+    """The number of frames of the pass at the switch."""
 
     apart: float | None
-    """How far apart both holders carry it on this frame, where it is the one of the switch; in Blender's units."""
+    """The distance between its places in both holders, if this frame is that of the switch; in Blender's units."""
 
     turned: float | None
-    """And by what angle, in radians."""
+    """The angle between them, in radians."""
 
 
 def hold_in(
@@ -79,10 +79,10 @@ def hold_in(
     *,
     frames: int | None = None,
 ) -> None:
-    """Key something on the frame that is shown in the space of a holder. It stays where it is seen.
+    """Key an object on the current frame in the space of a holder. It stays in its visible place.
 
-    What has no key before, or moves, gets one on the frame before, too: until then it moves as it did, but that smooth
-    paths end there. Its keys without a mode get *Smooth Screw*.
+    If it has no key before, or moves, it is also keyed on the frame before. Until then it moves as it did, except that
+    smooth paths end there. Its keys without a mode get *Smooth Screw*.
 
     Parameters
     ----------
@@ -93,13 +93,14 @@ def hold_in(
     bone : str, optional
         The name of a bone of the holder.
     frames : int, optional
-        Over how many frames before the key it passes from what held it before: 4 from one holder to another, and 0,
-        at once, where it is picked up or let go.
+        The number of frames before the key over which it passes from its previous holder. The default is 4 from one
+        holder to another, and 0 (immediately) if it is picked up or let go.
 
     Raises
     ------
     Refused
-        Where the holder follows the prop, or the prop repeats or is linked, or hangs where no constraint can place it.
+        If the holder follows the prop, or the prop repeats, is linked, or has a parent space that no constraint can
+        place it in.
     """
     target, name = _target(holder, bone)
 
@@ -121,28 +122,28 @@ def hold_in(
         return source if source and source.channels else None
 
     def act(transform: Transform, source: KeyedTransform | None) -> None:
-        _hold(transform, source, target, name, frames)
+        _key_hold(transform, source, target, name, frames)
 
     apply_edit(prop, plan, act, None)
 
 
 def hold_keys(prop: Target, frames: np.ndarray, holders: Sequence[tuple[bpy.types.Object, str] | None]) -> None:
-    """Have all keys of something say what they are held in, whose channels have its poses there already.
+    """Mark all keys of an object with their holders. Its channels must already have its poses in the holders' spaces.
 
     Parameters
     ----------
     prop
         An object or a pose bone.
     frames : array, shape (n,)
-        Of the Action, rising.
+        Frames of the Action, rising.
     holders : sequence of n
-        What keys are held in from each of these frames on: an object and the name of a bone of it, "" for none; or None
-        for the prop's parent, or the world. It passes at once.
+        The holder of keys from each of these frames on: an object and the name of one of its bones, "" for none; or
+        None for the prop's parent, or the world. Passes are immediate.
 
     Raises
     ------
     Refused
-        Where a holder follows the prop, or the prop is linked, has delta transforms, or too many holders.
+        If a holder follows the prop, or the prop is linked, has delta transforms, or too many holders.
     """
 
     def plan(transform: Transform, readings: Readings) -> Binding:
@@ -160,11 +161,11 @@ def hold_keys(prop: Target, frames: np.ndarray, holders: Sequence[tuple[bpy.type
 
 
 def match_grip(prop: Target) -> None:
-    """Give the key of something on the frame that is shown the grip that the same holder had on it before."""
+    """Give an object's key on the current frame the grip that the same holder had on it before."""
 
     def plan(transform: Transform, readings: Readings) -> np.ndarray:
         _, source = editable_keys(transform, readings)
-        frame = _frame(transform)
+        frame = _current_frame(transform)
         if not source.switches:
             raise Refused(NOT_HELD, name=transform.name)
         runs = source.runs
@@ -184,15 +185,15 @@ def match_grip(prop: Target) -> None:
 
 
 def pass_frames(prop: Target, frames: int, *, at: float | None = None) -> None:
-    """Choose over how many frames something passes to its next holder: that of the switch on the frame that is shown.
+    """Set the number of frames of an object's pass to its next holder: at the switch on the current frame, or the next.
 
-    Or else of the next switch behind it. `at` is another frame of the Action's to look from.
+    `at` is another frame of the Action to use as the current one.
     """
     _refuse_frames(frames)
 
     def plan(transform: Transform, readings: Readings) -> tuple[Binding, float, int]:
         binding, source = editable_keys(transform, readings)
-        frame = _frame(transform) if at is None else at
+        frame = _current_frame(transform) if at is None else at
         switch = next((one for one in source.switches if one.frame > frame - SAME_FRAME), None)
         if switch is None:
             raise Refused(NOT_HELD_YET, name=transform.name, frame=frame)
@@ -200,19 +201,19 @@ def pass_frames(prop: Target, frames: int, *, at: float | None = None) -> None:
 
     def act(_: Transform, planned: tuple[Binding, float, int]) -> None:
         binding, frame, number = planned
-        _say(binding, frame, hold(number, frames))
+        _write_hold_code(binding, frame, hold(number, frames))
 
     apply_edit(prop, plan, act, None)
 
 
 def hold_facts(prop: Target) -> HoldFacts:
-    """Return how something is held on the frame that is shown."""
+    """Return how an object is held on the current frame."""
     transform = transform_of(prop)
     source, binding = source_of(transform), active_binding(transform, bindings_of([transform]))
     holders = () if binding is None else tuple(holders_of(transform))
     if source is None or source.held is None or binding is None:
         return HoldFacts(holders, None, None, None, 0, None, None)
-    frame, by_number = _frame(transform), {holder.number: holder for holder in holders}
+    frame, by_number = _current_frame(transform), {holder.number: holder for holder in holders}
     number, _ = source.hold_at(frame)
     switch = next((one for one in source.switches if one.frame > frame - SAME_FRAME), None)
     until = next((one.frame for one in source.switches if one.frame > frame + SAME_FRAME), None)
@@ -229,7 +230,7 @@ def hold_facts(prop: Target) -> HoldFacts:
 
 
 def _target(holder: object, bone: str | None) -> tuple[bpy.types.Object | None, str]:
-    """Return the object and the name of the bone, "" for none, that something is to be held in."""
+    """Return the holding object and the name of its bone, "" for none."""
     if isinstance(holder, bpy.types.PoseBone):
         return cast(bpy.types.Object, holder.id_data), holder.name
     if holder is not None and not isinstance(holder, bpy.types.Object):
@@ -244,46 +245,46 @@ def _refuse_frames(frames: int) -> None:
         raise Refused(FRAMES_REFUSAL, frames=frames, most=MOST_FRAMES)
 
 
-def _frame(transform: Transform) -> float:
-    """Return the frame that is shown, as the Action has it."""
+def _current_frame(transform: Transform) -> float:
+    """Return the current frame in the time of the Action."""
     return frame_in_action(transform.animated, cast(bpy.types.Scene, bpy.context.scene).frame_current_final)
 
 
-def _hold(
+def _key_hold(
     transform: Transform, source: KeyedTransform | None, target: bpy.types.Object | None, bone: str, frames: int | None
 ) -> None:
-    """Key a transform, which is keyed so, in the space of a holder on the frame that is shown."""
-    seen, posed, frame = world_matrix(transform), transform.components(), _frame(transform)
+    """Key a transform with this source in the space of a holder on the current frame."""
+    seen, posed, frame = world_matrix(transform), transform.components(), _current_frame(transform)
     before = 0 if source is None else source.hold_at(frame - 2 * SAME_FRAME)[0]
     if _needs_key_before(source, frame):
         rows = components_on(transform, source, frame - 1.0)
         key_components(transform, rows, ("location", transform.rotation), frame - 1.0)
-        # As any key that is inserted, it leaves the motion as it is.
+        # Like any inserted key, it does not change the motion.
         follower.refresh([transform])
     binding = _binding_of(transform)
     number = 0 if target is None else add_holder(binding, target, bone)
     passes = source is not None and any(one.begin < frame < one.frame for one in source.switches)
     if number == (0 if source is None else source.hold_at(frame)[0]) and not passes:
-        # By way of the world rounding would move what rests.
+        # Converting to the world and back would move a resting object by rounding.
         key_components(transform, posed, ("location", transform.rotation), frame)
     else:
         _key_seen(transform, number, seen, frame)
     binding = _binding_of(transform)
-    _let_go_of_handles(binding, frame)
+    _reset_handles(binding, frame)
     _mark_all(binding, None if source is None else source.held)
     if frames is None:
         frames = HAND_TO_HAND if before and number and before != number else 0
-    _say(binding, frame, hold(number, frames if number != before else 0))
+    _write_hold_code(binding, frame, hold(number, frames if number != before else 0))
     following = (
         None if source is None else next((one for one in source.switches if one.frame > frame + SAME_FRAME), None)
     )
     if following is not None and following.begin < frame:
-        # It was passing over already: now it does so from here on.
-        _say(binding, following.frame, hold(following.after, int(following.frame - frame)))
+        # The object was already passing to the following holder: now that pass begins here.
+        _write_hold_code(binding, following.frame, hold(following.after, int(following.frame - frame)))
 
 
 def _key_seen(transform: Transform, number: int, seen: Matrix, frame: float) -> None:
-    """Key a transform in the space of the holder of a number so that it is where a matrix of the world is."""
+    """Key a transform in the space of the holder with a number, at the place of a world matrix."""
     holder = next((holder for holder in holders_of(transform) if holder.number == number), None)
     basis = np.array(basis_in(transform, holder, seen))
     rows = rows_of(*poses_of(basis[None]), transform, transform.components())[:, 0]
@@ -294,7 +295,7 @@ def _key_seen(transform: Transform, number: int, seen: Matrix, frame: float) -> 
 
 
 def _needs_key_before(source: KeyedTransform | None, frame: float) -> bool:
-    """Return whether something has no key before a frame, or is not at rest since the last one."""
+    """Return whether a source has no key before a frame, or is not at rest since the last one."""
     keys = np.empty(0) if source is None else source.keyed_frames
     keys = keys[keys < frame - SAME_FRAME]
     if source is None or not len(keys):
@@ -304,7 +305,7 @@ def _needs_key_before(source: KeyedTransform | None, frame: float) -> bool:
 
 
 def components_on(transform: Transform, source: KeyedTransform | None, frame: float) -> np.ndarray:
-    """Return the components (10,) that a transform has on a frame by a source. What has no keys there is as it is."""
+    """Return the components (10,) of a transform on a frame of a source. Parts without keys are as they are now."""
     rows = transform.components()
     if source is not None:
         is_keyed = [PART_OF[row] in source.keyed for row in range(len(rows))]
@@ -313,7 +314,7 @@ def components_on(transform: Transform, source: KeyedTransform | None, frame: fl
 
 
 def _carried(transform: Transform, source: KeyedTransform, holder: Holder | None, frame: float) -> Matrix | None:
-    """Return where a holder carries something on the frame that is shown, which is that of a switch."""
+    """Return the world matrix at which a holder carries a transform on the current frame, which is that of a switch."""
     run = next((run for run in source.runs if run.stretch.until > frame - SAME_FRAME), None)
     if run is None:
         return None
@@ -322,7 +323,7 @@ def _carried(transform: Transform, source: KeyedTransform, holder: Holder | None
 
 
 def key_components(transform: Transform, rows: np.ndarray, paths: Iterable[str], frame: float | None = None) -> None:
-    """Key components (10,) of a transform as Blender does it by hand, on a frame of its Action: else the one shown."""
+    """Key a transform's components (10,) as Blender does by hand, on a frame of its Action or the current frame."""
     scene_frame, data = cast(bpy.types.Scene, bpy.context.scene).frame_current_final, transform.animated.animation_data
     if frame is not None:
         scene_frame = frame if data is None else data.nla_tweak_strip_time_to_scene(frame)
@@ -333,12 +334,12 @@ def key_components(transform: Transform, rows: np.ndarray, paths: Iterable[str],
 
 
 def _binding_of(transform: Transform) -> Binding:
-    """Return what moves a transform by its own Action."""
+    """Return the binding of a transform in its own Action."""
     return next(one for one in bindings_of([transform]) if one.slot.plays_in(transform.animated))
 
 
 def _mark_all(binding: Binding, held: Marks | None) -> None:
-    """Have all keys say a mode and what they are held in: so far by others, or by none."""
+    """Mark all keys with a mode and a hold if they have none: the present mode, and the holds of `held`, or none."""
     is_new = not is_marked(binding)
     for fcurve in binding.keyed:
         frames = key_points(fcurve)[:, 0].astype(np.float64)
@@ -349,8 +350,8 @@ def _mark_all(binding: Binding, held: Marks | None) -> None:
         write_holds(fcurve, np.where(holds >= 0, holds, said))
 
 
-def _let_go_of_handles(binding: Binding, frame: float) -> None:
-    """Have Blender set the handles of the keys on a frame: those that there were are in another space."""
+def _reset_handles(binding: Binding, frame: float) -> None:
+    """Let Blender set the handles of the keys on a frame, as the previous handles are in another space."""
     for fcurve in binding.keyed:
         for key in fcurve.keyframe_points:
             if abs(key.co.x - frame) < SAME_FRAME:
@@ -358,8 +359,8 @@ def _let_go_of_handles(binding: Binding, frame: float) -> None:
         fcurve.update()
 
 
-def _say(binding: Binding, frame: float, code: int) -> None:
-    """Have the keys on a frame say a hold: see `marks.hold`."""
+def _write_hold_code(binding: Binding, frame: float, code: int) -> None:
+    """Mark the keys on a frame with a hold code: see `marks.hold`."""
     for fcurve in binding.keyed:
         is_there = np.abs(key_points(fcurve)[:, 0] - frame) < SAME_FRAME
         write_holds(fcurve, np.where(is_there, code, read_holds(fcurve)))

@@ -1,7 +1,7 @@
-"""Choosing modes: what happens between which keys, and with how many turns more.
+"""Modes and extra turns of segments: choosing, copying and repeating them.
 
-The mode of a segment is in the keys that begin it. What was chosen before there were any keys waits on the transform.
-Turns are in a channel of their own, and without it there are none. For targets, and what is refused, see `apply`.
+The keys that begin a segment store its mode. A mode chosen before there are any keys is stored on the transform. Turns
+are in a channel of their own; without it there are none. For targets and refusals see `apply`.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ from .apply import Readings, Target, Targets, apply_edit, editable_binding
 def set_mode(
     targets: Targets, mode: str, frames: Sequence[float] | None = None, *, refused: list[Refused] | None = None
 ) -> None:
-    """Choose what happens between keys.
+    """Set the mode of segments.
 
     Parameters
     ----------
     mode : str
         One of `MODE_IDS`.
     frames : sequence of float, optional
-        The frames of the keys that begin the segments meant; all other segments keep what they have. Without frames,
-        all keys get the mode.
+        The frames of the keys that begin the chosen segments; all other segments keep their modes. Without frames, all
+        keys get the mode.
     """
 
     def plan(transform: Transform, readings: Readings) -> list[Binding]:
@@ -50,7 +50,7 @@ def set_mode(
         return bindings if frames is None else [editable_binding(transform, bindings)]
 
     def act(transform: Transform, bindings: list[Binding]) -> None:
-        _act(transform, bindings, mode, lambda binding: set_mode_in(binding, mode, frames))
+        _mark_or_store(transform, bindings, mode, lambda binding: set_mode_in(binding, mode, frames))
 
     if mode not in MODE_NUMBERS:
         raise Refused(no_such_mode(mode, MODE_NUMBERS))
@@ -58,7 +58,7 @@ def set_mode(
 
 
 def set_mode_in(binding: Binding, mode: str, frames: Sequence[float] | None = None) -> None:
-    """Have the keys of a slot say a mode: those on these frames, which begin segments, or all."""
+    """Mark the keys of a slot with a mode: those on these frames, which begin segments, or all."""
     if frames is None:
         mark_all(binding, MODE_NUMBERS[mode])
         return
@@ -67,14 +67,16 @@ def set_mode_in(binding: Binding, mode: str, frames: Sequence[float] | None = No
 
 
 def _mark(binding: Binding, numbers_on: Callable[[np.ndarray], np.ndarray]) -> None:
-    """Have the keys of a slot say the modes of these numbers (n,), which are asked for by their frames (n,)."""
+    """Mark the keys of a slot with the numbers of modes (n,) that a function returns for their frames (n,)."""
     marks = [numbers_on(key_points(fcurve)[:, 0].astype(np.float64)) + 1 for fcurve in binding.keyed]
     for fcurve, of_keys in zip(binding.keyed, marks, strict=True):
         write_marks(fcurve, of_keys)
 
 
-def _act(transform: Transform, bindings: Sequence[Binding], awaited: str, mark: Callable[[Binding], object]) -> None:
-    """Mark what may be written of these bindings; without any keys the transform waits for them with a mode."""
+def _mark_or_store(
+    transform: Transform, bindings: Sequence[Binding], awaited: str, mark: Callable[[Binding], object]
+) -> None:
+    """Mark the editable ones of these bindings. If none has keys, store the mode on the transform."""
     if not any(binding.is_keyed for binding in bindings):
         transform.motion.awaited = awaited
     for binding in bindings:
@@ -83,7 +85,7 @@ def _act(transform: Transform, bindings: Sequence[Binding], awaited: str, mark: 
 
 
 def copy_modes(model: Target, targets: Targets, *, refused: list[Refused] | None = None) -> None:
-    """Give the keys of targets the modes that another transform, the model, has on their frames."""
+    """Give the keys of targets the modes of another transform, the model, on the same frames."""
     model = transform_of(model)
 
     def modes_on(frames: np.ndarray) -> np.ndarray:
@@ -96,7 +98,7 @@ def copy_modes(model: Target, targets: Targets, *, refused: list[Refused] | None
         return [binding for binding, _ in readings] if is_blenders else able(transform, readings)
 
     def act(transform: Transform, bindings: list[Binding]) -> None:
-        _act(transform, bindings, first, lambda binding: _mark(binding, modes_on))
+        _mark_or_store(transform, bindings, first, lambda binding: _mark(binding, modes_on))
 
     apply_edit(targets, plan, act, refused)
 
@@ -109,17 +111,17 @@ def set_turns(
     axis: str | None = None,
     refused: list[Refused] | None = None,
 ) -> None:
-    """Choose how many whole turns more are made between keys.
+    """Set the number of extra whole turns between keys.
 
     Parameters
     ----------
     turns : int
-        In the sense in which a segment turns anyway, against it where negative.
+        In the direction in which a segment turns anyway; negative for the opposite direction.
     frames : sequence of float, optional
-        The frames of the keys that begin the segments meant, all others keep what they have. Without frames, all
-        segments have so many.
+        The frames of the keys that begin the chosen segments; all others keep their turns. Without frames, all segments
+        get this number.
     axis : str, optional
-        One of `TURN_AXES`, for all segments: what turns are about. Left as it is where it is not given.
+        The axis of turns, one of `TURN_AXES`, for all segments. The default keeps the present one.
     """
 
     def plan(transform: Transform, readings: Readings) -> Binding:
@@ -141,7 +143,7 @@ def set_turns(
 
 
 def on_turns(transform: Transform) -> None:
-    """Take an edit of the property of turns as a choice for the segment on the frame that is shown."""
+    """Apply an edit of the turns property to the segment on the current frame."""
     source, turns = source_of(transform), transform.motion.turns
     frame = frame_in_action(transform.animated, scene().frame_current_final)
     segment = None if source is None else segment_at(source, frame)
@@ -150,15 +152,15 @@ def on_turns(transform: Transform) -> None:
 
 
 def repeat(targets: Targets, mode: str = "REPEAT", *, refused: list[Refused] | None = None) -> None:
-    """Have motions repeat before their first keys and behind their last ones: Cycles on all of their channels.
+    """Repeat motions before their first keys and after their last ones: add Cycles to all of their channels.
 
-    Blender has no way to add Cycles to a channel with other modifiers, and in-betweens repeat only where all channels
-    do so together. The mode of cycles is REPEAT, REPEAT_OFFSET or MIRROR.
+    Blender cannot add Cycles to a channel with other modifiers, and in-betweens repeat only if all channels do so
+    together. The mode of cycles is REPEAT, REPEAT_OFFSET or MIRROR.
     """
     cycles = Cycles(mode, mode, 0, 0)
 
     def plan(transform: Transform, readings: Readings) -> Binding:
-        # Where it is refused for its Cycles as they are, this is the way out.
+        # A transform that is refused because of its present Cycles can be mended this way.
         binding = editable_binding(transform, [binding for binding, _ in readings])
         source = next(source for one, source in readings if one is binding)
         if isinstance(source, KeyedTransform):
@@ -175,9 +177,10 @@ def repeat(targets: Targets, mode: str = "REPEAT", *, refused: list[Refused] | N
 
 
 def able(transform: Transform, readings: Readings) -> list[Binding]:
-    """Return the bindings of a transform, which is keyed so, that can have a mode beside Blender's own.
+    """Return those of a transform's bindings that can have a mode other than Blender's own.
 
-    That is its Action at least, or one of its strips where it has none: else `Refused`. Other strips keep Blender's.
+    These must include its Action, or one of its strips if it has none; otherwise `Refused` is raised. Other strips keep
+    Blender's in-betweens.
     """
     refuse_linked(transform)
     result, refusals = [], {}

@@ -1,8 +1,8 @@
-"""Keys on paths: moved, turned, retimed, inserted, deleted and selected, each key of a body in all of its channels.
+"""Keys on paths: moving, turning, retiming, inserting, deleting and selecting keys, each in all channels of a body.
 
-Where keys go is said in the world, and comes to channels through the space that these are in on the frame of each key.
-What has no keys of location cannot go anywhere: it turns about its origin until its point has come as near as it can.
-For targets, and what is refused, see `apply`.
+Moves are given in the world and converted to channels through their space on the frame of each key. A transform without
+keys of location cannot move: it turns about its origin until its lead point is as near as possible. For targets and
+refusals see `apply`.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from ..transforms import Channel, Refused, Transform
 from .apply import Readings, Target, TriedEdit, TriedEdits, apply_edit, editable_binding, editable_keys
 
 MIN_KEY_DISTANCE_FRAMES = 1.0
-"""From a key that is retimed to its neighbours, at least, where these were not nearer before."""
+"""The least distance in frames of a retimed key to its neighbours, unless these were nearer before."""
 
 MAX_STILL_CHANGE = 1e-6
-"""Values that differ by less need no key, and turns that do are none."""
+"""A smaller change of a value needs no key, and a smaller rotation counts as none."""
 
 POINT_FIELDS = ("co", "handle_left", "handle_right")
 SELECTION_FIELDS = ("select_control_point", "select_left_handle", "select_right_handle")
@@ -41,26 +41,26 @@ NOT_KEYED = n_("{name} has no keys of location or rotation to move: key it first
 
 
 class KeySpaces(NamedTuple):
-    """Some keys of something, n of them, and what their channels are in."""
+    """n keys of a transform, and the spaces of their channels."""
 
     frames: np.ndarray
-    """Of the Action, rising, shape (n,)."""
+    """Frames of the Action, rising, shape (n,)."""
 
     maps: AffineMaps
     """From the space of location channels into the world, shape (n,)."""
 
     turns: np.ndarray | None
-    """What stands between rotation and that space, shape (n, 3, 3); None where nothing does."""
+    """The matrices between rotation channels and that space, shape (n, 3, 3); None if there are none."""
 
     points: np.ndarray
-    """The points of the body that lead, in the world, shape (n, 3)."""
+    """The lead points of the body, in the world, shape (n, 3)."""
 
     weights: np.ndarray
-    """How much of a movement each takes part in, 0 to 1, shape (n,)."""
+    """The fraction of a movement that each key follows, 0 to 1, shape (n,)."""
 
 
 class _Keys(TriedEdit):
-    """Keys of a transform that are edited."""
+    """The keys of one transform that are being edited."""
 
     def __init__(self, transform: Transform, readings: Readings, spaces: KeySpaces) -> None:
         binding, source = editable_keys(transform, readings)
@@ -74,7 +74,7 @@ class _Keys(TriedEdit):
             for row, channel in transform.channels.items()
             if PART_OF[row] in parts and row not in source.driven and self.keys.get(channel) is not None
         ]
-        """The components that can be moved."""
+        """The rows of components that can be moved."""
         if not self.rows:
             raise Refused(NOT_KEYED, name=transform.name)
         self.before = source.values_at(spaces.frames)
@@ -86,10 +86,10 @@ class _Keys(TriedEdit):
         away = others[~near(others, spaces.frames)] - spaces.frames[:, None]
         back, forth = (np.abs(away[side]).min(initial=np.inf) for side in (away < 0.0, away > 0.0))
         self.room = -max(back - MIN_KEY_DISTANCE_FRAMES, 0.0), max(forth - MIN_KEY_DISTANCE_FRAMES, 0.0)
-        """How many frames its keys may go back and forth before they come to others."""
+        """The number of frames that the keys can move back and forth before they reach other keys."""
 
     def moved(self, delta: AffineMaps) -> np.ndarray:
-        """Return the components (10, n) with which maps of the world (n,) have moved its keys."""
+        """Return the components (10, n) of the keys moved by maps of the world (n,)."""
         _, spaces, turns, points, _ = self.spaces
         rows, original = self.before.copy(), self.source.original[:, None].repeat(len(points), axis=1)
         turn_into_quaternions(rows, self.source.order)
@@ -98,7 +98,7 @@ class _Keys(TriedEdit):
         if np.allclose(delta.axes, np.eye(3), atol=MAX_STILL_CHANGE) and self.rows[0] >= ROWS[ROTATION].start:
             axes = swings(points - places, delta.at(points) - places)
         along = spaces.axes if turns is None else spaces.axes @ turns
-        # Under uneven scale that is no rotation: this is the nearest.
+        # Under uneven scale this is no rotation: use the nearest one.
         first, _, last = np.linalg.svd(np.linalg.solve(along, axes @ along))
         quaternions = multiply(original[ROWS[ROTATION]].T, rows[ROWS[ROTATION]].T)
         poses = Poses(
@@ -109,7 +109,7 @@ class _Keys(TriedEdit):
         return channel_values(poses, each, np.zeros(len(points)), ends, original, self.source.order)
 
     def move(self, delta: AffineMaps) -> None:
-        """Have its keys be where maps of the world (n,) take them. Breakdowns shape the path from now on."""
+        """Move the keys by maps of the world (n,). Breakdown keys become ordinary keys, which shape the path."""
         frames, values, source = self.spaces.frames, self.moved(delta), self.source
         passed = source.key_frames[source.passed]
         for row in self.rows:
@@ -133,7 +133,7 @@ class _Keys(TriedEdit):
                 set_key(fcurve, float(frames[number]), float(values[row, number]))
 
     def retime(self, by: float) -> None:
-        """Have its keys be so many frames later, handles along with them."""
+        """Move the keys by a number of frames, together with their handles."""
         for channel, kept in self.keys.items():
             if kept is not None:
                 fields = {name: numbers.copy() for name, numbers in kept.items()}
@@ -144,7 +144,7 @@ class _Keys(TriedEdit):
 
 
 class KeyEdits(TriedEdits):
-    """Keys of several transforms of which places or frames are tried until they are good."""
+    """Keys of several transforms, for trying places or frames until the user accepts them."""
 
     def __init__(self, keys: Mapping[Transform, KeySpaces], *, refused: list[Refused] | None = None) -> None:
         def plan(transform: Transform, readings: Readings) -> _Keys:
@@ -153,14 +153,14 @@ class KeyEdits(TriedEdits):
         super().__init__(keys, plan, refused)
 
     def move(self, delta: Callable[[float], np.ndarray]) -> None:
-        """Have all keys be where a rigid map of the world (4, 4), by their weights, takes them from where they were."""
+        """Move all keys from their original places by rigid maps of the world (4, 4), which depend on their weights."""
         with self.edit():
             for one in self.tried:
                 maps = np.stack([delta(weight) for weight in one.spaces.weights.tolist()])
                 one.move(AffineMaps(maps[:, :3, :3], maps[:, :3, 3]))
 
     def retime(self, by: float) -> float:
-        """Have all keys be so many frames later than at first, as far as none comes to others; return how many."""
+        """Move all keys from their original frames, but not up to other keys; return the actual number of frames."""
         back, forth = (np.array([one.room[side] for one in self.tried]) for side in (0, 1))
         by = float(np.clip(by, back.max(), forth.min()))
         with self.edit():
@@ -170,7 +170,7 @@ class KeyEdits(TriedEdits):
 
 
 def insert_key(target: Target, frame: float) -> None:
-    """Key something in all channels with keys on a frame of its Action, as it is seen there: the motion stays."""
+    """Key the visible pose on a frame of the target's Action, in all channels with keys. The motion stays the same."""
 
     def plan(transform: Transform, readings: Readings) -> tuple[Binding, dict[Channel, float], bool]:
         binding, source = editable_keys(transform, readings)
@@ -185,7 +185,7 @@ def insert_key(target: Target, frame: float) -> None:
         for channel, value in values.items():
             fcurve = binding.curves[channel]
             behind = int(np.searchsorted(key_points(fcurve)[:, 0], frame))
-            # Automatic handles beside the key would be set anew.
+            # Blender would recalculate automatic handles next to the key.
             for key in fcurve.keyframe_points[max(behind - 1, 0) : behind + 1] if is_native else ():
                 key.handle_left_type = key.handle_right_type = "FREE"
             set_key(fcurve, frame, value)
@@ -194,7 +194,7 @@ def insert_key(target: Target, frame: float) -> None:
 
 
 def delete_keys(keys: Mapping[Transform, np.ndarray], *, refused: list[Refused] | None = None) -> None:
-    """Delete the keys on some frames (n,) of each of these. A channel without others goes with them."""
+    """Delete the keys on given frames (n,) of each transform. A channel without other keys is removed."""
 
     def plan(transform: Transform, readings: Readings) -> Binding:
         return editable_binding(transform, [binding for binding, _ in readings])
@@ -213,7 +213,7 @@ def delete_keys(keys: Mapping[Transform, np.ndarray], *, refused: list[Refused] 
 
 
 def select_keys(target: Transform, frames: np.ndarray) -> None:
-    """Have the keys on these frames (n,) be selected, and no others of something."""
+    """Select a target's keys on these frames (n,), and deselect all its others."""
     if (binding := active_binding(target)) is not None:
         for fcurve in binding.curves.values():
             chosen = near(key_points(fcurve)[:, 0], frames)
@@ -222,7 +222,7 @@ def select_keys(target: Transform, frames: np.ndarray) -> None:
 
 
 def swings(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the shortest turns (n, 3, 3) that take the directions of vectors (n, 3) to those of others."""
+    """Return the shortest rotations (n, 3, 3) that take the directions of vectors (n, 3) to those of others."""
     lengths = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
     cosines = lengths + np.einsum("ni,ni->n", first, second)
     turns = np.column_stack((np.where(cosines > 0.0, cosines, 1.0), np.cross(first, second)))

@@ -1,7 +1,7 @@
-"""Tangents of paths at keys: how fast a body leaves a key, or comes to it, by the handles of all its channels.
+"""Tangents of paths at keys: the speed at which a body leaves or reaches a key, set by the handles of all channels.
 
-In a segment of a mode handles say how far the body has come, and nothing of its path: so all channels get handles with
-one slope of that progress, which is 1 where the speed is even. The handle on the other end of the segment stays.
+In a segment with a mode, handles decide the progress along the path, but not the path. So the handles of all channels
+get the same slope of progress, which is 1 at an even speed. The handle at the other end of the segment stays.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ SIDE_BEFORE, SIDE_AFTER = range(2)
 """The sides of a key."""
 
 HANDLE_RATIO = 1.0 / 3.0
-"""The part of its segment that a handle is long in time, but where it is too steep."""
+"""The length of a handle in time, as a fraction of its segment, unless the handle is too steep."""
 
 EVEN_END = (HANDLE_RATIO, HANDLE_RATIO)
-"""Time and progress of the handle at the other end of a segment that was linear."""
+"""Time and progress of the handle at the other end of a previously linear segment, as fractions of the segment."""
 
 FREE = code_of("handle_left_type", "FREE")
 
 END_RATIO = 1e-6
-"""The part of a segment that is left out where progress is measured at its ends, which belong to others, too."""
+"""The fraction of a segment skipped when measuring progress at its ends, as these belong to other segments too."""
 
 MIN_GAIN = 0.5
-"""How much of the slope of handles a smooth mode takes over, at least: less is where its path turns back on itself."""
+"""The least fraction of the handles' slope that a smooth mode takes over; less means that its path turns back."""
 
 MAX_HANDLE_SHIFT = 1e-5
-"""By how much, in frames and units, Blender may set other handles anew."""
+"""The largest change, in frames and units, that Blender may make to other handles."""
 
 NO_SEGMENT = n_("{name} has no motion of a mode on this side of frame {frame:g}: choose a mode, or drag another handle")
 NO_HANDLES = n_(
@@ -50,7 +50,7 @@ NO_HANDLES = n_(
 
 
 class _Tangent(TriedEdit):
-    """A key of a transform whose handles on one side are edited."""
+    """A key of a transform whose handles on one side are being edited."""
 
     def __init__(self, transform: Transform, readings: Readings, frame: float, side: int) -> None:
         binding, whole = editable_keys(transform, readings)
@@ -61,24 +61,24 @@ class _Tangent(TriedEdit):
         if not (0 <= segment < len(source.key_frames) - 1 and source.modes[segment]):
             raise Refused(NO_SEGMENT, name=transform.name, frame=frame)
         self.side, self.ends = side, source.key_frames[[number, other]]
-        """The frames of the key, and of the one at the other end of the segment."""
+        """The frames of the key, and of the key at the other end of the segment."""
         self.handles = dict(filter(None, (self._handles(transform.channels[row]) for row in source.filled_rows)))
-        """By the channels with keys on both: the numbers of these keys, and the frames and values between, (2,)."""
+        """For channels with keys on both frames: the numbers of these keys, and their difference in frame and value."""
         self.held = {
             transform.channels[row]: (keys.times, existing(keys.left)[place], existing(keys.right)[place])
             for rows, keys in (source.channels if whole.switches else ())
             for place, row in enumerate(rows if keys.left is not None else ())
         }
-        """The frames and handles of keys in one hand: by these keys alone, as long as Blender sets all of them."""
+        """The frames and handles of the keys in the same holder, as if there were no others."""
         codes = {
             int(existing(self.keys[channel])["interpolation"][min(at), 0]) for channel, (at, _) in self.handles.items()
         }
         if not any(change[1] for _, change in self.handles.values()) or not codes <= {BEZIER, LINEAR}:
             raise Refused(NO_HANDLES, name=transform.name, frame=frame)
         self.shares = self._shares(source)
-        """The parts of its way that are done one, two and three eighths of the segment away from the key, (3,)."""
+        """The progress at one, two and three eighths of the segment away from the key, as fractions, shape (3,)."""
         self.slopes = (0.0, 1.0) if source.modes[segment] not in SMOOTH_MODES else None
-        """Those that handles of slope 0 and 1 make; None until that was tried."""
+        """The slopes that result from handles of slope 0 and 1; None until these were tried."""
 
     def _shares(self, whole: KeyedTransform) -> np.ndarray:
         source = whole.run_at(self.ends[0]).source
@@ -98,13 +98,13 @@ class _Tangent(TriedEdit):
         return channel, ((first, other), np.diff(fields["co"][at].astype(np.float64), axis=0)[0])
 
     def key(self, slope: float | None) -> None:
-        """Have the progress of its segment have this slope at the key, on its side; None for straight F-curves."""
+        """Give the progress of the segment this slope at the key, on its side; None for linear F-curves."""
         if slope is None:
             for channel, (at, _) in self.handles.items():
                 self.binding.curves[channel].keyframe_points[min(at)].interpolation = "LINEAR"
             return
         if self.slopes is None:
-            # At keys of a smooth mode it is that of Blender's own in-betweens in the direction of the tangent.
+            # At keys of a smooth mode the slope is that of Blender's own in-betweens in the direction of the tangent.
             self.slopes = self._slope_with(0.0), self._slope_with(1.0)
             self.put_back()
         low, high = self.slopes
@@ -135,7 +135,7 @@ class _Tangent(TriedEdit):
                         fields[f"handle_{side}_type"][at] = FREE
             begins[:] = BEZIER
             set_key_fields(fcurve := self.binding.curves[channel], fields)
-            # Where Blender sets the handles of other keys by those around, they stay as well.
+            # Handles of other keys that Blender has recalculated are set back.
             now = {name: key_points(fcurve, name) for name in names}
             shifts = np.max([np.abs(now[name] - fields[name]).max(axis=1) for name in names], axis=0)
             moved = np.arange(len(shifts))[keys][shifts[keys] > MAX_HANDLE_SHIFT]
@@ -146,7 +146,7 @@ class _Tangent(TriedEdit):
 
 
 class TangentEdit(TriedEdits):
-    """The tangent of a key on one of its sides, tried until it is good. Empty where it was refused."""
+    """The tangent of a key on one side, for trying slopes until the user accepts one. Empty if it was refused."""
 
     def __init__(self, transform: Transform, frame: float, side: int, *, refused: list[Refused] | None = None) -> None:
         def plan(one: Transform, readings: Readings) -> _Tangent:
@@ -156,12 +156,12 @@ class TangentEdit(TriedEdits):
 
     @property
     def ends(self) -> np.ndarray:
-        """The frames of the key, and of the one at the other end of the segment, (2,)."""
+        """The frames of the key, and of the key at the other end of the segment, shape (2,)."""
         return np.asarray(self.tried[0].ends)
 
     @property
     def first_share(self) -> float:
-        """The part of the segment that is done an eighth of it away from the key."""
+        """The progress an eighth of the segment away from the key, as a fraction."""
         return float(self.tried[0].shares[0])
 
     @property
@@ -170,7 +170,7 @@ class TangentEdit(TriedEdits):
         return float(self.tried[0].shares @ SLOPE_WEIGHTS)
 
     def apply(self, slope: float | None) -> None:
-        """Have progress have this slope at the key; None for an even one throughout, without handles."""
+        """Give progress this slope at the key; None for an even speed throughout the segment, without handles."""
         with self.edit():
             for one in self.tried:
                 one.key(slope)

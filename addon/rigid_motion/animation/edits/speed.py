@@ -1,9 +1,9 @@
-"""Even speed along a path: keys move in time, handles say the timing between them, and the path stays.
+"""Even speed along a path: moves keys in time and sets handles for the timing between them, while the path stays.
 
-A segment with a mode, or whose channels run straight from key to key, is a path with a progress of its own: the cubic
-of progress is fitted. Where Blender's own in-betweens bend, their values stay, and their times are fitted, as far as
-all channels have these in common. *Smooth Screw* has a path by the times of its keys: it is done until these settle,
-and by how much the path bends is measured. Where a body rests, it rests as long as before.
+In a segment with a mode, or with straight channels from key to key, the path is independent of the progress along it: a
+cubic of progress is fitted. Where Blender's own in-betweens bend, their values stay and their times are fitted, if all
+channels share the same times. The path of *Smooth Screw* depends on the times of its keys: retiming is repeated until
+these settle, and the change of the path is measured. A body that rests, rests as long as before.
 """
 
 from __future__ import annotations
@@ -39,26 +39,26 @@ SHARES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     EASE_OUT: lambda time: 0.5 * time * (3.0 - time**2),
     EASE_IN_OUT: lambda time: time**2 * (3.0 - 2.0 * time),
 }
-"""The share of the way that is done at a share of the time: cubics, which handles say exactly. What eases in has its
-full speed at the end, without a jump of its acceleration."""
+"""The fraction of the way done at a fraction of the time: cubics, which handles reproduce exactly. An ease-in reaches
+full speed at the end, without a jump of acceleration."""
 
 SAMPLES_PER_SEGMENT = 256
-"""Of these segments are measured: of half a turn it leaves out 6 millionths."""
+"""The number of samples for measuring a segment; for half a turn the measured length is 6 millionths too short."""
 
 MIN_WAY_RATIO = 1e-6
-"""The part of the whole way up to which a body rests from key to key, but for rounding."""
+"""The largest fraction of the whole way for which a body counts as resting from key to key: rounding."""
 
 MIN_WAY = 1e-5
-"""The whole way, in Blender's units or radians, up to which it does not move at all."""
+"""The largest whole way, in Blender's units or radians, for which a body counts as not moving."""
 
 MAX_TIME_GAP = 1e-4
-"""By how much of a segment handles may differ in time and still be in common."""
+"""The largest difference in time of handles that count as shared, as a fraction of the segment."""
 
 MAX_BEND_RATIO = 1e-5
-"""The part of its chord by which a channel may be off it and still run straight."""
+"""The largest distance of a channel from its chord at which it counts as straight, as a fraction of the chord."""
 
 SMOOTH_ROUNDS = 12
-"""How often the keys of *Smooth Screw* are moved, until they settle."""
+"""The number of rounds of moving the keys of *Smooth Screw*, until they settle."""
 
 MAX_BISECTIONS = 52
 """Halvings after which a number from 0 to 1 is as exact as it gets."""
@@ -67,21 +67,21 @@ EVEN_HANDLE_RATIOS = (1.0 / 3.0, 2.0 / 3.0)
 
 
 class EvenSpeed(NamedTuple):
-    """What became of the motion of one target between two keys."""
+    """The result for the motion of one target between two keys."""
 
     first: float
     last: float
 
     speed: float
-    """The mean while it moves, in Blender's units or radians a frame."""
+    """The mean speed while it moves, in Blender's units or radians per frame."""
 
     is_turning: bool
 
     unevenness: float
-    """The largest difference from the speed that was meant, as a part of the mean."""
+    """The largest difference from the intended speed, as a fraction of the mean."""
 
     bend: float
-    """How far the path lies beside what it was, at most, in Blender's units."""
+    """The largest distance of the path from the previous one, in Blender's units."""
 
 
 def equalise_speed(
@@ -93,20 +93,21 @@ def equalise_speed(
     between_frames: bool = False,
     refused: list[Refused] | None = None,
 ) -> dict[Transform, EvenSpeed]:
-    """Have bodies move at an even speed along their paths, which stay as they are.
+    """Make bodies move at an even speed along their paths, which stay as they are.
 
-    For targets, and what is refused, see `apply`.
+    For targets and refusals see `apply`.
 
     Parameters
     ----------
     ease : str
-        One of `EASES`: how speed begins and ends.
+        One of `EASES`: the speed at the beginning and at the end.
     frames : sequence of float, optional
-        Keys, from the first to the last of which it is done. Otherwise it is from the first of all to the last.
+        Frames of keys: the motion from the first to the last of them changes. The default is from the first key of all
+        to the last.
     turning : bool
-        Even the rate at which they turn, and not the speed of their origins. So it is where origins stay in place.
+        Even out the rate of rotation instead of the speed of origins. This is always so if origins stay in place.
     between_frames : bool
-        Have keys be where they need to be for an even speed, and not on the nearest whole frame.
+        Put keys exactly where an even speed needs them, not on the nearest whole frames.
     """
     if ease not in EASES:
         raise Refused(n_("{ease} is not an easing of speed: give one of {eases}"), ease=ease, eases=", ".join(EASES))
@@ -121,55 +122,55 @@ def equalise_speed(
         for _round in range(SMOOTH_ROUNDS if before.is_smooth.any() else 0):
             moved = run.even_frames(ease)
             _retime(binding, run, moved, ease)
-            run = _measured(read(binding), moved, before.is_turning)
+            run = _measure_run(read(binding), moved, before.is_turning)
         even = run.even_frames(ease) if between_frames else on_whole_frames(run.even_frames(ease))
         _retime(binding, run, even, ease)
-        return _measured(read(binding), even, before.is_turning, as_timed=True).compared(before, ease)
+        return _measure_run(read(binding), even, before.is_turning, as_timed=True).compared(before, ease)
 
     return apply_edit(targets, plan, act, refused)
 
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """A body from its first key to its last one, n segments with m samples each."""
+    """The motion of a body from its first to its last key: n segments with m samples each."""
 
     source: KeyedTransform
     frames: np.ndarray
     """The frames of the keys, shape (n + 1,)."""
 
     is_smooth: np.ndarray
-    """True for segments of *Smooth Screw*, shape (n,): it flows through keys by their frames, without handles."""
+    """True for segments of *Smooth Screw*, shape (n,): their flow through keys depends on frames, not on handles."""
 
     times: np.ndarray
-    """The frames of samples: where the parameter of a segment is in even steps from 0 to 1, shape (n, m)."""
+    """The frames of samples: at even steps of the parameter of a segment from 0 to 1, shape (n, m)."""
 
     bends: np.ndarray
-    """True for segments whose values are to stay, as no straight line from key to key, shape (n,)."""
+    """True for segments whose values must stay, as they are no straight line from key to key, shape (n,)."""
 
     fits: np.ndarray
-    """True for segments whose timing can be said by handles, shape (n,)."""
+    """True for segments whose timing can be set by handles, shape (n,)."""
 
     points: np.ndarray
-    """Places on these, shape (n, m, 3)."""
+    """The positions of samples, shape (n, m, 3)."""
 
     ways: np.ndarray
-    """How far it has come in a segment, in units or radians, shape (n, m)."""
+    """The way from the start of the segment to each sample, in units or radians, shape (n, m)."""
 
     is_turning: bool
 
     @property
     def rests(self) -> np.ndarray:
-        """Return in which segments it rests, shape (n,)."""
+        """True for segments in which the body rests, shape (n,)."""
         return self.ways[:, -1] <= MIN_WAY_RATIO * self.ways[:, -1].sum()
 
     @property
     def shares(self) -> np.ndarray:
-        """The part of the whole way that is done at each key, shape (n + 1,)."""
+        """The fraction of the whole way done at each key, shape (n + 1,)."""
         done = np.append(0.0, np.cumsum(np.where(self.rests, 0.0, self.ways[:, -1])))
         return done / done[-1]
 
     def even_frames(self, ease: str) -> np.ndarray:
-        """Return the frames (n + 1,) that keys are to be on."""
+        """Return the frames (n + 1,) of the keys for an even speed."""
         resting = np.append(0.0, np.cumsum(np.where(self.rests, np.diff(self.frames), 0.0)))
         moving = self.frames[-1] - self.frames[0] - resting[-1]
         result = self.frames[0] + resting + moving * _time_at(self.shares, ease)
@@ -177,37 +178,38 @@ class _Run:
         return result.astype(np.float32).astype(np.float64)  # as keys have them
 
     def timing(self, segment: int, ease: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the handles of a segment, in parts of its frames and of the change of its values: (2,) each, these
-        NaN where values stay.
+        """Return the handles of a segment, as fractions of its frames and of its change of values, (2,) each.
+
+        The latter are NaN if values stay.
         """
         shares = self.shares[segment : segment + 2]
         done = shares[0] + np.diff(shares) * self.ways[segment] / self.ways[segment, -1]
         first, last = _time_at(shares, ease)
         u, at = np.linspace(0.0, 1.0, done.size), (_time_at(done, ease) - first) / (last - first)
         if self.bends[segment]:
-            times = _fitted(u, at)
+            times = _fitted_handles(u, at)
             if times[0] > times[1]:
                 times[:] = times.mean()  # Blender shortens handles that pass one another
             return times, np.full(2, np.nan)
-        return np.array(EVEN_HANDLE_RATIOS), np.array(EVEN_HANDLE_RATIOS) if self.is_smooth[segment] else _fitted(
-            u, np.interp(u, at, u)
-        )
+        return np.array(EVEN_HANDLE_RATIOS), np.array(EVEN_HANDLE_RATIOS) if self.is_smooth[
+            segment
+        ] else _fitted_handles(u, np.interp(u, at, u))
 
     def compared(self, before: _Run, ease: str) -> EvenSpeed:
-        """Return what became of a run."""
+        """Return the result, compared with the run before."""
         moves = ~self.rests
         durations = np.diff(self.frames) * moves
         begins, total = np.append(0.0, np.cumsum(durations)), float(self.ways[moves, -1].sum())
         times = (begins[:-1, None] + self.times - self.frames[:-1, None])[moves] / begins[-1]
         meant, done = (np.diff(rows, axis=1) for rows in (SHARES[ease](times), self.ways[moves] / total))
         uneven = float((np.abs(done - meant) / np.diff(times, axis=1)).max())
-        bend = max(_apart(new, old) for new, old in zip(self.points, before.points, strict=True))
+        bend = max(_largest_distance(new, old) for new, old in zip(self.points, before.points, strict=True))
         ends = float(self.frames[0]), float(self.frames[-1])
         return EvenSpeed(*ends, total / float(begins[-1]), self.is_turning, uneven, bend)
 
 
 def _run_of(transform: Transform, source: KeyedTransform, frames: Sequence[float] | None, turning: bool) -> _Run:
-    """Return what is to be evened of a source. `Refused` where it cannot be."""
+    """Return the part of a source to even out. Raise `Refused` if that is impossible."""
     if source.switches:
         text = n_("{name} passes from hand to hand: its keys are in the spaces of the hands, not on one path")
         raise Refused(text, name=transform.name)
@@ -223,19 +225,19 @@ def _run_of(transform: Transform, source: KeyedTransform, frames: Sequence[float
         if lacks.any():
             text = n_("{name}: only some channels have a key on frame {frame:g}: key everything that moves there")
             raise Refused(text, name=transform.name, frame=float(keyed[lacks][0]))
-    run = _measured(source, keyed, turning)
+    run = _measure_run(source, keyed, turning)
     if not turning and run.ways.sum() <= MIN_WAY:
-        run = _measured(source, keyed, turning=True)
+        run = _measure_run(source, keyed, turning=True)
     if run.ways[:, -1].sum() <= MIN_WAY:
         text = n_("{name} does not move from frame {first:g} to {last:g}: select other keys")
         raise Refused(text, name=transform.name, first=float(keyed[0]), last=float(keyed[-1]))
     return run
 
 
-def _measured(source: KeyedTransform, frames: np.ndarray, turning: bool, *, as_timed: bool = False) -> _Run:
-    """Return a source from key to key of these frames (n + 1,), all of them keys of all channels that change.
+def _measure_run(source: KeyedTransform, frames: np.ndarray, turning: bool, *, as_timed: bool = False) -> _Run:
+    """Return the measured run of a source over keys on these frames (n + 1,), on which all changing channels have keys.
 
-    Samples are in even steps of time where it is to be measured `as_timed`, else of what handles are to say.
+    Samples are in even steps of time if `as_timed`, otherwise in even steps of the parameter that handles set.
     """
     count, m = len(frames) - 1, SAMPLES_PER_SEGMENT + 1
     u, durations = np.linspace(0.0, 1.0, m), np.diff(frames)
@@ -259,8 +261,8 @@ def _measured(source: KeyedTransform, frames: np.ndarray, turning: bool, *, as_t
 
 
 def _time_handles(source: KeyedTransform, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the handles of segments in parts of their frames, NaN where channels differ or ease, (n, 2); in which
-    segments any channel jumps at the end, and in which all do, both (n,).
+    """Return the handles of segments as fractions of their frames, NaN if channels differ or ease, (n, 2); for which
+    segments any channel jumps at the end, and for which all do, both (n,).
     """
     ends, constant = [], []
     for _, keys in source.channels:
@@ -279,7 +281,7 @@ def _time_handles(source: KeyedTransform, frames: np.ndarray) -> tuple[np.ndarra
 
 
 def _progress(source: KeyedTransform, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far channels have come on frames (n, m) of n segments, and which run straight and never back, (n,)."""
+    """Return the progress of channels on frames (n, m) of n segments, and which run straight and never back, (n,)."""
     values = source.values_at(frames.ravel()).reshape(10, *frames.shape)
     change = values[..., -1] - values[..., 0]
     weights = change / np.maximum(np.square(change).sum(axis=0), MIN_WAY**2)
@@ -290,7 +292,7 @@ def _progress(source: KeyedTransform, frames: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _time_at(shares: np.ndarray, ease: str) -> np.ndarray:
-    """Return the part of the time at which parts of the way (n,) are done."""
+    """Return the fractions of the time at which fractions of the way (n,) are done."""
     low, high = np.zeros(shares.shape), np.ones(shares.shape)
     for _bisection in range(MAX_BISECTIONS):
         middle = 0.5 * (low + high)
@@ -300,7 +302,7 @@ def _time_at(shares: np.ndarray, ease: str) -> np.ndarray:
 
 
 def on_whole_frames(frames: np.ndarray) -> np.ndarray:
-    """Return rising frames (n + 1,) rounded, each behind the one before, where there is room; the ends as they are."""
+    """Return rising frames (n + 1,) rounded, each after the one before, if there is room; the ends stay unchanged."""
     inner, first, last = np.rint(frames[1:-1]), np.floor(frames[0]) + 1.0, np.ceil(frames[-1]) - 1.0
     steps = np.arange(len(inner))
     if last - first + 1.0 < len(inner):
@@ -311,23 +313,23 @@ def on_whole_frames(frames: np.ndarray) -> np.ndarray:
 
 
 def _bezier(at: np.ndarray, first: float, second: float) -> np.ndarray:
-    """Return the cubic from 0 to 1 with these two between them."""
+    """Return the cubic Bezier from 0 to 1 with these two inner control values, at parameters (m,)."""
     rest = 1.0 - at
     return 3.0 * rest**2 * at * first + 3.0 * rest * at**2 * second + at**3
 
 
-def _fitted(at: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the two handles from 0 to 1 of the cubic whose slope is nearest to that of values (m,) at (m,)."""
+def _fitted_handles(at: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the two handles of the cubic from 0 to 1 whose slope best fits that of values (m,) at parameters (m,)."""
     middle, slopes = 0.5 * (at[1:] + at[:-1]), np.diff(values) / np.maximum(np.diff(at), MIN_WAY**2)
     rest = 1.0 - middle
     parts = np.stack((3.0 * rest * (1.0 - 3.0 * middle), 3.0 * middle * (2.0 - 3.0 * middle)), axis=1)
-    # Where slopes are steep the body is slow, and an error shows less.
+    # Where slopes are steep the body is slow, so an error shows less.
     weights = np.diff(at) / np.maximum(slopes, 1.0)
     return np.clip(np.linalg.lstsq(weights[:, None] * parts, weights * (slopes - 3.0 * middle**2), rcond=None)[0], 0, 1)
 
 
 def _retime(binding: Binding, run: _Run, frames: np.ndarray, ease: str) -> None:
-    """Move the keys of a run to other frames (n + 1,), and set the handles between them."""
+    """Move the keys of a run to new frames (n + 1,), and set the handles between them."""
     scales, last = np.diff(frames) / np.diff(run.frames), len(frames) - 2
     free, bezier, linear = (
         code_of(*names)
@@ -361,8 +363,8 @@ def _retime(binding: Binding, run: _Run, frames: np.ndarray, ease: str) -> None:
         set_key_fields(fcurve, fields)
 
 
-def _apart(points: np.ndarray, line: np.ndarray) -> float:
-    """Return how far points (m, 3) are from a line through others (m, 3), at most."""
+def _largest_distance(points: np.ndarray, line: np.ndarray) -> float:
+    """Return the largest distance of points (m, 3) from a polyline through other points (m, 3)."""
     start, along = line[:-1], np.diff(line, axis=0)
     away = points[:, None] - start
     share = np.einsum("psk,sk->ps", away, along) / np.maximum(np.einsum("sk,sk->s", along, along), MIN_WAY**4)
