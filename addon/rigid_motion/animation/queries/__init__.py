@@ -1,8 +1,8 @@
-"""What the user interface and scripts ask of motions. Nothing is changed.
+"""Read-only queries of motions, for the user interface and scripts.
 
 keyed         keys in the slot that the editors show, and their modes
-segments      one segment in numbers, and why something does not move as its mode says
-polls         what is asked of many at every redraw
+segments      facts about one segment, and problems of modes and holds
+polls         checks of many transforms on every redraw
 
 Each module imports only those above it.
 """

@@ -1,4 +1,4 @@
-"""What is keyed in the slot whose keys the editors show: its frames, and the modes of the segments between them."""
+"""Keys in the slot that the editors show: their frames, and the modes of the segments between them."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from ..transforms import Refused, Transform, transform_of
 
 
 def active_binding(transform: Transform, bindings: Iterable[Binding] | None = None) -> Binding | None:
-    """Return the slot whose keys the editors show: that of the Action, in tweak mode that of the strip.
+    """Return the slot whose keys the editors show: that of the Action, or in tweak mode that of the strip.
 
-    `bindings` are those that are known already, else the transform's are looked up as if nothing else used them.
+    `bindings` are those already known. Without them, the transform's own are looked up as if nothing else used them.
     """
     bindings = bindings_for(transform) if bindings is None else bindings
     active = (item for item in bindings if item.slot.plays_in(transform.animated) and transform in item.users)
@@ -28,7 +28,7 @@ def active_binding(transform: Transform, bindings: Iterable[Binding] | None = No
 
 
 def active_bindings(transforms: Sequence[Transform]) -> dict[Transform, Binding]:
-    """Return `active_binding` of each that has one, by a single look."""
+    """Return `active_binding` of each transform that has one, looking up all bindings once."""
     desired, result = set(transforms), {}
     for binding in bindings_of(transforms):
         for user in binding.users:
@@ -38,14 +38,14 @@ def active_bindings(transforms: Sequence[Transform]) -> dict[Transform, Binding]
 
 
 def source_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> KeyedTransform | None:
-    """Return what is keyed in the Action, None where nothing is. `Refused` where rigid motion cannot act on it."""
+    """Return the source in the Action, None if nothing is keyed. Raise `Refused` if rigid motion cannot act on it."""
     binding = active_binding(transform_of(carrier))
     source = None if binding is None else read(binding)
     return source if source and source.channels else None
 
 
 def sources_of(bindings: Sequence[Binding]) -> list[KeyedTransform | None]:
-    """Return what is keyed in each of these, None where nothing is, it is refused, or a driver moves a part of it."""
+    """Return the source of each binding; None if nothing is keyed, it is refused, or a driver moves a part of it."""
     result: list[KeyedTransform | None] = []
     for binding, source in zip(bindings, keyed_in(bindings), strict=True):
         result.append(None)
@@ -57,16 +57,16 @@ def sources_of(bindings: Sequence[Binding]) -> list[KeyedTransform | None]:
 
 
 def key_frames(carrier: bpy.types.Object | bpy.types.PoseBone | Transform, *, selected: bool = False) -> np.ndarray:
-    """Return the frames of location, rotation and scale keys, or of the selected ones alone, shape (n,), rising.
+    """Return the frames of location, rotation and scale keys, or only of the selected ones, shape (n,), rising.
 
-    Keys of the channel of turns count among the selected ones.
+    Selected keys of the turns channel count too.
     """
     binding = active_binding(transform_of(carrier))
     return np.empty(0) if binding is None else frames_in(binding, selected=selected)
 
 
 def modes_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform, frames: np.ndarray) -> list[str]:
-    """Return the modes of the segments at these frames. Without an Action, the mode that is awaited."""
+    """Return the modes of the segments at these frames. Without an Action, the mode stored on the transform."""
     transform = transform_of(carrier)
     binding = active_binding(transform)
     if binding is None:
@@ -75,9 +75,9 @@ def modes_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform, frames:
 
 
 def mode_shown(transform: Transform) -> str:
-    """Return the mode of the first segment of a transform, in its Action or the lowest of its strips with keys.
+    """Return the mode of a transform's first segment, in its Action or in the lowest of its strips with keys.
 
-    Without any keys it is the one that is awaited.
+    Without any keys it is the mode stored on the transform.
     """
     bindings = [binding for binding in bindings_for(transform) if binding.is_keyed]
     binding = active_binding(transform, bindings) or next(iter(bindings), None)
@@ -87,12 +87,12 @@ def mode_shown(transform: Transform) -> str:
 
 
 def segment_modes(binding: Binding) -> list[str]:
-    """Return the modes of the segments between the keys of a slot, one after the other."""
+    """Return the modes of the segments between the keys of a slot, in order."""
     return [MODE_NAMES[number] for number in modes_in(binding, frames_in(binding)[:-1]).tolist()]
 
 
 def frames_in(binding: Binding, *, selected: bool = False) -> np.ndarray:
-    """Return `key_frames` in a slot."""
+    """Return the same as `key_frames`, for a slot."""
     curves, frames = [*binding.moving.values()], [np.empty(0)]
     if selected and (turns := binding.curves.get(binding.users[0].turns_channel)) is not None:
         curves.append(turns)
@@ -103,14 +103,14 @@ def frames_in(binding: Binding, *, selected: bool = False) -> np.ndarray:
 
 
 def modes_in(binding: Binding, frames: np.ndarray) -> np.ndarray:
-    """Return the numbers of the modes at these frames, shape (n,); Blender's own where there is what is no mode."""
+    """Return the numbers of the modes at these frames, shape (n,); Blender's own for unknown modes."""
     modes = modes_said(binding)
     numbers = modes.at(frames + 0.5 * SAME_FRAME) if isinstance(modes, Marks) else np.full(len(frames), modes)
     return np.where(numbers == UNKNOWN_MODE, 0, numbers)
 
 
 def turns_in(binding: Binding, frames: np.ndarray) -> np.ndarray:
-    """Return the turns more of the segments at these frames, shape (n,)."""
+    """Return the extra turns of the segments at these frames, shape (n,)."""
     fcurve = binding.curves.get(binding.users[0].turns_channel)
     if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
         return np.zeros(len(frames))

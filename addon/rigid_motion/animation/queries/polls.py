@@ -1,6 +1,6 @@
-"""What is asked of many transforms on every redraw: which of them have modes, in-betweens, keys.
+"""Fast checks of many transforms on every redraw: which of them have modes, in-betweens, holders, keys.
 
-As little is read as can be, as if nothing else used the same Actions, and the answers come one by one.
+They read as little as possible, as if nothing else used the same Actions, and yield results one by one.
 """
 
 from __future__ import annotations
@@ -17,35 +17,37 @@ from ..transforms import WIDTHS, Transform, split_path
 
 
 def with_modes(transforms: Iterable[Transform]) -> Iterator[Transform]:
-    """Yield those whose keys say a mode, in one of their slots; and those that wait with one for keys.
+    """Yield the transforms whose keys have a mode in one of their slots, or that store a mode for future keys.
 
-    All keys of a transform have a mode where any has, so the first channel of each is enough.
+    If any key of a transform has a mode, all keys have, so checking the first channel of each is enough.
     """
     transforms = list(transforms)
     yield from (transform for transform in transforms if transform.motion.awaited != "BLENDER")
     keyed = (transform for transform in transforms if transform.motion.awaited == "BLENDER")
-    yield from _with(keyed, has_marks, by_first=True)
+    yield from _with_passing_channel(keyed, has_marks, by_first=True)
 
 
 def with_in_betweens(transforms: Iterable[Transform]) -> Iterator[Transform]:
-    """Yield those with in-betweens that are not Blender's own."""
-    return _with(transforms, has_terms)
+    """Yield the transforms with in-betweens other than Blender's own."""
+    return _with_passing_channel(transforms, has_terms)
 
 
 def with_holders(transforms: Iterable[Transform]) -> Iterator[Transform]:
-    """Yield those that something holds, or has held."""
+    """Yield the transforms with present or past holders."""
     return (transform for transform in transforms if any(map(is_ours, transform.carrier.constraints)))
 
 
 def with_more_keys_than(transforms: Iterable[Transform], count: int) -> Iterator[Transform]:
-    """Yield those of which a channel of location, rotation or scale has more keys than this."""
-    return _with(transforms, lambda fcurve: len(fcurve.keyframe_points) > count)
+    """Yield the transforms with more than `count` keys in a channel of location, rotation or scale."""
+    return _with_passing_channel(transforms, lambda fcurve: len(fcurve.keyframe_points) > count)
 
 
-def _with(
+def _with_passing_channel(
     transforms: Iterable[Transform], passes: Callable[[bpy.types.FCurve], bool], *, by_first: bool = False
 ) -> Iterator[Transform]:
-    """Yield those of which a channel of location, rotation or scale passes, or the first one in a slot with keys."""
+    """Yield the transforms with a channel of location, rotation or scale that passes; in each slot, check channels with
+    keys, or only the first of them.
+    """
     by_data_block: dict[bpy.types.Object, dict[str, Transform]] = {}
     for transform in transforms:
         by_data_block.setdefault(transform.animated, {})[transform.prefix] = transform

@@ -1,4 +1,4 @@
-"""What there is to tell of an object's motion at one frame, in numbers, and why it does not move as its mode says.
+"""Segment facts: numbers about an object's motion at one frame, and the reasons why it does not follow its mode.
 
 Frames are those of the Action, angles are radians, lengths are Blender's units in the space of the object's channels.
 """
@@ -25,20 +25,20 @@ from ..transforms import Refused, Transform, transform_of
 from .keyed import active_binding
 
 HALF_TURN = np.pi + 1e-3
-"""Half a turn, and what single precision makes of it."""
+"""Half a turn in radians, with a margin for single precision."""
 
 NEAR_HALF_TURN = np.radians(170.0)
-"""From here on a small change of a key may send a body that turns the shortest way round the other way."""
+"""The angle from which on a small change of a key may reverse a rotation by the shortest way."""
 
 MAX_SAME_VALUE_GAP = 1e-6
-"""Values that differ by less are the same."""
+"""Values that differ by less count as equal."""
 
 DIFFERING_REFUSAL = n_(
     "{name} moves by the same Action slot as {leader}, but has another rotation mode, driver, delta transform or "
     "Local Location; the in-betweens are those of {leader}: "
     "give it an Action of its own (Object > Relations > Make Single User)"
 )
-"""Why the motion of a slot, which is that of {leader}, does not fit another one of its users, and the way out."""
+"""The message for why the motion of a slot, computed for {leader}, does not fit another user of it; with a remedy."""
 
 
 @dataclass(frozen=True)
@@ -51,37 +51,37 @@ class SegmentFacts:
     distance: float
 
     key: float
-    """The frame of the key that decides its mode: its first one, or what that is a copy of where cycles repeat it."""
+    """The frame of the key that decides its mode: its first key, or the original of that key if cycles repeat it."""
 
     turn: float
-    """By how much it turns, spins included."""
+    """The angle of its rotation, spins included."""
 
     turns: float
-    """The turns among it that are more than the shortest way, by their sign: of the angles and of the channel."""
+    """The signed number of extra turns beyond the shortest way, from Euler angles and from the turns channel."""
 
     long_way: bool
-    """True if Blender's own in-betweens turn by more than half a turn where the modes turn by less: of quaternions."""
+    """True if Blender's own in-betweens of quaternions turn by more than half a turn and the modes by less."""
 
     is_sure: bool
-    """True if the keys say which way round it turns, however near to half a turn: angles do."""
+    """True if the keys decide the direction of rotation even near half a turn, as angles do."""
 
     two_axes: bool
-    """True if two Euler angles go by more than half a turn, of which the larger one decides."""
+    """True if two Euler angles change by more than half a turn; the larger one decides."""
 
     scales_unevenly: bool
-    """True if it changes a scale that the modes leave to Blender, one that is not the same along all axes."""
+    """True if its scale changes and is not uniform; the modes leave such a scale to Blender."""
 
 
 def frame_in_action(obj: bpy.types.Object, frame: float) -> float:
-    """Return a frame of the scene, as the keys in the editors have it: in tweak mode those of the strip."""
+    """Return a frame of the scene in the time of the keys in the editors: in tweak mode, in that of the strip."""
     data = obj.animation_data
     return frame if data is None else data.nla_tweak_strip_time_to_scene(frame, invert=True)
 
 
 def segment_at(source: KeyedTransform, frame: float) -> SegmentFacts | None:
-    """Return the segment that a frame is in, None before the first key and after the last where no cycle repeats them.
+    """Return the segment at a frame, None before the first key and after the last if no cycle repeats them.
 
-    A key is in the segment that it starts; the last one in the segment that it ends.
+    A key belongs to the segment that it starts; the last key to the segment that it ends.
     """
     keys, moment, backwards = source.key_frames, frame, False
     if source.cyclic is not None:
@@ -111,14 +111,14 @@ def segment_at(source: KeyedTransform, frame: float) -> SegmentFacts | None:
 
 
 def is_up_to_date(target: bpy.types.Object | bpy.types.PoseBone | Transform, source: KeyedTransform) -> bool:
-    """Return whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
+    """Return whether in-betweens fit the present keys. They may not while live update is off."""
     binding = active_binding(transform_of(target))
     planned = None if binding is None else planned_from(binding)
     return planned is None or (source.is_live and planned == source.digest24)
 
 
 def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str:
-    """Return why something does not move or is not held as its keys say, and the way out; "" where nothing is amiss."""
+    """Return why a target does not move or is not held according to its keys, with a remedy; "" if all is well."""
     transform = transform_of(target)
     bindings = bindings_of([transform])
     try:

@@ -1,8 +1,8 @@
-"""From differences to terms, which are what Generator modifiers add to F-curves.
+"""Terms: the polynomials that Generator modifiers add to F-curves, planned from differences of channel values.
 
-carriers  polynomials as the fewest products of linear factors that single precision follows
-planning  the terms that the channels of sources should have; NumPy alone, as carriers
-apply     terms and the modifiers that there are: what differs is written
+carriers  polynomials as few products of linear factors, accurate in single precision; NumPy alone
+planning  the terms that the channels of sources should have; NumPy alone
+apply     compares terms with the present modifiers and writes those that differ
 
 Each module imports only those above it.
 """

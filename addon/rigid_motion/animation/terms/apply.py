@@ -1,6 +1,6 @@
-"""From planned terms to the modifiers of F-curves: compared with those that there are, and written where they differ.
+"""Writing planned terms to the modifiers of F-curves, where they differ from the present ones.
 
-What is there and is as it should be is left alone: to write a modifier has Blender evaluate its Action anew.
+Modifiers that are already right are left alone, because writing one makes Blender evaluate its Action again.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ SETTINGS = (
     ("blend_in", 0.0),
     ("blend_out", 0.0),
 )
-"""What all terms have alike."""
+"""The settings that all terms share."""
 
 
 def apply(binding: Binding, source: KeyedTransform, planned: Mapping[int, Sequence[Term]]) -> bool:
-    """Have the channels of a slot have these terms, by the rows of their components, and no others.
+    """Give the channels of a slot exactly these terms, by the rows of their components.
 
-    A channel that has none of its own yet, of a part that others have keys of, is made with one key.
+    A channel that needs terms but does not exist yet is created with one key.
 
     Returns
     -------
     bool
-        Whether anything was changed that Blender evaluates.
+        Whether anything changed that Blender evaluates.
     """
     channels, changed = binding.users[0].channels, False
-    named = {channels[row]: of_row for row, of_row in _named(planned, source).items()}
+    named = {channels[row]: of_row for row, of_row in _terms_by_name(planned, source).items()}
     for channel in named.keys() - binding.curves.keys():
         _key_once(binding, channel, float(source.keyed_range[0]))
     influence = influence_for(source, sum(map(len, named.values())))
@@ -58,13 +58,13 @@ def apply(binding: Binding, source: KeyedTransform, planned: Mapping[int, Sequen
 
 
 def remove_terms(binding: Binding) -> bool:
-    """Take all terms out of the channels of a slot. Returns whether there were any."""
+    """Remove all terms from the channels of a slot, and return whether there were any."""
     removed = [fcurve for fcurve in binding.moving.values() if fcurve.modifiers and _apply_to(fcurve, {})]
     return bool(removed)
 
 
-def _named(planned: Mapping[int, Sequence[Term]], source: KeyedTransform) -> dict[int, dict[str, Term]]:
-    """Return terms by what they are called: by the modes and the frames that they are for, and numbered."""
+def _terms_by_name(planned: Mapping[int, Sequence[Term]], source: KeyedTransform) -> dict[int, dict[str, Term]]:
+    """Return terms by their names, which consist of modes, frames and numbers."""
     ranges = list({term[:2] for terms in planned.values() for term in terms})
     modes = source.modes_at(np.array(ranges).reshape(-1, 2).mean(axis=1)).tolist()
     bases = {}
@@ -82,7 +82,7 @@ def _named(planned: Mapping[int, Sequence[Term]], source: KeyedTransform) -> dic
 
 
 def _key_once(binding: Binding, channel: tuple[str, int], frame: float) -> None:
-    """Make a channel with one key that has the value of the property."""
+    """Create a channel with one key that has the value of the property."""
     user, (path, index) = binding.users[0], channel
     fcurve = binding.ensure_curve(channel)
     group = next((curve.group for (other, _), curve in binding.curves.items() if other == path and curve.group), None)
@@ -93,7 +93,7 @@ def _key_once(binding: Binding, channel: tuple[str, int], frame: float) -> None:
 
 
 def _apply_to(fcurve: bpy.types.FCurve, named: Mapping[str, Term]) -> bool:
-    """Have an F-curve have these terms, by their names. Returns whether any was changed."""
+    """Give an F-curve exactly these terms, by their names, and return whether anything changed."""
     modifiers, missing, spare, changed = fcurve.modifiers, dict(named), [], False
     ours = terms_in(fcurve)
     is_mixed = len(modifiers) > len(ours)
@@ -104,7 +104,7 @@ def _apply_to(fcurve: bpy.types.FCurve, named: Mapping[str, Term]) -> bool:
         else:
             changed |= write(modifier, term)
     changed |= bool(spare or missing)
-    # Those that are left change their names last: for one that is taken Blender finds another.
+    # Reused modifiers are renamed last: Blender changes a name that is still in use.
     while len(spare) > len(missing):
         modifiers.remove(spare.pop())
     for modifier in spare:
@@ -112,7 +112,7 @@ def _apply_to(fcurve: bpy.types.FCurve, named: Mapping[str, Term]) -> bool:
         write(modifier, term)
     if missing:
         _add(modifiers, missing, is_mixed=is_mixed)
-    # Python's references to what is made anew are lost: so only what would act on less than is seen.
+    # Python loses its references to recreated modifiers: so only move those that act on less than they should.
     for other in misplaced(fcurve) if is_mixed else ():
         put_behind(fcurve, other)
         changed = True
@@ -120,7 +120,7 @@ def _apply_to(fcurve: bpy.types.FCurve, named: Mapping[str, Term]) -> bool:
 
 
 def write(modifier: bpy.types.FModifierGenerator, term: Term) -> bool:
-    """Have a modifier be this term. Returns whether it was another one."""
+    """Set a modifier to this term, and return whether it was different."""
     ends = ("poly_order", len(term.coefficients) // 2), ("frame_start", term.first), ("frame_end", term.last)
     changed = cast(Any, modifier.coefficients)[:] != term.coefficients
     for name, value in (*SETTINGS, *ends):
@@ -133,7 +133,7 @@ def write(modifier: bpy.types.FModifierGenerator, term: Term) -> bool:
 
 
 def _add(modifiers: bpy.types.FCurveModifiers, named: Mapping[str, Term], *, is_mixed: bool) -> None:
-    """Add terms to the modifiers of an F-curve; ranges at once where all of these are terms, which is quicker."""
+    """Add terms to the modifiers of an F-curve. If all modifiers are terms, set ranges together, which is quicker."""
     for name, term in named.items():
         modifier: Any = modifiers.new("GENERATOR")
         modifier.name, modifier.show_expanded = name, False
@@ -145,7 +145,7 @@ def _add(modifiers: bpy.types.FCurveModifiers, named: Mapping[str, Term], *, is_
             modifier.coefficients = term.coefficients
     if not is_mixed:
         modifiers.foreach_set("use_restricted_range", np.ones(len(modifiers), bool))
-        # In this order: Blender keeps the end behind the start.
+        # In this order, as Blender keeps the end after the start.
         for number, name in enumerate(("frame_start", "frame_end")):
             frames = np.empty(len(modifiers), np.float32)
             modifiers.foreach_get(name, frames)
@@ -154,7 +154,7 @@ def _add(modifiers: bpy.types.FCurveModifiers, named: Mapping[str, Term], *, is_
 
 
 def _keep_influence(modifiers: bpy.types.bpy_prop_collection, influence: float, count: int) -> None:
-    """Have all terms, of which there are so many, keep an influence, which is not in use. This tags nothing."""
+    """Store an influence in all `count` terms, where Blender does not use it. This tags nothing for an update."""
     influences = np.empty(len(modifiers), np.float32)
     modifiers.foreach_get("influence", influences)
     ours = np.fromiter(map(is_term, modifiers), bool, len(modifiers)) if len(modifiers) > count else slice(None)

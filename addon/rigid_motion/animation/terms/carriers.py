@@ -5,18 +5,18 @@ source/blender/blenkernel/intern/fmodifier.cc:
 
     value = 1; for each factor: value *= slope * frame + offset
 
-Single precision is why terms look as they do. The slope of a factor is a power of two, so `slope * frame` is exact,
+Single precision determines the form of terms. The slope of a factor is a power of two, so `slope * frame` is exact,
 with or without a fused multiplication, and the factor is the distance of the frame from its root with a relative error
-of 2^-24 at most. The amplitude is the last factor, which is constant. What is left is that roots have to be frames that
-single precision holds, and there are two ways to live with it:
+of 2^-24 at most. The amplitude is the last factor, which is constant. The remaining problem is that roots must be
+frames that single precision can store. There are two ways around it:
 
 - A *pair*: d = (d + K T) - K T, where T is the Chebyshev polynomial of the degree of d. Where K is large enough for
   d + K T to have the signs of T at the extremes of T, both have all their roots between these, and are one term each,
-  whatever the degree. K is of the size of d. Roots are rounded, which costs about K times the degree times the step of
-  single precision over half the length of the piece, and more at its ends. Where that is too much, the pair becomes a
-  *chain*: d + K T - E T is rounded instead, with E a few times what rounding has left, e. The next product is then
-  E T - e, which has all its roots in the piece, too, and is so small that its own rounding matters less, by as much as
-  e is smaller than d; and so on. Each term more gains as many digits as the first two have.
+  for any degree. K is of the size of d. Roots are rounded, which costs about K times the degree times the step of
+  single precision over half the length of the piece, and more at its ends. If that is too much, the pair becomes a
+  *chain*: d + K T - E T is rounded instead, with E a few times the rounding error e. The next product is then E T - e,
+  which also has all its roots in the piece. It is so small that its own rounding matters less, by the ratio of e to d;
+  and so on. Each further term gains as many digits as the first two have.
 - *Bernstein* terms b C(n, i) s^i (1 - s)^(n - i): their roots are the ends of the piece, and are exact.
 
 Polynomials are Chebyshev series in x, which runs from -1 to 1 on their piece.
@@ -33,41 +33,41 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
 
 MIN_CHAIN_PRODUCTS, MAX_CHAIN_PRODUCTS = 2, 4
-"""The fewest and the most products of a chain."""
+"""The fewest and the most products in a chain."""
 
 ROOT_MARGIN_RATIO = 0.05
-"""K is larger than it has to be, by this share of d, so that roots of d + K T are apart from each other."""
+"""K exceeds its minimum by this fraction of d, to keep the roots of d + K T apart from each other."""
 
 ROUNDING_LEFT_FACTOR = 4.0
-"""How many times what rounding has left is left to the next product of a chain, so that this has all its roots."""
+"""E as a multiple of the rounding error: what a chain leaves to its next product, to give that all its roots."""
 
 SMALL_STEP = 1e-5
-"""After a step of Newton's that is no larger the root is exact to far more than single precision."""
+"""After a Newton step smaller than this, the root is exact far beyond single precision."""
 
 CARRIER_TOLERANCE_RATIO = 0.85
-"""The share of its tolerance that a carrier may use up on the frames where it is tried, as others are a bit worse."""
+"""The fraction of its tolerance that a carrier may use on the frames tried, as other frames are slightly worse."""
 
 DROPPED_TOLERANCE_RATIO = 0.25
-"""The share of its tolerance below which a Bernstein coefficient needs no term. Errors do not add up: the sum of all
+"""The fraction of the tolerance below which a Bernstein coefficient needs no term. Errors do not add up: the sum of all
 Bernstein polynomials is 1."""
 
 MOST_STEPS = 40
-"""The most steps to a root; most take six."""
+"""The most Newton steps to a root; most roots take six."""
 
 CHUNK_PIECES = 512
-"""How many pieces, of like degree, are worked on at once: arrays then fit the cache."""
+"""The number of pieces of similar degree computed at once: their arrays fit the processor's cache."""
 
 MOST_KNOWN = 16384
-"""How many pieces are remembered: those of a large rig. While one key is dragged, the others stay as they are."""
+"""The number of pieces to cache, enough for a large rig. While one key is dragged, all other pieces stay the same."""
 
 
 class Term(NamedTuple):
-    """What one Generator modifier adds from its first to its last frame, both included; all in single precision."""
+    """The product that one Generator modifier adds from its first to its last frame, inclusive; in single precision."""
 
     first: float
     last: float
     coefficients: tuple[float, ...]
-    """Those of Blender: slope and offset of each factor; the last factor is constant, (0, amplitude)."""
+    """As in Blender: slope and offset of each factor; the last factor is constant, (0, amplitude)."""
 
 
 def _single(values: ArrayLike) -> np.ndarray:
@@ -75,19 +75,19 @@ def _single(values: ArrayLike) -> np.ndarray:
 
 
 class _Products(NamedTuple):
-    """A product of linear factors for each of S pieces; those behind the degree of a piece are 1."""
+    """A product of linear factors for each of S pieces; factors beyond the degree of a piece are 1."""
 
     slopes: np.ndarray
-    """Shape (S, N), 0 behind the degree."""
+    """Shape (S, N), 0 beyond the degree."""
 
     offsets: np.ndarray
     """Shape (S, N)."""
 
     amplitudes: np.ndarray
-    """Shape (S,); where it is 0 there is no term."""
+    """Shape (S,); 0 means that there is no term."""
 
     def at(self, frames: np.ndarray) -> np.ndarray:
-        """Return the values on frames (S, M), as Blender works them out."""
+        """Return the values on frames (S, M), as Blender computes them."""
         slopes, offsets, amplitudes, frames = map(_single, (*self, frames))
         return _multiplied(slopes, offsets, frames) * amplitudes[:, None]
 
@@ -95,7 +95,7 @@ class _Products(NamedTuple):
         return _Products(*(values[rows] for values in self))
 
     def coefficients(self) -> list[tuple[float, ...]]:
-        """Return those of the terms."""
+        """Return the coefficients of the terms."""
         slopes, offsets, amplitudes = self
         degrees, every = np.count_nonzero(slopes, axis=1), np.arange(len(slopes))
         table = np.zeros((len(slopes), slopes.shape[1] + 1, 2))
@@ -106,7 +106,7 @@ class _Products(NamedTuple):
 
 
 def _multiplied(slopes: np.ndarray, offsets: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Return the products of factors (S, N) on frames (S, M), in the precision of these."""
+    """Return the products of factors (S, N) on frames (S, M), in the precision of the arguments."""
     factors = slopes.T[..., None] * frames
     factors += offsets.T[..., None]
     return factors.prod(axis=0)
@@ -114,7 +114,7 @@ def _multiplied(slopes: np.ndarray, offsets: np.ndarray, frames: np.ndarray) -> 
 
 @lru_cache(maxsize=64)
 def fit_of(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return Chebyshev nodes (count,), rising, and the matrix (count, count) from values there to series."""
+    """Return Chebyshev nodes (count,), rising, and the matrix (count, count) from values at the nodes to series."""
     x = np.cos(np.pi * (np.arange(count)[::-1] + 0.5) / count)
     weights = np.full(count, 2.0 / count)
     weights[0] /= 2
@@ -140,7 +140,7 @@ def _to_bernstein(degree: int) -> np.ndarray:
 
 
 def _values_of(series: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return Chebyshev series (S, N + 1) at x, (S, M) or (M,); shape (S, M)."""
+    """Return the values of Chebyshev series (S, N + 1) at x, (S, M) or (M,); shape (S, M)."""
     values = np.zeros((len(series), x.shape[-1]))
     for coefficients in (series @ _to_powers(series.shape[1])).T[::-1, :, None]:
         values *= x
@@ -149,9 +149,9 @@ def _values_of(series: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _roots(series: np.ndarray, low: np.ndarray, x: np.ndarray, high: np.ndarray, signs: np.ndarray) -> np.ndarray:
-    """Return the root of series (S, N + 1) in each bracket (S, N), with these signs at its high end: Newton's steps.
+    """Return the root of series (S, N + 1) in each bracket (S, N), with these signs at its high end, by Newton steps.
 
-    A step out of what is left of the bracket is to its middle instead.
+    A step out of the remaining bracket is replaced by one to its middle.
     """
     powers = (series @ _to_powers(series.shape[1])).T[::-1, :, None]
     for _ in range(MOST_STEPS):
@@ -171,29 +171,29 @@ def _roots(series: np.ndarray, low: np.ndarray, x: np.ndarray, high: np.ndarray,
 
 
 class _Pieces(NamedTuple):
-    """S pieces that chains are made for."""
+    """S pieces to make chains for."""
 
     middles: np.ndarray
-    """Frames, shape (S, 1)."""
+    """Their middle frames, shape (S, 1)."""
 
     halves: np.ndarray
-    """Half the lengths, shape (S, 1)."""
+    """Half their lengths in frames, shape (S, 1)."""
 
     slopes: np.ndarray
-    """Those of factors, powers of two that are between 1 and 2 over half the length; 0 behind the degree, (S, N)."""
+    """Slopes of factors: powers of two between 1 and 2 over half the length; 0 beyond the degree, (S, N)."""
 
     low: np.ndarray
-    """The extreme of T below each of its roots, shape (S, N): those from both ends in turns, so that partial products
-    stay moderate."""
+    """The extreme of T below each of its roots, shape (S, N). Roots are taken from both ends in turn, which keeps
+    partial products moderate."""
 
     roots: np.ndarray
-    """Shape (S, N)."""
+    """The roots of T, shape (S, N)."""
 
     high: np.ndarray
-    """The extreme above, shape (S, N)."""
+    """The extreme of T above each root, shape (S, N)."""
 
     signs: np.ndarray
-    """Those of K T there, shape (S, N)."""
+    """The signs of K T at the upper extremes, shape (S, N)."""
 
     spare: np.ndarray
     """The values of T, with the sign of K, at the nodes of `fit_of`, shape (S, N + 1)."""
@@ -202,12 +202,12 @@ class _Pieces(NamedTuple):
     def of(
         cls, series: np.ndarray, degrees: np.ndarray, first: np.ndarray, last: np.ndarray
     ) -> tuple[_Pieces, np.ndarray]:
-        """Return pieces for series (S, N + 1) of degrees (S, 1), from frames (S, 1), and how large K is, (S, 1)."""
+        """Return pieces for series (S, N + 1) of degrees (S, 1), between frames (S, 1), and the size of K, (S, 1)."""
         halves, turns = (last - first) / 2, np.pi / degrees
         extremes, factors = np.arange(series.shape[1]), np.arange(series.shape[1] - 1)
         signs = np.where(extremes <= degrees, (-1.0) ** extremes, 0.0)
         at_extremes = _values_of(series, np.cos(turns * extremes)) * signs
-        # Of d + K T and d - K T the one with the smaller K.
+        # Choose d + K T or d - K T, the one with the smaller K.
         needed = np.maximum(np.stack([-at_extremes.min(1), at_extremes.max(1)]), 0.0)
         sides = np.where(needed[0] <= needed[1], 1.0, -1.0)[:, None]
         numbers = np.where(factors % 2, degrees - 1 - factors // 2, factors // 2) * (factors < degrees)
@@ -221,10 +221,10 @@ class _Pieces(NamedTuple):
         return _Pieces(*(values[rows] for values in self))
 
     def product_of(self, values: np.ndarray, roots: np.ndarray | None = None) -> tuple[_Products, np.ndarray]:
-        """Return the products that are nearest to values (S, N + 1) at the nodes of `fit_of`, and what they leave.
+        """Return the products nearest to values (S, N + 1) at the nodes of `fit_of`, and the remaining differences.
 
-        Roots are between the extremes of T, where values have the signs of K T, if they are not given. Rounded are
-        these and amplitudes alone.
+        If roots are not given, they are searched between the extremes of T, where values have the signs of K T. Only
+        roots and amplitudes are rounded.
         """
         nodes, fit = fit_of(values.shape[1])
         x = _roots(values @ fit, self.low, self.roots, self.high, self.signs) if roots is None else roots
@@ -235,13 +235,13 @@ class _Pieces(NamedTuple):
 
 
 def _bernstein(series: np.ndarray, first: np.ndarray, last: np.ndarray, dropped: np.ndarray) -> list[_Products]:
-    """Return Bernstein terms for series (S, n + 1) on pieces, from frames (S, 1), but for what is below `dropped`."""
+    """Return Bernstein terms for series (S, n + 1) on pieces between frames (S, 1), without those below `dropped`."""
     degree = series.shape[1] - 1
     values = series @ _to_bernstein(degree)
     values[abs(values) <= dropped] = 0.0
     length, exponents = np.frexp(last - first)
     values *= [comb(degree, i) for i in range(degree + 1)] / length**degree
-    # Factors s and 1 - s with powers of two, at most 1 over the length, for slopes.
+    # The factors s and 1 - s get powers of two as slopes, at most 1 over the length.
     scales, result = np.ldexp(1.0, -exponents), []
     for i, amplitudes in enumerate(_single(values).T):
         rises = np.arange(degree) < i
@@ -250,30 +250,30 @@ def _bernstein(series: np.ndarray, first: np.ndarray, last: np.ndarray, dropped:
     return result
 
 
-_known: dict[bytes, list[tuple[float, ...]]] = {}
-"""The coefficients of terms by all that they depend on."""
+_term_cache: dict[bytes, list[tuple[float, ...]]] = {}
+"""Cached coefficients of terms, by all inputs that they depend on."""
 
 
 def carry(
     series: np.ndarray, first: np.ndarray, last: np.ndarray, tolerances: np.ndarray
 ) -> list[list[tuple[float, ...]]]:
-    """Return the coefficients of few terms for each of S polynomials that follow it within its tolerance on its piece.
+    """Return the coefficients of a few terms for each of S polynomials that keep to its tolerance on its piece.
 
-    Where none do so, those that come nearest.
+    If no terms do so, the nearest ones are returned.
 
     Parameters
     ----------
     series : (S, N + 1)
-        Chebyshev series; zeros behind the degree.
+        Chebyshev series; zeros beyond the degree.
     first, last : (S,)
-        The frames that pieces run between, in single precision.
+        The first and last frames of pieces, in single precision.
     tolerances : (S,)
-        How far off terms may be at any frame of the piece.
+        The largest error of terms at any frame of the piece.
     """
     asked = [row.tobytes() for row in np.column_stack((series, first, last, tolerances))]
-    if len(_known) > MOST_KNOWN:
-        _known.clear()
-    pending = np.array([row for row, one in enumerate(asked) if one not in _known], int)
+    if len(_term_cache) > MOST_KNOWN:
+        _term_cache.clear()
+    pending = np.array([row for row, one in enumerate(asked) if one not in _term_cache], int)
     degrees = np.where(series[pending] != 0, np.arange(series.shape[1]), 0).max(1, initial=0)
     order = np.argsort(degrees, kind="stable")
     for start in range(0, len(order), CHUNK_PIECES):
@@ -281,8 +281,8 @@ def carry(
         rows = pending[some]
         trimmed = series[rows, : degrees[some[-1]] + 1]
         coefficients = _carried(trimmed, degrees[some], first[rows], last[rows], tolerances[rows])
-        _known.update(zip([asked[row] for row in rows.tolist()], coefficients, strict=True))
-    return [_known[one] for one in asked]
+        _term_cache.update(zip([asked[row] for row in rows.tolist()], coefficients, strict=True))
+    return [_term_cache[one] for one in asked]
 
 
 def _carried(
@@ -298,7 +298,7 @@ def _carried(
     errors = abs(wanted).max(1)
 
     def try_out(rows: np.ndarray, products: list[_Products], most: float = np.inf) -> None:
-        """Take products for the terms of pieces, where there are no more than `most`, and they are nearer."""
+        """Use products as the terms of pieces if there are at most `most` of them and their errors are smaller."""
         found = abs(sum(product.at(frames[rows]) for product in products) - wanted[rows]).max(1)
         counts = sum((product.amplitudes != 0.0).astype(int) for product in products)
         nearer = (found < errors[rows]) & (counts <= most)
@@ -313,7 +313,7 @@ def _carried(
             dropped = DROPPED_TOLERANCE_RATIO * tolerances[rows, None]
             try_out(rows, _bernstein(series[rows, : degree + 1], first[rows], last[rows], dropped), most)
 
-    # At keys, where polynomials are 0, there are terms for one degree less than they have.
+    # At keys polynomials are 0, so a polynomial needs fewer Bernstein terms: one less than its degree.
     try_bernstein(MIN_CHAIN_PRODUCTS + 1, MIN_CHAIN_PRODUCTS)
     rows = np.flatnonzero((errors > allowed) & (degrees > 1))
     if len(rows):

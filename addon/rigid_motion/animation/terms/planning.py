@@ -1,12 +1,12 @@
-"""Which terms the channels of sources should have: their differences as polynomials on pieces of time, and carriers.
+"""Planning the terms of channels: fits differences by polynomials on pieces of time, and makes carriers for them.
 
-A difference is smooth within a span. It is tried on Chebyshev nodes, of all spans of all sources at once. Where no
-polynomial follows it, the span is split, at its breaks, and then at whole frames, halves, quarters and eighths, and
-the pieces are tried in the next round. What is left in the end lies between two neighbouring eighths of frames: there
-it runs straight, and is exact on both.
+A difference is smooth within a span. It is fitted on Chebyshev nodes, for all spans of all sources at once. If no
+polynomial fits, the span is split at its breaks, and then at whole frames, halves, quarters and eighths; the pieces are
+tried in the next round. The last remaining pieces lie between two neighbouring eighths of frames: there the terms are
+linear, and exact on both.
 
-Ranges of modifiers include both ends. At keys nothing is to be added, so ranges open by one step of single precision;
-of two pieces that meet the earlier one has the frame. Frames are those of the Action.
+Ranges of modifiers include both ends. At keys nothing may be added, so ranges start one step of single precision later;
+where two pieces meet, the frame belongs to the earlier one. Frames are those of the Action.
 """
 
 from __future__ import annotations
@@ -24,46 +24,47 @@ from ..evaluation.spans import Span, spans
 from .carriers import CARRIER_TOLERANCE_RATIO, Term, carry, fit_of
 
 NODES_PER_PIECE = 24
-"""How many moments a piece is tried on."""
+"""The number of Chebyshev nodes on which a piece is fitted."""
 
 MOST_DEGREE = NODES_PER_PIECE - 5
-"""The highest degree of a polynomial. What is behind it tells whether all has been seen."""
+"""The highest degree of a polynomial. The coefficients beyond it show whether the nodes were sufficient."""
 
 UNSEEN_COEFFICIENT_FACTOR = 10.0
-"""How many times the last coefficients the unseen ones may add up to. Those of a kink fall as slowly as 1 / k^2, which
-makes five times; and each of them is missed twice, as nodes take it for one of the seen ones."""
+"""The largest sum of the unseen coefficients, as a multiple of the last seen ones. Those of a kink fall as slowly as
+1 / k^2, which gives 5; and each of them counts twice, as nodes mistake it for a seen one."""
 
 LOCATION_TOLERANCE = 4e-6
-"""How far off location may be, in units: what single precision leaves of 64 units anyway, and no one sees."""
+"""The tolerance of location, in Blender's units: invisible, and the rounding of single precision at 64 units."""
 
 ROTATION_SCALE_TOLERANCE = 2e-6
-"""How far off rotation and scale may be: 2 micrometres at an arm's length."""
+"""The tolerance of rotation and scale: 2 micrometres at an arm's length."""
 
 COMPONENT_TOLERANCES = np.full(10, ROTATION_SCALE_TOLERANCE)
 COMPONENT_TOLERANCES[ROWS[LOCATION]] = LOCATION_TOLERANCE
-"""The tolerances of rows, where values are not large."""
+"""The tolerances of rows, if values are not large."""
 
 SINGLE_PRECISION = 1e-7
-"""Nothing is closer than this share of the values that differences are added to: a step is 1.2e-7 of them at most."""
+"""The least tolerance, as a fraction of the values that differences are added to: a step is at most 1.2e-7 of them."""
 
 SPAN_EDGE_RATIO = 1e-8
-"""The share of a span that moments keep away from its ends, where there is no difference but next to which there is."""
+"""The distance of moments from the ends of a span, as a fraction of the span: at the ends the difference is 0, but not
+next to them."""
 
 POLYNOMIAL_TOLERANCE_RATIO = 0.5
-"""The share of the tolerance that polynomials may use up; carriers have the rest."""
+"""The fraction of the tolerance that polynomials may use; carriers have the rest."""
 
 PARTS_PER_FRAME = 1, 2, 4, 8
-"""Into how many parts of a frame spans may be split: renderers blur motion by samples on such."""
+"""The parts of a frame at which spans may be split: motion blur samples lie on these."""
 
 LAST_FRAME = 1048574
-"""Blender's MAXFRAMEF: ranges of modifiers reach from its negative to it."""
+"""Blender's MAXFRAMEF: ranges of modifiers lie between its negative and it."""
 
 
 class _Pieces(NamedTuple):
-    """P pieces of spans that are to be tried."""
+    """P pieces of spans to be fitted."""
 
     spans: np.ndarray
-    """The number of the span among all, rising, shape (P,)."""
+    """The numbers of their spans among all, rising, shape (P,)."""
 
     first: np.ndarray
     """Shape (P,), in single precision, as `last` is."""
@@ -71,11 +72,11 @@ class _Pieces(NamedTuple):
     last: np.ndarray
 
     rows: np.ndarray
-    """Which rows are open, shape (P, 10)."""
+    """True for the rows still to be fitted, shape (P, 10)."""
 
 
 class _Polynomials(NamedTuple):
-    """Finished ones, a row each."""
+    """Finished polynomials, each for one row of components."""
 
     spans: np.ndarray
     rows: np.ndarray
@@ -85,14 +86,14 @@ class _Polynomials(NamedTuple):
     """Shape (., NODES_PER_PIECE)."""
 
     tolerances: np.ndarray
-    """What carriers may use up."""
+    """The tolerances left for carriers."""
 
     def some(self, rows: np.ndarray) -> _Polynomials:
         return _Polynomials(*(values[rows] for values in self))
 
 
 class _Spans:
-    """The spans of all sources, and their differences on any frames: where planning meets evaluation."""
+    """The spans of all sources, and their differences on any frames: the interface to evaluation."""
 
     def __init__(self, sources: Sequence[KeyedTransform]) -> None:
         self.sources = sources
@@ -104,11 +105,11 @@ class _Spans:
         self.is_key = np.array([(span.first_is_key, span.last_is_key) for span in self.all], bool).reshape(-1, 2)
 
     def pieces(self) -> _Pieces:
-        """Return all spans as pieces, but for those with no frame of single precision inside."""
+        """Return all spans as pieces, except those with no single-precision frame inside."""
         rows = np.zeros((len(self.all), len(COMPONENT_TOLERANCES)), bool)
         for number, span in enumerate(self.all):
             rows[number, list(span.rows)] = True
-        every = np.flatnonzero(_after(self.first) < self.last)
+        every = np.flatnonzero(_next_single(self.first) < self.last)
         return _Pieces(every, self.first[every], self.last[every], rows[every])
 
     def differences(self, numbers: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -125,7 +126,7 @@ class _Spans:
 
 
 def plan(sources: Sequence[KeyedTransform]) -> list[dict[int, list[Term]]]:
-    """Return, for each source, the terms that its channels should have, by rows; in order of time.
+    """Return, for each source, the terms of its channels, by rows and in order of time.
 
     Rows without terms are left out.
     """
@@ -133,7 +134,7 @@ def plan(sources: Sequence[KeyedTransform]) -> list[dict[int, list[Term]]]:
     every = _Spans(sources)
     finished, pieces = [], every.pieces()
     while len(pieces.spans):
-        polynomials, pieces = _tried(every, pieces)
+        polynomials, pieces = _fit_pieces(every, pieces)
         finished.append(polynomials)
         pieces = _split(every, pieces)
     if not finished:
@@ -151,11 +152,11 @@ def plan(sources: Sequence[KeyedTransform]) -> list[dict[int, list[Term]]]:
     return result
 
 
-def _after(frames: np.ndarray) -> np.ndarray:
+def _next_single(frames: np.ndarray) -> np.ndarray:
     return np.nextafter(np.float32(frames), np.float32(np.inf)).astype(float)
 
 
-def _before(frames: np.ndarray) -> np.ndarray:
+def _previous_single(frames: np.ndarray) -> np.ndarray:
     return np.nextafter(np.float32(frames), np.float32(-np.inf)).astype(float)
 
 
@@ -168,15 +169,15 @@ def _ranges(every: _Spans, found: _Polynomials) -> np.ndarray:
     owners = every.owners[found.spans]
     alike = (owners[1:] == owners[:-1]) & (found.rows[1:] == found.rows[:-1])
     opens[1:] |= alike & (found.last[:-1] == found.first[1:]) & ~closes[:-1]
-    first = np.where(opens, _after(found.first), found.first)
-    return np.stack([first, np.where(closes, _before(found.last), found.last)], 1)
+    first = np.where(opens, _next_single(found.first), found.first)
+    return np.stack([first, np.where(closes, _previous_single(found.last), found.last)], 1)
 
 
-def _tried(every: _Spans, pieces: _Pieces) -> tuple[_Polynomials, _Pieces]:
-    """Return the polynomials of the rows that one follows, and the pieces with the other rows open.
+def _fit_pieces(every: _Spans, pieces: _Pieces) -> tuple[_Polynomials, _Pieces]:
+    """Return the polynomials for rows that one fits, and the pieces with the other rows still open.
 
-    A polynomial ends where the difference does, so that what is 0 at keys stays so. Where there is no eighth of a frame
-    inside of a piece it runs straight.
+    A polynomial has the exact values of the difference at both ends, so a difference of 0 at keys stays 0. In a piece
+    without an eighth of a frame inside, it is linear.
     """
     nodes, to_series = fit_of(NODES_PER_PIECE)
     middles, halves = (pieces.first + pieces.last) / 2, (pieces.last - pieces.first) / 2
@@ -184,7 +185,7 @@ def _tried(every: _Spans, pieces: _Pieces) -> tuple[_Polynomials, _Pieces]:
     difference, native = every.differences(pieces.spans, moments)
     tolerances = np.maximum(COMPONENT_TOLERANCES, SINGLE_PRECISION * np.abs(native).max(axis=2))
     series = (difference[..., 1:-1].reshape(-1, NODES_PER_PIECE) @ to_series).reshape(difference[..., 1:-1].shape)
-    # What each degree leaves: at most, and at both ends, where a slope may be infinite and no node sees it.
+    # The error of each degree: at most, and at both ends, where a slope may be infinite without any node showing it.
     size = np.abs(series)
     behind = np.cumsum(size[..., ::-1], axis=2)[..., ::-1] - size
     at_first = difference[..., :1] - np.cumsum(series * (-1.0) ** np.arange(NODES_PER_PIECE), axis=2)
@@ -196,7 +197,7 @@ def _tried(every: _Spans, pieces: _Pieces) -> tuple[_Polynomials, _Pieces]:
     is_short = np.floor(PARTS_PER_FRAME[-1] * pieces.first) + 1 >= PARTS_PER_FRAME[-1] * pieces.last
     matters = pieces.rows & (size.sum(axis=2) + unseen > CARRIER_TOLERANCE_RATIO * tolerances)
     followed = is_close.any(axis=2) | is_short[:, None]
-    # Near gimbal lock several values of all angles turn alike, and which it is hangs on the frames that are asked for.
+    # Near gimbal lock different angles give the same rotation; which ones result depends on the frames asked for.
     turning = ROWS[ROTATION]
     is_torn = (matters & ~followed)[:, turning].any(axis=1)
     followed[is_torn, turning], matters[is_torn, turning] = False, pieces.rows[is_torn, turning]
@@ -213,10 +214,10 @@ def _tried(every: _Spans, pieces: _Pieces) -> tuple[_Polynomials, _Pieces]:
 
 
 def _split(every: _Spans, pieces: _Pieces) -> _Pieces:
-    """Return the parts of pieces.
+    """Return the parts of split pieces.
 
-    They are between breaks, or else on both sides of the whole frame that is nearest to the middle; or of the half, the
-    quarter or the eighth where no whole frame is inside.
+    Pieces are split at their breaks, or else at the whole frame nearest to the middle; or at the nearest half, quarter
+    or eighth if no whole frame is inside.
     """
     parts: list[tuple[int, float, float]] = []
     ends = zip(pieces.spans.tolist(), pieces.first.tolist(), pieces.last.tolist(), strict=True)
