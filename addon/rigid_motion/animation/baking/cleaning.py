@@ -46,7 +46,7 @@ TRANSITION_KEYS = 8
 """The number of keys over which cleaned keys blend into uncleaned ones."""
 
 MAX_DRAW_BACK_ROUNDS = 24
-"""Rounds of pulling back all keys of a frame where something moved too far: in the second half completely."""
+"""Rounds of pulling back all keys of a frame on which a point moved too far: in the second half completely."""
 
 USED_TOLERANCE_RATIO = 0.999
 """The fraction of the tolerance that is used, as keys are rounded."""
@@ -198,7 +198,7 @@ def pixels_of(camera: Any, nearest: float) -> float:
 
 
 def _check(transform: Transform, binding: Binding, source: KeyedTransform) -> None:
-    """Raise `Refused` if the keys are not dense, or do not alone decide where the transform is."""
+    """Raise `Refused` if the keys are not dense, or anything besides the keys moves the transform."""
     if source.held is not None:
         raise Refused(n_("{name} is held: Bake to World first, and clean that"), name=transform.name)
     refuse_linked(transform, binding)

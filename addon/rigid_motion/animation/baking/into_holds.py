@@ -223,7 +223,7 @@ def _find_segments(
     prop, sizes = poses_of(worlds.prop)
     if np.ptp(sizes, axis=0).max() > MAX_GROWTH_RATIO * np.abs(sizes).max():
         raise Refused(SCALE_REFUSAL, name=transform.name)
-    # The space of the channels: where the prop would be with zero in all of them.
+    # The space of the channels: where the prop would be with all of them at rest.
     own = BodyPoses(relative(poses_of(worlds.prop @ np.linalg.inv(worlds.local))[0], prop), radius)
     free = _free(source, frames)
     # If the visible range extends beyond the keys, the prop rests there.
@@ -262,7 +262,7 @@ def _free(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
 
 
 def _without(rest: RestStretch, others: Iterable[RestStretch]) -> RestStretch:
-    """Return a rest without those of its ends that lie in other rests."""
+    """Return a rest without the parts at its ends that lie in other rests."""
     first, last = rest.first, rest.last
     for other in sorted(others):
         if other.first <= first <= other.last:
@@ -351,7 +351,7 @@ class _Switches:
         """The frames on which the prop is free again."""
 
     def are_held(self, frames: np.ndarray) -> np.ndarray:
-        """Return True for those of these frames (m,) on which the prop is held."""
+        """Return True for the frames (m,) on which the prop is held."""
         after = frames[:, None]
         return ((after > self.begins - SAME_FRAME) & (after < self.untils - SAME_FRAME)).any(axis=1)
 

@@ -319,9 +319,9 @@ class BodyMotion:
         return np.array([ball_displacement(now[n], self.truth[n], radii) for n, radii in enumerate(balls)])
 
     def to_blame(self, number: int, moment: int, among: Iterable[int], share: float) -> list[int]:
-        """Return those of these joints that reduce a joint's error at a moment to a fraction of it, if set as recorded.
+        """Return a few of these joints that reduce a joint's error at a moment to a fraction of it, if set as recorded.
 
-        They are few: the one that helps most is first, and so on. Empty if even all of them do not suffice.
+        The joint that helps most is first, and so on. The list is empty if even all of them do not suffice.
         """
         chain, left, result = [*self.above(number)][::-1], list(among), []
         least = share * self._errors_with(number, moment, self._channels[chain, moment, None])[0]

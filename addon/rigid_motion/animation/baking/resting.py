@@ -1,4 +1,4 @@
-"""Rests of a body relative to something: stretches of frames on which one pose can replace all its poses.
+"""Rests of a body relative to a holder: stretches of frames on which one pose can replace all its poses.
 
 Errors are shell errors, see `rigid_motion.motion.shell_error`. Places are indices of frames, counted from 0.
 """
@@ -44,7 +44,7 @@ class RestStretch(NamedTuple):
 
 
 class BodyPoses:
-    """A body with poses (m,) relative to something.
+    """A body with poses (m,) in the space of a holder or of its channels.
 
     Each pose is also a point: its origin, and its axes with the length of the radius over the square root of 2. The
     distance of two points is at most their shell error, which is at most the square root of 2 times as large.

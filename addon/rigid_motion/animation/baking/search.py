@@ -287,7 +287,7 @@ class SearchedBody:
         }
 
     def _within_its_keys(self, keys: np.ndarray, number: int) -> np.ndarray:
-        """Return a joint's key frames, limited to the range of its present keys, outside of which it holds."""
+        """Return a joint's key frames, limited to the range of its present keys: it holds still outside of that."""
         first, last = self._ends(number)
         inside = keys[(keys > first) & (keys < last)]
         return keys if len(keys) == 1 else np.union1d(inside, (first, last))
@@ -309,10 +309,10 @@ class SearchedBody:
         return keyed
 
     def proven(self, chosen: dict[int, np.ndarray], keyed: Keyed, *, shared: bool) -> dict[int, KeyedTransform]:
-        """Return the joints that get fewer keys, with these, such that the whole body keeps to the tolerance.
+        """Return the joints that get fewer keys, and those keys, with the whole body within the tolerance.
 
-        Keys are put back in `chosen`, the key frames of each joint, where the actual motion has too large errors. A
-        joint that would not have fewer keys than before stays unchanged.
+        Keys are put back in `chosen`, the key frames of each joint, where the actual errors are too large. A joint that
+        would not have fewer keys than before stays unchanged.
         """
         fewer: dict[int, KeyedTransform] = {}
 
@@ -379,7 +379,7 @@ class SearchedBody:
     def _with_keys_at(
         self, frame: float, numbers: Iterable[int], chosen: dict[int, np.ndarray]
     ) -> dict[int, np.ndarray]:
-        """Return the new keys of those of these joints that get any: on the samples around a frame, or else on it."""
+        """Return the new keys of the joints that get any: on the samples around a frame, or else on the frame."""
         samples = self.frames[self.sampled]
         for around in (True, False) if self._fitted is self.sampled else (True,):
             added = {}

@@ -116,7 +116,7 @@ def set_turns(
     Parameters
     ----------
     turns : int
-        In the direction in which a segment turns anyway; negative for the opposite direction.
+        The number of turns, in the direction of the segment's own rotation; negative for the opposite direction.
     frames : sequence of float, optional
         The frames of the keys that begin the chosen segments; all others keep their turns. Without frames, all segments
         get this number.

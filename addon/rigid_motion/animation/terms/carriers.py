@@ -39,7 +39,7 @@ ROOT_MARGIN_RATIO = 0.05
 """K exceeds its minimum by this fraction of d, to keep the roots of d + K T apart from each other."""
 
 ROUNDING_LEFT_FACTOR = 4.0
-"""E as a multiple of the rounding error: what a chain leaves to its next product, to give that all its roots."""
+"""E as a multiple of the rounding error: large enough for the next product of the chain to have all its roots."""
 
 SMALL_STEP = 1e-5
 """After a Newton step smaller than this, the root is exact far beyond single precision."""
