@@ -1,7 +1,7 @@
-"""Charts of the report but for the viewer's: Vega-Lite specifications, as SVG that takes its colours from the page.
+"""Charts of the report (except the viewer's): Vega-Lite specifications, rendered to SVG in the page's colours.
 
-A new chart is a function here that returns a specification, or None where there is nothing to draw, a row of `CHARTS`,
-and its `chart(...)` in a template.
+To add a chart: write a function here that returns a specification, or None if there is nothing to draw; add it to
+`CHARTS`; call `chart(...)` in a template.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ DASHES: Specification = {
 
 
 def error_over_rate(numbers: Numbers, clip: int | None = None) -> Specification | None:
-    """Return the RMS shell error over the keys a second, of a clip or the mean of all."""
+    """Return the RMS shell error over the keys per second, for a clip or averaged over all clips."""
     places = [place for place, choice in enumerate(numbers.choices) if not isinstance(choice, Tolerance)]
     if len(places) < 2:
         return None
@@ -63,9 +63,9 @@ def error_over_rate(numbers: Numbers, clip: int | None = None) -> Specification 
 
 
 def keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Specification | None:
-    """Return the error over the keys a second that each mode keeps, evenly spaced or where it needs them."""
+    """Return the error over the keys per second of each mode, with keys evenly spaced or where the mode needs them."""
     together = overall(needed)
-    # Means over different clips do not make one curve.
+    # Means over different sets of clips do not make one curve.
     whole = together.asked == len(needed)
     reached = together.clips[:, 1] == len(needed)
     rows = []
@@ -83,7 +83,7 @@ def keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Specification
 def _lines(
     numbers: Numbers, rows: list[Specification], groups: Iterable[tuple[str, ...]], ticks: Sequence[float] | None = None
 ) -> Specification | None:
-    """Lines on logarithmic axes, on which powers of the rate are straight."""
+    """Return lines on log-log axes, where powers of the rate are straight; None with fewer than two points."""
     rows = [row for row in rows if np.isfinite(row["error"]) and row["error"] > 0.0 and row["rate"] > 0.0]
     if len(rows) < 2:
         return None
@@ -106,7 +106,7 @@ def _lines(
                 "type": "quantitative",
                 "title": "RMS shell error, mm",
                 "scale": {"type": "log", "nice": False, "padding": 8},
-                "axis": {"values": _ticks([row["error"] for row in rows]), "format": "~g"},
+                "axis": {"values": _tick_values([row["error"] for row in rows]), "format": "~g"},
             },
             "color": {
                 "field": "mode",
@@ -122,8 +122,8 @@ def _lines(
     }
 
 
-def _ticks(values: Sequence[float]) -> list[float]:
-    """1, 2 and 5 times powers of ten, among these values and once beyond."""
+def _tick_values(values: Sequence[float]) -> list[float]:
+    """Return 1, 2 and 5 times powers of ten that cover the values, extended by a factor of two at both ends."""
     low, high = min(values) / 2.0, max(values) * 2.0
     powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
     result = [step * 10.0**power for power in powers for step in (1, 2, 5)]
@@ -137,7 +137,7 @@ CHARTS: dict[str, Callable[..., Specification | None]] = {
 
 
 def chart(name: str, *arguments: Any) -> Markup:
-    """Return the SVG of a chart; empty where there is nothing to draw."""
+    """Return the SVG of a chart; empty if there is nothing to draw."""
     specification = CHARTS[name](*arguments)
     if specification is None:
         return Markup()

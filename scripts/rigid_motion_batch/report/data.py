@@ -1,13 +1,13 @@
-"""What the viewer needs of a clip, small: whole numbers of a step, as differences in time, gzipped, as base64.
+"""Compact clip data for the viewer: quantized integers, stored as differences over time, gzipped, in base64.
 
-An array of shape (rows, n) is described by `[offset, rows, n, step, width]`: where its bytes begin in the block, what a
-unit is worth, and how many bytes a number has. Each row holds the first number and then differences, modulo the width;
-the lowest bytes of all numbers come first, then the next, which gzip likes. `viewer/data.js` reads it.
+An array of shape (rows, n) is described by `[offset, rows, n, step, width]`: where its bytes begin in the block, the
+value of one unit, and the bytes per number. Each row holds the first number and then differences, modulo the width;
+the lowest bytes of all numbers come first, then the next ones, which compresses better. `viewer/data.js` reads it.
 
-Metres from the middle of the recording, radians, seconds from the clip's first sample; z is up. Of a single body the
-deviations of a mode from the recording are a difference of positions and a rotation vector in the world; of a whole
-body the differences of all joints' positions. Where a clip is long, the view has fewer samples than the chart, and the
-chart the largest error of every few samples: the worst sample of each mode is in both.
+Units: metres from the centre of the recording, radians, seconds from the clip's first sample; z is up. For a single
+body, a mode's deviation from the recording is a difference of positions and a rotation vector in the world; for a
+whole body, the differences of all joint positions. For a long clip, the view has fewer samples than the chart, and
+the chart shows the largest error of every few samples: the worst sample of each mode is in both.
 """
 
 from __future__ import annotations
@@ -33,32 +33,32 @@ from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.rest_bodies import carrying, short_names
 
 MOST_SEEN = {True: 4_000_000, False: 12_000_000}
-"""Bytes that the poses of all modes of a whole body, or of a single one, may take before the view has fewer of them."""
+"""Maximum bytes of the poses of all modes, for a whole body (True) or a single one; above it, the view is thinned."""
 
 FEWEST_SEEN = 300
-"""Samples that the view has at least."""
+"""Minimum number of samples in the view."""
 
 MOST_CHARTED = 50_000
-"""Samples of an error over time; of longer ones the largest of every few are kept."""
+"""Maximum number of samples of an error over time; longer ones keep the largest of every few."""
 
 MAGNIFICATION_FACTORS = (1000, 500, 200, 100, 50, 30, 20, 10, 5, 3, 2, 1)
-"""By which deviations are magnified."""
+"""The factors that deviations may be magnified by."""
 
 SEEN_AS = {True: 0.15, False: 0.34}
-"""How large the largest deviation may look, as a share of the size of a whole body, or else of the object."""
+"""Maximum size of the largest deviation on screen, as a fraction of the whole body's size (True) or the object's."""
 
 Description = list[float]
 
 
 class PackedNumbers:
-    """Numbers packed one array after the other."""
+    """A block of arrays of numbers, packed one after the other."""
 
     def __init__(self) -> None:
         self._parts: list[bytes] = []
         self._size = 0
 
     def put(self, values: np.ndarray, width: int = 2, step: float = 0.0) -> Description:
-        """Add an array of shape (rows, n) or (n,), rounded to this step, or the finest that the width has room for."""
+        """Add an array of shape (rows, n) or (n,), rounded to `step`, or coarser if the width has no room for that."""
         values = np.atleast_2d(np.asarray(values, dtype=float))
         step = max(step, float(np.abs(values).max(initial=0.0)) / (2 ** (8 * width - 1) - 1)) or 1.0
         whole = np.rint(values / step).astype(np.int64)
@@ -69,20 +69,20 @@ class PackedNumbers:
         return [self._size - len(packed), *values.shape, step, width]
 
     def text(self) -> str:
-        """All of it, the same for the same numbers."""
+        """Return the whole block as base64 text; the same numbers give the same text."""
         return base64.b64encode(gzip.compress(b"".join(self._parts), mtime=0)).decode("ascii")
 
 
 def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict[str, Any]:
-    """Return what the page has of a clip: names, warnings, and numbers of the recording and of each choice.
+    """Return the page's data about a clip: names, warnings, and numbers of the recording and of each choice.
 
-    `label` gives the name of a mode; the mesh is what a single rigid body moves.
+    `label` returns the name of a mode; `mesh` is the object that a single rigid body moves.
     """
     block, body = PackedNumbers(), clip.parents is not None
     begin = float(clip.times[0])
-    seen = _seen(clip)
+    seen = _view_samples(clip)
     truth = _joints(clip.truth)[:, seen]
-    # Around the middle: what is far from the origin of its world has digits to spare.
+    # Relative to the centre: coordinates far from the world's origin would waste digits.
     carries = carrying(clip.parents, truth) if clip.parents is not None else np.zeros(1, dtype=bool)
     drawn = np.flatnonzero(~carries)
     low, high = truth[drawn].min(axis=(0, 1)), truth[drawn].max(axis=(0, 1))
@@ -101,7 +101,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
     return {
         "name": clip.facts.name,
         "joints": short_names(clip.facts.joint_names) if body else [],
-        "parents": [] if clip.parents is None else _drawn_from(clip.parents, carries),
+        "parents": [] if clip.parents is None else _line_parents(clip.parents, carries),
         "drawn": drawn.tolist(),
         "size": size,
         "cell": cell,
@@ -135,14 +135,14 @@ def _choice_data(
     return {
         "name": result.choice.name,
         "title": result.choice.title,
-        "about": _about(result, keyed, every, thinned=len(within) < count),
+        "about": _summary_text(result, keyed, every, thinned=len(within) < count),
         "first": first,
         "count": count,
         "every": every,
         "seen": [int(np.searchsorted(seen, first)), len(within)],
         "keyed": keyed,
         "worst": largest,
-        "factor": _factor(largest, SEEN_AS[body] * size),
+        "factor": _magnification(largest, SEEN_AS[body] * size),
         "joint": int(np.argmax(by_joint)),
         "top": full_colour(of_joints) if of_joints else 0.0,
         "motions": [
@@ -164,7 +164,7 @@ def _choice_data(
 def _deviations(
     block: PackedNumbers, clip: ClipResult, motion: MotionResult, within: np.ndarray, first: int
 ) -> dict[str, Description]:
-    """How far a mode is from the recording at these samples of the clip."""
+    """Return a mode's deviations from the recording at these samples of the clip."""
     at = within - first
     away = _joints(motion.poses)[:, at] - _joints(clip.truth)[:, within]
     result = {"away": block.put(away.transpose(0, 2, 1).reshape(-1, len(at)))}
@@ -182,7 +182,7 @@ def _deviations(
 
 @lru_cache(maxsize=4)
 def mesh_data(mesh: Mesh) -> dict[str, Any]:
-    """Return a mesh as the viewer draws it."""
+    """Return a mesh in the form that the viewer draws."""
     block = PackedNumbers()
     edges = mesh.edges()
     none = np.zeros((1, edges.shape[1]))
@@ -196,18 +196,18 @@ def mesh_data(mesh: Mesh) -> dict[str, Any]:
 
 
 def json_in_page(content: Any) -> str:
-    """JSON that can stand in a script element, whatever the strings in it are."""
+    """Return JSON that is safe inside a script element, for any strings in it."""
     text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
 def _joints(poses: Poses) -> np.ndarray:
-    """Positions with the joints first, shape (joints, n, 3)."""
+    """Return positions with the joints first, shape (joints, n, 3)."""
     return poses.positions if poses.positions.ndim == 3 else poses.positions[None]
 
 
-def _seen(clip: ClipResult) -> np.ndarray:
-    """Return the samples of the clip that the view has."""
+def _view_samples(clip: ClipResult) -> np.ndarray:
+    """Return the indices of the clip's samples that go into the view."""
     count, motions = len(clip.times), [motion for result in clip.choices for motion in result.motions]
     body = clip.parents is not None
     a_sample = (7 if body else 12) * len(_joints(clip.truth)) * max(len(motions), 1)
@@ -222,17 +222,17 @@ def _seen(clip: ClipResult) -> np.ndarray:
 
 
 def peaks(errors: np.ndarray, every: int) -> np.ndarray:
-    """Return the largest of every few samples, shape (3, about n / every)."""
+    """Return the largest of every `every` samples, shape (3, about n / every)."""
     return np.maximum.reduceat(errors, np.arange(0, errors.shape[1], every), axis=1) if every > 1 else errors
 
 
-def _drawn_from(parents: np.ndarray, carries: np.ndarray) -> list[int]:
-    """Return the parents to draw lines from: none from a root that only carries the body about."""
+def _line_parents(parents: np.ndarray, carries: np.ndarray) -> list[int]:
+    """Return the parent that each joint's line starts at: -1 for none, also if that is a root that only carries."""
     return np.where((parents >= 0) & carries[parents], -1, parents).tolist()
 
 
-def _factor(largest: float, seen_as: float) -> int:
-    """By how much to magnify so that the largest deviation is seen, and looks no larger than this."""
+def _magnification(largest: float, seen_as: float) -> int:
+    """Return the magnification that makes the largest deviation visible, but at most `seen_as` large."""
     return (
         next(factor for factor in MAGNIFICATION_FACTORS if factor * largest <= seen_as or factor == 1)
         if largest > MAX_ROUNDING_M
@@ -241,22 +241,22 @@ def _factor(largest: float, seen_as: float) -> int:
 
 
 def nice(length: float) -> float:
-    """1, 2 or 5 times a power of ten, at least this."""
+    """Return the smallest 1, 2 or 5 times a power of ten that is at least `length`."""
     power = 10.0 ** floor(log10(length))
     return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= length)
 
 
 def size_as_text(metres: float) -> str:
-    """Return a length in the unit in which it has few digits."""
+    """Return a length as text, in the unit that needs few digits."""
     return f"{1e3 * metres:g} mm" if metres < 0.01 else f"{100 * metres:g} cm" if metres < 1.0 else f"{metres:g} m"
 
 
 def _extent(places: np.ndarray) -> float:
-    """How large a body is, from joints (joints, n, 3): the median of its diagonal over time."""
+    """Return the size of a body from its joints (joints, n, 3): the median over time of its bounding box's diagonal."""
     return float(np.median(np.linalg.norm(np.ptp(places, axis=0), axis=1)))
 
 
-def _about(result: ChoiceResult, keyed: bool, every: int, *, thinned: bool) -> str:
+def _summary_text(result: ChoiceResult, keyed: bool, every: int, *, thinned: bool) -> str:
     row = result.motions[0].metrics[0]
     if keyed:
         counts = sorted({count for motion in result.motions if (count := motion.metrics[0].keys) is not None})
@@ -271,10 +271,10 @@ def _about(result: ChoiceResult, keyed: bool, every: int, *, thinned: bool) -> s
 
 
 CREASE_COSINE = np.cos(np.radians(35.0))
-"""Faces that meet at a sharper angle keep an edge between them, in the shading and in the wireframe."""
+"""Faces that meet at a sharper angle (over 35 degrees) have an edge between them, in shading and wireframe."""
 
 MOST_TRIANGLES = 6000
-"""More would make the page slow and large."""
+"""Maximum number of triangles: more would make the page slow and large."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,17 +284,17 @@ class Mesh:
     Raises
     ------
     ValueError
-        Where it has more, or none.
+            If it has more, or none.
     """
 
     vertices: np.ndarray
     """Shape (v, 3), in metres."""
 
     triangles: np.ndarray
-    """Shape (t, 3), numbers of vertices, counter-clockwise from outside."""
+    """Shape (t, 3), vertex indices, counter-clockwise from outside."""
 
     tints: np.ndarray | None = None
-    """Shape (t,), 0 to 1: how much of a triangle's colour is its mode's, and not grey. All of it unless given."""
+    """Shape (t,), 0 to 1: how much of a triangle's colour is its mode's rather than grey. 1 for all by default."""
 
     def __post_init__(self) -> None:
         if not 0 < len(self.triangles) <= MOST_TRIANGLES:
@@ -307,12 +307,12 @@ class Mesh:
 
     @property
     def middle(self) -> np.ndarray:
-        """Of the bounding box, shape (3,)."""
+        """The centre of the bounding box, shape (3,)."""
         used = self.vertices[np.unique(self.triangles)]
         return (used.min(axis=0) + used.max(axis=0)) / 2.0
 
     def corners(self) -> np.ndarray:
-        """Return what is drawn of every corner of every triangle, shape (7, 3 t): its place, its normal, its tint."""
+        """Return position, normal and tint of every corner of every triangle, shape (7, 3 t)."""
         places, faces, owners = self._faces()
         normals = np.zeros((len(owners), 3))
         order = np.argsort(owners, kind="stable")
@@ -327,7 +327,7 @@ class Mesh:
         return np.concatenate((places.T, normals.T, np.repeat(tints, 3)[None]))
 
     def edges(self) -> np.ndarray:
-        """Both ends of every sharp edge, shape (6, e)."""
+        """Return both ends of every sharp edge, shape (6, e)."""
         places, faces, owners = self._faces()
         pairs = owners.reshape(-1, 3)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
         ordered, kinds = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
@@ -335,14 +335,14 @@ class Mesh:
         sums = np.zeros((len(ordered), 3))
         counts = np.bincount(kinds.ravel(), minlength=len(ordered))
         np.add.at(sums, kinds.ravel(), np.repeat(unit, 3, axis=0))
-        # The sum of two unit vectors is as long as the angle between them is small.
+        # The smaller the angle between two unit vectors, the longer is their sum.
         flat = (counts == 2) & ((sums * sums).sum(axis=1) > 2.0 + 2.0 * CREASE_COSINE)
         _, firsts = np.unique(owners, return_index=True)
         ends = places[firsts][ordered[~flat]]
         return ends.reshape(-1, 6).T
 
     def _faces(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Places of all corners (3 t, 3), normals of faces by their size (t, 3), and which corners are at one place."""
+        """Return corner positions (3 t, 3), area-scaled normals of faces (t, 3), and each corner's merged vertex."""
         places = np.asarray(self.vertices, dtype=float)[self.triangles].reshape(-1, 3)
         _, owners = np.unique(np.round(places, 6), axis=0, return_inverse=True)
         a, b, c = places.reshape(-1, 3, 3).transpose(1, 0, 2)
@@ -351,5 +351,5 @@ class Mesh:
 
 @cache
 def drill() -> Mesh:
-    """Return the drill that films have, of few triangles."""
+    """Return the low-poly version of the drill shown in films."""
     return Mesh(**np.load(ASSETS / "drill.npz"))

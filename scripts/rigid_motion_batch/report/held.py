@@ -1,6 +1,6 @@
-"""What should not move: how far bodies slip that hold one another, and how far points move that stay.
+"""Slip report: how far held objects slip in their holders, and how far points that should stay move.
 
-A table for each pair, and sentences.
+Contains a table for each pair, and sentences.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .numbers import STILL_AT, Numbers, digits, listed
 from .tables import Grid, grid_rows
 
 MOST_SAID = 5
-"""Pairs, or clips, that a sentence is said of; more pairs are counted."""
+"""Maximum number of pairs, or clips, that get a sentence; further pairs are only counted."""
 
 
 def slip_grids(pairs: Sequence[PairSlips], numbers: Numbers) -> list[Grid]:
@@ -35,7 +35,7 @@ def slip_grids(pairs: Sequence[PairSlips], numbers: Numbers) -> list[Grid]:
 
 
 def slips_in_mm(pair: PairSlips, numbers: Numbers) -> np.ndarray:
-    """Return the largest slips of a pair, shape (choices, modes); NaN where there are none."""
+    """Return the largest slips of a pair in mm, shape (choices, modes); NaN where there are none."""
     values = np.full((len(numbers.choices), len(numbers.modes)), np.nan)
     for some in pair.choices:
         for row in some.rows:
@@ -44,9 +44,9 @@ def slips_in_mm(pair: PairSlips, numbers: Numbers) -> np.ndarray:
 
 
 def slip_sentences(pairs: Sequence[PairSlips], numbers: Numbers, spoken_of: Choice | None) -> list[str]:
-    """Return a sentence for each of the first pairs: what the reference, straight lines and the best mode make of it.
+    """Return a sentence for each of the first pairs, with the slips of the reference, straight lines and the best mode.
 
-    With the choice of keys that the verdict speaks of, or the first that there is.
+    Uses the choice of keys that the verdict is about, or the first one with slips.
     """
     result = []
     for pair in pairs[:MOST_SAID]:
@@ -54,8 +54,8 @@ def slip_sentences(pairs: Sequence[PairSlips], numbers: Numbers, spoken_of: Choi
         known = np.isfinite(values).any(axis=1)
         if not known.any():
             continue
-        at = _shown(numbers, known, spoken_of)
-        said = _listed(values[at], numbers)
+        at = _choice_index(numbers, known, spoken_of)
+        said = _values_text(values[at], numbers)
         choice = numbers.choices[at]
         own = next(some.rows[0].recorded_slip_m for some in pair.choices if some.choice == choice)
         result.append(
@@ -69,25 +69,25 @@ def slip_sentences(pairs: Sequence[PairSlips], numbers: Numbers, spoken_of: Choi
 
 
 def still_sentences(numbers: Numbers, spoken_of: Choice | None) -> list[str]:
-    """Return the same of the first clips that have a point which stays, such as a pivot."""
+    """Return the same sentences for the first clips that have a point which stays, such as a pivot."""
     result: list[str] = []
     for name, values in zip(numbers.clips, numbers.values[STILL_AT], strict=True):
         known = np.isfinite(values).any(axis=1)
         if known.any() and len(result) < MOST_SAID:
-            at = _shown(numbers, known, spoken_of)
-            said, phrase = _listed(values[at], numbers), numbers.choices[at].phrase
+            at = _choice_index(numbers, known, spoken_of)
+            said, phrase = _values_text(values[at], numbers), numbers.choices[at].phrase
             result.append(f"{name} has a point that stays in the recording; it is off by up to {said} {phrase}.")
     return result
 
 
-def _shown(numbers: Numbers, known: np.ndarray, spoken_of: Choice | None) -> int:
-    """Return the place of the choice that is spoken of, or of the first of those that are known."""
+def _choice_index(numbers: Numbers, known: np.ndarray, spoken_of: Choice | None) -> int:
+    """Return the index of the choice that the verdict is about, or of the first one with values."""
     asked = numbers.choices.index(spoken_of) if spoken_of in numbers.choices else 0
     return asked if known[asked] else int(np.argmax(known))
 
 
-def _listed(values: np.ndarray, numbers: Numbers) -> str:
-    """Return the numbers, in mm, of the reference, of straight lines and of the best mode, of values (modes,)."""
+def _values_text(values: np.ndarray, numbers: Numbers) -> str:
+    """Return text with the values (modes,), in mm, of the reference, of straight lines and of the best mode."""
     at = {group[0]: values[numbers.modes.index(group[0])] for group in numbers.groups()}
     shown = {mode: digits(value) for mode, value in at.items() if np.isfinite(value)}
     least = min(shown.values(), key=float)

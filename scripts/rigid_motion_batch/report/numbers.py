@@ -1,6 +1,6 @@
-"""The numbers of a run as one array, gathered clip by clip: thousands of clips are a few megabytes.
+"""The numbers of a run as one array, gathered clip by clip; thousands of clips take a few megabytes.
 
-Values are in the units that the report shows: millimetres, degrees, keys and bytes a second.
+Values are in the units that the report shows: millimetres, degrees, keys per second and bytes per second.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rigid_motion_batch.analysis.results import ChoiceNumbers
 
 @dataclass(frozen=True)
 class Measure:
-    """A number that a clip has under one choice of keys and one mode."""
+    """A number of each clip, for one choice of keys and one mode."""
 
     metric: str
     """The field of `Metrics`."""
@@ -28,7 +28,7 @@ class Measure:
     title: str
     unit: str
     factor: float = 1.0
-    """From the metric's unit to this one."""
+    """Converts the metric's unit to this one."""
 
     def of(self, row: Metrics) -> float:
         value = getattr(row, self.metric)
@@ -50,7 +50,7 @@ MEASURES = (
 NONE, MINUS = "\u2013", "\u2212"
 
 ERROR_AT, LARGEST_AT, KEYS_AT, STILL_AT = 0, 2, 6, 9
-"""Places of measures. The RMS shell error decides, or the keys a second where a tolerance limits the error."""
+"""Indices of measures. The RMS shell error decides, or the keys per second if a tolerance limits the error."""
 
 KINDS: tuple[type[Choice], ...] = (Uniform, Budget, Tolerance)
 
@@ -61,44 +61,44 @@ class Numbers:
 
     clips: tuple[str, ...]
     choices: tuple[Choice, ...]
-    """By kind, and from the smallest amount to the largest."""
+    """Sorted by kind, then by amount."""
 
     modes: tuple[str, ...]
     values: np.ndarray
-    """Shape (measures, clips, choices, modes); NaN where a clip is too short for a choice."""
+    """Shape (measures, clips, choices, modes); NaN if a clip is too short for a choice."""
 
     groupings: tuple[frozenset[Groups], ...]
-    """Of each clip, the modes that are one motion under each choice."""
+    """For each clip, the modes that give identical motion, under each choice."""
 
     asked: str = REFERENCE
-    """The mode that others are to be held against, if it is among them."""
+    """The mode to compare others with, if the run includes it."""
 
     @property
     def reference(self) -> str | None:
-        """The mode that others are held against."""
+        """The mode that others are compared with; None if the run lacks it."""
         return self.asked if self.asked in self.modes else None
 
     def label(self, mode: str) -> str:
-        """Return the name of a mode, without its algebra."""
+        """Return the name of a mode, without its algebra in brackets."""
         return label_of(mode).partition(" (")[0]
 
     def joined(self, modes: Iterable[str]) -> str:
-        """Return the names of modes that are one motion."""
+        """Return the names of modes that give identical motion, joined by "="."""
         return " = ".join(map(self.label, modes))
 
     def groups(self, clip: int | None = None) -> Groups:
-        """Return the modes, those together that are one motion on a clip, or on all of them, under every choice."""
+        """Return the modes grouped by identical motion, under every choice, on one clip or on all."""
         groupings = self.groupings if clip is None else self.groupings[clip : clip + 1]
         return joint_groups(sorted({groups for some in groupings for groups in some}))
 
     def mean(self, clip: int | None = None) -> np.ndarray:
-        """Return the numbers of a clip, or geometric means over those with any, shape (measures, choices, modes)."""
+        """Return a clip's numbers, or geometric means over clips with values, shape (measures, choices, modes)."""
         if clip is not None or len(self.clips) == 1:
             return self.values[:, clip or 0]
         return np.stack([geometric_mean(of_clips) for of_clips in self.values])
 
     def deciding(self, choice: int) -> int:
-        """Return the measure that decides under a choice."""
+        """Return the index of the measure that decides under a choice."""
         return KEYS_AT if isinstance(self.choices[choice], Tolerance) else ERROR_AT
 
 
@@ -106,9 +106,9 @@ RMS_IS = "RMS is a mean over time in which large errors count more."
 
 
 def error_is(rigid: float | None, joint: float | None, clips: int) -> str:
-    """Return what the errors are, for somebody who has never seen them.
+    """Return a sentence that explains the errors to a reader who has never seen them.
 
-    The radii in metres of rigid bodies and of joints, where there are any, and how many clips there are.
+    `rigid` and `joint` are the radii in metres for rigid bodies and joints, if there are any; `clips` is a count.
     """
     around = [] if rigid is None else [f"{100.0 * rigid:g} cm of the body's origin"]
     around += [] if joint is None else [f"{100.0 * joint:g} cm of a joint"]
@@ -117,23 +117,23 @@ def error_is(rigid: float | None, joint: float | None, clips: int) -> str:
 
 
 def who_else(numbers: Numbers) -> str:
-    """Return who does without this program what one of the modes does; nothing where none is among them."""
+    """Return a sentence on what most game engines do; empty if that mode is not in the run."""
     known = STATE_OF_THE_ART in numbers.modes
     return f"{numbers.label(STATE_OF_THE_ART)} is what most game engines do." if known else ""
 
 
 class Gathering:
-    """Numbers while clips come in, one at a time."""
+    """Collects the numbers of clips, one clip at a time."""
 
     def __init__(self, reference: str = REFERENCE) -> None:
         self.reference = reference
         self._clips: list[str] = []
         self._rows: list[tuple[tuple[Choice, ...], tuple[str, ...], np.ndarray]] = []
-        """Of each clip its choices, its modes, and its numbers, shape (measures, choices, modes)."""
+        """For each clip its choices, its modes, and its numbers, shape (measures, choices, modes)."""
         self._groupings: list[frozenset[Groups]] = []
 
     def add(self, clip: str, results: Sequence[ChoiceNumbers]) -> None:
-        """Take the numbers of a clip of this name."""
+        """Add the numbers of a clip."""
         choices = tuple(result.choice for result in results)
         modes = tuple(dict.fromkeys(row.mode for result in results for row in result.rows))
         values = np.full((len(MEASURES), len(choices), len(modes)), np.nan)
@@ -145,7 +145,7 @@ class Gathering:
         self._groupings.append(frozenset(result.groups for result in results))
 
     def numbers(self) -> Numbers:
-        """All of them. Raises ValueError where no clip had a result."""
+        """Return the numbers of all clips. Raises ValueError if no clip had a result."""
         result = dict.fromkeys(choice for choices, _, _ in self._rows for choice in choices)
         choices = tuple(sorted(result, key=lambda choice: (KINDS.index(type(choice)), choice.size)))
         modes = tuple(dict.fromkeys(mode for _, own, _ in self._rows for mode in own))
@@ -159,7 +159,7 @@ class Gathering:
 
 
 def digits(value: float | None, places: int = 3) -> str:
-    """Return a number with so many significant digits, as tables show it."""
+    """Return a number with `places` significant digits, as tables show it."""
     if value is None or not isfinite(value):
         return NONE
     if abs(value) < MAX_ROUNDING_M * 1e3:
@@ -174,5 +174,5 @@ def listed(words: Iterable[str]) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share as prose has it: "64 %"."""
+    """Return a fraction as prose has it: "64 %"."""
     return f"{100 * share:.0f}\u00a0%"

@@ -1,7 +1,7 @@
-"""Pages: what the other modules made of a run, put into the templates, with the viewer and its data in the page itself.
+"""HTML pages of the report: fills the templates with the other modules' results, the viewer and its data.
 
-A content security policy forbids every request, and every script but the page's own; films, and data that would be too
-large for the page, are files beside it.
+A content security policy forbids every request, and every script except the page's own; films, and data too large for
+the page, are separate files next to it.
 """
 
 from __future__ import annotations
@@ -39,18 +39,18 @@ from .tables import Joints, joints_of
 from .verdict import verdict
 
 IN_THE_PAGE = 5_000_000
-"""Bytes of data of all clips; where they are more, each clip has a file beside the page."""
+"""Maximum bytes of data of all clips in the page; above it, each clip has a file next to the page."""
 
 MOST_TABS = 8
-"""More clips are a list to choose from."""
+"""Maximum number of clips shown as tabs; more become a list to choose from."""
 
 NO_BREAK = "\u00a0"
 
 MOST_WARNINGS = 3
-"""More are folded."""
+"""Maximum number of warnings shown; more are folded."""
 
 Films = Mapping[tuple[str, str], Path | None]
-"""(clip name, name of the choice) to its film, which may not be there yet; None where it could not be made."""
+"""(clip name, name of the choice) to its film, which may not exist yet; None if it could not be made."""
 
 
 def write_report(
@@ -65,37 +65,37 @@ def write_report(
     overview: str = "",
     advance: Callable[[], object] = lambda: None,
 ) -> list[Path]:
-    """Write one page on some clips.
+    """Write one page about the given clips.
 
     Parameters
     ----------
     path : Path
-        Of the page.
+            The page's file.
     clips : iterable of ClipResult
-        Gone through once, and only one of them is in memory at a time.
+            Iterated once, with only one clip in memory at a time.
     settings : Settings
     films : mapping, optional
-        Nothing where the run does without films.
+            Empty if the run makes no films.
     folder : Path, optional
-        Where the page will be in the end: what links are relative to. That of `path` unless given.
+            The page's final folder, which links are relative to. Defaults to that of `path`.
     mesh : Mesh, optional
-        Of the object that single rigid bodies move in the viewer; a drill unless given.
+            The object that single rigid bodies move in the viewer; a drill by default.
     slips : sequence of PairSlips
-        Of clips that hold one another.
+            Slips of clips that hold one another.
     overview : str
-        The way to a page of more clips; empty where there is none.
+            The link to a page of more clips; empty if there is none.
     advance : callable
         Called once for every clip.
 
     Returns
     -------
     list of Path
-        The page, and the files of data that were written beside it, in a folder named after it.
+            The page, and the data files written next to it, in a folder named after it.
 
     Raises
     ------
     ValueError
-        Where there is nothing to report.
+            If there is nothing to report.
     """
     folder = folder or path.parent
     films, mesh = films or {}, mesh or drill()
@@ -108,7 +108,7 @@ def write_report(
         advance()
     numbers = gathering.numbers()
     context = _context(numbers, page.facts, page.needed, settings, slips)
-    start = _start(numbers, page.choices, context["verdict"].choice)
+    start = _initial_view(numbers, page.choices, context["verdict"].choice)
     context |= {
         "clips": page,
         "overview": overview,
@@ -144,19 +144,19 @@ def write_overview(
     slips: Sequence[PairSlips] = (),
     advance: Callable[[], object] = lambda: None,
 ) -> None:
-    """Write the page of many clips, those that matter first: with a warning, and then by the largest error.
+    """Write the page of many clips, most important first: clips with warnings, then by the largest error.
 
     Parameters
     ----------
     path, clips, settings, slips, advance
-        As of `write_report`; of the clips the numbers alone are looked at.
+            As in `write_report`; only the numbers of the clips are used.
     pages : mapping
-        Clip name to the way from this page to the clip's; None where there is none.
+            Clip name to the link from this page to the clip's page; None if there is none.
 
     Raises
     ------
     ValueError
-        Where there is nothing to report.
+            If there is nothing to report.
     """
     gathering = Gathering(settings.reference)
     needed: list[KeysNeeded] = []
@@ -183,7 +183,7 @@ def write_overview(
 
 
 class _Clips:
-    """What a page has of its clips, gathered one after the other."""
+    """The contents of a page about its clips, gathered one clip at a time."""
 
     def __init__(self, path: Path, films: Films, folder: Path, mesh: Mesh) -> None:
         self.facts: list[ClipFacts] = []
@@ -193,9 +193,9 @@ class _Clips:
         self.joints: list[Joints] = []
         self.films: list[tuple[int, Choice, str | None]] = []
         self.places: list[dict[str, Any]] = []
-        """What the script finds them by."""
+        """Names of the clips and addresses of their data files, for the script."""
         self.inside: list[str] = []
-        """Their data, as JSON."""
+        """The clips' data, as JSON."""
         self.files: list[Path] = []
         self._warned: list[tuple[str, tuple[Any, ...], float]] = []
         self._path, self._films, self._folder, self._mesh = path, films, folder, mesh
@@ -221,7 +221,7 @@ class _Clips:
             self._move_out()
 
     def _move_out(self) -> None:
-        """Have the data of all clips so far in files beside the page: script elements bring them, also from disks."""
+        """Move the data of all clips so far to files next to the page; script elements load them, even from a disk."""
         beside = self._path.with_name(f"{self._path.stem}_data")
         for place, data in enumerate(self.inside):
             if data:
@@ -235,7 +235,7 @@ class _Clips:
         return None if film is None else quote(Path(os.path.relpath(film, self._folder)).as_posix())
 
     def warnings(self, choice: str) -> list[dict[str, str]]:
-        """All warnings, with the addresses of their moments under a choice."""
+        """Return all warnings, with links to their moments under a choice."""
         return [
             {
                 "clip": name,
@@ -248,10 +248,10 @@ class _Clips:
         ]
 
 
-def _start(
+def _initial_view(
     numbers: Numbers, choices: Sequence[tuple[str, tuple[Choice, ...]]], spoken_of: Choice | None
 ) -> tuple[str, str]:
-    """Return what the page opens with: the choice of the verdict, and the clip with the largest error."""
+    """Return the clip with the largest error and the verdict's choice, which the page opens with."""
     at = numbers.choices.index(spoken_of) if spoken_of else 0
     mode = numbers.modes.index(numbers.reference) if numbers.reference else 0
     largest = numbers.values[LARGEST_AT, :, at, mode]
@@ -336,14 +336,14 @@ def _context(
 
 
 def _csv(rows: Sequence[Metrics]) -> str:
-    """Rows as the address of a table, as in metrics.csv."""
+    """Return a table as in metrics.csv, as a data URL."""
     lines = (line_of(("" if cell is None else cell) for cell in astuple(row)) for row in rows)
     text = "".join((line_of(column.name for column in fields(Metrics)), *lines))
     return f"data:text/csv;base64,{base64.b64encode(text.encode()).decode('ascii')}"
 
 
 def marked(sentence: str, numbers: Numbers) -> Markup:
-    """Return a sentence with its numbers, and the names of modes in their colours, made to stand out."""
+    """Return a sentence as HTML with its numbers in bold and the names of modes in their colours."""
     names = {str(escape(numbers.label(mode))): place for place, mode in enumerate(numbers.modes)}
     known = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
 

@@ -1,6 +1,6 @@
-"""The page of reduced files: what each was and is in bytes and keys, and its clips before and after, side by side.
+"""The page about reduced files: their bytes and keys before and after, with both versions playing side by side.
 
-It is one file with the viewer of comparisons, in which the two are what modes are there.
+One file with the viewer of comparisons, where "before" and "after" take the place of modes.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from .data import MOST_CHARTED, Mesh, PackedNumbers, json_in_page, mesh_data, ni
 from .rendering import SCRIPTS, address, script_of, shaders, style, write_page
 
 BEFORE, AFTER = "lerp_slerp", "dq_sclerp"
-"""The modes whose colours they have."""
+"""The modes whose colours "before" and "after" have."""
 
 CHOICE = "reduced"
 
 DRAWN_STEP_RATIO = 1e-4
-"""Of the size of a body: how finely its joints are drawn."""
+"""The precision of drawn joint positions, as a fraction of the body's size."""
 
 MOST_TABS = 8
-"""More clips are a list to choose from."""
+"""Maximum number of clips shown as tabs; more become a list to choose from."""
 
 IN_THE_PAGE = 40_000_000
-"""Bytes of all clips that can be played; of more files, those play that had most bytes."""
+"""Maximum bytes of playable clips in the page; above it, the files that had most bytes are kept."""
 
 MIN_BETWEEN_FRAMES_RATIO = 1.02
-"""By how much an error between frames is larger than those that were proven, where it is worth a word."""
+"""An error between frames is mentioned if it exceeds the proven errors by this ratio."""
 
 UNMOVED = Mesh(np.eye(3), np.arange(3)[None])
-"""The viewer wants a mesh, although it draws bodies alone."""
+"""A placeholder mesh: the viewer requires one, although it only draws bodies here."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +49,17 @@ class ShownClip:
     name: str
     joints: Sequence[str]
     parents: np.ndarray
-    """The points that lines lead from, -1 for none, shape (points,)."""
+    """The index of the point that each point's line starts at, -1 for none, shape (points,)."""
 
     before: np.ndarray
     after: np.ndarray
-    """Where points are at the moments, shape (points, moments, 3): the joints, and what is drawn beside them."""
+    """Positions at the drawn moments, shape (points, moments, 3): of the joints, and other points drawn with them."""
 
     times: np.ndarray
-    """Seconds at which errors are known."""
+    """Times, in seconds, at which errors are known."""
 
     moments: np.ndarray
-    """Which of them are drawn."""
+    """The indices of the times that are drawn."""
 
     errors: np.ndarray
     """Shape (times,)."""
@@ -69,14 +69,14 @@ class ShownClip:
 
     worst_joint: int
     keys: tuple[np.ndarray, np.ndarray]
-    """Which of the times have keys, before and after."""
+    """The indices of the times that have keys, before and after."""
 
     key_counts: tuple[int, int]
     bytes: tuple[int, int]
 
 
 def clip_data(shown: ShownClip) -> dict[str, Any]:
-    """Return what the viewer has of a clip: see `data.clip_data`."""
+    """Return the viewer's data about a clip: see `data.clip_data`."""
     block, recorded, times = PackedNumbers(), PackedNumbers(), shown.times - shown.times[0]
     low, high = shown.before.min(axis=(0, 1)), shown.before.max(axis=(0, 1))
     truth = shown.before - (low + high) / 2.0
@@ -137,7 +137,7 @@ def clip_data(shown: ShownClip) -> dict[str, Any]:
 
 
 def _rows(points: np.ndarray) -> np.ndarray:
-    """Points (points, moments, 3) as rows of one coordinate each."""
+    """Return points (points, moments, 3) as rows of one coordinate each."""
     return points.transpose(0, 2, 1).reshape(-1, points.shape[1])
 
 
@@ -150,7 +150,7 @@ def _grouped(number: float) -> str:
 
 @dataclass(frozen=True)
 class Row:
-    """A file in the table."""
+    """A file's row in the table."""
 
     name: str
     state: str
@@ -162,32 +162,32 @@ class Row:
     """In metres."""
 
     tolerance: float | None
-    """None where a number of keys was asked for instead."""
+    """None if a number of keys was requested instead."""
 
     where: str
     address: str
-    """Of the clip of it that had most bytes; empty where none can be played."""
+    """The link to the file's clip that had most bytes; empty if no clip can be played."""
 
     @property
     def share(self) -> float | None:
-        """Of the bytes that are left."""
+        """The fraction of bytes that is left."""
         return self.bytes[1] / self.bytes[0] if self.bytes and self.bytes[0] else None
 
 
 def write_reduced(
     path: Path, done: Sequence[tuple[Mapping[str, Any], Sequence[dict[str, Any]]]], program: str, command: str
 ) -> None:
-    """Write the page of some files.
+    """Write the page about the given files.
 
     Parameters
     ----------
     path : Path
     done : sequence of pairs
-        What became of each input, as `reduce.py --json` has it, and the data of its clips that can be played.
+            The result of each input, as in `reduce.py --json`, and the data of its clips that can be played.
     program : str
         Name and version.
     command : str
-        As one would type it.
+            The command line, as typed.
     """
     names = _names([fate["source"] for fate, _ in done])
     order = sorted(range(len(done)), key=lambda place: (not done[place][0]["written"], -_saved(done[place][0])))
@@ -207,13 +207,13 @@ def write_reduced(
                 places.append({"name": title, "data": ""})
                 inside.append(data)
         rows.append(_row(names[place], fate, first))
-    total = _sum(rows)
+    total = _total_row(rows)
     between = max((choice["worst"] for _, views in done for view in views for choice in view["choices"]), default=0.0)
     context = {
         "rows": rows,
         "sum": total,
         "between": between if total.error is not None and between > MIN_BETWEEN_FRAMES_RATIO * total.error else None,
-        "states": _counted(row.state for row in rows),
+        "states": _state_counts(row.state for row in rows),
         "clips": places,
         "left_out": sum(len(views) for _, views in done) - len(places),
         "unplayed": sum(bool(fate["written"] and not views) for fate, views in done),
@@ -244,7 +244,7 @@ def write_reduced(
 
 
 def _names(sources: Sequence[str]) -> list[str]:
-    """Return what files are called on the page: their paths from the folder that all of them are in."""
+    """Return the names of files on the page: their paths relative to their common folder."""
     folders = {Path(os.path.abspath(source)).parent for source in sources}
     try:
         common = os.path.commonpath(folders)
@@ -254,7 +254,7 @@ def _names(sources: Sequence[str]) -> list[str]:
 
 
 def _title(file: str, clip: str, taken: set[str]) -> str:
-    """Return what a clip is called, which no other one is."""
+    """Return a unique title for a clip."""
     title = wanted = file if clip == Path(file).stem else f"{file}: {clip}"
     number = 1
     while title in taken:
@@ -287,8 +287,8 @@ def _row(name: str, fate: Mapping[str, Any], first: str) -> Row:
     )
 
 
-def _sum(rows: Sequence[Row]) -> Row:
-    """Return all that was reduced as one."""
+def _total_row(rows: Sequence[Row]) -> Row:
+    """Return the row with the totals of all reduced files."""
 
     def total(pairs: Iterable[tuple[int, int] | None]) -> tuple[int, int] | None:
         known = [pair for pair in pairs if pair]
@@ -300,7 +300,7 @@ def _sum(rows: Sequence[Row]) -> Row:
     return Row("All", "", "", clips, keys, weighs, largest, None, "", "")
 
 
-def _counted(states: Iterable[str]) -> str:
-    """Return how many files are in each state, but for those that were written."""
+def _state_counts(states: Iterable[str]) -> str:
+    """Return how many files are in each state, except the written ones."""
     counts = Counter(state for state in states if "written" not in state)
     return ", ".join(f"{count} {state}" for state, count in sorted(counts.items()))

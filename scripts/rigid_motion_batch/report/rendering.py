@@ -1,4 +1,4 @@
-"""Templates, style and scripts, put together: a page is one file that asks for nothing and runs no other script."""
+"""Rendering of pages: templates, style and scripts combined into one file with no requests and no other script."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from .numbers import digits
 HERE = Path(__file__).parent
 
 SCRIPTS = ("data", "mathematics", "state", "pointers", "drawing", "view", "chart", "tables", "page")
-"""The modules of the viewer, each after those that it imports."""
+"""The modules of the viewer, each after the modules it imports."""
 
 
 def write_page(path: Path, template: str, context: Mapping[str, Any]) -> None:
-    """Write what a template makes of a context."""
+    """Render a template with a context to a file."""
     with replacing(path) as stream:
-        stream.reconfigure(errors="backslashreplace")  # Names of files may be no text.
+        stream.reconfigure(errors="backslashreplace")  # File names may not be valid text.
         stream.writelines(_environment().get_template(template).generate(context))
 
 
@@ -49,19 +49,19 @@ def _environment() -> jinja2.Environment:
 
 
 def address(clip: str, choice: str, seconds: float | None = None) -> str:
-    """Return where a page shows a moment of a clip, as the script's `addressOf` writes it."""
+    """Return the link to a moment of a clip in a page, as the script's `addressOf` writes it."""
     moment = "" if seconds is None else f",{max(seconds, 0.0):.3f}"
     return f"#{quote(clip, safe='')},{quote(choice, safe='')}{moment}"
 
 
 def style() -> Markup:
-    """Return the style of all pages."""
+    """Return the CSS of all pages."""
     return Markup((HERE / "templates" / "page.css").read_text(encoding="utf-8"))
 
 
 @cache
 def script_of(names: tuple[str, ...]) -> Markup:
-    """Return the modules as one: imports and exports are only there for each of them alone."""
+    """Return the modules as one script, without the imports and exports between them."""
     texts = []
     for name in names:
         text = (HERE / "viewer" / f"{name}.js").read_text(encoding="utf-8")
@@ -72,7 +72,7 @@ def script_of(names: tuple[str, ...]) -> Markup:
 
 @cache
 def shaders() -> dict[str, list[str]]:
-    """Return the sources of each program: of its vertices, and of its fragments."""
+    """Return the sources of each shader program: vertex shader, fragment shader."""
     text = (HERE / "viewer" / "shaders.glsl").read_text(encoding="utf-8")
     parts = re.split(r"^//// (\w+)\n", text, flags=re.MULTILINE)[1:]
     return {name: sources.split("----\n") for name, sources in zip(parts[::2], parts[1::2], strict=True)}

@@ -1,4 +1,4 @@
-"""What the reader of a report needs to know of a run, beyond the numbers. Plain data, as parameters of tasks."""
+"""Settings of a report: facts about a run that its page shows besides the numbers. Plain data, as task parameters."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from rigid_motion_batch.analysis.modes import REFERENCE
 
 @dataclass(frozen=True)
 class PageSettings:
-    """What a page says of a run, but for its date."""
+    """Facts about a run that a page shows, except the date."""
 
     radius: float
-    """Of the shell of a rigid body, in metres."""
+    """The radius of the shell of a rigid body, in metres."""
 
     program: str
     """Name and version."""
 
     command: str
-    """The command line, as one would type it."""
+    """The command line, as typed."""
 
     reference: str = REFERENCE
-    """The mode that the others are held against."""
+    """The mode that the others are compared with."""
 
     joint_radius: float = JOINT_RADIUS_M
-    """Of the shell of a joint, in metres."""
+    """The radius of the shell of a joint, in metres."""
 
     details: Mapping[str, str] = field(default_factory=dict)
-    """Whatever else is worth a line, such as Blender's version: what it is, and its value."""
+    """Other facts worth a line, such as Blender's version: name to value."""

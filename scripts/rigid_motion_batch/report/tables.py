@@ -1,6 +1,6 @@
-"""The tables of the report, as rows of text for the templates: lower is better in all of them.
+"""Tables of the report, as rows of text for the templates; in all of them lower is better.
 
-Of whole bodies also joint by joint: errors over time, as pictures with a row for each joint, and in numbers.
+For whole bodies also per joint: errors over time, as images with a row for each joint, and as numbers.
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ class TableCell:
     small: str = ""
     best: bool = False
     value: float | None = None
-    """What it is sorted by, where that is not all of its text."""
+    """The value to sort by, if that is not the whole text."""
 
 
 @dataclass(frozen=True)
 class Row:
     modes: tuple[str, ...]
-    """Those that are one motion."""
+    """The modes that give this same motion."""
 
     cells: tuple[TableCell, ...]
 
 
 @dataclass(frozen=True)
 class Grid:
-    """All modes under all choices of keys, by one measure."""
+    """One measure, for all modes under all choices of keys."""
 
     scope: str
-    """The place of a clip, or "all"."""
+    """The index of a clip, or "all"."""
 
     column: int
-    """The measure."""
+    """The index of the measure."""
 
     caption: str
     heads: tuple[str, ...]
@@ -57,7 +57,7 @@ class Grid:
 
 
 def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
-    """Return a grid for each measure that a clip has, or that the mean over all clips has."""
+    """Return a grid for each measure that has values, for a clip or for the mean over all clips."""
     values = numbers.mean(clip)
     groups = numbers.groups(clip)
     where = (
@@ -80,12 +80,12 @@ def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
 
 
 def grid_rows(values: np.ndarray, groups: Groups, numbers: Numbers) -> tuple[Row, ...]:
-    """Return a row for each motion, of values of shape (choices, modes)."""
+    """Return a row for each motion, from values of shape (choices, modes)."""
     columns = [numbers.modes.index(group[0]) for group in groups]
     reference = numbers.modes.index(numbers.reference) if numbers.reference else None
     own = values[:, columns]
     texts = [[digits(value) for value in row] for row in own.tolist()]
-    least = [_least(row) for row in texts]
+    least = [_lowest_text(row) for row in texts]
     return tuple(
         Row(
             group,
@@ -103,14 +103,14 @@ def grid_rows(values: np.ndarray, groups: Groups, numbers: Numbers) -> tuple[Row
     )
 
 
-def _least(texts: Iterable[str]) -> str:
-    """Return the lowest as it is shown, so that ties are ties; nothing where all are."""
+def _lowest_text(texts: Iterable[str]) -> str:
+    """Return the lowest number as displayed, so that ties show as ties; empty if all are equal."""
     different = set(texts) - {NONE}
     return min(different, key=float) if len(different) > 1 else ""
 
 
 def _change(value: float, reference: int | None, row: np.ndarray, group: Sequence[str], numbers: Numbers) -> str:
-    """Return a value beside the reference's, in per cent."""
+    """Return the change of a value relative to the reference's, in percent."""
     if reference is None or not np.isfinite(value):
         return ""
     if numbers.reference in group:
@@ -123,7 +123,7 @@ def _change(value: float, reference: int | None, row: np.ndarray, group: Sequenc
 
 
 def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tuple[str, ...], str, list[TableCell]]]]:
-    """Heads, and for each motion and way to space keys the keys that are as good as the reference's at each rate."""
+    """Return column heads and rows: keys that match the reference at each rate, per motion and way to space keys."""
     together = overall(needed)
     asked = [at for at in range(len(together.rates)) if together.asked[at]]
     single = needed[0] if len(needed) == 1 else None
@@ -150,7 +150,7 @@ def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tup
 
 
 PICTURE_COLUMNS = 240
-"""Stretches of time that a picture has."""
+"""Maximum number of columns in an image, each for a stretch of time."""
 
 SHADE_COUNT = 24
 
@@ -160,30 +160,30 @@ class Joints:
     """The joints of a body under one choice of keys."""
 
     place: int
-    """Of the clip among those of the page."""
+    """The clip's index on the page."""
 
     clip: str
     choice: str
     title: str
     names: list[str]
     top: str
-    """The error that is the last colour, in mm."""
+    """The error that gets the last colour, in mm."""
 
     pictures: list[tuple[str, str]]
-    """Of each motion its name and its picture, as an address."""
+    """For each motion its name and its image, as a data URL."""
 
     worst: list[str]
-    """Of each motion the joint with the largest error, and that, in mm."""
+    """For each motion the joint with the largest error, and that error in mm."""
 
     slide: str
-    """How far a joint that stands on the ground slides in the recording itself, in mm; empty where none stands."""
+    """How far a joint that stands on the ground slides in the recording itself, in mm; empty if none stands."""
 
     rows: list[list[str]]
-    """RMS and largest error under each motion, for each joint, in mm."""
+    """For each joint, the RMS and largest error under each motion, in mm."""
 
 
 def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbers) -> Joints | None:
-    """Return the joints of a clip under a choice; None of a single rigid body."""
+    """Return the joints of a clip under a choice; None for a single rigid body."""
     motions = [motion for motion in result.motions if motion.joint_errors is not None]
     if not motions:
         return None
@@ -207,7 +207,7 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
 
 
 def heat_map(errors: np.ndarray, top: float) -> str:
-    """Return the errors (joints, n) as the address of a picture, a row for each joint, the colours ending at `top`."""
+    """Return errors (joints, n) as an image, as a data URL, with a row for each joint; `top` gets the last colour."""
     count = errors.shape[1]
     begins = np.unique(np.arange(min(PICTURE_COLUMNS, count)) * count // min(PICTURE_COLUMNS, count))
     largest = np.maximum.reduceat(errors, begins, axis=1)
@@ -217,7 +217,7 @@ def heat_map(errors: np.ndarray, top: float) -> str:
 
 
 def png(pixels: np.ndarray, palette: bytes) -> bytes:
-    """Return a picture (rows, columns) of numbers of colours, three bytes each."""
+    """Return a PNG of palette indices (rows, columns); the palette has three bytes per colour."""
 
     def chunk(kind: bytes, content: bytes) -> bytes:
         return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))

@@ -1,10 +1,9 @@
-"""The verdict: one sentence with a number that answers "which mode", and in how many cases that mode was the best.
+"""The verdict: one sentence with a number that says which mode is best, and in how many cases it was.
 
-It also names the choice of keys that it speaks of: pages open with that, and films show it. Everything is computed
-from the numbers of the run, and true for any outcome of it. Errors are RMS shell errors;
-several clips are averaged by the geometric mean, so that a large motion counts as much as a small one, and it is said
-so. Modes that are one motion throughout are one candidate, and the first of them names it. A draw is said to be one,
-and so is a loss.
+It also names the choice of keys that it is about: pages open with that choice, and films show it. The sentence is
+computed from the numbers of the run, and true for any outcome. Errors are RMS shell errors; several clips are averaged
+by the geometric mean, so a large motion counts as much as a small one, and the sentence says so. Modes that give the
+same motion throughout are one candidate, named after the first of them. Draws and losses are reported as such.
 """
 
 from __future__ import annotations
@@ -22,30 +21,30 @@ from rigid_motion_batch.analysis.needed import KeysNeeded, overall
 from .numbers import KINDS, Numbers, digits, listed, percent
 
 MAX_TIE_RATIO = 0.005
-"""Ratios closer to 1 than this are no difference: they would be shown as 0 %."""
+"""Ratios closer to 1 than this count as equal: they would be shown as 0 %."""
 
 ASKED_RATES = ("20", "15", "12", "30")
-"""The rate of the reference that the sentence on keys needed is about: the first that was possible."""
+"""Rates of the reference that the sentence on needed keys may use: the first one possible is taken."""
 
 SPACING_TEXTS = "evenly spaced", "where the motion needs them", "where needed, and fitted"
-"""How keys are placed, by `needed.DECIMATIONS`."""
+"""How keys are placed, in the order of `needed.DECIMATIONS`."""
 
 SAMPLE_IS_KEY = "No mode is off by more than rounding: every sample is a key, or nothing moves."
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a run comes to."""
+    """The conclusion of a run."""
 
     sentence: str
     choice: Choice | None = None
-    """The choice of keys that it speaks of, or the nearest to it in the run; None where no mode is off."""
+    """The choice of keys that it is about, or the nearest one in the run; None if no mode has an error."""
     wins: str = ""
-    """In how many cases the best mode was; empty of a single case."""
+    """In how many cases the best mode won; empty for a single case."""
 
     @property
     def text(self) -> str:
-        """All of it."""
+        """The sentence and the wins."""
         return " ".join(filter(None, (self.sentence, self.wins and f"{self.wins}.")))
 
 
@@ -55,11 +54,11 @@ class _Contest:
 
     numbers: Numbers
     places: tuple[int, ...]
-    """Of the choices among those of the run."""
+    """The indices of these choices among those of the run."""
 
     groups: tuple[tuple[str, ...], ...]
     values: np.ndarray
-    """What decides, shape (clips, choices, groups)."""
+    """The deciding measure, shape (clips, choices, groups)."""
 
     @property
     def kind(self) -> type:
@@ -71,12 +70,12 @@ class _Contest:
 
     @property
     def reference(self) -> int | None:
-        """The group that the reference is in."""
+        """The index of the group with the reference."""
         return next((place for place, group in enumerate(self.groups) if self.numbers.asked in group), None)
 
     @property
     def distinguishable(self) -> np.ndarray:
-        """Where all groups have a value and at least one of them has an error, shape (clips, choices)."""
+        """True where all groups have a value and at least one has an error, shape (clips, choices)."""
         least = MAX_ROUNDING_M * 1e3 if self.kind is not Tolerance else 0.0
         return np.isfinite(self.values).all(axis=2) & (self.values.max(axis=2) > least)
 
@@ -97,19 +96,19 @@ class _Contest:
 
 
 def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
-    """Return what a run says, in one sentence, and how often the best mode wins.
+    """Return the conclusion of a run in one sentence, and how often the best mode wins.
 
     Parameters
     ----------
     numbers : Numbers
     needed : sequence of KeysNeeded
-        Of the clips, where that was looked for.
+            Of the clips, if that was computed.
     """
     contests = list(_contests(numbers))
-    # What was asked is answered first: within a tolerance, how many keys.
+    # The question asked comes first: how many keys a tolerance needs.
     within = [contest for contest in contests if contest.kind is Tolerance]
-    verdicts = [*map(_beside_rival, within), _keys_needed(numbers, needed) if needed else None]
-    verdicts += [tell(contest) for contest in contests for tell in (_fewer_keys, _beside_rival)]
+    verdicts = [*map(_versus_rival, within), _keys_needed(numbers, needed) if needed else None]
+    verdicts += [tell(contest) for contest in contests for tell in (_fewer_keys, _versus_rival)]
     said = next((one for one in verdicts if one), None)
     if said is None:
         return Verdict(SAMPLE_IS_KEY)
@@ -118,12 +117,12 @@ def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
 
 
 def nearest(choices: Iterable[Choice], keys_per_s: float) -> Choice:
-    """Return the choice whose rate is nearest to so many keys a second, in ratio; tolerances come last."""
+    """Return the choice whose rate is nearest to `keys_per_s`, as a ratio; tolerances come last."""
     return min(choices, key=lambda one: (isinstance(one, Tolerance), abs(np.log(one.size / keys_per_s))))
 
 
 def _contests(numbers: Numbers) -> Iterable[_Contest]:
-    """One for each kind of choices under which anything was off."""
+    """Yield a contest for each kind of choice under which any mode had an error."""
     groups = tuple(
         own for group in numbers.groups() if (own := tuple(mode for mode in group if mode in MODES)) and own[0] in MODES
     )
@@ -140,9 +139,9 @@ def _contests(numbers: Numbers) -> Iterable[_Contest]:
 
 
 def _best(contest: _Contest) -> tuple[int, int, np.ndarray] | None:
-    """Return best group, what it is held against, and the ratios of the two, shape (choices,); None without a winner.
+    """Return the best group, its rival, and the ratios of the two, shape (choices,); None without a winner.
 
-    Held against the reference, or the next best in a run without it.
+    The rival is the reference, or the second best in a run without it.
     """
     if len(contest.groups) < 2:
         return None
@@ -161,7 +160,7 @@ def _best(contest: _Contest) -> tuple[int, int, np.ndarray] | None:
 
 
 def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Verdict | None:
-    """How few keys are as good as those of the reference at a rate, of those that were looked for."""
+    """Say how few keys are as good as the reference's at a given rate, from the keys needed."""
     together, reference = overall(needed), needed[0].reference
     rate = next((rate for rate in ASKED_RATES if together.asked[together.rates.index(rate)]), None)
     if rate is None:
@@ -183,20 +182,20 @@ def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Verdict | No
 
     said = f"As good as {theirs:.3g} evenly spaced keys a second of {label} are {amount(group)}, {SPACING_TEXTS[way]}"
     beside = next((place for place, group in enumerate(together.groups) if reference in group), group)
-    # Where keys are chosen better that is no merit of the mode: its rival has as good ones.
+    # Better placed keys are no merit of the mode: its rival can have them too.
     if beside != group and np.isfinite(shares[beside, way]):
         said += f", or {amount(beside)}"
-    return Verdict(f"{said}{_over(together.asked[at])}.", shown)
+    return Verdict(f"{said}{_mean_note(together.asked[at])}.", shown)
 
 
-def _over(clips: np.integer) -> str:
+def _mean_note(clips: np.integer) -> str:
     return f" (geometric mean over {clips} clips)" if clips > 1 else ""
 
 
 def _fewer_keys(contest: _Contest) -> Verdict | None:
-    """How far down the rate can go, until the error is that of the reference at a higher one.
+    """Say how far the rate can drop until the error equals the reference's at a higher rate.
 
-    None where the curves of this run do not tell: rates that do not cross, or an error that does not fall with them.
+    None if the curves of this run cannot tell: rates that do not cross, or an error that does not fall with the rate.
     """
     result = _best(contest)
     if contest.kind is Tolerance or not result or contest.reference is None or len(contest.places) < 2:
@@ -222,20 +221,20 @@ def _fewer_keys(contest: _Contest) -> Verdict | None:
     placed = " on average" if contest.kind is Budget else ""
     return Verdict(
         f"{most}{rate:.3g} keys a second{placed} of {contest.name(best)} are as good as {rates[highest]:g} of "
-        f"{contest.name(reference)}: {least}{percent(share)} fewer for the same error{_over(whole.sum())}.",
+        f"{contest.name(reference)}: {least}{percent(share)} fewer for the same error{_mean_note(whole.sum())}.",
         nearest(contest.choices, rate),
     )
 
 
-def _beside_rival(contest: _Contest) -> Verdict:
-    """How much closer the best mode is with as many keys, or how many fewer it needs within a tolerance."""
+def _versus_rival(contest: _Contest) -> Verdict:
+    """Say how much closer the best mode is with the same keys, or how many fewer keys it needs within a tolerance."""
     result = _best(contest)
     if not result:
         return _no_winner(contest)
     best, rival, ratios = result
     at = int(np.nanargmin(ratios))
     first, other, less = contest.name(best), contest.name(rival), percent(1.0 - ratios[at])
-    over = _over(contest.distinguishable[:, at].sum())
+    over = _mean_note(contest.distinguishable[:, at].sum())
     choice = contest.choices[at]
     if contest.kind is not Tolerance:
         placed = " on average" if contest.kind is Budget else ""
@@ -247,15 +246,16 @@ def _beside_rival(contest: _Contest) -> Verdict:
 
 
 def _no_winner(contest: _Contest) -> Verdict:
-    """Where no mode is better than the reference, or than all others; the choice with the fewest keys speaks, where
-    modes differ most.
+    """Say that no mode is better than the reference, or than all others.
+
+    The sentence is about the choice with the fewest keys, where modes differ most.
     """
     means, within = contest.means, contest.kind is Tolerance
     known = np.flatnonzero(np.isfinite(means).all(axis=1))
     at = int(known[-1] if within else known[0])
     choice = contest.choices[at]
     best = contest.reference if contest.reference is not None else int(np.argmin(means[at]))
-    over = _over(contest.distinguishable[:, at].sum())
+    over = _mean_note(contest.distinguishable[:, at].sum())
     better = means[known].min(axis=1) < (1.0 - MAX_TIE_RATIO) * means[known, best]
     if better.any():
         winners: dict[int, list[str]] = {}
@@ -278,7 +278,7 @@ def _no_winner(contest: _Contest) -> Verdict:
 
 
 def _wins(contest: _Contest) -> str:
-    """Return in how many cases the best mode was."""
+    """Say in how many cases the best mode won."""
     result = _best(contest)
     if not result or contest.distinguishable.sum() < 2:
         return ""

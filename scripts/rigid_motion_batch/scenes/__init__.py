@@ -1,1 +1,1 @@
-"""From a reconstruction to a film: the scene in which the modes move beside the recording. Needs Blender."""
+"""Scenes and films that show reconstructions: each mode moves side by side with the recording. Needs Blender."""

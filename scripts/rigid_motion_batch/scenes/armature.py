@@ -1,7 +1,7 @@
-"""Armatures: the bones of a figure as an ordinary rig, and its motion in the channels of these bones.
+"""Armatures of figures: bones as an ordinary rig, and the figure's motion in the channels of these bones.
 
-A bone begins at its joint and points along y to where the joint's bone ends, so it is turned from the joint by a turn
-of its own. Interpolation does not mind: every mode gives the same motion in a frame that is fixed to another.
+A bone begins at its joint and points along y to the end of the joint's bone, so bone and joint differ by a constant
+rotation. This does not affect interpolation: every mode gives the same motion in a rigidly attached frame.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from rigid_motion_batch.recordings.matrices import rigid
 from rigid_motion_batch.recordings.rest_bodies import LOOKED_AT, carrying
 
 LEAST_BONE = 0.02
-"""A bone is no shorter than so much of the figure: Blender removes bones of no length."""
+"""Minimum length of a bone, as a fraction of the figure's size: Blender removes bones of zero length."""
 
 MAX_STEADY_CHANGE = 1e-5
-"""Metres and parts of a quaternion: a channel that varies less is set, and not keyed."""
+"""Metres, or units of a quaternion component: a channel that varies less is set instead of keyed."""
 
 REST_QUATERNION = (1.0, 0.0, 0.0, 0.0)
 
@@ -42,17 +42,17 @@ class RestFigure:
     """Shape (joints,), in the space of the armature."""
 
     tails: np.ndarray
-    """The ends of their bones, there too: shape (joints, 3)."""
+    """The ends of the joints' bones, in the same space: shape (joints, 3)."""
 
     aside: np.ndarray
-    """Which joints only carry the others about, or stand where they move, shape (joints,)."""
+    """True for joints that only carry the others, or stand where the others move, shape (joints,)."""
 
     origin: np.ndarray
-    """The origin of that space in the figure's world: below it, on the ground. Shape (3,)."""
+    """The origin of the armature's space in the figure's world: below the figure, on the ground. Shape (3,)."""
 
     @classmethod
     def of(cls, clip: Clip) -> RestFigure:
-        """Return the figure of a clip, which may be in any unit and axes, and at rest anywhere."""
+        """Return the figure of a clip; the clip may be in any unit and axes, with a rest pose anywhere."""
         rest_body = clip.whole_body
         joints = clip.in_blender(rest_body.rest)
         turned = np.tile(REST_QUATERNION, (len(rest_body.tails), 1))
@@ -71,18 +71,18 @@ class RestFigure:
 
 
 class Rig:
-    """An armature of a figure, and what it takes to move it.
+    """An armature of a figure, and the transforms that convert joint poses to its channels.
 
     Parameters
     ----------
     name : str
     rest : Rest
     names : iterable of str
-        What its bones are to be called; Blender may cut and number them.
+            The names of its bones; Blender may shorten and number them.
     collection : bpy.types.Collection
-        What it is put into: one of the scene that is shown.
+            The collection for the object: one in the shown scene.
     like : Rig, optional
-        One of the same rest, whose bones it shares.
+            A rig with the same rest pose, to share bones with.
     """
 
     def __init__(
@@ -95,8 +95,8 @@ class Rig:
     ) -> None:
         self.obj: bpy.types.Object = bpy.data.objects.new(name, like.obj.data if like else bpy.data.armatures.new(name))
         collection.objects.link(self.obj)
-        self.bones: tuple[str, ...] = like.bones if like else _with_bones(self.obj, rest, names)
-        view_layer().update()  # A pose comes with it.
+        self.bones: tuple[str, ...] = like.bones if like else _make_bones(self.obj, rest, names)
+        view_layer().update()  # This creates the pose.
         for bone in pose_bones(self.obj):
             bone.rotation_mode = "QUATERNION"
         bones = armature(self.obj).bones
@@ -114,21 +114,19 @@ class Rig:
         self._before, self._after = placed(from_rest, to_parents), Poses(none, turns)
 
     def channels_of(self, joints: Poses) -> Poses:
-        """Return the channels of all bones where the joints have these poses in their parents' space, shape
-        (joints, n).
-        """
+        """Return the channels of all bones for poses of their joints in their parents' space, shape (joints, n)."""
         return placed(self._before[:, None], placed(joints, self._after[:, None]))
 
     def channels_of_bone(self, bone: int, joint: Poses) -> Poses:
-        """Return the channels of one bone where its joint has these poses, shape (n,)."""
+        """Return the channels of one bone for poses of its joint, shape (n,)."""
         return placed(self._before[bone], placed(joint, self._after[bone]))
 
     def joints_of(self, channels: Poses) -> Poses:
-        """Return the joints in their parents' space where the bones have these channels, shape (joints, n)."""
+        """Return the joints in their parents' space for these channels of the bones, shape (joints, n)."""
         return placed(inverse(self._before)[:, None], placed(channels, inverse(self._after)[:, None]))
 
     def key(self, bone: int, frames: np.ndarray, channels: Poses) -> None:
-        """Key a bone at frames (n,), or set it where it does not vary; its channels have the shape (n,)."""
+        """Key a bone at frames (n,), or just set it if it does not vary; the channels have shape (n,)."""
         pose_bone = pose_bones(self.obj)[self.bones[bone]]
         quaternions = align_signs(channels.quaternions)
         for name, values in (("location", channels.positions), ("rotation_quaternion", quaternions)):
@@ -139,7 +137,7 @@ class Rig:
                 setattr(pose_bone, name, values[0])
 
     def fill_in(self, mode: str) -> None:
-        """Have what happens between the keys of all bones be that of a mode of `KEYFRAME_MODES`."""
+        """Set the mode, one of `KEYFRAME_MODES`, that interpolates between the keys of all bones."""
         if mode not in KEYFRAME_MODES:
             raise ValueError(f"{mode} is not a mode of keys")
         keyed = [bone for bone in pose_bones(self.obj) if len(animation.key_frames(bone))]
@@ -147,8 +145,8 @@ class Rig:
             animation.set_mode(keyed, mode)
 
 
-def _with_bones(obj: bpy.types.Object, rest: RestFigure, names: Iterable[str]) -> tuple[str, ...]:
-    """Make the bones of an armature, and return what they are called."""
+def _make_bones(obj: bpy.types.Object, rest: RestFigure, names: Iterable[str]) -> tuple[str, ...]:
+    """Make the bones of an armature, and return their names."""
     view_layer().objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
     made: list[bpy.types.EditBone] = []

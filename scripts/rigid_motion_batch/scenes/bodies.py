@@ -1,7 +1,7 @@
-"""Bodies: a figure that moves under every mode as an ordinary rig, coloured by its errors, and the recording, a ghost.
+"""Bodies in a scene: a figure for each mode as an ordinary rig, coloured by its errors, and the recording as a ghost.
 
-How far off which joint is when lies on a mesh of its own, a vertex for each bone and frame, from which node groups
-colour the bones, flash the joints at their keys, and put a ring around the worst: the saved file plays for anyone.
+The errors of joints over time are stored in a separate mesh, with a vertex for each bone and frame. Node groups read it
+to colour the bones, flash the joints at their keys, and ring the worst joint: the saved file plays for anyone.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from .materials import ghost, ink, surface
 from .nodes import Group, Socket, add_attribute, apply_group, node_of
 
 SHADE_COUNT = 16
-"""The number of shades of the bones."""
+"""The number of colour shades of the bones."""
 
 ERROR, FLASH, WORST = "error", "flash", "worst"
-"""The attributes of the errors: in metres; how much a joint flashes and whether it has the ring, 0 to 1."""
+"""Attributes of the errors mesh: the error in metres; the joint's flash and whether it has the ring, 0 to 1."""
 
 IN_FRONT = 0.45
-"""The distance of what marks joints towards the camera, in units of the frame's height."""
+"""The distance of joint markers from the figure towards the camera, in units of the frame's height."""
 
 MIN_RING_ERROR_RATIO = 0.02
-"""The part of the error that colours reach up to: with less, the worst joint has no ring."""
+"""The worst joint has a ring if its error exceeds this fraction of the error with the last colour."""
 
 # In units of the frame's height.
 FLASH_RADIUS = 0.0046
@@ -43,19 +43,19 @@ RING_THICKNESS = 0.0021
 GRID_RADIUS = 0.0013
 
 GROUND_CELL_M = 0.5
-"""Metres between the lines of the ground; a figure of another size has others, as its size is to `TYPICAL_HEIGHT_M`."""
+"""Metres between ground lines, for a figure of `TYPICAL_HEIGHT_M`; scaled for figures of other sizes."""
 
 TYPICAL_HEIGHT_M = 1.7
 GRID_STEPS = 4
-"""Points of a line of the ground from one crossing to the next, at which it may end."""
+"""Points of a ground line from one crossing to the next: the line may end at any of them."""
 
 MOST_CELLS = 120
-"""Lines of the ground each way, at most."""
+"""Maximum number of ground lines each way."""
 
 
 @dataclass(frozen=True, eq=False)
 class StageMotion:
-    """What moves on the stage, in metres and Blender's axes, around the middle of the recording: n frames."""
+    """The motion of a body on the stage for n frames, in metres and Blender's axes, centred on the recording."""
 
     rest_body: RestBody
     rest: RestFigure
@@ -63,28 +63,27 @@ class StageMotion:
     """The joints in their parents' space at each frame, shape (joints, n)."""
 
     modes: Mapping[str, Poses]
-    """Mode id to the same."""
+    """Mode id to the same for that mode."""
 
     keys: Mapping[str, list[tuple[np.ndarray, Poses]]]
-    """Mode id to the frames of the keys of each joint, and the poses there."""
+    """Mode id to the key frames of each joint, and the poses at these frames."""
 
     errors: Mapping[str, np.ndarray]
-    """Mode id to how far off each joint is, shape (joints, n)."""
+    """Mode id to the error of each joint, shape (joints, n)."""
 
     flashes: Mapping[str, np.ndarray]
-    """Mode id to how much each joint flashes, 0 to 1, shape (joints, n)."""
+    """Mode id to the flash of each joint, 0 to 1, shape (joints, n)."""
 
     def places(self, poses: Poses) -> np.ndarray:
-        """Return where the bones begin and end that are seen,
-        of joints in their parents' space (joints, n): (n, m, 3).
-        """
+        """Return heads and tails of visible bones (n, m, 3), for joints in their parents' space (joints, n)."""
         seen = physique.seen_bones(self.rest)
         joints = self.rest.joints.positions[seen]
         return self.carried(poses, np.tile(seen, 2), np.concatenate((joints, self.rest.tails[seen])))
 
     def carried(self, poses: Poses, bones: Sequence[int] | np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Return where bones (k,) carry points that are there at rest (k, 3),
-        of joints in their parents' space (joints, n): (n, k, 3).
+        """Return points (k, 3) of the rest pose as carried by bones (k,): (n, k, 3).
+
+        `poses` are the joints in their parents' space, shape (joints, n).
         """
         joints = self.rest_body.skeleton.in_root_space(poses)[bones]
         back = conjugate(self.rest.joints.quaternions[bones])
@@ -93,7 +92,7 @@ class StageMotion:
 
 
 class Bodies:
-    """Figures for the lanes, out of materials, groups and meshes that they share."""
+    """Makes the figures of the lanes, with shared materials, node groups and meshes."""
 
     def __init__(self, cast: Cast, motion: StageMotion, shape: physique.Physique, full: float) -> None:
         self.cast, self.motion = cast, motion
@@ -139,7 +138,7 @@ class Bodies:
 
     @staticmethod
     def _key(rig: Rig, keys: list[tuple[np.ndarray, Poses]]) -> None:
-        """Key every bone; the joints of keys are in their parents' space."""
+        """Key every bone from poses of joints in their parents' space."""
         for bone, (frames, poses) in enumerate(keys):
             rig.key(bone, frames, rig.channels_of_bone(bone, poses))
 
@@ -173,7 +172,7 @@ class Bodies:
         rest_body = self._carried(f"{mode} figure", self.rest_body, rig, lane)
         bones = float(len(self.names))
         apply_group(rest_body, self.colours, Errors=errors, Bones=bones, Shades=SHADE_COUNT / self.full)
-        # Square to the camera, and in front of the figure: of the lane's turn there is nothing else.
+        # Facing the camera, in front of the figure; only the lane's rotation needs to be undone.
         turn = -self.cast.framing.yaw
         towards = rotate(layout.yaw_quaternion(turn), -layout.AWAY_AXIS * IN_FRONT * metres).tolist()
         shared = {"Errors": errors, "Bones": bones, "Towards": towards, "Material": self.cast.ink}
@@ -186,7 +185,7 @@ class Bodies:
         )
 
     def _errors(self, lane: Lane) -> bpy.types.Object:
-        """Return the errors of a mode: a vertex for each bone and frame, all bones of a frame one after another."""
+        """Return an object with the errors of a mode: a vertex per bone and frame, grouped by frame."""
         mode = lane.mode
         errors = self.motion.errors[mode]
         mesh = bpy.data.meshes.new(f"{mode} errors")
@@ -213,7 +212,7 @@ class Bodies:
 
 
 def ground_grid(motion: StageMotion, spacing: float) -> bpy.types.Mesh:
-    """Return lines on the ground around the way of a body, so many metres apart, as a mesh of edges."""
+    """Return a mesh of ground lines, `spacing` metres apart, around the path of a body."""
     reach = 2.5 * physique.body_size(motion.rest)
     way = motion.places(motion.recording).mean(axis=1)[:, :2]
     low, high = way.min(axis=0) - reach, way.max(axis=0) + reach
@@ -239,10 +238,9 @@ def ground_grid(motion: StageMotion, spacing: float) -> bpy.types.Mesh:
 
 
 def flashes(key_frames: list[np.ndarray], frames: np.ndarray, fade: float) -> np.ndarray:
-    """Return how much joints with keys at these frames flash at others (n,), 0 to 1: all at once,
-    then less for `fade` frames.
+    """Return the flash of joints at `frames` (n,), 0 to 1, shape (joints, n): 1 at a key, fading over `fade` frames.
 
-    Shape (joints, n). A joint with a single key does not.
+    `key_frames` are the keys of each joint. A joint with a single key does not flash.
     """
     result = np.zeros((len(key_frames), len(frames)))
     for own, flash in zip(key_frames, result, strict=True):
@@ -253,11 +251,11 @@ def flashes(key_frames: list[np.ndarray], frames: np.ndarray, fade: float) -> np
     return result
 
 
-def _looked_up(group: Group, name: str) -> Socket:
-    """Return what the errors have of the bone of each face or point at the frame that is shown."""
+def _error_value(group: Group, name: str) -> Socket:
+    """Return the value in the errors mesh for the bone of each face or point, at the shown frame."""
     bone = group.add("GeometryNodeInputNamedAttribute", physique.BONE, settings={"data_type": "INT"})
     frame = group.math("SUBTRACT", group.frame(), 1.0)
-    # Numbers are cut off to be an index.
+    # Blender truncates numbers to get an index.
     number = group.math("ADD", group.math("MULTIPLY_ADD", frame, group.inputs["Bones"], bone), 0.5)
     source = node_of(group.add("GeometryNodeObjectInfo", group.inputs["Errors"])).outputs["Geometry"]
     sample = node_of(group.add("GeometryNodeSampleIndex", source, settings={"data_type": "FLOAT", "domain": "POINT"}))
@@ -269,9 +267,9 @@ def _looked_up(group: Group, name: str) -> Socket:
 
 
 def _colours_group() -> bpy.types.NodeTree:
-    """Return the material of each face by the error of its bone: one of `Shades` for each metre."""
+    """Return a node group that picks each face's material by the error of its bone: `Shades` per metre."""
     group = Group("Colours of errors", Errors="Object", Bones="Float", Shades="Float")
-    shade = group.math("MULTIPLY", _looked_up(group, ERROR), group.inputs["Shades"])
+    shade = group.math("MULTIPLY", _error_value(group, ERROR), group.inputs["Shades"])
     shade = group.math("MINIMUM", group.math("MAXIMUM", shade, 0.0), SHADE_COUNT - 0.5)
     geometry = node_of(group.add("GeometryNodeSetMaterialIndex", group.inputs["Geometry"]))
     group.tree.links.new(shade, geometry.inputs["Material Index"])
@@ -279,9 +277,9 @@ def _colours_group() -> bpy.types.NodeTree:
 
 
 def _flashes_group() -> bpy.types.NodeTree:
-    """Return a ball at each joint that has just had a key."""
+    """Return a node group that draws a ball at each joint that has just passed a key."""
     group = Group("Key flashes", Errors="Object", Bones="Float", Radius="Float", Towards="Vector", Material="Material")
-    flash = _looked_up(group, FLASH)
+    flash = _error_value(group, FLASH)
     dark = group.math("LESS_THAN", flash, 0.02)
     points = group.add("GeometryNodeDeleteGeometry", group.inputs["Geometry"], dark, settings={"domain": "POINT"})
     points = _shifted(group, points)
@@ -292,10 +290,10 @@ def _flashes_group() -> bpy.types.NodeTree:
 
 
 def _rings_group() -> bpy.types.NodeTree:
-    """Return a ring around the joint that is off the most."""
+    """Return a node group that draws a ring around the joint with the largest error."""
     inputs = {"Radius": "Float", "Thickness": "Float", "Towards": "Vector", "Facing": "Vector", "Material": "Material"}
     group = Group("Ring around the worst", Errors="Object", Bones="Float", **inputs)
-    other = group.math("LESS_THAN", _looked_up(group, WORST), 0.5)
+    other = group.math("LESS_THAN", _error_value(group, WORST), 0.5)
     points = group.add("GeometryNodeDeleteGeometry", group.inputs["Geometry"], other, settings={"domain": "POINT"})
     points = _shifted(group, points)
     circle = group.add("GeometryNodeCurvePrimitiveCircle", Resolution=48)
@@ -309,12 +307,13 @@ def _rings_group() -> bpy.types.NodeTree:
 
 
 def _shifted(group: Group, points: Socket) -> Socket:
-    """Return the points moved towards the camera, where nothing hides them; its rays are parallel, so they are seen
-    where they were.
+    """Return the points moved towards the camera, in front of everything.
+
+    The camera's rays are parallel, so the points appear at the same place.
     """
     return group.add("GeometryNodeSetPosition", points, Offset=group.inputs["Towards"])
 
 
 def _input(socket: Socket, name: str) -> Socket:
-    """Return the input of a socket's node that is in use, of several that have the name."""
+    """Return the enabled input with this name of a socket's node; several may have the name."""
     return next(item for item in node_of(socket).inputs if item.name == name and item.enabled)

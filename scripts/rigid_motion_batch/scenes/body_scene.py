@@ -1,7 +1,7 @@
-"""The stage of whole bodies: one scene in which every mode moves its own figure, side by side, as an ordinary rig.
+"""The scene that compares modes on whole bodies: each mode moves its own figure, side by side, as an ordinary rig.
 
-As `scene`, whose frame, header, camera and lights these are. The bones have their keys and their modes, as an animator
-would give them; whoever opens the file with the extension can choose others, and without it they play as they are.
+Like `scene`, with the same frame, header, camera and lights. The bones have keys and modes as an animator would set
+them; with the extension, a user can choose other modes; without it, the file still plays.
 """
 
 from __future__ import annotations
@@ -34,32 +34,32 @@ from .settings import SceneSettings
 from .timeline import Timeline
 
 FADE_FRAMES, FADE_SHARE = 5.0, 0.6
-"""Frames in which a flash fades; where keys are near to one another, so much of what lies between them."""
+"""Frames that a flash takes to fade; or this fraction of the gap between keys, if that is shorter."""
 
 BAR_WIDTH_RATIO, BAR_GAP_RATIO = 0.24, 0.012
-"""The width of the bar of colours, and what is left free beside it, in units of the frame's height."""
+"""The width of the colour bar, and the gap next to it, in units of the frame's height."""
 
 LEAST_TEXT = "shell error 0"
 
 MARGIN_RATIO = 0.04
-"""The room around all joints, in units of the figure: its flesh."""
+"""The margin around all joints for the figure's flesh, as a fraction of the figure's size."""
 
 GROUND_RATIO = 0.05
-"""The part of the ground that is seen below the feet, in units of the figure."""
+"""The ground visible below the feet, as a fraction of the figure's size."""
 
 
 def build_body_scene(
     made: Reconstruction, settings: SceneSettings, findings: Sequence[Finding] = ()
 ) -> bpy.types.Scene:
-    """Make the scene of a comparison of whole bodies, in a file that is emptied for it.
+    """Make the scene of a comparison of whole bodies, in an emptied file.
 
     Parameters
     ----------
     made : Reconstruction
     settings : SceneSettings
-        But for the subject and the deviation: a body shows itself, as it is.
+            Subject and deviation are ignored: a body shows itself, unmagnified.
     findings : sequence of Finding
-        What else was found of it, for the lanes.
+            Further findings to show in the lanes.
     """
     timeline = begin(made, settings)
     lanes_of = identical_modes(made) if settings.distinct else tuple((mode,) for mode in made.keys)
@@ -94,7 +94,7 @@ def build_body_scene(
         worst={mode: errors.argmax(axis=0) for mode, errors in motion.errors.items()},
     )
     full = full_colour(motion.errors.values())
-    most = _most(1e3 * full, cast.largest_error)
+    most = _colour_bar_label(1e3 * full, cast.largest_error)
     reserved = (
         LEGEND_SIZE * (captions.width_of(LEAST_TEXT) + captions.width_of(most)) + BAR_WIDTH_RATIO + 4.0 * BAR_GAP_RATIO
     )
@@ -113,8 +113,8 @@ def build_body_scene(
 def shown_motion(
     made: Reconstruction, modes: Sequence[str], timeline: Timeline, rest: RestFigure
 ) -> tuple[StageMotion, np.ndarray]:
-    """Return what moves on the stage, and what became its origin: the middle of the recording,
-    on the ground, shape (3,).
+    """Return the motion on the stage, and the point that became its origin, shape (3,): the recording's centre, on the
+    ground.
     """
     clip = made.clip
     times = timeline.times_of(timeline.frames)
@@ -127,7 +127,7 @@ def shown_motion(
     centre = np.append((low + high)[:2] / 2.0, low[2])
 
     def around(poses: Poses, joint: int | None = None) -> Poses:
-        """Return the poses with the roots, or the joint if it is one, moved by the centre."""
+        """Return the poses with the roots (or the given joint, if it is a root) moved by the centre."""
         if joint is not None:
             return Poses(poses.positions - centre, poses.quaternions) if clip.whole_body.parents[joint] < 0 else poses
         positions = poses.positions.copy()
@@ -160,7 +160,7 @@ def shown_motion(
 
 
 def _notes(made: Reconstruction, modes: Iterable[str]) -> dict[str, str]:
-    """Return mode id to its own number of keys, where the modes have different ones."""
+    """Return mode id to its number of keys, if the modes differ in that."""
     kind = "key poses" if made.shared else "keys"
     counts = {
         mode: len(key_samples(keys)) if made.shared else sum(map(len, keys))
@@ -170,14 +170,14 @@ def _notes(made: Reconstruction, modes: Iterable[str]) -> dict[str, str]:
     return {} if len(set(counts.values())) == 1 else {mode: f"{count} {kind}" for mode, count in counts.items()}
 
 
-def _most(full: float, largest: float) -> str:
-    """Return what the bar of colours up to an error ends with; the largest there is, both in millimetres."""
+def _colour_bar_label(full: float, largest: float) -> str:
+    """Return the label at the end of the colour bar: its maximum and the largest error, both in millimetres."""
     top = f"{full:.{captions.decimals_for(full)}f} mm"
     return f"{top} and more, to {largest:.{captions.decimals_for(largest)}f}" if largest > 1.005 * full else top
 
 
 def _put_bar(cast: Cast, most: str) -> None:
-    """Add what the colours of bones mean, at the right below the lanes."""
+    """Add the colour bar of the bones, at the lower right below the lanes."""
     collection, frame = bpy.data.collections["Captions"], bpy.data.objects["Frame"]
     foot, right = -0.5 + layout.MARGIN_RATIO + 0.004, -cast.layout.cells[0].left
 
@@ -197,7 +197,7 @@ def _put_bar(cast: Cast, most: str) -> None:
 
 @contextmanager
 def registered() -> Iterator[None]:
-    """Register what the extension brings meanwhile, unless it is there already."""
+    """Register the extension's properties during the block, unless they are registered already."""
     there = hasattr(bpy.types.PoseBone, "rigid_motion")
     if not there:
         animation.register()

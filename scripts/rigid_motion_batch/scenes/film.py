@@ -1,7 +1,7 @@
-"""The film: a stage rendered to a video that any browser plays, and saved as the .blend it was rendered from.
+"""Film rendering: renders a scene to a video that any browser plays, and saves the .blend it was rendered from.
 
-A film may be rendered in pieces, by several processes, and joined; that costs it nothing. Every file is written beside
-its place and moved into it when it is whole.
+Several processes may render a film in pieces, which are then joined without loss. Every file is written under a
+temporary name and moved into place when complete.
 """
 
 from __future__ import annotations
@@ -19,29 +19,29 @@ from rigid_motion_batch.saving import save_copy
 from rigid_motion_batch.silencing import silenced
 
 LOSSLESS = "HUFFYUV", "MKV", ".mkv"
-"""Codec, container and extension of pieces of a film: exact to the bit, and quicker than PNG or FFV1."""
+"""Codec, container and extension of film pieces: lossless, and faster than PNG or FFV1."""
 
 
 def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int], None] | None = None) -> None:
-    """Render all frames of the scene to its MP4.
+    """Render all frames of the scene to an MP4 file.
 
     Parameters
     ----------
     scene : bpy.types.Scene
         Set up for video, as `scene.build_scene` leaves it.
     path : Path
-        Ending in .mp4. A file that is there is replaced, once the new one is whole.
+            Ends in .mp4. An existing file is replaced once the new one is complete.
     progress : callable, optional
-        Called after every frame with the number of frames that are done, and of all.
+            Called after every frame with the number of finished frames, and of all frames.
 
     Raises
     ------
     RuntimeError
-        Where Blender cannot render.
+            If Blender cannot render.
     OSError
-        Where the file cannot be put in its place.
+            If the file cannot be moved into place.
     KeyboardInterrupt
-        After Ctrl-C in a Blender program, which cancels; the module renders on.
+            After Ctrl-C in a Blender program, which cancels rendering; the module keeps rendering.
     """
     total = scene.frame_end - scene.frame_start + 1
     with written_beside(path) as beside, _counting(progress, total):
@@ -60,18 +60,18 @@ def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int
 def render_piece(
     blend: Path, first: int, last: int, path: Path, progress: Callable[[int, int], None] | None = None
 ) -> None:
-    """Render the frames from the first to the last of a saved stage, without loss.
+    """Render frames `first` to `last` of a saved scene, without loss.
 
     Parameters
     ----------
     blend : Path
-        As `save_blend` left it.
+            Saved by `save_blend`.
     first, last : int
         Frames, both included.
     path : Path
-        Ending as `LOSSLESS` says.
+            Has the extension of `LOSSLESS`.
     progress : callable, optional
-        As of `render_film`, and so is what is raised.
+            As in `render_film`, and so are the errors raised.
     """
     scene = _open(blend)
     scene.frame_start, scene.frame_end = first, last
@@ -83,30 +83,30 @@ def render_piece(
 def join_pieces(
     blend: Path, pieces: Sequence[Path], path: Path, progress: Callable[[int, int], None] | None = None
 ) -> None:
-    """Encode a film from its pieces, as if it had been rendered in one: the frames are the same to the bit.
+    """Encode a film from its pieces, bit-identical to a film rendered at once.
 
     Parameters
     ----------
     blend : Path
-        The stage that they are of, which says how it wants to be encoded.
+            The scene of the pieces, which has the encoder settings.
     pieces : sequence of Path
-        In their order, without gaps.
+            In order, without gaps.
     path : Path
-        Ending in .mp4.
+            Ends in .mp4.
     progress : callable, optional
-        As of `render_film`, and so is what is raised.
+            As in `render_film`, and so are the errors raised.
 
     Raises
     ------
     RuntimeError
-        Also where the pieces have more or fewer frames than the stage.
+            Also if the pieces have more or fewer frames than the scene.
     """
     scene = _open(blend)
     strips = scene.sequence_editor_create().strips
     frame = scene.frame_start
     for number, piece in enumerate(pieces):
         strip = strips.new_movie(f"Piece {number}", str(piece), 1, frame, fit_method="ORIGINAL")
-        # Blender 5.2 warns of the name that it had before.
+        # Blender 5.2 warns about the old name.
         frame += strip.content_duration if hasattr(strip, "content_duration") else strip.frame_duration
     if frame != scene.frame_end + 1:
         raise RuntimeError(f"{path}: its pieces have {frame - scene.frame_start} frames of {scene.frame_end}")
@@ -115,14 +115,14 @@ def join_pieces(
 
 
 def _open(blend: Path) -> bpy.types.Scene:
-    """Return the scene of a saved stage, which is opened for it. Its scripts, if it has come by any, do not run."""
+    """Open a saved file and return its scene. Scripts in the file do not run."""
     with silenced():
         bpy.ops.wm.open_mainfile(filepath=str(blend), use_scripts=False, load_ui=False)
     return blender.scene()
 
 
 def save_blend(path: Path) -> None:
-    """Save the open file as a compressed .blend. A file that is there is replaced."""
+    """Save the open file as a compressed .blend. An existing file is replaced."""
     with written_beside(path) as beside, silenced():
         save_copy(beside, compress=True)
 

@@ -1,6 +1,6 @@
-"""What a film is about beside the shell error: how far a body slips that another holds, a pivot moves, or feet slide.
+"""Findings shown in a film besides the shell error: slip of a held object, drift of a pivot, foot sliding.
 
-Each is a number of every mode, written into its lane, and a remark that says what it is. NumPy alone.
+Each is a number per mode, written into its lane, and a remark that explains it. Uses only NumPy.
 """
 
 from __future__ import annotations
@@ -12,31 +12,31 @@ from rigid_motion_batch.analysis.held import Slip
 from rigid_motion_batch.analysis.metrics import Metrics
 
 MAX_FINDINGS = 3
-"""Findings of a film at most."""
+"""Maximum number of findings in a film."""
 
 MIN_SLIDE_M = 5e-5
-"""Metres that feet slide at least: what never moves counts as standing."""
+"""Minimum foot sliding, in metres, that is a finding: joints that never move count as standing."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """The largest of a distance that there would be none of, in a perfect motion."""
+    """The maximum of a distance that would be zero in a perfect motion."""
 
     text: str
-    """What is written, with braces for the number and its unit."""
+    """The text, with braces for the number and its unit."""
 
     remark: str
-    """What that is."""
+    """Explains the text."""
 
     metres: Mapping[str, float]
     """Mode id to the distance."""
 
     recorded: float | None = None
-    """That of the recording itself."""
+    """The distance in the recording itself."""
 
 
 def findings_of(rows: Sequence[Metrics], slips: Iterable[Slip] = ()) -> list[Finding]:
-    """Return what there is to say of a clip under a choice of keys, by its rows, and of its slips where it is held."""
+    """Return the findings about a clip under a choice of keys, from its metrics, and its slips if it is held."""
     by_holder: dict[str, list[Slip]] = {}
     for slip in slips:
         by_holder.setdefault(slip.clip_a, []).append(slip)

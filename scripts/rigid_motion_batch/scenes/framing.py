@@ -1,8 +1,8 @@
-"""Framing: from which side a motion is seen, and whether the camera stays or follows it.
+"""Framing: the side from which a motion is seen, and whether the view stays or follows the motion.
 
-The camera itself never moves: what moves past it is the lane, by the focus, a path in Blender's axes and metres. A
-motion that has room where it is stays there; one that would be small is followed, smoothly, so that its quick turns
-still show. NumPy alone.
+The camera itself never moves; the lane moves past it, by the focus, a path in Blender's axes and metres. A motion that
+is large enough in a fixed view gets one; a motion that would be small is followed, smoothly, so that its quick turns
+still show. Uses only NumPy.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from rigid_motion.motion.quaternions import rotate
 from . import layout
 
 FOLLOW_GAIN = 1.2
-"""A motion is followed where that shows it so many times larger."""
+"""A motion is followed if that shows it larger by this factor."""
 
 MAX_LEVEL_RATIO = 0.3
-"""A body whose middle rises and falls by less of its height is followed over the ground alone."""
+"""A body is followed over the ground only if its centre rises and falls by less than this fraction of its height."""
 
 MIN_WALKED_RATIO = 0.5
-"""A body that gets so far, in units of its height, is seen from the side that it goes past."""
+"""A body that travels at least this far, in units of its height, is seen from the side."""
 
 THREE_QUARTER = np.radians(30.0)
-"""By how much it comes nearer to the camera as it goes."""
+"""The angle by which a walk comes nearer to the camera, in radians."""
 
 MAX_SMOOTHING_S = 0.12
-"""Seconds of the film: the standard deviation of the bell by which the focus is smoothed, at most."""
+"""Maximum standard deviation of the Gaussian that smooths the focus, in seconds of the film."""
 
 MAX_BESIDE_RATIO = 0.5
-"""The part of the room that the recording needs: what is farther off from it is cut where it leaves the view."""
+"""Deviating motions may leave the recording's extent by this fraction of it; anything farther is cut off."""
 
 MAX_LAG_RATIO = 1.35
-"""The most times that what is followed may need the room which it needs with a focus that is not smoothed."""
+"""Maximum ratio of the extent with a smoothed focus to that with an unsmoothed one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,17 +51,17 @@ class Solid:
 
     @property
     def middle(self) -> np.ndarray:
-        """The places that may be followed, shape (n, 3)."""
+        """The points that may be followed, shape (n, 3)."""
         middle = (self.outline.min(axis=0) + self.outline.max(axis=0)) / 2.0
         return layout.swept_points(self.poses, middle[None])
 
     def around(self, focus: np.ndarray) -> np.ndarray:
-        """Return its outermost points at every moment, from the focus (n, 3) on: shape (k, 3)."""
+        """Return its outermost points at all moments, relative to the focus (n, 3): shape (k, 3)."""
         poses = Poses(self.poses.positions - focus, self.poses.quaternions, self.poses.scales)
         return layout.swept_points(poses, self.outline)
 
     def heading(self, focus: np.ndarray) -> float:
-        """Return the yaw in radians from its broad side."""
+        """Return the yaw in radians that shows its broad side."""
         return layout.heading(self.around(focus))
 
 
@@ -73,11 +73,11 @@ class Jointed:
     """Shape (n, m, 3)."""
 
     surface: np.ndarray
-    """Other points of it that are seen, shape (n, k, 3)."""
+    """Other visible points of the body, shape (n, k, 3)."""
 
     @property
     def middle(self) -> np.ndarray:
-        """The mean of the joints, at one height as long as the body stays about there: a step is no reason to nod."""
+        """The mean of the joints, at constant height if the body roughly stays level: steps should not make it nod."""
         middle = self.places.mean(axis=1)
         tall = float(np.ptp(self.places[..., 2], axis=1).max())
         if np.ptp(middle[:, 2]) < MAX_LEVEL_RATIO * tall:
@@ -88,8 +88,8 @@ class Jointed:
         return (np.concatenate((self.places, self.surface), axis=1) - focus[:, None]).reshape(-1, 3)
 
     def heading(self, focus: np.ndarray) -> float:
-        """Return the yaw in radians of a walk that goes to the right and a little towards the camera; from the broad
-        side of what stays.
+        """Return the yaw in radians that shows a walk going right and a little towards the camera; without a walk, the
+        broad side.
         """
         middle = self.middle
         gone = middle[-1, :2] - middle[0, :2]
@@ -100,21 +100,21 @@ class Jointed:
 
 
 Moving = Solid | Jointed
-"""What is seen at n moments."""
+"""A subject at n moments."""
 
 
 @dataclass(frozen=True, eq=False)
 class Extent:
-    """The lowest and highest of right, up and away, shape (3,) each, that are seen of what moves, from the focus on.
+    """The visible bounds of the motion, relative to the focus: lowest and highest right, up and away, shape (3,) each.
 
-    As `layout.project` has them.
+    In the coordinates of `layout.project`.
     """
 
     low: np.ndarray
     high: np.ndarray
 
     cut: bool
-    """True if something gets farther to the sides."""
+    """True if something moves beyond these bounds to the sides."""
 
     @property
     def size(self) -> np.ndarray:
@@ -128,18 +128,18 @@ class Extent:
 
 @dataclass(frozen=True, eq=False)
 class Framing:
-    """How a motion of n moments is seen."""
+    """The view of a motion of n moments."""
 
     focus: np.ndarray
     """The points that the camera looks at, shape (n, 3)."""
 
     yaw: float
-    """The turn about z in radians that shows the motion well."""
+    """The rotation about z, in radians, that shows the motion well."""
 
     follows: bool
 
     def extent(self, recording: Moving, shown: Sequence[Moving] = ()) -> Extent:
-        """Return what a recording reaches, and others beside it as far as they do not make it small."""
+        """Return the bounds of a recording, extended for other motions as long as that does not make it small."""
         turn = layout.yaw_quaternion(self.yaw)
         seen = [layout.project(rotate(turn, moving.around(self.focus))) for moving in (recording, *shown)]
         lows, highs = (np.array([edge(points, axis=0) for points in seen]) for edge in (np.min, np.max))
@@ -150,8 +150,9 @@ class Framing:
 
     @classmethod
     def of(cls, recording: Moving, smoothing: float) -> Framing:
-        """Return what shows a recording well. `smoothing` is `MAX_SMOOTHING_S` in moments of it,
-        or less where that shows more.
+        """Return the framing that shows a recording well.
+
+        `smoothing` is `MAX_SMOOTHING_S` in moments of the recording; less is used if that shows more.
         """
         still = cls._facing(recording, np.zeros_like(recording.middle), follows=False)
         closest = cls(recording.middle, still.yaw, follows=True)._width(recording)
@@ -168,14 +169,12 @@ class Framing:
         return cls(focus, recording.heading(focus), follows)
 
     def _width(self, recording: Moving) -> float:
-        """Return the side of a square as large as what is seen."""
+        """Return the side of a square with the area of the visible bounds."""
         return float(np.sqrt(self.extent(recording).size.prod()))
 
 
 def _smoothed(path: np.ndarray, deviation: float) -> np.ndarray:
-    """Return a path (n, 3) smoothed by a bell whose standard deviation is so many samples.
-    It begins and ends where it did.
-    """
+    """Return a path (n, 3) smoothed by a Gaussian with this standard deviation, in samples; its ends stay in place."""
     reach = int(np.ceil(3.0 * deviation))
     bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(deviation, 1e-9)) ** 2)
     extended = np.pad(path, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")

@@ -1,7 +1,7 @@
-"""Lanes: what a motion has of the stage. What moves and its recording (`solids`, `bodies`), and a caption.
+"""Lanes: each mode's part of the stage, with the moving object and its recording (`solids`, `bodies`), and a caption.
 
-A lane is an empty; what moves is its child. Where the camera follows, the empty moves the other way. What is written
-is a child of the frame (`layout`).
+A lane is an empty with the moving objects as children. If the view follows the motion, the empty moves the other way.
+Text is a child of the frame (`layout`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .nodes import apply_group
 from .settings import SceneSettings
 from .timeline import Timeline, peaks
 
-# Sizes of letters on a card, in units of the frame's height, where there is room.
+# Letter sizes on a card, in units of the frame's height, if there is room.
 TITLE_SIZE = 0.044
 NAME_SIZE = 0.026
 NUMBER_SIZE = 0.05
@@ -37,19 +37,19 @@ SMALL_SIZE = 0.028
 FINDING_SIZE = 0.036
 
 INSET_RATIO, COLUMN_RATIO = 0.016, 0.15
-"""The space left free at the edges of a card, and the width of the numbers beside the graph."""
+"""The free space at the edges of a card, and the width of the column of numbers next to the graph."""
 
 GRAPH_HEIGHT_RATIO, GRAPH_COLUMNS = 0.066, 300
-"""The height of a graph, and how many columns keep their least and their largest sample."""
+"""The height of a graph, and the number of its columns: each keeps its lowest and highest sample."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cast:
-    """What all lanes share."""
+    """Data shared by all lanes."""
 
     timeline: Timeline
     framing: Framing
-    """At the moments that it was made for: `framing_steps` for each frame."""
+    """Has `framing_steps` moments per frame."""
 
     framing_steps: int
     layout: layout.Layout
@@ -66,7 +66,7 @@ class Cast:
     """The frames of the samples, shape (n,)."""
 
     notes: Mapping[str, str]
-    """Mode id to what its keys are, where the modes have different ones."""
+    """Mode id to a note on its keys, if the modes have different ones."""
 
     findings: Sequence[Finding]
     theme: Theme
@@ -77,7 +77,7 @@ class Cast:
     """The names of the joints of a body."""
 
     worst: Mapping[str, np.ndarray] = field(default_factory=dict)
-    """Mode id to the joint that the error is of, at each frame."""
+    """Mode id to the index of the joint with the error, at each frame."""
 
     @classmethod
     def arranged(
@@ -91,9 +91,9 @@ class Cast:
         timeline: Timeline,
         **own: Any,
     ) -> Cast:
-        """Return the cast with lanes arranged for what is seen of the motion; `own` are the fields that are left.
+        """Return the cast, with lanes arranged for the visible extent of the motion; `own` are the remaining fields.
 
-        Errors at frames, unless they are given, are between those of the samples.
+        Errors at frames, unless given, are interpolated from those at the samples.
         """
         theme, (width, height) = THEMES[settings.theme], settings.resolution
         named = any(names_of(modes, notes) for modes in lanes_of)
@@ -117,40 +117,40 @@ class Cast:
 
     @property
     def largest_error(self) -> float:
-        """In millimetres: what the graphs reach up to."""
+        """The upper end of the graphs, in millimetres."""
         return max(float(errors.max()) for errors in self.sampled.values())
 
     def found(self, finding: Finding, mode: str) -> str:
-        """Return what is written of a finding in the lane of a mode; empty where that has none."""
+        """Return the text of a finding for the lane of a mode; empty if the mode has none."""
         if mode not in finding.metres:
             return ""
         decimals = captions.decimals_for(1e3 * max(finding.metres.values()))
         return finding.text.format(f"{1e3 * finding.metres[mode]:.{decimals}f} mm")
 
     def seen_from_focus(self, places: np.ndarray) -> np.ndarray:
-        """Return places (n, 3) at the frames as they are seen, from the focus on, as `Framing.extent` has them."""
+        """Return points (n, 3) at the frames, relative to the focus and turned to the view, as in `Framing.extent`."""
         focus = self.framing.focus[:: self.framing_steps]
         return rotate(layout.yaw_quaternion(self.framing.yaw), places - focus)
 
     @property
     def behind(self) -> np.ndarray:
-        """The distance of the recording behind what moves, in the space of a lane, where it hides nothing."""
+        """The offset, in the space of a lane, that puts the recording behind the motion, where it hides nothing."""
         return rotate(layout.yaw_quaternion(-self.framing.yaw), self.extent.depth * layout.AWAY_AXIS)
 
 
 @dataclass(frozen=True, eq=False)
 class Lane:
-    """One lane, to be filled."""
+    """A lane to add objects to."""
 
     mode: str
-    """The first of those that are one motion."""
+    """The first of the modes with this motion."""
 
     empty: bpy.types.Object
     collection: bpy.types.Collection
     cell: layout.Cell
 
     def window(self, metres: float) -> dict[str, np.ndarray]:
-        """Return what can be seen of it, as inputs of `trails.WINDOW`; the picture's height spans so many metres."""
+        """Return the visible window of the lane, as inputs of `trails.WINDOW`; `metres` is the picture's height."""
         width, height = self.cell.room * metres / 2.0
         middle = layout.unproject(np.append(self.cell.view * metres, 0.0))
         return {"Middle": middle, "Right": layout.RIGHT_AXIS / width, "Up": layout.UP_AXIS / height}
@@ -164,7 +164,7 @@ class Lane:
 
 
 class Lanes:
-    """Builds the lanes, one call each, out of materials, groups and meshes that they share."""
+    """Builds the lanes, one per call, with shared materials, node groups and meshes."""
 
     def __init__(self, cast: Cast, frame: bpy.types.Object, enter: Callable[[Lane], None]) -> None:
         self.cast, self.frame, self.enter = cast, frame, enter
@@ -175,7 +175,7 @@ class Lanes:
         self.title_width = max(captions.width_of(_title(mode)) for mode in cast.errors)
 
     def build(self, modes: tuple[str, ...], cell: layout.Cell) -> None:
-        """Make the lane of modes that are one motion in its cell, in a collection of its own; the first gives names."""
+        """Make the lane of modes with identical motion in its cell, in a collection named after the first mode."""
         mode = modes[0]
         self.collection = bpy.data.collections.new(f"Lane {mode}")
         scene().collection.children.link(self.collection)
@@ -187,7 +187,7 @@ class Lanes:
         self._add_caption(modes, cell)
 
     def _place(self, lane: bpy.types.Object, cell: layout.Cell) -> None:
-        """Put the focus into the middle of the view on every frame."""
+        """Keep the focus in the middle of the view on every frame."""
         cast = self.cast
         lane.rotation_euler.z = cast.framing.yaw
         low, high = cast.extent.low, cast.extent.high
@@ -200,9 +200,7 @@ class Lanes:
             action_of(lane).name = lane.name
 
     def _add_caption(self, modes: tuple[str, ...], cell: layout.Cell) -> None:
-        """Add at the top the title and what else is known of the keys,
-        at the foot a graph of the error and a number.
-        """
+        """Add the title and notes on the keys at the top, and a graph of the error and a number at the bottom."""
         cast, mode, unit = self.cast, modes[0], cell.unit
         card = captions.card(f"{mode} card", cell.width, cell.height, self.card)
         self._put(bpy.data.objects.new(card.name, card), cell.x, cell.y, 1)
@@ -245,14 +243,14 @@ class Lanes:
         if self.names is None:
             text = f"max {cast.sampled[mode].max():.{captions.decimals_for(cast.largest_error)}f}"
             self._put(captions.words(f"{mode} max", text, SMALL_SIZE * unit, cast.faint, "RIGHT"), right, foot)
-        else:  # The joint that the number is of.
+        else:  # The joint with the error.
             size = min(SMALL_SIZE, COLUMN_RATIO / max(map(captions.width_of, cast.joints))) * unit
             changes = captions.changes(cast.timeline.frames, cast.worst[mode])
             joint = captions.readout(f"{mode} joint", self.names, size, *changes, interpolation="CONSTANT")
             self._put(joint, column, foot)
 
     def _add_graph(self, mode: str, left: float, foot: float, width: float, height: float) -> None:
-        """Add the error over time, all of it faint, and what has passed in the colour of the mode."""
+        """Add the error over time: faint for the whole film, in the mode's colour up to the present."""
         cast = self.cast
         kept = peaks(cast.sampled[mode], GRAPH_COLUMNS)
         heights = height * cast.sampled[mode][kept] / (cast.largest_error or 1.0)
@@ -270,8 +268,8 @@ class Lanes:
 
 
 def names_of(modes: tuple[str, ...], notes: Mapping[str, str]) -> list[str]:
-    """Return what is written below the title of modes that are one motion: a note on their keys, the other modes, and
-    who else does that.
+    """Return the lines below the title of modes with identical motion: a note on their keys, what most game engines do,
+    and the other modes.
     """
     others = [_title(mode) for mode in modes[1:]]
     known = ["as most game engines do"] if STATE_OF_THE_ART in modes else []
@@ -279,7 +277,7 @@ def names_of(modes: tuple[str, ...], notes: Mapping[str, str]) -> list[str]:
 
 
 def remark_on(finding: Finding) -> str:
-    """Return what a number in the lanes is, and how much the recording has of it."""
+    """Return the explanation of a finding's number, and its value in the recording."""
     if finding.recorded is None:
         return finding.remark
     recorded = 1e3 * finding.recorded
@@ -287,5 +285,5 @@ def remark_on(finding: Finding) -> str:
 
 
 def _title(mode: str) -> str:
-    """Return what a mode is called, without the algebra in brackets: its id tells."""
+    """Return the name of a mode, without the algebra in brackets."""
     return label_of(mode).partition(" (")[0]

@@ -1,10 +1,10 @@
-"""Layout: where the lanes stand and what the camera frames, in NumPy alone.
+"""Layout of the lanes in the picture, and what the camera frames. Uses only NumPy.
 
-Two spaces. The *stage* is Blender's world, in metres, z up; the camera looks along +y and down by `ELEVATION_RAD`,
-through parallel rays, so every lane is seen from the same side. The *frame* is what it sees: x right, y up, 0 in the
-middle, in units of the picture's height. `Layout.metres` leads from one to the other.
+There are two spaces. The *stage* is Blender's world, in metres, z up; the camera looks along +y and down by
+`ELEVATION_RAD`, with parallel rays, so every lane is seen from the same side. The *frame* is the picture: x right,
+y up, 0 in the middle, in units of the picture's height. `Layout.metres` converts one to the other.
 
-Deviations are by how much what is shown is off from the recording, and are drawn larger where they are small.
+Deviations are the differences of a shown motion from the recording; small ones are magnified.
 """
 
 from __future__ import annotations
@@ -30,27 +30,27 @@ FOOTER_RATIO = 0.045
 GAP_RATIO = 0.014
 PADDING_RATIO = 0.028
 FULL_CARD_RATIOS = (0.42, 0.3)
-"""The width and height of a card on which letters have their full size; on a smaller one all of them are smaller."""
+"""Minimum width and height of a card with letters of full size; on a smaller card all letters shrink."""
 
-# The parts of a card's height that are taken by what is written on it:
+# Parts of a card's height taken by its texts:
 CARD_HEAD_RATIO = 0.062  # the title
 CARD_NAMES_RATIO = 0.052  # names below it, if there are any
 CARD_FOOT_RATIO = 0.094  # the error
 CARD_FINDING_RATIO = 0.042  # each finding above that
 
 WRAP_GAIN = 0.85
-"""A layout of fewer rows is kept while it shows motion and letters so large relative to the best."""
+"""A layout with fewer rows is preferred if it shows motion and letters at least this large relative to the best."""
 
 DIRECTION_COUNT = 1024
-"""Spread over the sphere as on a sunflower (a spherical Fibonacci lattice)."""
+"""Number of directions spread over the sphere (a spherical Fibonacci lattice, as in a sunflower)."""
 
 SHOWN_RATIO = 2.5
-"""A path longer than so many times the object makes the object grow for display."""
+"""An object is enlarged for display if its path is longer than this multiple of its size."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One lane's part of the frame: its card, with a title at the top, the motion, and the error at the foot."""
+    """A lane's part of the frame: its card, with a title at the top, the motion, and the error at the bottom."""
 
     x: float
     y: float
@@ -61,21 +61,21 @@ class Cell:
     """True if there are names below the title."""
 
     found: int = 0
-    """How many findings there are above the error."""
+    """The number of findings above the error."""
 
     @property
     def unit(self) -> float:
-        """The size of its letters, 1 at most."""
+        """The scale of its letters, at most 1."""
         return min(1.0, self.width / FULL_CARD_RATIOS[0], self.height / FULL_CARD_RATIOS[1])
 
     @property
     def head(self) -> float:
-        """The height of what is written at the top."""
+        """The height of the text at the top."""
         return self.unit * (CARD_HEAD_RATIO + CARD_NAMES_RATIO * self.named)
 
     @property
     def base(self) -> float:
-        """The height of what is written at the foot."""
+        """The height of the text at the bottom."""
         return self.unit * (CARD_FOOT_RATIO + CARD_FINDING_RATIO * self.found)
 
     @property
@@ -85,7 +85,7 @@ class Cell:
 
     @property
     def room(self) -> np.ndarray:
-        """The width and height that the motion may fill."""
+        """The width and height available to the motion."""
         return np.array((self.width - self.unit * PADDING_RATIO, self.height - self.head - self.base))
 
     @property
@@ -99,7 +99,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Layout:
-    """The cells of all lanes, and the scale: how many metres the picture's height spans."""
+    """The cells of all lanes, and the scale: the picture's height in metres."""
 
     cells: tuple[Cell, ...]
     metres: float
@@ -107,13 +107,11 @@ class Layout:
 
 
 def heading(points: np.ndarray) -> float:
-    """Return the yaw in radians that brings the longest horizontal extent of `points`, shape (n, 3),
-    across the frame.
-    """
+    """Return the yaw in radians that aligns the longest horizontal extent of `points`, shape (n, 3), with the frame."""
     flat = points[:, :2] - points[:, :2].mean(axis=0)
     axis = np.linalg.eigh(flat.T @ flat)[1][:, 1]
     yaw = -np.arctan2(axis[1], axis[0])
-    # The axis has no sign. The half turn that keeps most of the recording's own x pointing right is taken.
+    # The axis has no sign: choose the half turn that keeps the recording's own x pointing mostly right.
     return float(yaw - np.pi * np.round(yaw / np.pi))
 
 
@@ -122,10 +120,9 @@ def yaw_quaternion(yaw: float) -> np.ndarray:
 
 
 def outermost(points: np.ndarray) -> np.ndarray:
-    """Return the few points, shape (m, 3), that reach furthest in any of many directions.
+    """Return the few points, shape (m, 3), that reach farthest in any of many directions.
 
-    They span what all points span, but for a thousandth of their size, and are few enough to be followed through
-    every frame.
+    They span all points up to a thousandth of the size, and are few enough to be transformed for every frame.
     """
     steps = np.arange(DIRECTION_COUNT) + 0.5
     height, turn = 1.0 - 2.0 * steps / DIRECTION_COUNT, np.pi * (1.0 + 5.0**0.5) * steps
@@ -135,16 +132,16 @@ def outermost(points: np.ndarray) -> np.ndarray:
 
 
 def swept_points(poses: Poses, points: np.ndarray) -> np.ndarray:
-    """Return where the object's points, shape (m, 3), come to be: shape (n m, 3)."""
+    """Return the object's points, shape (m, 3), moved by all poses: shape (n m, 3)."""
     arms = points[None] if poses.scales is None else points[None] * poses.scales[:, None, None]
     return (rotate(poses.quaternions[:, None], arms) + poses.positions[:, None]).reshape(-1, 3)
 
 
 def telling_point(poses: Poses, points: np.ndarray) -> np.ndarray:
-    """Return the point whose path is drawn, shape (3,): the tip of the object, where that moves.
+    """Return the point whose path is drawn, shape (3,): the tip of the object, if the tip moves.
 
-    The tip is the point furthest from the origin. A tool that pivots about it is better shown by another point: the
-    one that travels furthest, if that is more than twice as far.
+    The tip is the point farthest from the origin. A tool that pivots about its tip is better shown by the point that
+    travels farthest: that point is returned if it travels more than twice as far.
     """
     paths = swept_points(poses, points).reshape(len(poses), len(points), 3)
     travelled = np.linalg.norm(np.diff(paths, axis=0), axis=-1).sum(axis=0)
@@ -153,35 +150,35 @@ def telling_point(poses: Poses, points: np.ndarray) -> np.ndarray:
 
 
 def display_scale(path: np.ndarray, size: float) -> float:
-    """Return how much larger than it is the object is shown, so that it stays visible on a path of shape (n, 3)."""
+    """Return the factor that enlarges the object so that it stays visible on a path of shape (n, 3)."""
     extent = float(np.ptp(path, axis=0).max())
     return max(1.0, extent / (SHOWN_RATIO * size))
 
 
 def project(points: np.ndarray) -> np.ndarray:
-    """Return metres right and up in the frame, and away from the camera, of points on the stage: shape (..., 3)."""
+    """Return metres right, up and away from the camera, for points on the stage: shape (..., 3)."""
     return points @ np.stack((RIGHT_AXIS, UP_AXIS, AWAY_AXIS), axis=-1)
 
 
 def unproject(seen: np.ndarray) -> np.ndarray:
-    """Return the points on the stage that `project` takes to these."""
+    """Return points on the stage: the inverse of `project`."""
     return seen @ np.stack((RIGHT_AXIS, UP_AXIS, AWAY_AXIS))
 
 
 def arrange(lanes: int, extent: np.ndarray, aspect: float, *, named: bool = False, found: int = 0) -> Layout:
-    """Return cells in as few rows as show the object, and what is written, well.
+    """Return cells in the fewest rows that show object and text well.
 
     Parameters
     ----------
     lanes : int
     extent : array, shape (2,)
-        The width and height in metres that the motion needs in every cell. Above zero.
+            The width and height in metres that the motion needs in every cell. Positive.
     aspect : float
         The picture's width over its height.
     named : bool
         Whether there are names below the titles.
     found : int
-        How many findings there are above the errors.
+        The number of findings above the errors.
     """
     candidates = [_arranged(lanes, rows, extent, aspect, named, found) for rows in range(1, lanes + 1)]
     sizes = [candidate.cells[0].unit / candidate.metres for candidate in candidates]
@@ -208,23 +205,22 @@ def _arranged(lanes: int, rows: int, extent: np.ndarray, aspect: float, named: b
 
 
 MAX_MAGNIFIED_RATIO = 0.25
-"""The most of the object's size that the largest deviation is shown at, where it is magnified."""
+"""Maximum displayed size of a magnified deviation, as a fraction of the object's size."""
 
 MAGNIFICATION_STEPS = (1.0, 2.0, 5.0)
 """Magnifications are these, times a power of ten."""
 
 
 def largest_deviation(shown: Poses, recording: Poses, outline: np.ndarray) -> float:
-    """Return the farthest that any of the points (m, 3) of the object is off between poses (n,), in metres."""
+    """Return the largest distance of any of the object's points (m, 3) between two motions (n,), in metres."""
     apart = layout.swept_points(shown, outline) - layout.swept_points(recording, outline)
     return float(np.linalg.norm(apart, axis=-1).max())
 
 
 def magnification(deviation: float, size: float) -> float:
-    """Return how many times larger deviations up to this are shown on an object of this size;
-    1 where they are seen anyway.
+    """Return a round factor by which deviations up to this one are magnified on an object of this size.
 
-    A round number.
+    1 if they are visible anyway.
     """
     most = MAX_MAGNIFIED_RATIO * size / deviation if deviation > 1e-6 * size else 1.0
     power = 10.0 ** np.floor(np.log10(max(most, 1.0)))
@@ -232,11 +228,10 @@ def magnification(deviation: float, size: float) -> float:
 
 
 def magnified(shown: Poses, recording: Poses, factor: float, middle: np.ndarray) -> Poses:
-    """Return poses (n,) so many times as far off from the recording: the middle, shape (3,), of the object,
-    and the turn.
+    """Return poses (n,) with the deviation from the recording magnified: of the object's centre `middle` and rotation.
 
-    A point of the object is displaced by the factor times what it is, but for what large turns bend; no turn is
-    magnified beyond half a turn.
+    Each point of the object is displaced by about `factor` times its deviation (large rotations bend this). No rotation
+    is magnified beyond half a turn.
     """
     if factor == 1.0:
         return shown

@@ -1,4 +1,4 @@
-"""Materials that look alike in every engine: Workbench takes their viewport colour, EEVEE and Cycles their nodes."""
+"""Materials that look the same in every engine: Workbench uses their viewport colour, EEVEE and Cycles their nodes."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ import bpy
 from rigid_motion_batch.palette import Theme, linear
 
 GLOSS_FACTOR, BOUNCE_FACTOR = 0.0142, 0.878
-"""The factors of what Workbench's light `paint.sl` shows of a rough colour c that faces the camera:
-GLOSS_FACTOR + BOUNCE_FACTOR c (measured)."""
+"""Workbench's light `paint.sl` shows a rough colour c that faces the camera as GLOSS_FACTOR + BOUNCE_FACTOR c
+(measured)."""
 
 
 GHOST_CONTRAST = 0.5
-"""The amount that a ghost stands out from its card."""
+"""The contrast of a ghost with its card: a fraction from the card's colour to the ghost's."""
 
 
 def ghost(theme: Theme) -> bpy.types.Material:
-    """Return what the recording is made of: between its colour and that of the card, as if it were translucent."""
+    """Return the recording's material: a mix of its colour and the card's, so that it seems translucent."""
     colours = zip(linear(theme.ghost), linear(theme.card), strict=True)
     return _lit("Recording", tuple(GHOST_CONTRAST * ghost + (1.0 - GHOST_CONTRAST) * card for ghost, card in colours))
 
 
 def surface(name: str, colour: str, *, alpha: float = 1.0, roughness: float = 0.4) -> bpy.types.Material:
-    """Return a lit surface, translucent where alpha is below 1."""
+    """Return a lit surface, translucent if alpha is below 1."""
     return _lit(name, linear(colour), alpha, roughness)
 
 
@@ -44,7 +44,7 @@ def _lit(name: str, rgb: tuple[float, ...], alpha: float = 1.0, roughness: float
 
 
 def ink(name: str, colour: str) -> bpy.types.Material:
-    """Return a flat colour that no light changes, for what is read rather than seen."""
+    """Return a flat colour that ignores light, for text and symbols."""
     material, nodes, output = _new(name)
     rgb = linear(colour)
     material.diffuse_color = (*(max(0.0, (value - GLOSS_FACTOR) / BOUNCE_FACTOR) for value in rgb), 1.0)
@@ -57,7 +57,7 @@ def ink(name: str, colour: str) -> bpy.types.Material:
 
 def _new(name: str) -> tuple[Any, Any, Any]:
     material: Any = bpy.data.materials.new(name)
-    if material.node_tree is None:  # Blender 5 makes it, and warns of the switch.
+    if material.node_tree is None:  # Blender 5 has a node tree already, and warns about `use_nodes`.
         material.use_nodes = True
     nodes = material.node_tree.nodes
     nodes.clear()

@@ -1,4 +1,4 @@
-"""Node groups that animate by themselves, from the frame that is shown: no script at playback."""
+"""Geometry node groups, built in Python, that animate from the current frame: no script runs during playback."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ Socket = bpy.types.NodeSocket
 def add_attribute(
     mesh: bpy.types.Mesh, name: str, values: np.ndarray, domain: Literal["POINT", "FACE"] = "POINT"
 ) -> None:
-    """Give each point, or each face, a number of its own. The array's type is that of the attribute."""
+    """Add an attribute with a number for each point or face. The array's type determines the attribute's."""
     attribute: Any = mesh.attributes.new(name, "INT" if values.dtype == np.int32 else "FLOAT", domain)
     attribute.data.foreach_set("value", values)
 
 
 def node_of(socket: Socket) -> Any:
-    """Return the node of a socket, which has what nodes of its kind have."""
+    """Return the node of a socket, typed as Any: its attributes depend on its kind."""
     return socket.node
 
 
 class Group:
-    """A geometry node group in the making: `group.add("GeometryNodeFillCurve", curves)` is a node with its inputs."""
+    """A geometry node group under construction: `group.add("GeometryNodeFillCurve", curves)` adds a node."""
 
     def __init__(self, name: str, **inputs: str) -> None:
-        """Make a group that takes a geometry and then `inputs`, name to the kind of socket ("Float", "Material")."""
+        """Make a group with a geometry input and then `inputs`: name to the kind of socket ("Float", "Material")."""
         self.tree = cast(Any, bpy.data.node_groups.new(name, "GeometryNodeTree"))
         self.tree.is_modifier = True
         for direction in ("INPUT", "OUTPUT"):
@@ -41,8 +41,8 @@ class Group:
     def add(self, kind: str, *arguments: Any, settings: dict[str, Any] | None = None, **named: Any) -> Socket:
         """Add a node and return its first output.
 
-        Sockets among the arguments are linked, other values are set; None leaves an input as it is. The settings
-        become properties of the node.
+        Arguments that are sockets are linked, other values are set; None leaves an input unchanged. The settings become
+        properties of the node.
         """
         node = self.tree.nodes.new(kind)
         for name, value in (settings or {}).items():
@@ -63,11 +63,11 @@ class Group:
         return outputs["Value" if operation in ("DOT_PRODUCT", "DISTANCE", "LENGTH") else "Vector"]
 
     def attribute(self, name: str) -> Socket:
-        """Return a number that each point of the geometry carries."""
+        """Return a float attribute of the geometry's points."""
         return self.add("GeometryNodeInputNamedAttribute", name, settings={"data_type": "FLOAT"})
 
     def frame(self) -> Socket:
-        """Return the frame that is shown."""
+        """Return the current frame."""
         return node_of(self.add("GeometryNodeInputSceneTime")).outputs["Frame"]
 
     def finish(self, geometry: Socket) -> bpy.types.NodeTree:
@@ -76,7 +76,7 @@ class Group:
 
 
 def apply_group(obj: bpy.types.Object, group: bpy.types.NodeTree, **inputs: Any) -> bpy.types.NodesModifier:
-    """Give the object a modifier with the group, and its inputs their values."""
+    """Add a modifier with the group to the object, and set its inputs."""
     modifier: Any = obj.modifiers.new(group.name, "NODES")
     modifier.node_group = group
     for name, value in inputs.items():
@@ -88,7 +88,7 @@ def apply_group(obj: bpy.types.Object, group: bpy.types.NodeTree, **inputs: Any)
 
 
 def input_path(modifier: Any, name: str) -> str:
-    """Return the data path, from the object on, by which an input is animated. Blender 5.2 moved it."""
+    """Return the data path, relative to the object, that animates an input. Blender 5.2 moved it."""
     identifier = _identifier(modifier.node_group, name)
     if hasattr(modifier, "properties"):
         return str(getattr(modifier.properties.inputs, identifier).path_from_id("value"))

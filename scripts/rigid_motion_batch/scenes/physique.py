@@ -1,7 +1,7 @@
-"""Physique: what a figure looks like. Its skin where it has one, or else a solid for each bone.
+"""Meshes of figures: their skin if they have one, or else a solid for each bone.
 
-A mesh is of the figure at rest, in the space of its armature; each vertex is carried by bones, as numbers and weights,
-and each face knows the bone that its colour is of.
+A mesh shows the figure at rest, in the space of its armature; each vertex has the indices and weights of the bones
+that carry it, and each face has the bone that determines its colour.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ from .armature import RestFigure, Rig
 from .nodes import add_attribute
 
 BONE = "bone"
-"""The attribute of a face or point: the number of its bone."""
+"""The attribute of a face or point with the index of its bone."""
 
 RADIUS_PER_LENGTH = 0.13
-"""The thickness of a solid, relative to its length: its radius."""
+"""The radius of a solid, relative to its length."""
 
 THICKNESS_RANGE = 0.008, 0.034
-"""The thinnest and the thickest, relative to the figure."""
+"""Minimum and maximum radius, relative to the figure's size."""
 
 LINK_THICKNESS_RATIO = 0.5
-"""The thickness of what joins a bone to a child beside its end, relative to a solid."""
+"""The thickness of a link from a bone to a child that is not at its tail, relative to a solid."""
 
 AT_END = 0.02
-"""A bone that ends so near to a child, relative to the figure, leads to it."""
+"""A bone leads to a child if its tail is at most this far from it, relative to the figure's size."""
 
 STUB_LENGTH_RATIO = 0.04
-"""The length of a solid at a joint without children, relative to the figure, where bones do not lead to children: then
-they are of some program's making, and where they end means nothing."""
+"""The length of a solid at a joint without children, relative to the figure, if bones do not lead to children: their
+tails were then made up by some program, and mean nothing."""
 
 N_SIDES = 8
 WAIST_RATIO = 0.22
-"""The place along a solid where it is thickest."""
+"""Where a solid is thickest, as a fraction of its length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,24 +61,24 @@ class Physique:
 
     @property
     def foremost(self) -> np.ndarray:
-        """The bone that carries most of each vertex, shape (v,)."""
+        """The bone with the largest weight for each vertex, shape (v,)."""
         return np.take_along_axis(self.carriers, self.weights.argmax(axis=1)[:, None], axis=1)[:, 0]
 
     @property
     def bones(self) -> np.ndarray:
-        """The bone of each face: that of its first vertex."""
+        """The bone of each face: its first vertex's."""
         return self.foremost[[face[0] for face in self.faces]]
 
     @property
     def outermost(self) -> np.ndarray:
-        """The numbers of the vertices of each bone that are outermost along the axes, shape (k,)."""
+        """The indices of each bone's outermost vertices along the axes, shape (k,)."""
         parts = (np.flatnonzero(self.foremost == bone) for bone in np.unique(self.foremost))
         ends = [own[edge(self.vertices[own], axis=0)] for own in parts for edge in (np.argmin, np.argmax)]
         return np.unique(np.concatenate(ends))
 
     @classmethod
     def of(cls, clip: Clip, rest: RestFigure) -> Physique:
-        """Return the skin, or else solids."""
+        """Return the figure's skin, or solids if it has none."""
         skin = clip.whole_body.skin
         if skin is None:
             return cls._of_solids(rest)
@@ -103,7 +103,7 @@ class Physique:
 
 
 def _parts(rest: RestFigure, size: float) -> Iterator[tuple[int, np.ndarray, np.ndarray, float]]:
-    """Yield the bone of each solid, where it begins and ends, and how thick it is, relative to others."""
+    """Yield the bone of each solid, its head and tail, and its relative thickness."""
     heads, tails, seen = rest.joints.positions, rest.tails, seen_bones(rest)
     children = {joint: np.flatnonzero(rest.parents == joint) for joint in seen}
     gaps = {joint: np.linalg.norm(heads[own] - tails[joint], axis=1) for joint, own in children.items() if len(own)}
@@ -131,9 +131,9 @@ def _parts(rest: RestFigure, size: float) -> Iterator[tuple[int, np.ndarray, np.
 
 
 def body_size(rest: RestFigure) -> float:
-    """Return the largest extent of the joints of a figure at rest, without what only carries it about.
+    """Return the largest extent of the joints of a figure at rest, without joints that only carry it.
 
-    Where bones end is often made up by importers, and counts for a single joint alone.
+    The tails of bones are used only for a single joint: importers often make them up.
     """
     seen = seen_bones(rest)
     heads = rest.joints.positions[seen]
@@ -142,12 +142,12 @@ def body_size(rest: RestFigure) -> float:
 
 
 def seen_bones(rest: RestFigure) -> list[int]:
-    """Return the bones but for those that are aside: they may reach to wherever the body was left."""
+    """Return all bones except those that only carry: these may reach anywhere."""
     return np.flatnonzero(~rest.aside if not rest.aside.all() else rest.aside).tolist()
 
 
 def _solid(head: np.ndarray, tail: np.ndarray, share: float, size: float) -> tuple[np.ndarray, list[tuple[int, ...]]]:
-    """Return a spindle from head to tail, thickest near its head: its corners and faces."""
+    """Return corners and faces of a spindle from head to tail, thickest near its head."""
     along = tail - head
     length = float(np.linalg.norm(along))
     radius = share * float(np.clip(RADIUS_PER_LENGTH * length, THICKNESS_RANGE[0] * size, THICKNESS_RANGE[1] * size))
@@ -170,7 +170,7 @@ def _solid(head: np.ndarray, tail: np.ndarray, share: float, size: float) -> tup
 
 @dataclass(frozen=True, eq=False)
 class CarriedMesh:
-    """A mesh of the figure at rest, for as many objects as there are rigs to carry it."""
+    """A mesh of the figure at rest, shared by objects that follow different rigs."""
 
     mesh: bpy.types.Mesh
     carriers: np.ndarray
@@ -181,7 +181,7 @@ class CarriedMesh:
 
     @classmethod
     def rest_body(cls, name: str, physique: Physique) -> CarriedMesh:
-        """Return a physique. Its faces know their bones."""
+        """Return the mesh of a physique. Its faces have the attribute `BONE`."""
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(physique.vertices.tolist(), [], physique.faces)
         add_attribute(mesh, BONE, physique.bones.astype(np.int32), "FACE")
@@ -191,7 +191,7 @@ class CarriedMesh:
 
     @classmethod
     def joints(cls, name: str, rest: RestFigure) -> CarriedMesh:
-        """Return a vertex at each joint, which knows its bone."""
+        """Return a mesh with a vertex at each joint. The vertices have the attribute `BONE`."""
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(rest.joints.positions.tolist(), [], [])
         numbers = np.arange(len(rest.parents))[:, None]
@@ -199,8 +199,8 @@ class CarriedMesh:
         return cls(mesh, numbers, np.ones(numbers.shape))
 
     def hang_on(self, rig: Rig, obj: bpy.types.Object) -> None:
-        """Have a rig carry an object of this mesh."""
-        if not obj.vertex_groups:  # They are the mesh's: the first object brings them for all.
+        """Make an object with this mesh follow a rig."""
+        if not obj.vertex_groups:  # They belong to the mesh: the first object adds them for all.
             vertices = np.arange(len(self.carriers))
             for bone, name in enumerate(rig.bones):
                 group = obj.vertex_groups.new(name=name)

@@ -1,6 +1,6 @@
-"""The point of a body that stays in a recording, such as a pivot: a cross where it was, and one where a mode has it.
+"""Pivot markers: crosses at a body point that stays in a recording, one for the recording and one for the mode.
 
-They are in front of all else in a lane, square to the camera.
+They are in front of everything else in a lane, facing the camera.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from .lanes import Cast, Lane
 from .materials import ink
 
 MODE_CROSS_RATIO = 0.6
-"""The size of the cross of a mode, of that of the recording."""
+"""The size of a mode's cross, relative to the recording's."""
 
 ARM_RATIO, HALF_THICKNESS_RATIO = 0.017, 0.0022
-"""How far the arms of a cross reach, and half of how thick they are, in units of the frame's height."""
+"""The length of a cross's arms and half their thickness, in units of the frame's height."""
 
 
 class Pivot:
-    """Crosses for the lanes of a recording at the frames, (n,), whose point, shape (3,), stays."""
+    """Makes crosses in the lanes, for a recording at the frames (n,), whose point of shape (3,) stays."""
 
     def __init__(self, cast: Cast, recording: Poses, point: np.ndarray) -> None:
         self._cast, self._point = cast, point
@@ -38,9 +38,9 @@ class Pivot:
 
     @classmethod
     def of(cls, made: Reconstruction, cast: Cast, recording: Poses, enlarged: float) -> Pivot | None:
-        """Return that of a reconstruction; None where no point stays, or it is not seen where the body is."""
+        """Return the pivot of a reconstruction; None if no point stays, or the point is outside the view."""
         point = Ground.of(made).still_point
-        # In a body that is shown larger than it is the point would not stay.
+        # In an enlarged body, the point would not stay.
         if point is None or enlarged > 1.0:
             return None
         seen = layout.project(cast.seen_from_focus(layout.swept_points(recording, point[None])))[:, :2]
@@ -48,7 +48,7 @@ class Pivot:
         return cls(cast, recording, point) if ((seen > low) & (seen < high)).all() else None
 
     def enter(self, lane: Lane, shown: Poses) -> None:
-        """Add the cross of the recording, and that of a mode by its poses (n,) at the frames."""
+        """Add the recording's cross, and the mode's from its poses (n,) at the frames."""
         own = _cross(f"Pivot {lane.mode}", MODE_CROSS_RATIO * self._cast.layout.metres)
         own.materials.append(ink(f"Pivot {lane.mode}", colour_on(self._cast.theme, lane.mode)))
         for name, mesh, places, before in (
@@ -62,7 +62,7 @@ class Pivot:
 
     @property
     def _upright(self) -> np.ndarray:
-        """The rotation that turns a cross to the camera, in the space of a lane."""
+        """The rotation, in the space of a lane, that turns a cross to the camera."""
         half = (math.pi / 2.0 - layout.ELEVATION_RAD) / 2.0
         return multiply(
             layout.yaw_quaternion(-self._cast.framing.yaw), np.array((np.cos(half), np.sin(half), 0.0, 0.0))
@@ -70,7 +70,7 @@ class Pivot:
 
 
 def _cross(name: str, metres: float) -> bpy.types.Mesh:
-    """Return a cross around the origin, in a picture that is so many metres high."""
+    """Return a cross centred on the origin; `metres` is the height of the picture."""
     long, short = ARM_RATIO * metres, HALF_THICKNESS_RATIO * metres
     corners = [(x, y, 0.0) for w, h in ((long, short), (short, long)) for x, y in ((-w, -h), (w, -h), (w, h), (-w, h))]
     mesh = bpy.data.meshes.new(name)

@@ -1,10 +1,10 @@
-"""The stage: one scene in which every mode moves its own object, side by side, as ordinary keyed animation.
+"""The scene that compares modes on a rigid object: one object per mode, side by side, with ordinary keys.
 
-Lanes stand side by side in front of the `Frame`, an empty in the plane of the picture on which everything is written.
-What changes over time is either a key or a node group that reads the frame: the saved file plays for anyone,
-without scripts. The scene's custom properties tell where the recording's origin is.
+Lanes stand side by side in front of the `Frame`, an empty in the plane of the picture that carries all text.
+Everything that changes over time is either keyed or a node group that reads the frame: the saved file plays for
+anyone, without scripts. The scene's custom properties store where the recording's origin is.
 
-A rigid object (`solids`) moves under every mode. Its own channels are the poses of `timeline.ShownMotion`, within its
+A rigid object (`solids`) moves under every mode. Its channels are the poses of `timeline.ShownMotion`, within its
 lane.
 """
 
@@ -38,37 +38,37 @@ from .subject import load_subject, vertices_of
 from .timeline import ShownMotion, Timeline
 
 LEGEND_SIZE = 0.032
-"""The size of the letters below the lanes, in units of the frame's height, where there is room."""
+"""The letter size below the lanes, in units of the frame's height, if there is room."""
 
 CLOCK_RATIO = 0.3
-"""The room for the time, in units of the frame's height."""
+"""The width reserved for the time, in units of the frame's height."""
 
 CARD_SAMPLES = "8"
-"""How often a graphics card draws each pixel: it hardly takes longer."""
+"""Samples per pixel on a graphics card: they cost hardly any time."""
 
 MIN_EDGE_CONTRAST = 0.05
-"""The contrast from which the compositor takes pixels for an edge: thin grey lines are edges."""
+"""Minimum contrast that the compositor takes as an edge: thin grey lines are edges."""
 
 SOFTENED_PIXEL_RATIO = 0.35
-"""The part of a pixel that is the mean of those around it, near ones more: small letters are less jagged, and clear."""
+"""How much of a pixel is blurred with its neighbours: small letters are less jagged, and still clear."""
 
 
 def build_scene(
     reconstruction: Reconstruction, settings: SceneSettings, findings: Sequence[Finding] = ()
 ) -> bpy.types.Scene:
-    """Make the scene of a comparison, in a file that is emptied for it.
+    """Make the scene of a comparison of modes, in an emptied file.
 
     Parameters
     ----------
     reconstruction : Reconstruction
     settings : SceneSettings
     findings : sequence of Finding
-        What else was found of it, for the lanes.
+            Further findings to show in the lanes.
 
     Raises
     ------
     SubjectError
-        Where the object to show cannot be had.
+            If the object to show cannot be loaded.
     """
     timeline = begin(reconstruction, settings)
     motion = ShownMotion.of(reconstruction, timeline)
@@ -125,7 +125,7 @@ def assemble_scene(
     centre: np.ndarray,
     reserved: float = 0.0,
 ) -> bpy.types.Scene:
-    """Make the lanes, what is written around them, camera and lights.
+    """Make the lanes, the text around them, camera and lights.
 
     Parameters
     ----------
@@ -135,13 +135,13 @@ def assemble_scene(
     lanes_of : tuple of tuple of str
         The modes of each lane.
     enter : callable
-        Adds what moves to a lane.
+            Adds the moving objects to a lane.
     legend : sequence of str
         How to read the picture.
     centre : array, shape (3,)
-        The place of the recording that is the origin.
+            The point of the recording that became the origin.
     reserved : float
-        The space to be left free to the right of the legend, in units of the frame's height.
+            The free space to the right of the legend, in units of the frame's height.
     """
     scene = blender.scene()
     plan = cast.layout
@@ -159,7 +159,7 @@ def assemble_scene(
 
 
 def _notes(reconstruction: Reconstruction) -> dict[str, str]:
-    """Return mode id to its own number of keys, where the modes have different ones."""
+    """Return mode id to its rate of keys, if the modes have different numbers of keys."""
     counts = {mode: len(keys) for mode, (keys,) in reconstruction.keys.items() if len(keys)}
     if len(set(counts.values())) == 1:
         return {}
@@ -168,7 +168,7 @@ def _notes(reconstruction: Reconstruction) -> dict[str, str]:
 
 
 def _legend(cast: Cast, deviation: float, enlarged: float, radius: float, *, crosses: bool) -> list[str]:
-    """Return how to read the picture."""
+    """Return the parts of the legend that explains the picture."""
     full = f"{cast.largest_error:.{captions.decimals_for(cast.largest_error)}f}"
     drawn = f", {deviation:g} times as far off as it is" if deviation > 1.0 else ""
     error = f"mm: how far any point within {100.0 * radius:g} cm is off (graphs up to {full})"
@@ -178,7 +178,7 @@ def _legend(cast: Cast, deviation: float, enlarged: float, radius: float, *, cro
 
 
 def make_frame(metres: float) -> bpy.types.Object:
-    """Return the plane of the picture, behind everything that moves."""
+    """Return an empty in the plane of the picture, behind everything that moves."""
     frame = bpy.data.objects.new("Frame", None)
     frame.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION_RAD
     frame.scale = (metres, metres, metres)
@@ -187,7 +187,7 @@ def make_frame(metres: float) -> bpy.types.Object:
 
 
 def _make_header(made: Reconstruction, legend: str, cast: Cast, frame: bpy.types.Object, reserved: float) -> None:
-    """Make what is written above and below the lanes: clip, rate and time, and how to read the picture."""
+    """Make the text above and below the lanes: clip, rate, findings, time and legend."""
     collection = bpy.data.collections.new("Captions")
     blender.scene().collection.children.link(collection)
     collection.objects.link(frame)
@@ -217,7 +217,7 @@ def _make_header(made: Reconstruction, legend: str, cast: Cast, frame: bpy.types
 
 
 def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
-    """Make a camera square to the frame, in front of all that moves, with parallel rays."""
+    """Make an orthographic camera that faces the frame, in front of everything that moves."""
     lens = bpy.data.cameras.new("Camera")
     camera = bpy.data.objects.new("Camera", lens)
     scene.collection.objects.link(camera)
@@ -232,7 +232,7 @@ def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
 
 
 def make_lights(scene: bpy.types.Scene) -> None:
-    """Make two suns for EEVEE and Cycles. Workbench brings its own light."""
+    """Make two suns for EEVEE and Cycles. Workbench has its own light."""
     for name, strength, pitch, yaw in (("Key light", 3.0, 40.0, -35.0), ("Fill light", 1.2, 60.0, 50.0)):
         light = cast(bpy.types.SunLight, bpy.data.lights.new(name, "SUN"))
         light.energy = strength
@@ -243,7 +243,7 @@ def make_lights(scene: bpy.types.Scene) -> None:
 
 
 def set_up_render(scene: Any, settings: SceneSettings, frames: int, background: str = DARK.background) -> None:
-    """Set engine, size, colours and encoder of a scene of so many frames."""
+    """Set engine, size, colours and encoder of a scene with this number of frames."""
     scene.frame_start, scene.frame_end = 1, frames
     scene.frame_set(1)
     render = scene.render
@@ -251,7 +251,7 @@ def set_up_render(scene: Any, settings: SceneSettings, frames: int, background: 
     render.resolution_percentage = 100
     render.fps, render.fps_base = settings.fps, 1.0
     render.engine = _engine_id(settings.engine)
-    render.dither_intensity = 0.0  # Flat colours need none, and are encoded sooner.
+    render.dither_intensity = 0.0  # Flat colours need none, and encode faster without.
     scene.view_settings.view_transform = "Standard"
     _set_background(scene, background)
     _set_up_video(scene)
@@ -265,26 +265,26 @@ def set_up_render(scene: Any, settings: SceneSettings, frames: int, background: 
     shading.color_type = "MATERIAL"
     shading.show_object_outline = shading.show_shadows = shading.show_cavity = False
     scene.eevee.taa_render_samples = settings.samples
-    if hasattr(scene, "cycles"):  # An add-on, which may be off.
+    if hasattr(scene, "cycles"):  # Cycles is an add-on that may be disabled.
         scene.cycles.samples = settings.samples
         scene.cycles.use_denoising = False
 
 
 def _is_drawn_in_software() -> bool:
-    """Whether no graphics card draws here. Before 5.2, Blender cannot tell without a window."""
+    """Whether Blender renders without a graphics card. Before 5.2, Blender cannot tell without a window."""
     if not hasattr(gpu, "init"):
         return True
-    with suppress(SystemError):  # There is nothing to draw with, yet: a farm may have it.
+    with suppress(SystemError):  # No GPU backend here; a render farm may have one.
         gpu.init()
         return gpu.platform.device_type_get() == "SOFTWARE"
     return True
 
 
 def _smooth_edges(scene: Any) -> None:
-    """Have the compositor smooth edges: without a graphics card, samples would take four times as long."""
+    """Smooth edges in the compositor: without a graphics card, samples would take four times as long."""
     if bpy.app.version >= (5, 0):
         tree: Any = bpy.data.node_groups.new("Smooth edges", "CompositorNodeTree")
-        effects = getattr(scene, "compositor_effects", None)  # Blender 5.3 warns of the one group it had before.
+        effects = getattr(scene, "compositor_effects", None)  # Blender 5.3 warns about the older single node group.
         if effects is None:
             scene.compositing_node_group = tree
         else:
@@ -307,9 +307,9 @@ def _smooth_edges(scene: Any) -> None:
 
 
 def _set_up_video(scene: bpy.types.Scene) -> None:
-    """Set H.264 in an MP4 beside the .blend, wherever that is taken, by Blender's own encoder."""
+    """Set output to an H.264 MP4 next to the .blend, encoded by Blender itself."""
     image, video = existing(scene.render.image_settings), existing(scene.render.ffmpeg)
-    if hasattr(image, "media_type"):  # Blender 5 asks for the kind of output first.
+    if hasattr(image, "media_type"):  # Blender 5 needs the kind of output first.
         image.media_type = "VIDEO"
     image.file_format = "FFMPEG"
     image.color_mode = "RGB"
@@ -318,16 +318,16 @@ def _set_up_video(scene: bpy.types.Scene) -> None:
     video.ffmpeg_preset = "REALTIME"
     video.gopsize = scene.render.fps
     scene.render.use_file_extension = True
-    scene.render.use_stamp_date = False  # The same film is the same file, whenever it is made.
+    scene.render.use_stamp_date = False  # The same film is the same file, whenever it is rendered.
     scene.render.filepath = "//comparison.mp4"
 
 
 def _set_background(scene: bpy.types.Scene, background: str) -> None:
-    """Set one colour, for Workbench and for the others."""
+    """Set the background colour, for Workbench and for the other engines."""
     scene.world = bpy.data.worlds.new("World")
     colour = linear(background)
     scene.world.color = colour
-    if scene.world.node_tree is None:  # Blender 5 makes it, and warns of the switch.
+    if scene.world.node_tree is None:  # Blender 5 has a node tree already, and warns about `use_nodes`.
         scene.world.use_nodes = True
     nodes = existing(scene.world.node_tree).nodes
     socket: Any = next(node for node in nodes if node.bl_idname == "ShaderNodeBackground").inputs["Color"]
@@ -335,7 +335,7 @@ def _set_background(scene: bpy.types.Scene, background: str) -> None:
 
 
 def _engine_id(engine: str) -> str:
-    """Return Blender's name of an engine. EEVEE's was another before Blender 5."""
+    """Return Blender's identifier of an engine. Before Blender 5, EEVEE had another one."""
     if engine == "eevee":
         return "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
     return {"workbench": "BLENDER_WORKBENCH", "cycles": "CYCLES"}[engine]

@@ -1,4 +1,4 @@
-"""How a comparison is to be shown, and which object: all that can be said of it before Blender is loaded."""
+"""Settings of comparison scenes: how to show a comparison, and which object. Usable before Blender is loaded."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ MODELS = {"drill": "Drill", "controller": "Controller"}
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """How a comparison is shown."""
+    """The display settings of a comparison."""
 
     engine: str = "workbench"
     """One of `ENGINES`."""
 
     resolution: tuple[int, int] = (960, 540)
-    """Width and height in pixels, even: the codec wants that."""
+    """Width and height in pixels, even because the codec requires it."""
 
     fps: int = 30
 
     slow_motion: float = 1.0
-    """The factor by which it is slower than life."""
+    """The factor by which the film is slower than real time."""
 
     subject: str = "drill"
     """The object that moves: "drill", "controller" or "file.blend:Name"."""
@@ -35,8 +35,8 @@ class SceneSettings:
     antialiasing: str | None = None
     """The antialiasing of Workbench: one of `ANTIALIASING`; numbers are samples.
 
-    Where nothing is asked for, a graphics card draws 8 samples, as far as Blender can tell that there is one (5.2 and
-    later). Without one, the compositor smooths edges (SMAA), which takes a tenth of the time of FXAA.
+    By default, a graphics card draws 8 samples, if Blender can tell that there is one (5.2 and later). Without one,
+    the compositor smooths edges (SMAA), which takes a tenth of the time of FXAA.
     """
 
     samples: int = 16
@@ -46,14 +46,13 @@ class SceneSettings:
     """One of `palette.THEMES`."""
 
     deviation: float | None = None
-    """The factor by which a mode's deviation from the recording is shown larger than it is;
-    None for what shows it well."""
+    """The factor that magnifies a mode's deviation from the recording; None chooses a suitable one."""
 
     distinct: bool = False
-    """True if modes that are one motion share a lane."""
+    """True if modes with identical motion share a lane."""
 
     def __post_init__(self) -> None:
-        """Refuse what no option of a command line refuses by itself."""
+        """Raise ValueError for values that the command line's options do not check."""
         if min(self.resolution) < 2 or any(size % 2 for size in self.resolution):
             raise ValueError(f"resolution {self.resolution[0]}x{self.resolution[1]}: give two even numbers of pixels")
         if self.deviation is not None and not 1.0 <= self.deviation <= 1000.0:
@@ -61,11 +60,11 @@ class SceneSettings:
 
 
 class SubjectError(ValueError):
-    """The object to show cannot be had. The message says why, in one line."""
+    """The object to show cannot be loaded. The message says why, in one line."""
 
 
 def place_of_subject(requested: str) -> tuple[Path, str]:
-    """Return the file that an object is in, whether or not it is there, and its name in that.
+    """Return the file of an object, which need not exist, and the object's name in the file.
 
     Parameters
     ----------
@@ -75,7 +74,7 @@ def place_of_subject(requested: str) -> tuple[Path, str]:
     Raises
     ------
     SubjectError
-        Where no object is named.
+            If the request names no object.
     """
     if requested in MODELS:
         return MODELS_FILE, MODELS[requested]

@@ -1,4 +1,4 @@
-"""Rigid objects in lanes: each under its mode, the recording as its ghost, with trails, marks of keys and a pivot."""
+"""Rigid objects in lanes: each moved by its mode, with the recording as a ghost, trails, key marks and a pivot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TRAIL_SECONDS = 0.8
 PATH_BEHIND_SECONDS = 1.2
 PATH_AHEAD_SECONDS = 0.5
 MARKS_SHOWN = 14
-"""About so many marks are shown at once: those nearest in time, where keys are dense."""
+"""The approximate number of marks shown at once: the nearest in time, if keys are dense."""
 
 # In units of the frame's height.
 TRAIL_RADIUS = 0.0036
@@ -31,14 +31,14 @@ MARK_RADIUS = 0.0052
 
 
 class Solids:
-    """Rigid objects for the lanes, out of materials, groups and meshes that they share.
+    """Adds rigid objects to the lanes, with shared materials, node groups and meshes.
 
     Parameters
     ----------
     cast : Cast
     motion : ShownMotion
     deviated : dict of Poses
-        Mode id to poses at the fine frames, as far off from the recording as is shown.
+            Mode id to poses at the fine frames, with deviations from the recording magnified as shown.
     mesh : bpy.types.Mesh
     traced : array, shape (3,)
         The point of the object whose path is drawn.
@@ -64,7 +64,7 @@ class Solids:
         self.path = trails.polyline("Recording path", cast.timeline.fine_frames, recording)
 
     def _path_of(self, poses: Poses) -> np.ndarray:
-        """Return the way of the traced point, shape (n, 3)."""
+        """Return the path of the traced point, shape (n, 3)."""
         return layout.swept_points(poses, self.traced[None])
 
     def enter(self, lane: Lane) -> None:
@@ -81,7 +81,7 @@ class Solids:
         material = surface(f"Mode {mode}", colour_on(self.cast.theme, mode))
         self._add_actor(mode, lane, motion.modes[mode][::steps], material)
         if self.deviated[mode] is not motion.modes[mode]:
-            # The motion itself is there for whoever opens the file; its deviation is what is seen.
+            # The true motion is kept for users who open the file; only the magnified one is visible.
             bpy.data.objects[mode].hide_render = bpy.data.objects[mode].hide_viewport = True
             self._add_actor(f"{mode} deviating", lane, self.deviated[mode][::steps], material)
 
@@ -143,7 +143,7 @@ class Solids:
 
 
 def _paint(obj: bpy.types.Object, slots: list[int] | range, material: bpy.types.Material) -> None:
-    """Give this object its own material in slots of the mesh that it shares."""
+    """Set a material for this object only, in slots of its shared mesh."""
     for slot in slots:
         obj.material_slots[slot].link = "OBJECT"
         obj.material_slots[slot].material = material

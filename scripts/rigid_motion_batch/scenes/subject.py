@@ -1,7 +1,7 @@
-"""The object that is shown: a model of ours or any object of a user's .blend file, as one mesh of its own.
+"""The object to show: one of our models or any object of a user's .blend file, as a single new mesh.
 
-Whatever makes up its shape (modifiers, curves, text) is in the mesh; of the file it came from nothing else remains.
-Scripts in such a file never run: it is read as data.
+The mesh includes everything that makes up the shape (modifiers, curves, text); nothing else of the file remains.
+Scripts in the file never run: it is read as data.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from rigid_motion_batch.command_line import listed
 from .settings import SubjectError, place_of_subject
 
 TINTED = "Mode"
-"""The material that gives way to the colour of the lane."""
+"""The name of the material that is replaced by the lane's colour."""
 
 
 def load_subject(requested: str) -> bpy.types.Mesh:
-    """Return the mesh of an object, in its own axes and its size in the world of its file.
+    """Return the mesh of an object, in its own axes, with its world-space size in its file.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def load_subject(requested: str) -> bpy.types.Mesh:
     Raises
     ------
     SubjectError
-        Where the file, the object or its faces are missing.
+            If the file, the object or its faces are missing.
     """
     return _read_mesh(*place_of_subject(requested))
 
@@ -46,7 +46,7 @@ def vertices_of(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def tinted_slots(mesh: bpy.types.Mesh) -> list[int]:
-    """Return the material slots that take the colour of the lane: those named `TINTED`, or else the first."""
+    """Return the material slots that get the lane's colour: those named `TINTED`, or else the first."""
     named = [
         index for index, material in enumerate(mesh.materials) if material and _without_number(material.name) == TINTED
     ]
@@ -88,14 +88,14 @@ def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:
 
 
 def _evaluated_copy(loaded: bpy.types.Object) -> bpy.types.Mesh | None:
-    """Return the shape as its scene shows it, sized as in its file; None for what has no faces."""
+    """Return the evaluated mesh, sized as in its file's world; None for objects without faces."""
     objects = scene().collection.objects
     objects.link(loaded)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = loaded.evaluated_get(depsgraph)
     try:
         mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
-    except RuntimeError:  # A light, a camera, an empty.
+    except RuntimeError:  # A light, a camera or an empty.
         return None
     finally:
         size = evaluated.matrix_world.to_scale()
@@ -107,10 +107,10 @@ def _evaluated_copy(loaded: bpy.types.Object) -> bpy.types.Mesh | None:
 
 
 def _own_materials(mesh: bpy.types.Mesh) -> dict[bpy.types.Material, str]:
-    """Give the mesh copies of its materials, and return the names they are copies of.
+    """Replace the mesh's materials by copies, and return the copies with the original names.
 
-    Blender notes in what it loads which file that was, by its full path, and a copy has no such note. Images are
-    packed, so that the file that shows the object can be opened elsewhere.
+    Blender stores the full path of the source file in loaded data; copies do not have it. Images are packed, so that
+    the saved file can be opened elsewhere.
     """
     names: dict[bpy.types.Material, str] = {}
     for slot, material in enumerate(mesh.materials):
@@ -124,7 +124,7 @@ def _own_materials(mesh: bpy.types.Mesh) -> dict[bpy.types.Material, str]:
 
 
 def _discard_all_but(mesh: bpy.types.Mesh | None, before: set[bpy.types.ID]) -> None:
-    """Remove what came with the object, except what the mesh uses: its materials and their images."""
+    """Remove all data loaded with the object, except the materials and images that the mesh uses."""
     arrived = set(bpy.data.user_map()) - before
     kept: set[bpy.types.ID | None] = {mesh}
     for block in arrived:
@@ -137,7 +137,7 @@ def _discard_all_but(mesh: bpy.types.Mesh | None, before: set[bpy.types.ID]) -> 
 
 
 MOST_TRIANGLES = 4000
-"""So many are some 100 kB in a page."""
+"""Maximum number of triangles: 4000 take about 100 kB in a page."""
 
 MAX_TRIES = 6
 
@@ -145,8 +145,8 @@ MAX_TRIES = 6
 def simplified(requested: str, most: int = MOST_TRIANGLES) -> dict[str, np.ndarray]:
     """Return the surface of an object in its own axes, in metres: `vertices` (v, 3), `triangles` (t, 3), `tints` (t,).
 
-    It has so many triangles at most. Tints are 1 where a triangle has the colour of its mode, and 0 elsewhere.
-    `requested` is as in `load_subject`, whose errors it raises.
+    It has at most `most` triangles. Tints are 1 for triangles in the mode's colour, and 0 elsewhere. `requested` is as
+    in `load_subject`, and so are the errors raised.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     mesh = load_subject(requested)
@@ -158,7 +158,7 @@ def simplified(requested: str, most: int = MOST_TRIANGLES) -> dict[str, np.ndarr
         result = _surface(obj)
         if len(result["triangles"]) <= most:
             return result
-        # It may leave more than it is asked to, where much hangs on nothing.
+        # The modifier may leave more than requested, if the mesh has many loose parts.
         modifier.ratio *= 0.95 * most / len(result["triangles"])
     raise SubjectError(f"{requested}: Blender cannot simplify it to {most} triangles")
 

@@ -1,8 +1,8 @@
-"""Trails, key marks and graphs: what was and what will be, drawn around the frame that is shown.
+"""Trails, key marks and graphs: past and future motion, drawn around the current frame.
 
-A trail is a tube along the way of one point of the object, a mark a small ball at a vertex, a graph an area that grows
-from left to right. Each vertex carries its moment as the attribute `frame`; the node groups keep what lies within a
-window of frames around the current one, and of trails what lies within a window of the picture.
+A trail is a tube along the path of one point of the object, a mark a small ball at a vertex, a graph an area that
+grows from left to right. Each vertex has its moment as the attribute `frame`; the node groups keep vertices within a
+window of frames around the current one, and for trails, within a window of the picture.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from .nodes import Group, Socket, add_attribute, node_of
 
 FRAME = "frame"
 FLASH_FRAMES = 6.0
-"""The frames that a mark takes to swell before its key and to settle after it."""
+"""Frames that a mark takes to swell before its key, and to shrink after it."""
 
 
 def polyline(name: str, frames: np.ndarray, points: np.ndarray, *, joined: bool = True) -> bpy.types.Mesh:
-    """Return a mesh of vertices that know their frame, joined one to the next or single.
+    """Return a mesh of vertices with their frames, joined into a line or separate.
 
     Parameters
     ----------
@@ -36,17 +36,17 @@ def polyline(name: str, frames: np.ndarray, points: np.ndarray, *, joined: bool 
 
 
 WINDOW = {"Middle": "Vector", "Right": "Vector", "Up": "Vector"}
-"""The window that trails are kept within: the middle of a window of the picture in the world, and one over its half
-width and half height, along the directions in which these are."""
+"""The visible window of the picture, in the world: its centre, and the directions right and up, divided by its half
+width and half height."""
 
 FADE_RATIO = 0.15
-"""The part of the window's half, from its edge, where what is drawn begins to thin."""
+"""The fraction of the window's half size, from its edge inwards, over which trails fade out."""
 
 
 def trail_group() -> bpy.types.NodeTree:
-    """Return a tube from `Past` frames ago to `Ahead` frames from now, that thins by `Taper` towards its old end.
+    """Return a node group for a tube from `Past` frames ago to `Ahead` frames ahead, thinned by `Taper` at its old end.
 
-    None outside of the `WINDOW`.
+    Nothing outside the `WINDOW`.
     """
     inputs = {"Past": "Float", "Ahead": "Float", "Radius": "Float", "Taper": "Float", "Material": "Material"}
     group = Group("Trail", **inputs, **WINDOW)
@@ -62,15 +62,15 @@ def trail_group() -> bpy.types.NodeTree:
 
 
 def cut_group() -> bpy.types.NodeTree:
-    """Return what an object has within the `WINDOW`."""
+    """Return a node group that keeps the part of an object within the `WINDOW`."""
     group = Group("Cut", **WINDOW)
     return group.finish(_within_picture(group, group.inputs["Geometry"])[0])
 
 
 def marks_group() -> bpy.types.NodeTree:
-    """Return a ball at each key from `Past` frames ago to `Ahead` frames from now; it swells while its key is reached.
+    """Return a node group for balls at keys from `Past` frames ago to `Ahead` frames ahead; balls swell at their keys.
 
-    None outside of the `WINDOW`.
+    Nothing outside the `WINDOW`.
     """
     group = Group("Key marks", Past="Float", Ahead="Float", Radius="Float", Material="Material", **WINDOW)
     age, points = _within_window(group)
@@ -85,16 +85,16 @@ def marks_group() -> bpy.types.NodeTree:
 
 
 def graph(name: str, frames: np.ndarray, heights: np.ndarray, width: float) -> bpy.types.Mesh:
-    """Return the area below a curve, from the origin to the right, whose vertices know their frame.
+    """Return the area below a curve, from the origin to the right, with vertices that have their frames.
 
     Parameters
     ----------
     name : str
     frames : array, shape (n,)
     heights : array, shape (n,)
-        Not below zero.
+            Not negative.
     width : float
-        From the first frame to the last.
+            The distance from the first frame to the last.
     """
     count = len(frames)
     right = width * (frames - frames[0]) / max(float(np.ptp(frames)), 1e-9)
@@ -109,7 +109,7 @@ def graph(name: str, frames: np.ndarray, heights: np.ndarray, width: float) -> b
 
 
 def graph_group() -> bpy.types.NodeTree:
-    """Return what a graph has up to now."""
+    """Return a node group that keeps a graph up to the current frame."""
     group = Group("Graph", Material="Material")
     future = group.math("GREATER_THAN", group.attribute(FRAME), group.math("ADD", group.frame(), 1e-3))
     kept = group.add("GeometryNodeDeleteGeometry", group.inputs["Geometry"], future, settings={"domain": "POINT"})
@@ -117,7 +117,7 @@ def graph_group() -> bpy.types.NodeTree:
 
 
 def _within_picture(group: Group, points: Socket) -> tuple[Socket, Socket]:
-    """Return the points within the window, and how much is left of what is drawn there: 1, and 0 at its edge."""
+    """Return the points within the `WINDOW`, and how much they are faded: 1 inside, falling to 0 at the edge."""
     itself = group.add("GeometryNodeSelfObject")
     world = node_of(group.add("GeometryNodeObjectInfo", itself)).outputs["Transform"]
     place = group.add("FunctionNodeTransformPoint", group.add("GeometryNodeInputPosition"), world)
@@ -132,10 +132,10 @@ def _within_picture(group: Group, points: Socket) -> tuple[Socket, Socket]:
 
 
 def _within_window(group: Group) -> tuple[Socket, Socket]:
-    """Return how many frames ago each point was passed, and the points within the window."""
+    """Return the age of each point in frames, and the points within the window of frames."""
     age = group.math("SUBTRACT", group.frame(), group.attribute(FRAME))
     old = group.math("GREATER_THAN", age, group.inputs["Past"])
-    # Frames are single precision: the point of this very frame stays.
+    # Frames are single precision: keep the point of the current frame.
     future = group.math("LESS_THAN", group.math("ADD", age, group.inputs["Ahead"]), -1e-3)
     outside = group.math("ADD", old, future)
     kept = group.add("GeometryNodeDeleteGeometry", group.inputs["Geometry"], outside, settings={"domain": "POINT"})
