@@ -1,1 +1,1 @@
-"""What users do not run: the paper's study, benchmarks, and the makers of assets and pictures. No wheel has it."""
+"""Developer tools: the paper's study, benchmarks, and makers of assets and pictures. Not part of any wheel."""

@@ -1,10 +1,10 @@
-"""Poses a second of every mode, beside the libraries that offer the same motion, in one run on this machine.
+"""Benchmark of interpolation: poses per second of every mode, compared with libraries that offer the same motion.
 
     python scripts/research benchmark
     python scripts/research benchmark --rounds 30
 
-All ways of computing take turns, round by round, and the fastest round counts. It needs the packages of the extra
-`benchmark`.
+All implementations take turns, round by round, in one run on this machine, and the fastest round counts. Requires the
+packages of the extra `benchmark`.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from rigid_motion.motion.trigonometry import VECTOR_TANGENT
 
 PROGRAM = "Rigid Motion"
 
-MIN_MEASURED_S = 2.0  # seconds after which one way of computing a case has been measured well enough
+MIN_MEASURED_S = 2.0  # seconds after which one implementation has been measured well enough on a case
 
 Way = tuple[str, str]
-"""A mode, and what computes it."""
+"""A mode, and the program or library that computes it."""
 
 
 def cases(count: int) -> Iterator[Case]:
-    """Yield the shapes of work that users bring: `count` in-betweens or a few more in each."""
+    """Yield cases with the array shapes of typical work, each with about `count` in-betweens."""
     random = np.random.default_rng(7)
 
     def case(title: str, objects: int, keys: int, times: np.ndarray) -> Case:
@@ -63,7 +63,7 @@ def pytransform3d_sclerp(case: Case) -> np.ndarray:
 
 
 def scipy_screw(case: Case) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluate `RigidTransform`: a logarithm for each segment, an exponential for each in-between."""
+    """Evaluate `RigidTransform`: a logarithm per segment, an exponential per in-between."""
     (first, u), keys = case.pairs(), reshaped(case.keys, -1)
     turns = Rotation.from_quat(keys.quaternions, scalar_first=True)
     keys = RigidTransform.from_components(keys.positions, turns)
@@ -73,7 +73,7 @@ def scipy_screw(case: Case) -> tuple[np.ndarray, np.ndarray]:
 
 
 def scipy_slerp(case: Case) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluate `Slerp`, and `numpy.interp` for each coordinate."""
+    """Evaluate `Slerp`, and `numpy.interp` per coordinate."""
     turns = Slerp(case.key_times, Rotation.from_quat(case.keys.quaternions[0], scalar_first=True))
     straight = [np.interp(case.times, case.key_times, column) for column in case.keys.positions[0].T]
     return np.stack(straight, axis=-1), turns(case.times).as_quat(scalar_first=True)
@@ -87,7 +87,7 @@ def scipy_spline(case: Case) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ways(case: Case) -> dict[Way, Callable[[], object]]:
-    """Return all ways to compute a case."""
+    """Return all implementations that can compute a case."""
     result: dict[Way, Callable[[], object]] = {}
     for mode in MODES:
         result[mode, PROGRAM] = partial(case.filled_in, mode)
@@ -102,7 +102,7 @@ def ways(case: Case) -> dict[Way, Callable[[], object]]:
 
 
 def rates(case: Case, seconds: dict[Way, list[float]]) -> list[dict[str, Any]]:
-    """Return million poses a second, and this program's multiple of each peer."""
+    """Return millions of poses per second, and the ratio of this program's speed to each library's."""
     fastest = {way: min(times) for way, times in seconds.items()}
     return [
         {

@@ -1,10 +1,10 @@
-"""What modes cost in Blender, beside Blender without them, in one run on this machine.
+"""Benchmark of modes in Blender: playback, editing, undo and file sizes, with modes and without.
 
     python scripts/research benchmark_live
     python scripts/research benchmark_live --rounds 10 --scale 0.2
 
-The same work is done in turn with and without modes, so that a machine that slows down slows both: compare the ratios
-of the fastest. Figures are medians and the fastest, in milliseconds.
+The same work is done alternately with and without modes, in one run on this machine, so a slowdown affects both:
+compare the ratios of the fastest. Figures are medians and the fastest, in milliseconds.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from rigid_motion_batch.silencing import silenced
 
 MODE, NATIVE = "dq_sclerp", "BLENDER"
 CHAIN_BONES = 10  # bones from root to tip
-EDIT_COUNT = 8  # of a key in a row, unmeasured and then measured
+EDIT_COUNT = 8  # edits of a key in a row, first unmeasured and then measured
 
 Target = TypeVar("Target", bpy.types.Object, bpy.types.PoseBone)
 Targets = Sequence[bpy.types.Object | bpy.types.PoseBone]
 
 
 class Size(NamedTuple):
-    """Objects or bones, the keys of each on all channels, and the frames from the first key to the last."""
+    """The number of objects or bones, the keys of each on all channels, and the frames from first to last key."""
 
     count: int
     key_count: int
@@ -41,11 +41,11 @@ class Size(NamedTuple):
 
 
 SIZES = {"objects": Size(100, 10, 1000), "bones": Size(100, 10, 1000), "crowd": Size(400, 10, 1000)}
-HELD_SIZE = Size(100, 4, 1000)  # keys: where they begin, are picked up, are passed on and end
+HELD_SIZE = Size(100, 4, 1000)  # keys: at the start, when picked up, when passed on, and at the end
 
 
 def scaled(size: Size, scale: float) -> Size:
-    """Return a part of the objects and frames."""
+    """Return a size with a fraction of the objects and frames."""
     count, frames = max(1, round(scale * size.count)), max(2 * size.key_count, round(scale * size.frames))
     return Size(count, size.key_count, frames)
 
@@ -54,19 +54,19 @@ def scaled(size: Size, scale: float) -> Size:
 
 
 def new_object(name: str, data: bpy.types.ID | None = None) -> bpy.types.Object:
-    """Return a new object in the scene, an empty without data."""
+    """Return a new object in the scene; an empty if there is no data."""
     obj = bpy.data.objects.new(name, data)
     bpy.context.scene.collection.objects.link(obj)
     return obj
 
 
 def frames_of(size: Size) -> list[int]:
-    """Return the frames of keys, evenly over those of the scene."""
+    """Return the frames of keys, evenly spaced over the scene."""
     return np.linspace(1, size.frames, size.key_count).round().astype(int).tolist()
 
 
 def keyed(targets: Sequence[Target], size: Size, frames: Sequence[int] | None = None) -> list[Target]:
-    """Insert keys of poses drawn at random, on these frames or evenly over those of the scene."""
+    """Insert keys of random poses, at these frames or evenly spaced over the scene."""
     random = np.random.default_rng(5)
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, size.frames
     for target in targets:
@@ -86,7 +86,7 @@ def objects_of(size: Size) -> list[bpy.types.Object]:
 
 
 def bones_of(size: Size) -> list[bpy.types.PoseBone]:
-    """Return the bones of an armature in a new file, all of which have keys of location and rotation."""
+    """Return the bones of an armature in a new file; all bones have keys of location and rotation."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     rig = bpy.context.view_layer.objects.active = new_object("Rig", bpy.data.armatures.new("Rig"))
     bpy.ops.object.mode_set(mode="EDIT")
@@ -100,7 +100,7 @@ def bones_of(size: Size) -> list[bpy.types.PoseBone]:
 
 
 def switch(targets: Targets, mode: str) -> None:
-    """Have all move by a mode. By Blender's own in-betweens nothing is followed either, as without the extension."""
+    """Switch all targets to a mode. For Blender's own, the extension's updates are also disabled, as without it."""
     animation.set_enabled(True)
     animation.set_mode(targets, mode)
     bpy.context.view_layer.update()
@@ -111,7 +111,7 @@ def switch(targets: Targets, mode: str) -> None:
 
 
 def row(what: str, seconds: Sequence[float], native: Sequence[float], count: int = 1) -> dict[str, Any]:
-    """Return the figures of a work, from its seconds with modes and without, in which it was done so many times."""
+    """Return the figures of a task from its seconds with and without modes; a measurement repeats it `count` times."""
     scale = 1e3 / count
     return {
         "what": what,
@@ -122,12 +122,12 @@ def row(what: str, seconds: Sequence[float], native: Sequence[float], count: int
     }
 
 
-def beside_native(
+def compared_to_native(
     what: str, targets: Targets, rounds: int, work: Callable[[], None], before: Callable[[], None], count: int = 1
 ) -> dict[str, Any]:
-    """Return the figures of a work that is done so many times in a call, with modes and without.
+    """Return the figures of a task that each call repeats `count` times, with modes and without.
 
-    What has to be done `before` is not measured, and neither are changes of the mode. All have it in the end.
+    The preparation `before` is not measured, and neither are switches of the mode. All targets end up with the mode.
     """
     runs: dict[str, Callable[[], object]] = {}
     for mode in (NATIVE, MODE):
@@ -137,7 +137,7 @@ def beside_native(
 
 
 def channels(targets: Targets) -> Iterator[bpy.types.FCurve]:
-    """Yield the F-curves of the Actions that move these."""
+    """Yield the F-curves of the targets' Actions."""
     for carrier in dict.fromkeys(target.id_data for target in targets):
         yield from animation.channelbag_of(carrier).fcurves
 
@@ -154,36 +154,36 @@ def edit_again(key: bpy.types.Keyframe) -> None:
 
 
 def play(scene: bpy.types.Scene | None = None) -> None:
-    """Show all frames of a scene, one after the other: of the one that is open if no other is given."""
+    """Show all frames of a scene in order; of the open scene by default."""
     scene = scene or bpy.context.scene
-    # Blender has more to do for the scene that is seen.
+    # Blender does more work for the visible scene.
     bpy.context.window.scene = scene
     for frame in range(scene.frame_start, scene.frame_end + 1):
         scene.frame_set(frame)
 
 
 def push() -> None:
-    """Take a step of undo."""
+    """Push an undo step."""
     bpy.ops.ed.undo_push(message="Edit")
 
 
 def costs(kind: str, targets: Targets, size: Size, rounds: int) -> list[dict[str, Any]]:
-    """Measure playback, an edit of one key, and a step of undo."""
+    """Measure playback, an edit of one key, and an undo step."""
     few, middle = max(3, rounds // 4), targets[len(targets) // 2]
     fcurve = animation.channelbag_of(middle.id_data).fcurves.find(middle.path_from_id("location"))
     key, all_of_them = fcurve.keyframe_points[size.key_count // 2], f"{size.count} {kind}"
     again = partial(edit_again, key)
     return [
-        beside_native(f"{all_of_them} played, a frame", targets, few, play, lambda: None, size.frames),
-        beside_native(
+        compared_to_native(f"{all_of_them} played, a frame", targets, few, play, lambda: None, size.frames),
+        compared_to_native(
             f"one key edited of {all_of_them}, and the view updated", targets, rounds, again, again, EDIT_COUNT
         ),
-        beside_native(f"a step of undo, {all_of_them}", targets, rounds, push, partial(edit, key)),
+        compared_to_native(f"a step of undo, {all_of_them}", targets, rounds, push, partial(edit, key)),
     ]
 
 
 def choosing(size: Size, rounds: int) -> dict[str, Any]:
-    """Measure a mode chosen for all objects, beside an interpolation of Blender's own given to all of their keys."""
+    """Measure setting a mode on all objects, compared with setting a native interpolation on all of their keys."""
     targets = objects_of(size)
     curves = list(channels(targets))
 
@@ -205,7 +205,7 @@ def choosing(size: Size, rounds: int) -> dict[str, Any]:
 
 
 def holding(size: Size, rounds: int) -> dict[str, Any]:
-    """Measure playback of objects that one hand picks up and passes to another, beside such with keys alone."""
+    """Measure playback of objects that pass from hand to hand, compared with objects that only have keys."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     begins, picked_up, passed, ends = frames_of(size)
     runs: dict[str, Callable[[], object]] = {}
@@ -229,7 +229,7 @@ def holding(size: Size, rounds: int) -> dict[str, Any]:
 
 
 def files(kind: str, targets: Targets, size: Size) -> dict[str, Any]:
-    """Return the size of the open file in MB, compressed and not, with modes and without."""
+    """Return the size of the open file in MB, compressed and uncompressed, with modes and without."""
     result: dict[str, Any] = {"what": f"{size.count} {kind}"}
     with tempfile.TemporaryDirectory() as folder, silenced():
         path = Path(folder, "scene.blend")
@@ -242,7 +242,7 @@ def files(kind: str, targets: Targets, size: Size) -> dict[str, Any]:
 
 
 def measure(rounds: int, scale: float) -> dict[str, Any]:
-    """Return all figures, of scenes with a part of their objects and frames."""
+    """Return all figures, for scenes with a fraction `scale` of the objects and frames."""
     sizes = {name: scaled(size, scale) for name, size in SIZES.items()}
     rows, written = [], []
     for kind, scene in (("objects", objects_of), ("bones", bones_of)):

@@ -1,13 +1,13 @@
-"""Cleaning recordings, beside filters that are tuned to the truth: what is left of noise that was put in.
+"""Comparison of cleaning with filters that are tuned to the true motion, on recordings with added noise.
 
     python scripts/research cleaning FOLDER
 
-The tracks are recordings, or stretches and joints of them, by which no threshold was chosen but those of long spikes,
-held samples, hits and clocks, with other seeds. Noise is made with seeds: white (1 mm and 0.3 degrees along each axis),
+The tracks are recordings, or parts and joints of them. No threshold was chosen with them, except those of long spikes,
+held samples, hits and clocks, with other seeds. Noise is seeded: white (1 mm and 0.3 degrees along each axis),
 correlated (the same, each sample 0.7 of the one before), white with spikes in a hundredth of the samples, white with
-held samples in a fiftieth, and white with times that tremble. Errors are RMS shell errors at 10 cm. Rivals that are
-tuned know the truth: of all settings each gets the one that is best for the clip. Those of Blender are its formulas in
-NumPy, on locations and on the components of quaternions.
+held samples in a fiftieth, and white with jittering timestamps. Errors are RMS shell errors at 10 cm. Tuned rivals know
+the true motion: each gets the best of all settings for the clip. Blender's filters are its formulas in NumPy, applied
+to locations and to quaternion components.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ HIT_COUNT = 12
 CUTOFFS_HZ = np.geomspace(0.5, 60.0, 30)
 
 HAND, OPTICAL, MADE = "hand", "optical", "made"
-MIN_NOISE_SAMPLES = 200  # samples: noise is hard to measure
+MIN_NOISE_SAMPLES = 200  # samples: noise is hard to measure in shorter tracks
 TRACKS = (
     ("aframe_head.csv", "", 0, HAND),
     ("aframe_right.csv", "", 600, HAND),
@@ -47,13 +47,13 @@ TRACKS = (
     ("pab_run.fbx", "Lefthand", 0, OPTICAL),
     ("pab_run.fbx", "LeftFootThumb1", 0, OPTICAL),
 )
-"""The file, the joint, and the row that 1200 rows are taken from."""
+"""The file, the joint, the first of the 1200 rows to use, and the kind."""
 
 Filter = Callable[[np.ndarray], np.ndarray]
 
 
 def tracks(folder: Path) -> Iterator[tuple[str, str, np.ndarray, Poses]]:
-    """Yield the name, the kind, the times and the poses in metres of each track, the made ones last."""
+    """Yield the name, the kind, the times and the poses in metres of each track; generated tracks come last."""
     for file, joint, first, kind in TRACKS:
         (clip, *_), _ = read_clips([str(next(folder.rglob(file)))])
         poses = clip.in_blender(clip.poses)
@@ -74,7 +74,7 @@ def tracks(folder: Path) -> Iterator[tuple[str, str, np.ndarray, Poses]]:
 
 
 def shaken(kind: str, seed: int, times: np.ndarray, truth: Poses) -> tuple[np.ndarray, Poses, np.ndarray]:
-    """Return times and poses with noise, and which samples are spikes or held."""
+    """Return times and poses with noise, and a mask of samples that are spikes or held."""
     random, count = np.random.default_rng(seed), len(times)
     noise = random.normal(size=(2, count, 3))
     if kind == "correlated":
@@ -104,7 +104,7 @@ def shaken(kind: str, seed: int, times: np.ndarray, truth: Poses) -> tuple[np.nd
 
 
 def butterworth(order: int, cutoff: float, rate: float) -> Filter:
-    """Return the filter run forwards and backwards, by its response, the ends mirrored at their samples."""
+    """Return a Butterworth filter run forwards and backwards, by its frequency response, reflecting both ends."""
 
     def smooth(values: np.ndarray) -> np.ndarray:
         before, behind = 2.0 * values[0] - values[:0:-1], 2.0 * values[-1] - values[-2::-1]
@@ -118,7 +118,7 @@ def butterworth(order: int, cutoff: float, rate: float) -> Filter:
 
 
 def gaussian(width: int, sigma: float) -> Filter:
-    """Return Blender's Gaussian smooth: so many keys on either side, sigma as part of these."""
+    """Return Blender's Gaussian smooth: `width` keys on either side, sigma as a fraction of the width."""
     weights = np.exp(-0.5 * (np.abs(np.arange(-width, width + 1)) / width / sigma) ** 2)
 
     def smooth(values: np.ndarray) -> np.ndarray:
@@ -129,7 +129,7 @@ def gaussian(width: int, sigma: float) -> Filter:
 
 
 def one_euro(values: np.ndarray, times: np.ndarray, lowest: np.ndarray, betas: np.ndarray) -> np.ndarray:
-    """Return what the One Euro filter makes of values (n, k) with settings (m,), shape (m, n, k)."""
+    """Return values (n, k) filtered by the One Euro filter with settings (m,), shape (m, n, k)."""
     made = np.repeat(values[None], len(lowest), axis=0)
     speed = np.zeros_like(made[:, 0])
     for row, step in enumerate(np.diff(times), 1):
@@ -142,7 +142,7 @@ def one_euro(values: np.ndarray, times: np.ndarray, lowest: np.ndarray, betas: n
 
 
 def rivals(times: np.ndarray, poses: Poses, truth: Poses) -> dict[str, Poses]:
-    """Return what each rival makes of a recording."""
+    """Return a recording filtered by each rival."""
     rate = 1.0 / float(np.median(np.diff(times)))
     channels = poses.positions, poses.quaternions
     widths = np.unique(np.geomspace(1, 60, 25).astype(int))
@@ -168,7 +168,7 @@ def rivals(times: np.ndarray, poses: Poses, truth: Poses) -> dict[str, Poses]:
 
 
 def rms(poses: Poses, truth: Poses, rows: np.ndarray | slice = slice(None)) -> float:
-    """Return the RMS shell error in metres, of some rows."""
+    """Return the RMS shell error in metres over some rows."""
     return float(np.sqrt(np.mean(shell_error(poses, truth)[rows] ** 2)))
 
 
@@ -178,7 +178,7 @@ def hardest(truth: Poses) -> np.ndarray:
 
 
 def measure(kind: str, seed: int, name: str, track: str, times: np.ndarray, truth: Poses) -> dict[str, Any]:
-    """Return what becomes of a track with such noise. Lengths are in millimetres."""
+    """Return the results for a track with this kind of noise. Lengths are in millimetres."""
     stamped, shaky, out = shaken(kind, seed, times, truth)
     free, capped = clean(stamped, shaky), clean(stamped, shaky, TOLERANCE_M)
     left_out = capped.spikes | capped.repeats
@@ -203,19 +203,19 @@ def measure(kind: str, seed: int, name: str, track: str, times: np.ndarray, trut
 
 
 def hit_ratio(seed: int, times: np.ndarray, truth: Poses) -> float:
-    """Return the error that is left at the hits of a track with white noise, by that which was there."""
+    """Return the remaining fraction of the error at the hits of a track with white noise."""
     _, shaky, _ = shaken("white", seed, times, truth)
     hits = hardest(truth)
     return rms(clean(times, shaky).poses, truth, hits) / rms(shaky, truth, hits)
 
 
 def spread(values: list[Any]) -> list[float]:
-    """Return the least, the middle and the largest."""
+    """Return minimum, median and maximum."""
     return [float(part) for part in np.percentile(values, (0, 50, 100))]
 
 
-def summed_up(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the geometric means of what is left beside each rival, and the worst clip's, by kind of noise."""
+def summaries(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return by kind of noise the error ratios to each rival: the geometric mean and the worst clip's."""
     result = {}
     for kind in KINDS:
         own = [row for row in rows if row["noise"] == kind]
@@ -242,7 +242,7 @@ def summed_up(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, and write the figures."""
+    """Measure all tracks, and write the figures."""
     parser = study_parser("cleaning", __doc__)
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="with the recordings and rigs")
     options = parser.parse_args(arguments)
@@ -264,7 +264,7 @@ def main(arguments: list[str] | None = None) -> int:
         rows += [measure(kind, seed, name, track, times, truth) for kind in KINDS for seed in NOISE_SEEDS]
     figures = {
         "tolerance_mm": 1e3 * TOLERANCE_M,
-        "table": summed_up(rows),
+        "table": summaries(rows),
         "made": made,
         "as_recorded": untouched,
         "runs": len(rows),

@@ -1,10 +1,10 @@
-"""Keys that come back: animations that were keyed by hand and baked, and motion capture, as curves and as lines.
+"""Recovery of keys: baked hand-keyed animations, and motion capture, reduced to curves and to lines.
 
     python scripts/research curve_keys pab_walk.fbx freebvh.bvh
 
-The hand-made figure of 20 bones is that of the tests, with handles of a third of the segments and with those of
-Blender. All is exported by Blender with a key on every frame. What files show is worked out by matrices, with nothing
-of the program.
+The hand-made figure of 20 bones is that of the tests, with handles of a third of the segments and with Blender's
+automatic handles. Blender exports everything with a key on every frame. Playback of files is computed with matrices,
+independent of the program.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ MOVED = ("translation", "rotation")
 
 
 def keys_in(file: File, clip: str) -> dict[tuple[str, str], np.ndarray]:
-    """Return the times of the keys of each channel that moves, by the name of its node and its path."""
+    """Return the key times of each channel that moves, by node name and path."""
     nodes = file.json["nodes"]
     tracks = ((nodes[node].get("name"), path, times) for (node, path), (_, times, _) in file.tracks(clip).items())
     return {(name, path): times for name, path, times in tracks if path in MOVED and len(times) > 1}
 
 
 def measure(original: Path, folder: Path, own: dict[str, np.ndarray] | None = None) -> dict[str, Any]:
-    """Return what curves and lines make of the clips of a file, of whose nodes the frames of the own keys are known."""
+    """Return the results of curves and lines for the clips of a file; `own` are the known key frames by node name."""
     output, files, sizes = folder / "smaller.glb", {}, [animation_bytes(original)]
     for curves in (False, True):
         reduce_file(original, output, Options(TOLERANCE_M, RADIUS_M, curves=curves))
@@ -64,7 +64,7 @@ def measure(original: Path, folder: Path, own: dict[str, np.ndarray] | None = No
 
 
 def by_hand(handles: str, seed: int, folder: Path) -> dict[str, Any]:
-    """Return what comes back of a hand-made animation."""
+    """Return the results for a hand-made animation."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     own, exported = keys_of(hand_made(handles, seed=seed)), folder / "hand.glb"
     bpy.ops.export_scene.gltf(filepath=str(exported), export_format="GLB")
@@ -72,14 +72,14 @@ def by_hand(handles: str, seed: int, folder: Path) -> dict[str, Any]:
 
 
 def recorded(path: Path, folder: Path) -> dict[str, Any]:
-    """Return what comes of a recording."""
+    """Return the results for a recording."""
     exported = folder / "recorded.glb"
     export(path, exported, as_avatar=False)
     return {"name": path.stem, **measure(exported, folder)}
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, and write the figures."""
+    """Measure all animations, and write the figures."""
     parser = study_parser("curve_keys", __doc__)
     parser.add_argument("bodies", type=Path, nargs="+", metavar="PATH", help="FBX and BVH files")
     options = parser.parse_args(arguments)

@@ -1,7 +1,7 @@
-"""Blender's Decimate of the Graph Editor: the fewest keys that it leaves where an error must not become larger.
+"""Blender's Decimate of the Graph Editor: the fewest keys that it leaves within a maximum error.
 
-Users give it one error margin for all F-curves, in the units of these. Which margin an error needs is searched for.
-Errors are shell errors in metres at eighths of frames, as what is seen between frames counts as well.
+Users give it one error margin for all F-curves, in the F-curves' units. The margin for a given error is searched for.
+Errors are shell errors in metres at eighths of frames, because motion between frames counts as well.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.scenes.armature import RestFigure, Rig
 
-NUMBERS_PER_FREE_KEY = 6  # numbers of a key with free handles
-MARGIN_RANGE = (1e-5, 10.0)  # the smallest and the largest error margin of Decimate, in the units of the channels
-MAX_TRIALS = 12  # margins tried for an error, at most
-MIN_ERROR_RATIO = 0.98  # part of the requested error that is as good as equal to it
-MAX_MARGIN_RATIO = 1.01  # two margins whose ratio is less leave the same keys, or nearly
-PARTS_PER_FRAME = 8  # of a frame, at each of which errors are measured
-MIN_VARIATION = 1e-4  # a channel that never changes by more does not vary: importers calculate in single precision
+NUMBERS_PER_FREE_KEY = 6  # numbers per key with free handles
+MARGIN_RANGE = (1e-5, 10.0)  # minimum and maximum error margin of Decimate, in the units of the channels
+MAX_TRIALS = 12  # maximum number of margins tried for an error
+MIN_ERROR_RATIO = 0.98  # an error of at least this fraction of the requested one counts as equal to it
+MAX_MARGIN_RATIO = 1.01  # two margins with a smaller ratio leave (nearly) the same keys
+PARTS_PER_FRAME = 8  # errors are measured at this many parts of a frame
+MIN_VARIATION = 1e-4  # a channel that varies less is constant: importers calculate in single precision
 
 
 @dataclass(frozen=True)
 class Left:
-    """What is left of the keys of the channels that vary: frames with a key, keys, numbers, and the largest error."""
+    """Counts of the remaining keys of channels that vary: frames with a key, keys, numbers; and the largest error."""
 
     frames: int
     keys: float
@@ -38,14 +38,12 @@ class Left:
     largest: float
 
     def figures(self) -> dict[str, float]:
-        """Return them as they are published."""
+        """Return the counts as they are published."""
         return {"frames": self.frames, "key_count": self.keys, "numbers": self.numbers, "error_mm": 1e3 * self.largest}
 
 
 def between(frames: np.ndarray) -> np.ndarray:
-    """Return frames (n,) with the moments between them at which errors are measured, shape (`PARTS_PER_FRAME` (n - 1) +
-    1,).
-    """
+    """Return frames (n,) and the moments between them for measuring errors, shape (`PARTS_PER_FRAME` (n - 1) + 1,)."""
     count = len(frames)
     return np.interp(np.arange(PARTS_PER_FRAME * (count - 1) + 1) / PARTS_PER_FRAME, np.arange(count), frames)
 
@@ -70,13 +68,13 @@ def fcurves_of(obj: bpy.types.Object) -> dict[tuple[str, int], bpy.types.FCurve]
 
 
 def values_of(obj: bpy.types.Object, frames: np.ndarray) -> dict[tuple[str, int], np.ndarray]:
-    """Return what the F-curves of an object show at frames (n,), by Blender's own evaluation, each of shape (n,)."""
+    """Return the values of an object's F-curves at frames (n,), evaluated by Blender, each of shape (n,)."""
     at = frames.tolist()
     return {key: np.array([curve.evaluate(frame) for frame in at]) for key, curve in fcurves_of(obj).items()}
 
 
 def bend(obj: bpy.types.Object) -> None:
-    """Put curves between all keys of an object and its bones, with the handles that Blender gives new keys."""
+    """Make all keys of an object and its bones Bézier keys, with the handles that Blender gives new keys."""
     for fcurve in fcurves_of(obj).values():
         keys = np.array([key.co for key in fcurve.keyframe_points])
         replace_keys(fcurve, keys[:, 0], keys[:, 1], interpolation="BEZIER")
@@ -85,8 +83,8 @@ def bend(obj: bpy.types.Object) -> None:
 def decimated_within(
     obj: bpy.types.Object, left: Callable[[], Left], largest: float, trials: int = MAX_TRIALS
 ) -> Left | None:
-    """Return the fewest keys that Decimate leaves whose error is at most this, of straight lines or of curves through
-    all keys; None where no margin tried does. For arguments see `Decimations`.
+    """Return the fewest keys that Decimate leaves with at most this error, from linear or Bézier keys; None if no
+    margin tried achieves it. For arguments see `Decimations`.
     """
     animated = obj.animation_data
     straight = Decimations(obj, left, trials)
@@ -99,21 +97,21 @@ def decimated_within(
 
 
 class Decimations:
-    """Decimate of an object, with one error margin for all F-curves.
+    """Decimate applied to an object, with one error margin for all F-curves.
 
-    Each margin is tried on a copy of the Action that it has now, which it has again afterwards; `left` tells what is
-    left by the F-curves that it has when it is called.
+    Each margin is tried on a copy of the object's current Action, which is restored afterwards; `left` measures the
+    object's current F-curves when called.
     """
 
     def __init__(self, obj: bpy.types.Object, left: Callable[[], Left], trials: int = MAX_TRIALS) -> None:
         self.obj, self.left, self.trials = obj, left, trials
         self.recorded = obj.animation_data.action
-        self.tried: dict[float, Left] = {}  # the logarithm of a margin, and what it left
+        self.tried: dict[float, Left] = {}  # the logarithm of a margin, and its result
 
     def within(self, largest: float) -> Left | None:
-        """Return the fewest keys found whose error is at most this; None where no margin tried does.
+        """Return the fewest keys found with at most this error; None if no margin tried achieves it.
 
-        Margins are halved between the smallest that is too large and the largest below it that is not.
+        Bisects between the smallest margin that is too large and the largest margin below it that is not.
         """
         for _ in range(self.trials):
             low, high = self._between(largest)
@@ -150,7 +148,7 @@ class DecimatedBody:
         joints = clip.in_blender(clip.poses[:, made.samples])
         roots = clip.whole_body.parents < 0
         places = joints.positions[roots]
-        # Single precision is best around the origin.
+        # Single precision is most accurate near the origin.
         joints.positions[roots] -= (places.min(axis=(0, 1)) + places.max(axis=(0, 1))) / 2.0
         self.rig = Rig("Body", RestFigure.of(clip), clip.whole_body.joints, bpy.context.scene.collection)
         channels = self.rig.channels_of(joints)
@@ -163,15 +161,15 @@ class DecimatedBody:
         self._truth[:, ::PARTS_PER_FRAME] = self._skeleton.in_root_space(joints)
 
     def within(self, largest: float) -> Left | None:
-        """Return the fewest keys whose error is at most this, from straight lines or curves through all of them."""
+        """Return the fewest keys with at most this error, from linear or Bézier keys."""
         return decimated_within(self.rig.obj, self.left, largest)
 
     def errors(self) -> np.ndarray:
-        """Return how far off each joint is by the F-curves that the rig has now, shape (joints, n)."""
+        """Return the error of each joint with the rig's current F-curves, shape (joints, n)."""
         return shell_error(self.shown(), self._truth, self._radius)
 
     def shown(self) -> Poses:
-        """Return where the joints are by the F-curves that the rig has now, in the root's space, shape (joints, n)."""
+        """Return the joints with the rig's current F-curves, in the root's space, shape (joints, n)."""
         obj = self.rig.obj
         values, bones = values_of(obj, self.frames), [obj.pose.bones[name] for name in self.rig.bones]
 
@@ -186,7 +184,7 @@ class DecimatedBody:
         return self._skeleton.in_root_space(joints)
 
     def left(self) -> Left:
-        """Return the keys that the rig has now, and their largest error."""
+        """Return the counts of the rig's current keys, and their largest error."""
         curves = [fcurve for curve, fcurve in fcurves_of(self.rig.obj).items() if curve in self._counted]
         keys = [key.co.x for fcurve in curves for key in fcurve.keyframe_points]
         return Left(len(set(keys)), len(keys), NUMBERS_PER_FREE_KEY * len(keys), float(self.errors().max()))

@@ -1,4 +1,4 @@
-"""Pictures by Matplotlib: of the paper, as wide as its column, and of the extension's page."""
+"""Drawing with Matplotlib: pictures for the paper, as wide as its column, and for the extension's page."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ WIDTH_PX, DOTS_PER_INCH = 1004, 300  # pixels of a column of 8.5 cm
 INK, FAINT, RULE = "#1B2026", "#58626E", "#C9CFD6"
 
 LIGHT_DIRECTION, AMBIENT_RATIO = np.array((-0.42, 0.60, -0.68)), 0.5
-"""Where it comes from: right, up, and away from who looks."""
+"""The direction towards the light: right, up, and away from the viewer; and the ambient fraction of light."""
 
 MODEL_PIXELS_PER_PIXEL, POINT_SPACING_PX = (
     2,
     0.6,
-)  # pixels of a model for a pixel of the picture, each way, and how far its points are apart
+)  # pixels of a model per pixel of the picture, each way, and the spacing of the model's points
 
 
 def picture(width: int, height: int, ground: str = "none", dots_per_inch: int = 100) -> Axes:
-    """Return what a picture of so many pixels is drawn on, in units of its height, 0 in the middle."""
+    """Return the axes of a picture of this size in pixels; the units are its height, with 0 in the middle."""
     figure = Figure((width / dots_per_inch, height / dots_per_inch), dpi=dots_per_inch, facecolor=ground)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
@@ -46,18 +46,18 @@ def column(height: int) -> Axes:
 
 
 def save(axes: Axes, path: Path) -> None:
-    """Write a picture, without a note of what made it."""
+    """Write a picture, without metadata about the software."""
     axes.figure.savefig(path, dpi="figure", facecolor=axes.figure.get_facecolor(), metadata={"Software": None})
 
 
 def seen(points: np.ndarray, place: ArrayLike, metres: float) -> np.ndarray:
-    """Return where points (..., 3) in metres are seen in a picture whose height spans so many: shape (..., 2)."""
+    """Return where points (..., 3) in metres appear in a picture whose height spans `metres`: shape (..., 2)."""
     return project(points)[..., :2] / metres + place
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The surface of a model: triangles (t, 3, 3) in metres, their colours (t, 3), and which have that of a mode."""
+    """The surface of a model: triangles (t, 3, 3) in metres, colours (t, 3), and whether each has the mode's colour."""
 
     triangles: np.ndarray
     colours: np.ndarray
@@ -65,7 +65,7 @@ class Model:
 
     @classmethod
     def of(cls, subject: str) -> Model:
-        """Return the model of a subject of comparisons, as `load_subject` takes it."""
+        """Return the model of a subject, named as in `load_subject`."""
         mesh = load_subject(subject)
         mesh.calc_loop_triangles()
         slots = np.array([triangle.material_index for triangle in mesh.loop_triangles])
@@ -74,9 +74,9 @@ class Model:
         return cls(corners, colours[slots], np.isin(slots, tinted_slots(mesh)))
 
     def draw(self, axes: Axes, pose: Poses, place: ArrayLike, metres: float, colour: str, *, whole: bool) -> None:
-        """Draw it at a pose, shape (): its tinted parts, or the whole of it, of a colour."""
+        """Draw the model at a pose, shape (), with its tinted parts or the whole of it in `colour`."""
         corners = project(rotate(pose.quaternions, self.triangles) + pose.positions) / metres
-        # Right, up, away are left-handed.
+        # Right, up, away is a left-handed system.
         normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 1] - corners[:, 0])
         facing = normals[:, 2] < 0.0
         corners, normals = corners[facing], normals[facing] / np.linalg.norm(normals[facing], axis=1, keepdims=True)
@@ -88,7 +88,7 @@ class Model:
         parts = [(centroids(times) @ corners[halvings == times], halvings == times) for times in set(halvings.tolist())]
         points = np.concatenate([pieces.reshape(-1, 3) for pieces, _ in parts])
         colours = np.concatenate([np.repeat(colours[cut], pieces.shape[1], axis=0) for pieces, cut in parts])
-        # The nearest part of a triangle in a pixel is seen.
+        # In each pixel, the nearest part of a triangle is visible.
         order = np.argsort(-points[:, 2])
         cells = np.rint(points[order, :2] / pixel).astype(int)
         low, high = cells.min(axis=0), cells.max(axis=0) + 1
@@ -100,7 +100,7 @@ class Model:
 
 @cache
 def centroids(halvings: int) -> np.ndarray:
-    """Return the middles of the parts of a triangle whose sides are halved so often, as shares of its corners."""
+    """Return the centroids of a triangle's parts after halving its sides repeatedly, as weights of its corners."""
     parts = np.eye(3)[None]
     for _ in range(halvings):
         middles = 0.5 * (parts + np.roll(parts, -1, axis=1))
@@ -111,7 +111,7 @@ def centroids(halvings: int) -> np.ndarray:
 
 
 def write_legend(axes: Axes, entries: list[tuple[str, str]], x: float, y: float, points: float) -> None:
-    """Write patches of colour in one line, each with its word."""
+    """Write colour patches with labels in one line."""
     handles = [axes.fill([], [], color=colour, label=label)[0] for colour, label in entries]
     place = {"loc": "lower left", "bbox_to_anchor": (x, y), "bbox_transform": axes.transData, "borderaxespad": 0.0}
     axes.legend(

@@ -1,4 +1,4 @@
-"""Bodies of the benchmark of GLB files: imported by Blender, of one height, with a skin where they are avatars."""
+"""Bodies for the GLB benchmark: imported by Blender, scaled to one height, avatars with a skin."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import bpy
 import numpy as np
 
 HEIGHT_M = 1.7
-"""Metres."""
+"""The height of all bodies, in metres."""
 
 RADIUS_M = 0.03
-"""Metres: what is looked at around joints of a body of that height; of larger ones in proportion."""
+"""The radius of the shell around joints of a body of that height, in metres; proportional for larger bodies."""
 
 CORNERS = np.array([*itertools.product((-1.0, 1.0), (0.0, 1.0), (-1.0, 1.0))])
 BOX_FACES = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
-"""Of a box; y goes along the bone."""
+"""Corners and faces of a box; y is along the bone."""
 
 HALF_WIDTH_RATIO = 0.15
-"""Half the width of a box, of the length of its bone."""
+"""Half the width of a box, relative to the length of its bone."""
 
 PARENT_WEIGHT = 0.3
-"""Of a bone's parent, in the vertices where the bone begins."""
+"""The weight of a bone's parent, in the vertices at the bone's head."""
 
 SMILE_M, SMILE_PERIOD_S = 0.02, 2.5
-"""Metres by which the expression moves all vertices, and how often it comes."""
+"""The distance that the expression moves all vertices, in metres, and its period, in seconds."""
 
 
 def export(path: Path, output: Path, *, as_avatar: bool) -> None:
@@ -37,7 +37,7 @@ def export(path: Path, output: Path, *, as_avatar: bool) -> None:
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = int(min(ends)), int(max(ends))
     if as_avatar:
-        _dress(rig)
+        _add_skin(rig)
     bpy.ops.export_scene.gltf(filepath=str(output), export_format="GLB")
 
 
@@ -51,8 +51,8 @@ def _imported(path: Path, scale: float) -> bpy.types.Object:
     return next(obj for obj in bpy.data.objects if obj.type == "ARMATURE")
 
 
-def _dress(rig: bpy.types.Object) -> None:
-    """Give a rig a skin, a box around each bone, and an expression with a key on every frame."""
+def _add_skin(rig: bpy.types.Object) -> None:
+    """Add a skin to a rig, a box around each bone, and an expression with a key on every frame."""
     bones, count = list(rig.data.bones), len(CORNERS)
     boxes = [CORNERS * (HALF_WIDTH_RATIO * bone.length, bone.length, HALF_WIDTH_RATIO * bone.length) for bone in bones]
     rests = [np.array(bone.matrix_local) for bone in bones]

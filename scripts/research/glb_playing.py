@@ -1,7 +1,7 @@
-"""What the benchmark of GLB files measures: bytes of animations, and errors, by nothing of the program.
+"""Measurements for the GLB benchmark: bytes of animations, and errors of playback, independent of the program.
 
-Files are played by matrices, decoded before that by npm's `meshoptimizer` where they are compressed. Lengths are in the
-unit of a file.
+Files are played with matrices; compressed files are first decoded by npm's `meshoptimizer`. Lengths are in the unit of
+the file.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ for (const extension of document.getRoot().listExtensionsUsed())
   if (extension.extensionName.includes("meshopt")) extension.dispose();
 await io.write(process.argv[2], document);
 """
-"""Has Node write a file without compression."""
+"""A Node script that writes a file without compression."""
 
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
@@ -39,9 +39,9 @@ def json_of(path: Path) -> dict[str, Any]:
 
 
 def animation_bytes(path: Path) -> int:
-    """Return the bytes of all keys of a file as they are stored: times and values.
+    """Return the stored bytes of all keys of a file: times and values.
 
-    Where these share views with one another, each view counts once; elsewhere what they take of theirs.
+    Compressed views count once, even if keys share them; in uncompressed views, only the bytes of the keys count.
     """
     document, total, views = json_of(path), 0, set[int]()
     samplers = [sampler for animation in document["animations"] for sampler in animation["samplers"]]
@@ -59,7 +59,7 @@ def animation_bytes(path: Path) -> int:
 
 
 def opened(path: Path, tools: Path | None) -> Played:
-    """Return a file as it plays."""
+    """Return a file ready for playback, decompressed if needed."""
     if not {*MESHOPT} & {*json_of(path).get("extensionsUsed", ())}:
         return Played(path)
     assert tools is not None
@@ -72,14 +72,14 @@ def opened(path: Path, tools: Path | None) -> Played:
 
 
 class Played(File):
-    """A file whose skins are worked out by one product of matrices, and whose worlds are known when asked for again."""
+    """A file that computes skins with one matrix product, and caches the world matrices."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self.known: dict[tuple[object, bytes], np.ndarray] = {}
 
     def worlds(self, clip: int | str | None, times: np.ndarray) -> np.ndarray:
-        """Matrices of all nodes, shape (nodes, times, 4, 4)."""
+        """Return the world matrices of all nodes, shape (nodes, times, 4, 4)."""
         key = clip, times.tobytes()
         if key not in self.known:
             self.known[key] = super().worlds(clip, times)
@@ -106,7 +106,7 @@ class Played(File):
 
 
 class Beside(Played):
-    """The meshes of one file, as the nodes of another with the same names carry them."""
+    """The meshes of one file, moved by the nodes of another file with the same names."""
 
     def __init__(self, file: Played, other: Played) -> None:
         self.__dict__ |= vars(file)
@@ -119,7 +119,7 @@ class Beside(Played):
         return clip if isinstance(clip, str) and clip in names else None
 
     def worlds(self, clip: int | str | None, times: np.ndarray) -> np.ndarray:
-        """Matrices of all nodes, shape (nodes, times, 4, 4); of those that the other has not, as they were."""
+        """Return world matrices of nodes, shape (nodes, times, 4, 4); nodes missing in the other file keep theirs."""
         result = self.file.worlds(clip, times).copy()
         theirs = self.other.worlds(self.clip_of_other(clip), times)
         for number, other in enumerate(self.theirs):
@@ -128,7 +128,7 @@ class Beside(Played):
         return result
 
     def tracks(self, clip: int | str | None) -> dict[tuple[int, str], Track]:
-        """Return the tracks; those of morph targets as the other has them: by the name of the node, or the only one."""
+        """Return the tracks; morph targets take the other file's track for the same node, or else its only one."""
         result = super().tracks(clip)
         theirs = self.other.tracks(self.clip_of_other(clip))
         weights = {node: track for (node, path), track in theirs.items() if path == "weights"}
@@ -139,7 +139,7 @@ class Beside(Played):
 
 
 def size_of(file: File) -> float:
-    """Return the largest extent along any axis of the joints of a file, or of its nodes, as they rest."""
+    """Return the largest extent along any axis of a file's joints, or else nodes, in the rest pose."""
     rested = [joint for skin in file.json.get("skins", []) for joint in skin["joints"]] or [
         *range(len(file.json["nodes"]))
     ]
@@ -147,7 +147,7 @@ def size_of(file: File) -> float:
 
 
 def joints(file: File, clip: str, times: np.ndarray, radius: float) -> np.ndarray:
-    """Return where heads of nodes with names, and points beside them, are in the world, shape (nodes, times, 7, 3)."""
+    """Return world positions of named nodes' heads and six points around each, shape (nodes, times, 7, 3)."""
     named = [number for number, node in enumerate(file.json["nodes"]) if "name" in node]
     worlds = file.worlds(clip, times)[named]
     axes = np.swapaxes(worlds[..., :3, :3], -1, -2)
@@ -157,20 +157,20 @@ def joints(file: File, clip: str, times: np.ndarray, radius: float) -> np.ndarra
 
 
 def vertices(file: File, clip: str, times: np.ndarray) -> np.ndarray:
-    """Return where all vertices are in the world, shape (times, vertices, 3)."""
+    """Return world positions of all vertices, shape (times, vertices, 3)."""
     seen = [points for what, points in file.points(clip, times).items() if what.startswith("mesh")]
     return np.concatenate(seen, axis=1) if seen else np.zeros((len(times), 0, 3))
 
 
 AT_ONCE = 400
-"""Moments that are looked at together."""
+"""The number of moments evaluated together."""
 
 
 def errors_of(original: Played, smaller: Played, radius: float, enough: float = np.inf) -> dict[str, float | None]:
-    """Return the largest displacements of joints, with points so far from them, and of vertices, None without any.
+    """Return the largest displacements of joints and points at `radius` from them, and of vertices (None without any).
 
-    They are looked for at eighths of the gaps between the keys of both files; and of both at the keys of the first.
-    Where one is over `enough`, no more are looked for.
+    The first two are evaluated at eighths of the gaps between the keys of both files; "at_frames" is both at the
+    original's keys. The evaluation stops once a displacement exceeds `enough`.
     """
     largest = {"joints": 0.0, "vertices": 0.0, "at_frames": 0.0}
     beside = Beside(original, smaller)

@@ -1,10 +1,10 @@
-"""Animations of GLB files made smaller: reduce, gltf-transform and gltfpack side by side.
+"""Benchmark of GLB animation sizes: reduce, gltf-transform and gltfpack compared.
 
     python scripts/research glb_sizes --hand-made walk.fbx fox.glb --mocap run.bvh --avatars run.bvh --tools FOLDER
 
-GLB files are taken as they are, all others are exported by Blender, avatars with a skin and an expression. `--tools` is
-the folder with the programs `gltfpack` and `gltf-transform`, as `npm install gltfpack @gltf-transform/cli` puts them
-into `node_modules/.bin`; without it they are left out, and so is what they decode.
+GLB files are used as they are; all others are exported by Blender, avatars with a skin and an expression. `--tools` is
+the folder with the programs `gltfpack` and `gltf-transform`, which `npm install gltfpack @gltf-transform/cli` puts into
+`node_modules/.bin`; without it, these programs and every compressed file that needs their decoder are left out.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ EXPORTED, RESAMPLED = "as exported", "gltf-transform `resample`"
 NOT_PACKED, DEFAULTS = "gltfpack `-noq -af 0`", "gltfpack `-cc`, its defaults"
 
 KINDS = ("animation", "file", "brotli")
-"""What is counted in bytes: all keys, whole files, and these as servers send them."""
+"""Counts of bytes: all keys, the whole file, and the file as compressed by a web server."""
 
 RATE_KEPT = {"-cc": "gltfpack `-cc -af 0`", "-cz": "gltfpack `-cz -af 0`"}
-"""How its animations are compressed, by EXT_ and by the newer KHR_meshopt_compression."""
+"""gltfpack's options for compressed animations: EXT_meshopt_compression and the newer KHR_meshopt_compression."""
 
 ROTATION_BITS, TRANSLATION_BITS = range(4, 17), range(6, 25)
-"""What its `-ar` and `-at` may be."""
+"""Valid values of gltfpack's `-ar` and `-at`."""
 
 
 class Measured:
-    """A body, and what each program makes of it."""
+    """A body, and the results of each program for it."""
 
     def __init__(self, path: Path, group: str, tools: Path | None, folder: Path) -> None:
         self.tools, self.output = tools, folder / "smaller.glb"
@@ -65,7 +65,7 @@ class Measured:
         self.cheapest = cache(self._cheapest)
 
     def ways(self) -> Iterator[tuple[str, Callable[[], dict[str, Any]]]]:
-        """Yield the names of all rows, and what makes them."""
+        """Yield the names of all rows, with functions that make them."""
         yield EXPORTED, partial(self._row, self.exported)
         for tolerance in TOLERANCES_M:
             within = f"within {1e3 * tolerance:g} mm"
@@ -80,7 +80,7 @@ class Measured:
             yield RESAMPLED, self._resampled
 
     def _row(self, path: Path) -> dict[str, Any]:
-        import brotli  # for figures alone: the tests go without
+        import brotli  # Needed only for figures: the tests run without it.
 
         content = path.read_bytes()
         errors = errors_of(self.original, opened(path, self.tools), RADIUS_M * self.scale)
@@ -89,7 +89,7 @@ class Measured:
         return {**sizes, **millimetres}
 
     def _reduced(self, way: str, tolerance: float) -> dict[str, Any]:
-        """Return a row of reduce; one without numbers where it leaves the file alone, which would grow."""
+        """Return a row for reduce; empty if reduce leaves the file alone because it would grow."""
         self.output.unlink(missing_ok=True)
         given = {"--tolerance": tolerance * self.scale, "--radius": RADIUS_M * self.scale}
         lengths = [part for name, length in given.items() for part in (name, f"{1e3 * length:.6f}mm")]
@@ -100,9 +100,9 @@ class Measured:
         return self._row(self.output) if self.output.exists() else {}
 
     def _packed_within(self, flag: str, tolerance: float) -> dict[str, Any]:
-        """Return a row of gltfpack with all frames, and the bits that take fewest bytes; none where none will do."""
+        """Return a row for gltfpack with all frames, and the bits that need the fewest bytes; empty if none suffice."""
         bits = self.cheapest(tolerance)
-        return {} if bits is None else self._packed(flag, *_kept_in(bits)) | {"bits": "{}/{}".format(*bits)}
+        return {} if bits is None else self._packed(flag, *_frame_options(bits)) | {"bits": "{}/{}".format(*bits)}
 
     def _packed(self, *options: object) -> dict[str, Any]:
         self._pack(*options)
@@ -121,16 +121,16 @@ class Measured:
         subprocess.run([found, *map(str, arguments)], check=True, capture_output=True)
 
     def _cheapest(self, tolerance: float) -> tuple[int, int] | None:
-        """Return the bits of rotations and of translations that take the fewest bytes within a tolerance, if any do."""
+        """Return the bits of rotations and translations with the fewest bytes within a tolerance, or None."""
         largest = tolerance * self.scale
 
         def is_within(*bits: int) -> bool:
-            self._pack("-cc", *_kept_in(bits))
+            self._pack("-cc", *_frame_options(bits))
             errors = errors_of(self.original, opened(self.output, self.tools), RADIUS_M * self.scale, largest)
             return max(error or 0.0 for error in errors.values()) <= largest
 
         def size(bits: tuple[int, int]) -> int:
-            self._pack("-cc", *_kept_in(bits))
+            self._pack("-cc", *_frame_options(bits))
             return animation_bytes(self.output)
 
         def least(of: range, fits: Any) -> int | None:
@@ -150,13 +150,13 @@ class Measured:
         return min(found, key=size, default=None)
 
 
-def _kept_in(bits: tuple[int, ...]) -> tuple[object, ...]:
-    """Return the options by which gltfpack keeps all frames, in so many bits for rotations and translations."""
+def _frame_options(bits: tuple[int, ...]) -> tuple[object, ...]:
+    """Return gltfpack's options to keep all frames, with these bits for rotations and translations."""
     return ("-af", 0, "-ar", bits[0], "-at", bits[1])
 
 
 def means(clips: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return geometric means over clips of what each program leaves of the bytes as exported."""
+    """Return geometric means over clips of the fraction of the exported bytes that each program leaves."""
     result = []
     for rows in zip(*(clip["tools"] for clip in clips), strict=True):
         known = [(row, clip["tools"][0]) for row, clip in zip(rows, clips, strict=True) if "animation" in row]
@@ -170,7 +170,7 @@ def means(clips: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def beside(clips: list[dict[str, Any]]) -> dict[str, dict[str, dict[str, float]]]:
-    """Return the bytes of reduce in those of gltfpack `-cc` within the same tolerance: geometric means over clips."""
+    """Return ratios of reduce's bytes to gltfpack `-cc`'s at the same tolerance: geometric means over clips."""
     result: dict[str, dict[str, dict[str, float]]] = {}
     for tolerance in TOLERANCES_M:
         within = f"within {1e3 * tolerance:g} mm"
@@ -188,7 +188,7 @@ def beside(clips: list[dict[str, Any]]) -> dict[str, dict[str, dict[str, float]]
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, and write the figures."""
+    """Measure all files, and write the figures."""
     parser = study_parser("glb_sizes", __doc__)
     for group, title in GROUPS.items():
         option = f"--{group.replace('_', '-')}"

@@ -1,4 +1,4 @@
-"""In-betweens of keys, as work that is timed."""
+"""Test cases of in-betweens for benchmarks: keys, and the times to evaluate."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rigid_motion.motion.poses import reshaped
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Objects (b) with keys (n), looked at m times each; and the same as a list of pairs, as the peers want it."""
+    """Objects (b) with keys (n), evaluated m times each; also as a list of pairs, which other libraries need."""
 
     title: str
     key_times: np.ndarray
@@ -24,7 +24,7 @@ class Case:
         return self.keys.shape[0] * self.times.shape[-1]
 
     def pairs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first key of each in-between among all keys of all objects, and the share u of the way on."""
+        """Return the index of each in-between's first key, among all keys of all objects, and the fraction u."""
         objects, n = self.keys.shape
         times = np.broadcast_to(self.times, (objects, self.times.shape[-1]))
         segment = np.clip(np.searchsorted(self.key_times, times, side="right") - 1, 0, n - 2)
@@ -38,9 +38,9 @@ class Case:
         return keys[first], keys[first + 1], u
 
     def filled_in(self, mode: str) -> Poses:
-        """Return the in-betweens of a mode, shape (b, m): each segment is worked out once."""
+        """Return the in-betweens of a mode, shape (b, m); each segment is computed once."""
         return interpolate(self.key_times, self.keys, self.times, mode)
 
     def in_the_algebra(self, mode: str) -> Poses:
-        """Return the same, shape (b m,), by the algebra that the mode is named after: each begins with its keys."""
+        """Return the same, shape (b m,), by the algebra that the mode is named after; each starting from its keys."""
         return MODES[mode].reference(*self.ends())

@@ -1,12 +1,11 @@
-"""What bodies cost live, beside packed poses at even rates, beside game engines, and in a room of many.
+"""Cost of live streaming: compared with packed poses at even rates, with game engines, and in a crowded room.
 
     python scripts/research live_costs FOLDER ...
 
 Whole bodies and single hands are sent by the codec of [the wire](wire.md) over UDP on loopback; a receiver in another
-process shows them, and goes by the recording's clock, however busy the machine is. Bytes are those of datagrams with
-the 28 bytes of UDP and IPv4 around each, without the description that a receiver gets when it joins. Errors are the
-largest of any joint's ball, which reaches to the ends of bones that the file has, in the root's space, at the moments
-that are shown.
+process shows them on the recording's clock, however busy the machine is. Bytes are those of datagrams with the 28 bytes
+of UDP and IPv4 headers each, without the description that a receiver gets when it joins. Errors are the largest of any
+joint's ball, which reaches to the tails of bones in the file, in the root's space, at the moments shown.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ TOLERANCE_M = 0.005
 DELAYS = {0.1: "100 ms", 0.2: "200 ms"}
 
 FLOATS = "float32 at 30 Hz"
-"""In the paper's words the state of the art: position and rotation of every joint at an even rate."""
+"""The state of the art, according to the paper: position and rotation of every joint at an even rate."""
 
 WAYS = {
     "20 ms": Way(0.02, 0.02, 0.0),
@@ -39,16 +38,16 @@ WAYS = {
     "250 ± 40 ms, 5 % lost": Way(0.21, 0.29, 0.05),
     "250 ± 40 ms, 20 % lost": Way(0.21, 0.29, 0.2),
 }
-"""Links for game engines and us."""
+"""Links that game engines and our codec are tried on."""
 
-HAND = "aframe_right"  # the clip of the hand that holds the tool
+HAND = "aframe_right"  # the clip of the hand with the tool
 
 COST = {"bytes": "bytes_a_second_with_headers", "rms_mm": "rms_mm", "largest_mm": "largest_mm"}
-"""The names of figures, and those that they have where they are measured."""
+"""Names of figures, and their names in the measurements."""
 
 
 def costs_of(clip: Clip) -> dict[str, Any]:
-    """Return the joints of a body, and what each way to send it costs."""
+    """Return the number of joints of a body, and the cost of each way to send it."""
     report(clip.name)
     times, poses = samples_of(clip)
     body = body_of(clip, poses)
@@ -60,7 +59,7 @@ def costs_of(clip: Clip) -> dict[str, Any]:
 
 
 def table(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return recordings, what is in their middle and the largest of each figure, and what is saved beside floats."""
+    """Return the costs of recordings, the median and maximum of each figure, and the savings compared with floats."""
     ways = [row["ways"] for row in rows]
     return {
         "rows": rows,
@@ -76,7 +75,7 @@ def table(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def engines(clip: Clip) -> list[dict[str, Any]]:
-    """Return what game engines show of a hand and its tool over each link, and what the codec does."""
+    """Return errors and bytes of game engines, and of the codec, for a hand and its tool over each link."""
     times, poses = samples_of(clip)
     truth = truth_of(times, poses[0])
     frames = np.arange(0.5, float(truth.moments[-1]), 1.0 / PICTURES_PER_S)
@@ -94,7 +93,7 @@ def engines(clip: Clip) -> list[dict[str, Any]]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, and write the figures."""
+    """Measure all costs, and write the figures."""
     parser = study_parser("live_costs", __doc__)
     parser.add_argument("folders", nargs="+", type=Path, metavar="PATH", help="recordings and rigs, or folders of them")
     parser.add_argument("--users", type=int, default=30, help="of the room (%(default)s)")

@@ -1,11 +1,11 @@
-"""Fill in the pages in docs/ with what the studies found: docs/figures/NAME.json is `NAME` in them.
+"""Fill in the pages in docs/ with the results of studies: docs/figures/NAME.json is the variable `NAME` in a page.
 
     python scripts/research pages
     python scripts/research pages --check
 
-A page of figures is rendered (Jinja2) from the template of its name in docs/templates/. Other pages quote a few
-figures: what is between `<!--= EXPRESSION -->` and `<!-- end -->` is the expression's value. Tables that such a page
-quotes are macros of docs/templates/quotes.md.
+A page of figures is rendered (Jinja2) from the template of the same name in docs/templates/. Other pages quote a few
+figures: the text between `<!--= EXPRESSION -->` and `<!-- end -->` is the expression's value. Tables that such a page
+quotes are macros in docs/templates/quotes.md.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ QUOTE = re.compile(r"(<!--= (.+?) -->)(.*?)(<!-- end -->)", re.DOTALL)
 
 
 def write_figures(name: str, figures: Any, command: str, root: Path = ROOT, **versions: object) -> Path:
-    """Write what a study found to docs/figures/NAME.json, and return its path.
+    """Write the results of a study to docs/figures/NAME.json, and return the file's path.
 
     Parameters
     ----------
@@ -38,11 +38,11 @@ def write_figures(name: str, figures: Any, command: str, root: Path = ROOT, **ve
     figures : dict
         Numbers, texts, and lists and dictionaries of them. Numbers get six significant digits; NaN becomes null.
     command : str
-        What made them; folders are left out of its paths.
+        The command that made them; folders are removed from its paths.
     root : Path
         The checkout.
     **versions
-        Of what they depend on beside Python and NumPy.
+        Versions of programs that the figures depend on, besides Python and NumPy.
     """
     versions |= {"Python": platform.python_version(), "NumPy": np.__version__}
     machine = [*(f"{program} {version}" for program, version in versions.items()), platform.system()]
@@ -54,7 +54,7 @@ def write_figures(name: str, figures: Any, command: str, root: Path = ROOT, **ve
 
 
 def as_json(value: Any) -> Any:
-    """Return a value as JSON has it."""
+    """Return a value that JSON can represent."""
     if isinstance(value, dict):
         return {str(key): as_json(item) for key, item in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
@@ -68,31 +68,31 @@ def as_json(value: Any) -> Any:
 
 
 def spread(values: Iterable[float], decimals: int = 0, factor: float = 1.0) -> str:
-    """Return the least and the largest, times a factor: "4 to 7"; one number where they are written alike."""
+    """Return the minimum and maximum, times a factor: "4 to 7"; a single number if both have the same text."""
     values = [factor * value for value in values]
     return " to ".join(dict.fromkeys(f"{value:.{decimals}f}" for value in (min(values), max(values))))
 
 
 def rest(shares: Iterable[float | None]) -> list[float | None]:
-    """Return what shares leave of 1."""
+    """Return 1 minus each fraction; None stays None."""
     return [None if share is None else 1.0 - share for share in shares]
 
 
 def less(share: float, word: str = "less", decimals: int = 0) -> str:
-    """Return a share that is saved: "3 % less"; below zero it is how much more: "3 % more"."""
+    """Return a saved fraction as text: "3 % less"; a negative one is an increase: "3 % more"."""
     percents = round(100.0 * share, decimals)
     return f"{abs(percents):.{decimals}f}\N{NO-BREAK SPACE}% {'more' if percents < 0.0 else word}".rstrip()
 
 
 def alike(shares: Iterable[float], word: str = "less") -> str:
-    """Return shares that are saved, as a sentence has them: "33, 50 and 53 % less"."""
+    """Return saved fractions as one text: "33, 50 and 53 % less"."""
     texts = [less(share, word) for share in shares]
     numbers, units = zip(*(text.split("\N{NO-BREAK SPACE}") for text in texts), strict=True)
     return f"{listed(numbers)}\N{NO-BREAK SPACE}{units[0]}" if len(set(units)) == 1 else listed(texts)
 
 
 def each(values: Iterable[float], form: str = "{:.2f}", factor: float = 1.0) -> list[str]:
-    """Return numbers as texts of this form, times a factor; a dash where there is none."""
+    """Return numbers, times a factor, formatted with `form`; a dash for None."""
     return ["\N{EN DASH}" if value is None else form.format(factor * value) for value in values]
 
 
@@ -103,7 +103,7 @@ FILTERS = (alike, digits, each, less, listed, percent, rest, spread)
 
 
 def environment(root: Path = ROOT) -> jinja2.Environment:
-    """Return what templates are rendered in, with all figures."""
+    """Return the Jinja2 environment of the templates, with all figures as globals."""
     result = jinja2.Environment(
         loader=jinja2.FileSystemLoader(root / TEMPLATES),
         undefined=jinja2.StrictUndefined,
@@ -120,13 +120,13 @@ def environment(root: Path = ROOT) -> jinja2.Environment:
 
 
 def pages(root: Path = ROOT) -> list[Path]:
-    """Return the pages that are filled in, or may quote."""
+    """Return the pages that are rendered from templates, or that may quote figures."""
     named = {path.name for path in (root / TEMPLATES).glob("*.md")} - {"quotes.md"}
     return sorted({root / "README.md", *(root / "docs").glob("*.md"), *(root / "docs" / name for name in named)})
 
 
 def filled(path: Path, templates: jinja2.Environment) -> str:
-    """Return a page with its figures."""
+    """Return the text of a page with its figures filled in."""
     if path.parent.name == "docs" and path.name in templates.list_templates():
         return templates.get_template(path.name).render()
     page = path.read_text(encoding="utf-8")

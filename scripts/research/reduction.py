@@ -1,12 +1,12 @@
-"""What Reduce Keys to Poses leaves of recordings, beside Blender's own curves, and its Decimate of the Graph Editor.
+"""Comparison of Reduce Keys to Poses with Blender's own curves, and with Decimate of the Graph Editor.
 
     python scripts/research reduction
     python scripts/research reduction --recordings FOLDER --bodies FOLDER_OR_FILES
 
 Each recording is an object with a key of location and rotation on every frame, as Blender's users import it. *Reduce
-Keys to Poses* leaves the fewest keys within the tolerance. Keys on as few frames are searched for between which Blender
-puts its own curves, by the same search; and Decimate gets the largest error margin with which it is no worse, found by
-trials. All errors are those of what Blender shows, at eighths of frames.
+Keys to Poses* leaves the fewest keys within the tolerance. The same search finds the fewest frames to key for Blender's
+own curves; and Decimate gets the largest error margin at which its error is no larger, found by trials. All errors are
+those of Blender's evaluation, at eighths of frames.
 """
 
 from __future__ import annotations
@@ -52,27 +52,27 @@ from rigid_motion_batch.scenes.body_scene import registered
 
 ROTATION_MODES = ("QUATERNION", "XYZ")
 RIVALS = "curves", "curves_between", "decimate"
-MAX_TRIALS = 14  # error margins and tolerances tried until a rival is as good as the reduced poses
-ROUNDING_RATIO = 1e-4  # the share by which single precision may miss a tolerance
+MAX_TRIALS = 14  # maximum tries of error margins and tolerances until a rival is as good as the reduced poses
+ROUNDING_RATIO = 1e-4  # the fraction by which single precision may exceed a tolerance
 
 TOLERANCE, RADIUS_M, HEIGHT_M = Tolerance("10mm"), 0.03, 1.7
-"""The errors that are allowed, of the ball at every joint, and what every body's largest extent is made; metres."""
+"""The error tolerance, the radius of the ball at every joint, and the largest extent all bodies are scaled to, in m."""
 
 MODE = "motor_spline"
 WAYS = {"keys of each joint": False, "key poses": True}
 BODY_RIVALS = "Blender's curves", "Decimate"
 
-MOST_FRAMES = 1200  # longer recordings are cut off
+MOST_FRAMES = 1200  # longer recordings are truncated
 
 
 def read(path: Path, rate: float) -> Clip:
-    """Read the first body of a file at so many frames a second, and straight between these at `PARTS_PER_FRAME` of
-    each, as Blender shows a key on every frame; of a skeleton the root.
+    """Read the first body of a file, sampled at `rate` and then linearly at `PARTS_PER_FRAME` times that rate, as
+    Blender shows a key on every frame; of a skeleton only the root.
 
     Raises
     ------
     TrajectoryError
-        Where it cannot be read, or has fewer than two usable poses.
+        If it cannot be read, or has fewer than two usable poses.
     """
     clip = read_clips([str(path)])[0][0]
     poses = clip.in_metres(clip.poses if clip.rest_body is None else clip.poses[0])
@@ -84,12 +84,12 @@ def read(path: Path, rate: float) -> Clip:
 
 
 def frames_of(clip: Clip) -> np.ndarray:
-    """Return the frames of its poses (n,), from 1 on, of which every `PARTS_PER_FRAME`th is whole."""
+    """Return the frames of the clip's poses (n,), from 1 on; every `PARTS_PER_FRAME`th is a whole frame."""
     return 1.0 + np.arange(len(clip.times)) / PARTS_PER_FRAME
 
 
 def import_clip(clip: Clip, rotation_mode: str, keys: np.ndarray | slice = slice(None)) -> bpy.types.Object:
-    """Return an empty with a key on every frame, or on some of them, alone in a new file, selected."""
+    """Return an empty with keys on all frames, or only `keys`, alone in a new file, selected."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     obj = bpy.data.objects.new(clip.name, None)
     obj.rotation_mode = rotation_mode
@@ -101,7 +101,7 @@ def import_clip(clip: Clip, rotation_mode: str, keys: np.ndarray | slice = slice
 
 
 def shown(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
-    """Return the poses of an object at frames (n,) by its F-curves."""
+    """Return the poses of an object at frames (n,), evaluated from its F-curves."""
     values = values_of(obj, frames)
     location, turns = (
         np.column_stack([values[channel] for channel in sorted(values) if channel[0].startswith(what)])
@@ -113,16 +113,16 @@ def shown(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
 
 
 def recorded(obj: bpy.types.Object, clip: Clip) -> Poses:
-    """Return the poses of an object with a key on every frame: on frames the clip's, between them as they are shown."""
+    """Return the poses of a fully keyed object: the clip's on whole frames, evaluated ones between them."""
     result = shown(obj, frames_of(clip))
     result[::PARTS_PER_FRAME] = clip.poses[::PARTS_PER_FRAME]
     return result
 
 
 def outcome(obj: bpy.types.Object, truth: Poses, radius: float, *, poses: bool = False) -> Left:
-    """Return what an object has now for keys, in a channel on average, and how far off it is shown.
+    """Return the counts of an object's keys (per channel on average) and numbers, and its largest error.
 
-    Keys of whole poses take a number for their frame and one for each channel.
+    With `poses`, keys are whole poses, which take a number for their frame and one for each channel.
     """
     curves = [
         [key.co.x for key in fcurve.keyframe_points]
@@ -135,17 +135,17 @@ def outcome(obj: bpy.types.Object, truth: Poses, radius: float, *, poses: bool =
 
 
 def errors_of(obj: bpy.types.Object, truth: Poses, radius: float) -> np.ndarray:
-    """Return how far off an object is shown, in metres, at every part of a frame, shape (n,)."""
+    """Return the error of an object's evaluated motion at every part of a frame, in metres, shape (n,)."""
     return shell_error(shown(obj, 1.0 + np.arange(truth.shape[0]) / PARTS_PER_FRAME), truth, radius)
 
 
 def blenders_curves(
     clip: Clip, truth: Poses, rotation_mode: str, tolerance: float, radius: float, largest: float
 ) -> tuple[Left | None, Left | None]:
-    """Return the fewest poses found between which Blender's curves stay within the tolerance on frames, and the fewest
-    between which they stay within the largest error between frames too; None where they never do.
+    """Return the fewest keys found with which Blender's curves stay within the tolerance on frames, and the fewest with
+    which they stay within `largest` between frames too; None if they never do.
 
-    They are searched for as of quaternions. For what Euler angles make of them, and between frames, the tolerance is
+    The search is done for quaternions. To account for Euler angles and for errors between frames, the tolerance is
     lowered.
     """
     aim, frames, kept = tolerance, frames_of(clip)[::PARTS_PER_FRAME], None
@@ -168,8 +168,8 @@ def blenders_curves(
 
 
 def measure(clip: Clip, rotation_mode: str, tolerance: float, radius: float) -> dict[str, Any]:
-    """Return what *Reduce Keys to Poses* leaves of a recording, and what its rivals do with no larger an error; None
-    where they cannot be so good.
+    """Return the results of *Reduce Keys to Poses* for a recording, and those of its rivals with at most the same
+    error; None for a rival that cannot reach it.
     """
     report(f"{clip.name}, {rotation_mode}")
     obj = import_clip(clip, rotation_mode)
@@ -185,7 +185,7 @@ def measure(clip: Clip, rotation_mode: str, tolerance: float, radius: float) -> 
 
 
 def means(rows: list[dict[str, Any]], rival: str) -> dict[str, float]:
-    """Return what a rival has in multiples of reduced poses: geometric means over those recordings where it can."""
+    """Return a rival's counts as ratios to reduced poses: geometric means over recordings where the rival succeeds."""
     pairs = [(row[rival], row["reduced"]) for row in rows if row[rival]]
     ratios = {name: [one[name] / reduced[name] for one, reduced in pairs] for name in rows[0]["reduced"]}
     return {"recordings": len(pairs), **{name: geometric_mean(np.array(own)) for name, own in ratios.items()}}
@@ -195,7 +195,7 @@ def means(rows: list[dict[str, Any]], rival: str) -> dict[str, float]:
 
 
 def of_bodies(paths: Sequence[Path]) -> dict[str, Any]:
-    """Return all that is measured of the bodies in files."""
+    """Return all measurements of the bodies in files."""
     clips = [replace(read_clips([str(path)])[0][0], name=path.stem) for path in paths]
     bodies = [of_height(part_of(clip, 0, min(len(clip.times), MOST_FRAMES) - 1)) for clip in clips]
     pairs = {way: [beside(body, way) for body in bodies] for way in WAYS}
@@ -217,21 +217,21 @@ def of_bodies(paths: Sequence[Path]) -> dict[str, Any]:
 
 
 def about(body: Clip) -> dict[str, Any]:
-    """Return what a body is."""
+    """Return the name and dimensions of a body."""
     joints, frames = body.poses.shape
     extent = HEIGHT_M / body.metres_per_unit
     return {"name": body.name, "joints": joints, "frames": frames, "rate": body.samples_a_second, "extent": extent}
 
 
 def of_height(clip: Clip) -> Clip:
-    """Return the same body, larger or smaller: in the first frame its joints span `HEIGHT_M` along one of the axes."""
+    """Return the body scaled so that its joints in the first frame span `HEIGHT_M` along one of the axes."""
     places = clip.rest_body.skeleton.in_root_space(clip.poses[:, :1]).positions
     return replace(clip, metres_per_unit=HEIGHT_M / float(np.ptp(places, axis=(0, 1)).max()))
 
 
 def beside(body: Clip, way: str) -> list[dict[str, Any]]:
-    """Return what is left by keys of each joint or by key poses, by the same with Blender's curves between them, and by
-    Decimate within the error that the first have.
+    """Return the keys left by a way of reducing, by the same way with Blender's curves, and by Decimate within the
+    first one's error.
     """
     report(f"{body.name}, {way}")
     made = {mode: reconstruct(body, TOLERANCE, [mode], RADIUS_M, shared=WAYS[way]) for mode in (MODE, REFERENCE)}
@@ -242,7 +242,7 @@ def beside(body: Clip, way: str) -> list[dict[str, Any]]:
 
 
 def left_by(made: Reconstruction) -> dict[str, Any]:
-    """Return what the keys of its one mode are, their largest error between frames as well, and how far feet slide."""
+    """Return counts and largest errors of a reconstruction with a single mode, also between frames, and foot slide."""
     (row,) = measured(made).rows
     slides = {"slide_mm": row.foot_slide_m, "recorded_slide_mm": row.recorded_slide_m}
     return {
@@ -256,8 +256,9 @@ def left_by(made: Reconstruction) -> dict[str, Any]:
 
 
 def largest_error(made: Reconstruction) -> float:
-    """Return the largest error of any joint at any part of a frame, in metres: the recording is straight between its
-    samples.
+    """Return the largest error of any joint at any part of a frame, in metres.
+
+    The recording is taken as linear between its samples.
     """
     (mode,) = made.keys
     every = np.arange(made.samples.start, made.samples.stop)
@@ -267,7 +268,7 @@ def largest_error(made: Reconstruction) -> float:
 
 
 def numbers_of(made: Reconstruction) -> int:
-    """Return how many numbers the keys take: for each its time, and the place and the turn where these vary."""
+    """Return how many numbers the keys take: for each its time, and position and rotation where they vary."""
     (keys,), clip = made.keys.values(), made.clip
     places = np.ptp(clip.poses.positions, axis=1).max(axis=1) * clip.metres_per_unit > MIN_VARIATION
     counts, channels, moves = np.array([*map(len, keys)]), 4 + 3 * places, moving(clip)
@@ -276,7 +277,7 @@ def numbers_of(made: Reconstruction) -> int:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, and write the figures."""
+    """Measure all recordings and bodies, and write the figures."""
     parser = study_parser("reduction", __doc__)
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="more recordings, axes and unit as they are")
     parser.add_argument("--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="BVH, FBX, folders of them")

@@ -1,9 +1,9 @@
-"""The modes beside Blender's own curves: how close on recordings, and where what is rigid shows.
+"""Comparison of modes with Blender's own curves: accuracy on recordings, and the benefits of rigid motion.
 
     python scripts/research rivals --recordings FOLDER
 
-Errors are shell errors at a radius of 0.1 m with evenly spaced keys, as shares of those of Blender's curves; means are
-geometric, over the recordings of the folder that have two samples to each key.
+Errors are shell errors at a radius of 0.1 m with evenly spaced keys, as ratios to those of Blender's curves; means are
+geometric, over the recordings of the folder that have two samples per key.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from rigid_motion_batch.recordings.clips import Clip
 
 MODES = (REFERENCE, STATE_OF_THE_ART, "dq_sclerp", "pga_lerp", "motor_spline")
 KEYS_PER_S = (2, 3, 5, 10, 20, 30)
-"""Keys a second."""
+"""Keys per second."""
 
 SHELL_RADIUS_M = 0.1
 MAX_RECORDING_S = 20.0
-"""Seconds of a recording that are looked at."""
+"""Maximum seconds used of a recording."""
 
 LEVERS_M = (0.1, 0.3, 1.0)
-"""Metres from the hand to the origin of the tool that it holds."""
+"""Metres from the hand to the origin of the tool it holds."""
 
 MAX_ROUNDING_M = 1e-6
-"""Metres that are none."""
+"""Metres that count as zero."""
 
 HELD_AT = (5, 10)
 REACHED_AT = 8
 DOOR_TURNS_DEG = (60, 120, 170)
-"""Degrees of a door between two keys."""
+"""Degrees that a door turns between two keys."""
 
 HINGE_DISTANCE_M = 0.8
-"""Metres from the origin of the door."""
+"""Metres from the door's origin to its hinge."""
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -65,9 +65,9 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def sampled(clip: Clip, rate: float) -> tuple[np.ndarray, Poses, np.ndarray] | None:
-    """Return times in seconds and poses in metres of the first seconds of a clip, and which of them are keys.
+    """Return times in seconds, poses in metres, and the indices of keys, for the first seconds of a clip.
 
-    None where nearly all would be.
+    None if the clip has fewer than two samples per key.
     """
     count = int(np.searchsorted(clip.times, clip.times[0] + MAX_RECORDING_S))
     times, poses = clip.times[:count], clip.in_metres(clip.poses[:count])
@@ -79,7 +79,7 @@ def sampled(clip: Clip, rate: float) -> tuple[np.ndarray, Poses, np.ndarray] | N
 
 
 def errors(clips: Iterable[Clip]) -> dict[str, Any]:
-    """Return the RMS errors of all modes at all rates as shares of those of the reference, and over how many clips."""
+    """Return RMS errors of all modes at all rates, as ratios to the reference's, and the number of clips."""
     result: dict[str, Any] = {}
     for rate in KEYS_PER_S:
         report(f"{rate} keys a second")
@@ -95,9 +95,9 @@ def errors(clips: Iterable[Clip]) -> dict[str, Any]:
 
 
 def slips(clips: Iterable[Clip]) -> dict[str, Any]:
-    """Return how far a tool gets from its place in the hand that holds it, at most, in mm.
+    """Return the maximum distance of a tool from its place in the hand that holds it, in mm.
 
-    Hand and tool are keyed together, each for itself: the tool's origin is beside the hand's by a lever.
+    Hand and tool are keyed at the same times, independently; the lever is the distance between their origins.
     """
     result: dict[str, Any] = {}
     for rate in HELD_AT:
@@ -122,7 +122,7 @@ def slips(clips: Iterable[Clip]) -> dict[str, Any]:
 
 
 def reach() -> dict[str, float]:
-    """Return the RMS errors in mm of the generated hand at `REACHED_AT` keys a second, which pictures show."""
+    """Return the RMS errors in mm of the generated hand at `REACHED_AT` keys per second, as shown in pictures."""
     taken = sampled(read_motion(from_here(ASSETS) / "reach.csv"), REACHED_AT)
     assert taken is not None
     times, poses, keys = taken
@@ -133,7 +133,7 @@ def reach() -> dict[str, float]:
 
 
 def door(degrees: float) -> dict[str, float]:
-    """Return how far the hinge of a door leaves its place between two keys, in mm."""
+    """Return how far a door's hinge leaves its place between two keys, in mm."""
     half = np.radians(degrees) / 2.0
     quaternions = np.array(((1.0, 0.0, 0.0, 0.0), (np.cos(half), 0.0, 0.0, np.sin(half))))
     hinge = np.array((HINGE_DISTANCE_M, 0.0, 0.0))
@@ -146,10 +146,10 @@ def door(degrees: float) -> dict[str, float]:
 
 
 def other_sign(clips: Iterable[Clip]) -> dict[str, float]:
-    """Return the largest error of rotation in degrees at 10 keys a second where every other key has the quaternion of
-    the other sign, which is the same pose; the median over the clips.
+    """Return the largest rotation error in degrees at 10 keys per second if every other key's quaternion is negated,
+    which is the same pose; the median over the clips.
 
-    Blender takes the four numbers as they are; so that is worked out here.
+    Blender interpolates the four numbers as they are; `blenders_quaternions` does the same.
     """
     rows = []
     for clip in clips:
@@ -171,7 +171,7 @@ def other_sign(clips: Iterable[Clip]) -> dict[str, float]:
 
 
 def blenders_quaternions(key_times: np.ndarray, quaternions: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return what Blender makes of quaternions (k, 4) of any sign at times (m,): four curves, as positions have."""
+    """Return Blender's interpolation of quaternions (k, 4) of any sign at times (m,): four independent curves."""
     still = np.tile((1.0, 0.0, 0.0, 0.0), (len(quaternions), 1))
     rows = [
         interpolate(key_times, Poses(quaternions[:, some], still), times, REFERENCE).positions

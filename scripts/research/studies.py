@@ -1,4 +1,4 @@
-"""What studies share: their command line, their clock, and where their figures go."""
+"""Shared code of studies: their command line, their clock, and writing of their figures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Name = TypeVar("Name", bound=Hashable)
 
 
 def study_parser(name: str, description: str, epilog: str = "") -> Parser:
-    """Return the parser of a study, with the option where to write."""
+    """Return the parser of a study, with an option for the output folder."""
     parser = parser_of(f"research {name}", description, epilog)
     parser.set_defaults(study=name)
     parser.add_argument("--root", type=Path, default=ROOT, metavar="FOLDER", help="of docs/figures (this checkout)")
@@ -28,14 +28,14 @@ def study_parser(name: str, description: str, epilog: str = "") -> Parser:
 
 
 def publish(name: str, figures: object, options: argparse.Namespace, *given: object, **versions: object) -> int:
-    """Write figures, made by a study with these arguments, and return the exit code."""
+    """Write the figures of a study that ran with these arguments, and return the exit code."""
     command = " ".join(["python scripts/research", options.study, *map(str, given)])
     print(write_figures(name, figures, command, options.root, **versions))
     return 0
 
 
 def report(text: str) -> None:
-    """Print what is measured now."""
+    """Print the name of the current measurement."""
     print(f"{text} ...", file=sys.stderr, flush=True)
 
 
@@ -47,9 +47,10 @@ def interleaved_seconds(
     most: float = float("inf"),
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[Name, list[float]]:
-    """Return the seconds of every round of each, interleaved, so that a machine that slows down slows all.
+    """Return the seconds of every round of each run; rounds are interleaved, so a slowdown of the machine affects all.
 
-    A warm run has one before it that pays for memory and caches. One that has used up `most` seconds has no more.
+    With `warm`, an unmeasured run comes before each measured one, to fill memory and caches. A run that has used `most`
+    seconds gets no further rounds.
     """
     seconds: dict[Name, list[float]] = {name: [] for name in runs}
     for _ in range(rounds):
@@ -64,12 +65,12 @@ def interleaved_seconds(
 
 
 def files_in(paths: Iterable[Path], extensions: Collection[str] = EXTENSIONS) -> list[Path]:
-    """Return the files that are given, and those with these extensions in folders and below, each once.
+    """Return the given files, and all files with these extensions in the given folders and subfolders, each once.
 
     Raises
     ------
     TrajectoryError
-        Where there is no such file, or none in a folder.
+        If a path does not exist, or a folder has no such files.
     """
     result: dict[Path, None] = {}
     for path in paths:

@@ -1,1 +1,1 @@
-"""What `live_costs` measures beside the codec: packed poses, game engines on a bad link, and a room of many."""
+"""Comparisons of live streaming for `live_costs`: packed poses, game engines on a bad link, and a crowded room."""

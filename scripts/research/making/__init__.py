@@ -1,1 +1,1 @@
-"""How the assets are made: motions as people move, the device that records them, and the models as meshes."""
+"""Makers of the assets: human motions, the device that records them, and models as meshes."""

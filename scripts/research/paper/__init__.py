@@ -1,10 +1,10 @@
-"""The paper, reproduced: its figures, its table and its example, from this program (`python scripts/research paper`).
+"""The paper, reproduced: its figures, its table and its example (`python scripts/research paper`).
 
-parts                        all of it, part by part: each writes docs/figures/paper_PART.json
-motions                      the clips that it is tried on
-table                        Table 1, and why a screw wins here and loses there
-sending                      streams that are sent when needed, and bytes
-holding                      a tool that recorded hands pass on, in the world and in the space of the hand
+parts                        all parts of the reproduction: each writes docs/figures/paper_PART.json
+motions                      the clips it is applied to
+table                        Table 1, and why a screw wins on some clips and loses on others
+sending                      streams that send only when needed, and their bytes
+holding                      a tool passed between recorded hands, in the world and in the space of the hand
 bodies                       the same study on whole bodies
 timing                       the running time of a frame
 triangle, strips, catching   the figures, in numbers and drawn

@@ -1,7 +1,7 @@
-"""What the paper asks, of whole bodies: key poses needed, and errors.
+"""The paper's study on whole bodies: the key poses each mode needs, and its errors.
 
-A body is measured as a rig has it: every joint is interpolated in its parent's space. Errors are in metres, measured in
-the space of the roots.
+Each joint is interpolated in its parent's space, as in a rig. Errors are in metres, measured in the space of the
+roots.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from rigid_motion_batch.recordings.clips import Clip
 from .table import SCREW, has_samples_for, means, shares_of
 
 MODES = (REFERENCE, BLENDERS, SCREW, "pga_lerp", "motor_spline")
-ERROR_RATES = (5, 10)  # key poses a second at which errors are measured
+ERROR_RATES = (5, 10)  # key poses per second at which errors are measured
 
 SEARCHED_S = 10.0
-"""Seconds of a whole body, from its first sample on, for which key poses are searched: every try reduces keys anew."""
+"""Seconds of a whole body, from its first sample, used to search for key poses: every try reduces keys anew."""
 
 EXTENSIONS = (".bvh", ".fbx", ".glb", ".gltf", ".blend")  # of files that may hold a body
 
 
-# -- what there is to measure ------------------------------------------------------------------------------------------
+# -- input -------------------------------------------------------------------------------------------------------------
 
 
 def read_body(path: Path) -> Clip:
@@ -44,7 +44,7 @@ def read_body(path: Path) -> Clip:
     Raises
     ------
     TrajectoryError
-        Where there is none, or nothing of it moves.
+        If there is none, or none of its joints moves.
     """
     whole = [clip for clip in read_clips([str(path)])[0] if clip.rest_body is not None]
     if not whole:
@@ -54,13 +54,13 @@ def read_body(path: Path) -> Clip:
     return replace(whole[0], name=path.stem)
 
 
-# -- what comes of it --------------------------------------------------------------------------------------------------
+# -- results -----------------------------------------------------------------------------------------------------------
 
 
 def needed_of(clip: Clip) -> dict[str, dict[str, list[float]]]:
-    """Return the key poses that every mode needs, by mode and decimation: `shares_of` the reference's at `RATES`.
+    """Return the key poses that each mode needs, by mode and decimation: `shares_of` the reference's at `RATES`.
 
-    Blender's curves have evenly spaced ones alone.
+    Blender's curves are only tried with evenly spaced key poses.
     """
     radii = np.full(len(clip.rest_body.joints), JOINT_RADIUS_M)
     searched = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SEARCHED_S, side="right")) - 1)
@@ -70,7 +70,7 @@ def needed_of(clip: Clip) -> dict[str, dict[str, list[float]]]:
 
 
 class _Evenly(Ways):
-    """The way to have evenly spaced keys: of curves that all keys influence, every try takes minutes."""
+    """Evenly spaced keys only: for Blender's curves, which depend on all keys, every other try takes minutes."""
 
     def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
         del mode, target, evenly
@@ -78,9 +78,9 @@ class _Evenly(Ways):
 
 
 def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:
-    """Return by mode and rate, of `ERROR_RATES`, the RMS shell error of the body and its RMS velocity error.
+    """Return the body's RMS shell error and RMS velocity error, by mode and rate of `ERROR_RATES`.
 
-    NaN where the clip has no two samples to a key pose.
+    NaN if the clip has fewer than two samples per key pose.
     """
     result = {mode: dict.fromkeys(ERROR_RATES, (np.nan, np.nan)) for mode in MODES}
     for rate in ERROR_RATES:
@@ -91,7 +91,7 @@ def errors_of(clip: Clip) -> dict[str, dict[int, tuple[float, float]]]:
 
 
 def measure(clips: Sequence[Clip]) -> dict[str, Any]:
-    """Return all of it in numbers, with geometric means over bodies."""
+    """Return all results, with geometric means over bodies."""
     needed, rates = [needed_of(clip) for clip in clips], [int(rate) for rate in RATES]
     errors = {clip.name: errors_of(clip) for clip in clips}
 

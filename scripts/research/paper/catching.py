@@ -1,10 +1,10 @@
-"""The figure "catching a tool": a drill thrown by one person and caught by another, as a third one's headset shows it.
+"""The figure "catching a tool": a drill thrown by one person and caught by another, as shown by a third one's headset.
 
-The two hands and the tool are separate streams, at the same rate over the same link, and a mode fills in what
-arrives. A hand that holds the tool is one rigid body with it, so nothing between them should move. The hand is tracked
-at the wrist, a hand's length from where it holds. All modes are shown at the same moments of the motion; one that looks
-ahead gets there later. Beside the modes is what holds make of it: the tool in the space of the hand that has it, with
-an update as it is let go and one as it is caught. Seconds, metres.
+The two hands and the tool are separate streams, with the same rate and link; a mode interpolates what arrives. A hand
+and the tool it holds are one rigid body, so nothing between them should move. The hand is tracked at the wrist, a
+hand's length from the grip. All modes are shown at the same moments of the motion; a mode that looks ahead gets there
+later. The modes are compared with holding: the tool in the space of the hand that has it, with an update at release
+and one at the catch. Seconds, metres.
 """
 
 from __future__ import annotations
@@ -31,35 +31,35 @@ from rigid_motion_batch.scenes.scene import set_up_render
 from rigid_motion_batch.scenes.settings import SceneSettings
 
 HELD, MOVED = "held", "lerp_slerp"
-"""The tool in the space of the hand, and the mode that fills in hands and flight then."""
+"""The tool in the space of the hand, and the mode that then interpolates the hands and the flight."""
 
 ENGINES = ("lerp_slerp", "dq_sclerp", "pga_lerp", "motor_spline", HELD)
 PASS_S = 1 / 24
-"""For how long the tool passes from its flight to the hand that catches it, where it is held."""
+"""Seconds of blending from the flight to the catching hand, for the held tool."""
 
 UPDATES_PER_S = (5, 10, 15, 20)  # updates a second
-PHASE_COUNT = 6  # senders of the same rate that begin one after the other within an interval
+PHASE_COUNT = 6  # senders of the same rate, started at different times within an interval
 
-GRIP_M = np.array((0.0, -HAND_M, 0.0))  # where the wrist is, in the axes of the tool that the hand holds
+GRIP_M = np.array((0.0, -HAND_M, 0.0))  # the wrist, in the axes of the tool that the hand holds
 _, RELEASE, CATCH, _ = THROW_THERE.moments
 WITHDRAWN_S = 0.45  # seconds that the hands take from the throw to rest, and from rest to the catch
-READY_OFFSET_M = np.array((-0.08, -0.04, -0.04))  # from the catch to where the hand waits for it
-END_S = 2.55  # what comes after is another throw
+READY_OFFSET_M = np.array((-0.08, -0.04, -0.04))  # from the catch to the place where the hand waits for it
+END_S = 2.55  # later samples belong to another throw
 
-SHOWN_S = (0.32, 1.90)  # the moments that are shown, from the first to the last
+SHOWN_S = (0.32, 1.90)  # the first and last moments shown
 FILM_FPS, SLOW_MOTION_FACTOR = 30, 3.0  # of the film
-FILM_SIZE = (720, 1220)  # pixels: as the picture, but smaller
-HEIGHT_PX, ROW_PX = 1700, 299  # pixels: of the picture, and of what one mode shows
-HEIGHT_M = HEIGHT_PX / 250  # that the picture's height spans
+FILM_SIZE = (720, 1220)  # pixels: like the picture, but smaller
+HEIGHT_PX, ROW_PX = 1700, 299  # pixels: of the picture, and of each mode's row
+HEIGHT_M = HEIGHT_PX / 250  # metres spanned by the picture's height
 TRAIL_SECONDS = 0.7  # of the motion
 
 YAW_RAD = np.radians(52.0)
-"""By which the scene is turned for the eye, so that neither the throw nor the tool is seen end on."""
+"""The rotation of the scene towards the viewer, so that neither the throw nor the tool is seen end on."""
 
-MIDDLE_M = np.array((0.0, 0.40, 1.14))  # of the throw
+MIDDLE_M = np.array((0.0, 0.40, 1.14))  # the centre of the throw
 LABELS = {HELD: "Straight, in the space of the hand"}
 COLOURS = {mode: colour_of(mode) for mode in ENGINES} | {HELD: "#009E73"}
-HANDS = {"thrower": "#3A6EA5", "catcher": "#7A5C99"}  # with the colours of their controllers
+HANDS = {"thrower": "#3A6EA5", "catcher": "#7A5C99"}  # the hands, and the colours of their controllers
 
 Bodies = Mapping[str, Poses]
 """The poses of the tool and of both hands, (n,) each."""
@@ -69,7 +69,7 @@ Bodies = Mapping[str, Poses]
 
 
 def bodies(clip: Clip) -> tuple[np.ndarray, Bodies]:
-    """Return the times of the first throw of a clip, shape (n,), and the poses then."""
+    """Return the times of a clip's first throw, shape (n,), and the poses at these times."""
     part = clip.times <= END_S
     times, tool = clip.times[part], clip.poses[part]
     held = Poses(tool.positions + rotate(tool.quaternions, GRIP_M), tool.quaternions)
@@ -85,17 +85,17 @@ def bodies(clip: Clip) -> tuple[np.ndarray, Bodies]:
 
 
 def _recorded(times: np.ndarray) -> tuple[float, float]:
-    """Return the last sample before the tool is let go, and the first after it is caught."""
+    """Return the times of the last sample before the tool is released, and of the first after it is caught."""
     return float(times[times <= RELEASE][-1]), float(times[times >= CATCH][0])
 
 
 def ticks_of(times: np.ndarray, rate: float) -> np.ndarray:
-    """Return the moments at which a sender sends, from the first sample on."""
+    """Return the sending times of a sender, from the first sample on."""
     return times[0] + np.arange(int((times[-1] - times[0]) * rate + 1e-6) + 1) / rate
 
 
 def shown_of(times: np.ndarray, poses: Bodies, rate: float, mode: str, moments: np.ndarray) -> Bodies:
-    """Return what a receiver shows of every body at these moments of the motion: its updates, interpolated."""
+    """Return the poses of every body that a receiver shows at these moments: its updates, interpolated."""
     ticks = ticks_of(times, rate)
     sent = {body: interpolate(times, of_body, ticks, "dq_sclerp") for body, of_body in poses.items()}
     used = MOVED if mode == HELD else mode
@@ -104,7 +104,7 @@ def shown_of(times: np.ndarray, poses: Bodies, rate: float, mode: str, moments: 
 
 
 def _held(times: np.ndarray, poses: Bodies, ticks: np.ndarray, shown: Bodies, moments: np.ndarray) -> Poses:
-    """Return the tool in the space of what holds it at these moments: a hand, nothing, the other hand."""
+    """Return the tool, moved by its current holder at these moments: a hand, none, the other hand."""
     let_go, caught = _recorded(times)
     flying = np.array((let_go, *ticks[(ticks > let_go) & (ticks < caught)], caught))
     updates = interpolate(times, poses["tool"], flying, "dq_sclerp")
@@ -112,23 +112,23 @@ def _held(times: np.ndarray, poses: Bodies, ticks: np.ndarray, shown: Bodies, mo
     thrown, taken = (_tool_in(shown[hand]) for hand in HANDS)
     before = joined((thrown[moments <= let_go], flown[moments > let_go]))
     share = np.clip((moments - caught) / PASS_S + 1.0, 0.0, 1.0)
-    return _straight(before, taken, share * share * (3.0 - 2.0 * share))
+    return _blended(before, taken, share * share * (3.0 - 2.0 * share))
 
 
-def _straight(first: Poses, second: Poses, shares: np.ndarray) -> Poses:
-    """Return poses (n,) that are by these shares (n,) from some to others: LERP and SLERP."""
+def _blended(first: Poses, second: Poses, shares: np.ndarray) -> Poses:
+    """Return poses (n,) between two motions, at these fractions (n,): LERP and SLERP."""
     turns = shares[:, None] * turns_between(first.quaternions, second.quaternions)
     positions = first.positions + shares[:, None] * (second.positions - first.positions)
     return Poses(positions, turned(first.quaternions, turns))
 
 
 def _tool_in(hand: Poses) -> Poses:
-    """Return where a hand holds the tool, shape (n,)."""
+    """Return the poses of the tool as held by a hand, shape (n,)."""
     return Poses(hand.positions - rotate(hand.quaternions, GRIP_M), hand.quaternions)
 
 
 def figures(clip: Clip) -> dict[str, dict[int, dict[str, float]]]:
-    """Return all modes at all rates."""
+    """Return the figures of all modes at all rates."""
     times, poses = bodies(clip)
     return {mode: {rate: view(times, poses, rate, mode) for rate in UPDATES_PER_S} for mode in ENGINES}
 
@@ -136,14 +136,14 @@ def figures(clip: Clip) -> dict[str, dict[int, dict[str, float]]]:
 def view(times: np.ndarray, poses: Bodies, rate: int, mode: str) -> dict[str, float]:
     """Return the figure in numbers, for one mode at one rate, in metres.
 
-    "error" is the RMS shell error of the tool, "slip" the most that it moves in the hand that holds it, between updates
-    at all of which it is held; "gap" is between the tool and where the catching hand would hold it when it is caught,
-    as the figure shows it, and "mean_gap" on average over senders that begin one after the other, as are the others.
+    "error" is the tool's RMS shell error; "slip" the most that it moves in the hand that holds it, between updates at
+    all of which it is held; "gap" the distance between the tool and where the catching hand would hold it at the catch,
+    as in the figure. "mean_gap", "error" and "slip" cover senders started at different times within an interval.
     """
     result = []
     for phase in range(PHASE_COUNT):
         late = times >= times[0] + phase / (PHASE_COUNT * rate)
-        result.append(_looked_at(times[late], {body: of_body[late] for body, of_body in poses.items()}, rate, mode))
+        result.append(_one_sender(times[late], {body: of_body[late] for body, of_body in poses.items()}, rate, mode))
     errors, slips, gaps = zip(*result, strict=True)
     return {
         "error": rms(np.concatenate(errors)),
@@ -153,8 +153,8 @@ def view(times: np.ndarray, poses: Bodies, rate: int, mode: str) -> dict[str, fl
     }
 
 
-def _looked_at(times: np.ndarray, poses: Bodies, rate: int, mode: str) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return for a sender that begins with the first of these times: shell errors, slips while held, and the gap."""
+def _one_sender(times: np.ndarray, poses: Bodies, rate: int, mode: str) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return shell errors, slips while held, and the gap, for a sender that starts with the first of these times."""
     let_go, caught = _recorded(times)
     moments = times[(times >= SHOWN_S[0]) & (times <= SHOWN_S[1])]
     shown = shown_of(times, poses, rate, mode, moments)
@@ -165,14 +165,14 @@ def _looked_at(times: np.ndarray, poses: Bodies, rate: int, mode: str) -> tuple[
     first = ticks[np.maximum(segment - seen.behind, 0)]
     last = ticks[np.minimum(segment + 1 + seen.ahead, len(ticks) - 1)]
     holding = zip(HANDS, (last <= let_go, first >= caught), strict=True)
-    slips = [_apart(shown["tool"], shown[hand])[held] for hand, held in holding]
+    slips = [_grip_distances(shown["tool"], shown[hand])[held] for hand, held in holding]
     then = shown_of(times, poses, rate, mode, np.array((caught,)))
-    gap = float(_apart(then["tool"], then["catcher"])[0])
+    gap = float(_grip_distances(then["tool"], then["catcher"])[0])
     return measure(moments, shown["tool"], truth).shell, np.concatenate(slips), gap
 
 
-def _apart(tool: Poses, hand: Poses) -> np.ndarray:
-    """Return how far the tool's origin is from where the hand holds it, shape (n,)."""
+def _grip_distances(tool: Poses, hand: Poses) -> np.ndarray:
+    """Return the distance of the tool's origin from where the hand holds it, shape (n,)."""
     return np.linalg.norm(_tool_in(hand).positions - tool.positions, axis=-1)
 
 
@@ -180,14 +180,14 @@ def _apart(tool: Poses, hand: Poses) -> np.ndarray:
 
 
 def frame_moments(caught: float) -> np.ndarray:
-    """Return the moments that the frames of the film show, that of the catch among them."""
+    """Return the moments shown by the frames of the film, including that of the catch."""
     rate = FILM_FPS * SLOW_MOTION_FACTOR
     before, after = (np.floor(abs(end - caught) * rate) for end in SHOWN_S)
     return caught + np.arange(-before, after + 1.0) / rate
 
 
 def pictures(clip: Clip) -> tuple[np.ndarray, Callable[[int], Axes]]:
-    """Return the moments of the film, shape (n,), and what draws one of its frames."""
+    """Return the moments of the film, shape (n,), and a function that draws one of its frames."""
     times, poses = bodies(clip)
     result = figures(clip)
     moments = frame_moments(_recorded(times)[1])
@@ -263,6 +263,6 @@ def write_film(clip: Clip, path: Path) -> None:
 
 
 def _turned(poses: Poses) -> Poses:
-    """Return poses turned for the eye, around the middle of the throw."""
+    """Return poses rotated towards the viewer, around the centre of the throw."""
     turn = layout.yaw_quaternion(YAW_RAD)
     return Poses(rotate(turn, poses.positions - MIDDLE_M), multiply(turn, poses.quaternions))

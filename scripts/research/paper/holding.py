@@ -1,18 +1,18 @@
-"""A tool that is held in one recorded hand and goes to the other: handed over, or thrown and caught.
+"""A tool held by one recorded hand and passed to the other: handed over, or thrown and caught.
 
-Both hands are recorded; the tool is made up. It is one rigid body with the hand that holds it, flies freely when it
-is thrown, with the hand's velocities, and is one rigid body with the other hand from then on. So that the other hand is
-there at that moment, its recording is moved as a whole, without a turn.
+Both hands are recorded; the tool is simulated. The tool is rigidly attached to the hand that holds it, flies freely
+with the hand's velocities after a throw, and is then rigidly attached to the other hand. The other hand's recording is
+translated as a whole, without rotation, to be at the right place at that moment.
 
-Four ways to send it, at the same updates a second of both hands and the tool:
+Four ways to send the tool and both hands, at the same updates per second:
 
-separate  three streams in the world, as of three devices: their updates are not of the same moments
-together  one stream in the world: all updates are of the same moments
-marked    the same, and all bodies are sent once more at the moments at which a hand lets the tool go and has it
-held      the tool in the space of the hand that holds it; in the air it is sent in the world, and once more
-          at those moments
+separate  three streams in the world, as from three devices: their updates are at different moments
+together  one stream in the world: all updates are at the same moments
+marked    the same, with extra updates of all bodies when one hand releases the tool and when the other gets it
+held      the tool in the space of the hand that holds it; in the air it is sent in the world, with extra
+          updates at these moments
 
-A tool is as far off as its end is, `REACH_M` from the hand. Seconds, metres.
+The tool's error is that of its end, `REACH_M` from the hand. Seconds, metres.
 """
 
 from __future__ import annotations
@@ -32,47 +32,47 @@ from rigid_motion_batch.recordings.clips import Clip
 
 REACH_M = 0.3
 GRIP_M, TOOL_END_M = np.array((0.0, 0.0, 0.5 * REACH_M)), np.array((0.0, 0.0, 0.5 * REACH_M))
-"""The tool's middle in the space of the hand that has it first, and its end in the space of the tool."""
+"""The tool's centre in the space of the hand that has it first, and its end in the space of the tool."""
 
 UPDATES_PER_S = (30, 20, 15, 12)
 MODES = ("lerp_slerp", "dq_sclerp", "motor_spline")
 WAYS = ("separate", "together", "marked", "held")
 
 CHANGE_INTERVAL_S, SENT_AROUND_S = 0.97, 1.2
-"""From one change of hands to the next that is tried, and what is sent before and after it."""
+"""Seconds between the simulated changes of hands, and the duration sent before and after each."""
 
 FLIGHT_S, GRAVITY_M_PER_S2 = 0.5, np.array((0.0, -9.81, 0.0))
 KINDS = {"handed over": 0.0, "caught": -FLIGHT_S}
-"""Both kinds of changes of hands, and when the giver lets go."""
+"""Both kinds of changes of hands, with the time at which the giver releases the tool."""
 
 LATE = {"giver": 0.0, "tool": 1 / 3, "taker": 2 / 3}
-"""By what share of the interval updates of separate streams are late."""
+"""The delay of each separate stream, as a fraction of the update interval."""
 
 SHOWN_PER_S = 90.0
-"""Moments a second that are looked at."""
+"""Evaluated moments per second."""
 
 PHASE_STEP_RATIO = 0.618
-"""Of the interval, by which one sender is later than that of the change before."""
+"""The phase of updates shifts by this fraction of the interval from one change to the next."""
 
 VELOCITY_STEP_S = 0.02
-"""Over which the velocities are measured with which a tool is thrown."""
+"""The time span, in seconds, over which the velocities of a throw are measured."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """A change of hands at the time 0: two recordings, and the tool that is made up."""
+    """A change of hands at time 0: two recordings, and the simulated tool."""
 
     times: np.ndarray
     giver: Poses
     taker: Poses
     let_go: float
-    """When the giver has it no more: before 0 where it is thrown."""
+    """The time at which the giver releases the tool: before 0 if it is thrown."""
 
     phase: float
-    """By what share of the interval all updates are late."""
+    """The delay of all updates, as a fraction of the interval."""
 
     def poses(self, body: str, times: np.ndarray) -> Poses:
-        """Return where a body is, shape (n,)."""
+        """Return the poses of a body, shape (n,)."""
         if body != "tool":
             return interpolate(self.times, getattr(self, body), times, "dq_sclerp")
         flown = self.flown(times)
@@ -80,7 +80,7 @@ class Change:
         return joined((flown[times < 0.0], taken[times >= 0.0]))
 
     def flown(self, times: np.ndarray) -> Poses:
-        """Return where the tool is before the taker has it."""
+        """Return the poses of the tool before the taker has it."""
         held = self.given(self.poses("giver", np.minimum(times, self.let_go)))
         if self.let_go == 0.0:
             return held
@@ -95,21 +95,21 @@ class Change:
 
     @staticmethod
     def given(hand: Poses) -> Poses:
-        """Return where the tool is in the giver's hand, shape (n,)."""
+        """Return the poses of the tool in the giver's hand, shape (n,)."""
         return Poses(hand.positions + rotate(hand.quaternions, GRIP_M), hand.quaternions)
 
     @cached_property
     def grip(self) -> Poses:
-        """The tool in the taker's hand, shape ()."""
+        """The pose of the tool in the taker's hand, shape ()."""
         return placed(inverse(self.poses("taker", np.zeros(1))), self.flown(np.zeros(1)))[0]
 
 
 def measure(clips: Iterable[Clip]) -> dict[str, Any]:
-    """Return what becomes of the tool between recorded hands: by kind of change, mode, way and rate, in metres.
+    """Return errors of the tool between recorded hands: by kind of change, mode, way and rate, in metres.
 
-    "held" is how far it slips at most in the hand while it is held, away from changes of hands: the mean of that over
-    all changes. "change" is the same near the change, where it is off the hand that has it. "jump" is how far it jumps
-    there, and "error" the RMS of how far it is off in the world.
+    "held" is the most that the tool slips in the hand while held, away from changes of hands, averaged over all
+    changes. "change" is the same near the change, relative to the hand that has the tool. "jump" is its jump at the
+    change, and "error" the RMS of its error in the world.
     """
     pairs = list(_pairs(clips))
     result: dict[str, Any] = {"hands": sorted(give.name for give, _ in pairs)}
@@ -117,14 +117,14 @@ def measure(clips: Iterable[Clip]) -> dict[str, Any]:
         changes = [change for pair in pairs for change in _changes(*pair, let_go)]
         result["changes"] = len(changes)
         result[kind] = {
-            mode: {way: {rate: _looked_at(changes, mode, way, rate) for rate in UPDATES_PER_S} for way in WAYS}
+            mode: {way: {rate: _figures_of(changes, mode, way, rate) for rate in UPDATES_PER_S} for way in WAYS}
             for mode in MODES
         }
     return result
 
 
 def _pairs(clips: Iterable[Clip]) -> Iterator[tuple[Clip, Clip]]:
-    """Yield the two hands of each recording, either of which has the tool first."""
+    """Yield the two hands of each recording, in both orders: the first one has the tool first."""
     hands: dict[str, list[Clip]] = {}
     for clip in clips:
         stem, _, side = clip.name.rpartition("_")
@@ -144,7 +144,7 @@ def _changes(giver: Clip, taker: Clip, let_go: float) -> Iterator[Change]:
         yield replace(change, taker=Poses(take.positions + off, take.quaternions))
 
 
-def _looked_at(changes: list[Change], mode: str, way: str, rate: float) -> dict[str, float]:
+def _figures_of(changes: list[Change], mode: str, way: str, rate: float) -> dict[str, float]:
     """Return the figures of all changes, for one mode, way and rate."""
     margin, rows, errors = 2.5 / rate, [], []
     moments = np.arange(-SENT_AROUND_S + margin, SENT_AROUND_S - margin, 1.0 / SHOWN_PER_S)
@@ -162,7 +162,7 @@ def _looked_at(changes: list[Change], mode: str, way: str, rate: float) -> dict[
 
 
 def _shown(change: Change, moments: np.ndarray, mode: str, way: str, rate: float) -> list[Poses]:
-    """Return what a receiver shows of the bodies at moments (n,)."""
+    """Return the poses of giver, tool and taker that a receiver shows at moments (n,)."""
     ticks = -SENT_AROUND_S + (change.phase + np.arange(int(2.0 * SENT_AROUND_S * rate) - 1)) / rate
     if way == "marked":
         ticks = np.union1d(ticks, (change.let_go, 0.0))

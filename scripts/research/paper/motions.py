@@ -1,6 +1,6 @@
-"""The clips that the table is made from: those in assets/, and other recordings. Not those of a body at rest.
+"""Clips for the paper's table: those in assets/, and other recordings, except those of a body at rest.
 
-Times are seconds, lengths metres. Errors do not depend on the axes, so recordings are taken as they are.
+Times are in seconds, lengths in metres. Errors do not depend on the axes, so recordings are used as they are.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 
 MAX_REST_RMS = 0.01
-"""A body is at rest that stays, by the root mean square, so near to its mean pose: less than a hand trembles."""
+"""A body is at rest if its RMS distance from its mean pose is below this, in metres: less than a hand trembles."""
 
 Read = TypeVar("Read")
 
@@ -32,7 +32,7 @@ def assets() -> dict[str, Clip]:
 
 
 def read_all(paths: Iterable[Path], read: Callable[[Path], Read]) -> tuple[list[Read], dict[str, str]]:
-    """Return what could be read, and of the other files why not."""
+    """Return the results of reading all files, and for each file that cannot be read, the reason."""
     result, left_out = [], {}
     for path in paths:
         try:
@@ -50,7 +50,7 @@ def read_motion(path: Path) -> Clip:
     Raises
     ------
     TrajectoryError
-        Where it cannot be read, or is at rest.
+        If it cannot be read, or is at rest.
     """
     clip = replace(read_clips([str(path)], "blender")[0][0], name=path.stem)
     if clip.rest_body:
@@ -62,7 +62,7 @@ def read_motion(path: Path) -> Clip:
 
 
 def spread(poses: Poses, radius: float = 0.1) -> float:
-    """Return how far the points of the shell are from their means, the farthest, by the root mean square."""
+    """Return the largest RMS distance of any shell point from its mean."""
     points = poses.positions + rotate(poses.quaternions, radius * np.eye(3)[:, None])
     offsets = points - points.mean(axis=1, keepdims=True)
     return float(np.sqrt(np.square(offsets).sum(axis=-1).mean(axis=1).max()))

@@ -1,7 +1,7 @@
-"""Reproduce the paper: its figures, its table and its example, from this program, with the paper's numbers beside them.
+"""Reproduce the paper: its figures, its table and its example, next to the paper's own numbers.
 
-Kamarianakis, Lydatakis, Papagiannakis, "Never 'Drop the Ball' in the Operating Room", 2021. The table is made from the
-clips in assets/, and from those in a folder. The part on whole bodies takes those that --bodies names.
+Kamarianakis, Lydatakis, Papagiannakis, "Never 'Drop the Ball' in the Operating Room", 2021. The table uses the clips in
+assets/ and in the folder of --recordings. The part on whole bodies uses the files of --bodies.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def main(arguments: list[str]) -> int:
 
 
 def clips_of(options: argparse.Namespace) -> tuple[dict[str, list[Clip]], dict[str, str]]:
-    """Return the clips of each set, and of the recordings that do not count why not."""
+    """Return the clips of each set, and for each rejected recording, the reason."""
     files = files_in([options.recordings]) if options.recordings else []
     recordings, left_out = motions.read_all(files, motions.read_motion)
     sets = {"recordings": recordings, "assets": list(motions.assets().values())}
@@ -80,7 +80,7 @@ def clips_of(options: argparse.Namespace) -> tuple[dict[str, list[Clip]], dict[s
 
 
 def tabulate(options: argparse.Namespace) -> dict[str, Any]:
-    """Return Table 1, and why a screw wins here and loses there."""
+    """Return Table 1, and why a screw wins on some clips and loses on others."""
     sets, left_out = clips_of(options)
     clips = [clip for of_set in sets.values() for clip in of_set]
     needed = {clip.name: table.needed(clip) for clip in clips}
@@ -107,17 +107,17 @@ def tabulate(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def send(options: argparse.Namespace) -> dict[str, Any]:
-    """Return streams that are sent when needed, and bytes."""
+    """Return the costs of streams that send only when needed."""
     return sending.costs(next(iter(clips_of(options)[0].values())))
 
 
 def hold(options: argparse.Namespace) -> dict[str, Any]:
-    """Return a tool that recorded hands hold and pass on, in the world and in the space of the hand."""
+    """Return the errors of a tool passed between recorded hands, in the world and in the space of the hand."""
     return holding.measure(next(iter(clips_of(options)[0].values())))
 
 
 def measure_bodies(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the same of whole bodies."""
+    """Return the results of the study on whole bodies."""
     clips, left_out = motions.read_all(files_in(options.bodies, bodies.EXTENSIONS), bodies.read_body)
     return bodies.measure(clips) | {"left_out": left_out} if clips else {}
 

@@ -1,9 +1,9 @@
-"""What a live stream costs that is sent when needed, beside even streams of the state of the art that are as good.
+"""Cost of streams that send only when needed, compared with equally accurate streams at even rates.
 
-The even streams are those of the paper, `lerp_slerp` at its rates; the other is the codec of `rigid_motion.streams`,
-over loopback to another process (`streaming.measuring`). It has a tolerance, which is searched for: the one at which
-the RMS shell error is that of the even stream. Bytes are a second's, with those of UDP and IPv4 around each datagram,
-without the description that a receiver gets when it joins. The first `SENT_S` are sent. Seconds, metres.
+The even streams are the paper's state of the art, `lerp_slerp` at its rates; the other is the codec of
+`rigid_motion.streams`, over loopback to another process (`streaming.measuring`). The codec's tolerance is searched for:
+its RMS shell error must equal that of the even stream. Bytes are per second, with the UDP and IPv4 headers of each
+datagram, without the description that a receiver gets when it joins. Only the first `SENT_S` are sent. Seconds, metres.
 """
 
 from __future__ import annotations
@@ -23,18 +23,19 @@ from rigid_motion_batch.streaming.sending import body_of, samples_of
 
 from .table import SHELL_RADIUS_M, UPDATES, has_samples_for
 
-DELAYS_S = (0.1, 0.2)  # by which the picture is behind
+DELAYS_S = (0.1, 0.2)  # the delay of the shown motion
 SENT_S = 10.0
 
 TOLERANCE_RANGE = 1.0, 5.0, 4
-"""From this multiple of the smallest requested error to this multiple of the largest, so many."""
+"""Tried tolerances: from this multiple of the smallest requested error, to this multiple of the largest, and the
+number of tolerances."""
 
 PACKINGS = {"7 doubles": 56, "7 singles": 28}
-"""Bytes of a pose."""
+"""Bytes per pose."""
 
 
 def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, float]:
-    """Send a clip over loopback, and return datagrams and bytes a second, and the RMS shell error of what was shown."""
+    """Send a clip over loopback, and return datagrams and bytes per second, and the RMS shell error of the shown motion."""
     times, poses = samples_of(clip)
     cost, _ = measure([body_of(clip, poses, SHELL_RADIUS_M)], times, poses, tolerance, delay)
     size = cost["bytes_a_second_with_headers"]
@@ -42,7 +43,7 @@ def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, floa
 
 
 def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:
-    """Return by delay and rate of the state of the art the datagrams and the bytes a second that are as good."""
+    """Return datagrams and bytes per second, by delay and by the rate of the equally accurate even stream."""
     clip = part_of(clip, 0, int(np.searchsorted(clip.times, clip.times[0] + SENT_S, side="right")) - 1)
     ways = Ways(clip, SHELL_RADIUS_M)
     requested = {
@@ -60,16 +61,16 @@ def costs_of(clip: Clip) -> dict[float, dict[int, tuple[float, float]]]:
 
 
 def lowest(cost: np.ndarray, errors: np.ndarray, requested: float) -> float:
-    """Return the cost at which a curve (n,) is off by so much; infinite where it never is so good.
+    """Return the cost at which a curve (n,) reaches the requested error; infinite if it never does.
 
-    Between two points, error and cost are taken to be lines on a double logarithmic scale.
+    Between two points, the curve is a straight line on a double logarithmic scale.
     """
     order = np.argsort(errors)
     return float(np.exp(np.interp(np.log(requested), np.log(errors[order]), np.log(cost[order]), left=np.inf)))
 
 
 def costs(clips: list[Clip]) -> dict[str, Any]:
-    """Return the geometric means over clips, and the bytes of even streams, for each of the paper's rates."""
+    """Return geometric means over clips, and the bytes of even streams, for each of the paper's rates."""
     of_clips = {clip.name: costs_of(clip) for clip in clips}
     even = {name: [rate * (size + STAMP_BYTES + HEADER_BYTES) for rate in UPDATES] for name, size in PACKINGS.items()}
     needed = {}

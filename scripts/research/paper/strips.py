@@ -1,7 +1,7 @@
-"""The figure "interpolation algorithms": the drill at the same moments under the paper's three engines, in strips.
+"""The figure "interpolation algorithms": the drill at the same moments with the paper's three engines, in strips.
 
-The tool turns about its tip, which rests where it is, as an instrument does in an opening; the receiver has the first
-pose and the last. Metres.
+The tool rotates about its resting tip, as an instrument in an incision; the receiver has only the first and the last
+pose. Metres.
 """
 
 from __future__ import annotations
@@ -16,32 +16,32 @@ from rigid_motion.motion.quaternions import angle_between, normalise, rotate
 from rigid_motion_batch.palette import DARK, colour_of
 
 ENGINES = {"lerp_slerp": "State of the art", "dq_sclerp": "Dual quaternions", "pga_lerp": "Multivectors"}
-"""Mode id to what the paper calls it."""
+"""Mode id to the paper's name."""
 
-SHOWN_MOMENTS = np.linspace(0.0, 1.0, 7)  # shares of the way
+SHOWN_MOMENTS = np.linspace(0.0, 1.0, 7)  # fractions of the motion
 
 SWING, AXIS = np.radians(110.0), normalise(np.array((0.0, 0.97, 0.24)))
-"""From the first pose to the last, about the line of sight and a little towards it."""
+"""The rotation from the first pose to the last: about the line of sight, tilted a little towards it."""
 
-UPRIGHT = normalise(np.array((1.0, -1.0, 0.0, 0.0)))  # the bit points down, and the grip away from who looks
-SIDEWAYS = normalise(np.array((1.0, 0.0, 0.0, 1.0)))  # the grip to the left
+UPRIGHT = normalise(np.array((1.0, -1.0, 0.0, 0.0)))  # the bit points down, and the grip away from the viewer
+SIDEWAYS = normalise(np.array((1.0, 0.0, 0.0, 1.0)))  # the grip points left
 
-HEIGHT_M = 1.56  # that the picture's height spans
+HEIGHT_M = 1.56  # metres spanned by the picture's height
 
 
 def shown() -> dict[str, Poses]:
-    """Return the poses at `SHOWN_MOMENTS` by mode; the tip is at the origin in the first and the last."""
+    """Return the poses at `SHOWN_MOMENTS` by mode; in the first and last pose the tip is at the origin."""
     keys = held_by(BIT_TIP_M, np.zeros((2, 3)), chain(about(AXIS, np.array((-0.5, 0.5)) * SWING), SIDEWAYS, UPRIGHT))
     return {mode: interpolate([0.0, 1.0], keys, SHOWN_MOMENTS, mode) for mode in ENGINES}
 
 
 def figures() -> dict[str, float]:
-    """Return how far the tip gets from where it rests, at most, by mode."""
+    """Return the tip's maximum distance from its resting point, by mode."""
     return {mode: np.linalg.norm(tips(poses), axis=1).max() for mode, poses in shown().items()}
 
 
 def tips(poses: Poses) -> np.ndarray:
-    """Return how far the tip has left the point that it rests on, shape (7, 3)."""
+    """Return the tip's displacement from its resting point, shape (7, 3)."""
     return poses.positions + rotate(poses.quaternions, BIT_TIP_M)
 
 

@@ -1,12 +1,12 @@
-"""The running time of a generated frame, engine against engine in one run.
+"""Running time per generated frame, with all engines compared in one run.
 
-Two readings of the same work, a hand for each of `USER_COUNT` users at `FRAMES_PER_S`:
+There are two measurements of the same work, a hand for each of `USER_COUNT` users at `FRAMES_PER_S`:
 
-- `Case.filled_in`: this program's own forms, which work a segment out once and then fill its frames;
-- `Case.in_the_algebra`: every frame encoded, interpolated and extracted anew as in the paper, all of them in one array.
+- `Case.filled_in`: this program's own forms, which compute a segment once and then evaluate its frames;
+- `Case.in_the_algebra`: as in the paper, each frame is encoded, interpolated and extracted anew, all in one array.
 
-All engines take turns in every round, and each is held against the state of the art of the same round; the interval is
-from a bootstrap over rounds. Seconds. Timings differ from run to run.
+All engines take turns in every round, and each is compared with the state of the art in the same round; the interval
+is from a bootstrap over rounds. Seconds. Timings differ from run to run.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ ROUND_COUNT = 25
 BOOTSTRAP_RESAMPLES, BOOTSTRAP_SEED, CONFIDENCE_RATIO = 2000, 2021, 0.95  # of the bootstrap
 
 WARM_UP_NUMBERS = 3 * 2**20
-"""Numbers in an array that is made and let go before a race: the C library of Linux then keeps what NumPy lets go."""
+"""Numbers in an array that is allocated and freed before a race: Linux's C library then keeps memory freed by NumPy."""
 
 
 def races(clip: Clip, needed: Mapping[str, Mapping[str, list[float]]], rounds: int = ROUND_COUNT) -> dict[str, Any]:
@@ -43,14 +43,14 @@ def races(clip: Clip, needed: Mapping[str, Mapping[str, list[float]]], rounds: i
     ----------
     clip : Clip
     needed : mapping
-        By mode what it needs to be as good as the state of the art: "updates" at each of the paper's rates.
+        By mode the updates needed to be as good as the state of the art: "updates" at each of the paper's rates.
     rounds : int
 
     Returns
     -------
     dict
-        "equal" rates, "as good" ones and the "paper"'s: by mode and rate what `race` found. The same of the "algebra",
-        for which the rate makes no difference: it begins anew with every frame.
+        Results of `race` by mode and rate, for "equal" rates, "as good" ones and the "paper"'s. The same for the
+        "algebra", for which the rate makes no difference: it starts anew with every frame.
     """
     exact = [mode for mode in MODES if not MODES[mode].is_smooth]
     result: dict[str, Any] = {}
@@ -70,12 +70,12 @@ def races(clip: Clip, needed: Mapping[str, Mapping[str, list[float]]], rounds: i
 def race(
     clip: Clip, engine: Callable[[Case, str], object], updates: Mapping[str, float], rounds: int
 ) -> dict[str, dict[str, float]]:
-    """Return of each mode, with its updates a second, the running time of a frame.
+    """Return the running time per frame of each mode, at its updates per second.
 
-    "relative" is the median over rounds of its ratio to that of the state of the art, "low" and "high" the bounds of
-    the confidence interval, "processor" the mean processor time of a frame in seconds.
+    "relative" is the median over rounds of its ratio to the state of the art's, "low" and "high" the bounds of the
+    confidence interval, "processor" the mean processor time per frame in seconds.
     """
-    # Otherwise whose arrays are handed back to the system, and fetched again page by page, is a matter of luck.
+    # Otherwise it is random whose arrays are returned to the system, and fetched again page by page.
     np.zeros(WARM_UP_NUMBERS).fill(1.0)
     cases = {mode: case_of(clip, rate) for mode, rate in updates.items()}
     runs = {mode: partial(engine, case, mode) for mode, case in cases.items()}
@@ -102,7 +102,7 @@ def compared(ratios: np.ndarray) -> dict[str, float]:
 
 
 def case_of(clip: Clip, rate: float) -> Case:
-    """Return the keys of a sender of that rate, alike for all users, and when frames are shown."""
+    """Return the keys of a sender of that rate, the same for all users, and the times of frames."""
     keys = decimate(clip.times, rate)
     times, poses = clip.times[keys], clip.poses[keys]
     quaternions = np.tile(align_signs(poses.quaternions), (USER_COUNT, 1, 1))

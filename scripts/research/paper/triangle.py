@@ -1,7 +1,7 @@
-"""The figure "LERP and SLERP of multivectors": a triangle between two extreme poses, filled in both ways.
+"""The figure "LERP and SLERP of multivectors": a triangle between two extreme poses, interpolated both ways.
 
-LERP of motors is `pga_lerp`, SLERP `pga_slerp`. Twenty in-betweens stand at even steps, and how far the one
-way leaves the other is counted. Metres; the triangle is about as large as one.
+LERP of motors is `pga_lerp`, SLERP `pga_slerp`. Twenty in-betweens are evenly spaced, and the maximum distance between
+the two ways is measured. Metres; the triangle is about one metre large.
 """
 
 from __future__ import annotations
@@ -18,30 +18,30 @@ from rigid_motion.motion.quaternions import angle_between, normalise, rotate
 IN_BETWEENS = 20
 
 ENGINES = {"lerp": "pga_lerp", "slerp": "pga_slerp"}
-"""What the paper calls them, and the modes that they are here."""
+"""The paper's names, and the corresponding modes."""
 
 COLOURS = {"lerp": "#FFD60A", "slerp": "#1FA63A"}  # of the paper's figure: yellow and green
 
 TRIANGLE_M = np.array(((-0.30, 0.0, -0.36), (0.40, 0.0, -0.26), (-0.08, 0.0, 0.46)))
 """The corners in the body's own axes, shape (3, 3)."""
 
-TURN, AXIS = np.radians(150.0), normalise(np.array((-0.45, 0.85, 0.20)))  # of the second pose: an extreme turn
+TURN, AXIS = np.radians(150.0), normalise(np.array((-0.45, 0.85, 0.20)))  # of the second pose: an extreme rotation
 
 EXTREMES = Poses(
     [(-1.85, 0.0, -0.60), (1.65, 0.0, -0.30)],
     normalise(np.array([(1.0, 0.0, 0.0, 0.0), (np.cos(TURN / 2), *np.sin(TURN / 2) * AXIS)])),
 )
 
-WAY_RATIOS = np.arange(1, IN_BETWEENS + 1) / (IN_BETWEENS + 1.0)  # of the way, without the ends
+WAY_RATIOS = np.arange(1, IN_BETWEENS + 1) / (IN_BETWEENS + 1.0)  # fractions of the way, without the ends
 
 
 def in_betweens(shares: np.ndarray = WAY_RATIOS) -> dict[str, Poses]:
-    """Return the poses of either kind at shares of the way (n,)."""
+    """Return the poses of both engines at fractions of the way (n,)."""
     return {name: interpolate([0.0, 1.0], EXTREMES, shares, mode) for name, mode in ENGINES.items()}
 
 
 def figures() -> dict[str, float]:
-    """Return the figure in numbers: degrees that LERP and SLERP turn at a step, and how far they are apart at most."""
+    """Return the figure in numbers: degrees per step of LERP and SLERP, and their maximum distance."""
     poses, first = in_betweens(), EXTREMES.quaternions[:1]
     steps = {
         name: np.diff(np.degrees(angle_between(first, np.concatenate((first, of_kind.quaternions)))))

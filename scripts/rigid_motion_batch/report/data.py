@@ -284,7 +284,7 @@ class Mesh:
     Raises
     ------
     ValueError
-            If it has more, or none.
+        If it has more, or none.
     """
 
     vertices: np.ndarray

@@ -70,32 +70,32 @@ def write_report(
     Parameters
     ----------
     path : Path
-            The page's file.
+        The page's file.
     clips : iterable of ClipResult
-            Iterated once, with only one clip in memory at a time.
+        Iterated once, with only one clip in memory at a time.
     settings : Settings
     films : mapping, optional
-            Empty if the run makes no films.
+        Empty if the run makes no films.
     folder : Path, optional
-            The page's final folder, which links are relative to. Defaults to that of `path`.
+        The page's final folder, which links are relative to. Defaults to that of `path`.
     mesh : Mesh, optional
-            The object that single rigid bodies move in the viewer; a drill by default.
+        The object that single rigid bodies move in the viewer; a drill by default.
     slips : sequence of PairSlips
-            Slips of clips that hold one another.
+        Slips of clips that hold one another.
     overview : str
-            The link to a page of more clips; empty if there is none.
+        The link to a page of more clips; empty if there is none.
     advance : callable
         Called once for every clip.
 
     Returns
     -------
     list of Path
-            The page, and the data files written next to it, in a folder named after it.
+        The page, and the data files written next to it, in a folder named after it.
 
     Raises
     ------
     ValueError
-            If there is nothing to report.
+        If there is nothing to report.
     """
     folder = folder or path.parent
     films, mesh = films or {}, mesh or drill()
@@ -149,14 +149,14 @@ def write_overview(
     Parameters
     ----------
     path, clips, settings, slips, advance
-            As in `write_report`; only the numbers of the clips are used.
+        As in `write_report`; only the numbers of the clips are used.
     pages : mapping
-            Clip name to the link from this page to the clip's page; None if there is none.
+        Clip name to the link from this page to the clip's page; None if there is none.
 
     Raises
     ------
     ValueError
-            If there is nothing to report.
+        If there is nothing to report.
     """
     gathering = Gathering(settings.reference)
     needed: list[KeysNeeded] = []

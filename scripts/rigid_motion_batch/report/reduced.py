@@ -183,11 +183,11 @@ def write_reduced(
     ----------
     path : Path
     done : sequence of pairs
-            The result of each input, as in `reduce.py --json`, and the data of its clips that can be played.
+        The result of each input, as in `reduce.py --json`, and the data of its clips that can be played.
     program : str
         Name and version.
     command : str
-            The command line, as typed.
+        The command line, as typed.
     """
     names = _names([fate["source"] for fate, _ in done])
     order = sorted(range(len(done)), key=lambda place: (not done[place][0]["written"], -_saved(done[place][0])))

@@ -78,11 +78,11 @@ class Rig:
     name : str
     rest : Rest
     names : iterable of str
-            The names of its bones; Blender may shorten and number them.
+        The names of its bones; Blender may shorten and number them.
     collection : bpy.types.Collection
-            The collection for the object: one in the shown scene.
+        The collection for the object: one in the shown scene.
     like : Rig, optional
-            A rig with the same rest pose, to share bones with.
+        A rig with the same rest pose, to share bones with.
     """
 
     def __init__(

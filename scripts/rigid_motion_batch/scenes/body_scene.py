@@ -57,9 +57,9 @@ def build_body_scene(
     ----------
     made : Reconstruction
     settings : SceneSettings
-            Subject and deviation are ignored: a body shows itself, unmagnified.
+        Subject and deviation are ignored: a body shows itself, unmagnified.
     findings : sequence of Finding
-            Further findings to show in the lanes.
+        Further findings to show in the lanes.
     """
     timeline = begin(made, settings)
     lanes_of = identical_modes(made) if settings.distinct else tuple((mode,) for mode in made.keys)

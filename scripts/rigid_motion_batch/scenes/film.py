@@ -30,18 +30,18 @@ def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int
     scene : bpy.types.Scene
         Set up for video, as `scene.build_scene` leaves it.
     path : Path
-            Ends in .mp4. An existing file is replaced once the new one is complete.
+        Ends in .mp4. An existing file is replaced once the new one is complete.
     progress : callable, optional
-            Called after every frame with the number of finished frames, and of all frames.
+        Called after every frame with the number of finished frames, and of all frames.
 
     Raises
     ------
     RuntimeError
-            If Blender cannot render.
+        If Blender cannot render.
     OSError
-            If the file cannot be moved into place.
+        If the file cannot be moved into place.
     KeyboardInterrupt
-            After Ctrl-C in a Blender program, which cancels rendering; the module keeps rendering.
+        After Ctrl-C in a Blender program, which cancels rendering; the module keeps rendering.
     """
     total = scene.frame_end - scene.frame_start + 1
     with written_beside(path) as beside, _counting(progress, total):
@@ -65,13 +65,13 @@ def render_piece(
     Parameters
     ----------
     blend : Path
-            Saved by `save_blend`.
+        Saved by `save_blend`.
     first, last : int
         Frames, both included.
     path : Path
-            Has the extension of `LOSSLESS`.
+        Has the extension of `LOSSLESS`.
     progress : callable, optional
-            As in `render_film`, and so are the errors raised.
+        As in `render_film`, and so are the errors raised.
     """
     scene = _open(blend)
     scene.frame_start, scene.frame_end = first, last
@@ -88,18 +88,18 @@ def join_pieces(
     Parameters
     ----------
     blend : Path
-            The scene of the pieces, which has the encoder settings.
+        The scene of the pieces, which has the encoder settings.
     pieces : sequence of Path
-            In order, without gaps.
+        In order, without gaps.
     path : Path
-            Ends in .mp4.
+        Ends in .mp4.
     progress : callable, optional
-            As in `render_film`, and so are the errors raised.
+        As in `render_film`, and so are the errors raised.
 
     Raises
     ------
     RuntimeError
-            Also if the pieces have more or fewer frames than the scene.
+        Also if the pieces have more or fewer frames than the scene.
     """
     scene = _open(blend)
     strips = scene.sequence_editor_create().strips

@@ -172,7 +172,7 @@ def arrange(lanes: int, extent: np.ndarray, aspect: float, *, named: bool = Fals
     ----------
     lanes : int
     extent : array, shape (2,)
-            The width and height in metres that the motion needs in every cell. Positive.
+        The width and height in metres that the motion needs in every cell. Positive.
     aspect : float
         The picture's width over its height.
     named : bool

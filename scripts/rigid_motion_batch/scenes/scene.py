@@ -63,12 +63,12 @@ def build_scene(
     reconstruction : Reconstruction
     settings : SceneSettings
     findings : sequence of Finding
-            Further findings to show in the lanes.
+        Further findings to show in the lanes.
 
     Raises
     ------
     SubjectError
-            If the object to show cannot be loaded.
+        If the object to show cannot be loaded.
     """
     timeline = begin(reconstruction, settings)
     motion = ShownMotion.of(reconstruction, timeline)
@@ -135,13 +135,13 @@ def assemble_scene(
     lanes_of : tuple of tuple of str
         The modes of each lane.
     enter : callable
-            Adds the moving objects to a lane.
+        Adds the moving objects to a lane.
     legend : sequence of str
         How to read the picture.
     centre : array, shape (3,)
-            The point of the recording that became the origin.
+        The point of the recording that became the origin.
     reserved : float
-            The free space to the right of the legend, in units of the frame's height.
+        The free space to the right of the legend, in units of the frame's height.
     """
     scene = blender.scene()
     plan = cast.layout

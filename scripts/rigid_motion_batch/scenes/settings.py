@@ -74,7 +74,7 @@ def place_of_subject(requested: str) -> tuple[Path, str]:
     Raises
     ------
     SubjectError
-            If the request names no object.
+        If the request names no object.
     """
     if requested in MODELS:
         return MODELS_FILE, MODELS[requested]

@@ -38,7 +38,7 @@ class Solids:
     cast : Cast
     motion : ShownMotion
     deviated : dict of Poses
-            Mode id to poses at the fine frames, with deviations from the recording magnified as shown.
+        Mode id to poses at the fine frames, with deviations from the recording magnified as shown.
     mesh : bpy.types.Mesh
     traced : array, shape (3,)
         The point of the object whose path is drawn.

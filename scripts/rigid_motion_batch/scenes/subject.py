@@ -33,7 +33,7 @@ def load_subject(requested: str) -> bpy.types.Mesh:
     Raises
     ------
     SubjectError
-            If the file, the object or its faces are missing.
+        If the file, the object or its faces are missing.
     """
     return _read_mesh(*place_of_subject(requested))
 

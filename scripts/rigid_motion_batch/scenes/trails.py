@@ -92,9 +92,9 @@ def graph(name: str, frames: np.ndarray, heights: np.ndarray, width: float) -> b
     name : str
     frames : array, shape (n,)
     heights : array, shape (n,)
-            Not negative.
+        Not negative.
     width : float
-            The distance from the first frame to the last.
+        The distance from the first frame to the last.
     """
     count = len(frames)
     right = width * (frames - frames[0]) / max(float(np.ptp(frames)), 1e-9)
