@@ -1,15 +1,15 @@
-"""A hand and the tool in it over a bad link, as game engines show them and as we do.
+"""Models of game engines that show a hand and its tool over a bad link, compared with our codec.
 
-Small models of what each engine does with the poses that arrive, after its source code and at its defaults:
+Small models of how each engine handles arriving poses, after its source code and at its defaults:
 
-- Mirror (`SnapshotInterpolation.cs`): a buffer of two intervals that grows with jitter, time 2 % faster or 4 % slower
-  where the buffer drifts, no extrapolation.
-- Netcode for GameObjects (`BufferedLinearInterpolator.cs`): between two poses, an interval and 50 ms behind, on beyond
-  the second by up to three intervals, and towards that by dt / 0.1 s at every frame ("lerp of lerp").
-- Godot (`MultiplayerSynchronizer`): the newest pose at each of 60 physics ticks, between two by physics interpolation.
+- Mirror (`SnapshotInterpolation.cs`): a buffer of two intervals that grows with jitter; time runs 2 % faster or 4 %
+  slower if the buffer drifts; no extrapolation.
+- Netcode for GameObjects (`BufferedLinearInterpolator.cs`): interpolates between two poses, an interval and 50 ms late,
+  extrapolates by up to three intervals, and moves towards the result by dt / 0.1 s per frame ("lerp of lerp").
+- Godot (`MultiplayerSynchronizer`): the newest pose at each of 60 physics ticks per second, with physics interpolation.
 
-All get the poses of hand and tool in separate datagrams, 30 times a second, and drop those that are overtaken. An
-error is that of a ball of 10 cm, at the constant delay that suits what was shown best. Seconds and metres.
+All receive the poses of hand and tool in separate datagrams, 30 times per second, and drop overtaken ones. Errors are
+those of a ball of 10 cm, at the constant delay that fits the shown motion best. Seconds and metres.
 """
 
 from __future__ import annotations
@@ -30,28 +30,29 @@ from rigid_motion.streams.paths import KnotPath
 from rigid_motion_batch.streaming.measuring import HEADER_BYTES
 
 POSES_PER_S, PICTURES_PER_S, PHYSICS_TICK_S = 30.0, 72.0, 1.0 / 60.0
-"""Poses a second that an engine sends, pictures a second, and Godot's physics tick."""
+"""Poses per second sent by an engine, pictures per second, and Godot's physics tick."""
 
 RADIUS_M = 0.1
-GRIP_M = np.array((0.0, 0.3, 0.0))  # the tool's middle in the hand's space
-SETTLED_S = 3.0  # seconds after which it counts what is shown
+GRIP_M = np.array((0.0, 0.3, 0.0))  # the tool's centre in the hand's space
+SETTLED_S = 3.0  # shown poses before this time do not count
 
 MIN_HAND_SPEED_M_PER_S, MAX_FROZEN_SPEED_RATIO, MIN_FROZEN_S = 0.2, 0.1, 0.1
-"""A hand that moves by more than this (m/s) is frozen where it is shown with less than this part of it for so long."""
+"""A shown hand is frozen if the true one moves faster than this (m/s), but it moves at less than this fraction of the
+speed, for at least this many seconds."""
 
-MIN_JUMP_BACK_M = 0.005  # metres against the way of the hand from one picture to the next: a jump back
+MIN_JUMP_BACK_M = 0.005  # metres against the hand's direction from one picture to the next: a jump back
 LAGS_S = np.arange(0.0, 0.8, 0.005)
 
 Pose = tuple[np.ndarray, np.ndarray]
 """Position (3,) and quaternion (4,)."""
 
 Arrivals = list[tuple[float, float, Pose]]
-"""Arrival, time of the sender, and pose, in the order of arrivals."""
+"""Arrival time, sending time and pose, in the order of arrivals."""
 
 
 @dataclass(frozen=True)
 class Way:
-    """A link: datagrams take from one to another number of seconds, as likely, and a part never arrives."""
+    """A link: delays are uniformly distributed between two numbers of seconds, and a fraction of datagrams is lost."""
 
     shortest: float
     longest: float
@@ -66,26 +67,26 @@ class Way:
 
 
 def mix(first: Pose, second: Pose, share: float) -> Pose:
-    """Return a pose between two or beyond: straight, and about one axis."""
+    """Return a pose between two poses or beyond: linear, and about one axis."""
     turn = turned(first[1], share * turns_between(first[1], second[1]))
     return first[0] + share * (second[0] - first[0]), normalise(turn)
 
 
 def arriving(arrivals: Arrivals, moments: np.ndarray) -> Iterator[tuple[float, Arrivals]]:
-    """Yield each moment, and what has arrived since the one before."""
+    """Yield each moment, and the arrivals since the previous moment."""
     ends = np.searchsorted([arrival for arrival, _, _ in arrivals], moments, side="right").tolist()
     for moment, begin, end in zip(moments.tolist(), [0, *ends], ends, strict=False):
         yield moment, arrivals[begin:end]
 
 
 def without_overtaken(arrivals: Arrivals) -> Arrivals:
-    """Return the arrivals that nothing sent later came before."""
+    """Return the arrivals that were not preceded by a later-sent one."""
     newest = [-np.inf, *accumulate((sent for _, sent, _ in arrivals), max)]
     return [it for it, latest in zip(arrivals, newest, strict=False) if it[1] > latest]
 
 
 def mirror(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
-    """Show by snapshot interpolation with dynamic adjustment."""
+    """Return the poses shown by snapshot interpolation with dynamic adjustment."""
     interval, buffer, shown = 1.0 / POSES_PER_S, [], []
     local, scale, multiple, last_arrival, before = 0.0, 1.0, 2.0, None, frames[0]
     drift, taken = _Average(POSES_PER_S), _Average(2.0 * POSES_PER_S)
@@ -123,7 +124,7 @@ def mirror(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
 
 @dataclass
 class _Average:
-    """An exponential moving average over so many values, and the deviation from it."""
+    """An exponential moving average over about `count` values, and their variance."""
 
     count: float
     value: float | None = None
@@ -137,7 +138,7 @@ class _Average:
 
 
 def netcode(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
-    """Show by lerp of lerp."""
+    """Return the poses shown by lerp of lerp."""
     offset = float(np.mean([arrival - sent for arrival, sent, _ in arrivals])) + 0.05 + 1.0 / POSES_PER_S
     waiting, shown, before = [], [], frames[0]
     current = arrivals[0][2]
@@ -156,7 +157,7 @@ def netcode(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
 
 
 def godot(arrivals: Arrivals, frames: np.ndarray) -> list[Pose]:
-    """Show the newest at each physics tick, and between the last two ticks."""
+    """Return the poses shown: the newest at each physics tick, interpolated between the last two ticks."""
     pose, ticks = arrivals[0][2], []
     for tick, come in arriving(
         without_overtaken(arrivals),
@@ -179,18 +180,18 @@ ENGINES: dict[str, Callable[[Arrivals, np.ndarray], list[Pose]]] = {
 }
 
 
-# -- what comes out ----------------------------------------------------------------------------------------------------
+# -- results -----------------------------------------------------------------------------------------------------------
 
 
 def truth_of(times: np.ndarray, hand: Poses) -> KnotPath:
-    """Return the hand (n,) and the tool in it, as two joints."""
+    """Return the path of the hand (n,) and the tool in it, as two joints."""
     tool = Poses(hand.positions + rotate(hand.quaternions, GRIP_M), hand.quaternions)
     turns = align_signs(np.stack((hand.quaternions, tool.quaternions)))
     return KnotPath(times - times[0], Poses(np.stack((hand.positions, tool.positions)), turns))
 
 
 def by_engine(engine: str, truth: KnotPath, way: Way, frames: np.ndarray) -> Poses:
-    """Return what an engine shows at each frame (n,), shape (2, n)."""
+    """Return the poses that an engine shows at each frame (n,), shape (2, n)."""
     rng, shown = np.random.default_rng(7), []
     sent = np.arange(0.0, truth.moments[-1], 1.0 / POSES_PER_S)
     for body in truth.at(sent):
@@ -202,7 +203,7 @@ def by_engine(engine: str, truth: KnotPath, way: Way, frames: np.ndarray) -> Pos
 
 
 def by_codec(truth: KnotPath, way: Way, frames: np.ndarray, tolerance: float, delay: float) -> tuple[Poses, float]:
-    """Return what a receiver shows of one sender of both bodies, and the bytes a second with headers."""
+    """Return the poses that a receiver shows of one sender of both bodies, and bytes per second with headers."""
     rng = np.random.default_rng(7)
     bodies = [StreamBody.rigid("hand", radius=RADIUS_M), StreamBody.rigid("tool", radius=RADIUS_M)]
     sender, receiver = Sender(bodies, tolerance, delay), Receiver()
@@ -242,7 +243,7 @@ def by_codec(truth: KnotPath, way: Way, frames: np.ndarray, tolerance: float, de
 
 
 def seen(shown: Poses, truth: KnotPath, frames: np.ndarray) -> dict[str, float]:
-    """Compare what was shown at frames (n,) with the truth; slip is the tool's middle from its place in the hand."""
+    """Compare the poses shown at frames (n,) with the truth; slip is the tool's displacement in the hand."""
     kept = frames > SETTLED_S
     shown, frames = shown[:, kept], frames[kept]
     hand, tool = shown

@@ -1,6 +1,6 @@
-"""Packed poses: every joint of a body at an even rate, as floats or as the smallest three components of quaternions.
+"""Packed poses: all joints of a body at an even rate, as floats or as the smallest three quaternion components.
 
-A receiver goes straight from one pose to the next.
+The receiver interpolates linearly between poses.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ WAYS: dict[str, tuple[float, int | None]] = {
     "29 bits at 30 Hz": (30.0, 9),
     "29 bits at 12 Hz": (12.0, 9),
 }
-"""How often all joints are sent, and the bits of each component of a quaternion; None for floats."""
+"""The sending rate of all joints, and the bits per quaternion component; None for floats."""
 
 STAMP_BYTES = 5
-"""Bytes of a datagram that say whose it is, and when: as few as will do."""
+"""Bytes of a datagram for the sender and the time: as few as suffice."""
 
 PLACE_BITS, CUBE_M = 16, 8.0
-"""The bits of each coordinate of a place that is packed, over a cube of so many metres."""
+"""The bits per packed position coordinate, and the side of the cube that they cover, in metres."""
 
 
 def packed(body: StreamBody, times: np.ndarray, poses: Poses) -> dict[str, dict[str, float]]:
-    """Return what each way costs of samples (n,) of poses (joints, n), and how far off they are."""
+    """Return the cost and the errors of each way to pack samples (n,) of poses (joints, n)."""
     result, sliding, step = {}, np.asarray(body.sliding), CUBE_M / (2**PLACE_BITS - 1)
     for label, (rate, bits) in WAYS.items():
         moments = np.arange(times[0], times[-1] + 1.0 / rate, 1.0 / rate)
-        # Floats are as good as exact.
+        # Floats count as exact.
         sent, turn, place = KnotPath(times, poses).at(np.minimum(moments, times[-1])), 4 * 32, 3 * 32
         if bits:
             turn, place = 2 + 3 * bits, 3 * PLACE_BITS
@@ -46,7 +46,7 @@ def packed(body: StreamBody, times: np.ndarray, poses: Poses) -> dict[str, dict[
 
 
 def smallest_three(quaternions: np.ndarray, bits: int) -> np.ndarray:
-    """Return unit quaternions (..., 4) as they come back from three components of so many bits each."""
+    """Return unit quaternions (..., 4) as decoded from three components of this many bits each."""
     largest = np.argmax(np.abs(quaternions), axis=-1)[..., None]
     step = np.sqrt(2.0) / (2**bits - 2)
     rounded = np.rint(quaternions / step) * step

@@ -1,4 +1,4 @@
-"""Many users in one room: each a process that sends datagrams of the codec by a Zenoh router, and hears the others."""
+"""Benchmark of a crowded room: each user is a process that sends the codec's datagrams to all others by Zenoh."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
-DATAGRAMS_PER_S = 20.0  # datagrams a second of each user
+DATAGRAMS_PER_S = 20.0  # datagrams per second of each user
 STAMP = struct.Struct("<d")
-SETTLING_S = 5.0  # seconds in which all have to hear of one another, and that do not count
+SETTLING_S = 5.0  # uncounted seconds at the start, in which all users connect
 
 
 def measured(users: int, seconds: float) -> dict[str, float]:
-    """Play a room for so many seconds, and return what came out.
+    """Run a room for this many seconds, and return its figures.
 
-    Processor time is of one processor; `rate` are datagrams heard a second by all.
+    Processor times are fractions of one processor; `rate` is the number of datagrams heard per second by all.
     """
     context = multiprocessing.get_context("spawn")
     with socket.socket() as free:
@@ -28,7 +28,7 @@ def measured(users: int, seconds: float) -> dict[str, float]:
     datagrams, pipes = _datagrams(), []
     for user in (None, *range(users)):
         here, there = context.Pipe()
-        context.Process(target=_run, args=(there, user, place, datagrams, seconds), daemon=True).start()
+        context.Process(target=_run_process, args=(there, user, place, datagrams, seconds), daemon=True).start()
         pipes.append(here)
         here.recv()
     start = time.time() + 1.0
@@ -53,7 +53,7 @@ def measured(users: int, seconds: float) -> dict[str, float]:
 
 
 def _datagrams() -> list[bytes]:
-    """Return those of a hand that swings, said anew at every sample."""
+    """Return the datagrams of a hand that swings, updated at every sample."""
     from rigid_motion.motion import Poses
     from rigid_motion.streams import Sender, StreamBody
 
@@ -67,8 +67,8 @@ def _datagrams() -> list[bytes]:
     return [datagram for datagram in result if len(datagram) < 200]
 
 
-def _run(pipe: Connection, user: int | None, place: str, datagrams: list[bytes], seconds: float) -> None:
-    """Be a user, or the router, in a process of its own."""
+def _run_process(pipe: Connection, user: int | None, place: str, datagrams: list[bytes], seconds: float) -> None:
+    """Run a user, or the router, in a separate process."""
     import zenoh
 
     role, side = ("router", "listen") if user is None else ("client", "connect")

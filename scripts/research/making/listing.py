@@ -1,7 +1,7 @@
-"""The pictures of the extension's page: its icon, and a hammer that swings between the same two keys, twice.
+"""Pictures for the extension's page: its icon, and the featured picture of a hammer swinging between the same two keys.
 
-Of the featured picture, the left side is by Blender's own in-betweens, the right one by the screw. Both hammers are
-keyed objects, and each one drawn is where Blender shows it on a frame. They move in the plane of x and z.
+The left side of the featured picture uses Blender's own in-betweens, the right side the screw. Both hammers are keyed
+objects, drawn where Blender shows them on each frame. They move in the plane of x and z.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from rigid_motion_batch.scenes.body_scene import registered
 NATIVE, RIGID, KEY = "#F08A3C", "#38B6FF", "#FFB52E"
 GROUND, WORDS, FAINT = "#303030", "#E6E6E6", "#9A9A9A"
 
-HANDLE_LENGTH = 4.3  # from the hammer's origin, in its head, to where the hand holds it
-GRIP = Vector((0.0, 0.0, -HANDLE_LENGTH))  # where that is on the hammer
-SWING_RAD = math.radians(62.0)  # how far a key leans to its side
-FIRST_FRAME, LAST_FRAME, GHOSTS_BETWEEN = 1, 61, 3  # the frames of the keys, and how many ghosts are between them
+HANDLE_LENGTH = 4.3  # from the hammer's origin, in its head, to the hand
+GRIP = Vector((0.0, 0.0, -HANDLE_LENGTH))  # the hand, in the hammer's space
+SWING_RAD = math.radians(62.0)  # the tilt of a key to its side
+FIRST_FRAME, LAST_FRAME, GHOSTS_BETWEEN = 1, 61, 3  # the frames of the keys, and the number of ghosts between them
 
 HANDLE = ((0.0, 0.0, -HANDLE_LENGTH - 0.3), (0.0, 0.0, 0.0), 0.16, "#B98A54")
 HEAD_BOXES = ((0.27, 0.57, 0.25), (0.51, 0.81, 0.38), (-0.57, -0.27, 0.25), (-0.81, -0.51, 0.38), (-0.35, 0.35, 0.34))
 CYLINDERS = (HANDLE, *(((begin, 0.0, 0.0), (end, 0.0, 0.0), radius, "#C9CED6") for begin, end, radius in HEAD_BOXES))
-"""Both ends, radius and colour, from the back to the front."""
+"""Both ends, radius and colour, from back to front."""
 
 CYLINDER_SHADES = np.linspace(-1.0, 1.0, 25)  # across a cylinder
 
@@ -41,7 +41,7 @@ CYLINDER_SHADES = np.linspace(-1.0, 1.0, 25)  # across a cylinder
 
 
 def icon(path: Path) -> None:
-    """Draw a body that goes from key to key along an arc, and turns with it; outlined, for any ground."""
+    """Draw a body that moves along an arc from key to key and turns with it; outlined, to suit any background."""
     axes = picture(256, 256)
     axes.set(xlim=(-1.0, 1.0), ylim=(-1.0, 1.0))
 
@@ -58,7 +58,7 @@ def icon(path: Path) -> None:
         corners = centre + towards([at]) + towards(at + turn + np.arange(0, 360, 90), size)
         for width, outline in ((0.21, "#1B1F24"), (0.1, colour)):
             line(np.concatenate((corners, corners[:, :2]), axis=1), width, outline)
-            axes.fill(*corners, color=outline, zorder=2)  # as lines are: what is drawn later covers
+            axes.fill(*corners, color=outline, zorder=2)  # Like lines: later ones cover earlier ones.
     save(axes, path)
 
 
@@ -66,7 +66,7 @@ def icon(path: Path) -> None:
 
 
 def featured(path: Path) -> None:
-    """Draw both hammers at their keys and between them, the paths of head and grip, and the hand."""
+    """Draw both hammers at their keys and in between, the paths of head and grip, and the hand."""
     axes = picture(1920, 1080, GROUND)
     axes.set(xlim=(-9.6, 9.6), ylim=(-5.4, 5.4))
     with registered():
@@ -103,12 +103,12 @@ def _swinging(axes: Axes, x: float, mode: str | None, colours: tuple[str, str], 
 
 
 def swing(hammer: bpy.types.Object, hand: Vector, mode: str | None) -> list[Matrix]:
-    """Key a hammer so that the hand holds it on both sides, with a mode or, None, with Blender's own in-betweens.
+    """Key a hammer so that the hand holds it at both ends of the swing, with a mode or (None) Blender's in-betweens.
 
     Returns
     -------
     list of Matrix
-        Where Blender shows it on each frame.
+        The evaluated world matrix on each frame.
     """
     hammer.rotation_mode = "QUATERNION"
     for frame, angle in ((FIRST_FRAME, -SWING_RAD), (LAST_FRAME, SWING_RAD)):
@@ -130,12 +130,12 @@ def swing(hammer: bpy.types.Object, hand: Vector, mode: str | None) -> list[Matr
 
 
 def _draw_hammer(axes: Axes, pose: Matrix, colour: str | None = None) -> None:
-    """Draw a hammer as cylinders in their light; in one colour, or that of wood and steel."""
+    """Draw a hammer as lit cylinders; in one colour, or in those of wood and steel."""
     for *ends, radius, material in CYLINDERS:
         begin, end = (np.array(pose @ Vector(end))[::2] for end in ends)
         along = (end - begin) / np.linalg.norm(end - begin)
         out = np.array((-along[1], along[0]))
-        # Each strip faces as much outwards as it is off the middle; the light comes from the left, above and in front.
+        # Strips face outwards in proportion to their offset; the light comes from the left, above and in front.
         bright = np.clip(CYLINDER_SHADES * (out @ (-0.45, 0.55)) + np.sqrt(1.0 - CYLINDER_SHADES**2) * 0.7, 0.0, 1.0)
         edges = radius * CYLINDER_SHADES[:, None] * out
         strips = np.stack((begin + edges[:-1], end + edges[:-1], end + edges[1:], begin + edges[1:]), axis=1)

@@ -1,8 +1,8 @@
-"""The models of assets/models.blend: a table of parts for each, all of them lofted through rings.
+"""Make the models of assets/models.blend: a table of parts for each model, all lofted through rings.
 
 Millimetres. Axes as in `motions`: a tool points along +y, z is up, the origin is in the middle of the grip. Parts may
-cut through one another; each is closed in itself. The drill is an orthopaedic surgeon's; its bit lies in the plane
-x = 0. The hand controller is one for the right hand: thumb pad on the left of its face, buttons on the right.
+intersect; each is a closed surface. The drill is an orthopaedic surgeon's; its bit lies in the plane x = 0. The hand
+controller is for the right hand: thumb pad on the left of its face, buttons on the right.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ MATERIALS = {"Mode": ("#CED4DA", 0.0, 0.32), "Metal": ("#CBCED2", 0.7, 0.30), "R
 """Colour, metallic, roughness."""
 
 Place = tuple[ArrayLike, np.ndarray, np.ndarray]
-"""The beginning, the direction of the axis, and what is up there."""
+"""The start, the direction of the axis, and the up direction."""
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A closed surface through rings (k, m, 3), of one of `MATERIALS`; an endless one ends in its first ring."""
+    """A closed surface through rings (k, m, 3), in one of `MATERIALS`; an endless one ends in its first ring."""
 
     material: str
     rings: np.ndarray
     endless: bool
 
     def faces(self) -> list[list[int]]:
-        """Return quads between the rings, and a face at each end, as indices of the points."""
+        """Return quads between the rings, and a face at each end, as point indices."""
         index = np.arange(self.rings.size // 3).reshape(self.rings.shape[:2])
         corners = (index, np.roll(index, -1, 1), np.roll(index, -1, (0, 1)), np.roll(index, -1, 0))
         quads = np.stack(corners, axis=-1).reshape(-1, 4).tolist()
@@ -60,14 +60,14 @@ def loft(
     Parameters
     ----------
     rows : array-like, shape (k, 2), (k, 3) or (k, 4)
-        Of each ring how far along the axis it is, half its width, half its height (as its width, if there is none),
-        and how far up its middle is.
+        For each ring its position along the axis, half its width, half its height (its width by default), and the
+        height of its centre.
     exponent : float
         2 is an ellipse, more is squarer.
     count : int
-        So many rings, on smooth curves through the rows; 0 for those of the rows.
+        The number of rings, on smooth curves through the rows; 0 uses the rows as rings.
     twist : float
-        Radians by which rings are turned, for each millimetre along the axis.
+        Rotation of rings in radians, per millimetre along the axis.
     """
     (centre, axis, up), rows = place, np.asarray(rows, dtype=np.float64)
     if count:
@@ -87,14 +87,14 @@ def loft(
 
 
 def box(material: str, place: Place, half: tuple[float, float, float], edge: float) -> Part:
-    """Return a box about its place, `half` its width, height and length; edges are cut off at both ends of its axis."""
+    """Return a box centred on its place; `half` is half its width, height and length; both ends have cut edges."""
     width, height, length = half
     ends = ((-length, edge), (edge - length, 0.0), (length - edge, 0.0), (length, edge))
     return loft(material, place, [(d, width - inset, height - inset) for d, inset in ends], exponent=6.0, points=32)
 
 
 def pad(rows: ArrayLike, side: float, depth: float) -> np.ndarray:
-    """Return the rows of a pad that stands out a little on the upper side (1) or the lower (-1), so deep as a share."""
+    """Return the rows of a pad that stands out a little on the upper (1) or lower side (-1); depth is a fraction."""
     along, width, height, rise = np.transpose(rows)
     return np.stack((along, 0.94 * width, depth * height, rise + side * (1.06 - depth) * height), axis=1)
 
@@ -208,7 +208,7 @@ MODELS = {"Drill": drill, "Controller": controller}
 
 
 def build_material(name: str) -> bpy.types.Material:
-    """Return a new material of `MATERIALS`, alike in Workbench (viewport) and in EEVEE and Cycles (nodes)."""
+    """Return a new material of `MATERIALS` that looks the same in Workbench (viewport), EEVEE and Cycles (nodes)."""
     colour, metallic, roughness = MATERIALS[name]
     material = surface(name, colour, roughness=roughness)
     shader = next(node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
@@ -217,7 +217,7 @@ def build_material(name: str) -> bpy.types.Material:
 
 
 def build_mesh(name: str, parts: list[Part], materials: dict[str, bpy.types.Material]) -> bpy.types.Mesh:
-    """Return a new mesh of all parts, in metres, smooth but for its creases, its faces outwards."""
+    """Return a new mesh of all parts, in metres, smooth except at creases, with outward faces."""
     mesh, used = bpy.data.meshes.new(name), list(dict.fromkeys(part.material for part in parts))
     vertices, faces, numbers = [], [], []
     for part in parts:
@@ -240,15 +240,15 @@ def build_mesh(name: str, parts: list[Part], materials: dict[str, bpy.types.Mate
 
 
 def build_models() -> list[bpy.types.Object]:
-    """Return new objects of all models at the origin, in no scene yet."""
+    """Return new objects of all models at the origin, not in any scene."""
     materials = {name: build_material(name) for name in MATERIALS}
     return [bpy.data.objects.new(name, build_mesh(name, model(), materials)) for name, model in MODELS.items()]
 
 
 def write_models(path: Path) -> None:
-    """Write a .blend file with a scene for each model. What is open in Blender stays as it is.
+    """Write a .blend file with a scene for each model, without changing the open file.
 
-    The scenes are written as a library, so the file carries neither a window layout nor the path it was written to.
+    The scenes are written as a library, so the file contains neither a window layout nor its own path.
     """
     models = build_models()
     scenes = [bpy.data.scenes.new(model.name) for model in models]

@@ -1,11 +1,11 @@
-"""Motions of a hand-held tool as people make them: reaching, pivoting on a tip, throwing and catching, driving a screw;
-and of a door.
+"""Generated human motions of a hand-held tool: reaching, pivoting on a tip, throwing and catching, driving a screw; and
+of a door.
 
 Metres, seconds, radians; right-handed, z up, the person stands at the origin and looks along +y. The tool's own axes
 are x to the right, y forward (along the bit), z up, with the origin in the hand: a tool held level points along +y.
 
-The strokes are minimum-jerk (Flash and Hogan, 1985): quintics in time, here in the joint angles or in the angles and
-places of the tool. Strokes that overlap add up (Flash and Henis, 1991).
+The strokes are minimum-jerk (Flash and Hogan, 1985): quintics in time, in the joint angles or in the tool's angles and
+positions. Overlapping strokes add up (Flash and Henis, 1991).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rigid_motion.motion.quaternions import multiply, rotate
 from .tracking import turn, unsteadiness
 
 BIT_TIP_M = np.array((0.0, 0.160, 0.062))
-"""Where the drill's bit ends, in the tool's axes."""
+"""The tip of the drill's bit, in the tool's axes, in metres."""
 
 CENTRE_OF_MASS = np.array((0.0, 0.010, 0.030))
 
@@ -34,7 +34,7 @@ X_AXIS, Y_AXIS, Z_AXIS = np.eye(3)
 
 @dataclass(frozen=True)
 class MadeMotion:
-    """A motion: its poses at any times (n,), and how long it takes."""
+    """A motion: its poses at any times (n,), and its duration."""
 
     duration: float
     poses: Callable[[np.random.Generator, np.ndarray], Poses]
@@ -49,7 +49,7 @@ def strokes(times: np.ndarray, onsets: ArrayLike, durations: ArrayLike, amounts:
     Parameters
     ----------
     onsets, durations, amounts : array-like, shapes (k, ...) that broadcast
-        Each stroke goes from 0 to its amount. Before it is 0, and after it stays.
+        Each stroke goes from 0 to its amount; before it is 0, afterwards it stays at its amount.
     """
     onsets, durations, amounts = np.broadcast_arrays(onsets, durations, amounts)
     done = np.clip((times.reshape((-1,) + (1,) * onsets.ndim) - onsets) / durations, 0.0, 1.0)
@@ -58,7 +58,7 @@ def strokes(times: np.ndarray, onsets: ArrayLike, durations: ArrayLike, amounts:
 
 @dataclass(frozen=True)
 class Knot:
-    """What a motion passes through: where, how fast and at what acceleration. A knot of rest has neither."""
+    """A point of a motion: position, velocity and acceleration. At rest, the latter two are 0."""
 
     time: float
     place: ArrayLike
@@ -67,9 +67,9 @@ class Knot:
 
 
 def through(knots: list[Knot], times: np.ndarray) -> np.ndarray:
-    """Return the minimum-jerk motion from knot to knot at `times`, shape (n, d): continuous up to the acceleration.
+    """Return the minimum-jerk motion through knots at `times`, shape (n, d), with continuous acceleration.
 
-    It rests before the first knot and after the last. Between two knots of free flight it is the parabola.
+    It rests before the first knot and after the last. Between two knots of free flight it is a parabola.
     """
     starts = np.array([knot.time for knot in knots])
     place, velocity, acceleration = (
@@ -89,12 +89,12 @@ def through(knots: list[Knot], times: np.ndarray) -> np.ndarray:
 
 
 def about(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Return turns by `angles` (n,) about one axis, as quaternions (n, 4)."""
+    """Return rotations by `angles` (n,) about one axis, as quaternions (n, 4)."""
     return turn(angles[:, None] * axis)
 
 
 def chain(*turns: np.ndarray) -> np.ndarray:
-    """Return the product of quaternions, the outermost first."""
+    """Return the product of quaternions, outermost first."""
     return reduce(multiply, turns)
 
 
@@ -109,7 +109,7 @@ SHOULDER_M = np.array((0.18, 0.0, 1.40))
 UPPER_ARM_M, FOREARM_M, HAND_M = 0.30, 0.26, 0.08
 
 JOINT_LAGS = np.array((0.00, 0.00, 0.03, 0.05, 0.08, 0.10, 0.10))
-"""The shoulder sets off first, the elbow and the wrist follow."""
+"""Seconds that each joint starts late: the shoulder starts first, the elbow and the wrist follow."""
 
 POSTURES_RAD = np.radians(
     # azimuth, elevation and rotation of the upper arm; elbow flexion; pronation; wrist flexion and deviation
@@ -127,7 +127,7 @@ REACH_DURATIONS = np.array((0.78, 0.85, 0.70, 0.80, 0.85))
 
 
 def reach(rng: np.random.Generator, times: np.ndarray) -> Poses:
-    """Return five reaches of an arm of seven joint angles: shoulder, elbow and wrist."""
+    """Return five reaches of an arm with seven joint angles: shoulder, elbow and wrist."""
     angles = POSTURES_RAD[0] + strokes(
         times, REACH_ONSETS[:, None] + JOINT_LAGS, REACH_DURATIONS[:, None], np.diff(POSTURES_RAD, axis=0)
     )
@@ -136,7 +136,7 @@ def reach(rng: np.random.Generator, times: np.ndarray) -> Poses:
 
 
 def arm(angles: np.ndarray) -> Poses:
-    """Return the pose of the tool for joint angles (n, 7) as in `POSTURES_RAD`; with all 0 the arm hangs."""
+    """Return the pose of the tool for joint angles (n, 7) as in `POSTURES_RAD`; at 0 the arm hangs down."""
     azimuth, elevation, rotation, elbow, pronation, flexion, deviation = angles.T
     upper_arm = chain(about(Z_AXIS, azimuth), about(X_AXIS, elevation), about(Z_AXIS, rotation))
     forearm = multiply(upper_arm, about(X_AXIS, elbow))
@@ -147,7 +147,7 @@ def arm(angles: np.ndarray) -> Poses:
         + FOREARM_M * rotate(forearm, -Z_AXIS)
         + HAND_M * rotate(hand, -Z_AXIS)
     )
-    # The tool points along the hand, which hangs down where the tool is level.
+    # The tool points along the hand; with all angles at 0 the hand hangs down, and this turns the tool level.
     return Poses(grip, multiply(hand, turn(-0.5 * np.pi * X_AXIS)))
 
 
@@ -183,10 +183,10 @@ def pivot(rng: np.random.Generator, times: np.ndarray) -> Poses:
 
 @dataclass(frozen=True)
 class Throw:
-    """A hand swings and lets go, the tool flies and turns about an axis, the other hand catches it and rests."""
+    """A throw: a hand swings and lets go, the tool flies and rotates about an axis, the other hand catches it."""
 
     moments: tuple[float, float, float, float]
-    """The start, the release, the catch and the rest."""
+    """The times of start, release, catch and rest."""
 
     centres: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike]
     """The centre of mass at these moments."""
@@ -194,13 +194,13 @@ class Throw:
     axis: np.ndarray
 
     angles: tuple[float, float, float, float] = (0.0, -2.0, 366.0, 360.0)
-    """Degrees at these moments. Between them the hands turn back for the swing, and on with what they have caught."""
+    """Degrees at these moments. In the hands, the tool turns back for the swing, and on after the catch."""
 
     def knots(self) -> list[Knot]:
-        """Return the centre of mass, and the angle about the axis in radians.
+        """Return knots of the centre of mass, and of the angle about the axis in radians.
 
-        A hand that lets go or catches moves as the free body, up to the acceleration; in flight the angle has a
-        constant rate.
+        A hand that releases or catches the tool moves like the free body, up to the acceleration; in flight the angle
+        has a constant rate.
         """
         start, release, catch, rest = self.moments
         held, released, caught, resting = np.column_stack((self.centres, np.radians(self.angles)))
@@ -214,7 +214,7 @@ class Throw:
         ]
 
     def airborne(self, times: np.ndarray) -> np.ndarray:
-        """Return 1 in flight, 0 in a hand, with 40 ms of letting go and of closing in between, shape (n,)."""
+        """Return 1 in flight and 0 in a hand, with 40 ms transitions for release and grip, shape (n,)."""
         _, release, catch, _ = self.moments
         return strokes(times, [release - 0.04, catch], [0.04, 0.04], [1.0, -1.0])
 
@@ -245,16 +245,16 @@ def throw(rng: np.random.Generator, times: np.ndarray) -> Poses:
 # ---- driving a screw -------------------------------------------------------------------------------------------------
 
 SCREW_PITCH_M = 2.75e-3
-"""The advance a turn of a 6.5 mm cancellous bone screw."""
+"""The advance per turn of a 6.5 mm cancellous bone screw."""
 
 
 def screw(rng: np.random.Generator, times: np.ndarray) -> Poses:
-    """Drive a screw a little over two turns by six strokes of the wrist, with a rest for each new grip."""
+    """Drive a screw a little over two turns in six strokes of the wrist, with a rest for each new grip."""
     onsets = np.array((0.25, 0.98, 1.70, 2.42, 3.12, 3.84))
     durations = np.array((0.56, 0.54, 0.52, 0.54, 0.54, 0.56))
     roll = strokes(times, onsets, durations, np.radians((118.0, 132.0, 140.0, 136.0, 128.0, 112.0)))
     roll += np.radians(0.4) * unsteadiness(rng, times, 1)[:, 0]
-    # The hand pushes a little beside the axis, so the tool leans, and the lean goes round with the turn.
+    # The hand pushes slightly off the axis, so the tool leans, and the lean rotates with the screw.
     lean = np.radians(1.4) * np.stack((np.cos(roll), np.zeros_like(roll), np.sin(roll)), axis=-1)
     lean += np.radians(0.3) * unsteadiness(rng, times, 3) * (1.0, 0.0, 1.0)
     aim, depth = turn(np.radians(-38.0) * X_AXIS), SCREW_PITCH_M * roll / (2.0 * np.pi)
@@ -266,11 +266,11 @@ def screw(rng: np.random.Generator, times: np.ndarray) -> Poses:
 # ---- a tool in a hand ------------------------------------------------------------------------------------------------
 
 GRIP = Poses(np.array((0.02, 0.26, 0.07)), turn(np.radians((20.0, -8.0, 35.0))))
-"""Where the marker of a long tool is, seen from that of the hand which holds it."""
+"""The pose of a long tool's marker, relative to that of the hand that holds it."""
 
 
 def hold(rng: np.random.Generator, times: np.ndarray) -> Poses:
-    """Return the hand that swings a long tool over the site, turns it over and back, and shakes it off."""
+    """Return the poses of a hand that swings a long tool over the site, turns it over and back, and shakes it."""
     #         onset, duration, sideways, forward, up in metres, then swing, tilt, roll in degrees
     table = np.array(
         (
@@ -291,22 +291,22 @@ def hold(rng: np.random.Generator, times: np.ndarray) -> Poses:
 
 
 def held_in(hand: Poses, grip: Poses) -> Poses:
-    """Return the poses (n,) of what a hand holds in that grip."""
+    """Return the poses (n,) of an object that a hand holds in that grip."""
     places = hand.positions + rotate(hand.quaternions, grip.positions)
     return Poses(places, multiply(hand.quaternions, grip.quaternions))
 
 
 HOLD = "hold"
-"""The recording of two devices: a hand, and the tool that it holds."""
+"""The recording of two devices: a hand, and the tool it holds."""
 
 # ---- a door ----------------------------------------------------------------------------------------------------------
 
 HINGE_M, DOOR_EDGE_M = np.array((-0.40, 0.70, 1.00)), np.array((-0.80, 0.0, 0.0))
-"""Where the hinge is, and where it is seen from the tracker at the door's edge."""
+"""The hinge in the world, and relative to the tracker at the door's edge."""
 
 
 def door(_: np.random.Generator, times: np.ndarray) -> Poses:
-    """Push a door open, and on to the wall, from where it is slammed and springs back a little."""
+    """Push a door open, further to the wall, then slam it; it springs back a little."""
     #         onset, duration, degrees
     table = np.array(((0.3, 0.8, 100.0), (1.25, 0.6, 70.0), (2.3, 0.75, -170.0), (3.05, 0.35, 14.0), (3.4, 0.4, -14.0)))
     opened = strokes(times, table[:, :1], table[:, 1:2], np.radians(table[:, 2:]))
@@ -314,7 +314,7 @@ def door(_: np.random.Generator, times: np.ndarray) -> Poses:
 
 
 OTHER_MOTIONS = {HOLD: MadeMotion(4.6, hold), "door": MadeMotion(4.6, door)}
-"""Motions that the page of the paper leaves out."""
+"""Motions that the paper's page leaves out."""
 
 MOTIONS = {
     "reach": MadeMotion(4.7, reach),

@@ -1,9 +1,9 @@
-"""The tables of the coder of streams: how often each symbol occurs, on recordings and on generated motions.
+"""Make the symbol tables of the stream coder: frequencies of symbols, on recordings and on generated motions.
 
     python scripts/research stream_tables FOLDER
 
-counts in every body and every single body of the folder and in the motions of assets/, at two delays, with receivers
-that answer soon, later, and not at all, and writes addon/rigid_motion/streams/tables.json.
+counts symbols for every body and single body of the folder, and for the motions of assets/, at two delays, with
+receivers that answer soon, later, and not at all, and writes addon/rigid_motion/streams/tables.json.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.streaming.sending import body_of, even_rate, samples_of
 
 SETTINGS = ((0.1, 0.0), (0.2, 0.0), (0.1, 0.06), (0.1, 0.15), (0.2, 0.15), (0.1, None))
-"""Delays, and seconds that a datagram takes; None where no receiver answers."""
+"""Delays in seconds, and the latency of datagrams; None if no receiver answers."""
 
-MOST_SECONDS = 15.0  # of a recording, so that long ones do not have all the say
-SINGLE_RADIUS = 0.1  # of the balls of single bodies
-PRIOR_COUNT = 12.0  # what a table without any counts is worth beside them: as the mean over the kinds of knots
+MOST_SECONDS = 15.0  # used of a recording, so that long ones do not dominate
+SINGLE_RADIUS = 0.1  # of the balls of single bodies, in metres
+PRIOR_COUNT = 12.0  # the weight, in counts, of the mean over kinds of knots, which a table without counts falls back to
 
 
 class Counting:
-    """A coder that writes nothing, and counts how often each symbol of each table occurs."""
+    """A coder that writes nothing, and counts the symbols of each table."""
 
     def __init__(self) -> None:
         self.counts = [np.zeros(len(table) - 1) for table in standard_tables()]
@@ -68,7 +68,7 @@ def samples(folder: Path) -> Iterator[tuple[StreamBody, np.ndarray, Poses]]:
 def count(
     coder: Counting, body: StreamBody, times: np.ndarray, poses: Poses, delay: float, latency: float | None
 ) -> None:
-    """Count the symbols of what a sender says of a motion."""
+    """Count the symbols of all messages that a sender sends about a motion."""
     sender, receiver = Sender([body], 0.005, delay, even_rate(times)), Receiver()
     write = sender.codec.write
 
@@ -88,7 +88,7 @@ def count(
 
 
 def probabilities(counts: list[np.ndarray]) -> Iterator[np.ndarray]:
-    """Yield those of each symbol of each table: what was counted, and beside it what was for all kinds of knots."""
+    """Yield the symbol probabilities of each table: its own counts, smoothed by the counts over all kinds of knots."""
     for table, counted in enumerate(counts):
         if table < FLAG_TABLE_COUNT:
             alike = range(table % (HISTORY_COUNT * NEIGHBOUR_COUNT), FLAG_TABLE_COUNT, HISTORY_COUNT * NEIGHBOUR_COUNT)
@@ -100,20 +100,20 @@ def probabilities(counts: list[np.ndarray]) -> Iterator[np.ndarray]:
             )
         else:
             alike = [table]
-        # Of symbols that were never seen ever less are expected.
+        # Unseen symbols get an ever smaller probability.
         mean = sum(counts[other] for other in alike) + 4.0 * 0.6 ** np.arange(len(counted))
         yield (counted + PRIOR_COUNT * mean / mean.sum()) / (counted.sum() + PRIOR_COUNT)
 
 
 def table_of(probability: np.ndarray) -> tuple[int, ...]:
-    """Return cumulative frequencies that add up to `FREQUENCY_TOTAL`, none of them 0."""
+    """Return cumulative frequencies that add up to `FREQUENCY_TOTAL`, each symbol's above 0."""
     frequencies = 1 + np.floor(probability * (FREQUENCY_TOTAL - len(probability))).astype(int)
     frequencies[np.argmax(frequencies)] += FREQUENCY_TOTAL - frequencies.sum()
     return (0, *np.cumsum(frequencies).tolist())
 
 
 def tables_of(counts: list[np.ndarray]) -> list[Sequence[int]]:
-    """Return the tables of these counts. Those that say what no motion here has, as that it is held, stay."""
+    """Return the tables for these counts. Tables never used here, such as those about holding, stay as they are."""
     tables: list[Sequence[int]] = [table_of(probability) for probability in probabilities(counts)]
     for table in range(KNOT_COUNTS, len(tables)):
         if not counts[table].any():
@@ -122,7 +122,7 @@ def tables_of(counts: list[np.ndarray]) -> list[Sequence[int]]:
 
 
 def text_of(tables: Iterable[Sequence[int]]) -> str:
-    """Return what is in the file of these tables."""
+    """Return the content of the table file."""
     return json.dumps(list(tables), separators=(",", ":")) + "\n"
 
 

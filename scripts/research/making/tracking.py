@@ -1,8 +1,8 @@
-"""What a hand and a tracking device add to an ideal motion: unsteadiness, noise and an uneven timer.
+"""Simulated tracking: adds a hand's unsteadiness, noise and uneven timestamps to an ideal motion.
 
-Seconds, metres, radians. The levels are those of hand-held controllers: a median step of 11.1 ms that strays between 7
-and 17 ms, noise of a few tenths of a millimetre and hundredths of a degree, most of it slower than the frames (it
-wanders), and the 8 to 12 Hz tremor that every outstretched hand has (Elble and Randall, 1978).
+Seconds, metres, radians. The levels are those of hand-held controllers: a median step of 11.1 ms that varies between 7
+and 17 ms; noise of a few tenths of a millimetre and hundredths of a degree, mostly slower than the frame rate (drift);
+and the 8 to 12 Hz tremor of every outstretched hand (Elble and Randall, 1978).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ROTATION_WANDER, ROTATION_WHITE = np.radians(0.06), np.radians(0.03)
 def tick(rng: np.random.Generator, duration: float) -> np.ndarray:
     """Return the times at which a 90 Hz device reports, from 0 to about `duration`.
 
-    Each step is a little uneven; one in fourteen is late by 2 to 6 ms, and the step after it makes up for half of that.
+    Steps vary a little; one in fourteen is late by 2 to 6 ms, and the next step makes up for half of that.
     """
     count = round(duration * SAMPLES_PER_S)
     steps = 1.0 / SAMPLES_PER_S + 0.60e-3 * rng.standard_normal(count)
@@ -40,7 +40,7 @@ def tick(rng: np.random.Generator, duration: float) -> np.ndarray:
 def wander(
     rng: np.random.Generator, times: np.ndarray, channels: int, band: tuple[float, float], slope: float = 0.0
 ) -> np.ndarray:
-    """Return independent random signals, shape (n, channels), of an expected root mean square of 1.
+    """Return independent random signals, shape (n, channels), with an expected root mean square of 1.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def wander(
 
 
 def unsteadiness(rng: np.random.Generator, times: np.ndarray, channels: int) -> np.ndarray:
-    """Return the sway and tremor of a held hand, shape (n, channels), of a root mean square of about 1."""
+    """Return the sway and tremor of a held hand, shape (n, channels), with a root mean square of about 1."""
     return wander(rng, times, channels, (0.3, 3.0), slope=2.0) + 0.10 * wander(rng, times, channels, (8.0, 12.0))
 
 
@@ -69,13 +69,13 @@ def track(
 ) -> Poses:
     """Return the poses of `motion` as a device would report them at `times`.
 
-    Each is of a moment a little beside the time it is stamped with, and noisy.
+    Each pose has noise, and belongs to a moment slightly off its timestamp.
     """
     return noisy(rng, motion(rng, times + STAMP_ERROR * rng.standard_normal(len(times))), times)
 
 
 def noisy(rng: np.random.Generator, poses: Poses, times: np.ndarray) -> Poses:
-    """Return poses at `times` with noise that wanders, and noise that is new with every frame."""
+    """Return poses at `times` with slowly drifting noise, and noise that is independent in every frame."""
     count = len(times)
     position_noise = POSITION_WANDER * wander(rng, times, 3, (0.2, 12.0), slope=1.0)
     position_noise += POSITION_WHITE * rng.standard_normal((count, 3))
@@ -96,7 +96,7 @@ def table(times: np.ndarray, poses: Poses) -> str:
 
 
 def table_of_devices(times: np.ndarray, devices: Mapping[str, Poses]) -> str:
-    """Return what several devices recorded at the same times, by their names, as one text: a row of each in turn."""
+    """Return the recordings of several devices at the same times as one text: a row of each device in turn."""
     rows = zip(*(_rows(times, poses) for poses in devices.values()), strict=True)
     lines = (f"{name},{row}" for together in rows for name, row in zip(devices, together, strict=True))
     return "\n".join([f"device,{HEADER}", *lines, ""])

@@ -35,7 +35,7 @@ PACKINGS = {"7 doubles": 56, "7 singles": 28}
 
 
 def sent(clip: Clip, tolerance: float, delay: float) -> tuple[float, float, float]:
-    """Send a clip over loopback, and return datagrams and bytes per second, and the RMS shell error of the shown motion."""
+    """Send a clip over loopback, and return datagrams and bytes per second, and the RMS shell error of the result."""
     times, poses = samples_of(clip)
     cost, _ = measure([body_of(clip, poses, SHELL_RADIUS_M)], times, poses, tolerance, delay)
     size = cost["bytes_a_second_with_headers"]

@@ -1,4 +1,4 @@
-"""The numbers of whole bodies as rows and tables: what they are of, and that names of any kind survive."""
+"""Tests of metrics of whole bodies, as rows and tables: what they measure, and that hostile names survive."""
 
 import csv
 import re
@@ -30,7 +30,7 @@ HOSTILE = (
     "",
     "'=1+1\t\u2028\x85\x1c\u200b",
 )
-"""As many as the body has joints."""
+"""Names with special characters, one for each joint of the body."""
 
 MODES = ("lerp_slerp", "dq_sclerp", "cga_slerp", "motor_spline")
 

@@ -1,4 +1,4 @@
-"""Key poses needed by whole bodies: they reach what they have to, and no fewer do."""
+"""Tests of the key poses that whole bodies need: they reach the target error, and fewer would not."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ WAYS = Ways(swinging_body(seconds=1.3, seed=6), RADII)
 
 
 def rms(ways: Ways, keys: np.ndarray, mode: str) -> float:
-    """By matrices, in metres."""
+    """Return the RMS shell error in metres, computed with matrices."""
     clip = ways.clip
     metres = Poses(clip.poses.positions * clip.metres_per_unit, clip.poses.quaternions)
     return float(np.sqrt(np.mean(body_errors(clip.times, metres, PARENTS, (keys,) * len(JOINTS), mode, RADII) ** 2)))

@@ -14,7 +14,7 @@ from tests.scripts.clips.recordings import swinging_clip
 
 
 def shell_errors(clip: Clip, keys: np.ndarray, mode: str, radius: float = 0.1) -> np.ndarray:
-    """By SciPy and singular values: how far any point within the radius is off, in metres."""
+    """Return the largest displacement of any point within the radius, in metres, by SciPy and singular values."""
     shown = interpolate(clip.times[keys], clip.poses[keys], clip.times, mode)
     matrices = [Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix() for poses in (shown, clip.poses)]
     offsets = (shown.positions - clip.poses.positions) * clip.metres_per_unit

@@ -1,4 +1,4 @@
-"""Bodies that hold one another: which do is found, and how far modes let them slip is measured."""
+"""Tests of held bodies: which pairs are found, and how far the held body slips under each mode."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ RADIUS = 0.1
 FIVE = Uniform("5")
 
 PLACE, TURN = np.array((0.05, 0.3, -0.1)), Rotation.from_euler("xyz", (20.0, -40.0, 100.0), degrees=True)
-"""Where the tool is in the hand."""
+"""The pose of the tool in the hand."""
 
 HAND = swinging_clip("hand")
 
@@ -30,7 +30,7 @@ def turns_of(poses: Poses) -> Rotation:
 
 
 def held_by(hand: Clip, places: np.ndarray = PLACE, turn: Rotation = TURN, name: str = "tool") -> Clip:
-    """What a hand holds, at these places in it."""
+    """Return a body that a hand holds at these places in the hand."""
     turns = turns_of(hand.poses)
     poses = Poses(hand.poses.positions + turns.apply(places), (turns * turn).as_quat(scalar_first=True))
     return replace(hand, name=name, poses=poses)
@@ -41,8 +41,8 @@ def slip_of(hand: Clip, tool: Clip, choice: Uniform | Tolerance = FIVE) -> dict[
     return {row.mode: row for row in slips(*made)}
 
 
-def by_matrices(hand: Poses, tool: Poses) -> np.ndarray:
-    """How far any point of the ball around the tool is from its place in the hand, by another way."""
+def displacements_by_matrices(hand: Poses, tool: Poses) -> np.ndarray:
+    """Return the largest displacement of the ball around the tool from its place in the hand, by matrices."""
     back = turns_of(hand).inv()
     places, turns = back.apply(tool.positions - hand.positions), back * turns_of(tool)
     return largest_displacements(places - PLACE, RADIUS * (turns.as_matrix() - TURN.as_matrix()))
@@ -56,7 +56,9 @@ def test_a_slip_is_the_largest_distance_of_any_point_of_the_ball(mode: str):
     tool = held_by(HAND)
     row, (keys,) = slip_of(HAND, tool)[mode], FIVE.keys(HAND, mode, RADIUS)
     times = HAND.times[keys[0] : keys[-1] + 1]
-    off = by_matrices(*(interpolate(HAND.times[keys], clip.poses[keys], times, mode) for clip in (HAND, tool)))
+    off = displacements_by_matrices(
+        *(interpolate(HAND.times[keys], clip.poses[keys], times, mode) for clip in (HAND, tool))
+    )
     assert row.max_slip_m == pytest.approx(off.max(), rel=1e-9)
     assert row.rms_slip_m == pytest.approx(np.sqrt(np.mean(off**2)), rel=1e-9)
     assert (row.clip_a, row.clip_b, row.rate_hz, row.decimation, row.tolerance_m) == (
@@ -112,14 +114,14 @@ def test_the_mean_rotation_takes_no_notice_of_signs():
 
 
 def slid(metres: float) -> Clip:
-    """A tool that is elsewhere in the hand for a single sample."""
+    """Return a tool that is displaced in the hand for a single sample."""
     places = np.tile(PLACE, (len(HAND.times), 1))
     places[101, 1] += metres
     return held_by(HAND, places)
 
 
 def shrunk(clip: Clip, share: float) -> Clip:
-    """A clip whose motion is a small part of what it was."""
+    """Return a clip with its motion scaled to a fraction."""
     few = Rotation.from_rotvec(share * turns_of(clip.poses).as_rotvec())
     return replace(clip, poses=Poses(share * clip.poses.positions, few.as_quat(scalar_first=True)))
 

@@ -115,7 +115,7 @@ def test_what_takes_every_sample_is_not_reached() -> None:
 def clip_of(
     name: str, keys: object, reference: float = 100.0, groups: object = (("lerp_slerp",), ("dq_sclerp",))
 ) -> KeysNeeded:
-    """A clip of 10 s in which so many keys, (groups, decimations), were needed at each of two rates."""
+    """Return the result for a clip of 10 s that needs these numbers of keys, (groups, decimations), at both rates."""
     keys = np.repeat(np.array(keys, dtype=float)[..., None], 2, axis=-1)
     return KeysNeeded(
         clip=name,

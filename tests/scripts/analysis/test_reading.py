@@ -1,4 +1,4 @@
-"""Reading sources: of several bodies the good ones stay, and the others are named."""
+"""Tests of reading sources: good bodies are kept, and the others are named."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from rigid_motion_batch.recordings import clip_reading as study
 
 
 def body(name: str, sound: int, lost: int = 0) -> Trajectory:
-    """A body with so many good samples, and so many that were not tracked."""
+    """Return a body with `sound` good samples, and `lost` samples that were not tracked."""
     positions = np.zeros((sound + lost, 3))
     positions[sound:] = np.nan
     quaternions = np.tile((1.0, 0.0, 0.0, 0.0), (sound + lost, 1))
@@ -20,7 +20,7 @@ def body(name: str, sound: int, lost: int = 0) -> Trajectory:
 
 @pytest.fixture
 def recorded(monkeypatch: pytest.MonkeyPatch):
-    """Lets a source hold these bodies."""
+    """Return a function that makes every source contain these bodies."""
 
     def hold(*bodies: Trajectory, named: str = "") -> None:
         recording = Recording(Path("take.csv"), bodies, body=named)

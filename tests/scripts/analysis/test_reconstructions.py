@@ -1,4 +1,4 @@
-"""Whole bodies under few keys: which keys there are, and that errors do not depend on how they are worked out."""
+"""Tests of whole bodies with few keys: which keys there are, and that their errors match independent computations."""
 
 from dataclasses import replace
 
@@ -38,8 +38,8 @@ def measured(made: Reconstruction, mode: str = "lerp_slerp") -> MotionErrors:
     return errors_of(made, mode, Ground.of(made))
 
 
-def independently(made: Reconstruction, mode: str) -> np.ndarray:
-    """The shell errors by matrices, in metres."""
+def errors_by_matrices(made: Reconstruction, mode: str) -> np.ndarray:
+    """Return the shell errors in metres, computed with matrices."""
     clip = made.clip
     metres = Poses(clip.poses.positions * clip.metres_per_unit, clip.poses.quaternions)
     keys = tuple(np.resize(own, max(len(own), 1)) for own in made.keys[mode])
@@ -81,7 +81,7 @@ def test_keys_that_the_motion_chooses_keep_every_joint_within_the_tolerance(mode
     made = reconstruct(swinging_body(), Tolerance("15mm"), (mode,), RADII, shared=shared)
     errors = measured(made, mode)
     assert errors.shell.max() <= 0.015 * (1.0 + 1e-9)
-    np.testing.assert_allclose(errors.shell, independently(made, mode), atol=1e-9)
+    np.testing.assert_allclose(errors.shell, errors_by_matrices(made, mode), atol=1e-9)
     moved = [tuple(own) for own in made.keys[mode] if len(own) > 1]
     assert (len(set(moved)) == 1) == shared
     assert all(own[0] == 0 and own[-1] == len(made.clip.times) - 1 for own in moved)
@@ -91,7 +91,7 @@ def test_keys_that_the_motion_chooses_keep_every_joint_within_the_tolerance(mode
 def test_errors_are_had_again_by_matrices(mode: str) -> None:
     made = evenly(swinging_body(seed=5), "4", (mode,))
     errors = measured(made, mode).shell
-    np.testing.assert_allclose(errors, independently(made, mode), atol=1e-9)
+    np.testing.assert_allclose(errors, errors_by_matrices(made, mode), atol=1e-9)
     assert rms(made.shell(mode)) == pytest.approx(np.sqrt(np.mean(errors**2)), rel=1e-12)
 
 
@@ -129,7 +129,7 @@ def test_a_foot_that_stands_is_seen_and_how_far_it_slides_is_the_farthest_from_w
 def test_the_point_that_stays_is_found_and_how_far_each_mode_moves_it() -> None:
     times, pivot = np.linspace(0.0, 2.0, 121), np.array((0.2, -0.1, 0.3))
     random = np.random.default_rng(2)
-    # About a point of its own, by turns of any kind; beside it a hinge, which is a line of such points.
+    # Arbitrary rotations about one point; then a hinge, on which every point stays.
     wild = normalise(np.array((1.0, 0.0, 0.0, 0.0)) + np.sin(np.outer(3.0 * times, random.normal(size=4))))
     half = 0.7 * np.sin(2.0 * times)
     hinge = np.stack((np.cos(half), 0.0 * half, 0.0 * half, np.sin(half)), axis=1)

@@ -1,4 +1,4 @@
-"""Steps that need Blender, for the tests: standard library and bpy alone."""
+"""Test steps that need Blender, using only the standard library and bpy."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rigid_motion_batch.pipeline.steps import Step, StepJob
 
 
 class Save(Step, blender=True):
-    """Write a .blend file with a scene of this name, and whether it was a Blender with a program of its own."""
+    """Write a .blend file with a scene of this name, and note whether bpy ran in a Blender program."""
 
     name: str
     frames: tuple[int, ...] = ()

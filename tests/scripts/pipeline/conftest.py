@@ -1,4 +1,4 @@
-"""Where runs of the pipeline write."""
+"""Fixtures for tests of the pipeline: the output folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plans of the steps in `steps`, and what is to be seen of their runs."""
+"""Helpers to run plans of the steps in `steps`, and to inspect the results."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EXECUTORS = {"serial": Executor, "processes": lambda: ProcessExecutor(2)}
 
 
 def task(name: str, step: Step, *after: Task, **fields: object) -> Task:
-    """A task that publishes its file under its name."""
+    """Return a task that publishes its file under its name."""
     fields = {"publish": {FILE: f"{name}.txt"}} | fields
     return Task(step, name, after=tuple(item.key for item in after), **fields)
 
@@ -28,12 +28,12 @@ def writing(name: str, text: str = "", log: object = "", **fields: object) -> Ta
 
 
 def joining(name: str, *after: Task, log: object = "", **fields: object) -> Task:
-    """A task that joins the texts of others."""
+    """Return a task that joins the texts of other tasks."""
     return task(name, Join(str(log)), *after, **fields)
 
 
 class Listener(Progress):
-    """Keeps what it is told."""
+    """Records progress and notes."""
 
     def __init__(self) -> None:
         super().__init__(io.StringIO())
@@ -55,7 +55,7 @@ class Listener(Progress):
 
 
 class Watched(Store):
-    """Keeps the names of the tasks that made something."""
+    """A store that records the names of tasks that made a result."""
 
     def __init__(self, output: Path, **options: object) -> None:
         super().__init__(output, **options)
@@ -67,7 +67,7 @@ class Watched(Store):
 
 
 def run(plan: Plan, store: Store, executor: Executor, **options: object) -> Run:
-    """Do what is missing of a plan."""
+    """Run the missing tasks of a plan."""
     work = Run(store, executor, **{"progress": Listener(), **options})
     work.do(plan)
     return work
@@ -86,7 +86,7 @@ def states(outcome: Run) -> dict[str, int]:
 
 
 def contents(output: Path) -> dict[str, str]:
-    """The files in a folder, without what the pipeline keeps there of its own."""
+    """Return the texts of all files in a folder, except the pipeline's own files."""
     return {
         path.relative_to(output).as_posix(): path.read_text()
         for path in output.rglob("*")
@@ -95,5 +95,5 @@ def contents(output: Path) -> dict[str, str]:
 
 
 def half_written(output: Path) -> list[Path]:
-    """What is being made, or was when it was killed."""
+    """Return the files being made, also those of a killed run."""
     return [*(output / OWN_FOLDER / "scratch").glob("*")]

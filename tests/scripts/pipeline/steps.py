@@ -1,4 +1,4 @@
-"""Steps for the tests of the pipeline: what they do can be seen from outside, in files."""
+"""Steps for tests of the pipeline, with effects that can be seen from outside, in files."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from pathlib import Path
 from rigid_motion_batch.pipeline.steps import Step, StepJob, TaskError
 
 FILE = "out.txt"
-"""The one file that every result has."""
+"""The file that every result has."""
 
 
 class Write(Step, stage="write"):
-    """Write a text, and note in a log that it was done."""
+    """Writes a text, and notes that in a log."""
 
     text: str = ""
     log: str = ""
     seconds: float = 0.0
     files: tuple[str, ...] = ()
-    """More of them, with the same text."""
+    """Further files with the same text."""
 
     def make(self, job: StepJob) -> dict[str, int]:
         _note(self.log, self.text)
@@ -35,7 +35,7 @@ class Write(Step, stage="write"):
 
 
 class Join(Step, stage="join"):
-    """Write what is in the results before it that are there."""
+    """Writes the joined texts of the available results before it."""
 
     log: str = ""
 
@@ -45,11 +45,11 @@ class Join(Step, stage="join"):
 
 
 class Report(Join, stage="report", partial=True):
-    """The same, also where some are missing."""
+    """A `Join` that also runs if some results are missing."""
 
 
 class Copy(Step):
-    """Write what is in a file from outside."""
+    """Writes the content of an input file."""
 
     log: str = ""
 
@@ -63,7 +63,7 @@ class Copy(Step):
 
 
 class Vanish(Copy):
-    """Write what is in a file that is taken away meanwhile."""
+    """Writes the content of an input file, which then disappears."""
 
     def make(self, job: StepJob) -> None:
         super().make(job)
@@ -71,7 +71,7 @@ class Vanish(Copy):
 
 
 class Fail(Step):
-    """Write half, and fail."""
+    """Writes half, and fails."""
 
     foreseen: bool = True
 
@@ -83,7 +83,7 @@ class Fail(Step):
 
 
 class Stumble(Step):
-    """Fail at writing a file."""
+    """Fails to write a file."""
 
     file: str
 
@@ -93,14 +93,14 @@ class Stumble(Step):
 
 
 class Forget(Step):
-    """Make nothing."""
+    """Makes no file."""
 
     def make(self, job: StepJob) -> None:
         pass
 
 
 class Die(Step):
-    """Write half and die of SIGKILL, so many times; then write all."""
+    """Writes half and dies of SIGKILL, the first `times` times; then writes everything."""
 
     marker: str
     times: int
@@ -117,7 +117,7 @@ class Die(Step):
 
 
 class ProcessId(Step):
-    """Write who did it, after a while."""
+    """Writes the process id, after some seconds."""
 
     text: str
     seconds: float
@@ -128,14 +128,14 @@ class ProcessId(Step):
 
 
 class FillDisk(Step):
-    """What writing on a full disk comes to."""
+    """Fails as on a full disk."""
 
     def make(self, job: StepJob) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(job.folder / FILE))
 
 
 class Chatter(Step):
-    """Print on the standard output as Blender does, from Python and from below, and say how far it is."""
+    """Prints to standard output as Blender does, from Python and from C, and reports progress."""
 
     def make(self, job: StepJob) -> None:
         print("Saved: 'x.png'", flush=True)

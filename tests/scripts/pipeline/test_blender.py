@@ -1,4 +1,4 @@
-"""Steps in a Blender program. `BLENDER` names one; without it a stand-in runs the worker in a Python with bpy."""
+"""Tests of steps run by a Blender program, named by `BLENDER`; otherwise by a stand-in, a Python with bpy."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ else:
 
 @pytest.fixture(params=["program", "stand-in"])
 def blender(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    monkeypatch.delenv("PYTHONPATH")  # A Blender finds nothing by it.
+    monkeypatch.delenv("PYTHONPATH")  # Blender ignores it.
     monkeypatch.chdir(ROOT)
     if request.param == "program":
         if "BLENDER" not in os.environ:
@@ -126,7 +126,7 @@ def test_a_blender_ends_with_what_started_it(blender: str, tmp_path: Path) -> No
 
 
 def blenders() -> list[int]:
-    """The processes that do a request."""
+    """Return the ids of processes that perform a request in Blender."""
     result = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:

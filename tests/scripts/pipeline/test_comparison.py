@@ -1,4 +1,4 @@
-"""A comparison as a plan: what it makes, and what is done again when something changes."""
+"""Tests of a comparison as a plan: its results, and which tasks run again after a change."""
 
 from __future__ import annotations
 
@@ -198,7 +198,7 @@ def test_only_what_an_option_changes_is_done_again(
 
 @pytest.mark.slow
 def test_a_clip_takes_two_kilobytes_at_most_between_two_plans(output: Path, toss: Path) -> None:
-    """Ten thousand clips, and Python with the program, are to stay within 200 MB."""
+    """The limit for ten thousand clips, and Python with the program, is 200 MB."""
     import tracemalloc
 
     for number in range(60):

@@ -1,4 +1,4 @@
-"""Random histories of a folder: plans change, files are edited, deleted and damaged, and runs do what is missing."""
+"""Random histories of an output folder: plans change, files are edited, deleted and damaged, and runs catch up."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NAMES = st.sampled_from(["a", "b", "both", "after", "report"])
 
 
 class Histories(RuleBasedStateMachine):
-    """Two tasks that may be the same or fail, one that reads both, one that reads that, and one that takes any."""
+    """Two tasks that may be equal or fail, one that joins both, one that joins that, and one that accepts gaps."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -31,13 +31,13 @@ class Histories(RuleBasedStateMachine):
         self.output, self.log = self.folder / "out", self.folder / "log"
         self.texts = {"a": "1", "b": "2"}
         self.kept: dict[str, str] = {}
-        """The key of each result that is there, and its text."""
+        """The key of each existing result, and its text."""
         self.there: dict[str, str] = {}
-        """What is in the file of each task."""
+        """The content of the file of each task."""
         self.placed: dict[str, str] = {}
-        """The key of the result that a file is, if it was not touched since."""
+        """The key of the result that a file was published from, unless the file was touched since."""
         self.own: dict[str, set[str]] = {name: set() for name in ("a", "b", "both", "after", "report")}
-        """All that was ever put into the file of each task."""
+        """All texts that were ever published to the file of each task."""
 
     def teardown(self) -> None:
         shutil.rmtree(self.folder)
@@ -91,15 +91,15 @@ class Histories(RuleBasedStateMachine):
                 run_in(self.output, *plan)
         else:
             outcome = run_in(self.output, *plan, overwrite=overwrite)
-            done, failed, skipped = self.follow(plan)
+            done, failed, skipped = self.simulate(plan)
             assert outcome.failures == dict.fromkeys(failed, "it cannot be made; make another")
             assert states(outcome).get(FAILED, 0) == len(failed)
             assert states(outcome).get(SKIPPED, 0) == skipped
         assert sorted(self.log.read_text().split()) == sorted(done)
         assert contents(self.output) == {f"{name}.txt": text for name, text in self.there.items()}
 
-    def follow(self, plan: list[Task]) -> tuple[list[str], set[str], int]:
-        """Do in mind what a run does, and return what it notes in the log, the failures, and how many are skipped."""
+    def simulate(self, plan: list[Task]) -> tuple[list[str], set[str], int]:
+        """Simulate a run, and return the expected log, the failed tasks, and the number of skipped tasks."""
         settled: dict[str, str | None] = {}
         done, failed, skipped = [], set(), 0
         for it in plan:

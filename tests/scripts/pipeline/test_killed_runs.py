@@ -1,4 +1,4 @@
-"""Runs and workers that are killed: what is done stays, and the next run ends the work."""
+"""Tests of killed runs and workers: finished results stay, and the next run completes the work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tasks in processes of their own: how many there are, and what happens when one dies."""
+"""Tests of tasks in separate processes: how many run, and what happens if one dies."""
 
 from __future__ import annotations
 

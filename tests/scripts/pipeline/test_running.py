@@ -1,4 +1,4 @@
-"""What a run does, whoever does it."""
+"""Tests of runs of plans, with any executor."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from tests.scripts.pipeline.steps import FILE, Fail, Join, Write
 
 
 class Log:
-    """Which tasks were begun, between two looks."""
+    """The log of started tasks; `new` returns those since its last call."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.seen = path, 0
@@ -119,7 +119,7 @@ def test_what_was_published_of_something_else_does_not_pass_for_the_result_of_a_
 
 
 def test_a_plan_is_taken_task_by_task(output: Path) -> None:
-    """Of ten thousand clips only a few are in memory."""
+    """With ten thousand clips, only a few may be in memory."""
     ahead: list[int] = []
 
     def plan() -> Iterator[Task]:
@@ -133,7 +133,7 @@ def test_a_plan_is_taken_task_by_task(output: Path) -> None:
 
 
 def film(output: Path, log: object, piece: str = "1", step: Step | None = None, **options: object) -> Run:
-    """Run a plan of a film whose pieces are wanted where it is missing only."""
+    """Run a plan of a film, with pieces that are made only if the film is missing."""
     pieces = [Task(Write(text, str(log)), f"piece {text}") for text in (piece, "2")]
     whole = task("film", step or Join(str(log)), *pieces, spends=tuple(item.key for item in pieces))
     with Store(output, **options) as store, Executor() as executor:
@@ -247,6 +247,6 @@ def test_progress_is_told_in_weights_and_names(output: Path) -> None:
     tasks = [writing("a", seconds=2.0), task("b", steps.Chatter(), seconds=4.0)]
     outcome = run_in(output, *tasks, executor=ProcessExecutor(2), progress=listener)
     assert listener.total == 6.0
-    assert any(doing == "b" and done in (2.0, 4.0) for done, doing in listener.reached)  # Half of it is 2.0.
+    assert any(doing == "b" and done in (2.0, 4.0) for done, doing in listener.reached)  # Half of the total is 2.0.
     assert listener.reached[-1][0] == 6.0
     assert states(outcome) == {"done": 2}

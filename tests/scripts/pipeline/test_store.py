@@ -1,4 +1,4 @@
-"""The output folder: nothing of others is replaced, damage is noticed, two runs do not share it."""
+"""Tests of the output folder: foreign files are never replaced, damage is noticed, two runs cannot share it."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ def test_whatever_becomes_of_its_records_the_work_goes_on(
 
 
 def rewritten(path: Path, content: str) -> None:
-    """Change a file so that its size and time do not show it."""
+    """Change a file's content, keeping its size and time."""
     status = path.stat()
     assert len(content) == status.st_size
     path.write_text(content)
@@ -241,7 +241,7 @@ def test_a_file_without_a_task_that_publishes_it_any_more_can_be_withdrawn(outpu
 
 
 def test_a_folder_for_nothing_is_gone_where_a_lock_that_is_held_cannot_be_deleted(output, monkeypatch) -> None:
-    """So it is on Windows, where the lock is deleted as it is released."""
+    """As on Windows, where the lock is deleted on release."""
     plain = os.unlink
 
     def unlink(path: str, **options: object) -> None:

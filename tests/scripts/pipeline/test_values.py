@@ -1,4 +1,4 @@
-"""Values as JSON and arrays, and back."""
+"""Tests of converting values to JSON and arrays, and back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a task is done again for: a change in the part of the program that its step may use."""
+"""Tests of step versions: a task runs again if the code that its step may use changes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.scripts.pipeline.steps import Write
 
 @pytest.fixture
 def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A room of the program."""
+    """Return a folder that stands for the program, with two rooms (folders of modules)."""
     monkeypatch.setattr(places, "place_of", lambda name: tmp_path / name)
     digest_of.cache_clear()
     (tmp_path / "measuring" / "deep").mkdir(parents=True)

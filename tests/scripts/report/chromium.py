@@ -1,4 +1,4 @@
-"""A headless Chromium, driven through its pipe for debugging: pages are opened, looked at and used as by hand."""
+"""A headless Chromium for tests, driven through its debugging pipe: opens pages, inspects and operates them."""
 
 import json
 import os
@@ -16,7 +16,7 @@ PROGRAM = next((path for name in NAMES if (path := shutil.which(name))), None)
 
 
 PATIENCE = 90.0
-"""Seconds that an answer may take."""
+"""Maximum seconds to wait for an answer."""
 
 WITH_PIPE = """
 import fcntl, os, sys
@@ -25,11 +25,11 @@ os.dup2(pipe[0], 3)
 os.dup2(pipe[1], 4)
 os.execv(sys.argv[3], sys.argv[3:])
 """
-"""Becomes a program that has two files of ours as 3 and 4, which is where Chromium looks for its pipe."""
+"""Replaces itself by a program with two of our files as descriptors 3 and 4, where Chromium looks for its pipe."""
 
 
 class Browser:
-    """One page. `problems` has what its console complained of, `requests` the addresses that it asked for."""
+    """One page. `problems` are its console's complaints, `requests` the addresses that it requested."""
 
     def __init__(self, sent: Any, answers: int) -> None:
         self._sent, self._answers, self._number, self._session, self._read = sent, answers, 0, {}, b""
@@ -42,7 +42,7 @@ class Browser:
             self.call(f"{domain}.enable")
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """Have something done, and return what it gives."""
+        """Call a method of the debugging protocol, and return its result."""
         self._number += 1
         number = self._number
         message = {"id": number, "method": method, "params": parameters, **self._session}
@@ -76,14 +76,14 @@ class Browser:
         return message
 
     def close(self) -> None:
-        """Have the browser end, all of its processes."""
+        """End the browser with all of its processes."""
         self._session = {}
         self.call("Browser.close")
 
     def open(
         self, address: str, *, width: int = 1440, height: int = 900, dark: bool = False, script: bool = True
     ) -> None:
-        """Open a page of so many pixels, and wait until it is loaded."""
+        """Open a page of this size in pixels, and wait until it is loaded."""
         phone = width < 600
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
@@ -91,24 +91,24 @@ class Browser:
         self.call("Emulation.setEmulatedMedia", features=[scheme, calm])
         self.call("Emulation.setScriptExecutionDisabled", value=not script)
         self.loaded = False
-        # A page that differs in the fragment alone would not be loaded anew.
+        # A page that differs only in the fragment would not be reloaded.
         place, mark, fragment = address.partition("#")
         self.call("Page.navigate", url=f"{place}?{self._number}{mark}{fragment}")
         while not self.loaded:
             self._receive()
 
     def run(self, expression: str) -> Any:
-        """The value of an expression of JavaScript, awaited."""
+        """Return the value of a JavaScript expression, awaited."""
         answer = self.call("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
     def settle(self) -> None:
-        """Wait until what was asked for is on the screen."""
+        """Wait until the page has drawn pending changes."""
         self.run("new Promise((done) => setTimeout(() => [requestAnimationFrame(done), setTimeout(done, 300)], 450))")
 
     def mouse(self, *moves: tuple[str, float, float]) -> None:
-        """Moves of the left button: ("pressed" | "moved" | "released", x, y), in pixels of the page."""
+        """Send events of the left button: ("pressed" | "moved" | "released", x, y), in pixels of the page."""
         held = 0
         for what, x, y in moves:
             held = {"pressed": 1, "released": 0}.get(what, held)

@@ -1,4 +1,4 @@
-"""The viewer's modules run without a page: by Node where there is one, otherwise in a headless Chromium."""
+"""Runs the viewer's modules without a page: in Node if available, otherwise in a headless Chromium."""
 
 import json
 import shutil
@@ -14,7 +14,7 @@ NODE = shutil.which("node")
 
 
 def value_of(expression: str, *modules: str) -> Any:
-    """The value of an expression that the exports of these modules are there for, awaited."""
+    """Return the value of an expression that may use the exports of these modules, awaited."""
     script = f"{script_of(modules)}\nreturn {expression};"
     wrapped = f"(async () => {{ {script} }})()"
     if NODE:
@@ -29,6 +29,6 @@ def value_of(expression: str, *modules: str) -> Any:
 
 
 def require() -> None:
-    """Skip a test for which there is no Chromium here."""
+    """Skip the test if there is no Chromium."""
     if not chromium.PROGRAM:
         pytest.skip("there is no Chromium here (Debian: apt-get install chromium)")

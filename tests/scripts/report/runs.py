@@ -1,4 +1,4 @@
-"""Results of a comparison for the tests of the report."""
+"""Results of comparisons, for tests of the report."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,7 +22,7 @@ def result_of(
     warnings: Sequence[ClipWarning] = (),
     needed: bool = False,
 ) -> ClipResult:
-    """What the analysis finds of a clip under some choices of keys."""
+    """Return the results of the analysis of a clip, for some choices of keys."""
     result = [compare_clip(clip, choice, modes, EVERYWHERE) for choice in choices]
     counted = keys_needed(Ways(clip, RIGID_RADIUS_M), modes) if needed else None
     return clip_result(replace(clip, warnings=(*clip.warnings, *warnings)), [item for item in result if item], counted)

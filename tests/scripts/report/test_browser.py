@@ -1,4 +1,4 @@
-"""The page in a browser: it draws, plays and is steered as by hand, complains of nothing and asks for nothing."""
+"""Tests of pages in a browser: they draw, play and can be operated, without console problems or requests."""
 
 import time
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ PATIENCE = 30.0
 
 HOSTILE = "</script><img src=x onerror='broken = 1'><script>broken = 1</script>{{ 7 * 7 }}"
 NOISE = "GL Driver Message"
-"""What Chromium says of its own drawing without a graphics card."""
+"""Chromium's console message about drawing without a graphics card."""
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def chromium() -> Iterator[Browser]:
 
 
 def renamed(result: ChoiceResult) -> ChoiceResult:
-    """A result in which a mode has the name of an attack, as somebody else's motion may have."""
+    """Return a result in which a mode has a hostile name, as a foreign motion may have."""
     motions = [
         replace(
             motion,
@@ -55,7 +55,7 @@ def renamed(result: ChoiceResult) -> ChoiceResult:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Pages of all kinds."""
+    """Return a folder with pages of all kinds."""
     folder = tmp_path_factory.mktemp("pages")
     two = [
         result_of(swinging_clip("a"), warnings=[WARNING]),
@@ -76,7 +76,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def page(chromium: Browser, folder: Path) -> Iterator[Browser]:
-    """A browser in which nothing went wrong once the test is over, and that no request has left."""
+    """Yield a browser, and check after the test that it had no problems and sent no request."""
     chromium.problems.clear()
     chromium.requests.clear()
     yield chromium
@@ -110,7 +110,7 @@ def near(moment: float) -> str:
 
 
 def opened(page: Browser, path: Path, fragment: str = "", **how: Any) -> Browser:
-    """Open a page, and wait until it shows its clip, or says why not."""
+    """Open a page, and wait until it shows its clip, or an explanation why it cannot."""
     page.open(f"{path.as_uri()}{fragment}", **how)
     shows(page, "document.querySelector('#overview, #cursor line') !== null || "
                 "document.getElementById('about').textContent.endsWith('page')")  # fmt: skip
@@ -123,7 +123,7 @@ def now(page: Browser) -> float:
 
 
 def colours_in_view(page: Browser) -> int:
-    """How many colours the view has."""
+    """Return the number of colours in the view."""
     return page.run(
         """(() => { const canvas = document.createElement("canvas"), view = document.getElementById("view");
         Object.assign(canvas, { width: view.width, height: view.height });
@@ -151,7 +151,7 @@ def test_every_page_draws_its_view_and_chart_and_fits(page, folder, name, dark, 
     assert len(curves) >= 2
     assert min(curves) > 100
     assert page.run("document.documentElement.scrollWidth") <= width
-    # All that matters is on the first screen.
+    # Everything important is on the first screen.
     assert box(page, "#view")["y"] + box(page, "#view")["height"] < 900
 
 
@@ -243,7 +243,7 @@ def test_names_are_nothing_but_text(page: Browser, folder: Path) -> None:
 
 def test_without_a_script_the_numbers_are_there(page: Browser, folder: Path) -> None:
     page.open((folder / "two.html").as_uri(), script=False)
-    # What runs here is the test's, not the page's.
+    # The script run here is the test's, not the page's.
     page.call("Emulation.setScriptExecutionDisabled", value=False)
     assert page.run("getComputedStyle(document.querySelector('.stage')).display") == "none"
     assert page.run("document.querySelector('.grid').offsetHeight") > 100

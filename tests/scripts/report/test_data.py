@@ -1,4 +1,4 @@
-"""What Python packs is what the viewer reads, and the viewer's mathematics is that of the program."""
+"""Tests of the viewer's data: JavaScript reads what Python packs, and both compute the same mathematics."""
 
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ TEN = (Uniform("10"),)
 
 
 def read(clip: ClipResult, expression: str) -> Any:
-    """An expression of JavaScript in which `recording` and `choice` are those of a clip, as the viewer reads them."""
+    """Evaluate a JavaScript expression in which `recording` and `choice` are a clip's, as the viewer reads them."""
     packed = json_in_page(clip_data(clip, str, drill()))
     made = f"""(async (clip) => {{
         const recording = await readRecording(clip.recording), choice = await readChoice(clip.choices[0], recording);
@@ -34,7 +34,7 @@ def read(clip: ClipResult, expression: str) -> Any:
 
 
 def middle_of(clip: ClipResult) -> np.ndarray:
-    """Of the box around the recording."""
+    """Return the centre of the box around the recording."""
     places = clip.truth.positions.reshape(-1, 3)
     return (places.min(axis=0) + places.max(axis=0)) / 2.0
 
@@ -120,5 +120,5 @@ def test_a_body_is_in_the_middle_wherever_its_root_stands() -> None:
     np.testing.assert_allclose(low, -high, atol=1e-12)
     assert result["drawn"] == [1, 2, 3, 4, 5, 6, 7]
     assert result["size"] == pytest.approx(1.57, abs=0.02)
-    # It walks 3.5 m, more than 5 m from where its root stands.
+    # The body walks 3.5 m, more than 5 m from its resting root.
     assert np.ptp(result["box"], axis=0).max() == pytest.approx(3.9, abs=0.3)

@@ -1,4 +1,4 @@
-"""The page is one file that needs no network, says all numbers without a script too, and trusts no name."""
+"""Tests of report pages: one file without requests, with all numbers even without scripts, safe with any name."""
 
 import csv
 import io
@@ -31,14 +31,14 @@ TEN = (Uniform("10"),)
 
 
 class Page(HTMLParser):
-    """What is in a page: texts by the element that they are in, and the attributes of all elements."""
+    """The content of a page: texts by the element around them, and the attributes of all elements."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
         self.elements: list[tuple[str, dict[str, str | None]]] = []
         self.texts: dict[str, list[str]] = {}
         self.words = ""
-        """All that is shown, in its order."""
+        """All visible text, in order."""
         self._open = [""]
         self.feed(path.read_text(encoding="utf-8"))
 
@@ -96,7 +96,7 @@ def test_every_number_is_there_without_a_script(tmp_path: Path) -> None:
             for motion in result.motions:
                 row = motion.metrics[0]
                 for value in (1e3 * row.rms_shell_m, 1e3 * row.max_shell_m, row.rms_rotation_deg):
-                    assert any(_same(text, value) for text in cells), value
+                    assert any(_has_value(text, value) for text in cells), value
 
 
 def test_it_opens_with_what_the_verdict_speaks_of_and_says_what_the_errors_are(tmp_path: Path) -> None:
@@ -114,7 +114,7 @@ def test_it_opens_with_what_the_verdict_speaks_of_and_says_what_the_errors_are(t
     assert "10 cm of the body's origin or 3 cm of a joint is out of place" in both
 
 
-def _same(text: str, value: float) -> bool:
+def _has_value(text: str, value: float) -> bool:
     try:
         return abs(float(text) - value) <= 5e-3 * value
     except ValueError:
@@ -134,7 +134,7 @@ def test_the_table_to_take_along_is_that_of_all_modes(tmp_path: Path) -> None:
 def test_a_warning_is_above_the_verdict_and_leads_to_its_moment(tmp_path: Path) -> None:
     warning = ClipWarning("A gap of 183 ms.", "Record again.", 101.25, 101.5)
     page = written(tmp_path / "report.html", result_of(swinging_clip(), TEN, warnings=[warning]))
-    # The recording begins at 100 s, the page's time with it.
+    # The recording starts at 100 s, and so does the page's time.
     assert "#swing,10,1.250" in page.attributes("a", "href")
     text = all_text(page)
     assert (

@@ -1,4 +1,4 @@
-"""The verdict is one true sentence with a number, whatever a run comes to."""
+"""Tests of the verdict: one true sentence with a number, for any outcome of a run."""
 
 from collections.abc import Mapping, Sequence
 
@@ -16,7 +16,7 @@ FIVE, TEN, TWENTY = map(Uniform, ("5", "10", "20"))
 def numbers(
     choices: Sequence[Choice], *clips: Mapping[str, Sequence[float]], same: Sequence[tuple[str, ...]] = ()
 ) -> Numbers:
-    """A run in which these clips have these errors, in mm (keys a second within a tolerance), under each choice."""
+    """Return a run with these clips' errors in mm (or keys per second within a tolerance), under each choice."""
     modes = tuple(clips[0])
     values = np.full((len(MEASURES), len(clips), len(choices), len(modes)), np.nan)
     for place, clip in enumerate(clips):
@@ -30,7 +30,7 @@ def numbers(
 
 
 def keys_needed(keys: Mapping[str, Sequence[float]], *, fitted: bool = False) -> KeysNeeded:
-    """A clip of 10 s on which modes need so many keys to be as good as the reference with 201: one for each spacing."""
+    """Return a clip of 10 s whose modes need these keys to match the reference with 201, one number per spacing."""
     groups = tuple((mode,) for mode in keys)
     ways = 3 if fitted else 2
     result = np.stack([np.repeat(np.array(keys[group[0]], float)[:, None], len(RATES), axis=1) for group in groups])

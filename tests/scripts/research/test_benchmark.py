@@ -1,4 +1,4 @@
-"""The benchmark's cases are what they say, and its figures what the page reads."""
+"""Tests of the interpolation benchmark: rates of the fastest round, and the figures that its page reads."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The benchmark of modes in Blender does what it says, and its figures are what the page reads."""
+"""Tests of the benchmark of modes in Blender, and of the figures that its page reads."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The figures of whole bodies, on a small one."""
+"""Tests of the reduction study on whole bodies, with a small body."""
 
 import bpy
 import numpy as np
@@ -14,7 +14,7 @@ from tests.balls import largest_displacements
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.research.keeping import written
 
-# Blender's BVH importer leaves closing the file to Python.
+# Blender's BVH importer leaves it to Python to close the file.
 pytestmark = [pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"), pytest.mark.any_blender]
 
 TIMES = np.arange(24) / 30.0
@@ -27,7 +27,7 @@ def body(tmp_path) -> Clip:
 
 
 def shown(body: DecimatedBody) -> np.ndarray:
-    """Matrices of all bones in the world, frame by frame, shape (n, joints, 4, 4)."""
+    """Return the world matrices of all bones, frame by frame, shape (n, joints, 4, 4)."""
     result = []
     for frame in body.frames:
         bpy.context.scene.frame_set(int(frame), subframe=frame - int(frame))

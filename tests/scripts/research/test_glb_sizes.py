@@ -1,4 +1,4 @@
-"""What the benchmark of GLB files measures is what its page says."""
+"""Tests of the GLB benchmark: it measures what its page says."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ def written(made: Making, path: Path, name: str = "Walk") -> Path:
 
 
 def moved(made: Making, frame: int) -> Making:
-    """The same, with the first joint elsewhere on one frame."""
+    """Return the file with the first joint displaced on one frame."""
     channel = made.json["animations"][0]["channels"][0]
     output = made.json["animations"][0]["samplers"][channel["sampler"]]["output"]
     view = made.json["bufferViews"][made.json["accessors"][output]["bufferView"]]

@@ -1,4 +1,4 @@
-"""Models of game engines, on a link that does nothing but take its time; and the study that has them."""
+"""Tests of the game engines' models on a link with only a constant delay, and of the live cost study."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def test_a_steady_hand_is_shown_steadily(engine: str) -> None:
     hand = Poses(times[:, None] * (0.5, 0.0, 0.0), np.tile((1.0, 0.0, 0.0, 0.0), (900, 1)))
     truth, frames = truth_of(times, hand), np.arange(0.5, 9.9, 1.0 / PICTURES_PER_S)
     result = seen(by_engine(engine, truth, Way(0.02, 0.02, 0.0), frames), truth, frames)
-    # By half an update at most: an engine without a buffer holds each until the next.
+    # At most half an update's motion: an engine without a buffer holds each pose until the next.
     assert result["largest_mm"] < 1e3 * 0.5 / 30.0 + 3.0
     assert (result["freezes"], result["jumps_back"]) == (0, 0)
     assert 0.02 < result["delay"] < 0.3

@@ -1,4 +1,4 @@
-"""Pages have the figures of their studies."""
+"""Tests that pages contain the figures of their studies."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,7 @@ TEMPLATES = environment()
 
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
-    """A checkout without pages."""
+    """Return a checkout without pages."""
     for folder in ("docs/figures", "docs/templates"):
         (tmp_path / folder).mkdir(parents=True)
     return tmp_path
@@ -29,7 +29,7 @@ def test_every_quote_ends_and_none_begins_a_line_of_a_paragraph(path: Path):
     assert not re.findall(r"[^\w.\N{EN DASH}][-\N{MINUS SIGN}]\d+(?:\.\d+)? ?%", page), "a negative percentage"
     assert page.count("<!--= ") == page.count("<!-- end -->") == len(QUOTE.findall(page))
     for line in page.splitlines():
-        # Markdown takes such a line for HTML, and leaves what follows on it as it is.
+        # Markdown treats such a line as HTML, and does not format the rest of it.
         assert not re.match(r"\s*(?:[-*] )?<!-- ?(?:= .+?|end) -->.", line), line
 
 

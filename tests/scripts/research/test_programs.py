@@ -1,4 +1,4 @@
-"""Every study and benchmark that `python scripts/research` knows is there."""
+"""Tests that every study and benchmark of `python scripts/research` exists."""
 
 from importlib import import_module
 

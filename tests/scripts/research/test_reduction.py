@@ -1,4 +1,4 @@
-"""The figures of reduced keys and of Blender's Decimate are those of what Blender shows."""
+"""Tests of the reduction study: figures of reduced keys and of Decimate match Blender's evaluation."""
 
 import pytest
 
@@ -24,7 +24,7 @@ def live():
 
 @pytest.fixture(scope="module")
 def clip() -> Clip:
-    """The first two seconds of a clip."""
+    """Return the first two seconds of a clip."""
     whole = reduction.read(reduction.ASSETS / "reach.csv", 30.0)
     return part_of(whole, 0, 59 * PARTS_PER_FRAME)
 

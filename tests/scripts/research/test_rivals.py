@@ -1,4 +1,4 @@
-"""The modes beside Blender's curves: what is rigid stays rigid, and the figures are those that the page reads."""
+"""Tests of the comparison with Blender's curves: rigid connections stay rigid, and the page's figures are written."""
 
 import json
 from pathlib import Path
@@ -21,7 +21,7 @@ def test_a_tool_stays_in_the_hand_and_a_door_on_its_hinge_by_screws_alone():
             assert row["dq_sclerp"] == row["motor_spline"] == 0.0
     for degrees, off in ((60.0, 107.18), (120.0, 400.0)):
         door = rivals.door(degrees)
-        # Half a chord's distance from the arc.
+        # The distance from the middle of the chord to the arc.
         assert door["lerp_slerp"] == pytest.approx(off, abs=0.01)
         assert door["dq_sclerp"] == 0.0
 

@@ -54,12 +54,12 @@ def timeline_of(made: Reconstruction) -> Timeline:
 
 
 def bones_of_joints() -> list[str]:
-    """What the bones of the joints are called; Blender has an order of its own."""
+    """Return the names of the joints' bones, in the order of joints; Blender has a different order."""
     return [group.name for group in bpy.data.objects["lerp_slerp keys"].vertex_groups]
 
 
 def seen(rig: bpy.types.Object, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the joints are that bones are turned from, in the space of the armature, as Blender shows them now."""
+    """Return the evaluated joints at the current frame, in the space of the armature, from the poses of their bones."""
     evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     matrices = np.array([evaluated.pose.bones[bone].matrix for bone in bones_of_joints()])
     quaternions = Rotation.from_matrix(matrices[:, :3, :3]) * Rotation.from_quat(turns, scalar_first=True).inv()
@@ -67,7 +67,7 @@ def seen(rig: bpy.types.Object, turns: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def turns_of(rig: bpy.types.Object, rest: RestFigure) -> np.ndarray:
-    """How bones are turned from their joints."""
+    """Return the rotations from joints to their bones."""
     bones = np.array([rig.data.bones[bone].matrix_local for bone in bones_of_joints()])[:, :3, :3]
     joints = Rotation.from_quat(rest.joints.quaternions, scalar_first=True)
     return (joints.inv() * Rotation.from_matrix(bones)).as_quat(scalar_first=True)
@@ -137,7 +137,7 @@ def test_bones_have_the_keys_that_were_kept_and_their_mode(tmp_path):
 
 
 def errors_at(made: Reconstruction, mode: str, frame: int) -> np.ndarray:
-    """How far any point of the ball at each joint is off, tried with many points."""
+    """Return the largest displacement of any point of the ball at each joint, from many random points."""
     time = np.atleast_1d(timeline_of(made).times_of(np.array(float(frame))))
     number = int(np.searchsorted(made.clip.times, time[0] - 1e-9))
     assert made.clip.times[number] == pytest.approx(time[0])
@@ -154,7 +154,7 @@ def errors_at(made: Reconstruction, mode: str, frame: int) -> np.ndarray:
 
 @pytest.mark.parametrize("skin", [False, True], ids=["solids", "skin"])
 def test_the_colour_of_each_face_is_that_of_its_joints_error(skin):
-    # Every frame shows a sample.
+    # At this rate, every frame shows a sample.
     made = made_of(dancing_clip(rate=48.0, skin=skin))
     scene = build_body_scene(made, SETTINGS)
     materials = bpy.data.objects["lerp_slerp figure"].data.materials
@@ -171,7 +171,7 @@ def test_the_colour_of_each_face_is_that_of_its_joints_error(skin):
 
 
 def instances_of(name: str) -> list[np.ndarray]:
-    """Where the instances of an object are."""
+    """Return the positions of the instances of an object."""
     return [
         np.array(instance.matrix_world.translation)
         for instance in bpy.context.evaluated_depsgraph_get().object_instances
@@ -196,7 +196,7 @@ def test_joints_flash_at_their_keys_and_the_worst_has_the_ring():
     worst = int(errors_at(made, "lerp_slerp", between).argmax())
     rig = bpy.data.objects["lerp_slerp"].evaluated_get(bpy.context.evaluated_depsgraph_get())
     joint = np.array(rig.matrix_world @ rig.pose.bones[JOINTS[worst]].head)
-    # Nearer to the camera, and at the same place of the picture.
+    # The ring is nearer to the camera, at the same place in the picture.
     assert np.abs(in_picture(scene, ring) - in_picture(scene, joint)).max() < 1e-4
     assert np.linalg.norm(ring - joint) > 0.1
 

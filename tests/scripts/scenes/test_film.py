@@ -33,7 +33,7 @@ def test_the_film_has_every_frame_and_is_what_browsers_play_and_nothing_else_is_
     data = film.read_bytes()
     assert data[4:8] == b"ftyp"
     profile = data[data.index(b"avcC") + 5]
-    assert profile in (66, 77, 100)  # Baseline, Main, High: all of 8 bits and 4:2:0.
+    assert profile in (66, 77, 100)  # Baseline, Main, High: all have 8 bits and 4:2:0.
     movie = bpy.data.movieclips.load(str(film))
     assert movie.frame_duration == scene.frame_end == 9
     assert tuple(movie.size) == (160, 90)

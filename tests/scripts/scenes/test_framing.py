@@ -28,7 +28,7 @@ def test_what_has_room_where_it_is_is_not_followed():
 
 
 def walking(*, climbs: float = 0.0) -> np.ndarray:
-    """Joints of a body that bobs as it goes, and climbs by so many metres."""
+    """Return joints of a body that bobs while walking, and climbs by this many metres."""
     steps = np.linspace(0.0, 12.0, 200)
     middle = np.stack((steps, 0.0 * steps, 1.0 + 0.03 * np.sin(5.0 * steps) + climbs * steps / 12.0), axis=-1)
     return middle[:, None] + np.array([(0.0, 0.2, 0.8), (0.1, -0.2, 0.7), (0.2, 0.0, -1.0), (-0.3, 0.0, -1.0)])

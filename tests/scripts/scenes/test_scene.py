@@ -37,7 +37,7 @@ def changed(clip: Clip, scale: float | tuple[float, ...] = 1.0, offset: float = 
 
 
 def evaluated_points(obj: bpy.types.Object) -> np.ndarray:
-    """World points of the object as it is drawn, instances included."""
+    """Return world positions of the object's vertices as drawn, instances included."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     points = [np.empty((0, 3))]
     for instance in depsgraph.object_instances:
@@ -49,7 +49,7 @@ def evaluated_points(obj: bpy.types.Object) -> np.ndarray:
 
 
 def poses_on(frames: np.ndarray, names: Iterable[str]) -> dict[str, Poses]:
-    """World poses of several objects, for which the scene steps through the frames only once."""
+    """Return world poses of several objects, stepping through the frames only once."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     shown = {name: ([], []) for name in names}
     for frame in frames.astype(int).tolist():
@@ -122,7 +122,7 @@ def test_everything_that_moves_stays_within_its_own_card(size, offset, modes):
                 if "Cut" in obj.modifiers:
                     points = evaluated_points(obj)[::10]
                 seen = np.array([world_to_camera_view(scene, scene.camera, Vector(point)) for point in points])
-                seen = seen.reshape(-1, 3)  # Nothing is left of what is cut altogether.
+                seen = seen.reshape(-1, 3)  # A completely cut object leaves nothing.
                 places = (seen[:, :2] - 0.5) * (aspect, 1.0) - np.array(card.location[:2])
                 assert (np.abs(places) < half).all()
                 assert (seen[:, 2] > scene.camera.data.clip_start).all()

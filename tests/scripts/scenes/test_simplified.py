@@ -1,4 +1,4 @@
-"""The object of a film as few triangles."""
+"""Tests of simplifying the object of a film to few triangles."""
 
 import bpy
 import numpy as np

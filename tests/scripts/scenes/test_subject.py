@@ -9,7 +9,7 @@ from rigid_motion_batch.scenes.subject import load_subject, vertices_of
 
 
 def painted(picture: Path) -> bpy.types.Material:
-    """A material with an image of its own."""
+    """Return a material with an image."""
     image = bpy.data.images.new("Paint", 4, 4)
     image.filepath_raw, image.file_format = str(picture), "PNG"
     image.save()
@@ -22,7 +22,7 @@ def painted(picture: Path) -> bpy.types.Material:
 
 @pytest.fixture
 def user_file(tmp_path, empty_file):
-    """A cube under a parent of twice the size, with a modifier, a material and a script; and a lamp."""
+    """Return a file with a cube (with modifier, material and script) under a parent of twice the size, and a lamp."""
     cube = bpy.data.objects.new("Cube", bpy.data.meshes.new("Cube"))
     corners = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1))).reshape(3, -1).T
     cube.data.from_pydata(corners.tolist(), [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6)])

@@ -1,4 +1,4 @@
-"""Made-up clips of which it is known what should come out, and the throw of the assets."""
+"""Generated clips with known results, and the throw of the assets."""
 
 from functools import cache
 from pathlib import Path
@@ -13,14 +13,14 @@ ASSETS = Path(__file__).resolve().parents[4] / "assets"
 
 
 def clip(name: str, times: np.ndarray, positions: np.ndarray, angles: np.ndarray) -> Clip:
-    """A body at these positions (n, 3) that is turned about z by these angles (n,)."""
+    """Return a body at these positions (n, 3), rotated about z by these angles (n,)."""
     zero = np.zeros_like(angles)
     quaternions = np.stack((np.cos(angles / 2.0), zero, zero, np.sin(angles / 2.0)), axis=-1)
     return Clip(name, f"{name}.csv", "blender", times, Poses(positions, quaternions), ())
 
 
 def circling(name: str = "circling", turns: float = 0.0, *, rate: float = 240.0, seconds: float = 4.0) -> Clip:
-    """A body on a circle of 30 cm, 0.4 times a second round; it turns so many times as much: 1 is a pivot."""
+    """Return a body circling at 30 cm, 0.4 times per second; it rotates `turns` times as fast: 1 is a pivot."""
     times = np.arange(round(rate * seconds) + 1) / rate
     angles = 2.0 * np.pi * 0.4 * times
     positions = 0.3 * np.stack((np.cos(angles), np.sin(angles), np.zeros_like(angles)), axis=-1)
@@ -29,6 +29,6 @@ def circling(name: str = "circling", turns: float = 0.0, *, rate: float = 240.0,
 
 @cache
 def thrown() -> Clip:
-    """A drill that is thrown and caught."""
+    """Return a drill that is thrown and caught."""
     (clip,), _ = read_clips([str(ASSETS / "throw.csv")], "blender")
     return clip

@@ -1,4 +1,4 @@
-"""The throw and the catch."""
+"""Tests of the figure with the throw and the catch."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""The figures: what they show, in numbers, and that it fits into their column."""
+"""Tests of the paper's figures: their numbers, and that their text fits into the column."""
 
 import pytest
 
@@ -19,7 +19,7 @@ def test_the_tip_rests_under_screws_and_leaves_its_place_under_the_state_of_the_
 @pytest.mark.parametrize("figure", ["triangle", "strips", "catching"])
 def test_all_words_are_inside_of_the_picture_and_large_enough_to_read(figure: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(catching, "UPDATES_PER_S", (5, 20))
-    monkeypatch.setattr(Model, "draw", lambda *_, **__: None)  # it takes seconds, and no words are in it
+    monkeypatch.setattr(Model, "draw", lambda *_, **__: None)  # Drawing takes seconds, and adds no text.
     drawn = {"triangle": triangle.draw, "strips": strips.draw, "catching": lambda: catching.pictures(thrown())[1](90)}
     axes = drawn[figure]()
     assert (axes.figure.bbox.width, axes.figure.dpi) == (WIDTH_PX, DOTS_PER_INCH)

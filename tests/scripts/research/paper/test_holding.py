@@ -1,4 +1,4 @@
-"""A tool that recorded hands hold, hand over, throw and catch."""
+"""Tests of a tool that recorded hands hold, hand over, throw and catch."""
 
 from functools import cache
 from typing import Any
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.once
 
 
 def waving(side: str, often: float) -> Clip:
-    """A hand that swings to and fro about z, so many times a second."""
+    """Return a hand that swings to and fro about z, `often` times per second."""
     times = np.arange(0.0, 3.5, 1 / 120)
     angles = np.sin(2.0 * np.pi * often * times)
     return clip(f"made_{side}", times, 0.4 * np.stack((np.cos(angles), np.sin(angles), 0.0 * angles), axis=-1), angles)

@@ -1,4 +1,4 @@
-"""Which recordings count, found out by measuring."""
+"""Tests of which recordings are used, decided by measuring."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`python scripts/research paper`, as people run it, and what a stream costs."""
+"""Tests of `python scripts/research paper` on the command line, and of a stream's cost."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The table on clips of which the answer is known."""
+"""Tests of the table on clips with known results."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def test_a_screw_is_the_straight_line_or_tells_which_way_it_turns(turns: float, 
     needed = table.needed(clip)
     assert needed[straight] == pytest.approx([1.0] * 4)
     for rate, share in zip(UPDATES, needed[screw], strict=True):
-        # 1.6 turns of a pivot: with four segments each is less than half a turn.
+        # A pivot of 1.6 turns: with four segments each is less than half a turn.
         keys = rate * clip.times[-1] + 1.0
         assert share * keys == pytest.approx(5.0 if turns else keys, rel=0.01)
 

@@ -1,4 +1,4 @@
-"""What is raced is the same work, and what is made of the seconds is right. How long it takes is for nobody to test."""
+"""Tests of the races: all engines do the same work, and the seconds are evaluated correctly. No test of the speed."""
 
 import numpy as np
 import pytest
