@@ -1,5 +1,4 @@
-"""Generated human motions of a hand-held tool: reaching, pivoting on a tip, throwing and catching, driving a screw; and
-of a door.
+"""Generated human motions: a hand-held tool that reaches, pivots, is thrown and drives a screw; and a door.
 
 Metres, seconds, radians; right-handed, z up, the person stands at the origin and looks along +y. The tool's own axes
 are x to the right, y forward (along the bit), z up, with the origin in the hand: a tool held level points along +y.

@@ -102,7 +102,7 @@ def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
     ----------
     numbers : Numbers
     needed : sequence of KeysNeeded
-        Of the clips, if that was computed.
+        The keys needed on each clip, if computed.
     """
     contests = list(_contests(numbers))
     # The question asked comes first: how many keys a tolerance needs.

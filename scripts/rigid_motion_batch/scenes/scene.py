@@ -102,14 +102,14 @@ def build_scene(
     solids = Solids(cast, motion, deviated, mesh, layout.telling_point(motion.recording, outline), pivot)
     legend = _legend(cast, deviation, enlarged, float(reconstruction.radii[0]), crosses=bool(pivot))
     scene = assemble_scene(reconstruction, settings, cast, lanes_of, solids.enter, legend, motion.centre)
-    # Our own models are closed: what faces away costs time and is never seen.
+    # Our own models are closed: back faces cost time and are never visible.
     existing(existing(scene.display).shading).show_backface_culling = settings.subject in MODELS
     scene["deviation_shown_times"] = deviation
     return scene
 
 
 def begin(made: Reconstruction, settings: SceneSettings) -> Timeline:
-    """Empty the file, name its scene after what is compared, and return the timeline."""
+    """Empty the file, name its scene after the clip and the choice of keys, and return the timeline."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     blender.scene().name = f"{made.clip.name} {made.choice.name}"
     return Timeline.between(float(made.times[0]), float(made.times[-1]), settings.fps, settings.slow_motion)
@@ -137,7 +137,7 @@ def assemble_scene(
     enter : callable
         Adds the moving objects to a lane.
     legend : sequence of str
-        How to read the picture.
+        The parts of the text that explains the picture.
     centre : array, shape (3,)
         The point of the recording that became the origin.
     reserved : float
