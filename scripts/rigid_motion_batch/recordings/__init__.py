@@ -1,7 +1,7 @@
-"""Reading recorded motions of rigid bodies and whole figures, from whatever a tracker, a game or Blender wrote.
+"""Recorded motions of rigid bodies and whole figures, read from tracker, game and Blender files.
 
-`read_clips` gives them repaired, `read_trajectories` as they were recorded. Both keep the file's own axes and units;
-`rigid_motion_batch.axes` turns poses to Blender's axes.
+`read_clips` returns repaired motions, `read_trajectories` returns them as recorded. Both keep the axes and units of the
+file; `rigid_motion_batch.axes` converts poses to Blender's axes.
 """
 
 from .clip_reading import read_clips

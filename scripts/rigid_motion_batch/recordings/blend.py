@@ -1,9 +1,9 @@
-"""Animated objects, rigs and pose bones of .blend files: where Blender evaluates them on whole frames and at keys.
+"""Animated objects, rigs and pose bones of .blend files, evaluated by Blender on whole frames and at keys.
 
-The file's data is linked into the running Blender, a probe follows the object, or the bones, in a scene of its own, and
-all of it is taken out again: what is open stays as it is. Python of the file (its text blocks, scripted drivers) is not
-run. An armature whose bones move is a whole body; a bone is named OBJECT/BONE. Times are frame / frame rate, positions
-are Blender units, axes are Blender's; those of a bone are its own, y along it.
+The data of the file is linked into the running Blender. In a scene of its own, a probe object follows the object or the
+bones; then everything is removed again, and the open file stays unchanged. Python in the file (text blocks, scripted
+drivers) is not run. An armature whose bones move is a whole body; a bone is named OBJECT/BONE. Times are frame / frame
+rate, positions are Blender units, axes are Blender's. A bone has its own axes, with y along the bone.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
     import bpy
 
 OF_BONES = "pose.bones["
-"""The beginning of the data paths of everything that a driver may drive in a bone."""
+"""Start of the data path of every bone property that a driver may drive."""
 
 MAX_LISTED_BONES = 5
-"""Bones of a rig that are listed where one has to be named."""
+"""Bones listed per rig when the user has to name one."""
 
 
 @dataclass(frozen=True)
 class BlendBody:
-    """Object that is followed, or a bone of its pose."""
+    """An object to read, or one bone of its pose."""
 
     obj: bpy.types.Object
     bone: str | None = None
@@ -45,16 +45,16 @@ class BlendBody:
         return self.obj.name if self.bone is None else f"{self.obj.name}/{self.bone}"
 
     def frames_of_keys(self) -> tuple[float, float] | None:
-        """Return the first and last frame of what moves it in the object's Action and NLA strips, None for neither.
+        """Return the first and last frame of the object's keys and NLA strips, or None if it has none.
 
-        What moves any bone of a rig counts for all of them, which hang on one another by parents and constraints.
+        Keys of any bone count for all bones of the rig, because parents and constraints connect bones.
         """
         data = self.obj.animation_data
         if data is None:
             return None
         strips = [strip for track in data.nla_tracks for strip in track.strips]
         ranges: list[tuple[float, ...]] = [(strip.frame_start, strip.frame_end) for strip in strips]
-        # One that only its modifiers make has no keys, and says that they are on frame 0.
+        # An F-curve made by modifiers only has no keys, but reports a range at frame 0.
         ranges += [
             fcurve.range()[:]
             for fcurve in curves_that_move(data.action, data.action_slot, bones=self.bone is not None)
@@ -64,9 +64,9 @@ class BlendBody:
 
 
 def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Trajectory]:
-    """Read the first, by name, of the animated objects and the rigs whose bones have keys; or all animated objects.
+    """Read the first (by name) of the animated objects and the rigs with bone keys; or all animated objects.
 
-    Any other object, and any bone, can be had by its name.
+    Any other object and any bone can be read by name.
     """
     with in_blender(path, "save it again from Blender"), _without_scripts(), _opened(path) as (objects, scenes):
         if not scenes:
@@ -85,7 +85,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
             selection.of(animated, unlisted=[requested])
             return [_sample(path, bones[requested], scenes, options.scale)]
         with_keys = {name: _bones_with_keys(obj) for name, obj in objects.items()}
-        # Of all objects those that are animated, and of one any whose bones are as well.
+        # For all objects: only animated ones. For a single one: also rigs with animated bones.
         every = selection.requested == ALL
         moving = [name for name in objects if name in animated or (with_keys[name] and not every)]
         few = [f"{name}/{bone}" for name, bones in with_keys.items() for bone in bones[:MAX_LISTED_BONES]]
@@ -107,13 +107,13 @@ def _sample(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], scale: f
 def _sample_whole(path: Path, rig: bpy.types.Object, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
     if not armature_of(rig).bones:
         raise TrajectoryError(path, f"{shown(rig.name)} has no bones at all", "name another object of the file")
-    # What moves any bone counts.
+    # Keys of any bone count, so the first bone will do.
     moments, metres = _moments(path, BlendBody(rig, armature_of(rig).bones[0].name), scenes, rig.name)
     return whole_body(path, rig, rig.name, moments, metres, scale)
 
 
 def _moments(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], name: str = "") -> tuple[Moments, float]:
-    """Return when a body is looked at, and the metres of a unit."""
+    """Return the frames at which to sample a body, and the metres per unit."""
     scene = next((scene for scene in scenes if scene in body.obj.users_scene), scenes[0])
     keyed = body.frames_of_keys()
     first, last = keyed if keyed and keyed[0] < keyed[1] else (scene.frame_start, scene.frame_end)
@@ -132,7 +132,7 @@ def _moments(path: Path, body: BlendBody, scenes: list[bpy.types.Scene], name: s
 
 
 def _bones_are_moved(obj: bpy.types.Object) -> bool:
-    """Return whether drivers or constraints may move the bones of what may be an armature."""
+    """Return whether the object is an armature whose bones may be moved by drivers or constraints."""
     if obj.type != "ARMATURE" or not obj.pose:
         return False
     data = obj.animation_data
@@ -143,7 +143,7 @@ def _bones_are_moved(obj: bpy.types.Object) -> bool:
 
 
 def _bones_with_keys(obj: bpy.types.Object) -> list[str]:
-    """Return the bones that the object's Action or NLA strips move, in the order of the armature."""
+    """Return the bones moved by the object's Action or NLA strips, in the order of the armature."""
     from bpy.utils import unescape_identifier
 
     data = obj.animation_data
@@ -161,9 +161,10 @@ def _bones_with_keys(obj: bpy.types.Object) -> list[str]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[dict[str, bpy.types.Object], list[bpy.types.Scene]]]:
-    """Yield the objects by name, and the scenes, of the file: linked while this lasts, or those of the open file.
+    """Yield the objects by name and the scenes of the file: linked during the context, or those of the open file.
 
-    Objects that the file itself links are among them where a scene has them; its own go before others of their name.
+    Objects that the file itself links are included if a scene contains them. Local objects win over linked ones of the
+    same name.
     """
     import bpy
 
@@ -185,14 +186,14 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, bpy.types.Object], list[bpy.
         scenes = [scene for scene in here.scenes if scene]
         yield _by_name([obj for obj in here.objects if obj], scenes), scenes
     finally:
-        # A library takes those along that it alone needed, so they are looked for again each time.
+        # Removing a library also removes libraries that only it used, so list them again each time.
         while added := [library for library in bpy.data.libraries if library not in before]:
             bpy.data.libraries.remove(added[0])
 
 
 def _by_name(own: list[bpy.types.Object], scenes: list[bpy.types.Scene]) -> dict[str, bpy.types.Object]:
-    """Return the objects of the file, and then those of libraries, each in the order of their names."""
-    # A scene of a damaged file may come without its collection.
+    """Return the objects of the file, then those of libraries, each sorted by name."""
+    # In a damaged file, a scene may have no collection.
     linked = (obj for scene in scenes if scene.collection for obj in scene.collection.all_objects)
     objects = {obj.name: obj for obj in sorted(own, key=lambda obj: obj.name)}
     for obj in sorted(linked, key=lambda obj: obj.name):
@@ -202,7 +203,7 @@ def _by_name(own: list[bpy.types.Object], scenes: list[bpy.types.Scene]) -> dict
 
 @contextmanager
 def _without_scripts() -> Iterator[None]:
-    """Keep the file's Python from running. The preference also switches off what Blender was started with (`-y`)."""
+    """Keep the Python code of the file from running. The preference also overrides the command line option `-y`."""
     import bpy
 
     preferences = cast("bpy.types.Preferences", bpy.context.preferences).filepaths

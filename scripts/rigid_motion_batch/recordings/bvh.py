@@ -1,10 +1,10 @@
-"""BVH: a hierarchy of joints with offsets and channels, and a row of channel values for every frame.
+"""BVH files: a hierarchy of joints with offsets and channels, and one row of channel values per frame.
 
-Without a name it is the whole body. The poses of joints that are named are their world poses: a joint without any
-rotation has the world's axes. Positions are in the file's unit, which BVH does not tell; angles are degrees, applied in
-the order of the channels. Position channels replace the joint's offset, as Blender's importer has it, but where they
-are plainly meant to be added to it. That importer itself is not used: it works in single precision, needs Blender, and
-a file that it cannot read ends in an IndexError or, unnoticed, in a wrong skeleton.
+Without a name, the whole body is read. Named joints are read as world poses: a joint without any rotation has the axes
+of the world. Positions are in the unit of the file, which BVH does not state. Angles are degrees, applied in the order
+of the channels. Position channels replace the offset of the joint, as in Blender's importer, unless they are clearly
+meant to be added to it. Blender's importer itself is not used: it works in single precision, needs Blender, and a file
+that it cannot read ends in an IndexError or in an unnoticed wrong skeleton.
 Source: Meredith and Maddock, Motion capture file formats explained, Sheffield 2001.
 """
 
@@ -34,19 +34,19 @@ from .tables import HeaderLine, lines_of
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
 
 AXES = "opengl"
-"""What its files have, as a rule: a name in `axes.AXES`."""
+"""Usual axes of BVH files: a name in `axes.AXES`."""
 
 MOST_JOINTS = 3000
-"""Joints of a body, three times what the most detailed rigs have. With more, what follows takes minutes."""
+"""Joints of a body, three times as many as the most detailed rigs have. Later steps would take minutes with more."""
 
 MAX_JOINT_DEPTH = 500
-"""Joints that hang on one another: five times what the longest tails have."""
+"""Depth of the joint hierarchy, five times that of the longest tails."""
 
 ADDED_OFFSET_RATIO = 0.5
-"""Times its distance from the OFFSET that a position is from 0, where it is meant to be added to that."""
+"""Positions nearer to 0 than this fraction of their distance from the OFFSET are meant to be added to it."""
 
 LONGEST_NAME = 100
-"""Words of a joint's name."""
+"""Maximum number of words in the name of a joint."""
 
 
 @dataclass
@@ -55,25 +55,28 @@ class Joint:
 
     name: str
     parent: int | None
-    """The index of the parent, which is lower than its own. None for a root."""
+    """The index of the parent, lower than the joint's own index. None for a root."""
 
     offset: tuple[float, ...] = (0.0, 0.0, 0.0)
     channels: list[tuple[str, str]] = field(default_factory=list)
-    """Axis and kind, in the order of the file: ("Z", "rotation")."""
+    """Axis and kind of each channel, in the order of the file: ("Z", "rotation")."""
 
     end: tuple[float, ...] | None = None
-    """The offset of its end site, where it has one."""
+    """The offset of the end site, if there is one."""
 
 
 def read(path: Path, selection: Selection) -> list[Trajectory]:
-    """Read the whole body; or joints that are named, or all, in the order of the file. A single joint is no body."""
+    """Read the whole body, or the named joints, or all joints in the order of the file.
+
+    A single joint is not a whole body.
+    """
     joints, motion = _read_hierarchy(path)
     names = [joint.name for joint in joints]
     as_body = selection.requested is None and len(joints) > 1
     taken = names if as_body else selection.of(names)
     header, frame_time, values, warnings = _read_motion(path, motion, joints)
     refuse_too_many(path, len(joints), len(values))
-    # What is not finite in the file is not in the poses either, and no news.
+    # Non-finite numbers of the file stay non-finite in the poses, without warnings.
     with np.errstate(invalid="ignore", over="ignore"):
         times, as_read = np.arange(len(values)) * frame_time, values[0].copy()
         if count := _add_offsets(joints, values):
@@ -93,7 +96,7 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
 
 
 def _cells(header: HeaderLine, joints: list[Joint], values: np.ndarray, added: np.ndarray) -> Cells:
-    """Return where the numbers of a body are, below a header; to values (n, channels) so much was added."""
+    """Return where the file has the numbers of a body. `added` (channels,) was added to the values (n, channels)."""
 
     def numbers(poses: Poses) -> dict[int, np.ndarray]:
         result, column = {}, 0
@@ -115,7 +118,7 @@ def _cells(header: HeaderLine, joints: list[Joint], values: np.ndarray, added: n
 
 
 def _rest_body(joints: list[Joint]) -> RestBody:
-    """Return the body of a hierarchy at rest, no joint being turned: bones end at end sites or amid their children."""
+    """Return the rest body of a hierarchy, with unrotated joints: bones end at end sites or amid their children."""
     parents = np.array([-1 if joint.parent is None else joint.parent for joint in joints])
     places = np.array([joint.offset for joint in joints])
     for index in np.flatnonzero(parents >= 0).tolist():
@@ -128,9 +131,10 @@ def _rest_body(joints: list[Joint]) -> RestBody:
 
 
 def _add_offsets(joints: list[Joint], values: np.ndarray) -> int:
-    """Add their OFFSETs to positions of joints below the root, in values (n, channels), where that is meant.
+    """Add the OFFSET to position channels of joints below the root, in values (n, channels), if the file means it so.
 
-    It is where they are nearer to 0 than to the OFFSET in most joints. Returns how many joints have such positions.
+    It does if, for most joints, the positions are nearer to 0 than to the OFFSET. Returns the number of these joints,
+    or 0.
     """
     column, near = 0, []
     places: list[tuple[int, float]] = []
@@ -154,9 +158,9 @@ def _add_offsets(joints: list[Joint], values: np.ndarray) -> int:
 
 
 def _poses(joints: list[Joint], values: np.ndarray) -> Poses:
-    """Return all joints in their parents' space, shape (joints, n), from values (n, channels of all joints).
+    """Return the joints in their parents' space, shape (joints, n), from values (n, channels of all joints).
 
-    The signs of quaternions that Euler angles give say nothing, and are aligned.
+    Quaternion signs are aligned, as Euler angles do not determine them.
     """
     begins = np.cumsum([0, *(len(joint.channels) for joint in joints)]).tolist()
     poses = Poses(np.empty((len(joints), len(values), 3)), np.empty((len(joints), len(values), 4)))
@@ -166,7 +170,7 @@ def _poses(joints: list[Joint], values: np.ndarray) -> Poses:
 
 
 def _local(joint: Joint, own: np.ndarray) -> Poses:
-    """Return a joint's poses in its parent's space, from its own channels (n, channels)."""
+    """Return the poses of a joint in its parent's space, from its own channels (n, channels)."""
     positions = np.tile(joint.offset, (len(own), 1))
     turns = []
     for column, (axis, kind) in enumerate(joint.channels):
@@ -179,7 +183,7 @@ def _local(joint: Joint, own: np.ndarray) -> Poses:
 
 
 class _Words:
-    """The words of the hierarchy, one after another, with the line that each is in."""
+    """Words of the hierarchy, read one by one, with the line of the last word read."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -220,13 +224,13 @@ class _Words:
 
 
 def _read_hierarchy(path: Path) -> tuple[list[Joint], int]:
-    """Read the joints with unique names, and the line of the word MOTION."""
+    """Read the joints with unique names, and the line number of the word MOTION."""
     words = _Words(path)
     first = words.next("HIERARCHY")
     if first.upper() != "HIERARCHY":
         words.fail(f"a BVH file begins with HIERARCHY, not with {shown(first)}")
     joints: list[Joint] = []
-    # The joints that are open, innermost last. An end site has no pose of its own and is None.
+    # The joints whose braces are open, innermost last. None stands for an end site, which has no pose of its own.
     opened: list[int | None] = []
     while (word := words.next("MOTION")).upper() != "MOTION":
         if len(joints) > MOST_JOINTS:
@@ -282,7 +286,7 @@ def _read_channels(words: _Words) -> list[tuple[str, str]]:
 def _read_motion(
     path: Path, motion: int, joints: list[Joint]
 ) -> tuple[HeaderLine, float, np.ndarray, tuple[ClipWarning, ...]]:
-    """Read what is behind the line `motion`.
+    """Read the part of the file after the line `motion`.
 
     Returns
     -------
@@ -292,7 +296,7 @@ def _read_motion(
         Seconds between frames.
     values : array, shape (frames, channels)
     warnings : tuple of ClipWarning
-        Where there are more or fewer frames than the file says.
+        A warning if the number of frames differs from the one that the file states.
     """
     rows = ((number, text) for number, line in lines_of(path, after=motion) if (text := line.strip()))
     settings = list(islice(rows, 2))
@@ -312,7 +316,7 @@ def _read_motion(
 
 
 def _read_setting(path: Path, row: list[tuple[int, str]], name: str, motion: int) -> float:
-    """Read the positive number behind `name` in a row, which is empty where the file has ended at the line `motion`."""
+    """Read the positive number after `name` in a row. The row is empty if the file ends at the line `motion`."""
     number, text = row[0] if row else (motion, "")
     label, _, value = text.partition(":")
     try:

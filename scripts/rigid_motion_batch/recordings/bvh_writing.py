@@ -1,4 +1,4 @@
-"""Bodies as BVH (Biovision Hierarchy)."""
+"""BVH (Biovision Hierarchy) writing of whole bodies."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ PLACES = "Xposition Yposition Zposition"
 def write_bvh(file: TextIO, rest_body: RestBody, sliding: np.ndarray, times: np.ndarray, poses: Poses) -> None:
     """Write the poses (joints, n) of a body, each joint in its parent's space, at an even rate.
 
-    Joints that slide (joints,) have channels for their places, the others are where they are at rest. A body with
-    several roots is written with as many hierarchies, which Blender and this program read.
+    Joints that slide (joints,) have position channels; the other joints stay at their rest positions. A body with
+    several roots is written as several hierarchies, which Blender and this program can read.
     """
     places = poses.positions[:, 0]
     children: list[list[int]] = [[] for _ in rest_body.joints]

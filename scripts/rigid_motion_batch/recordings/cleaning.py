@@ -1,4 +1,4 @@
-"""Clips without their trembling and spikes, and what is said of that: see `rigid_motion.motion.clean`."""
+"""Clips without jitter and spikes, and descriptions of what was removed: see `rigid_motion.motion.clean`."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from .clips import Clip
 from .recordings import Trajectory
 
 RIGID_RADIUS_M, JOINT_RADIUS_M = 0.1, 0.03
-"""Metres: the radius of what a hand holds, and of what is around a joint of a body."""
+"""Metres: the radius of an object in a hand, and of the surroundings of a joint of a body."""
 
 MAX_LISTED_ROWS = 8
-"""Rows that are named."""
+"""Number of rows listed by number."""
 
 MIN_UNTOUCHED_RATIO = 0.25
-"""The share of samples that are left alone from which on it is said."""
+"""Share of untouched samples above which the description mentions them."""
 
 
 def cleaned_clip(clip: Clip, tolerance: float | None = None, radius: float | None = None) -> tuple[Clip, Cleaned]:
-    """Return a clip without its trembling, and what was found; lengths are in metres."""
+    """Return a clip without jitter, and what was found; tolerance and radius are in metres."""
     metres, body = clip.metres_per_unit, clip.rest_body
     radius = radius or (JOINT_RADIUS_M if body else RIGID_RADIUS_M)
-    stands = standing(clip.times, _places(clip, clip.poses), shaky=True) if body else None
+    stands = standing(clip.times, _joint_positions(clip, clip.poses), shaky=True) if body else None
     tolerance, skeleton = tolerance and tolerance / metres, body.skeleton if body else None
     found = clean(clip.times, clip.poses, tolerance, radius / metres, skeleton, stands=stands)
     return replace(clip, times=found.times, poses=found.poses), found
 
 
 def cleaned_first(clip: Clip, tolerance: float | None) -> Clip:
-    """Return a clip without its trembling, of whose repairs one says so."""
+    """Return a clip without jitter, with a sentence among its repairs that says so."""
     cleaned, found = cleaned_clip(clip, tolerance)
     said = "; ".join(described(clip, found))
     return replace(
@@ -44,7 +44,7 @@ def cleaned_first(clip: Clip, tolerance: float | None) -> Clip:
 
 
 def described(clip: Clip, found: Cleaned, rows: np.ndarray | None = None) -> Iterator[str]:
-    """Yield what was found of a clip, and how far it was moved; `rows` (n,) are those of its samples in the file."""
+    """Yield what was found in a clip, and how far samples were moved; `rows` (n,) are their row numbers."""
     rows = np.arange(len(clip.times)) if rows is None else rows
     metres, body = clip.metres_per_unit, clip.rest_body
     position, rotation = (float(np.max(each)) for each in found.noise)
@@ -54,7 +54,7 @@ def described(clip: Clip, found: Cleaned, rows: np.ndarray | None = None) -> Ite
     worst = " at its worst joint" if body and sizes else ""
     yield f"jitters by {' and '.join(sizes)}{worst}" if sizes else "no noticeable jitter"
     replaced = found.spikes | found.repeats
-    within = np.where(_below(clip, replaced), 0.0, found.moved)
+    within = np.where(_with_joints_below(clip, replaced), 0.0, found.moved)
     yield f"moved at most {length(metres * float(within.max()))}"
     kinds = ("a spike", "spikes"), ("a repeat of the one before", "repeats of the one before")
     for mask, (single, several) in zip((found.spikes, found.repeats), kinds, strict=True):
@@ -67,18 +67,20 @@ def described(clip: Clip, found: Cleaned, rows: np.ndarray | None = None) -> Ite
     if (share := float(np.mean(found.alone))) > MIN_UNTOUCHED_RATIO:
         yield f"{share:.0%} is left nearly unchanged: noise cannot be distinguished from motion there"
     if body:
-        now, before = (length(slide(_places(clip, poses), found.stands)) for poses in (found.poses, clip.poses))
+        now, before = (
+            length(slide(_joint_positions(clip, poses), found.stands)) for poses in (found.poses, clip.poses)
+        )
         contacts = f"contacts held: {len(spans(found.stands))}, feet slide by {now} there, before by {before}"
         yield contacts if found.stands.any() else "no foot clearly stands: none is held"
 
 
-def _places(clip: Clip, poses: Poses) -> np.ndarray:
-    """Return where the joints of a body are that has these poses, in metres and Blender's axes."""
+def _joint_positions(clip: Clip, poses: Poses) -> np.ndarray:
+    """Return the positions of the joints of a body in these poses, in metres and Blender's axes."""
     return clip.in_blender(clip.whole_body.skeleton.in_root_space(poses)).positions
 
 
-def _below(clip: Clip, marked: np.ndarray) -> np.ndarray:
-    """Return which samples hang on marked ones, or are."""
+def _with_joints_below(clip: Clip, marked: np.ndarray) -> np.ndarray:
+    """Return the marked samples and those of the joints below them."""
     if clip.rest_body is None:
         return marked
     marked = marked.copy()
@@ -88,12 +90,12 @@ def _below(clip: Clip, marked: np.ndarray) -> np.ndarray:
 
 
 def length(metres: float) -> str:
-    """Return a length as it is spoken of."""
+    """Return a length as text, in millimetres below a metre."""
     return f"{metres:.2g} m" if metres >= 1.0 else f"{1e3 * metres:.2g} mm"
 
 
 def rows_of(clip: Clip, trajectory: Trajectory) -> np.ndarray:
-    """Return the samples of a trajectory that a clip of it has, shape (n,)."""
+    """Return the indices of the trajectory's samples that its clip contains, shape (n,)."""
     times, _, repairs = repair(trajectory.times, trajectory.poses, trajectory.rate)
     kept = np.ones(len(trajectory.times), dtype=bool)
     for done in repairs:
@@ -103,7 +105,7 @@ def rows_of(clip: Clip, trajectory: Trajectory) -> np.ndarray:
 
 
 def fill_in(numbers: np.ndarray, clip: Clip, found: Cleaned, trajectory: Trajectory, rows: np.ndarray) -> None:
-    """Fill in numbers (rows, columns) of a file with what was moved of a clip, the samples `rows` of a trajectory."""
+    """Fill the moved samples of a clip into numbers (rows, columns) of a file; `rows` index the trajectory."""
     cells = trajectory.cells
     assert cells is not None
     poses = replace(

@@ -1,6 +1,6 @@
-"""From recordings to clips: repaired, cut to the part that is requested, and named.
+"""Clips read from recordings: repaired, cut to the requested part, and named.
 
-Another motion of a clip is read like the clip, and matched to it in time and joint by joint.
+Another motion for a clip is read in the same way, and matched to the clip in time and joint by joint.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from .recordings import Trajectory, TrajectoryError, shown
 from .rest_bodies import in_parents, repaired
 
 LONGEST_NAME = 80
-"""Characters of a clip's name: folders below folders have to fit what file systems allow."""
+"""Characters of a clip's name: nested folders have to fit the limits of file systems."""
 
 MOST_BYTES = 240
-"""Bytes of a clip's name in UTF-8, in which some characters have four: file systems allow 255."""
+"""Bytes of a clip's name in UTF-8, where a character may take four: file systems allow 255."""
 
 NOT_FOLDERS = {"metrics.csv", "metrics_joints.csv", "keys_needed.csv", "slip.csv", "report.html", "manifest.json"}
-"""Names that the output needs itself."""
+"""Names that the output itself uses."""
 
 DEVICES = {"con", "prn", "aux", "nul"} | {
     f"{device}{digit}" for device in ("com", "lpt") for digit in "0123456789\u00b9\u00b2\u00b3"
 }
-"""Names that Windows keeps for devices, whatever follows them after a dot."""
+"""Names that Windows reserves for devices, with or without a dot and more characters after them."""
 
 
 def read_clips(
@@ -49,22 +49,22 @@ def read_clips(
     Parameters
     ----------
     sources : iterable of str
-        As `rigid_motion_batch.recordings.read_trajectories` takes them.
+        As in `rigid_motion_batch.recordings.read_trajectories`.
     axes : str, optional
-        A name in `rigid_motion_batch.axes.AXES`; None for those of each format.
+        A name in `rigid_motion_batch.axes.AXES`; None for the axes of each format.
     options : ReadingOptions, optional
-        What the files do not say of themselves, and which part of them to take.
+        Facts that the files do not state, and the part of the recordings to read.
 
     Returns
     -------
     clips : list of Clip
     notes : list of str
-        What the user should know of what was read, a line each.
+        Notes for the user on the files read, one line each.
 
     Raises
     ------
     TrajectoryError
-        For the first source that cannot be read, or of which fewer than two poses are left.
+        For the first source that cannot be read, or has fewer than two usable poses.
     """
     read = [read_source(source, axes, options) for source in sources]
     clips = [clip for some, _ in read for clip in some]
@@ -75,10 +75,10 @@ def read_clips(
 
 
 def read_source(source: str, axes: str | None, options: ReadingOptions = AS_THE_FILE_SAYS) -> tuple[list[Clip], str]:
-    """Read the clips of one source, repaired, with names that need not be unique, and a note on it, which may be empty.
+    """Read the repaired clips of one source, with names that need not be unique, and a note on it, which may be empty.
 
-    Of several bodies those are left out, with a note, that there are no two poses of. Raises TrajectoryError where the
-    source cannot be read, or nothing of it is left.
+    If there are several bodies, bodies with fewer than two poses are left out, and the note says so. Raises
+    TrajectoryError if the source cannot be read, or no body is left.
     """
     recording = read_trajectories(source, options)
     stem, several = recording.path.stem, len(recording.trajectories) > 1
@@ -111,9 +111,10 @@ def make_clip(
     *,
     measured: bool = True,
 ) -> Clip:
-    """Return a trajectory, repaired and cut. Raises TrajectoryError where fewer than two poses are left of it.
+    """Return a trajectory, repaired and cut. Raises TrajectoryError if fewer than two poses are left.
 
-    `measured` is whether devices recorded it: gaps and jumps of an animation are meant.
+    `measured` says that devices recorded it: gaps and jumps of an animation are intended, so there are no warnings on
+    them.
     """
     times, poses, repairs = repair(trajectory.times, trajectory.poses, trajectory.rate)
     if len(times) < 2:
@@ -124,7 +125,7 @@ def make_clip(
     warnings, calibration, begin = list(trajectory.warnings), 0, float(times[0])
     if axes == "unreal" and options.scale is None and metres == 1.0 and rest_body is None:
         warnings.append(ClipWarning("its lengths are read as metres, and Unreal has centimetres", "add --scale 0.01"))
-    part = _part(source, times - begin, options)
+    part = _requested_part(source, times - begin, options)
     if rest_body is not None and options.start is None:
         calibration, warning = calibration_pose(times, poses, rest_body, metres)
         part = slice(max(part.start, calibration), part.stop)
@@ -151,7 +152,7 @@ def make_clip(
     return clip if options.clean is None else cleaned_first(clip, options.clean or None)
 
 
-def _part(source: str, seconds: np.ndarray, options: ReadingOptions) -> slice:
+def _requested_part(source: str, seconds: np.ndarray, options: ReadingOptions) -> slice:
     """Return the samples from start to end, in seconds since the first. Raises TrajectoryError for fewer than two."""
     first, last = options.start or 0.0, math.inf if options.end is None else options.end
     part = slice(int(np.searchsorted(seconds, first)), int(np.searchsorted(seconds, last, "right")))
@@ -165,9 +166,9 @@ def _part(source: str, seconds: np.ndarray, options: ReadingOptions) -> slice:
 
 
 def clip_names(requested: Sequence[tuple[str, str]]) -> list[str]:
-    """Return names for clips, as `folder_names` gives them, of what each would like to be called and of its body.
+    """Return clip names as `folder_names` makes them, from pairs of a requested name and the name of the body.
 
-    The body, empty where the user named none, is part of the name only where several would like to be called the same.
+    The body is empty if the user named none. It is added to the name only if several clips request the same name.
     """
     folded = [_safe(name).casefold() for name, _ in requested]
     alike = Counter(folded)
@@ -178,10 +179,11 @@ def clip_names(requested: Sequence[tuple[str, str]]) -> list[str]:
 
 
 def folder_names(requested: Iterable[str]) -> list[str]:
-    """Return names like those requested that are safe for folders on every system, each unlike all before it.
+    """Return unique names close to those requested, safe as folder names on every system.
 
-    Letters and digits of any script stay, and so do dots, dashes and underscores inside. Case makes no difference, nor
-    does how a letter with an accent is spelled in Unicode. No name begins with what spreadsheets take for a formula.
+    Letters and digits of any script are kept, as are dots, dashes and underscores inside a name. Uniqueness ignores
+    case and the Unicode form of accented letters. No name begins with a character that starts a formula in a
+    spreadsheet.
     """
     names: list[str] = []
     unavailable = set(NOT_FOLDERS)
@@ -201,35 +203,35 @@ def folder_names(requested: Iterable[str]) -> list[str]:
 
 
 def _safe(name: str) -> str:
-    """Return a name like the one requested that is safe for a folder."""
+    """Return the requested name, changed to be safe for a folder."""
     safe = re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFC", name)).strip("._-")[:LONGEST_NAME]
     safe = safe.encode()[:MOST_BYTES].decode(errors="ignore").strip("._-") or "clip"
     return f"clip-{safe}" if safe.casefold().split(".")[0] in DEVICES else safe
 
 
 MAX_TIME_ROUNDING_S = 6e-4
-"""Seconds that a motion may begin later or end sooner: times are often rounded to milliseconds."""
+"""Seconds by which the other motion may begin later or end sooner: times are often rounded to milliseconds."""
 
 
 def with_against(clip: Clip, source: str, name: str, axes: str | None, options: ReadingOptions) -> tuple[Clip, str]:
-    """Return a clip beside another motion, cut to the time that both have, and notes on that, which may be empty.
+    """Return a clip with another motion to compare with, cut to the time that both have, and notes, which may be empty.
 
     Parameters
     ----------
     clip : Clip
     source : str
-        As `read_trajectories` takes it; of one body.
+        As in `read_trajectories`; one body.
     name : str
-        What to call its motion.
+        The name for the other motion.
     axes : str, optional
-        As for the clip; None for those of the source's own format.
+        As for the clip; None for the axes of the source's format.
     options : ReadingOptions
-        Those of the clip. Its part is not that of the other motion, whose clock is its own.
+        Options of the clip. Its start and end do not apply to the other motion, which has its own clock.
 
     Raises
     ------
     TrajectoryError
-        Where the source cannot be read, has not the joints of the clip, or no time that the clip has.
+        If the source cannot be read, lacks joints of the clip, or does not overlap the clip in time.
     """
     honoured = {"scale", *format_of(split_source(source)[0]).honours}
     own = {name: getattr(options, name) for name in options.given if name in honoured}
@@ -237,7 +239,7 @@ def with_against(clip: Clip, source: str, name: str, axes: str | None, options: 
     if len(others) > 1:
         raise TrajectoryError(source, f"{len(others)} bodies", "name the one that moves as the recording does")
     other = others[0]
-    result = OtherMotion(name, other.times, _as_in(clip, other, source))
+    result = OtherMotion(name, other.times, _converted_to_clip(clip, other, source))
     first, last = np.searchsorted(clip.times, other.times[[0, -1]] + (-MAX_TIME_ROUNDING_S, MAX_TIME_ROUNDING_S))
     if last - first < 2:
         problem = f"it lasts from {_span(other.times)}, and {clip.source} from {_span(clip.times)}"
@@ -254,8 +256,8 @@ def _span(times: np.ndarray) -> str:
     return f"{times[0].round(3):.13g} to {times[-1].round(3):.13g} s"
 
 
-def _as_in(clip: Clip, other: Clip, source: str) -> Poses:
-    """Return the poses of another clip in the axes, the unit and, of a whole body, the joints of a clip."""
+def _converted_to_clip(clip: Clip, other: Clip, source: str) -> Poses:
+    """Return the poses of another clip in the axes, the unit and (for a whole body) the joints of the clip."""
     own, theirs = clip.rest_body, other.rest_body
     poses = from_blender(other.in_blender(other.poses), clip.axes)
     poses = Poses(poses.positions / clip.metres_per_unit, poses.quaternions, poses.scales)

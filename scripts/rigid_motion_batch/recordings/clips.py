@@ -1,7 +1,7 @@
-"""Clips: what a comparison is about, the motion of one rigid body, or of a whole figure of joints, in one recording.
+"""Clips: the repaired motion of one rigid body or of a whole figure of joints, the subject of a comparison.
 
-Times are seconds and poses are in the recording's own axes and units, repaired. Errors are in metres and do not depend
-on the axes; only what Blender shows is converted (`rigid_motion_batch.axes`).
+Times are seconds. Poses are in the axes and units of the recording. Errors are in metres and do not depend on the axes;
+poses are converted only for display in Blender (`rigid_motion_batch.axes`).
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 @dataclass(frozen=True)
 class ClipWarning:
-    """Warning of what changes the meaning of the numbers, and what to do about it. As a string it is a sentence."""
+    """Warning of something that changes the meaning of the numbers, and what to do about it. `str` makes a sentence."""
 
     text: str
     way_out: str = ""
     start_s: float | None = None
-    """The place in the recording, in seconds of its times; None where it is everywhere."""
+    """Start of the affected part, in seconds of the recording's times; None if the whole recording is affected."""
 
     end_s: float | None = None
 
@@ -32,13 +32,13 @@ class ClipWarning:
 
 @dataclass(frozen=True, eq=False)
 class OtherMotion:
-    """Another motion of a clip, by its own samples; between these straight lines and SLERP."""
+    """Another motion of a clip, with its own samples, interpolated by straight lines and SLERP."""
 
     name: str
-    """The name of the motion, and its id beside those of modes."""
+    """The name of the motion, also its id among the modes."""
 
     times: np.ndarray
-    """Seconds of the clip's clock, strictly rising, shape (m,)."""
+    """Seconds of the clip's clock, strictly increasing, shape (m,)."""
 
     poses: Poses
     """Poses like those of the clip, shape (m,) or (joints, m)."""
@@ -53,57 +53,57 @@ class Clip:
     """One body of one recording, of n samples."""
 
     name: str
-    """A name that is unique among the clips of a run, and safe as the name of a folder."""
+    """A name, unique among the clips of a run, and safe as a folder name."""
 
     source: str
-    """The source that the user gave: the file, and the body where one was named."""
+    """The source that the user gave: the file, and the body if one was named."""
 
     axes: str
     """The convention of the recording: a name in `rigid_motion_batch.axes.DESCRIBED`."""
 
     times: np.ndarray
-    """Seconds, strictly rising, shape (n,)."""
+    """Seconds, strictly increasing, shape (n,)."""
 
     poses: Poses
-    """Poses of shape (n,), signs aligned. Of a figure shape (joints, n), each joint's in its parent's space."""
+    """Poses of shape (n,), signs aligned. For a figure shape (joints, n), each joint in its parent's space."""
 
     repairs: tuple[str, ...]
-    """Sentences on what is hard to believe of the recording, and on what had to be repaired in it."""
+    """Sentences on implausible parts of the recording, and on the repairs made."""
 
     metres_per_unit: float = 1.0
-    """The length of the recording's unit. Errors, and what Blender shows, are in metres."""
+    """The length of the recording's unit. Errors and the display in Blender are in metres."""
 
     body: str = ""
-    """The body that the user asked for by name. It becomes part of the clip's where another clip has the same."""
+    """The body that the user asked for by name. It is added to the clip's name if another clip has the same name."""
 
     rest_body: RestBody | None = None
     """The rest body of a whole body; None for a single rigid body."""
 
     rate: float | None = None
-    """Samples a second, where there may be more between these."""
+    """Samples a second of the recording, if `times` may have additional samples in between."""
 
     warnings: tuple[ClipWarning, ...] = ()
-    """Warnings on the repairs that change the meaning of the numbers, with the way out."""
+    """Warnings of problems that change the meaning of the numbers, each with a way out."""
 
     calibration: int = 0
-    """Samples of a T-pose or the like before the motion, which are left out."""
+    """Number of samples of a T-pose or similar before the motion, which are left out."""
 
     against: OtherMotion | None = None
-    """The motion that the user compares with it beside the modes."""
+    """The motion that the user compares with the clip, in addition to the modes."""
 
     @property
     def samples_a_second(self) -> float:
-        """The rate of the recording, which tells it or has it between most samples."""
+        """The rate that the recording states, or else the rate of the median interval."""
         return self.rate or 1.0 / float(np.median(np.diff(self.times)))
 
     @property
     def joints(self) -> int:
-        """The number of joints of a figure, or the single one of a rigid body."""
+        """The number of joints of a figure; 1 for a rigid body."""
         return len(self.rest_body.joints) if self.rest_body else 1
 
     @property
     def whole_body(self) -> RestBody:
-        """The figure of a clip that has one."""
+        """The rest body of a clip that has one."""
         assert self.rest_body is not None
         return self.rest_body
 
@@ -120,7 +120,7 @@ class Clip:
 
 @dataclass(frozen=True)
 class ClipFacts:
-    """A clip without its samples."""
+    """Facts of a clip, without its samples."""
 
     name: str
     source: str
@@ -132,7 +132,7 @@ class ClipFacts:
     repairs: tuple[str, ...]
 
     joint_names: tuple[str, ...] = ()
-    """The names of the joints of a whole body; none of a single rigid one."""
+    """The names of the joints of a whole body; empty for a single rigid body."""
 
     warnings: tuple[ClipWarning, ...] = ()
     body: str = ""

@@ -1,7 +1,7 @@
-"""The clock of a body, of all columns of time that a file has.
+"""The clock of a body, chosen among all time columns of a file.
 
-Trackers write the time of the device, that of the computer and that of the day, of which one may stand still for a
-hundred rows. The one with the most different values is taken, of several of these the steadiest.
+Trackers write the time of the device, of the computer and of the day, and one of them may stand still for a hundred
+rows. The clock with the most steps forward is taken; among several of these, the steadiest.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from .tables import HeaderLine
 from .times import kind_of_times, seconds_of, seconds_of_dates, unit_by_rate, whole_ticks
 
 NEARLY_ALL = 0.99
-"""The share of the most steps forward from which on a clock has as many."""
+"""Clocks with at least this fraction of the largest number of steps forward count as equally good."""
 
 LONGEST_SHOWN = 60
-"""Characters of a column's name."""
+"""Characters shown of a column's name."""
 
 SAME_RATE = 0.01
-"""Part by which the lengths of two clocks may differ that run at one speed."""
+"""Ratio by which the lengths of two clocks may differ that run at the same speed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """Times of all rows of a file."""
+    """Times of all rows of a file, from one column or two."""
 
     name: str
     seconds: np.ndarray
@@ -39,16 +39,16 @@ class Clock:
 
     remark: str = ""
     dated: bool = False
-    """True if these are dates or clock times."""
+    """True if the times are dates or clock times."""
 
     unit: str = ""
-    """The unit as the file or the user says it."""
+    """The unit that the file or the user states."""
 
     ticks: np.ndarray = field(default_factory=lambda: np.empty(0))
     """The numbers in the file."""
 
     per_second: float = 0.0
-    """How many a second has of them; 0 where they are no numbers in a single column."""
+    """Number of ticks per second; 0 if the times are not numbers in a single column."""
 
 
 def clock_of(
@@ -75,13 +75,13 @@ def clock_of(
             clocks.append(_clock(header, column, layout, options, body))
         except TrajectoryError as error:
             errors.append(error)
-    clocks = _joined(clocks)
+    clocks = _with_nanoseconds(clocks)
     if not clocks:
         raise errors[0]
     steps = [np.diff(clock.seconds[body]) for clock in clocks]
     forward = [int(np.count_nonzero(some > 0.0)) for some in steps]
     best = [place for place, many in enumerate(forward) if many >= NEARLY_ALL * max(forward)]
-    chosen = min(best, key=lambda place: _unsteadiness(steps[place]))
+    chosen = min(best, key=lambda place: _step_variation(steps[place]))
     lengths = {clocks[place].name: _length(clocks[place].seconds[body]) for place in best}
     if max(lengths.values()) > (1.0 + SAME_RATE) * min(lengths.values()):
         both = listed([f"{shown(name)} lasts {length:.4g} s" for name, length in lengths.items()], 3)
@@ -119,8 +119,8 @@ def _clock(
     return Clock(name, seconds_of(ticks, per_second), remark, unit=unit, ticks=ticks, per_second=per_second)
 
 
-def _joined(clocks: list[Clock]) -> list[Clock]:
-    """Return clocks with those made one of which the first counts seconds, and the next the nanoseconds of each."""
+def _with_nanoseconds(clocks: list[Clock]) -> list[Clock]:
+    """Return the clocks, joining each pair of a column of seconds and the next column of their nanoseconds."""
     result: list[Clock] = []
     for clock in clocks:
         before = result[-1] if result else clock
@@ -134,13 +134,13 @@ def _joined(clocks: list[Clock]) -> list[Clock]:
 
 
 def _length(seconds: np.ndarray) -> float:
-    """Return how long a clock runs through the rows, wild times not counted."""
+    """Return the seconds from the 5th to the 95th percentile of a clock, which ignores outliers."""
     known = seconds[np.isfinite(seconds)]
     return float(np.subtract(*np.percentile(known, (95.0, 5.0)))) if len(known) else 0.0
 
 
-def _unsteadiness(steps: np.ndarray) -> float:
-    """Return how far steps usually are from the usual one, as part of it, to percents."""
+def _step_variation(steps: np.ndarray) -> float:
+    """Return the median deviation of the steps from the median step, as a fraction of it, rounded to percents."""
     steps = steps[steps > 0.0]
     usual = np.median(steps) if len(steps) else 1.0
     return round(float(np.median(np.abs(steps - usual)) / usual), 2) if len(steps) else np.inf

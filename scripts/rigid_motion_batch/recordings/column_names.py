@@ -1,9 +1,9 @@
-"""Names of columns in other people's logs: what each holds, of which axis, in which unit, of which body.
+"""Names of columns in tracker logs: what a column holds, and its axis, unit and body.
 
 Loggers write `t`, `timestamp_ms` and `Time (s)`, `x`, `px`, `PosX`, `pos_x_cm` and `position.x`, `qw`, `rot_w` and
-`Rotation W`; with several bodies in a row `left_pos_x` and `LeftHand.position.x`. A name is cut into words, at dots,
-dashes, blanks and capitals; words with a meaning are taken away, and what is left is the body's name. Numbers stand for
-axes where they end a name of such a kind: `q0`, `position[2]`, `m03`, `R_11`.
+`Rotation W`; with several bodies in a row `left_pos_x` and `LeftHand.position.x`. A name is split into words, at dots,
+dashes, blanks and capitals. Words with a known meaning are removed, and the rest is the name of the body. Numbers stand
+for axes if they end such a name: `q0`, `position[2]`, `m03`, `R_11`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import cast
 from .options import TICKS_PER_S_BY_UNIT
 
 LONGEST_NAME = 100
-"""Characters. What is longer is no name of a column that is known."""
+"""Characters. No known column has a longer name."""
 
 UNITS = {
     "s": "s sec secs second seconds",
@@ -31,15 +31,15 @@ UNITS = {
     "deg": "deg degs degree degrees °",
     "rad": "rad rads radian radians",
 }
-"""Units, and how they are written."""
+"""Units and their spellings."""
 
 UNIT_OF = {spelling: unit for unit, spellings in UNITS.items() for spelling in spellings.split()}
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-"""Units of length."""
+"""Units of length, in metres."""
 
 UNITS_AS_WORDS = {word for word, unit in UNIT_OF.items() if unit not in TICKS_PER_S_BY_UNIT} - {"in", "feet"}
-"""Units that need no brackets to be distinguished from parts of a body."""
+"""Units that, without brackets, cannot be mistaken for body parts."""
 
 KINDS = {
     "position": "p pos position positions t trans translation translate loc location coord coords coordinate",
@@ -48,17 +48,17 @@ KINDS = {
     "euler": "euler eulers angle angles rpy",
     "matrix": "m mat matrix transform pose tf extrinsic extrinsics",
 }
-"""Kinds of axes, and how each is written. A rotation is a quaternion where it has a w, and Euler angles otherwise."""
+"""Kinds of columns and their spellings. A rotation with a w is a quaternion, any other rotation is Euler angles."""
 
 KIND_OF = {word: kind for kind, words in KINDS.items() if kind != "matrix" for word in words.split()}
 NUMBERED = KIND_OF | dict.fromkeys(KINDS["matrix"].split(), "matrix")
-"""Words that a number behind them makes an axis of. Before a letter those of matrices mean nothing."""
+"""Words that make an axis together with a number after them. Before a letter, words for matrices have no meaning."""
 
 LEADING_LETTERS = ("p", "q", "t")
-"""Letters that tell the kind where a name begins with them. An r is rather the right side."""
+"""Letters that tell the kind at the beginning of a name. An r there more likely means the right side."""
 
 TURNS = ("roll", "pitch", "yaw")
-"""Euler angles that do not name their axis."""
+"""Names of Euler angles that do not state their axis."""
 
 _WORDS = {
     "time": "t ts time times timestamp timestamps stamp clock elapsed realtime datetime",
@@ -76,23 +76,23 @@ TIME = frozenset(_WORDS["time"].split())
 """Words for time."""
 
 WITH_TIME = TIME | frozenset(_WORDS["beside time"].split())
-"""Words for time, and those that may stand with them and change nothing. `delta` and `frame` change the meaning."""
+"""Words for time, and words that may accompany them without effect. `delta` and `frame` change the meaning."""
 
 FRAMES = frozenset(_WORDS["frames"].split())
-"""Words for a count of frames."""
+"""Words for a frame count."""
 
 WITH_FRAMES = FRAMES.union(_WORDS["beside frames"].split())
 
 DATES = {"date", "datetime", "iso"}
-"""Words that tell of a time that it is a date."""
+"""Words for a time that is a date."""
 
 DEVICES = tuple(_WORDS["devices"].split())
-"""Words for whose a row is, what tells most first."""
+"""Words for a column that says whose row it is, the most specific first."""
 
 WITH_DEVICES = frozenset(DEVICES).union(_WORDS["beside devices"].split())
 
 WITHOUT_MEANING = frozenset(_WORDS["without meaning"].split())
-"""Words beside a position or rotation that tell no body from another."""
+"""Words in the name of a position or rotation that do not distinguish bodies."""
 
 _UPPER = r"[^\W\d_a-z]"
 WORD = re.compile(rf"{_UPPER}+(?={_UPPER}[a-z])|{_UPPER}?[a-z]+|{_UPPER}+|\d+|°")
@@ -104,25 +104,25 @@ ENDS_WITH_AXIS = re.compile(rf"(?:^|[\W_])(?:{AXIS.pattern})$", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class ColumnName:
-    """Meaning of a column's name."""
+    """The meaning of a column's name."""
 
     kind: str
     """"time", "frame", "scale", "device", or one of `KINDS`."""
 
     axis: str = ""
-    """x, y, z, w, one of `TURNS`, or a number: "0", or "03" of a row and a column; of a device the word for it; "date"
-    of a time that is called so."""
+    """x, y, z, w, one of `TURNS`, or a number: "0", or "03" for row 0 and column 3. For a device, the word for it. For
+    a time, "date" if the name says so."""
 
     unit: str = ""
-    """One of `UNITS`, or what stood in brackets; empty where nothing is said."""
+    """One of `UNITS`, or the text in brackets; empty if the name states no unit."""
 
     body: str = ""
-    """The body as it was written."""
+    """The body, spelled as in the file."""
 
 
 @lru_cache(maxsize=4096)
 def column_name(text: str) -> ColumnName | None:
-    """Return what the name of a column says; None where that is nothing known."""
+    """Return the meaning of a column's name, or None if it is not known."""
     if len(text) > LONGEST_NAME:
         return None
     text, unit = _without_brackets(text)
@@ -139,24 +139,24 @@ def column_name(text: str) -> ColumnName | None:
         return ColumnName("scale")
     taken = {len(words) - 1}
     result = ColumnName("scale") if words[-1:] == ["scale"] else _pose(words, unit, taken)
-    return result and replace(result, body=_body(text, words, spans, taken))
+    return result and replace(result, body=_body_name(text, words, spans, taken))
 
 
 def unit_in(text: str) -> str:
-    """Return the unit that a name ends with, whatever else it says; empty where it has none."""
+    """Return the unit at the end of any name; empty if there is none."""
     text, unit = _without_brackets(text[-LONGEST_NAME:])
     words = WORD.findall(text)
     return unit or (UNIT_OF.get(words[-1].lower(), "") if len(words) > 1 else "")
 
 
 def _without_brackets(text: str) -> tuple[str, str]:
-    """Return a name without the unit in brackets, and the unit. An axis in brackets stays, and so does a number."""
+    """Return a name without the unit in brackets, and the unit. An axis or a number in brackets stays."""
     text, unit = text.strip().replace("\u00b5", "u").replace("\u03bc", "u"), ""
     for match in BRACKETS.finditer(text):
         content, before = match[1].lower(), text[: match.start()]
         numbered = content.isdecimal() and re.search(r"[\w\]]$", before) and not ENDS_WITH_AXIS.search(before)
         if content not in ("x", "y", "z", "w") and not numbered:
-            # Of what has no unit one writes [], [1] or [-].
+            # Quantities without a unit are marked [], [1] or [-].
             unit = UNIT_OF.get(content, content.strip("-1"))
             text = before + " " * len(match[0]) + text[match.end() :]
     return text, unit
@@ -166,7 +166,7 @@ def _time(words: list[str], unit: str) -> ColumnName | None:
     parts = " ".join(TIME_WITH_UNIT.sub(r"\1 \2", word) for word in words).split()
     units = [UNIT_OF[word] for word in parts if UNIT_OF.get(word) in TICKS_PER_S_BY_UNIT]
     others = [word for word in parts if UNIT_OF.get(word) not in TICKS_PER_S_BY_UNIT]
-    # A plain s is a scale; any other unit of time tells that this is one.
+    # A plain s is a scale; any other unit of time means a time.
     timely = not TIME.isdisjoint(others) or (bool(units) and words != ["s"])
     if not timely or not WITH_TIME.issuperset(others):
         return None
@@ -175,10 +175,10 @@ def _time(words: list[str], unit: str) -> ColumnName | None:
 
 
 def _pose(words: list[str], unit: str, taken: set[int]) -> ColumnName | None:
-    """Return what the name of a position or rotation says; the places of the words that say it are left in `taken`."""
+    """Return the meaning of a position's or rotation's name. The places of the words used are left in `taken`."""
     taken.clear()
     for place, word in enumerate(words):
-        # A single letter in between is rather part of a name.
+        # A single letter in the middle is more likely part of the body's name.
         if place and word in UNITS_AS_WORDS and (len(word) > 1 or place == len(words) - 1):
             unit = unit or UNIT_OF[word]
             taken.add(place)
@@ -204,7 +204,7 @@ def _pose(words: list[str], unit: str, taken: set[int]) -> ColumnName | None:
 
 
 def _numbered(words: list[str], unit: str, taken: set[int]) -> ColumnName | None:
-    """Return what a name says that ends with one number, or with those of a row and a column."""
+    """Return the meaning of a name that ends with one number, or with the numbers of a row and a column."""
     first = len(words) - 2 if len(words[-1]) == 1 and words[-2:-1] and words[-2].isdecimal() else len(words) - 1
     kinds = {place: NUMBERED[word] for place, word in enumerate(words[:first]) if word in NUMBERED}
     axis = "".join(words[first:])
@@ -217,8 +217,8 @@ def _numbered(words: list[str], unit: str, taken: set[int]) -> ColumnName | None
     return ColumnName(known[-1] if known else NUMBERED[words[max(kinds)]], axis, unit)
 
 
-def _body(text: str, words: list[str], spans: list[tuple[int, int]], taken: set[int]) -> str:
-    """Return what is left of a name: as it was written, where it stands together."""
+def _body_name(text: str, words: list[str], spans: list[tuple[int, int]], taken: set[int]) -> str:
+    """Return the words left of a name: as written, if they are adjacent, else joined by underscores."""
     left = [place for place, word in enumerate(words) if place not in taken and word not in WITHOUT_MEANING]
     if not left:
         return ""

@@ -1,7 +1,7 @@
-"""Columns of a header: which are which body's time, position and rotation, and what there is to say where they are not.
+"""Columns of a header: the time, position and rotation of each body, or an error that says what is missing.
 
-A row may hold several bodies, each with a name of its own in front of its columns (`left_x`, `right_x`), or one body
-of several, which another column names (`device`).
+A row may hold several bodies, each with its own name in front of its columns (`left_x`, `right_x`), or one of several
+bodies, named in another column (`device`).
 """
 
 from __future__ import annotations
@@ -22,58 +22,56 @@ QUATERNION = ("qx", "qy", "qz", "qw")
 EULER = ("rx", "ry", "rz")
 MATRIX = ("m00", "m01", "m02", "m10", "m11", "m12", "m20", "m21", "m22")
 BOTTOM = ("m30", "m31", "m32")
-"""The rest of a matrix of four rows: its translation, where it is transposed."""
+"""The fourth row of a matrix: the translation, if the matrix is transposed."""
 
 OPTIONAL = ("scale", *BOTTOM)
 
 KNOWN_NAMES = "t, time, timestamp_ms; x, px, pos_x, position.x; qw, rot_w, rotation.w"
-"""Text of an error on the names that are known."""
+"""Known names, for the text of an error."""
 
 MOST_FOUND = 12
-"""Columns that an error names."""
+"""Number of columns that an error lists."""
 
 MOST_REMARKS = 3
-"""Bodies that are named as left out."""
+"""Number of bodies listed as left out."""
 
 NOT_POSES = {"v", "vel", "velocity", "linear", "angular", "acc", "accel", "acceleration", "gyro", "omega", "b", "bias"}
-"""What names of columns begin with that look like positions and are none."""
+"""First words of column names that look like positions but are not."""
 
 
 @dataclass(frozen=True)
 class RowLayout:
-    """Layout of a row: where everything is, as indices."""
+    """Layout of a row: the column index of each value."""
 
     times: tuple[int, ...]
-    """The columns that may be the time; none where the rows are counted."""
+    """Columns that may be the time; empty if the rows are counted instead."""
 
     bodies: Mapping[str, Mapping[str, int]]
-    """The columns of each body by name, empty where its columns have none in front: `POSITION`, then `QUATERNION`,
-    `MATRIX` or `EULER`, maybe some of `OPTIONAL`, and t where it has a clock of its own.
-    """
+    """The columns of each body by its name, which is empty for columns without a prefix: `POSITION`, then `QUATERNION`,
+    `MATRIX` or `EULER`, possibly some of `OPTIONAL`, and t if the body has its own clock."""
 
     units: Mapping[int, str]
-    """Units of the columns that tell theirs: a name in `TICKS_PER_S_BY_UNIT` or `column_names.METRES`, "deg", "rad", or
-    unknown.
-    """
+    """Units of the columns that state one: a name in `TICKS_PER_S_BY_UNIT` or `column_names.METRES`, "deg", "rad", or
+    an unknown one."""
 
     devices: tuple[int, ...] = ()
-    """Columns that may tell whose the row is, the likeliest first."""
+    """Columns that may tell whose row it is, the most likely first."""
 
     remark: str = ""
-    """What is left out, although it looks like a body, and what is guessed."""
+    """Remarks on columns that look like a body but are left out, and on guesses."""
 
 
 Found = dict[str, list[int]]
-"""Meanings in a body, each to all columns that could be it, by their names."""
+"""Meanings of the columns of a body, each with the indices of all columns whose names fit."""
 
 
 def layout_of(header: HeaderLine, options: ReadingOptions) -> RowLayout:
-    """Return what the columns of a header are.
+    """Return the meanings of the columns of a header.
 
     Raises
     ------
     TrajectoryError
-        Where columns are missing, or more than one could be meant.
+        If columns are missing or ambiguous.
     """
     cells, names = header.cells, names_of(header)
     explicit = _explicit(header, options)
@@ -96,7 +94,7 @@ def layout_of(header: HeaderLine, options: ReadingOptions) -> RowLayout:
     for index, label, name in _own_clocks(header, names, whole):
         bodies[label].setdefault("t", []).append(index)
         names[index] = name
-    # A date beside a count of seconds says the same again.
+    # A date in addition to a count of seconds is redundant.
     axes = [name.axis if name else "" for name in names]
     times = [index for index in of_kind["time"] if axes[index] != "date"] or of_kind["time"]
     times = (options.frame_rate and of_kind["frame"]) or times
@@ -107,7 +105,7 @@ def layout_of(header: HeaderLine, options: ReadingOptions) -> RowLayout:
         problem = f"no column of time, only one that counts frames ({frames[0]})" if frames else "poses without times"
         raise header.error(problem, "say how many frames a second it has: --frame-rate 90")
     if not timed or not whole:
-        raise _missing(header, names, bodies, bool(times), needed, explicit)
+        raise _missing_error(header, names, bodies, bool(times), needed, explicit)
 
     def only(meaning: str, indices: Sequence[int]) -> int:
         if len(indices) == 1:
@@ -124,14 +122,16 @@ def layout_of(header: HeaderLine, options: ReadingOptions) -> RowLayout:
     units |= {index: unit for index in explicit.values() if (unit := unit_in(cells[index]))}
     devices = sorted(of_kind["device"], key=lambda index: DEVICES.index(axes[index]))
     devices = [explicit["device"]] if "device" in explicit else devices
-    remarks = [text for label, result in bodies.items() if label not in whole and (text := _lacking(label, result))]
+    remarks = [
+        text for label, result in bodies.items() if label not in whole and (text := _missing_parts(label, result))
+    ]
     numbered = [columns["qw"] for columns in where.values() if "qw" in columns and axes[columns["qw"]].isdecimal()]
     remarks += [f"{shown(cells[index])} is taken for w" for index in numbered[:1]]
     return RowLayout(tuple(times), where, units, tuple(devices), "; ".join(remarks[-MOST_REMARKS:]))
 
 
 def names_of(header: HeaderLine) -> list[ColumnName | None]:
-    """Return what the names of a header say, a body's name always in the same case."""
+    """Return the meanings of the header's column names, spelling the name of each body in the same case."""
     if header.names is not None:
         return list(header.names)
     labels: dict[str, str] = {}
@@ -153,7 +153,7 @@ def _explicit(header: HeaderLine, options: ReadingOptions) -> dict[str, int]:
 
 
 def _bodies(names: Sequence[ColumnName | None], explicit: set[int]) -> dict[str, Found]:
-    """Return the columns of positions, rotations and scales, by the name of the body in front."""
+    """Return the columns of positions, rotations and scales, by the prefix that names the body."""
     bodies: dict[str, Found] = {"": {}}
     numbered: dict[tuple[str, str], Found] = {}
     with_w = {name.body for name in names if name and name.kind == "rotation" and name.axis == "w"}
@@ -177,7 +177,7 @@ def _bodies(names: Sequence[ColumnName | None], explicit: set[int]) -> dict[str,
 
 
 def _numbered(kind: str, axes: list[str]) -> Iterator[tuple[str, str]]:
-    """Yield what numbers in the place of axes mean, if they are as many as there have to be, and the numbers."""
+    """Yield pairs of a meaning and the number that stands for an axis; nothing if the count of numbers does not fit."""
     numbers = sorted(map(int, axes))
     count, base = len(axes), numbers[0]
     if count >= len(MATRIX) and all(len(axis) == 2 for axis in axes):
@@ -189,7 +189,7 @@ def _numbered(kind: str, axes: list[str]) -> Iterator[tuple[str, str]]:
         and base < 2
         and (count, kind == "position") in ((3, True), (4, False))
     ):
-        # q0 to q3 have w in front, as in flight, and q1 to q4 behind, as in space.
+        # q0 to q3 have w first, as in aviation, and q1 to q4 have it last, as in spaceflight.
         order = "xyz" if count == 3 else "wxyz" if kind == "quaternion" and base == 0 else "xyzw"
         yield from (("q" * (count == 4) + order[int(axis) - base], axis) for axis in axes)
         return
@@ -203,7 +203,7 @@ def _numbered(kind: str, axes: list[str]) -> Iterator[tuple[str, str]]:
 
 
 def _join_halves(bodies: dict[str, Found], names: Sequence[ColumnName | None]) -> None:
-    """Make one body of a position and a rotation that are between other frames, as in p_RS_R_x and q_RS_w."""
+    """Merge a position and a rotation between different frames into one body, as in p_RS_R_x and q_RS_w."""
     units = {index: name.unit for index, name in enumerate(names) if name}
     halves: dict[bool, list[str]] = {True: [], False: []}
     for label, found in bodies.items():
@@ -220,7 +220,7 @@ def _join_halves(bodies: dict[str, Found], names: Sequence[ColumnName | None]) -
 def _own_clocks(
     header: HeaderLine, names: Sequence[ColumnName | None], labels: Mapping[str, object]
 ) -> Iterator[tuple[int, str, ColumnName]]:
-    """Yield the columns whose names say a time once a body's name is taken away."""
+    """Yield the columns whose names mean a time once the name of a body is removed."""
     for index, cell in enumerate(header.cells):
         for label in labels if names[index] is None and header.names is None else ():
             rest = re.sub(rf"(^|[\W_]){re.escape(label)}([\W_]|$)", " ", cell, flags=re.IGNORECASE) if label else cell
@@ -229,12 +229,12 @@ def _own_clocks(
 
 
 def known_in(header: HeaderLine) -> int:
-    """Return how many columns mean something: of the lines that could be the header, the one with the most is taken."""
+    """Return the number of columns with a known meaning, which is highest in the likeliest header line."""
     return sum(name is not None for name in names_of(header))
 
 
-def _lacking(label: str, found: Found) -> str:
-    """Return what a body lacks that has most of what it needs; empty for what need not be one."""
+def _missing_parts(label: str, found: Found) -> str:
+    """Return what a nearly complete body lacks; empty if it need not be a body."""
     least = min(({*POSITION, *rotation} - {*found} for rotation in (QUATERNION, EULER)), key=len)
     if len(least) > 2 or not label:
         return ""
@@ -242,7 +242,7 @@ def _lacking(label: str, found: Found) -> str:
     return f"{shown(label)} is left out, as {lacks}"
 
 
-def _missing(
+def _missing_error(
     header: HeaderLine,
     names: Sequence[ColumnName | None],
     bodies: Mapping[str, Found],
@@ -250,11 +250,11 @@ def _missing(
     needed: Sequence[str],
     explicit: Mapping[str, int],
 ) -> TrajectoryError:
-    """Return what is missing to a header of which no body is whole: of the body that lacks the least."""
+    """Return the error for a header without a complete body: it names what the most complete body lacks."""
     cells = header.cells
     label, nearest = max(bodies.items(), key=lambda body: sum(item in body[1] for item in needed))
     if not nearest.keys() >= set(POSITION) and header.names is None:
-        # Something by chance ends like an axis.
+        # The name of some other column ends like an axis by chance.
         label, nearest = "", bodies[""]
     missing = [item for item in ("t", *needed) if item not in explicit and item not in nearest]
     if timed:
@@ -289,13 +289,13 @@ def _missing(
 
 
 def columns_found(cells: Sequence[str]) -> str:
-    """Return the columns that a file has, for an error."""
+    """Return the columns of a file, as text for an error."""
     names = [cell if len(cell) <= 24 else f"{cell[:24]}..." for cell in dict.fromkeys(cells) if cell]
     return listed(names, limit=MOST_FOUND) or "none"
 
 
 def require_time_unit(header: HeaderLine, unit: str) -> None:
-    """Raise TrajectoryError where the unit of time is none that is known. Of dates it is no matter: `t [hh:mm:ss]`."""
+    """Raise TrajectoryError if the unit of time is unknown. For dates it does not matter: `t [hh:mm:ss]`."""
     if unit and unit not in TICKS_PER_S_BY_UNIT:
         raise header.error(
             f"{shown(unit)} is not a known unit of time", f"--time-unit {', '.join(TICKS_PER_S_BY_UNIT)}"
@@ -305,9 +305,9 @@ def require_time_unit(header: HeaderLine, unit: str) -> None:
 def metres_of(
     header: HeaderLine, layout: RowLayout, columns: Mapping[str, int], options: ReadingOptions
 ) -> list[float]:
-    """Return the metres of a unit in each of the columns x, y and z, of which those are metres that say nothing.
+    """Return the metres per unit of the columns x, y and z. Columns without a unit are in metres.
 
-    Raises TrajectoryError for a unit of length that is not known.
+    Raises TrajectoryError for an unknown unit of length.
     """
     if options.scale is not None:
         return [options.scale] * 3

@@ -1,4 +1,4 @@
-"""Intrinsic Euler angles as quaternions, for formats that record rotations as turns about one axis after another."""
+"""Intrinsic Euler angles converted to quaternions, for formats with rotations about one axis after another."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from rigid_motion.motion.quaternions import multiply
 
 
 def quaternions_from_intrinsic_eulers(angles: np.ndarray, order: str) -> np.ndarray:
-    """Return rotations R1 R2 ... of turns about the axes in `order`, each about the axis as the earlier ones left it.
+    """Return the rotations R1 R2 ... about the axes in `order`, each axis as moved by the earlier rotations.
 
     Parameters
     ----------
     angles : array, shape (n, len(order))
         Radians.
     order : str
-        One letter of X, Y, Z for each column of `angles`: "YXZ" is A-Frame's, "ZXY" the common one in BVH.
+        One letter of X, Y, Z for each column of `angles`: "YXZ" is A-Frame's order, "ZXY" the common one in BVH.
 
     Returns
     -------
     array, shape (n, 4)
-        w, x, y, z. NaN where an angle is infinite or NaN.
+        w, x, y, z. NaN if an angle is infinite or NaN.
     """
     result = np.tile((1.0, 0.0, 0.0, 0.0), (len(angles), 1))
     for column, axis in enumerate(order):

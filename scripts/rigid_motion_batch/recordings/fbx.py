@@ -1,10 +1,10 @@
-"""FBX files, binary ones, by Blender's own importer: the whole skeleton as Blender shows it.
+"""Binary FBX files, read by Blender's own importer: the whole skeleton as Blender shows it.
 
-The file tells how many frames it has a second; keys may be closer. Images that it names are not looked for.
+The file states its frame rate; keys may be closer. Images that it names are not opened.
 
-Blender's importer makes room for whatever a file says of itself, up to hundreds of gigabytes, so it is looked first
-whether its records fit one another. A record is where it ends, how many properties it has, its name, these properties,
-and further records up to one that is all zeros.
+Blender's importer allocates whatever sizes a file states, up to hundreds of gigabytes. So first the records of the file
+are checked for consistency. A record consists of its end, its number of properties, its name, the properties, and
+nested records up to one of all zeros.
 Source: Blender's notes on the format, https://code.blender.org/2013/08/fbx-binary-file-format-specification/.
 """
 
@@ -31,7 +31,7 @@ ADDON = "io_scene_fbx"
 
 
 def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Trajectory]:
-    """Read the whole skeleton; or bones that are named, or all."""
+    """Read the whole skeleton, or the named bones, or all bones."""
     refuse_too_large(path)
     refuse_damaged(path)
     return read_imported(path, selection, lambda: _import(path), ADDON, options.scale)
@@ -53,7 +53,7 @@ def _import(path: Path) -> None:
 
 @contextmanager
 def _without_images() -> Iterator[None]:
-    """Keep images from being opened, wherever a stranger's file says that they are: the importer gets empty ones."""
+    """Give the importer empty images, so that it opens no files at paths that a stranger's file names."""
     import bpy
     from bpy_extras import image_utils
 
@@ -71,32 +71,32 @@ def _without_images() -> Iterator[None]:
 MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
 
 FIRST_RECORD_BYTE = len(MAGIC) + 4
-"""Byte where the records begin, behind the version."""
+"""Byte offset of the first record, after the version."""
 
 MIN_FBX_VERSION = 7100
-"""Version that Blender's importer takes, and later ones."""
+"""Oldest version that Blender's importer reads."""
 
 SINCE_WIDE = 7500
-"""Version since which places and numbers have 8 bytes each, and not 4."""
+"""Version from which offsets and counts have 8 bytes instead of 4."""
 
 MAX_RECORD_DEPTH = 100
-"""Records within records; importers go 10 deep."""
+"""Nesting depth of records; importers go 10 deep."""
 
 BYTES_BY_TYPE = {b"Z": 1, b"C": 1, b"B": 1, b"Y": 2, b"I": 4, b"F": 4, b"D": 8, b"L": 8}
-"""Bytes of the properties that are one number."""
+"""Bytes of properties that hold one number."""
 
 ITEM_BYTES_BY_TYPE = {b"b": 1, b"c": 1, b"i": 4, b"l": 8, b"f": 4, b"d": 8}
-"""Bytes of a number in those that are many."""
+"""Bytes per number in properties that hold arrays."""
 
 MAX_EXPANSION_RATIO = 1032
-"""Bytes that zlib makes of one at most."""
+"""Largest ratio of unpacked to packed bytes in zlib."""
 
 MAX_HARMLESS_BYTES = 1 << 24
-"""Bytes. What cannot become more is not unpacked to see."""
+"""Bytes. Data that cannot unpack to more is not unpacked as a check."""
 
 
 def refuse_damaged(path: Path) -> None:
-    """Raise TrajectoryError where a file is no binary FBX, is cut off, or says more than it holds."""
+    """Raise TrajectoryError if a file is not a binary FBX, is cut off, or states more data than it holds."""
     with path.open("rb") as file:
         head = file.read(FIRST_RECORD_BYTE)
         if head.startswith(MAGIC) and len(head) == FIRST_RECORD_BYTE:
@@ -134,7 +134,7 @@ class _Records:
                 begin = place + zeros + name
                 if not begin <= end <= inside or count > end - begin:
                     self.fail("a part of it is longer than the whole")
-                place = self._behind_properties(begin, count)
+                place = self._end_of_properties(begin, count)
                 if place > end:
                     self.fail("a part of it is longer than the whole")
                 if place < end:
@@ -144,7 +144,7 @@ class _Records:
         except struct.error:
             self.fail("it ends too soon")
 
-    def _behind_properties(self, place: int, count: int) -> int:
+    def _end_of_properties(self, place: int, count: int) -> int:
         for _ in range(count):
             kind = self.content[place : place + 1]
             place += 1
@@ -163,7 +163,7 @@ class _Records:
         return place
 
     def _refuse_false_size(self, place: int, requested: int, size: int, packed: bool) -> None:
-        """Refuse numbers at a place that cannot take as many bytes, unpacked if they are packed, as the file says."""
+        """Refuse an array whose data do not fit the size in bytes (unpacked, if `packed`) that the file states."""
         self.unpacked += requested
         if self.unpacked > LARGEST_FILE:
             problem = f"its numbers are more than {LARGEST_FILE} bytes"

@@ -1,4 +1,5 @@
-"""Skins of glTF files: the surface that the nodes of a body carry where they rest, by weights or as a whole.
+"""Skins of glTF files: the surface that the nodes of a body carry at rest, by weights or rigidly.
+
 
 Source: the glTF 2.0 specification, Khronos 2021, section 3.7.
 """
@@ -18,13 +19,13 @@ from .rest_bodies import MAX_JOINTS_PER_VERTEX, MOST_VERTICES, Skin
 from .scene_bodies import with_above
 
 TRIANGLES_MODE = 4
-"""The mode of primitives whose every three vertices are a triangle."""
+"""The mode of primitives in which every three vertices are a triangle."""
 
 DRACO = "KHR_draco_mesh_compression"
 
 
 def skin_of(nodes: Nodes, own: Sequence[int], to_blender: np.ndarray) -> Skin | None:
-    """Return the surface of a body, or None where it has no triangles or too many vertices.
+    """Return the surface of a body, or None if it has no triangles or too many vertices.
 
     Parameters
     ----------
@@ -32,17 +33,17 @@ def skin_of(nodes: Nodes, own: Sequence[int], to_blender: np.ndarray) -> Skin | 
     own : sequence of int
         The nodes that are joints of the body.
     to_blender : array, shape (3, 3)
-        Takes points to the axes of the body.
+        Converts points to the axes of the body.
 
     Raises
     ------
     GltfError
-        For a mesh that is compressed or damaged.
+        For a compressed or damaged mesh.
     """
     rows = {node: joint for joint, node in enumerate(own)}
     parts, before = [], 0
     for primitive, carriers, maps in _carried(nodes, rows):
-        part = _part(nodes, primitive, carriers, maps)
+        part = _primitive_surface(nodes, primitive, carriers, maps)
         parts.append(Skin(part.vertices @ to_blender.T, part.triangles + before, part.joints, part.weights))
         before += len(part.vertices)
         if before > MOST_VERTICES:
@@ -53,7 +54,7 @@ def skin_of(nodes: Nodes, own: Sequence[int], to_blender: np.ndarray) -> Skin | 
 
 
 def _carried(nodes: Nodes, rows: dict[int, int]) -> Iterator[tuple[Json, np.ndarray, AffineMaps]]:
-    """Yield what joints carry: a primitive, the numbers of these joints (k,), and where its mesh is for each (k,)."""
+    """Yield each primitive, the numbers of the joints that carry it (k,), and its transform for each joint (k,)."""
     json = nodes.document.json
     for number, node in enumerate(objects(json, "nodes")):
         if "mesh" not in node:
@@ -78,7 +79,7 @@ def _carried(nodes: Nodes, rows: dict[int, int]) -> Iterator[tuple[Json, np.ndar
                 yield primitive, carriers, maps
 
 
-def _part(nodes: Nodes, primitive: Json, carriers: np.ndarray, maps: AffineMaps) -> Skin:
+def _primitive_surface(nodes: Nodes, primitive: Json, carriers: np.ndarray, maps: AffineMaps) -> Skin:
     """Return the surface of a primitive, in the axes of the document."""
     document, attributes = nodes.document, primitive["attributes"]
     if DRACO in primitive.get("extensions", {}):
