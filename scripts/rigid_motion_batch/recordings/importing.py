@@ -1,7 +1,7 @@
-"""Bodies of files that Blender imports: into a scene of their own, out of which all of it is taken again.
+"""Bodies of files that Blender's importers read, in a scene of their own that is removed afterwards.
 
-What is open stays as it is. Times begin with 0 on the first key, axes and units are those that the importer makes of
-the file's. A stranger's file is data: importers are written in Python, fail in any way there is, and may crash.
+The open file stays unchanged. Times begin with 0 on the first key; axes and units are those that the importer produces.
+A stranger's file is data: importers are written in Python, fail in any possible way, and may crash.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ if TYPE_CHECKING:
     import bpy
 
 NUMBERED = re.compile(r"(?P<name>.+)\.\d{3,}", re.DOTALL)
-"""A name that Blender has numbered, for there was one like it."""
+"""A name that Blender has numbered because it was taken."""
 
 LONGEST_REASON = 120
-"""Characters of what an importer says."""
+"""Characters quoted of an importer's error message."""
 
 
 def read_imported(
     path: Path, selection: Selection, importer: Callable[[], object], addon: str, scale: float | None
 ) -> list[Trajectory]:
-    """Read the largest whole body of a file, or else the first object that moves; or what is named, or all.
+    """Read the largest whole body of a file, or else the first moving object; or the requested body, or all.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ def read_imported(
     importer : callable
         Imports the file into the current scene.
     addon : str
-        The add-on of Blender that it is in.
+        The Blender add-on of the importer.
     scale : float or None
-        Metres of a unit, where the user says them.
+        Metres per unit, if the user gives them.
 
     Raises
     ------
     TrajectoryError
-        Where there is no Blender, the file cannot be imported, or nothing in it moves.
+        If this is not Blender, the file cannot be imported, or nothing in it moves.
     """
     with in_blender(path, "export it again"), _imported(path, importer, addon) as (scene, names):
         found = _Scene(path, scene, names, scale)
@@ -65,7 +65,7 @@ def read_imported(
 
 
 class _Scene:
-    """A scene that was imported, whose nodes are its objects, and the bones of its armatures."""
+    """An imported scene; its nodes are the objects, and the bones of the armatures."""
 
     def __init__(
         self, path: Path, scene: bpy.types.Scene, names: dict[bpy.types.Object, str], scale: float | None
@@ -118,9 +118,9 @@ class _Scene:
         return self._with_remarks(result, [node])
 
     def _moments(self, own: Sequence[int]) -> Moments:
-        """Return even frames from the first key of what moves these nodes to the last one, and all keys between."""
+        """Return even frames from the first to the last key that moves these nodes, and all keys between."""
         objects = dict.fromkeys(above for node in own for above in with_parents(self.nodes[node][0]))
-        # What does not move is looked at for as long as everything else does.
+        # Nodes that do not move are sampled for as long as the other nodes move.
         keys = _keys_of(objects) or _keys_of(obj for obj, bone in self.nodes if bone is None)
         first, last = min(frames[0] for frames in keys), max(frames[-1] for frames in keys)
         refuse_far_frames(self.path, self.names[own[0]], np.array([first, last]))
@@ -131,7 +131,7 @@ class _Scene:
         return moments_between(first, last, rate, step, frames, straight=straight)
 
     def _with_remarks(self, trajectory: Trajectory, own: Sequence[int], remark: str = "") -> Trajectory:
-        """Return it with remarks on what of the file was left."""
+        """Return the trajectory with remarks on parts of the file that were not read."""
         obj, data = self.nodes[own[0]][0], self.nodes[own[0]][0].animation_data
         left, takes = _other_takes(obj, data.action, self.scene) if data and data.action else [], ""
         if data and data.action and left:
@@ -140,7 +140,7 @@ class _Scene:
 
 
 def _parent(obj: bpy.types.Object, bone: str | None) -> tuple[bpy.types.Object | None, str | None]:
-    """Return what an object, or a bone of it, hangs on: an object, or a bone of it."""
+    """Return the parent of an object or of its bone: an object, or one of its bones."""
     if bone is None:
         return obj.parent, (obj.parent_bone or None) if obj.parent_type == "BONE" else None
     above = armature_of(obj).bones[bone].parent
@@ -154,17 +154,17 @@ def _curves_of(obj: bpy.types.Object) -> Iterator[bpy.types.FCurve]:
 
 
 def _keys_of(objects: Iterable[bpy.types.Object]) -> list[np.ndarray]:
-    """Return the frames of the keys, rising, of each curve that moves some objects or their bones."""
+    """Return the frames of the keys, increasing, of each F-curve that moves the objects or their bones."""
     keys = (keys_of(fcurve).frames for obj in objects for fcurve in _curves_of(obj))
     return [frames for frames in keys if len(frames)]
 
 
 def _other_takes(obj: bpy.types.Object, own: bpy.types.Action, scene: bpy.types.Scene) -> list[str]:
-    """Return other Actions that move an object, or the bones of a rig, of those that the importer has made."""
+    """Return the names of other imported Actions that move the object, or the bones of the rig."""
     if obj.type != "ARMATURE":
         return [action.name for action in _takes_of(obj, scene) if action != own]
     bones, result = {*armature_of(obj).bones.keys()}, []
-    for action in _made(scene):
+    for action in _imported_actions(scene):
         if action != own:
             curves = (fcurve for slot in action.slots for fcurve in fcurves_of(action, slot))
             channels = (BONE_CHANNEL.match(fcurve.data_path) for fcurve in curves)
@@ -174,15 +174,17 @@ def _other_takes(obj: bpy.types.Object, own: bpy.types.Action, scene: bpy.types.
 
 
 def _takes_of(obj: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Action]:
-    """Return the Actions that the importer has made for an object that is no rig, after which it calls them."""
+    """Return the imported Actions of an object that is not a rig: their names start with its name."""
     if obj.type == "ARMATURE":
         return []
-    own = (action for action in _made(scene) if action.name.startswith(f"{obj.name}|") and len(action.slots))
+    own = (
+        action for action in _imported_actions(scene) if action.name.startswith(f"{obj.name}|") and len(action.slots)
+    )
     return [action for action in own if any(curves_that_move(action, action.slots[0], bones=False))]
 
 
-def _made(scene: bpy.types.Scene) -> Iterator[bpy.types.Action]:
-    """Yield the Actions that the importer has made, after the scene."""
+def _imported_actions(scene: bpy.types.Scene) -> Iterator[bpy.types.Action]:
+    """Yield the Actions that the importer created, which are those newer than the scene."""
     import bpy
 
     return (action for action in bpy.data.actions if action.session_uid > scene.session_uid)
@@ -195,7 +197,7 @@ def _made(scene: bpy.types.Scene) -> Iterator[bpy.types.Action]:
 def _imported(
     path: Path, importer: Callable[[], object], addon: str
 ) -> Iterator[tuple[bpy.types.Scene, dict[bpy.types.Object, str]]]:
-    """Yield a scene with what was imported, and its objects with their names; all of it gone afterwards."""
+    """Yield a scene with the imported data, and its objects with their names; all are removed afterwards."""
     import bpy
 
     before = {block.session_uid for block in bpy.data.user_map()}
@@ -207,7 +209,7 @@ def _imported(
     scene = bpy.data.scenes.new("Importing")
     try:
         scene.render.fps, scene.render.fps_base = 24, 1.0
-        # Importers go by what the window shows: an override is not enough for the mode that they edit bones in.
+        # Importers use the scene of the window: a context override is not enough for entering Edit Mode.
         window.scene = scene
         with enabled(path, addon):
             run_operator(path, "import", importer)
@@ -221,7 +223,7 @@ def _imported(
 
 
 def run_operator(path: Path, what: str, do: Callable[[], object]) -> None:
-    """Have Blender "import" or "export" a file. Raises TrajectoryError with what it says where it cannot."""
+    """Have Blender "import" or "export" a file. On failure, raises TrajectoryError with Blender's message."""
     try:
         with silenced(), redirect_stderr(io.StringIO()), warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -236,7 +238,7 @@ def run_operator(path: Path, what: str, do: Callable[[], object]) -> None:
 
 
 def _reason(path: Path, error: Exception) -> str:
-    """Return what an importer says: the last line of it, or of a traceback, where Blender adds what called it."""
+    """Return the last line of an importer's error message or traceback, without Blender's note of the calling code."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     lines = [line for line in lines if not line.startswith("Location:")]
     said = lines[-1].removeprefix("Error: ") if lines else ""
@@ -248,7 +250,7 @@ def _reason(path: Path, error: Exception) -> str:
 
 @contextmanager
 def enabled(path: Path, addon: str) -> Iterator[None]:
-    """Switch on an add-on of Blender's own for as long as this lasts."""
+    """Enable one of Blender's bundled add-ons during the context."""
     import addon_utils
 
     _, loaded = addon_utils.check(addon)
@@ -266,10 +268,10 @@ def enabled(path: Path, addon: str) -> Iterator[None]:
 
 
 def _only_its_action(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
-    """Keep the Action that an object has, or else that of its first strip, and nothing else of its NLA.
+    """Keep the Action of an object (or else that of its first strip), and remove its NLA tracks.
 
-    Blender writes the Actions of all objects for each of them into an FBX: of these it gets that which is called after
-    it, as Blender calls new ones.
+    Blender writes the Actions of all objects into an FBX for each object. Of these, the object gets the one with the
+    default name that Blender gives to its new Actions.
     """
     data = obj.animation_data
     if data is None:
@@ -288,6 +290,6 @@ def _only_its_action(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
 
 
 def _own_name(name: str, taken: set[str]) -> str:
-    """Return what the file calls an object that was numbered, for there is one of that name in what is open."""
+    """Return the name of an object in the file, if Blender numbered it because the name was taken."""
     numbered = NUMBERED.fullmatch(name)
     return numbered["name"] if numbered and numbered["name"] in taken else name

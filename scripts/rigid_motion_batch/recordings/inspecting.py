@@ -1,7 +1,7 @@
 """Contents of a recording: its bodies, units, axes, times and motion, and what looks wrong with it.
 
-Nothing is printed here, and nothing but the recording read. Lengths are in metres, times in seconds, angles in degrees;
-x, y and z are the recording's own axes.
+Nothing is printed here, and only the recording is read. Lengths are in metres, times in seconds, angles in degrees; x,
+y and z are the recording's own axes.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from .sizing import axis_up, leading
 UNIT_NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches", "ft": "feet"}
 
 MAX_EVEN_INTERVAL_RATIO = 0.1
-"""Part of the median by which the middle nine tenths of all intervals differ, at most, where samples are even."""
+"""Samples are even if the middle 90 % of the intervals differ from the median by at most this fraction of it."""
 
 ABOVE_THE_FLOOR = 0.3, 2.5
-"""Metres, where hands, heads and cameras of people are."""
+"""Lowest and highest metres above the floor for hands, heads and cameras of people."""
 
 LEAST_TREMBLING = 1e-6, 1e-4
-"""Metres and degrees: less is rounding."""
+"""Metres and degrees: less jitter is rounding."""
 
 
 @dataclass(frozen=True)
@@ -44,50 +44,53 @@ class Unit:
     metres: float
     name: str
     known_from: str
-    """The origin of the unit, and so how sure it is."""
+    """Where the unit is known from, and so how certain it is."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Timing of the samples that can be used."""
+    """Timing of the usable samples."""
 
     samples: int
     recorded: int
-    """Samples in the file; those that are damaged or left out are no part of the others."""
+    """Samples in the file, including those that are damaged or left out."""
 
     first: float
-    """The time of the first, in seconds as the file has them."""
+    """The time of the first sample, in seconds of the file's times."""
 
     seconds: float
     rate: float
-    """Samples a second: as the file has it, or by the median interval."""
+    """Samples a second: as the file states, or from the median interval."""
 
     shortest: float
     longest: float
-    """Intervals, in seconds."""
+    """The shortest and the longest interval, in seconds."""
 
     even: bool
     gaps: int
-    """Intervals in which samples are missing."""
+    """Number of intervals in which samples are missing."""
 
 
 @dataclass(frozen=True)
 class Size:
-    """Size of a motion; of a whole body, that of all its joints, and the way and the turns of what carries it about."""
+    """Extent and speed of a motion.
+
+    For a whole body, the extent is that of all joints; path, speeds and turns are those of the joint that leads it.
+    """
 
     lowest: tuple[float, float, float]
     highest: tuple[float, float, float]
     path: float
-    """Metres that the body goes."""
+    """Length of the path of the body, in metres."""
 
     speed: float
-    """Metres a second, which 95 % of the speeds are below."""
+    """The 95th percentile of the speed, in metres a second."""
 
     turning: float
-    """Degrees a second, likewise."""
+    """The 95th percentile of the turning speed, in degrees a second."""
 
     turned: float
-    """Degrees, the largest turn away from the first sample."""
+    """The largest rotation away from the first sample, in degrees."""
 
     @property
     def extent(self) -> tuple[float, float, float]:
@@ -97,42 +100,42 @@ class Size:
 
 @dataclass(frozen=True)
 class MeasuredTrembling:
-    """What no motion explains in a body that was measured: see `rigid_motion.motion.clean`."""
+    """Jitter and spikes of a measured body, which no motion explains: see `rigid_motion.motion.clean`."""
 
     position: float
-    """Metres, the standard deviation along an axis; 0 where none is found."""
+    """Standard deviation along an axis, in metres; 0 if no jitter is found."""
 
     rotation: float
-    """Degrees, likewise."""
+    """Standard deviation about an axis, in degrees; 0 if no jitter is found."""
 
     spikes: tuple[float, ...]
-    """The times of samples that are spikes, or only repeat the one before, in seconds of the file."""
+    """The times of samples that are spikes or repeats of the sample before, in seconds of the file's times."""
 
 
 @dataclass(frozen=True)
 class Contents:
-    """Contents of a body."""
+    """Contents of one body."""
 
     name: str
     joints: tuple[str, ...]
-    """The joints of a whole body; none for a single rigid one."""
+    """The joints of a whole body; empty for a single rigid body."""
 
     unit: Unit
     timing: Timing
     size: Size
     scaled: bool
-    """True if it grows or shrinks."""
+    """True if the body grows or shrinks."""
 
     up: str
-    """The axis that seems to be up, or empty."""
+    """The axis that seems to point up; empty if unclear."""
 
     repairs: tuple[str, ...]
-    """Sentences on what was repaired."""
+    """Sentences on the repairs."""
 
     warnings: tuple[ClipWarning, ...]
 
     trembling: MeasuredTrembling | None
-    """None for whole bodies, and what was animated."""
+    """None for whole bodies and animations."""
 
 
 @dataclass(frozen=True)
@@ -140,11 +143,11 @@ class Axes:
     """The convention of a recording's axes."""
 
     name: str
-    """The one that it is read in: a name in `axes.DESCRIBED`."""
+    """The convention used for reading: a name in `axes.DESCRIBED`."""
 
     known_from: str
     others: tuple[str, ...] = ()
-    """Other conventions that the motion speaks for."""
+    """Other conventions that fit the motion."""
 
     @property
     def described(self) -> str:
@@ -159,32 +162,32 @@ class Inspection:
     format: str
     bytes: int
     bodies: tuple[str, ...]
-    """The names of all, as they may stand behind FILE: in a source. Of a whole body, see its joints."""
+    """The names of all bodies, to be used after FILE: in a source. For a whole body, see its joints."""
 
     axes: Axes
     contents: tuple[Contents, ...]
     unreadable: tuple[tuple[str, str], ...] = ()
-    """Bodies that there are no two poses of, and why."""
+    """Bodies with fewer than two poses, and the reason."""
 
     note: str = ""
-    """A note on what was taken and left: takes, armatures, guessed units."""
+    """A note on what was read and what was not: takes, armatures, guessed units."""
 
 
 def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_THE_FILE_SAYS) -> Inspection:
-    """Look into a recording.
+    """Return the contents of a recording.
 
     Parameters
     ----------
     source : str
-        As `read_trajectories` takes it. Of a file without a whole body, all bodies are looked at.
+        As in `read_trajectories`. All bodies of a file without a whole body are read.
     axes : str, optional
-        The axes of the recording, a name in `rigid_motion_batch.axes.AXES`, where the user knows them.
+        The axes of the recording, a name in `rigid_motion_batch.axes.AXES`, if the user knows them.
     options : ReadingOptions, optional
 
     Raises
     ------
     TrajectoryError
-        Where it cannot be read, or no body of it has two poses.
+        If the recording cannot be read, or none of its bodies has two poses.
     """
     recording = read_all_singles(source, options)
     path, result = recording.path, format_of(recording.path)
@@ -204,7 +207,7 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
     ups = {content.up for content in contents if content.up}
     taken = _axes(recording, axes, next(iter(ups)) if len(ups) == 1 else "")
     size = path.stat().st_size
-    # Of the bodies, and not of the others, which are listed.
+    # The remarks of the bodies that were read; the other bodies are listed anyway.
     note = "; ".join(dict.fromkeys(item.remark for item in recording.trajectories if item.remark))
     return Inspection(source, result.label, size, bodies, taken, tuple(contents), tuple(unreadable), note)
 
@@ -218,7 +221,7 @@ def _contents(clip: Clip, trajectory: Trajectory, unit: Unit, trembling: Measure
         _timing(clip, len(trajectory.times)),
         _size(clip),
         clip.poses.scales is not None,
-        _up(clip),
+        _up_axis(clip),
         tuple(repair for repair in clip.repairs if repair not in said),
         clip.warnings,
         trembling,
@@ -285,8 +288,8 @@ def _size(clip: Clip) -> Size:
     )
 
 
-def _up(clip: Clip) -> str:
-    """Return the axis that is up, by where people are above the floor, or how they stand; empty if unclear."""
+def _up_axis(clip: Clip) -> str:
+    """Return the axis that points up, judged by heights above the floor or by how a body stands; empty if unclear."""
     if clip.rest_body is not None:
         return axis_up(clip.rest_body, clip.poses)
     low, high = np.percentile(clip.poses.positions * clip.metres_per_unit, (1.0, 99.0), axis=0)

@@ -1,11 +1,11 @@
-"""Poses in JSON: lists of objects that have a position and a rotation, or a matrix, under names that columns may have.
+"""JSON files of poses: lists of objects with a position and a rotation, or a matrix, under keys named like columns.
 
-What an object holds becomes columns, named by its keys (`position.x`, `rotation[3]`), and several lists are several
-bodies. Known besides are some orders and axes: A-Frame's `avatar-recorder` and `motion-capture-recorder` have degrees
-that it applies in the order Y X Z, or quaternions x, y, z, w in recordings of January 2017; axes are right-handed, y
-up, -z forward. nuScenes has w first, z up and x forward. NeRF's `transforms.json` has no times: the names of its images
-are counted; its world has z up, and its cameras look along -z with y up. Record3D's `metadata.json` has lists of seven
-numbers, and their rate; axes are those of ARKit, y up, -z forward.
+The values of an object become columns, named by their keys (`position.x`, `rotation[3]`); several lists are several
+bodies. In addition, the orders and axes of some programs are known. A-Frame's `avatar-recorder` and
+`motion-capture-recorder` have degrees applied in the order Y X Z, or quaternions x, y, z, w in recordings of January
+2017; axes are right-handed, y up, -z forward. nuScenes has w first, z up and x forward. NeRF's `transforms.json` has no
+times, so its images are counted by their names; its world has z up, and its cameras look along -z with y up. Record3D's
+`metadata.json` has lists of seven numbers, and their rate; axes are those of ARKit, y up, -z forward.
 Sources: https://github.com/dmarcos/aframe-motion-capture-components, https://www.nuscenes.org/nuscenes#data-format,
 https://docs.nerf.studio/quickstart/data_conventions.html,
 https://developer.apple.com/documentation/arkit/arcamera/transform.
@@ -36,19 +36,19 @@ from .times import MAX_SAMPLES_PER_S
 from .tracks import read_below
 
 LARGEST_FILE = 1 << 28
-"""Bytes: two hours of a headset and two controllers at 90 Hz. All of a file is in memory, at ten times its size."""
+"""Bytes: two hours of a headset and two controllers at 90 Hz. The whole file is in memory, at ten times its size."""
 
 MAX_OBJECT_DEPTH = 4
-"""Objects inside of objects that are looked into."""
+"""Depth of nested objects that are searched."""
 
 LOOKED_AT = 16
-"""Poses of a list that tell what each of them holds."""
+"""Poses at the start of a list that determine its columns."""
 
 MOST_VALUES = 1000
-"""Values of a pose that are looked at."""
+"""Values read per pose to determine the columns."""
 
 VECTOR_LENGTHS = (3, 4, 9, 12, 16)
-"""Numbers of a list that is a vector, a quaternion or a matrix."""
+"""Lengths of lists that are vectors, quaternions or matrices."""
 
 RECORD3D = ("qx", "qy", "qz", "qw", "x", "y", "z")
 
@@ -58,16 +58,16 @@ EXPECTED = (
 )
 
 LONGEST_TEXT = 100
-"""Characters of a time, or the name of a body."""
+"""Characters of a time or of a body's name."""
 
 Objects = list[dict[str, Any]]
 
 Key = tuple[str | int, ...]
-"""The way to a value inside of a pose."""
+"""The path of keys and indices to a value inside a pose."""
 
 
 def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
-    """Read the bodies that have any poses. One without a name has the file's."""
+    """Read the bodies that have poses. A body without a name gets that of the file."""
     text = read_text(path, LARGEST_FILE)
     try:
         content = json.loads(text)
@@ -85,12 +85,12 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
             layout_of(header, said)
             found[way] = poses
         except TrajectoryError as error:
-            # Lists of events and the like are none of poses.
+            # Lists with few known columns hold other things than poses, such as events.
             problems += [error] * (known_in(header) > len(header.cells) / 2)
     if not found:
         raise problems[0] if problems else TrajectoryError(path, "this JSON holds no poses", EXPECTED)
     header, keys, said = _header(path, next(iter(found.values())), options, rate)
-    # What is last on the way to all of them, such as "poses", is no name.
+    # The last key is not a name if it is the same for all lists, such as "poses".
     last = len({way[-1:] for way in found}) == 1
     lists = {".".join(way[: len(way) - last]): poses for way, poses in found.items()}
     rows = cache(partial(_rows, header, keys, layout_of(header, said), lists))
@@ -102,7 +102,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
 
 
 def _lists(content: Any, way: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Objects]]:
-    """Yield the lists of objects, and the keys on the way to each."""
+    """Yield the keys that lead to each list of objects, and the list."""
     if isinstance(content, list):
         if content and all(isinstance(item, list) and len(item) == len(RECORD3D) for item in content):
             content = [dict(zip(RECORD3D, item, strict=True)) for item in content]
@@ -111,7 +111,7 @@ def _lists(content: Any, way: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str,
     elif isinstance(content, dict) and len(way) < MAX_OBJECT_DEPTH:
         columns = {key: item for key, item in content.items() if isinstance(item, list) and len(item) > 1}
         if len(columns) > 1 and len({*map(len, columns.values())}) == 1:
-            # Columns of numbers are poses, too.
+            # An object of equally long lists holds the columns of poses.
             yield way, [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         for key, item in content.items():
             yield from _lists(item, (*way, key))
@@ -120,7 +120,7 @@ def _lists(content: Any, way: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str,
 def _header(
     path: Path, poses: Objects, options: ReadingOptions, rate: Any
 ) -> tuple[HeaderLine, list[Key], ReadingOptions]:
-    """Return the columns that the poses of a list make, where they are in one, and what is known by their program."""
+    """Return the columns of a list's poses as a header, their keys, and options with facts known of the program."""
     first = [pose for pose in poses[:LOOKED_AT] if isinstance(pose, dict)]
     keys = list(dict.fromkeys(key for pose in first for key in islice(_keys(pose), MOST_VALUES)))
     cells = ["device", "frame", *map(_cell, keys)]
@@ -146,7 +146,7 @@ def _header(
 
 
 def _keys(value: Any, way: Key = ()) -> Iterator[Key]:
-    """Yield the ways to all values of a pose that can be those of columns."""
+    """Yield the paths to all values of a pose that can be columns."""
     if isinstance(value, dict) and len(way) < MAX_OBJECT_DEPTH:
         for key, item in value.items():
             yield from _keys(item, (*way, key))
@@ -161,40 +161,40 @@ def _keys(value: Any, way: Key = ()) -> Iterator[Key]:
 
 
 def _cell(key: Key) -> str:
-    """Return the name of a column."""
+    """Return the column name for a path."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in key).lstrip(".")
 
 
-def _image(pose: Any) -> str:
-    """Return the name of a pose's image, if it has one."""
+def _image_name(pose: Any) -> str:
+    """Return the file name of a pose's image, or an empty text."""
     return str(pose.get("file_path", "")) if isinstance(pose, dict) else ""
 
 
-def _order(poses: Objects) -> list[int]:
-    """Return the places of poses in the order of their images, or as they are."""
-    images = [*map(_image, poses)]
+def _image_order(poses: Objects) -> list[int]:
+    """Return the indices of poses sorted by the names of their images, or unchanged if there are no images."""
+    images = [*map(_image_name, poses)]
     return sorted(range(len(poses)), key=lambda place: in_order(images[place]) if any(images) else [])
 
 
 def _rows(
     header: HeaderLine, keys: list[Key], layout: RowLayout, lists: Mapping[str, Objects]
 ) -> list[tuple[int, str]]:
-    """Return a row for each pose: its body, its number or that of its image, and what it holds.
+    """Return a row for each pose: its body, the number of the pose or its image, and its values.
 
     Raises
     ------
     TrajectoryError
-        Where a pose lacks a number that is needed.
+        If a pose lacks a needed number.
     """
     needed = {index for body in layout.bodies.values() for index in body.values()}
     needed |= set(layout.times) if len(layout.times) == 1 else set()
     texts = {*layout.devices, *layout.times}
     rows = []
     for name, poses in lists.items():
-        for place in _order(poses):
-            cells = [name, number_in(_image(poses[place]), place)]
+        for place in _image_order(poses):
+            cells = [name, number_in(_image_name(poses[place]), place)]
             for index, key in enumerate(keys, len(cells)):
-                cell = _text(poses[place], key) if index in needed or index in texts else ""
+                cell = _cell_text(poses[place], key) if index in needed or index in texts else ""
                 if cell is None or (cell and index not in texts and not is_number(cell)):
                     if index in needed:
                         problem = (
@@ -208,8 +208,8 @@ def _rows(
 
 
 def _write(content: Any, lists: Mapping[str, Objects], keys: Sequence[Key], target: Path, numbers: np.ndarray) -> None:
-    """Write what was read with other numbers in it, of which those that are NaN are none."""
-    poses = [own[place] for own in lists.values() for place in _order(own)]
+    """Write the content with other numbers in it; NaN keeps the present number."""
+    poses = [own[place] for own in lists.values() for place in _image_order(own)]
     for row, column in np.argwhere(np.isfinite(numbers)).tolist():
         *way, last = keys[column - 2]
         held: Any = poses[row]
@@ -220,8 +220,8 @@ def _write(content: Any, lists: Mapping[str, Objects], keys: Sequence[Key], targ
         json.dump(content, file, indent=1, ensure_ascii=False)
 
 
-def _text(value: Any, key: Key) -> str | None:
-    """Return what is in a pose, as the cell of a table: empty for null, JavaScript's NaN, and None for nothing."""
+def _cell_text(value: Any, key: Key) -> str | None:
+    """Return a value of a pose as the cell of a table: empty for null (JavaScript's NaN), None if there is no value."""
     for part in key:
         try:
             value = value[part]

@@ -1,6 +1,6 @@
-"""Frames of the keys that move an object or the bones of a rig: of its Action, its NLA strips and its parents.
+"""Frames of the keys that move an object or the bones of a rig, from its Action, NLA strips and parents.
 
-Frames are those of the scene: keys in strips are where the strips put them, scaled, repeated and reversed.
+Frames are those of the scene: keys in strips are at their frames after scaling, repeating and reversing.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
     import bpy
 
 TRANSFORMS = ("location", "rotation_", "scale", "delta_")
-"""Beginnings of the data paths of the channels that move an object."""
+"""Starts of the data paths of channels that move an object."""
 
 BONE_CHANNEL = re.compile(r'pose\.bones\["(?P<name>(?:\\.|[^"\\])*)"\]\.(?:location|rotation_|scale)', re.DOTALL)
-"""The data paths of the channels that move a pose bone, whose name is escaped in them."""
+"""Data paths of channels that move a pose bone; the bone's name is escaped in them."""
 
 CONSTANT_CODE, LINEAR_CODE = 0, 1
-"""Blender's numbers of the interpolations of keys."""
+"""Blender's numbers for the interpolation of keys."""
 
 MOST_KEYS = 1_000_000
-"""Keys of a strip with all of its repeats; keys of one with more are left to looking between samples."""
+"""Keys of a strip with all its repeats; with more, the keys are ignored, and sampling relies on checks of the gaps."""
 
 
 MAX_SAME_VALUE_RATIO = 1e-5
-"""Share by which values may differ that are one and the same: of the largest of a curve, or of 1."""
+"""Values count as equal if they differ by less than this fraction of the curve's largest value, or of 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,20 +37,20 @@ class CurveKeys:
     """The keys of an F-curve."""
 
     frames: np.ndarray
-    """Shape (n,), rising."""
+    """Shape (n,), increasing."""
 
     jumps: np.ndarray
-    """Shape (n,): whether the curve jumps to that key, from a constant value before it to another one."""
+    """Shape (n,): whether the curve jumps to this key from a different constant value."""
 
     straight: bool
-    """True if there are straight lines or constant values between them."""
+    """True if all interpolation between the keys is linear or constant."""
 
     varies: bool
-    """True if their values differ."""
+    """True if the values of the keys differ."""
 
 
 def fcurves_of(action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> Iterator[bpy.types.FCurve]:
-    """Yield the F-curves that an Action has for one of its slots."""
+    """Yield the F-curves of an Action's slot."""
     from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
     if action is not None and slot is not None:
@@ -61,14 +61,14 @@ def fcurves_of(action: bpy.types.Action | None, slot: bpy.types.ActionSlot | Non
 def curves_that_move(
     action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None, *, bones: bool
 ) -> Iterator[bpy.types.FCurve]:
-    """Yield the F-curves of a slot that move its object, and with `bones` those that move the bones of its pose."""
+    """Yield the F-curves of a slot that move its object and, with `bones`, its pose bones."""
     for fcurve in fcurves_of(action, slot):
         if fcurve.data_path.startswith(TRANSFORMS) or (bones and BONE_CHANNEL.match(fcurve.data_path)):
             yield fcurve
 
 
 def keys_of(fcurve: bpy.types.FCurve) -> CurveKeys:
-    """Return the keys of an F-curve, by their frames."""
+    """Return the keys of an F-curve, sorted by frame."""
     points = fcurve.keyframe_points
     places, kinds = np.empty(2 * len(points), dtype=np.float32), np.empty(len(points), dtype=np.int32)
     points.foreach_get("co", places)
@@ -82,7 +82,7 @@ def keys_of(fcurve: bpy.types.FCurve) -> CurveKeys:
 
 
 def with_parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
-    """Yield an object, and what it hangs on."""
+    """Yield an object and its ancestors."""
     one: bpy.types.Object | None = obj
     while one is not None:
         yield one
@@ -90,20 +90,20 @@ def with_parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
 
 
 def moments_of(obj: bpy.types.Object, lead: float) -> tuple[np.ndarray, bool]:
-    """Return the frames at which a curve may bend or jump that moves an object, its bones or its parents.
+    """Return the frames at which F-curves of an object, its bones or its parents may bend or jump.
 
     Parameters
     ----------
     obj : bpy.types.Object
     lead : float
-        So many frames before a jump there is another moment.
+        A further moment is added this many frames before each jump.
 
     Returns
     -------
     frames : array, shape (n,)
-        In any order, some of them several times.
+        In any order, possibly with repeats.
     straight : bool
-        Whether there is nothing but straight lines and steps between them.
+        Whether there are only straight lines and steps between the frames.
     """
     result, straight = [np.empty(0)], True
     for parent in with_parents(obj):
@@ -113,24 +113,24 @@ def moments_of(obj: bpy.types.Object, lead: float) -> tuple[np.ndarray, bool]:
                 result += [keys.frames, keys.frames[keys.jumps] - lead]
                 straight &= keys.straight and not fcurve.modifiers
             for track in data.nla_tracks:
-                result += _of_strips(track.strips, lead)
+                result += _strip_moments(track.strips, lead)
                 straight = False
     return np.concatenate(result), straight
 
 
-def _of_strips(strips: Iterable[bpy.types.NlaStrip], lead: float) -> Iterator[np.ndarray]:
+def _strip_moments(strips: Iterable[bpy.types.NlaStrip], lead: float) -> Iterator[np.ndarray]:
     for strip in strips:
         yield np.array([strip.frame_start - lead, strip.frame_start, strip.frame_end])
         yield np.array([strip.frame_start + strip.blend_in, strip.frame_end - strip.blend_out])
         if strip.type == "META":
-            yield from _of_strips(strip.strips, lead)
+            yield from _strip_moments(strip.strips, lead)
         elif strip.action is not None and not strip.use_animated_time:
             for fcurve in curves_that_move(strip.action, strip.action_slot, bones=True):
-                yield _in_strip(strip, keys_of(fcurve), lead)
+                yield _strip_keys(strip, keys_of(fcurve), lead)
 
 
-def _in_strip(strip: bpy.types.NlaStrip, keys: CurveKeys, lead: float) -> np.ndarray:
-    """Return where a strip puts the keys of its Action, in each of its repeats, which begin with a jump as a rule."""
+def _strip_keys(strip: bpy.types.NlaStrip, keys: CurveKeys, lead: float) -> np.ndarray:
+    """Return the frames of an Action's keys in a strip, in each repeat. A repeat usually begins with a jump."""
     first, last, scale = strip.action_frame_start, strip.action_frame_end, abs(strip.scale)
     length = (last - first) * scale
     rows = (keys.frames >= first) & (keys.frames <= last)

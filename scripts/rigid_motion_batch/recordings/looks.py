@@ -1,4 +1,4 @@
-"""What Blender shows of objects and bones, frame by frame."""
+"""Poses of objects and bones as evaluated by Blender, frame by frame."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     import bpy
 
 LAST_FRAME = 1048574
-"""Last frame that Blender has; a damaged file could, and would keep it at work for hours."""
+"""Blender's last frame. A damaged file could name a later one, and keep Blender busy for hours."""
 
 BLOCK_FRAMES = 256
-"""Frames whose matrices are kept at once."""
+"""Frames whose matrices are kept in memory at once."""
 
 
 def single_motions(
@@ -37,9 +37,9 @@ def single_motions(
     radius: float,
     metres: float,
 ) -> list[Trajectory]:
-    """Return the motions of bones in the world, or without any of an object, a trajectory each under these names.
+    """Return the motions of bones in the world (or of an object, if there are no bones), one trajectory per name.
 
-    `radius` is that of the balls in which all points count, in metres; `metres` is the length of the unit.
+    `radius`, in metres, is that of the ball in which errors of all points count; `metres` is the length of the unit.
     """
     with looking(path, [rig], rig, bones) as look:
         seen = sampled(moments, look, np.full(len(names), -1), radius, metres)
@@ -53,13 +53,13 @@ def looking(
     rig: bpy.types.Object | None = None,
     bones: Sequence[str] = (),
 ) -> Iterator[Look]:
-    """Look at bones of a rig in the world, or without any at objects, with everything that moves them.
+    """Yield a function that evaluates bones of a rig in the world, or objects if there are no bones.
 
-    Objects are evaluated beside bones, too.
+    If there are bones, the objects are evaluated too.
     """
     with probe() as obj:
         if rig and bones:
-            # The bones are evaluated that something depends on.
+            # Blender evaluates only bones that something depends on.
             held = cast("bpy.types.ArmatureConstraint", obj.constraints.new("ARMATURE"))
             for bone in bones:
                 target = held.targets.new()
@@ -72,9 +72,10 @@ def looking(
 
 @contextmanager
 def probe() -> Iterator[bpy.types.Object]:
-    """Yield an object that is shown in the current scene, which is new; whatever its constraints follow is evaluated.
+    """Yield an object in a new current scene, where everything that its constraints follow is evaluated.
 
-    Blender evaluates what is hidden only for the sake of what is shown. Both are gone afterwards.
+    Blender evaluates hidden objects only if visible ones depend on them. The object and the scene are removed
+    afterwards.
     """
     import bpy
 
@@ -90,24 +91,24 @@ def probe() -> Iterator[bpy.types.Object]:
 
 @dataclass(eq=False)
 class Look:
-    """Look at bones of an armature, or at objects."""
+    """Evaluator of bones of an armature, or of objects."""
 
     path: Path
     objects: Sequence[bpy.types.Object]
     rig: bpy.types.Object | None
     bones: Sequence[str]
     first: dict[bpy.types.Object, np.ndarray] = field(default_factory=dict)
-    """Matrices of the armature and of the objects, as they were at first, shape (4, 4) each."""
+    """World matrices of the armature and the objects at the first evaluation, shape (4, 4) each."""
 
     def __call__(self, frames: np.ndarray) -> Poses:
-        """Return them on some frames (n,), shape (bones, n) or (objects, n), with scales.
+        """Return the poses on frames (n,), with scales, shape (bones, n) or (objects, n).
 
-        NaN is the quaternion of one that has no direction.
+        The quaternion of a matrix without a direction is NaN.
 
         Raises
         ------
         TrajectoryError
-            Where that is too much, or beyond where Blender goes, or where the pose of the armature lacks a bone.
+            If there are too many poses or frames beyond Blender's limit, or the pose of the armature lacks a bone.
         """
         import bpy
 
@@ -127,21 +128,21 @@ class Look:
         return joined(parts, axis=1)
 
     def _matrices(self, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-        """Return where Blender has all of them now, shape (bones, 4, 4) or (objects, 4, 4)."""
+        """Return the current world matrices of the bones or objects, shape (bones, 4, 4) or (objects, 4, 4)."""
         if not self.rig or not self.bones:
             return np.array([matrix_of(other.evaluated_get(depsgraph)) for other in self.objects])
-        seen, rows = self.rig.evaluated_get(depsgraph), self._rows
-        pose = cast("bpy.types.Pose", seen.pose)  # Where there is none, `_rows` says so.
+        seen, rows = self.rig.evaluated_get(depsgraph), self._bone_rows
+        pose = cast("bpy.types.Pose", seen.pose)  # Without a pose, `_bone_rows` raised an error.
         raw = np.empty(16 * len(pose.bones), dtype=np.float32)
         pose.bones.foreach_get("matrix", raw)
-        # They come column by column.
+        # Blender returns matrices column by column.
         columns = raw.reshape(-1, 4, 4)[rows].astype(np.float64)
         with np.errstate(invalid="ignore", over="ignore"):
             return matrix_of(seen) @ columns.transpose(0, 2, 1)
 
     @cached_property
-    def _rows(self) -> np.ndarray:
-        """Where the bones are in the list of the pose, which has an order of its own."""
+    def _bone_rows(self) -> np.ndarray:
+        """Indices of the bones in the list of pose bones, which has its own order."""
         import bpy
 
         depsgraph, rig = bpy.context.evaluated_depsgraph_get(), cast("bpy.types.Object", self.rig)
@@ -160,12 +161,12 @@ def unscaled(poses: Poses) -> Poses:
 
 
 def matrix_of(obj: bpy.types.Object) -> np.ndarray:
-    """Return where an object is in the world, shape (4, 4), in double precision: NumPy takes it as Blender has it."""
+    """Return the world matrix of an object, shape (4, 4), converted from Blender's single to double precision."""
     return np.array(obj.matrix_world, dtype=np.float64)
 
 
 def refuse_far_frames(path: Path, name: str, frames: np.ndarray) -> None:
-    """Raise TrajectoryError for frames where Blender does not go, at which an object of that name is to be seen."""
+    """Raise TrajectoryError if the object or body of that name has frames beyond Blender's limit."""
     if not (np.abs(frames) <= LAST_FRAME).all():
         problem = f"{shown(name)} moves from frame {frames.min():g} to {frames.max():g}, where Blender does not go"
         raise TrajectoryError(path, problem, "delete the keys that are far off")

@@ -1,7 +1,7 @@
-"""Rigid poses of matrices, which may scale, shear and hide what they move.
+"""Rigid poses from matrices that may contain scale and shear, or hide an object by a scale of 0.
 
-Of a matrix the position is kept as it is, and of its axes the direction of y, which is that of bones; x is made square
-to it, z square to both, and all of length 1.
+The position of a matrix is kept, and so is the direction of its y axis, which runs along a bone. x is made orthogonal
+to y, z orthogonal to both, and all have length 1.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import align_signs, from_matrices
 
 SHORTEST_AXIS = 1e-12
-"""Length below which an axis has no direction: bones are hidden by scaling them to nothing."""
+"""Length below which an axis has no direction: bones are hidden by a scale of 0."""
 
 MAX_STEADY_SCALE_RATIO = 1e-4
-"""Share by which a scale may differ that is one and the same: single precision, through a chain of matrices."""
+"""Ratio by which a constant scale may vary: single precision, through a chain of matrices."""
 
 
 def rigid(matrices: np.ndarray) -> Poses:
-    """Return the rigid poses of matrices (..., 4, 4). NaN is the quaternion of one whose x or y axis is nothing."""
+    """Return the rigid poses of matrices (..., 4, 4). The quaternion is NaN if the x or y axis has no length."""
     return rigid_of(matrices[..., :3, :3], matrices[..., :3, 3])
 
 
 def rigid_of(axes: np.ndarray, origins: np.ndarray) -> Poses:
-    """Return the same of axes, the columns of (..., 3, 3), and origins (..., 3)."""
+    """Return the rigid poses of axes, the columns of (..., 3, 3), and origins (..., 3)."""
     with np.errstate(invalid="ignore", over="ignore"):
         y, x = _unit(axes[..., 1]), _unit(axes[..., 0])
         x = _unit(x - np.sum(x * y, axis=-1, keepdims=True) * y)
@@ -43,14 +43,15 @@ def scales_of(axes: np.ndarray) -> np.ndarray:
 
 
 def growing(poses: Poses) -> Poses:
-    """Return poses (n,) without their scales if these are the same all along: the unit that a file was made in."""
+    """Return poses (n,), without scales if these are constant: then they are the unit that the file was made in."""
     scales = poses.scales
     steady = scales is None or np.allclose(scales, scales[0], rtol=MAX_STEADY_SCALE_RATIO, atol=0.0)
     return Poses(poses.positions, poses.quaternions) if steady else poses
 
 
 def filled(poses: Poses) -> Poses:
-    """Return poses (bones, n), each missing quaternion being the last before, else the first after, or no turn.
+    """Return poses (bones, n) with missing quaternions replaced by the last one before, the first after, or no
+    rotation.
 
     Signs are aligned.
     """

@@ -1,12 +1,13 @@
-"""Exports of optical systems, whose headers have several rows: Motive (OptiTrack), Vicon and Qualisys.
+"""Exports of optical motion capture with headers of several rows: Motive (OptiTrack), Vicon and Qualisys.
 
-Motive, format versions 1.2 to 1.25: the first line holds the settings of the take in pairs. A few rows then say of each
-column its type (Rigid Body, Bone, Marker ...), its body's name and ID, what it holds (Rotation, Position, error) and
-its axis. Euler angles (Rotation Type XYZ and the other orders) are degrees about the axes as the earlier turns left
-them. Axes are right-handed, y up.
-Vicon: a line such as `Objects` or `Segments`, the rate, the names of the bodies, those of the columns, and the units.
-Qualisys 6D: lines of a word and its value, among them the rate and the names of the bodies, and the names of the
-columns. Both are right-handed, z up. Cells that are empty were not tracked.
+Motive, format versions 1.2 to 1.25: the first line holds the settings of the take in pairs. A few rows then state for
+each column its type (Rigid Body, Bone, Marker ...), the name and ID of its body, its quantity (Rotation, Position,
+error) and its axis. Euler angles (Rotation Type XYZ and the other orders) are intrinsic, in degrees. Axes are
+right-handed, y up.
+
+Vicon: a line such as `Objects` or `Segments`, the rate, the names of the bodies, the names of the columns, and the
+units. Qualisys 6D: lines of a word and its value, among them the rate and the names of the bodies, and the names of the
+columns. Both are right-handed, z up. Empty cells were not tracked.
 Sources: https://docs.optitrack.com/motive/data-export/data-export-csv,
 https://help.naturalpoint.com/kb/articles/changes-in-motive-s-reported-euler-angles,
 https://docs.qualisys.com/qtm/content/processing_measurement/rotation_angles_in_qtm.htm,
@@ -36,36 +37,36 @@ from .tracks import read_below
 METRES = {"meters": "m", "centimeters": "cm", "millimeters": "mm", "inches": "in", "feet": "ft"}
 
 ROTATION_TYPES = {"quaternion": ""} | {"".join(order): "".join(order).upper() for order in permutations("xyz")}
-"""Rotation Type to the order of the turns."""
+"""Order of the Euler angles for each Rotation Type."""
 
 MOST_HEADER_ROWS = 20
-"""Rows after which what is still no sample will not be one. Motive writes about eight."""
+"""Maximum number of header rows. Motive writes about eight."""
 
 VICON = ("Objects", "Segments", "Trajectories", "Model Outputs", "Joints", "Devices")
-"""The lines that tables of Vicon begin with, those of poses first."""
+"""First lines of Vicon's tables, tables of poses first."""
 
 TRACKED = ("rigid body", "bone")
-"""The types of columns that have rotations."""
+"""Types of columns that have rotations."""
 
 ROT = tuple(map(str, range(9)))
-"""What stands in the brackets of Qualisys's Rot[0] to Rot[8]."""
+"""The numbers in the brackets of Qualisys's Rot[0] to Rot[8]."""
 
 AS_ANGLES = 0.01
-"""How far a matrix may be from that of the angles beside it."""
+"""Largest difference between a matrix and that of the angles in the same row, if both state the same rotation."""
 
 EMPTY_CHARACTERS = ' ,;\t"'
-"""What stands around the only cell of a row."""
+"""Characters around the only cell of a row."""
 
 EXPORT_ALONE = "export each body to a file of its own"
 
 
 def recognises_motive(head: list[str]) -> bool:
-    """Return whether the first line begins as Motive's does."""
+    """Return whether the first line begins like Motive's."""
     return head[0].lstrip('"').startswith("Format Version")
 
 
 def read_motive(path: Path, selection: Selection) -> list[Trajectory]:
-    """Read the rigid bodies of the take, or its bones where it has none or one of them is requested."""
+    """Read the rigid bodies of the take, or its bones if there are no rigid bodies or a bone is requested."""
     rows, line, separator = _motive_rows(path)
     settings = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
     unit = METRES[_setting(path, settings, "Length Units", "Meters", METRES)]
@@ -103,13 +104,13 @@ def read_motive(path: Path, selection: Selection) -> list[Trajectory]:
 
 
 def _labels(bodies: Iterable[tuple[str, str]]) -> dict[tuple[str, str], str]:
-    """Return what bodies are called, by their names and numbers."""
+    """Return unique names of bodies, keyed by their name and number in the file."""
     keys = list(dict.fromkeys(bodies))
     return dict(zip(keys, unique([name for name, _ in keys]), strict=True))
 
 
 def _motive_rows(path: Path) -> tuple[list[list[str]], int, str]:
-    """Return the rows of a header, the line of the last one, and what separates cells."""
+    """Return the rows of a header, the number of the last line, and the separator of the cells."""
     rows: list[list[str]] = []
     last, separator = 0, ","
     for number, line in lines_of(path):
@@ -126,7 +127,7 @@ def _motive_rows(path: Path) -> tuple[list[list[str]], int, str]:
 
 
 def _setting(path: Path, settings: dict[str, str], name: str, usual: str, known: Iterable[str]) -> str:
-    """Return a setting of the take in lower case, which has to be one of those known."""
+    """Return a setting of the take in lower case, which has to be a known one."""
     value = settings.get(name) or usual
     if value.lower() not in known:
         raise TrajectoryError(path, f"{name} is {shown(value)}", f"export with one of {', '.join(known)}", 1)
@@ -134,7 +135,7 @@ def _setting(path: Path, settings: dict[str, str], name: str, usual: str, known:
 
 
 def recognises_vicon(head: list[str]) -> bool:
-    """Return whether the first two lines are what a table of Vicon holds, and its rate."""
+    """Return whether the first two lines are the title of a Vicon table and its rate."""
     first, second = ((*(line.strip(' ,;\t"') for line in head[:2]), "", ""))[:2]
     return first in VICON and second.replace(".", "", 1).isdecimal()
 
@@ -160,7 +161,7 @@ def read_vicon(path: Path, selection: Selection, options: ReadingOptions) -> lis
 
 
 def _until_blank(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-    """Return the rows of a table, behind which may be others."""
+    """Return the rows of a table up to a blank line, after which other tables may follow."""
     return takewhile(lambda row: bool(row[1].strip(EMPTY_CHARACTERS)), lines)
 
 
@@ -172,14 +173,14 @@ def _rate(path: Path, text: str, line: int) -> float:
 
 
 def recognises_qualisys(head: list[str]) -> bool:
-    """Return whether the first lines are those of a file of 6D data."""
+    """Return whether the first lines are those of a 6D data file."""
     return head[0].startswith(("NO_OF_FRAMES", "FILE_VERSION")) and any(
         line.startswith("NO_OF_BOD") for line in head[:20]
     )
 
 
 def read_qualisys(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
-    """Read the bodies of a file of 6D data."""
+    """Read the bodies of a 6D data file."""
     settings: dict[str, list[str]] = {}
     for number, line in islice(lines_of(path), 2 * MOST_HEADER_ROWS):
         cells = cells_of(path, number, line, "\t")
@@ -200,16 +201,15 @@ def read_qualisys(path: Path, selection: Selection, options: ReadingOptions) -> 
     if all(name is None or name.kind != "time" for name in names) and not (options.frame_rate or options.time_unit):
         options = replace(options, frame_rate=_rate(path, (settings.get("FREQUENCY") or [""])[0], 1))
     return read_below(
-        selection, options, _turned(HeaderLine(path, number, "\t", cells, names=names), names), EXPORT_ALONE
+        selection, options, _with_matrix_order(HeaderLine(path, number, "\t", cells, names=names), names), EXPORT_ALONE
     )
 
 
-def _turned(header: HeaderLine, names: Sequence[ColumnName | None]) -> HeaderLine:
-    """Return a header of which Rot[0] to Rot[8] go down the columns of the matrix, unless the angles beside say
-    otherwise.
+def _with_matrix_order(header: HeaderLine, names: Sequence[ColumnName | None]) -> HeaderLine:
+    """Return a header in which Rot[0] to Rot[8] go down the columns of the matrix, unless the angles show otherwise.
 
-    These are turns about the moved axes x, y and z, in this order, unless somebody has chosen others: then, and without
-    them, nothing tells, which is a warning.
+    By default, the angles are intrinsic turns about x, y and z in this order. If the user of Qualisys chose other
+    angles, or exported none, nothing shows the order of the matrix, which is a warning.
     """
     wanted = ("roll", "pitch", "yaw", *ROT)
     axes = [name.axis if name and name.kind in ("euler", "rotation") else "" for name in names]

@@ -1,6 +1,6 @@
-"""Options for reading a recording: names of columns, units, the order of Euler angles, and which part to take.
+"""Options for reading a recording: column names, units, Euler order, and the part to read.
 
-Everything is plain data, so that it travels with a task as JSON. Command lines say it by a group of options.
+All are plain data, so that they can be sent with a task as JSON. Command lines have a group of options for them.
 """
 
 from __future__ import annotations
@@ -16,43 +16,44 @@ from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.command_line import number
 
 TICKS_PER_S_BY_UNIT = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
-"""Units of time, and how many there are in a second."""
+"""Units of time, and how many of each make a second."""
 
 MEANINGS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz", "rx", "ry", "rz", "scale", "device")
-"""Meanings of columns: time, position, quaternion, Euler angles about x, y and z, scale, and whose the row is."""
+"""Meanings of columns: time, position, quaternion, Euler angles about x, y and z, scale, and name of the body in the
+row."""
 
 
 @dataclass(frozen=True)
 class ReadingOptions:
-    """Options for reading a recording; what is left as it is, the file has to say. ValueError where a value is none."""
+    """Options for reading a recording; unset ones are left to the file. Raises ValueError for invalid values."""
 
     columns: tuple[tuple[str, str], ...] = ()
-    """Pairs of a name in `MEANINGS` and the column's name in the file. They go before what names are taken to mean."""
+    """Pairs of a name in `MEANINGS` and the column's name in the file. They override the meanings of names."""
 
     time_unit: str | None = None
-    """A name in `TICKS_PER_S_BY_UNIT`; times are taken to be in it, whatever the file says of them."""
+    """A name in `TICKS_PER_S_BY_UNIT`: the unit of times, which overrides that of the file."""
 
     scale: float | None = None
-    """Metres for each unit of the positions, whatever the file says of them."""
+    """Metres per unit of the positions, which overrides the unit of the file."""
 
     euler: str | None = None
-    """The order of turns by Euler angles, as SciPy has it: "YXZ" about the axes as the earlier turns left them
-    (intrinsic), "zxy" about those of the world (extrinsic). The two are the same rotation."""
+    """The order of Euler angles, as in SciPy: "YXZ" about the moved axes (intrinsic), "zxy" about the world's axes
+    (extrinsic). These two examples are the same rotation."""
 
     degrees: bool = False
-    """True if angles are degrees, whatever their names say. Otherwise those are radians whose names do not say."""
+    """True if angles are degrees, overriding their names. Otherwise, angles whose names state no unit are radians."""
 
     frame_rate: float | None = None
-    """Frames a second, where the file counts frames instead of seconds."""
+    """Frames a second, if the file counts frames instead of seconds."""
 
     start: float | None = None
-    """Seconds after the first sample: those before are left out. With any, a T-pose in front is taken for motion."""
+    """Seconds after the first sample; earlier samples are left out. If set, an initial T-pose counts as motion."""
 
     end: float | None = None
-    """Seconds after the first sample: those behind are left out."""
+    """Seconds after the first sample; later samples are left out."""
 
     clean: float | None = None
-    """Metres by which cleaning may move a sample, 0 for any; None where nothing is cleaned."""
+    """Metres by which cleaning may move a sample, 0 for no limit; None for no cleaning."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", tuple((meaning, column) for meaning, column in self.columns))
@@ -84,22 +85,22 @@ class ReadingOptions:
 
     @property
     def given(self) -> tuple[str, ...]:
-        """The names of the fields that say anything."""
+        """The names of the fields that are set."""
         return tuple(name for name, value in vars(self).items() if not (value is None or value is False or value == ()))
 
     @property
     def intrinsic_order(self) -> str:
-        """The order of turns about the moved axes: fixed axes in one order are moved axes in the opposite one."""
+        """The order of turns about the moved axes: an extrinsic order reversed is the equal intrinsic one."""
         order = self.euler or ""
         return order if order.isupper() else order[::-1].upper()
 
 
 AS_THE_FILE_SAYS = ReadingOptions()
-"""Options of which none is set."""
+"""Options with none set."""
 
 
 def add_reading_options(parser: argparse.ArgumentParser) -> None:
-    """Add a group of options: `--axes`, and others of which `reading_options` makes one thing."""
+    """Add the group of options that `reading_options` turns into `ReadingOptions`, and `--axes`."""
     group = parser.add_argument_group("reading", "For recordings that leave something out; docs/csv.md has examples.")
     group.add_argument(
         "--axes",
@@ -150,14 +151,14 @@ def add_clean_option(parser: argparse._ActionsContainer) -> None:
         "--clean",
         nargs="?",
         const=0.0,
-        type=_most_moved,
+        type=_clean_length,
         metavar="LENGTH",
         help="first remove jitter and spikes from recordings, moving only spikes by more than 2mm or another length"
         " with its unit (any); errors are relative to the cleaned motion",
     )
 
 
-def _most_moved(text: str) -> float:
+def _clean_length(text: str) -> float:
     parts = re.fullmatch(r"(\d{1,6}\.?\d{0,6}|\.\d{1,6})\s*(mm|cm|m)", text.strip().lower())
     if not parts or not float(parts[1]):
         raise ValueError(f"{text!r} is not a length such as 2mm: write --clean after the inputs, or --clean=2mm")
@@ -165,7 +166,7 @@ def _most_moved(text: str) -> float:
 
 
 def reading_options(options: argparse.Namespace) -> ReadingOptions:
-    """Return what the options of that group say. Raises ValueError for some that do not go together."""
+    """Return the parsed options of this group. Raises ValueError for contradictory ones."""
     if options.degrees and not options.euler:
         raise ValueError("--degrees is for Euler angles: add their order, such as --euler YXZ")
     return ReadingOptions(
@@ -181,5 +182,5 @@ def _columns(text: str) -> tuple[tuple[str, str], ...]:
 
 
 def _field(name: str, convert: Callable[[str], Any]) -> Callable[[str], object]:
-    """Return a function that reads one field of `ReadingOptions`, which checks it."""
+    """Return a function that parses one field of `ReadingOptions`, with its checks."""
     return lambda text: getattr(ReadingOptions(**{name: convert(text)}), name)
