@@ -50,7 +50,7 @@ def growing(poses: Poses) -> Poses:
 
 
 def filled(poses: Poses) -> Poses:
-    """Return poses (bones, n) with missing quaternions replaced by the last one before, the first after, or no
+    """Return poses (bones, n), each missing quaternion replaced by the last before, else the first after, or no
     rotation.
 
     Signs are aligned.

@@ -19,8 +19,7 @@ TICKS_PER_S_BY_UNIT = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 """Units of time, and how many of each make a second."""
 
 MEANINGS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz", "rx", "ry", "rz", "scale", "device")
-"""Meanings of columns: time, position, quaternion, Euler angles about x, y and z, scale, and name of the body in the
-row."""
+"""Meanings of columns: time, position, quaternion, Euler angles about x, y and z, scale, and name of the row's body."""
 
 
 @dataclass(frozen=True)

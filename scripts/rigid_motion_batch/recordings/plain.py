@@ -1,22 +1,22 @@
-"""Tables whose lines are rows: with named columns, without any names, and the cameras of COLMAP and g2o.
+"""Tables with one row per line: with named columns, with unnamed columns, and the cameras of COLMAP and g2o.
 
 Columns have names in any order, as loggers write them: `t,x,y,z,qx,qy,qz,qw`, `timestamp_ms,pos_x,...,rot_w`.
-`column_names` says which are known, and `columns` how they become bodies: several in a row, or one of several that
-another column names. The quaternion's order is that of the names; other columns are ignored. Separated by commas,
+`column_names` says which names are known, and `columns` how columns become bodies: several in a row, or one of several
+that another column names. The names give the order of the quaternion; other columns are ignored. Separators are commas,
 semicolons or tabs; with the latter two, numbers may have a decimal comma. The program's own files
 (`t,x,y,z,qw,qx,qy,qz`) are such CSVs.
 
-Rows of numbers without names are those of TUM, KITTI, pose matrices, EuRoC, VINS and OpenVINS, and Nuke's .chan.
-Where a comment names the columns (`# timestamp tx ty tz qx qy qz qw`), the names are used. Otherwise what is where is
-seen by the numbers: a matrix has right angles, a quaternion the length 1. Columns may be named by their place,
-`--columns t=1,x=2`. At which end of a quaternion w is no number says: at the last, as in TUM, unless the first rotation
-is 1 0 0 0; in rows with commas, as of EuRoC and VINS, at the one that is larger in the first row. A guess is a warning.
-Nuke's axes are right-handed, y up, and its cameras look along -z.
+Rows of unnamed numbers are those of TUM, KITTI, pose matrices, EuRoC, VINS and OpenVINS, and Nuke's .chan. If a comment
+names the columns (`# timestamp tx ty tz qx qy qz qw`), the names are used. Otherwise the numbers show the layout: a
+matrix has orthogonal axes, a quaternion has length 1. Columns may be named by their place, `--columns t=1,x=2`. No
+number shows at which end of a quaternion w is. It is taken to be last, as in TUM, unless the first rotation is 1 0 0 0.
+In rows with commas, as of EuRoC and VINS, it is at the end with the larger number in the first row. A guess is a
+warning. Nuke's axes are right-handed, y up, and its cameras look along -z.
 
-COLMAP's images.txt and g2o's graphs have no times: they are numbers of images or vertices, and need a rate. COLMAP has
-two lines for each image, in any order, and the world as the camera sees it: its pose is the inverse of that. Cameras
-look along z, with x to the right and y down; the axes of the world may be any, and mostly are those of a camera, too.
-Its unit of length is any.
+COLMAP's images.txt and g2o's graphs have no times, only numbers of images or vertices, and need a rate. COLMAP has two
+lines for each image, in any order, and the world as seen by the camera: the camera's pose is the inverse. Cameras look
+along z, with x to the right and y down. The axes of the world may be any, and mostly are those of a camera, too. The
+unit of length may be any.
 Sources: https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats,
 https://www.cvlibs.net/datasets/kitti/eval_odometry.php, https://colmap.github.io/format.html#images-txt,
 https://github.com/RainerKuemmerle/g2o/wiki/File-Format-SLAM-3D.
@@ -43,34 +43,34 @@ from .tables import HeaderLine, header_lines, is_number, lines_of, lines_of_word
 from .tracks import read_below
 
 MIN_ROW_NUMBERS = 3
-"""Numbers in a row that is one of a recording."""
+"""Numbers that a row of a recording has at least."""
 
 LOOKED_AT = 500
-"""Rows that tell what the columns are."""
+"""Rows that determine the meaning of the columns."""
 
 MIN_ALIKE_RATIO = 0.9
-"""The share of them that have to be alike."""
+"""Share of these rows that must agree."""
 
 MAX_AXES_ERROR = 0.02
-"""How far from 1 lengths may be, and from 0 the products of axes, in files of few digits."""
+"""Tolerance for lengths of 1 and dot products of 0, in files of few digits."""
 
 TUM_NUMBERS = 8
 """Numbers in a row of TUM."""
 
 MIN_FIRST_LARGER_RATIO = 0.75
-"""The share of rows in which the first number of four is larger than the last, from which on it may be w."""
+"""Share of rows above which w may be first: those with the first number of four larger than the last."""
 
 MAX_UNTURNED_W_ERROR = 1e-6
-"""How far from 1 the w of a body may be that has not turned yet, as trackers begin."""
+"""Distance from 1 of the w of a body that has not turned yet: trackers often begin so."""
 
 POSITIONS_ONLY = 4
-"""Numbers in a row of a time and a position."""
+"""Numbers in a row of time and position."""
 
 MIN_AXIS_LENGTH = 1e-12
-"""Length that axes have at least."""
+"""Lower bound for the length of axes, against division by 0."""
 
 ROTATION_COLUMNS = [0, 1, 2, 4, 5, 6, 8, 9, 10]
-"""The axes in the rows of a matrix."""
+"""The places of the axes in a row of matrix numbers."""
 
 POSITION = [ColumnName("position", axis) for axis in "xyz"]
 TIME = [ColumnName("time")]
@@ -88,16 +88,16 @@ G2O = ["", "frame", "x", "y", "z", "qx", "qy", "qz", "qw"]
 
 
 def read_named(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
-    """Read the requested bodies. One without a name of its own has the file's."""
+    """Read the requested bodies. A body without a name gets that of the file."""
     header = _find_header(path, options)
     way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
     return read_below(selection, options, header, f"{way_out}, or split the file")
 
 
 def _find_header(path: Path, options: ReadingOptions) -> HeaderLine:
-    """Find the line that names all that is needed: one of the first, or the only one further down.
+    """Return the line that names all needed columns: one of the first lines, or the only one further down.
 
-    Where none does, TrajectoryError says what the nearest lacks.
+    If there is none, raises TrajectoryError with what the best candidate lacks.
     """
     first = [line.of_rows() for line in header_lines(path)]
     result: list[HeaderLine] = []
@@ -125,19 +125,19 @@ def _find_header(path: Path, options: ReadingOptions) -> HeaderLine:
 
 
 def recognises_rows(head: list[str]) -> bool:
-    """Return whether the first row, comments aside, consists of numbers."""
+    """Return whether the first row that is not a comment consists of numbers."""
     row = next((line for line in head if line.strip() and not line.lstrip().startswith("#")), "")
     cells = _cells(row)
     return len(cells) >= MIN_ROW_NUMBERS and all(map(is_number, cells))
 
 
 def read_rows(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
-    """Read the one body of the file, which has the file's name."""
+    """Read the single body of the file, named after the file."""
     return read_below(selection, options, _header(path, options), "write a file for each")
 
 
 def _header(path: Path, options: ReadingOptions) -> HeaderLine:
-    """Return the line that names the columns, or one before the first row with what its numbers look like."""
+    """Return the line that names the columns, or else a header made up from the numbers of the first rows."""
     *comments, row = header_lines(path)
     for line in comments:
         with suppress(TrajectoryError):
@@ -146,7 +146,7 @@ def _header(path: Path, options: ReadingOptions) -> HeaderLine:
     text = next(lines_of(path, after=row.number - 1))[1]
     cells = [str(place) for place, _ in enumerate(_cells(text), 1)]
     header = HeaderLine(path, row.number - 1, _separator(text), cells)
-    names, warnings = _names(header)
+    names, warnings = _guessed_names(header)
     warnings = () if "qw" in dict(options.columns) else warnings
     if not names and not options.columns:
         if len(cells) == POSITIONS_ONLY:
@@ -160,18 +160,18 @@ def _header(path: Path, options: ReadingOptions) -> HeaderLine:
 
 
 def _separator(row: str) -> str | None:
-    """Return what separates numbers, which may have decimal commas beside other separators; None for white space."""
+    """Return the separator of numbers; None for white space. With separators other than commas, commas are decimal."""
     return next((mark for mark in ";\t," if mark in row.strip()), None)
 
 
 def _cells(row: str) -> list[str]:
-    """Return the cells of a row, of which empty ones at the end do not count."""
+    """Return the cells of a row, without empty cells at the end."""
     separator = _separator(row)
     return (row if separator == "," else row.replace(",", ".")).strip().rstrip(separator).split(separator)
 
 
-def _names(header: HeaderLine) -> tuple[list[ColumnName], tuple[ClipWarning, ...]]:
-    """Return what the columns below a header are, as far as they matter; none where that cannot be seen."""
+def _guessed_names(header: HeaderLine) -> tuple[list[ColumnName], tuple[ClipWarning, ...]]:
+    """Return the meanings of the columns below a header, as far as needed; empty if the numbers do not show them."""
     if header.path.suffix.lower() == ".chan":
         return CHAN, ()
     table = _numbers(header)
@@ -182,7 +182,7 @@ def _names(header: HeaderLine) -> tuple[list[ColumnName], tuple[ClipWarning, ...
     for first in (1, 0) if width >= TUM_NUMBERS else (0,) if width == TUM_NUMBERS - 1 else ():
         before, block = TIME[:first], table[:, first:]
         if _mostly(_is_unit, block[:, 3:7]) or (width == TUM_NUMBERS and not _mostly(_is_unit, block[:, :4])):
-            order, warnings = _order(header, block[:, 3:7], 4 + first)
+            order, warnings = _quaternion_order(header, block[:, 3:7], 4 + first)
             return [*before, *POSITION, *order], warnings
         if _mostly(_is_unit, block[:, :4]):
             return [*before, *_quaternion("xyzw"), *POSITION], ()
@@ -190,7 +190,7 @@ def _names(header: HeaderLine) -> tuple[list[ColumnName], tuple[ClipWarning, ...
 
 
 def _numbers(header: HeaderLine) -> np.ndarray:
-    """Return the numbers of the first rows, NaN where there is none."""
+    """Return the numbers of the first rows, NaN for missing ones."""
     width = len(header.cells)
     table = np.full((LOOKED_AT, width), np.nan)
     for row, (_, line) in enumerate(islice(header.rows(), LOOKED_AT)):
@@ -200,7 +200,7 @@ def _numbers(header: HeaderLine) -> np.ndarray:
 
 
 def _mostly(fits: Callable[[np.ndarray], np.ndarray], rows: np.ndarray) -> bool:
-    """Return whether nearly all rows, those aside that are empty or nothing but zeros, are of a kind."""
+    """Return whether nearly all rows fit, ignoring rows that are incomplete or all zeros."""
     known = rows[np.isfinite(rows).all(axis=1) & rows.any(axis=1)]
     with np.errstate(over="ignore", invalid="ignore"):
         return len(known) > 0 and bool(fits(known).mean() >= MIN_ALIKE_RATIO)
@@ -211,7 +211,7 @@ def _is_unit(rows: np.ndarray) -> np.ndarray:
 
 
 def _is_rotation(rows: np.ndarray) -> np.ndarray:
-    """Return which rows of nine numbers are axes at right angles, of one length."""
+    """Return which rows of nine numbers are orthogonal axes of equal length."""
     axes = rows.reshape(-1, 3, 3)
     axes = axes / np.maximum(np.linalg.norm(axes, axis=2).mean(axis=1), MIN_AXIS_LENGTH)[:, None, None]
     return np.abs(axes @ axes.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < MAX_AXES_ERROR
@@ -221,8 +221,10 @@ def _quaternion(order: str) -> list[ColumnName]:
     return [ColumnName("quaternion", axis) for axis in order]
 
 
-def _order(header: HeaderLine, four: np.ndarray, place: int) -> tuple[list[ColumnName], tuple[ClipWarning, ...]]:
-    """Return which of four numbers is w, the first of which is in that place, and a warning where that is a guess."""
+def _quaternion_order(
+    header: HeaderLine, four: np.ndarray, place: int
+) -> tuple[list[ColumnName], tuple[ClipWarning, ...]]:
+    """Return the order of a quaternion's four numbers, the first in column `place`, and a warning if it is guessed."""
     first, last = np.abs(four[np.isfinite(four).all(axis=1)])[:, [0, 3]].T
     if header.path.suffix.lower() == ".tum" or not len(first):
         return _quaternion("xyzw"), ()
@@ -242,29 +244,29 @@ def _order(header: HeaderLine, four: np.ndarray, place: int) -> tuple[list[Colum
 
 
 def recognises_images(head: list[str]) -> bool:
-    """Return whether this is COLMAP's images.txt: by its comments, or by its first image and the points in it."""
+    """Return whether this is COLMAP's images.txt, from its comments, or from its first image."""
     rows = [line for line in head if not line.startswith("#")]
-    return any("POINTS2D[]" in line for line in head) or bool(rows and _image(rows[0]))
+    return any("POINTS2D[]" in line for line in head) or bool(rows and _image_cells(rows[0]))
 
 
 def read_images(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
-    """Read the cameras of COLMAP's images.txt. Of images in folders, each folder is a body."""
+    """Read the cameras of COLMAP's images.txt. If images are in folders, each folder is a body."""
     remark = "poses of the world were turned into those of the camera; COLMAP's unit of length may be any (--scale)"
     header = HeaderLine(path, 0, "\t", COLMAP, rows_of=_images, inverted=True, axes="opencv", remark=remark, shift=1)
     return read_below(selection, options, header, "name the folder of each camera's images in front of their names")
 
 
 def _images(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-    """Yield a row for each image in the order of their names: the last number in it, its folder, and the pose."""
-    images = [(number, cells) for number, line in lines if (cells := _image(line))]
+    """Yield a row for each image, sorted by name: the last number in its name, its folder, and the pose."""
+    images = [(number, cells) for number, line in lines if (cells := _image_cells(line))]
     for place, (number, cells) in enumerate(sorted(images, key=lambda image: in_order(image[1][-1]))):
         yield number, "\t".join([number_in(cells[-1], place), cells[-1].rpartition("/")[0], *cells[1:8]])
 
 
-def _image(line: str) -> list[str] | None:
-    """Return the cells of the first line of an image: a number, a quaternion and a position, a camera, and a name.
+def _image_cells(line: str) -> list[str] | None:
+    """Return the cells of an image's first line: its number, quaternion, position, camera, and name.
 
-    None for any other, such as that of its points, which are numbers to its end.
+    Returns None for any other line, such as the line of its points, which ends with a number.
     """
     cells = line.split(maxsplit=9)
     numbers = len(cells) == 10 and cells[0].isdecimal() and cells[8].isdecimal() and all(map(is_number, cells[1:8]))
@@ -272,24 +274,24 @@ def _image(line: str) -> list[str] | None:
 
 
 def in_order(name: str) -> list[tuple[int, str]]:
-    """Return a key that sorts names as people do: 9 before 10."""
+    """Return a sort key for names in natural order: 9 before 10."""
     return [(int(part or 0), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d{1,18})", name)]
 
 
 def number_in(name: str, otherwise: int) -> str:
-    """Return the last number in the name of an image, or another."""
+    """Return the last number in the file name of an image, or else `otherwise`."""
     file = name.rpartition("/")[2]
     numbers = re.findall(r"\d{1,15}", file.rpartition(".")[0] or file)
     return numbers[-1] if numbers else str(otherwise)
 
 
 def recognises_graph(head: list[str]) -> bool:
-    """Return whether this is a graph of g2o, which has a word in front of every row."""
+    """Return whether this is a g2o graph, where every row begins with a word."""
     return any(line.startswith((VERTEX, "EDGE_SE3:QUAT")) for line in head)
 
 
 def read_graph(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
-    """Read the vertices of a graph, as they are numbered."""
+    """Read the vertices of a graph, ordered by number."""
     header = HeaderLine(path, 0, None, G2O, rows_of=_vertices, advice="export the vertices, too")
     return read_below(selection, options, header, "write a file for each")
 

@@ -1,12 +1,12 @@
-"""Sense of a recording: what no hand, no device and no room has is said, whatever the file claims.
+"""Plausibility of a recording: warnings of speeds, sizes and sample rates that no hand, device or room has.
 
-The limits are wide. Of the recordings by other people that this program is tried on, the fastest, a fast game, has
-95 % of its speeds below 7.1 m/s, and the jumpiest one sample at 19 m/s; all stay within 2.3 m, with 30 to 286 samples
-a second.
+The limits are wide. Among the recordings by other people that this program is tested on, the fastest, a fast game, has
+95 % of its speeds below 7.1 m/s, and the jumpiest has one sample at 19 m/s. All stay within 2.3 m, with 30 to 286
+samples a second.
 
-So are breaks in the motion: a T-pose in front of it, gaps without samples, and jumps. Times of these are strictly
-rising and poses are repaired, as `rigid_motion.motion.repair` gives them; what is said in texts counts from the first
-sample, as the options `--start` and `--end` do.
+There are also warnings of breaks in the motion: an initial T-pose, gaps without samples, and jumps. For these, times
+are strictly increasing and poses are repaired, as by `rigid_motion.motion.repair`. Seconds in texts count from the
+first sample, like the options `--start` and `--end`.
 """
 
 from __future__ import annotations
@@ -25,40 +25,40 @@ from .rest_bodies import RestBody, size_of
 from .times import MAX_SAMPLES_PER_S, MIN_SAMPLES_PER_S, typical_interval
 
 HIGHEST_SPEED = 20.0
-"""Metres a second, which 95 % of the speeds are below: nearly three times what a fast game has. A hand at rest in
-centimetres passes for one in metres; one that moves does not."""
+"""Metres a second, the limit for the 95th percentile of the speed: nearly three times that of a fast game. A resting
+hand in centimetres passes as one in metres; a moving hand does not."""
 
 MAX_ROOM_WIDTH_M = 100.0
-"""Metres: wider than rooms and halls where people are tracked."""
+"""Metres: more than the width of rooms and halls where people are tracked."""
 
 LOOK_BACK = 8
-"""Samples among which those of one device come again, where a few take turns."""
+"""Samples within which each device appears again, if a few devices take turns."""
 
 MIN_NEARER_RATIO = 10.0
-"""Times nearer to an earlier sample than to the last one that a sample has to be, not to follow the last. Along
-any motion that is sampled well the last one is the nearest."""
+"""A sample does not follow the last one if an earlier sample is this many times nearer. In a well sampled motion, the
+last sample is the nearest."""
 
 SAME_TIME = 0.01
-"""Metres between samples of one time that one device does not have."""
+"""Metres between samples with the same timestamp that one device cannot have."""
 
 MIN_MIXED_RATIO = 0.25
-"""The share of samples that do not follow the last one, from which on there are several devices. Of two that take turns
-it is all; of two in any order, half."""
+"""Share of samples that do not follow the last one, above which there are several devices. For two that take turns the
+share is 1; for two in random order, half."""
 
 MAX_ORIGIN_DISTANCE_M = 20.0
-"""Metres from the origin of a recording, which lies in the room where it was made. A headset is 170 cm above it."""
+"""Metres from the origin, which lies in the room of the recording. A headset is 170 cm above it."""
 
 MIN_MIXED_SAMPLES = 16
-"""Samples that are enough to see that."""
+"""Samples needed to detect several devices."""
 
 
 def require_one_body(trajectory: Trajectory, path: Path | str, way_out: str, line: int) -> None:
-    """Refuse samples that jump to and fro between places: those of several devices, taken for one.
+    """Raise an error if samples jump back and forth: those of several devices, read as one.
 
     Raises
     ------
     TrajectoryError
-        With the speed at which they would have to jump.
+        With the speed of the jumps.
     """
     times, positions = _usable(trajectory)
     interval = typical_interval(times)
@@ -84,22 +84,22 @@ def require_one_body(trajectory: Trajectory, path: Path | str, way_out: str, lin
 
 
 def implausibilities(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[ClipWarning, ...]:
-    """Return what of a recording is hard to believe.
+    """Return warnings of implausible times and lengths in a recording.
 
     Parameters
     ----------
     trajectory : Trajectory
     time_unit : bool
-        Whether its format takes the unit of time from the user.
+        Whether the user can set the unit of time for its format.
     """
     times, positions = _usable(trajectory)
-    # Speeds between times that are next to nothing apart leave the range of floats.
+    # Tiny differences in time make speeds overflow.
     with np.errstate(over="ignore", invalid="ignore"):
-        return (*_of_times(times, time_unit), *_of_lengths(times, positions))
+        return (*_timing_warnings(times, time_unit), *_length_warnings(times, positions))
 
 
 def _usable(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and positions, in seconds and metres, of samples with no damage in both; of a body its root's."""
+    """Return times in seconds and positions in metres of the undamaged samples; for a whole body those of its root."""
     rows = np.abs(trajectory.times) < MAX_MEASURE
     poses = trajectory.poses if trajectory.rest_body is None else trajectory.poses[0]
     positions = poses.positions
@@ -107,7 +107,7 @@ def _usable(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     return trajectory.times[rows], positions[rows] * trajectory.metres_per_unit
 
 
-def _of_times(times: np.ndarray, time_unit: bool) -> Iterator[ClipWarning]:
+def _timing_warnings(times: np.ndarray, time_unit: bool) -> Iterator[ClipWarning]:
     interval = typical_interval(times)
     if not interval > 0.0:
         return
@@ -122,12 +122,12 @@ def _of_times(times: np.ndarray, time_unit: bool) -> Iterator[ClipWarning]:
         yield ClipWarning(f"{1.0 / interval:.3g} samples a second, more than any device has", way_out)
 
 
-def _of_lengths(times: np.ndarray, positions: np.ndarray) -> Iterator[ClipWarning]:
+def _length_warnings(times: np.ndarray, positions: np.ndarray) -> Iterator[ClipWarning]:
     if len(times) < MIN_MIXED_SAMPLES:
         return
     steps = np.diff(times)
     forward = steps > 0.0
-    speeds = np.linalg.norm(np.diff(positions, axis=0)[forward], axis=-1) / _lasting(steps[forward])
+    speeds = np.linalg.norm(np.diff(positions, axis=0)[forward], axis=-1) / _without_short_steps(steps[forward])
     fast = float(np.percentile(speeds, 95.0)) if len(speeds) else 0.0
     low, high = np.percentile(positions, (1.0, 99.0), axis=0)
     extent, away = float(np.linalg.norm(high - low)), float(np.linalg.norm(low + high)) / 2.0
@@ -140,49 +140,49 @@ def _of_lengths(times: np.ndarray, positions: np.ndarray) -> Iterator[ClipWarnin
 
 
 MAX_T_POSE_SAMPLES = 5
-"""Samples in front that may hold the same T-pose."""
+"""Samples at the start that may hold the same T-pose."""
 
 MAX_HELD_POSE_RATIO = 1e-3
-"""Part of its size by which a body may move and still hold a pose."""
+"""Fraction of its size by which a body may move while it holds a pose."""
 
 MIN_T_POSE_JUMP_RATIO = 0.1
-"""Part of its size that a joint moves, at least, from a T-pose to the motion."""
+"""Smallest jump of a joint from a T-pose to the motion, as a fraction of the body's size."""
 
 MIN_T_POSE_JUMP_FACTOR = 5.0
-"""Factor by which that is farther than any joint moves in any sample afterwards."""
+"""Factor by which this jump exceeds the largest step of any joint afterwards."""
 
 MIN_FIRST_JUMP_FACTOR = 10.0
-"""Such a factor where the first pose is neither a T-pose nor that at rest, and more than `HIGHEST_SPEED`."""
+"""This factor if the first pose is no T-pose and no rest pose; its jump must also be faster than `HIGHEST_SPEED`."""
 
 FIRST_JUMP_SAMPLES = 60
-"""Samples that are looked at for that."""
+"""Samples after the T-pose that are compared with the jump."""
 
 AT_REST = 0.02
-"""Part of its size by which any joint may be away from where it is at rest."""
+"""Distance of joints from their rest positions, as a fraction of the body's size, that counts as the rest pose."""
 
 MIN_T_POSE_SPAN_RATIO, MAX_T_POSE_DEPTH_RATIO = 0.75, 0.4
-"""The least that the arms of a T-pose reach, and the most that it is deep, as parts of its largest extent."""
+"""Smallest arm span and largest depth of a T-pose, as fractions of its largest extent."""
 
 MIN_GAP_S = 0.2
-"""Seconds: the longest time between keys of a comparison at 5 keys a second. In a longer gap there is no key at all."""
+"""Seconds: the longest interval between keys of a comparison, at 5 keys a second. No key falls into a longer gap."""
 
 MIN_LOST_RATIO = 0.25
-"""The share of rows from which on it is no repair to leave them out."""
+"""Share of dropped rows from which on dropping them is a loss, not a repair."""
 
 MIN_ISOLATED_JUMP_FACTOR = 10.0
-"""Factor by which a jump goes farther than the samples around it."""
+"""Factor by which a jump exceeds the steps of the samples around it."""
 
 JUMP_REACH_SAMPLES = 8
-"""Samples before and after a jump that it is compared with."""
+"""Samples before and after a jump that are compared with it."""
 
 MOST_JUMPS = 0.01
-"""The share of samples up to which jumps are faults of some, and not the unit of all."""
+"""Share of samples up to which jumps are faults of single samples, and not a wrong unit."""
 
 MOST_NAMED = 5
-"""Gaps or jumps that are named, the largest ones."""
+"""Number of gaps or jumps listed, the largest ones."""
 
 BLOCK_SAMPLES = 4096
-"""Samples of a body that are looked at at once."""
+"""Samples of a body processed at once."""
 
 LEAVE_OUT = "take a part without it: --start and --end"
 
@@ -190,14 +190,14 @@ LEAVE_OUT = "take a part without it: --start and --end"
 def calibration_pose(
     times: np.ndarray, poses: Poses, rest_body: RestBody, metres: float
 ) -> tuple[int, ClipWarning | None]:
-    """Find a pose in front of a whole body's motion that is no part of it.
+    """Find an initial pose that is not part of a whole body's motion.
 
     Returns
     -------
     samples : int
-        How many samples hold a T-pose or the pose at rest, from which the body jumps into its motion: 0 for none.
+        Number of samples that hold a T-pose or the rest pose before the body jumps into its motion: 0 for none.
     warning : ClipWarning or None
-        What to say of these; also of another pose that it jumps from.
+        A warning of these samples, or of another pose before such a jump.
     """
     if len(times) < MIN_MIXED_SAMPLES:
         return 0, None
@@ -213,7 +213,7 @@ def calibration_pose(
         f"than {others * metres:.2g} m afterwards"
     )
     where = float(times[0]), float(times[held])
-    kind = _kind(places[:, 0], rest_body, size)
+    kind = _pose_kind(places[:, 0], rest_body, size)
     if (
         kind
         and held <= MAX_T_POSE_SAMPLES
@@ -228,8 +228,8 @@ def calibration_pose(
     return 0, None
 
 
-def _kind(places: np.ndarray, rest_body: RestBody, size: float) -> str:
-    """Return what pose these places (joints, 3) are: a T-pose in any axes, or that at rest; empty for any other."""
+def _pose_kind(places: np.ndarray, rest_body: RestBody, size: float) -> str:
+    """Return "a T-pose" (in any axes) or "the pose at rest" for places (joints, 3); empty for any other pose."""
     smallest, middle, largest = np.sort(np.ptp(places, axis=0))
     if middle > MIN_T_POSE_SPAN_RATIO * largest and smallest < MAX_T_POSE_DEPTH_RATIO * largest:
         return "a T-pose"
@@ -238,7 +238,7 @@ def _kind(places: np.ndarray, rest_body: RestBody, size: float) -> str:
 
 
 def losses(repairs: Sequence[Repair], count: int) -> tuple[list[ClipWarning], list[Repair]]:
-    """Return warnings of repairs that cost a good part of so many rows of a recording, and the other repairs."""
+    """Return warnings of repairs that drop a large share of the `count` rows of a recording, and the other repairs."""
     costly = [
         repair
         for repair in repairs
@@ -261,9 +261,9 @@ def losses(repairs: Sequence[Repair], count: int) -> tuple[list[ClipWarning], li
 def breaks(
     times: np.ndarray, poses: Poses, rest_body: RestBody | None, metres: float, begin: float
 ) -> list[ClipWarning]:
-    """Find the gaps of a recording that are longer than the time between keys, and its jumps, in their order.
+    """Return warnings of gaps longer than the time between keys, and of jumps, in order of time.
 
-    `metres` is the length of the unit of the poses, `begin` the time of the first sample of the recording.
+    `metres` is the length of the poses' unit, `begin` the time of the first sample of the recording.
     """
     steps = np.diff(times)
     result = [*_gaps(times, steps, begin)]
@@ -276,12 +276,12 @@ def _gaps(times: np.ndarray, steps: np.ndarray, begin: float) -> Iterator[ClipWa
     gaps = np.flatnonzero((steps > MIN_GAP_S) & (steps > MIN_ISOLATED_JUMP_FACTOR * np.median(steps)))
     for row in _largest(steps, gaps):
         first, last = times[row : row + 2].tolist()
-        text = f"no samples from {first - begin:.2f} s to {last - begin:.2f} s{_of(gaps, 'gaps')}"
+        text = f"no samples from {first - begin:.2f} s to {last - begin:.2f} s{_one_of(gaps, 'gaps')}"
         yield ClipWarning(f"{text}: no error is measured there", LEAVE_OUT, first, last)
 
 
 def _jumps(times: np.ndarray, steps: np.ndarray, lengths: np.ndarray, begin: float) -> Iterator[ClipWarning]:
-    steps = _lasting(steps)
+    steps = _without_short_steps(steps)
     fast = np.flatnonzero(lengths > HIGHEST_SPEED * steps)
     if len(fast) > MOST_JUMPS * len(steps):
         return
@@ -290,18 +290,18 @@ def _jumps(times: np.ndarray, steps: np.ndarray, lengths: np.ndarray, begin: flo
     jumps = fast[lengths[fast] > MIN_ISOLATED_JUMP_FACTOR * usual]
     for row in _largest(lengths, jumps):
         first, last = times[row : row + 2].tolist()
-        text = f"a jump at {first - begin:.2f} s{_of(jumps, 'jumps')}: {lengths[row]:.2g} m in one sample, at "
+        text = f"a jump at {first - begin:.2f} s{_one_of(jumps, 'jumps')}: {lengths[row]:.2g} m in one sample, at "
         text += f"{lengths[row] / steps[row]:.3g} m/s, where tracking was lost or takes were joined"
         yield ClipWarning(text, LEAVE_OUT, first, last)
 
 
-def _lasting(steps: np.ndarray) -> np.ndarray:
-    """Return steps forward of which none is far shorter than the others: stamps that come late do not make speed."""
+def _without_short_steps(steps: np.ndarray) -> np.ndarray:
+    """Return steps forward, raised to at least half the median: late timestamps do not mean high speed."""
     return np.maximum(steps, np.median(steps) / 2.0) if len(steps) else steps
 
 
 def _lengths(poses: Poses, rest_body: RestBody | None) -> Iterator[np.ndarray]:
-    """Yield how far a body, or any joint of it, gets from each sample to the next, block by block."""
+    """Yield the step of a body (or of its fastest joint) from each sample to the next, block by block."""
     count = poses.shape[-1]
     for first in range(0, count - 1, BLOCK_SAMPLES):
         part = poses[..., first : first + BLOCK_SAMPLES + 1]
@@ -313,5 +313,5 @@ def _largest(sizes: np.ndarray, rows: np.ndarray) -> list[int]:
     return sorted(rows[np.argsort(-sizes[rows], kind="stable")][:MOST_NAMED].tolist())
 
 
-def _of(rows: np.ndarray, what: str) -> str:
+def _one_of(rows: np.ndarray, what: str) -> str:
     return f" (one of {len(rows)} {what})" if len(rows) > 1 else ""

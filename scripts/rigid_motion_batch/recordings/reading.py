@@ -1,4 +1,4 @@
-"""The way from `FILE`, `FILE:BODY` or `FILE:*` to trajectories: the table of formats, and which one reads a file."""
+"""Reading of `FILE`, `FILE:BODY` or `FILE:*` into trajectories: the table of formats, and the choice of format."""
 
 from __future__ import annotations
 
@@ -19,48 +19,48 @@ from .sizing import sized
 from .tables import encoding_of
 
 HEAD_BYTES = 65536
-"""Bytes of a file that are looked at to tell its format."""
+"""Bytes at the start of a file that determine its format."""
 
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file."""
+    """A file format."""
 
     label: str
     extensions: tuple[str, ...]
     read: Callable[..., list[Trajectory]]
-    """A function of the path, the bodies that are requested and, where it honours any, the options."""
+    """A function of the path, the selection of bodies and, if the format honours any, the options."""
 
     recognises: Callable[[list[str]], bool] | None = None
-    """A function of the first lines. None where the extension is enough."""
+    """A function of the first lines. None if the extension is sufficient."""
 
     honours: tuple[str, ...] = ()
-    """The options that it takes: for what its files do not say themselves. The scale is applied to all formats, and
-    the part to take when clips are made."""
+    """The options that it takes, for facts that its files do not state. The scale is applied to all formats; start and
+    end are applied when clips are made."""
 
     measured: bool = True
-    """True if it holds what devices measured, and not what was animated, which may go at any speed."""
+    """True if it holds measurements of devices, and not animation, which may have any speed."""
 
     axes: str = "blender"
-    """The convention of its files, where nothing says otherwise: a name in `axes.AXES`."""
+    """The default axes of its files: a name in `axes.AXES`."""
 
     in_metres: bool = True
-    """True if its files say how long the unit of a body is, or the format prescribes it. It may still be wrong."""
+    """True if its files state the unit of a body's length, or the format prescribes it. It may still be wrong."""
 
     says_unit: bool = True
-    """True if it has a unit for lengths, or its files always say theirs."""
+    """True if the format prescribes a unit of length, or its files always state theirs."""
 
 
 TEXT = (".csv", ".tsv", ".txt", ".tum", ".chan", ".g2o")
-"""How the names of tables may end. What is in them says which one it is."""
+"""Extensions of tables. The content determines the format."""
 
 JSON = (".json",)
 
 VALUE_OPTIONS = ("time_unit", "frame_rate", "euler", "degrees")
 TABLE = ("columns", *VALUE_OPTIONS)
 
-# Of the formats that share an extension the first that recognises the content reads it. The last one needs not: it
-# takes the rest, and says what is wrong with it.
+# If formats share an extension, the first that recognises the content reads it. The last format takes the rest, and
+# reports what is wrong with it.
 FORMATS = (
     Format("Motive CSV", TEXT, optical.read_motive, optical.recognises_motive),
     Format("Vicon CSV", TEXT, optical.read_vicon, optical.recognises_vicon, VALUE_OPTIONS),
@@ -90,10 +90,10 @@ OTHER_FORMATS = {
     ".ods .xls .xlsx": "save the sheet as CSV",
     ".ulg": "make tables of it: ulog2csv FILE",
 }
-"""What to do with files that others write, and that are not read, by how they end."""
+"""Advice for files of other programs that cannot be read, by extension."""
 
 MOST_NAMES = 10_000
-"""Names in a folder among which one is looked for that is like another."""
+"""Names in a folder that are searched for similar ones."""
 
 
 def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> Recording:
@@ -102,28 +102,28 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
     Parameters
     ----------
     source : str
-        A path; with `:BODY` behind it for one body by name, with `:*` for all bodies. A path alone asks for the first
-        body, such as the first animated object of a .blend, an FBX or a glTF, or for the whole skeleton: of a BVH, an
-        FBX or a glTF, and of an armature whose bones move.
+        A path; with `:BODY` after it for one body by name, with `:*` for all bodies. A path alone selects one body: the
+        first, such as the first animated object of a .blend, an FBX or a glTF, or the whole skeleton of a BVH, an FBX,
+        a glTF, or an armature whose bones move.
     options : ReadingOptions
-        What the file does not say of itself.
+        Facts that the file does not state.
 
     Returns
     -------
     Recording
-        The trajectories as recorded, the names of the bodies that were left, and what there is to say of them.
+        The trajectories as recorded, the names of the other bodies, and remarks.
 
     Raises
     ------
     TrajectoryError
-        One line: the file, the line in it, what is wrong and the way out. Also where no body has two samples, where an
-        option is given that means nothing to the format, and where a recording cannot be meant as it is read.
+        One line: the file, the line in it, what is wrong and the way out. Also if no body has two samples, an option
+        does not apply to the format, or a recording cannot be meant as it is read.
 
     Notes
     -----
     Tables take memory for their numbers and not for their text, JSON up to 30 times its size. Files beyond the limits
     in `tables`, `bvh` and `json_logs` are refused. Blender itself reads .blend and FBX files, and may crash on a
-    damaged one: where that must not happen, read them in a process of their own.
+    damaged one: to be safe from that, read them in a separate process.
     """
     path, body = split_source(source)
     selection = Selection(path, body)
@@ -142,7 +142,7 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
 
 
 def read_all_singles(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> Recording:
-    """Read all bodies of a file, where none is named and the first is no whole body; otherwise the same."""
+    """Read all bodies of a file if none is named and the first is not a whole body; else as `read_trajectories`."""
     recording = read_trajectories(source, options)
     if recording.others and not recording.body and recording.trajectories[0].rest_body is None:
         return read_trajectories(f"{recording.path}:{ALL}", options)
@@ -167,38 +167,38 @@ def _read(result: Format, path: Path, selection: Selection, options: ReadingOpti
 
 
 def files_of(source: str) -> list[str]:
-    """Return what a source stands for: of a folder the files that may be recordings, in the order of their names."""
+    """Return the source itself or, for a folder, its files that may be recordings, sorted by name."""
     try:
         if not os.path.isdir(source):
             return [source]
         names = sorted(entry.name for entry in os.scandir(source) if entry.is_file())
     except (OSError, ValueError):
-        return [source]  # What is wrong with it is said when it is read.
+        return [source]  # Reading it will raise the error.
     return [os.path.join(source, name) for name in names if name.lower().endswith(ENDINGS)] or [source]
 
 
 def split_source(source: str) -> tuple[Path, str | None]:
-    """Return the file and the body. Both may have colons in their names, and a Windows path begins with a drive's.
+    """Return the file and the name of the body. Both may contain colons, as may a Windows drive.
 
     Raises
     ------
     TrajectoryError
-        Where no part of `source` before a colon, nor the whole, is a file.
+        If neither `source` nor any part of it before a colon is a file.
     """
     colons = [index for index, character in enumerate(source) if character == ":"]
     for end in [len(source), *reversed(colons)]:
-        # "C:" of "C:\take.csv" is no file of its own, whatever lies in the current folder.
+        # The "C" of "C:\take.csv" is a drive, even if the current folder has a file of that name.
         drive = end == 1 and source[:1].isalpha() and source[2:3] in ("\\", "/")
         if not drive and os.path.isfile(source[:end]):
             return Path(source[:end]), source[end + 1 :] if end < len(source) else None
     for end in [len(source), *reversed(colons)]:
-        if result := _what_is_no_file(source[:end]):
+        if result := _problem_of_path(source[:end]):
             raise TrajectoryError(source[:end], *result)
-    raise TrajectoryError(source, f"no such file{_near(source)}", "check the path")
+    raise TrajectoryError(source, f"no such file{_similar_name(source)}", "check the path")
 
 
-def _near(source: str) -> str:
-    """Return what may have been meant by the name of a file that is not there, if it or its body is much like one."""
+def _similar_name(source: str) -> str:
+    """Return a hint at a similar file name in the folder of a missing file, or an empty text."""
     folder, name = os.path.split(source)
     with suppress(OSError, ValueError), os.scandir(folder or ".") as entries:
         names = [entry.name for entry in islice(entries, MOST_NAMES) if entry.name.lower().endswith(ENDINGS)]
@@ -206,8 +206,8 @@ def _near(source: str) -> str:
     return ""
 
 
-def _what_is_no_file(path: str) -> tuple[str, str] | None:
-    """Return what is at a path that is no file, and the way out; None for nothing. It is looked at, and not opened."""
+def _problem_of_path(path: str) -> tuple[str, str] | None:
+    """Return the problem and the way out for an existing path that is not a file, else None. The path is not opened."""
     if os.path.isdir(path):
         return "this is a folder without recordings", "name a file, or a folder that has some"
     if os.path.exists(path) and not os.path.isfile(path):
@@ -218,7 +218,7 @@ def _what_is_no_file(path: str) -> tuple[str, str] | None:
 
 
 def format_of(path: Path) -> Format:
-    """Return the format that reads a file, by its name and, where several share that, by how it begins."""
+    """Return the format of a file, chosen by extension and, if several formats share that, by its first lines."""
     candidates = [known for known in FORMATS if path.suffix.lower() in known.extensions]
     if not candidates:
         problem = f"unknown extension {shown(path.suffix)}"

@@ -1,4 +1,4 @@
-"""Results of reading: the trajectories of the bodies that were asked for, the names of the others, or one clear error.
+"""Results of reading: trajectories of the requested bodies, names of the other bodies, or one clear error.
 
 Times are seconds; positions are in the unit of the file; quaternions are w, x, y, z with the signs of the file.
 """
@@ -18,30 +18,30 @@ from .clips import ClipWarning
 from .rest_bodies import RestBody
 
 ALL = "*"
-"""Name that asks for every body of a file."""
+"""Name that requests every body of a file."""
 
 MOST_POSES = 50_000_000
-"""Poses of all joints together: a file may hold any number of joints and frames in little space."""
+"""Poses of all joints together: a small file may state any number of joints and frames."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Where a file has the numbers of a body, for others in their place."""
+    """Cells of a file that hold the numbers of a body, for writing other numbers in their place."""
 
     rows: np.ndarray
     """The row of each sample, shape (n,)."""
 
     shape: tuple[int, int]
-    """Rows and columns of the file."""
+    """Number of rows and columns of the file."""
 
     numbers: Callable[[Poses], Mapping[int, np.ndarray]]
-    """A function of poses like those of the trajectory, which returns numbers (n,) by their columns."""
+    """A function of poses like those of the trajectory. It returns the numbers (n,) of each column."""
 
     write: Callable[[Path, np.ndarray], None]
-    """Writes the whole file to a path with numbers of that shape, where NaN stands for what is there."""
+    """A function that writes the whole file to a path with numbers of that shape; NaN keeps the present number."""
 
     times: Callable[[np.ndarray], Mapping[int, np.ndarray]] | None = None
-    """A function of times (n,), likewise; None where the column is that of others too, or has no numbers."""
+    """A function of times (n,), likewise; None if the time column is shared with other bodies, or has no numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,70 +52,69 @@ class Trajectory:
     """The body: CSV file stem, Motive rigid body, A-Frame device, BVH joint, Blender object, or OBJECT/BONE."""
 
     times: np.ndarray
-    """Seconds, shape (n,). Neither rising nor finite unless the recording is sound."""
+    """Seconds, shape (n,). Only a sound recording has increasing and finite ones."""
 
     poses: Poses
-    """Shape (n,). A sample that was not tracked is NaN; scales are None unless the file has one that is not 1.
+    """Shape (n,). A sample that was not tracked is NaN; scales are None unless the file has a scale other than 1.
 
-    Of a whole body shape (joints, n), each joint's in its parent's space, without scales."""
+    For a whole body shape (joints, n), each joint in its parent's space, without scales."""
 
     metres_per_unit: float = 1.0
-    """The length of one unit of the positions, where the file tells it; 1 otherwise."""
+    """The length of one unit of the positions, if the file states it; 1 otherwise."""
 
     remark: str = ""
-    """A remark for whoever asked for this body."""
+    """A remark for the user who requested this body."""
 
     warnings: tuple[ClipWarning, ...] = ()
-    """Warnings on what is hard to believe of this recording."""
+    """Warnings of implausible parts of this recording."""
 
     dated: bool = False
-    """True if its times were dates or clock times, whose unit no one can mistake."""
+    """True if its times were dates or clock times, whose unit is certain."""
 
     rest_body: RestBody | None = None
     """The rest body of a whole body."""
 
     rate: float | None = None
-    """Samples a second, where there may be more between these."""
+    """Samples a second of the recording, if `times` may have additional samples in between."""
 
     axes: str = ""
-    """Those that its program has, where they are not those of the format: a name in `axes.DESCRIBED`."""
+    """The axes of the program that wrote the file, if other than those of the format: a name in `axes.DESCRIBED`."""
 
     cells: Cells | None = None
-    """None where nothing can be written in the place of what was read."""
+    """None if the numbers in the file cannot be replaced."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Trajectories that were read of a file, and what there is to say of them."""
+    """The trajectories read from a file, with remarks."""
 
     path: Path
 
     trajectories: tuple[Trajectory, ...]
-    """The bodies that were asked for, in the order of the file."""
+    """The requested bodies, in the order of the file."""
 
     others: tuple[str, ...] = ()
-    """The names of the bodies that were left."""
+    """The names of the other bodies."""
 
     note: str = ""
-    """A note for a file of several bodies of which none was named: what was taken, what is left, how to name it. And
-    what there is to say of those that were taken.
-    """
+    """Remarks on the bodies read. If the file has several bodies and none was named, also a note that says which was
+    read, which are left, and how to name one."""
 
     body: str = ""
-    """The body that was asked for by name; empty where the first was, or all."""
+    """The body that was requested by name; empty if the first or all were."""
 
     axes: str = "blender"
     """The convention of its format, or of the program that wrote it: a name in `axes.DESCRIBED`."""
 
     axes_known: bool = False
-    """True if these are those of the program that wrote it, of several that write such a format."""
+    """True if the axes are those of the program that wrote the file, in a format that several programs write."""
 
     measured: bool = True
-    """True if its format holds what devices measured, and not what was animated."""
+    """True if the format holds measurements of devices, and not animation."""
 
 
 class TrajectoryError(ValueError):
-    """Error that says why a recording cannot be read, in one line: `FILE:LINE: what is wrong; way out`."""
+    """Error that says in one line why a recording cannot be read: `FILE:LINE: what is wrong; way out`."""
 
     def __init__(self, path: Path | str, problem: str, way_out: str, line: int | None = None) -> None:
         where = f"{path}:{line}" if line else f"{path}"
@@ -124,11 +123,11 @@ class TrajectoryError(ValueError):
 
 
 class NoMotion(TrajectoryError):
-    """Error of a file without a recording, which need not be wrong: a table of other things, or a body at rest."""
+    """Error for a file without a recording, which need not be damaged: another kind of table, or a body at rest."""
 
 
 def refuse_too_many(path: Path, joints: int, frames: float) -> None:
-    """Raise TrajectoryError for more poses than can be kept."""
+    """Raise TrajectoryError for more poses than memory can hold."""
     if joints * frames > MOST_POSES:
         problem = f"{joints} joints in {frames:.0f} frames are more than {MOST_POSES} poses"
         raise TrajectoryError(path, problem, "export fewer joints, or split the recording")
@@ -141,25 +140,25 @@ class Selection:
         self.path = path
         self.requested = requested
         self.names: tuple[str, ...] = ()
-        self._near = ""
-        """What may have been meant by a name that the file has not."""
+        self._similar_name = ""
+        """Hint at a similar name, for a name that is not in the file."""
 
     def of(self, names: Sequence[str], unlisted: Sequence[str] = (), more: int = 0) -> list[str]:
-        """Return the requested ones among the bodies of the file.
+        """Return the requested bodies of the file.
 
         Parameters
         ----------
         names : sequence of str
             The bodies, in the order of the file.
         unlisted : sequence of str
-            More bodies, to be had by name only.
+            More bodies, selected only by name.
         more : int
-            How many of those there are besides, which an error counts and does not name.
+            How many further bodies there are, which an error counts but does not name.
 
         Raises
         ------
         TrajectoryError
-            Where the file has no body of that name, whatever its case, or several, or none at all.
+            If the name, ignoring case, fits no body of the file or several, or the file has no bodies.
         """
         self.names = tuple(names)
         if self.requested in (None, ALL):
@@ -174,16 +173,16 @@ class Selection:
         self.match([*names, *unlisted])
         if self.requested not in names and self.requested not in unlisted:
             way_out = f"it holds {listed([*names, *unlisted], more=more)}"
-            raise TrajectoryError(self.path, f"no body named {shown(self.requested)}{self._near}", way_out)
+            raise TrajectoryError(self.path, f"no body named {shown(self.requested)}{self._similar_name}", way_out)
         return [self.requested]
 
     def match(self, names: Iterable[str]) -> None:
-        """Take the name in the file for the one that is requested, where they differ in case and underscores alone.
+        """Replace the requested name by the one in the file, if they differ only in case and underscores.
 
         Raises
         ------
         TrajectoryError
-            Where several names in the file do.
+            If several names in the file fit.
         """
         requested, names = self.requested or ALL, tuple(names)
         if requested == ALL or requested in names:
@@ -193,10 +192,10 @@ class Selection:
             problem = f"no body named {shown(requested)}, and {len(alike)} that differ from it in their case alone"
             raise TrajectoryError(self.path, problem, f"name one of {listed(alike)}")
         self.requested = alike[0] if alike else requested
-        self._near = self._near or ("" if alike else did_you_mean(requested, names))
+        self._similar_name = self._similar_name or ("" if alike else did_you_mean(requested, names))
 
     def recording(self, trajectories: Sequence[Trajectory]) -> Recording:
-        """Return the result, with what there is to say about the bodies that were taken, and those that were not."""
+        """Return the recording, with remarks on the bodies that were read and those that were not."""
         taken = {trajectory.name for trajectory in trajectories}
         others = tuple(name for name in self.names if name not in taken)
         notes = list(dict.fromkeys(trajectory.remark for trajectory in trajectories if trajectory.remark))
@@ -210,12 +209,12 @@ class Selection:
 
 
 def _folded(name: str) -> str:
-    """Return a name in small letters, with the underscores that Blender has for spaces in BVH files."""
+    """Return a name in lower case, with underscores for spaces, as Blender writes names to BVH files."""
     return name.casefold().replace(" ", "_")
 
 
 def unique(names: Sequence[str]) -> list[str]:
-    """Return the names, a repeated one numbered as Blender does: Hand, Hand.001, Hand.002."""
+    """Return the names, with repeated ones numbered like in Blender: Hand, Hand.001, Hand.002."""
     result: list[str] = []
     unavailable = set(names)
     numbers: dict[str, int] = {}
@@ -232,5 +231,5 @@ def unique(names: Sequence[str]) -> list[str]:
 
 
 def shown(text: str, limit: int = 24) -> str:
-    """Return a piece of a file, in quotes and short enough for a line of error."""
+    """Return a text from a file, in quotes, and short enough for an error message."""
     return repr(text if len(text) <= limit else f"{text[:limit]}...")
