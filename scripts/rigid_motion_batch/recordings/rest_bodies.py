@@ -1,7 +1,7 @@
-"""Figures: what a whole body is made of, its joints at rest and its skin; and how large it is.
+"""Rest bodies of figures: the joints at rest and the skin of a whole body, and its size and likely unit.
 
-Arrays have the joints first, parents before their children. Lengths are in the unit of the file and axes are its own,
-as those of the poses that go with a figure: each joint's in its parent's space, those of roots in the world.
+Arrays have the joints first, parents before their children. Lengths are in the unit of the file, and axes are its own,
+like those of a figure's poses: each joint in its parent's space, roots in the world.
 """
 
 from __future__ import annotations
@@ -25,63 +25,63 @@ UNITS = (
     ("feet", 0.3048),
     ("decimetres", 0.1),
 )
-"""Units of files that do not say theirs, the likelier first, and their lengths in metres."""
+"""Units of files that do not state theirs, the most likely first, and their lengths in metres."""
 
 IN_METRES = 0.2, 5.0
-"""Smallest and largest size, in metres, of a body that is assumed to be in metres."""
+"""Smallest and largest size of a body that is assumed to be in metres."""
 
 GROWN_UP = 0.9, 2.3
-"""Metres that most bodies measure: a unit that makes a body as large is taken to be the file's."""
+"""Smallest and largest usual size of bodies, in metres: a unit that gives such a size is taken as the file's."""
 
 HIGHEST_HIPS = 1.3
-"""Metres above the floor, beyond which the lowest joint of a body that stands on it is not."""
+"""Metres above the floor: the lowest joint of a body that stands on the floor is never higher."""
 
 TYPICAL_HEIGHT_M = 1.7
-"""Metres; where no unit makes a body that large, that is taken which comes nearest."""
+"""Metres. If no unit gives a size in `GROWN_UP`, the unit that comes nearest to this height is taken."""
 
 PLAUSIBLE_HEIGHTS_M = 0.5, 2.5
-"""Metres: children and giants. A body of another size is hardly in the unit that was guessed."""
+"""Metres: from children to giants. For a body of any other size, the guessed unit is hardly right."""
 
 MOST_NAMED = 5
-"""Joints that are named of one kind of fault."""
+"""Joints listed for each kind of fault."""
 
 MOST_VERTICES = 200_000
-"""A body with more is shown without its skin."""
+"""Vertices of a skin; a body with more is shown without its skin."""
 
 MAX_JOINTS_PER_VERTEX = 4
-"""Joints that carry a vertex; more are left out, the weaker ones."""
+"""Joints that carry a vertex; weaker ones beyond these are dropped."""
 
 MAX_ROOT_DISTANCE_RATIO = 0.3
-"""How far a root is from its body, of the size of that, up to which it is a part of it."""
+"""Distance of a root from its body, as a fraction of the body's size, up to which it is part of the body."""
 
 MIN_LOOSE_MOVE_RATIO = 0.05
-"""How far all moves that hangs on a root which stands, of the size of the body, where nothing is joined to it."""
+"""Children of a still root are loose if all of them move by more than this fraction of the body's size."""
 
 ZERO_SIZE = 1e-9
-"""The size of what has none, in any unit."""
+"""Size, in any unit, below which a body has no size."""
 
 LOOKED_AT = 64
-"""Moments of a motion that tell what moves in it."""
+"""Moments of a motion that determine which joints move."""
 
 MAX_SAME_NUMBER_RATIO = 1e-6
-"""Share by which numbers differ that are the same: single precision."""
+"""Ratio by which equal numbers may differ: single precision."""
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """The surface of a body where its joints are at rest."""
+    """The surface of a body, with its joints at rest."""
 
     vertices: np.ndarray
     """Shape (v, 3), in the world."""
 
     triangles: np.ndarray
-    """Shape (t, 3), numbers of vertices."""
+    """Shape (t, 3), vertex indices."""
 
     joints: np.ndarray
     """Shape (v, 4): the joints that carry each vertex."""
 
     weights: np.ndarray
-    """Shape (v, 4): how much of it each carries. They sum to 1; what is not needed is 0."""
+    """Shape (v, 4): the weights of these joints. They sum to 1; unused ones are 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,23 +89,22 @@ class RestBody:
     """A body at rest."""
 
     joints: tuple[str, ...]
-    """Their names, each once."""
+    """Unique names of the joints."""
 
     parents: np.ndarray
-    """Shape (joints,): the number of each joint's parent, lower than its own, -1 for roots."""
+    """Shape (joints,): the index of each joint's parent, lower than its own, -1 for roots."""
 
     rest: Poses
-    """Poses of the joints at rest, shape (joints,), in the world and not in their parents' space."""
+    """Poses of the joints at rest, shape (joints,), in the world and not in the space of the parents."""
 
     tails: np.ndarray
-    """Ends of the bones of all joints, each in the joint's own space, shape (joints, 3)."""
+    """Bone tails of all joints, each in the joint's own space, shape (joints, 3)."""
 
     skin: Skin | None = None
 
     ends: np.ndarray | None = None
-    """How far from each joint its bone ends where no child begins, shape (joints,), and 0 where an importer made that
-    up; None where the file has no such ends.
-    """
+    """Lengths, shape (joints,), of bones that end where no child begins, and 0 for the other bones; None if the file
+    has no such ends, or an importer made them up."""
 
     @property
     def skeleton(self) -> Skeleton:
@@ -113,17 +112,17 @@ class RestBody:
 
 
 def in_parents(world: Poses, parents: np.ndarray) -> Poses:
-    """Return poses in the world (joints, n), each in the space of its parent, if it has one of parents (joints,)."""
+    """Return poses (joints, n) in the world, converted to the space of each joint's parent, if it has one."""
     local = Poses(world.positions.copy(), world.quaternions.copy(), world.scales)
-    for joint in np.flatnonzero(parents >= 0).tolist():  # One by one: all of a long recording is large.
+    for joint in np.flatnonzero(parents >= 0).tolist():  # One by one: a long recording takes much memory at once.
         local[joint] = placed(inverse(world[parents[joint]]), world[joint])
     return local
 
 
 def repaired(rest_body: RestBody) -> tuple[RestBody, tuple[str, ...]]:
-    """Return a figure with finite numbers alone, and what was done for that, a sentence each, as in `repair`.
+    """Return a figure with only finite numbers, and a sentence on each repair, as in `repair`.
 
-    Where a joint is at rest, and where its bone ends, decides about nothing but how it is drawn.
+    The rest positions and the tails of joints affect only how bones are drawn.
     """
     places, tails, skin, done = rest_body.rest.positions, rest_body.tails, rest_body.skin, []
     wrong = ~(np.abs(np.concatenate((places, tails), axis=1)) < MAX_MEASURE).all(axis=1)
@@ -141,10 +140,10 @@ def repaired(rest_body: RestBody) -> tuple[RestBody, tuple[str, ...]]:
 
 
 def tails_of(rest: Poses, parents: np.ndarray) -> np.ndarray:
-    """Return ends of bones that nothing tells, as `RestBody` has them, of joints at rest in the world (joints,).
+    """Return tails, as in `RestBody`, for bones of joints at rest in the world (joints,) where the file has none.
 
-    They are in the middle of a joint's children; at one without any, along y as far as its parent is, or as the
-    farthest of all, or 1 where all are in one place.
+    The tail is amid the joint's children. Without children, it is along y, at the distance of the parent; if that is 0,
+    at the largest such distance, or at 1 if all joints are in one place.
     """
     hanging = np.flatnonzero(parents >= 0)
     arms, lengths = np.zeros((len(parents), 3)), np.zeros(len(parents))
@@ -158,10 +157,9 @@ def tails_of(rest: Poses, parents: np.ndarray) -> np.ndarray:
 
 
 def carrying(parents: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return which joints only carry a body about, or stand where it moves, by their places (joints, n, 3).
+    """Return which joints only carry a body around, or stand where it moves, given their positions (joints, n, 3).
 
-    They may be anywhere. One that is near to the only joint that hangs on it is a part of the body, as hips without
-    legs are.
+    Such joints may be anywhere. A joint near its only child is part of the body, like hips without legs.
     """
     places = few_of(places)
     result = ~part_of_body(parents, places)
@@ -176,15 +174,15 @@ def carrying(parents: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def part_of_body(parents: np.ndarray, places: np.ndarray | None = None) -> np.ndarray:
-    """Return which joints are part of a body, shape (joints,), by their places (joints, n, 3) where these are known.
+    """Return which joints are part of a body, shape (joints,), using their positions (joints, n, 3) if known.
 
-    Joints that only carry the rest of it about, from the ground or from wherever they were left, are none: a body
-    begins where a joint first has several children. Where that joint stands while one of these goes away from it, it
-    begins with its children, without those that stand far from all that moves.
+    Joints that only carry the body around, such as from the ground, are not part of it: a body begins at the first
+    joint with several children. If that joint is still while one of its children moves away, the body begins with the
+    children, without those that are still and far from everything that moves.
     """
     children = np.bincount(parents[parents >= 0], minlength=len(parents))
     body = np.ones(len(parents), dtype=bool)
-    moves = None if places is None else _travels(places)
+    moves = None if places is None else _is_moving(places)
     for root in np.flatnonzero(parents < 0).tolist():
         chain = [root]
         while children[chain[-1]] == 1:
@@ -192,23 +190,24 @@ def part_of_body(parents: np.ndarray, places: np.ndarray | None = None) -> np.nd
         if children[chain[-1]] > 1:
             body[chain[:-1]] = False
             if places is not None and moves is not None and moves.any() and not moves[chain[-1]]:
-                body[_beside(parents, places, moves, chain[-1])] = False
+                body[_still_joints(parents, places, moves, chain[-1])] = False
     return body
 
 
 def few_of(places: np.ndarray) -> np.ndarray:
-    """Return places (joints, n, 3) at a few moments of all."""
+    """Return positions (joints, n, 3) at a few of the moments."""
     return places[:, :: -(-places.shape[1] // LOOKED_AT)]
 
 
-def _travels(places: np.ndarray) -> np.ndarray:
-    """Return which joints are not always at the same place, shape (joints,)."""
+def _is_moving(places: np.ndarray) -> np.ndarray:
+    """Return which joints change their position, shape (joints,)."""
     return np.ptp(places, axis=1).max(axis=-1) > MAX_SAME_NUMBER_RATIO * np.abs(places).max(axis=(1, 2), initial=1.0)
 
 
-def _beside(parents: np.ndarray, places: np.ndarray, moves: np.ndarray, root: int) -> list[int]:
-    """Return the joints that are no part of what moves below one that stands and has several children; none where all
-    stay about where they hang, as on hips.
+def _still_joints(parents: np.ndarray, places: np.ndarray, moves: np.ndarray, root: int) -> list[int]:
+    """Return the still joints that are not part of the body moving below a still root with several children.
+
+    Returns none if all children stay about where they are attached, as on hips.
     """
     hanging = np.flatnonzero(parents == root)
     gone = np.linalg.norm(places[hanging] - places[hanging, :1], axis=-1).max(axis=1)
@@ -230,12 +229,12 @@ def _beside(parents: np.ndarray, places: np.ndarray, moves: np.ndarray, root: in
 
 
 def size_of(parents: np.ndarray, places: np.ndarray) -> float:
-    """Return the largest extent along any axis of the joints of a body at these places (joints, 3)."""
+    """Return the largest extent along any axis of a body with joints at these positions (joints, 3)."""
     return float(np.ptp(places[part_of_body(parents)], axis=0).max())
 
 
 def unit_of(size: float) -> tuple[str, float]:
-    """Return the unit that a body of this size is likely to be in: what it is called, and its length in metres."""
+    """Return the name of the likely unit of a body of this size, and its length in metres."""
     if size < ZERO_SIZE or IN_METRES[0] <= size <= IN_METRES[1]:
         return UNITS[0]
     for name, length in UNITS:
@@ -245,10 +244,10 @@ def unit_of(size: float) -> tuple[str, float]:
 
 
 def unit_above_floor(size: float, lowest: float, highest: float) -> tuple[str, float, str]:
-    """Return the unit that a body is likely to be in, its length in metres, and what else than its size speaks for it.
+    """Return the name of a body's likely unit, its length in metres, and evidence for it other than the size.
 
-    The body is so large, and its joints are so high above the floor. Where by its size all of it would be higher than
-    the hips of giants, it is a part of a body, such as the upper half: then its height is that of a grown-up.
+    `lowest` and `highest` are the heights of its joints above the floor. If its size alone would put the whole body
+    above the hips of giants, it is part of a body, such as the upper half: then its height is that of an adult.
     """
     usual, length = unit_of(size)
     if length == 1.0 or lowest * length <= HIGHEST_HIPS:
@@ -263,14 +262,14 @@ def unit_above_floor(size: float, lowest: float, highest: float) -> tuple[str, f
 
 
 def likely_metres(parents: np.ndarray, places: np.ndarray, metres_per_unit: float = 1.0) -> float:
-    """Return the length of the unit that a body with joints at these places (joints, 3) is likely to be in."""
+    """Return the likely length in metres of the unit of a body with joints at these positions (joints, 3)."""
     with np.errstate(invalid="ignore", over="ignore"):
         size = size_of(parents, places) * metres_per_unit
     return metres_per_unit * (unit_of(size)[1] if np.isfinite(size) else 1.0)
 
 
 def sureness(size: float, length: float) -> str:
-    """Return how sure it is that the unit of a body of this size is so many metres long, which the size alone says."""
+    """Return how certain a unit of this length in metres is, judged by the size of the body alone."""
     fitting = [(name, size * metres) for name, metres in UNITS if GROWN_UP[0] <= size * metres <= GROWN_UP[1]]
     others = [f"{name} ({metres:.3g} m)" for name, metres in fitting if metres != size * length]
     if others:
@@ -281,6 +280,6 @@ def sureness(size: float, length: float) -> str:
 
 
 def short_names(joints: Sequence[str]) -> list[str]:
-    """Return the names of joints without a namespace that they all have: "mixamorig:Hips" becomes "Hips"."""
+    """Return joint names without a namespace that all share: "mixamorig:Hips" becomes "Hips"."""
     spaces = {name.rpartition(":")[0] for name in joints}
     return [name.rpartition(":")[2] for name in joints] if len(spaces) == 1 else list(joints)

@@ -1,4 +1,4 @@
-"""Writing numbers into a recording where others were read, everything else of it staying as it is."""
+"""Writing of changed numbers into a copy of a recording, with everything else unchanged."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from rigid_motion.motion.eulers import extrinsic_eulers_from_quaternions
 from .tables import CELL, HeaderLine
 
 WRITTEN_DECIMALS = 9
-"""Of numbers that are written: nanometres where lengths are metres."""
+"""Decimals of written numbers: nanometres if lengths are metres."""
 
 ENCODINGS = {codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
-"""By how files begin. That is left in the text, and so written again."""
+"""Encodings by byte order mark. The mark stays in the text, and so is written again."""
 
 POINT, COMMA = (re.compile(rf"[-+]?(?:\d+{mark}?\d*|{mark}\d+)(?:[eE][-+]?\d+)?") for mark in (r"\.", ","))
-"""Patterns of the numbers of a vector."""
+"""Patterns of the numbers in a vector."""
 
 
 def eulers_near(quaternions: np.ndarray, order: str, near: np.ndarray) -> np.ndarray:
-    """Return the angles (n, 3) of rotations (n, 4) about axes in `order`, as the earlier turns left these.
+    """Return intrinsic Euler angles (n, 3) of rotations (n, 4) about the axes in `order`.
 
-    Of the angles that are the same rotation those nearest to others (n, 3), all in radians.
+    Of all angles of the same rotation, those nearest to `near` (n, 3) are returned, all in radians.
     """
     angles = extrinsic_eulers_from_quaternions(quaternions, order[::-1])[:, ["XYZ".index(axis) for axis in order]]
     other = np.array([np.pi, np.pi, np.pi]) + angles * (1.0, -1.0, 1.0)
@@ -36,7 +36,7 @@ def eulers_near(quaternions: np.ndarray, order: str, near: np.ndarray) -> np.nda
 
 
 def write_text(header: HeaderLine, target: Path, numbers: np.ndarray) -> None:
-    """Write the file of a header to a path, with other numbers (rows, columns) in it but for those that are NaN."""
+    """Write the file of a header to a path, with other numbers (rows, columns); NaN keeps the present number."""
     changed = np.isfinite(numbers).any(axis=1)
     rows = {line: numbers[row] for row, (line, _) in enumerate(header.rows()) if changed[row]}
     with header.path.open("rb") as head:
@@ -65,7 +65,7 @@ def _text(value: float, before: str, separator: str | None) -> str:
 
 
 def _spans(line: str, separator: str | None, vectors: bool) -> list[tuple[int, int]]:
-    """Return where the cells of a line begin and end, those of numbers in a vector each for itself."""
+    """Return the start and end of each cell of a line; the numbers of a vector count as cells."""
     between = re.escape(separator) if separator else r"\s"
     whole = rf"(?:{CELL.pattern}|[^{between}])+" if vectors else rf'(?:"[^"]*"|[^{between}])+'
     if separator:

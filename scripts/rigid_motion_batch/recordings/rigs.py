@@ -1,6 +1,6 @@
-"""Whole bodies of the open Blender, where it shows them: the bones of armatures, or objects that hang on one another.
+"""Whole bodies evaluated by the running Blender: the bones of armatures, or hierarchies of objects.
 
-The surface that an armature carries is that of all of its meshes together, where its bones are at rest.
+The skin of an armature is the surface of all its meshes together, in the rest pose.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     import bpy
 
 AT_CHILD = 0.01
-"""The part of its length within which a bone ends where its child begins."""
+"""A bone ends at its child if the distance is within this fraction of the bone's length."""
 
 
 @contextmanager
 def in_blender(path: Path, again: str) -> Iterator[None]:
-    """Raise TrajectoryError where this is no Blender, or fails at a file in a way that no importer foresees.
+    """Raise TrajectoryError if this is not Blender, or reading a file fails in a way that no importer handles.
 
-    `again` is what to do about names that are no text, which Blender takes as they are, and Python fails at: with a
-    SystemError on some ways.
+    `again` is the advice for names that are not valid text: Blender accepts them, but Python fails, sometimes with a
+    SystemError.
     """
     try:
         import bpy  # noqa: F401
@@ -50,14 +50,14 @@ def in_blender(path: Path, again: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class RigJoints:
-    """The bones of an armature that count."""
+    """The bones of an armature that are read as joints."""
 
     names: tuple[str, ...]
     parents: np.ndarray
-    """Shape (joints,): the number of the nearest bone above that counts, -1 for none."""
+    """Shape (joints,): the index of the nearest ancestor that is a joint, -1 for none."""
 
     left_out: tuple[str, ...] = ()
-    """Bones that deform nothing, and only control others."""
+    """Bones that do not deform, and only control others."""
 
     @property
     def remark(self) -> str:
@@ -66,13 +66,13 @@ class RigJoints:
 
 
 def armature_of(rig: bpy.types.Object) -> bpy.types.Armature:
-    """Return the data of an object that is an armature."""
+    """Return the data of an armature object."""
     return cast("bpy.types.Armature", rig.data)
 
 
 def joints_of(rig: bpy.types.Object) -> RigJoints:
-    """Return the bones that deform, if any do, or else all; parents before their children."""
-    bones = list(armature_of(rig).bones)  # Blender lists the hierarchy from its roots on.
+    """Return the deforming bones, or all bones if none deforms; parents before their children."""
+    bones = list(armature_of(rig).bones)  # Blender lists parents before children.
     kept = [bone for bone in bones if bone.use_deform] or bones
     numbers = {bone.name: number for number, bone in enumerate(kept)}
     nearest: dict[str, int] = {}
@@ -94,28 +94,28 @@ def whole_body(
     *,
     made_up: bool = False,
 ) -> Trajectory:
-    """Return the whole skeleton of an armature, and the skin that it carries.
+    """Return the whole skeleton of an armature, and its skin.
 
     Parameters
     ----------
     path : Path
-        The file that it is of, for errors.
+        The file of the armature, for errors.
     rig : bpy.types.Object
         An armature, of the open file or linked.
     name : str
-        What the body is to be called.
+        The name of the body.
     moments : Moments
-        Where it is looked at; and between them where it bends.
+        The moments to sample; more are added where the motion bends in between.
     metres_per_unit : float
     scale : float, optional
-        The same as the user says it. Without, a size tells whether it can be.
+        Metres per unit as given by the user. Without it, the size shows whether `metres_per_unit` is likely.
     made_up : bool
-        Whether an importer made up where the bones end.
+        Whether an importer made up the ends of the bones.
 
     Raises
     ------
     TrajectoryError
-        Where it has no bones, or too many for so many frames.
+        If the armature has no bones, or too many for the number of frames.
     """
     joints = joints_of(rig)
     if not joints.names:
@@ -123,7 +123,7 @@ def whole_body(
     meshes, metres = carried_by(rig), scale or likely_unit(rig, metres_per_unit)
     with looking(path, meshes, rig, joints.names) as look:
         seen = sampled(moments, lambda frames: unscaled(look(frames)), joints.parents, OF_JOINTS, metres)
-    # What a damaged file has beyond all measure is for the repair to say.
+    # Numbers of a damaged file that are not finite or too large are reported by the repair.
     with np.errstate(invalid="ignore", over="ignore"):
         rest_body = _rest_body(rig, joints, look.first, meshes, made_up=made_up)
     return seen.as_body(name, moments, metres, rest_body, metres_per_unit, joints.remark)
@@ -138,9 +138,9 @@ def body_of_objects(
     moments: Moments,
     scale: float | None,
 ) -> Trajectory:
-    """Return objects as the joints of a whole body, which rests where they are at first.
+    """Return objects as the joints of a whole body, with the rest pose on the first frame.
 
-    `parents` has the number of what each hangs on among them, -1 for nothing, shape (objects,).
+    `parents` holds the index of each object's parent among them, -1 for none, shape (objects,).
     """
     with looking(path, objects) as look:
         first = look(moments.frames[:1])
@@ -152,7 +152,7 @@ def body_of_objects(
 
 
 def likely_unit(rig: bpy.types.Object, metres_per_unit: float = 1.0) -> float:
-    """Return the length of the unit that a rig is likely to be in, from where its joints rest."""
+    """Return the likely length of the unit of a rig, judged by the rest positions of its joints."""
     joints, there = joints_of(rig), matrix_of(rig)
     with np.errstate(invalid="ignore", over="ignore"):
         heads = np.array([armature_of(rig).bones[name].head_local for name in joints.names]) @ there[:3, :3].T
@@ -175,12 +175,12 @@ def _rest_body(
     largest = 0.0 if made_up else float(np.ptp(rest.positions, axis=0).max())
     tails = _shortened(tails, rest.positions, joints.parents, largest)
     skin = skin_of(meshes, joints.names, matrices)
-    free = None if made_up else _free_ends(tails, rest, joints.parents)
+    free = None if made_up else _free_end_lengths(tails, rest, joints.parents)
     return RestBody(joints.names, joints.parents, rest, np.ascontiguousarray(tails), skin, free)
 
 
-def _free_ends(tails: np.ndarray, rest: Poses, parents: np.ndarray) -> np.ndarray:
-    """Return how long bones are that end at none of their children, shape (joints,), and 0 for the others."""
+def _free_end_lengths(tails: np.ndarray, rest: Poses, parents: np.ndarray) -> np.ndarray:
+    """Return the lengths of bones that do not end at a child, shape (joints,), and 0 for the others."""
     lengths, hanging = np.linalg.norm(tails, axis=-1), np.flatnonzero(parents >= 0)
     ends, gaps = rest.positions + rotate(rest.quaternions, tails), np.full(len(parents), np.inf)
     np.minimum.at(gaps, parents[hanging], np.linalg.norm(ends[parents[hanging]] - rest.positions[hanging], axis=-1))
@@ -188,9 +188,9 @@ def _free_ends(tails: np.ndarray, rest: Poses, parents: np.ndarray) -> np.ndarra
 
 
 def _shortened(tails: np.ndarray, heads: np.ndarray, parents: np.ndarray, largest: float) -> np.ndarray:
-    """Return tails (joints, 3) of bones no longer than the way to their children, or else that from their parents.
+    """Return tails (joints, 3) of bones, no longer than the distance to their farthest child, or else to their parent.
 
-    Bones up to the largest length stay: longer ones than a body is large are an importer's, where it took other units.
+    Bones up to `largest` are kept: bones longer than a body come from an importer that assumed other units.
     """
     hanging = np.flatnonzero(parents >= 0)
     gaps = np.linalg.norm(heads[hanging] - heads[parents[hanging]], axis=-1)
@@ -204,7 +204,7 @@ def _shortened(tails: np.ndarray, heads: np.ndarray, parents: np.ndarray, larges
 
 
 def carried_by(rig: bpy.types.Object) -> list[bpy.types.Object]:
-    """Return the mesh objects that an armature deforms; none where their vertices are too many."""
+    """Return the mesh objects that an armature deforms; none if they have too many vertices."""
     import bpy
 
     from rigid_motion.animation.transforms.sizes import deforms
@@ -220,15 +220,15 @@ def _mesh_of(obj: bpy.types.Object) -> bpy.types.Mesh:
 def skin_of(
     meshes: Sequence[bpy.types.Object], joints: Sequence[str], matrices: Mapping[bpy.types.Object, np.ndarray]
 ) -> Skin | None:
-    """Return the skin of some mesh objects, or None where there are no triangles.
+    """Return the skin of mesh objects, or None if there are no triangles.
 
     Parameters
     ----------
     meshes : sequence of bpy.types.Object
     joints : sequence of str
-        The bones: what is in no vertex group of theirs is carried by the first.
+        The bones. Vertices in no vertex group of these are carried by the first.
     matrices : mapping of bpy.types.Object to array, shape (4, 4)
-        Where each mesh object is in the world.
+        The world matrix of each mesh object.
     """
     numbers = {name: number for number, name in enumerate(joints)}
     vertices, triangles, carriers, weights, before = [], [], [], [], 0
@@ -251,8 +251,8 @@ def skin_of(
 
 
 def _carriers(mesh: bpy.types.Mesh, joint_of_group: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the joints (vertices, 4) that carry each vertex most, and by how much of it."""
-    # Blender has no way to hand out all weights at once.
+    """Return the joints (vertices, 4) with the largest weights for each vertex, and these weights."""
+    # Blender cannot return all weights at once.
     entries = [
         (vertex.index, joint_of_group[group.group], group.weight)
         for vertex in mesh.vertices

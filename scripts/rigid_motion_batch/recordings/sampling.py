@@ -1,8 +1,8 @@
-"""Moments of a motion that become samples: so many that what lies between them is on a straight way.
+"""Sampling of a motion: enough samples that interpolation between them is accurate.
 
-A recording is looked at on even frames, and at every key of every curve. Where Blender then shows something else
-between two samples than lines and even turns (`lerp_slerp`) from the one to the other, the gap between them is halved,
-and its halves again. Everyday recordings, with a key on every frame, stay as they are.
+A recording is evaluated on even frames, and at every key of every F-curve. If Blender's motion between two samples
+differs from interpolation by lines and even turns (`lerp_slerp`), the gap between them is halved, and its halves again.
+Everyday recordings, with a key on every frame, stay as they are.
 """
 
 from __future__ import annotations
@@ -24,66 +24,66 @@ from .recordings import MOST_POSES, Trajectory
 from .rest_bodies import RestBody, in_parents
 
 MAX_GAP_ERROR_M = 1e-3
-"""Metres that what lies between two samples may be off."""
+"""Metres: the largest interpolation error between two samples."""
 
 OF_JOINTS, OF_OBJECTS = 0.03, 0.1
-"""Metres around a joint and an object in which all points count, as in comparisons."""
+"""Radius in metres around a joint and an object within which errors of all points count, as in comparisons."""
 
 HALVING_ERROR_RATIO = 0.6
-"""The share of that at which a gap is halved: of a cubic curve, the looks see at least three quarters of the most."""
+"""Fraction of that error at which a gap is halved: checks see at least 3/4 of the largest error of a cubic curve."""
 
 LOOK_PLACES = np.array([0.25, 0.75])
-"""Places in a gap that are looked at. Half-way an ease in and out would seem to be a straight line."""
+"""Places in a gap that are checked. Half-way, an ease in and out would look like a straight line."""
 
 HALF_WAY = np.array([0.5])
-"""Place where curves of straight lines are looked at: what several of them make together bends to one side."""
+"""Place where straight curves are checked: several combined bend to one side."""
 
 MAX_LINE_TURN_RAD = np.radians(20.0)
-"""A turn from sample to sample that is wider is looked at as if it were eased: quaternions on a line ease it."""
+"""Turns between samples above this angle are checked like eased ones: linearly interpolated quaternions ease a turn."""
 
 MAX_GAP_HALVINGS = 8
-"""Number of times that a gap may be halved."""
+"""How often a gap may be halved."""
 
 MIN_KEY_GAP_STEPS = 0.0125
-"""Keys that are closer, in steps of the recording, are one: to Blender a hundredth of a frame is none."""
+"""Keys closer than this, in steps of the recording, count as one: Blender ignores a hundredth of a frame."""
 
 JUMP_STEPS = 2.0 * MIN_KEY_GAP_STEPS
-"""Steps that a jump takes."""
+"""Duration of a jump, in steps of the recording."""
 
 MAX_SAME_GAP_STEPS = 2e-3
-"""Steps by which gaps may differ that are the same: F-curves keep frames in single precision."""
+"""Steps by which equal gaps may differ: F-curves store frames in single precision."""
 
 MAX_KEYS_PER_S, MIN_KEYS_PER_S = 240.0, 5.0
-"""Keys a second that are taken to be the rate of a file."""
+"""Largest and smallest number of keys a second that is taken as the rate of a file."""
 
 MAX_ROUND_RATE_ERROR = 2e-4
-"""Share by which a rate may be off a whole number that is one: 29.97 is none."""
+"""Ratio by which a whole-number rate may be off: 29.97 is not a whole number."""
 
 ON_A_FRAME = 1e-4
 """Distance from a whole frame within which a key is on it."""
 
 MAX_MULTIPLE_ERROR = 0.05
-"""Share of the least gap between keys by which others may miss its multiples."""
+"""Fraction of the smallest gap between keys by which other gaps may deviate from its multiples."""
 
 MAX_SAMPLES_PER_KEY = 4.0
-"""Number of samples that a key may stand for where keys were thinned."""
+"""Largest average number of samples per key in a thinned curve."""
 
 MIN_FLIP_RAD = np.radians(60.0)
-"""Turn between two frames, and back, beyond which angles have jumped by a whole turn."""
+"""Turn between two samples and back, above which Euler angles have jumped by a whole turn."""
 
 MOST_ADDED = 20
-"""Samples for each that there is without; noise may ask for any number."""
+"""Added samples per original sample: noise could require any number."""
 
 BLOCK_GAPS = 256
-"""Gaps that are looked into at once."""
+"""Gaps checked at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Moments to look at a recording at first."""
+    """The first moments at which a recording is sampled."""
 
     frames: np.ndarray
-    """Frames of shape (n,), rising; between whole frames too."""
+    """Frames of shape (n,), increasing, not only whole ones."""
 
     fps: float
     """Frames a second."""
@@ -95,7 +95,7 @@ class Moments:
     """Frames between two samples of the recording."""
 
     straight: bool = False
-    """True if all keys are joined by straight lines or steps."""
+    """True if all keys are connected by straight lines or steps."""
 
     def times(self, frames: np.ndarray) -> np.ndarray:
         """Return the times of frames, in seconds."""
@@ -103,9 +103,9 @@ class Moments:
 
 
 def merged(even: np.ndarray, keys: np.ndarray, step: float) -> np.ndarray:
-    """Return even frames (n,), rising, and the keys between the first and the last of them, less those as good as one.
+    """Return even frames (n,), increasing, merged with the keys between the first and last of them.
 
-    A key that is near to an even frame is on it, and of several near to one another the first is taken.
+    A key near an even frame is replaced by it; of several keys near each other, the first is kept.
     """
     keys = np.unique(keys[(keys > even[0]) & (keys < even[-1])])
     kept: list[float] = []
@@ -116,7 +116,7 @@ def merged(even: np.ndarray, keys: np.ndarray, step: float) -> np.ndarray:
 
 
 def moments_between(first: float, last: float, fps: float, step: float, keys: np.ndarray, *, straight: bool) -> Moments:
-    """Return even frames from the first key to the last one, and all keys (n,) between, in any order."""
+    """Return even frames from the first to the last frame, and all keys (n,) between, given in any order."""
     even = first + step * np.arange(int((last - first) / step + MAX_SAME_GAP_STEPS) + 1)
     if last - even[-1] > MAX_SAME_GAP_STEPS * step:
         even = np.append(even, last)
@@ -125,16 +125,16 @@ def moments_between(first: float, last: float, fps: float, step: float, keys: np
 
 
 def on_frames(frames: np.ndarray) -> np.ndarray:
-    """Return frames, those on whole ones that nearly are."""
+    """Return frames, with those near whole frames rounded."""
     whole = np.rint(frames)
     return np.where(np.abs(frames - whole) < ON_A_FRAME, whole, frames)
 
 
 def rate_of(keys: Iterable[np.ndarray], fps: float) -> float | None:
-    """Return how many keys a second the densest curve has; None where that is no rate that anything is recorded at.
+    """Return the highest number of keys a second of any F-curve; None if no recording has such a rate.
 
-    `keys` are the frames of those of each curve, rising, and there are `fps` frames a second. A curve with even gaps,
-    or a thinned one whose gaps are multiples of the least, goes before uneven ones.
+    `keys` are the frames of each curve's keys, increasing, at `fps` frames a second. Curves with even gaps, and thinned
+    ones with gaps that are multiples of the smallest, take precedence over uneven ones.
     """
     rates: dict[bool, list[float]] = {True: [], False: []}
     for frames in keys:
@@ -151,31 +151,31 @@ def rate_of(keys: Iterable[np.ndarray], fps: float) -> float | None:
 
 
 def away(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return how far the nearest of others, which rise, is from each of some frames; shape of the frames."""
+    """Return the distance of each frame to the nearest of `others`, which are increasing; shape of the frames."""
     return np.abs(frames - others[nearest(others, frames)]) if len(others) else np.full(len(frames), np.inf)
 
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Samples, and what there is to say of the gaps between them."""
+    """Samples of a motion, and the problems found in the gaps between them."""
 
     frames: np.ndarray
-    """Shape (n,), rising."""
+    """Shape (n,), increasing."""
 
     poses: Poses
     """Poses in the world, shape (joints, n)."""
 
     added: int = 0
-    """Number of samples that halved a gap."""
+    """Number of samples added by halving gaps."""
 
     off: float = 0.0
-    """Error between two samples where halving does not help, in the unit of the poses; else 0."""
+    """Largest error between two samples where halving does not help, in the unit of the poses; else 0."""
 
     gaps: tuple[float, ...] = ()
-    """The frames where these gaps begin."""
+    """The first frames of these gaps."""
 
     flips: int = 0
-    """Gaps in which something turns over and back."""
+    """Number of gaps in which a joint turns over and back."""
 
     def as_body(
         self,
@@ -186,7 +186,7 @@ class Sampled:
         metres_per_unit: float = 1.0,
         remark: str = "",
     ) -> Trajectory:
-        """Return the joints as a whole body, each in its parent's space; otherwise as `described`."""
+        """Return the joints as a whole body, each in its parent's space, with rate and remarks as in `described`."""
         with np.errstate(invalid="ignore", over="ignore"):
             local = in_parents(filled(self.poses), rest_body.parents)
         poses = Poses(local.positions, align_signs(local.quaternions))
@@ -194,7 +194,7 @@ class Sampled:
         return self.described(body, moments, metres)
 
     def as_singles(self, names: Sequence[str], moments: Moments, metres: float, remark: str = "") -> list[Trajectory]:
-        """Return a trajectory in the world for each joint, or object; what there is to say is of the first."""
+        """Return a trajectory in the world for each joint or object; the remarks are on the first."""
         times, poses, rate = moments.times(self.frames), filled(self.poses), moments.fps / moments.step
         first, *others = (
             Trajectory(name, times, growing(own), rate=rate) for name, own in zip(names, poses, strict=True)
@@ -202,7 +202,7 @@ class Sampled:
         return [self.described(replace(first, remark=remark), moments, metres), *others]
 
     def described(self, trajectory: Trajectory, moments: Moments, metres: float) -> Trajectory:
-        """Return a trajectory of these samples with its rate and what there is to say; its unit has so many metres."""
+        """Return a trajectory of these samples with rate, remarks and warnings; `metres` is the metres per unit."""
         remarks, warnings = [trajectory.remark], trajectory.warnings
         if self.added:
             remarks.append(f"added {self.added} samples between frames, where it bends by more than a millimetre")
@@ -225,19 +225,19 @@ class Sampled:
 def sampled(
     moments: Moments, look: Callable[[np.ndarray], Poses], parents: np.ndarray, radius: float, metres: float
 ) -> Sampled:
-    """Look at a motion, and again between samples where it is off a straight way.
+    """Sample a motion, and again between samples where interpolation is inaccurate.
 
     Parameters
     ----------
     moments : Moments
     look : callable
-        Given frames (n,), rising: the poses in the world, shape (joints, n). What is not finite is no matter.
+        Given frames (n,), increasing: the poses in the world, shape (joints, n). Non-finite poses are ignored.
     parents : array of int, shape (joints,)
-        Joints go a straight way in the space of their parents.
+        Joints are interpolated in the space of their parents.
     radius : float
-        Of the ball around each joint in which all points count; metres.
+        Metres: the radius of the ball around each joint within which errors of all points count.
     metres : float
-        The length of the unit that the poses are in.
+        The length of the poses' unit.
     """
     gaps = _Gaps(look, Skeleton(parents), radius / metres, moments.straight)
     frames, poses = moments.frames, look(moments.frames)
@@ -262,7 +262,7 @@ def sampled(
         if not len(split):
             break
         middles = (frames[split] + frames[split + 1]) / 2.0
-        poses = _with(poses, split + 1, look(middles))
+        poses = _inserted(poses, split + 1, look(middles))
         frames = np.insert(frames, split + 1, middles)
         begins = split + np.arange(len(split))
         unsure = np.ravel((begins, begins + 1), order="F")
@@ -272,7 +272,7 @@ def sampled(
 
 @dataclass(frozen=True, eq=False)
 class _Gaps:
-    """Errors of what lies between samples."""
+    """Interpolation errors in the gaps between samples."""
 
     look: Callable[[np.ndarray], Poses]
     skeleton: Skeleton
@@ -280,7 +280,7 @@ class _Gaps:
     straight: bool
 
     def errors(self, frames: np.ndarray, poses: Poses, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the largest distance and angle of any joint in these gaps (n,) between samples, shape (n,) each."""
+        """Return the largest error in distance and angle of any joint in these gaps (n,), shape (n,) each."""
         errors, angles = np.zeros(len(gaps)), np.zeros(len(gaps))
         for first in range(0, len(gaps), BLOCK_GAPS):
             rows = np.arange(first, min(first + BLOCK_GAPS, len(gaps)))
@@ -291,16 +291,16 @@ class _Gaps:
             for some, looks in ((eased, LOOK_PLACES), (~eased, HALF_WAY)):
                 if some.any():
                     places = frames[gaps[rows[some]]], frames[gaps[rows[some]] + 1]
-                    result = self._off(*places, begin[:, some], end[:, some], looks)
+                    result = self._gap_errors(*places, begin[:, some], end[:, some], looks)
                     errors[rows[some]], angles[rows[some]] = result
         return errors, angles
 
-    def _off(
+    def _gap_errors(
         self, first: np.ndarray, last: np.ndarray, begin: Poses, end: Poses, looks: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the errors of gaps from the first frames (n,) to the last, and from poses (joints, n) to others."""
+        """Return the errors of gaps between the first and last frames (n,), with poses (joints, n) at both ends."""
         seen = self.look((first[:, None] + (last - first)[:, None] * looks).ravel())
-        # What is damaged, or has no direction, is no reason for more samples.
+        # Damaged poses, and ones without a direction, do not require more samples.
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             begin, end = (in_parents(some, self.skeleton.parents) for some in (begin, end))
             straight = self.skeleton.in_root_space(_between(begin, end, looks))
@@ -314,7 +314,7 @@ class _Gaps:
 
 
 def _between(a: Poses, b: Poses, looks: np.ndarray) -> Poses:
-    """Return poses (joints, n k) on lines and even turns from some (joints, n) to others, at the looks (k,)."""
+    """Return poses (joints, n k) interpolated by lines and even turns between poses (joints, n), at the places (k,)."""
     turned = align_signs(np.stack((a.quaternions, b.quaternions), axis=-2))[..., 1, :]
     straight = lerp_slerp(a[..., None], Poses(b.positions, turned, b.scales)[..., None], looks)
     return reshaped(straight, len(a), -1)
@@ -324,8 +324,8 @@ def _scales(poses: Poses) -> np.ndarray:
     return np.ones(poses.shape) if poses.scales is None else poses.scales
 
 
-def _with(poses: Poses, places: np.ndarray, more: Poses) -> Poses:
-    """Return poses (joints, n) with more of them (joints, k) before these places (k,)."""
+def _inserted(poses: Poses, places: np.ndarray, more: Poses) -> Poses:
+    """Return poses (joints, n) with `more` poses (joints, k) inserted before these places (k,)."""
     scales = None
     if poses.scales is not None or more.scales is not None:
         scales = np.insert(_scales(poses), places, _scales(more), axis=1)

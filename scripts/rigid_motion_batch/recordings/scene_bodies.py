@@ -1,7 +1,7 @@
-"""Bodies of a file that holds a scene: whole ones of joints, objects that move alone, and which of them is requested.
+"""Bodies of a scene file: whole bodies of joints, single moving objects, and the choice of the requested ones.
 
-A whole body is the bones of a skeleton, or without one at least `MIN_MOVING_NODES` nodes that move and hang on one
-another. What else moves, such as a prop or a camera, is a single rigid body.
+A whole body is the bones of a skeleton or, without a skeleton, at least `MIN_MOVING_NODES` moving nodes in one
+hierarchy. Any other moving node, such as a prop or a camera, is a single rigid body.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from .recordings import ALL, NoMotion, Selection, Trajectory, TrajectoryError, u
 from .tables import LARGEST_FILE
 
 MIN_MOVING_NODES, MIN_GENERATIONS = 5, 3
-"""Nodes that move, and how many of them hang on one another, that are a body: a car and its wheels are none."""
+"""Moving nodes, and generations of them in the hierarchy, that make a body: a car and its wheels do not."""
 
 MAX_LISTED_NAMES = 5
-"""Names that a remark tells."""
+"""Number of names listed in a remark."""
 
 
 def refuse_too_large(path: Path, *others: Path) -> None:
-    """Raise TrajectoryError where a file, and those that belong to it, have more bytes than are read."""
+    """Raise TrajectoryError if a file, together with the files that belong to it, exceeds the size limit."""
     size = sum(item.stat().st_size for item in (path, *others))
     if size > LARGEST_FILE:
         problem = f"{size} bytes are more than the {LARGEST_FILE} that are read"
@@ -35,37 +35,37 @@ def refuse_too_large(path: Path, *others: Path) -> None:
 
 
 class Scene(Protocol):
-    """Nodes that can be looked at."""
+    """Nodes whose motion can be read."""
 
     def whole(self, name: str, own: Sequence[int], remark: str) -> Trajectory:
-        """Return a whole body of some nodes under a name."""
+        """Return the nodes `own` as a whole body with a name."""
 
     def joints(self, chosen: Sequence[int], own: Sequence[int]) -> list[Trajectory]:
-        """Return chosen ones of the nodes of a whole body, each alone, in the world."""
+        """Return the chosen nodes of a whole body as single bodies in the world."""
 
     def alone(self, node: int) -> Trajectory:
-        """Return a node that is of no whole body, in the world."""
+        """Return a node that belongs to no whole body, in the world."""
 
 
 @dataclass(frozen=True, eq=False)
 class SceneBodies:
-    """Bodies of a scene, which is made of nodes: objects, bones and what else hangs on one another."""
+    """Bodies of a scene. Its nodes are objects, bones and other members of a hierarchy."""
 
     path: Path
     names: Sequence[str]
-    """Of the nodes."""
+    """Names of the nodes."""
 
     wholes: Mapping[str, Sequence[int]]
     """The joints of whole bodies, parents first."""
 
     moving: Sequence[str]
-    """Whole bodies that move, the largest first."""
+    """Moving whole bodies, the largest first."""
 
     alone: Sequence[int]
-    """Other nodes that move."""
+    """Other moving nodes."""
 
     others: Sequence[int]
-    """Other nodes, to be had by their names."""
+    """Other nodes, selected only by name."""
 
     @classmethod
     def of(
@@ -78,21 +78,21 @@ class SceneBodies:
         skeletons: Mapping[str, Sequence[int]],
         aside: Iterable[int] = (),
     ) -> SceneBodies:
-        """Tell apart the bodies of a scene.
+        """Find the bodies of a scene.
 
         Parameters
         ----------
         path : Path
         names : sequence of str
-            Of the nodes.
+            Names of the nodes.
         parents : array of int, shape (nodes,)
-            The number of what each hangs on, -1 for nothing; in any order.
+            The index of each node's parent, -1 for none; in any order.
         moves, keyed : array of bool, shape (nodes,)
-            Whether a node moves by itself, and whether it has keys, which may all be the same.
+            Whether a node moves by itself, and whether it has keys, which may all be equal.
         skeletons : mapping of str to sequence of int
-            The joints of those bodies that have a skeleton.
+            The joints of the bodies that have a skeleton.
         aside : iterable of int
-            Nodes that count for nothing.
+            Nodes to ignore.
         """
         free = np.ones(len(names), dtype=bool)
         free[[*chain.from_iterable(skeletons.values()), *aside]] = False
@@ -111,17 +111,17 @@ class SceneBodies:
         return cls(path, names, wholes, sorted(moving, key=lambda name: -len(wholes[name])), alone, others)
 
     def read(self, selection: Selection, scene: Scene) -> list[Trajectory]:
-        """Return what is requested; where nothing is named, the largest whole body, or else the first node that moves.
+        """Return the requested bodies or, if none is named, the largest whole body, or else the first moving node.
 
         Raises
         ------
         TrajectoryError
-            Where it is not in the file, or nothing moves.
+            If the body is not in the file, or nothing moves.
         """
         if not (self.moving or self.alone):
             problem = "nothing moves in this file"
             raise NoMotion(self.path, problem, "export what moves, a skeleton or objects, together with its animation")
-        largest, alone = next(iter(self.moving), None), self._called(self.alone)
+        largest, alone = next(iter(self.moving), None), self._names_of(self.alone)
         if selection.requested is None and largest is not None:
             others = listed([*self.moving[1:], *alone], MAX_LISTED_NAMES)
             remark = f"took {largest} of {len(self.moving) + len(alone)} bodies; others: {others}" if others else ""
@@ -134,18 +134,18 @@ class SceneBodies:
             return [scene.whole(name, self.wholes[name], "")]
         if name in nodes:
             whole, node = nodes[name]
-            selection.of(alone if whole is None else self._called(self.wholes[whole]), [name])
+            selection.of(alone if whole is None else self._names_of(self.wholes[whole]), [name])
             single = scene.alone(node) if whole is None else scene.joints([node], self.wholes[whole])[0]
             return [replace(single, name=name)]
-        taken = selection.of([*self._called(joints), *alone], self._called(self.others))
+        taken = selection.of([*self._names_of(joints), *alone], self._names_of(self.others))
         singles = [scene.alone(node) for node in self.alone[: len(taken)]]
         return [*(scene.joints(joints, joints) if joints else ()), *singles]
 
-    def _called(self, nodes: Iterable[int]) -> list[str]:
+    def _names_of(self, nodes: Iterable[int]) -> list[str]:
         return [self.names[node] for node in nodes]
 
     def _by_name(self, largest: str | None) -> dict[str, tuple[str | None, int]]:
-        """Return nodes by what they may be called, WHOLE/JOINT too, each with the whole body that it is of."""
+        """Return each node's whole body (if any) and index by its possible names, which include WHOLE/JOINT."""
         wholes = sorted(self.wholes.items(), key=lambda item: item[0] != largest)
         joints = [(self.names[node], (whole, node)) for whole, own in wholes for node in own]
         others = [(self.names[node], (None, node)) for node in (*self.alone, *self.others)]
@@ -154,12 +154,12 @@ class SceneBodies:
 
 
 def jointed(parents: np.ndarray, moves: np.ndarray, belongs: np.ndarray) -> list[list[int]]:
-    """Return the nodes of each body that has no skeleton, parents first.
+    """Return the nodes of each body without a skeleton, parents first.
 
     Parameters
     ----------
     parents : array of int, shape (nodes,)
-        The number of what each hangs on, -1 for nothing; in any order.
+        The index of each node's parent, -1 for none; in any order.
     moves, belongs : array of bool, shape (nodes,)
         Whether a node moves by itself, and whether it may be a joint.
     """
@@ -179,7 +179,7 @@ def jointed(parents: np.ndarray, moves: np.ndarray, belongs: np.ndarray) -> list
 
 
 def with_above(parents: np.ndarray, chosen: Iterable[int]) -> list[int]:
-    """Return nodes and all that they hang on, parents first."""
+    """Return the chosen nodes and all their ancestors, parents first."""
     result: dict[int, None] = {}
     for node in chosen:
         line = [node]
@@ -190,7 +190,7 @@ def with_above(parents: np.ndarray, chosen: Iterable[int]) -> list[int]:
 
 
 def nearest_above(parents: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Return the nearest chosen node that each node hangs on, shape (nodes,), -1 for none."""
+    """Return the nearest chosen ancestor of each node, shape (nodes,), -1 for none."""
     result = np.full(len(parents), -1, dtype=np.int64)
     for node in parents_first(parents):
         if (parent := parents[node]) >= 0:
@@ -199,14 +199,14 @@ def nearest_above(parents: np.ndarray, chosen: np.ndarray) -> np.ndarray:
 
 
 def parents_among(parents: np.ndarray, own: Sequence[int]) -> np.ndarray:
-    """Return which of some nodes each of these hangs on, by their places, shape (own,), -1 for none."""
+    """Return the nearest ancestor of each node within `own`, as an index into `own`, shape (own,), -1 for none."""
     places = np.full(len(parents) + 1, -1, dtype=np.int64)
     places[[*own]] = np.arange(len(own))
     return places[nearest_above(parents, places[:-1] >= 0)[[*own]]]
 
 
 def parents_first(parents: np.ndarray) -> list[int]:
-    """Return the numbers of nodes, each followed by all that hangs on it."""
+    """Return the indices of nodes, each followed by all its descendants."""
     children: list[list[int]] = [[] for _ in range(len(parents) + 1)]
     for node, parent in enumerate(parents.tolist()):
         children[parent].append(node)

@@ -1,4 +1,4 @@
-"""How large a body is, and which unit and which axis up that speaks for, where its file does not say them."""
+"""Size of a body, and the unit and the up axis that it makes likely if the file does not state them."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from .rest_bodies import (
 )
 
 MIN_UPRIGHT_RATIO = 1.5
-"""Times the other extents that a body has along the axis that is up."""
+"""Smallest ratio of the extent along the up axis to the other extents of a body."""
 
 
 def sized(path: Path, trajectory: Trajectory, axes: str, *, unit_given: bool) -> Trajectory:
-    """Return a whole body in the unit that it is likely to be in by its size, where that is not given or cannot be.
+    """Return a whole body in the likely unit for its size, if its unit is not given or cannot be right.
 
     `axes` are those of the file: a name in `axes.AXES`.
     """
@@ -55,9 +55,7 @@ def sized(path: Path, trajectory: Trajectory, axes: str, *, unit_given: bool) ->
 
 
 def whole_places(body: RestBody, poses: Poses) -> np.ndarray | None:
-    """Return where the joints of a body (joints, n) are at a few moments without damage, shape (joints, m, 3); None
-    without any.
-    """
+    """Return joint positions of a body at a few undamaged moments, shape (joints, m, 3), or None if there are none."""
     every = -(-poses.shape[1] // LOOKED_AT)
     with np.errstate(invalid="ignore", over="ignore"):
         places = body.skeleton.in_root_space(poses[:, ::every]).positions
@@ -66,9 +64,9 @@ def whole_places(body: RestBody, poses: Poses) -> np.ndarray | None:
 
 
 def axis_up(body: RestBody, poses: Poses) -> str:
-    """Return which of x, y and z is up for a body with these poses (joints, n), by the first; empty if that is unclear.
+    """Return which of x, y and z points up for a body in the first of these poses (joints, n); empty if unclear.
 
-    The head is above the hips, and these above the feet. A body whose joints have other names stands on its end.
+    The head is above the hips, and the hips above the feet. For unknown joint names, the longest extent is vertical.
     """
     places, bones = body.skeleton.in_root_space(poses[:, :1]).positions[:, 0], humanoid_bones(body.joints)
     feet = [bones[name] for name in ("LeftFoot", "RightFoot") if name in bones]
@@ -83,12 +81,12 @@ def axis_up(body: RestBody, poses: Poses) -> str:
 
 
 def leading(body: RestBody, poses: Poses) -> Poses:
-    """Return the motion (n,) of what carries a body about: its first root, or what hangs on that where it stands still.
+    """Return the motion (n,) of the joint that leads a body: its first root, or a descendant if the root stands still.
 
-    Of several that hang on it that with the most joints, of those below which anything moves. `poses` are those of the
-    joints (joints, n) in their parents' space.
+    Among children, the one with the most joints is followed, but moving branches take precedence. `poses` are those of
+    the joints (joints, n) in their parents' space.
     """
-    joint, sizes, stands = 0, body.skeleton.sizes, np.array([_stands(own) for own in poses])
+    joint, sizes, stands = 0, body.skeleton.sizes, np.array([_stands_still(own) for own in poses])
     moves = ~stands
     for child in range(len(moves) - 1, 0, -1):
         if body.parents[child] >= 0:
@@ -98,6 +96,6 @@ def leading(body: RestBody, poses: Poses) -> Poses:
     return body.skeleton.in_root_space(poses)[0 if stands[joint] else joint]
 
 
-def _stands(poses: Poses) -> bool:
+def _stands_still(poses: Poses) -> bool:
     parts = poses.positions, poses.quaternions
     return all(np.ptp(part, axis=0).max() <= MAX_SAME_NUMBER_RATIO * np.abs(part).max(initial=1.0) for part in parts)
