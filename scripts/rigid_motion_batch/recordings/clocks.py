@@ -59,10 +59,10 @@ def clock_of(
     count: int,
     body: np.ndarray | slice,
 ) -> Clock:
-    """Return the clock for the rows of a body, of so many in the file, by the columns that may be it.
+    """Return the clock for the rows of a body, chosen from the columns that may be the time; `count` is all rows of the
+    file.
 
-    Without any column the rows are counted. Raises TrajectoryError where several clocks are as good and disagree, or
-    none can be read.
+    Without such columns, rows are counted. Raises TrajectoryError if equally good clocks disagree, or none can be read.
     """
     if not columns:
         return Clock("", np.arange(count) / (options.frame_rate or 1.0))

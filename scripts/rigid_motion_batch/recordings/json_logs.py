@@ -85,7 +85,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
             layout_of(header, said)
             found[way] = poses
         except TrajectoryError as error:
-            # Lists with few known columns hold other things than poses, such as events.
+            # Lists with few known columns, such as lists of events, are not poses: their errors do not count.
             problems += [error] * (known_in(header) > len(header.cells) / 2)
     if not found:
         raise problems[0] if problems else TrajectoryError(path, "this JSON holds no poses", EXPECTED)

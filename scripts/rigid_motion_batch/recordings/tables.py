@@ -1,11 +1,11 @@
 """Text files of numbers: lines, named columns and rows.
 
-A file is gone through piece by piece, so that it is the numbers that take memory and not the text, and nothing that
-a file says of itself is trusted before it has been read.
+Files are read piece by piece, so that numbers and not text take memory. Nothing that a file states about itself is
+trusted before it has been read.
 
-A cell may hold a whole vector or quaternion, as Unity prints them: `(0.1, 0.2, 0.3)`, `"0.1, 0.2, 0.3"`. A row of such
-cells becomes one of numbers, and its header one with a name for each: `Position` becomes `Position.x`, `Position.y` and
-`Position.z`. Four numbers are x, y, z, w. A comma with a blank behind it is no decimal one.
+A cell may hold a whole vector or quaternion, as Unity prints them: `(0.1, 0.2, 0.3)`, `"0.1, 0.2, 0.3"`. Such a cell is
+split into numbers, and its header into a name for each: `Position` becomes `Position.x`, `Position.y` and `Position.z`.
+Four numbers are x, y, z, w. A comma followed by a blank is not a decimal comma.
 """
 
 from __future__ import annotations
@@ -30,62 +30,62 @@ from .recordings import TrajectoryError, shown
 SEPARATORS = (",", ";", "\t")
 
 BLANK_CHARACTERS = " \t,;\r\v\f"
-"""What a row without a number consists of."""
+"""Characters of a row without numbers."""
 
 UNITS_BELOW = {"", "-", "1", *UNIT_OF}
-"""What the cells of a row of units are, where it stands below the names."""
+"""Cells of a row of units below the names."""
 
 LARGEST_FILE = 1 << 30
-"""Bytes. Files beyond are refused: an hour of a hundred bodies at 90 Hz has half as many."""
+"""Bytes. Larger files are refused: an hour of a hundred bodies at 90 Hz has half as many."""
 
 MOST_ROWS = 20_000_000
-"""Files with more are refused: they would be two days at 100 Hz."""
+"""Rows; files with more are refused: two days at 100 Hz."""
 
 LONGEST_LINE = 1 << 22
-"""Characters. What has longer lines is no table."""
+"""Characters. A file with longer lines is not a table."""
 
 MOST_COLUMNS = 100_000
-"""Ten thousand bodies have fewer."""
+"""Columns; ten thousand bodies have fewer."""
 
 PIECE_BYTES = 1 << 18
-"""Bytes that are read at once."""
+"""Bytes read at once."""
 
 BLOCK_ROWS = 1 << 14
-"""Rows that are parsed at once."""
+"""Rows parsed at once."""
 
 DAMAGED_ADVICE = "delete this line if it is damaged, as the last one of a recording that was cut off"
-"""The way out of a line that is not like the others."""
+"""Advice for a line that differs from the others."""
 
 MOST_COMMENTS = 100
-"""Lines. Behind so many no header is looked for."""
+"""Lines of comments before the header."""
 
 MOST_METADATA = 50
-"""Lines. Among so many a header is looked for that has others before it."""
+"""Lines within which a header may follow other lines."""
 
 
 def encoding_of(head: bytes) -> str:
-    """Return UTF-8 or, where the byte order mark says so, UTF-16."""
+    """Return UTF-8 or, if there is its byte order mark, UTF-16."""
     return "utf-16" if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
 
 
 def read_text(path: Path, largest: int = LARGEST_FILE) -> str:
-    r"""Read the text of the file, its line ends made `\n`.
+    r"""Read the text of a file, with line ends converted to `\n`.
 
     Raises
     ------
     TrajectoryError
-        Where the file is no text, or has more bytes than the largest that is allowed.
+        If the file is not text, or has more than `largest` bytes.
     """
     return "".join(_pieces(path, largest))
 
 
 def lines_of(path: Path, after: int = 0) -> Iterator[tuple[int, str]]:
-    """Yield the lines of the file, without their ends, and their numbers: all, or those after one.
+    """Yield the numbers and lines of a file, without line ends: all lines, or those after one.
 
     Raises
     ------
     TrajectoryError
-        As `read_text`, and where a line is longer than any of a table.
+        As in `read_text`, and if a line is too long for a table.
     """
     number, begun = 0, ""
     for piece in _pieces(path, LARGEST_FILE):
@@ -102,7 +102,7 @@ def lines_of(path: Path, after: int = 0) -> Iterator[tuple[int, str]]:
 
 
 def _pieces(path: Path, largest: int) -> Iterator[str]:
-    r"""Yield the text of the file piece by piece, its line ends made `\n`."""
+    r"""Yield the text of a file piece by piece, with line ends converted to `\n`."""
     lines = 0
     with path.open("rb") as file:
         size = path.stat().st_size
@@ -129,7 +129,7 @@ def _pieces(path: Path, largest: int) -> Iterator[str]:
 
 
 def cells_of(path: Path, number: int, line: str, separator: str | None) -> list[str]:
-    """Return the cells of a header's line, without quotes and surrounding blanks."""
+    """Return the cells of a header line, without quotes and surrounding blanks."""
     if line.count(separator or " ") >= MOST_COLUMNS:
         raise TrajectoryError(path, f"more than {MOST_COLUMNS} columns", "export fewer bodies", number)
     if separator is None:
@@ -152,47 +152,47 @@ class HeaderLine:
     cells: list[str]
 
     vectors: bool = False
-    """True if cells of the rows hold vectors, and the names of the header are those of their numbers."""
+    """True if cells of the rows hold vectors; `cells` then has a name for each of their numbers."""
 
     names: Sequence[ColumnName | None] | None = None
-    """What the columns mean, where the format says so and not the cells."""
+    """Meanings of the columns, if the format defines them instead of the cells."""
 
     rows_of: Callable[[Iterator[tuple[int, str]]], Iterable[tuple[int, str]]] | None = None
-    """A function that makes rows of the lines below, where not every line is one."""
+    """A function that makes rows from the lines below, if not every line is a row."""
 
     inverted: bool = False
-    """True if the poses are those of the world, as a camera sees it."""
+    """True if the poses are those of the world relative to a camera."""
 
     axes: str = ""
-    """The axes of the program that wrote it, where they are known: a name in `axes.DESCRIBED`."""
+    """The axes of the program that wrote the file, if known: a name in `axes.DESCRIBED`."""
 
     advice: str = ""
-    """The way out where columns are missing, if it is not to name them."""
+    """The way out for missing columns, if naming them is not."""
 
     remark: str = ""
-    """What there is to say of how the file is read."""
+    """A remark on how the file is read."""
 
     warnings: tuple[ClipWarning, ...] = ()
 
     shift: int = 0
-    """Cells of a row that the line has not, at its beginning."""
+    """Number of cells at the start of a row that the line in the file lacks."""
 
     write: Callable[[Path, np.ndarray], None] | None = None
-    """A function that writes the file with other numbers, where lines are no rows."""
+    """A function that writes the file with other numbers, if lines are not rows."""
 
     @classmethod
     def of(cls, path: Path, number: int, text: str) -> HeaderLine:
-        """Return the cells of a line, which may be a comment."""
+        """Return the header made of a line, which may be a comment."""
         text = text.lstrip("# \t")
         separator = max(SEPARATORS, key=text.count) if any(mark in text for mark in SEPARATORS) else None
         return cls(path, number, separator, cells_of(path, number, text, separator))
 
     def error(self, problem: str, way_out: str) -> TrajectoryError:
-        """Return an error of this line."""
+        """Return an error for this line."""
         return TrajectoryError(self.path, problem, way_out, self.number)
 
     def rows(self) -> Iterator[tuple[int, str]]:
-        """Yield the lines of the rows below with their numbers, without blank ones and comments."""
+        """Yield the numbers and lines of the rows below, without blank lines and comments."""
         lines = lines_of(self.path, after=self.number)
         for number, line in self.rows_of(lines) if self.rows_of else lines:
             line = line.strip(" ")
@@ -200,16 +200,16 @@ class HeaderLine:
                 yield number, flattened(line, self.separator) if self.vectors else line
 
     def cells_below(self, column: int) -> Iterator[tuple[int, str]]:
-        """Yield the cells of a column, without quotes, with their lines; empty where a row is too short."""
+        """Yield the line number and cell of a column in each row, without quotes; empty if the row is too short."""
         for number, line in self.rows():
             cells = split_row(line, self.separator)
             yield number, cells[column].strip() if column < len(cells) else ""
 
     def numbers_below(self, columns: Mapping[str, int]) -> np.ndarray:
-        """Return the numbers of some columns, by names for the errors, shape (rows, columns). Empty cells are NaN.
+        """Return the numbers of columns, shape (rows, columns). Empty cells are NaN. Errors use the names in `columns`.
 
-        Where cells are not separated by commas, a comma is taken as the decimal sign. Empty cells beyond those of the
-        header are no matter; too few matter where a requested one is missing. Raises TrajectoryError with the line.
+        If the separator is not a comma, commas are decimal. Empty cells beyond the header are ignored. Missing cells
+        are an error only if a requested one is missing. Raises TrajectoryError with the line.
         """
         path, separator, width = self.path, self.separator, len(self.cells)
         indices = [*columns.values()]
@@ -245,7 +245,7 @@ class HeaderLine:
         return np.concatenate(blocks)
 
     def of_rows(self) -> HeaderLine:
-        """Return the header as the first row below it has it, or with the units of a row that holds nothing else."""
+        """Return the header with names adapted to vectors in the first row below, or to a row of units."""
         below = ((number, line.strip()) for number, line in islice(lines_of(self.path, self.number), MOST_COMMENTS))
         number, row = next(((number, line) for number, line in below if line and line[0] != "#"), (0, ""))
         units = [cell.strip().strip("[]()") for cell in split_row(row, self.separator)]
@@ -257,10 +257,10 @@ class HeaderLine:
 
 
 def header_lines(path: Path) -> Iterator[HeaderLine]:
-    """Yield lines that may name the columns: comments, as `numpy.savetxt` and EuRoC have it, and the first line behind.
+    """Yield lines that may name the columns: comments, as by `numpy.savetxt` and EuRoC, and the first line after them.
 
-    The last one is that line, without cells where there are only comments. Blank lines are skipped, and so is what
-    tells spreadsheets the separator (`sep=;`). Raises TrajectoryError where the file is empty.
+    The last one is that line, or has no cells if there are only comments. Blank lines are skipped, as is the line that
+    tells spreadsheets the separator (`sep=;`). Raises TrajectoryError if the file is empty.
     """
     number = comments = 0
     for number, line in lines_of(path):
@@ -276,7 +276,7 @@ def header_lines(path: Path) -> Iterator[HeaderLine]:
 
 
 def lines_of_words(path: Path, after: int) -> Iterator[HeaderLine]:
-    """Yield lines behind one, near the beginning, that hold no numbers. Blank lines are skipped."""
+    """Yield lines after the line `after`, near the beginning, that hold no numbers. Blank lines are skipped."""
     for number, line in islice(lines_of(path, after=after), max(MOST_METADATA - after, 0)):
         header = HeaderLine.of(path, number, line.strip())
         if header.cells and not any(map(is_number, header.cells)):
@@ -292,7 +292,7 @@ def split_row(line: str, separator: str | None) -> list[str]:
 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:
-    """Return the number in a cell, which may be empty or have a decimal comma in quotes."""
+    """Return the number in a cell, which may be empty (NaN) or have a decimal comma in quotes."""
     try:
         if not cell.strip(" "):
             return np.nan
@@ -306,13 +306,13 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
 
 CELL = re.compile(r'"?[(\[{]([^()\[\]{}"]*)[)\]}]"?|"([^"]*)"')
 NAMED = re.compile(r"^[xyzw]\s*[=:]\s*", re.IGNORECASE)
-"""Pattern of what is in front of a number, as Unreal writes it: X=0.1 Y=0.2 Z=0.3."""
+"""Pattern of the name before a number, as in Unreal: X=0.1 Y=0.2 Z=0.3."""
 
 AXES = "xyzw"
 
 
 def flattened(line: str, separator: str | None) -> str:
-    """Return a row in which every number has a cell of its own, and no other cell a separator inside."""
+    """Return a row with each number of a vector in its own cell, and without separators inside other cells."""
     between = separator or " "
 
     def flat(match: re.Match[str]) -> str:
@@ -322,7 +322,7 @@ def flattened(line: str, separator: str | None) -> str:
 
 
 def expanded(names: Sequence[str], line: str, separator: str | None) -> list[str] | None:
-    """Return the names of a row's columns once it is flattened; None where none of its cells holds several numbers."""
+    """Return the column names for a flattened row; None if none of its cells holds several numbers."""
     sizes: list[int] = []
 
     def mark(match: re.Match[str]) -> str:
@@ -341,7 +341,7 @@ def expanded(names: Sequence[str], line: str, separator: str | None) -> list[str
 
 
 def _numbers(match: re.Match[str]) -> list[str]:
-    """Return the number in a cell, or the three or four of them; none where it holds anything else."""
+    """Return the one, three or four numbers in a cell, as texts; empty if it holds anything else."""
     text = (match[1] if match[1] is not None else match[2]).strip()
     if ";" in text:
         parts = text.split(";")

@@ -1,9 +1,9 @@
-"""Times as seconds: in the unit that a file or a user says, or that makes a rate of devices where seconds cannot be.
+"""Times converted to seconds, in the unit that the file or user states, or else the unit that gives a plausible rate.
 
 Dates and clock times are exact to the nanosecond, as seconds since the earliest of them. Dates are those of ISO 8601 in
 its extended format, with `T` or a blank before the clock time, and with or without an offset from UTC:
-`2026-11-22T10:00:00.123456Z`, `2026-11-22 10:00:00+01:00`. A clock time is `10:00:00.123`. A column is of one kind
-throughout, which is that of its first time.
+`2026-11-22T10:00:00.123456Z`, `2026-11-22 10:00:00+01:00`. A clock time is `10:00:00.123`. All times of a column must
+be of the same kind as the first.
 """
 
 from __future__ import annotations
@@ -23,36 +23,36 @@ from .recordings import TrajectoryError, shown
 from .tables import DAMAGED_ADVICE, HeaderLine, is_number
 
 MIN_SAMPLES_PER_S = 5.0
-"""Samples a second. Of poses there are hardly ever fewer: the slowest recordings of people that are known have 15."""
+"""Samples a second. Pose recordings hardly ever have fewer: the slowest known ones of people have 15."""
 
 MAX_SAMPLES_PER_S = 5000.0
-"""Samples a second. Trackers with markers reach 1000 to 2000; no device for poses has more."""
+"""Samples a second. Marker trackers reach 1000 to 2000; no pose device has more than this."""
 
 TOO_SLOW = 0.5
-"""Samples a second. A hand is elsewhere after two seconds: no one records it so, and times in other units look so."""
+"""Samples a second. A hand is elsewhere after two seconds: fewer samples mean that times are not in seconds."""
 
 MIN_UNIT_STEPS = 2
-"""Steps of time that tell a unit. A file of two samples says nothing of it."""
+"""Steps of time needed to guess a unit. A file of two samples does not allow it."""
 
 SINCE_1970 = 1e9, 4e9
-"""Seconds from 1970 to 2001 and to 2096, between which clocks are that count from there."""
+"""Seconds from 1970 to 2001 and to 2096: clocks between these count from 1970."""
 
 MAX_EXACT_INTEGER = 2.0**53
-"""Number beyond which a float64 leaves out whole numbers, such as nanoseconds since 1970."""
+"""Limit above which a float64 skips whole numbers, such as nanoseconds since 1970."""
 
 LARGEST_WHOLE = 2.0**62
-"""Number beyond which the difference of two whole numbers might be none that fits 64 bits."""
+"""Limit above which the difference of two whole numbers might not fit 64 bits."""
 
 MIN_WILD_TIME_RATIO = 10.0
-"""Times further from the median than half of all others that a wild time is; of even times all are within two."""
+"""An outlier is farther from the median than this multiple of the median distance. Even times are within two."""
 
 LONG_NAMES = {"ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 
 
 def typical_interval(times: np.ndarray) -> float:
-    """Return the median of the steps forward in times of shape (n,), whatever else is among them; NaN where none is.
+    """Return the median of the forward steps in times of shape (n,), ignoring all other steps; NaN if there are none.
 
-    One wild time stamp, a clock that is set back and times that come twice make no difference to it.
+    A single wrong timestamp, a clock that is set back, and repeated times do not affect it.
     """
     forward = _steps_forward(times)
     return float(np.median(forward)) if len(forward) else np.nan
@@ -64,20 +64,20 @@ def _steps_forward(times: np.ndarray) -> np.ndarray:
 
 
 def whole_ticks(header: HeaderLine, column: int) -> np.ndarray:
-    """Return the numbers in a column of times, whole ones where a float64 cannot hold them, shape (rows,)."""
+    """Return the numbers in a column of times, shape (rows,), as integers if they are too large for a float64."""
     ticks = header.numbers_below({"t": column})[:, 0]
     if MAX_EXACT_INTEGER < np.nanmax(np.abs(ticks), initial=0.0) < LARGEST_WHOLE:
-        # With fractions, or without a number in some row, they are not whole, and as near as floats are.
+        # Fractions and missing numbers are no integers: then the floats are returned.
         with suppress(ValueError, OverflowError):
             return np.fromiter((int(cell) for _, cell in header.cells_below(column)), np.int64)
     return ticks
 
 
 def seconds_of(ticks: np.ndarray, a_second: float) -> np.ndarray:
-    """Return times (n,), of which there are so many in a second, as seconds.
+    """Return times (n,), given with `a_second` ticks per second, as seconds.
 
-    They are as in the file where they are seconds, and otherwise those since the earliest time, wild ones not counted:
-    of a clock that counts from 1970 nothing is lost.
+    Times in seconds are unchanged. Others count from the earliest time that is not an outlier, so that clocks that
+    count from 1970 lose no precision.
     """
     if a_second == 1.0 or not np.isfinite(ticks).any():
         return ticks.astype(float)
@@ -86,7 +86,7 @@ def seconds_of(ticks: np.ndarray, a_second: float) -> np.ndarray:
 
 
 def earliest(ticks: np.ndarray) -> float:
-    """Return the earliest time, without wild ones."""
+    """Return the earliest time that is not an outlier."""
     usable = ticks[np.abs(ticks) < MAX_MEASURE]
     if not len(usable):
         return 0.0
@@ -95,15 +95,15 @@ def earliest(ticks: np.ndarray) -> float:
 
 
 def unit_by_rate(header: HeaderLine, ticks: np.ndarray) -> tuple[str, str]:
-    """Return the unit of times (n,) of one body that nothing says, and what to say of it; empty where they are seconds.
+    """Return the guessed unit of times (n,) of one body, and a remark on the guess; both are empty for seconds.
 
-    Some clocks count from 1970. Otherwise hardly ever more than one of milliseconds, microseconds and nanoseconds makes
-    a rate that devices have.
+    Some clocks count from 1970. Otherwise, usually only one of milliseconds, microseconds and nanoseconds gives a rate
+    that devices have.
 
     Raises
     ------
     TrajectoryError
-        Where the times are in none of these, or numbers of rows.
+        If no unit fits, or the times are row numbers.
     """
     interval = typical_interval(ticks)
     if len(_steps_forward(ticks)) < MIN_UNIT_STEPS:
@@ -132,39 +132,39 @@ MOMENT = re.compile(
     r"(?:(\d{4}-\d\d-\d\d)[T ])?(\d\d?):(\d\d)(?::(\d\d)(?:[.,](\d{1,9}))?)?(?: ?(Z|[+-]\d\d(?::?\d\d)?))?",
     re.ASCII | re.IGNORECASE,
 )
-"""Day, hour, minute, second, fraction and offset. Java leaves out seconds that are 0, and Python a digit of hours."""
+"""Day, hour, minute, second, fraction and offset. Java omits seconds that are 0, and Python omits a digit of hours."""
 
 LIKE_A_DATE = re.compile(r"\d[:/]\d|\d[-.]\d\d?[-.]\d|\d{8}T\d", re.ASCII)
-"""Pattern of dates as other standards and countries have them."""
+"""Pattern of dates in other formats."""
 
 CLOCK_TIME = "a clock time"
 
 MIDNIGHT = datetime(1970, 1, 1, tzinfo=UTC)
 
 LEAP_SECOND = 60
-"""The last second of some minutes."""
+"""Number of the leap second at the end of some minutes."""
 
 DAY_S = 86_400
-"""Seconds."""
+"""Seconds of a day."""
 
 MAX_MEDIAN_DISTANCE_S = 2**61 // 10**9
-"""Seconds from the median, 73 years. What is further is wild, and counts as so far: the difference of any two times is
-then a whole number of nanoseconds that fits 64 bits."""
+"""Seconds from the median, 73 years. Times farther away are outliers, moved to this distance: so the difference of any
+two times is a number of nanoseconds that fits 64 bits."""
 
 MISSING_TIME_NS = -1
-"""Value instead of nanoseconds, where a row has no time."""
+"""Value of nanoseconds for a row without a time."""
 
 LONGEST_SHOWN = 40
-"""Characters of a time in an error: as long as any is."""
+"""Characters of a time in an error, as long as the longest time."""
 
 
 def kind_of_times(header: HeaderLine, column: int) -> str | None:
-    """Return what the times in a column are, by the first that there is; None for numbers.
+    """Return the kind of times in a column, judged by the first one; None for numbers.
 
     Raises
     ------
     TrajectoryError
-        Where it is a date in a way of writing that is not known.
+        If it is a date in an unknown format.
     """
     number, cell = next(
         ((number, cell) for number, cell in header.cells_below(column) if not _is_missing(cell)), (0, "")
@@ -187,18 +187,18 @@ def seconds_of_dates(header: HeaderLine, column: int, kind: str) -> np.ndarray:
         Above rows that are long enough.
     column : int
     kind : str
-        Of all its times.
+        The kind of all its times.
 
     Returns
     -------
     array, shape (rows,)
-        Seconds since the earliest, wild ones not counted; empty cells are NaN. A clock that falls by more than half a
-        day has passed midnight.
+        Seconds since the earliest time that is not an outlier; empty cells are NaN. A clock that falls by more than
+        half a day has passed midnight.
 
     Raises
     ------
     TrajectoryError
-        With the number of the line, for what is no such time.
+        With the line number, for cells that hold no time of this kind.
     """
     moments = np.fromiter(_moments(header, column, kind), np.dtype((np.int64, 2)))
     known = moments[:, 1] != MISSING_TIME_NS
@@ -214,7 +214,7 @@ def seconds_of_dates(header: HeaderLine, column: int, kind: str) -> np.ndarray:
 
 
 def _moments(header: HeaderLine, column: int, kind: str) -> Iterator[tuple[int, int]]:
-    """Yield the seconds of every row since some midnight in UTC, and the nanoseconds besides."""
+    """Yield for each row the whole seconds since a fixed midnight in UTC, and the remaining nanoseconds."""
     for number, cell in header.cells_below(column):
         match = MOMENT.fullmatch(cell)
         if match is None and _is_missing(cell):
@@ -224,7 +224,7 @@ def _moments(header: HeaderLine, column: int, kind: str) -> Iterator[tuple[int, 
             if match is None:
                 raise ValueError(cell)
             day, hour, minute, second, fraction, offset = match.groups()
-            seconds = _minute(day, hour, minute, offset) + int(second or 0)
+            seconds = _seconds_to_minute(day, hour, minute, offset) + int(second or 0)
             if int(second or 0) > LEAP_SECOND:
                 raise ValueError(second)
         except ValueError:
@@ -237,24 +237,24 @@ def _moments(header: HeaderLine, column: int, kind: str) -> Iterator[tuple[int, 
 
 
 @lru_cache(maxsize=1024)
-def _minute(day: str | None, hour: str, minute: str, offset: str | None) -> int:
-    """Return seconds from some midnight in UTC to the beginning of a minute. Raises ValueError for no such minute."""
+def _seconds_to_minute(day: str | None, hour: str, minute: str, offset: str | None) -> int:
+    """Return seconds from a fixed midnight in UTC to the start of a minute. Raises ValueError for an invalid minute."""
     moment = datetime.fromisoformat(f"{day or '2000-01-01'}T{hour:0>2}:{minute}{(offset or 'Z').upper()}")
     return (moment - MIDNIGHT) // timedelta(seconds=1)
 
 
 def _through_midnights(seconds: np.ndarray) -> np.ndarray:
-    """Return clock times (n,) as seconds since the first midnight, also those that come back from the next day."""
+    """Return clock times (n,) as seconds since the first midnight, across later midnights in both directions."""
     seconds = seconds % DAY_S  # An offset from UTC may lead out of the day.
     steps = np.diff(seconds)
     days = np.cumsum((steps < -DAY_S // 2).astype(np.int64) - (steps > DAY_S // 2))
-    # Before the first day there is none: what goes up there is a gap.
+    # There is no day before the first: a large step up there is a gap.
     days -= np.minimum(np.minimum.accumulate(days), 0)
     return seconds + DAY_S * np.concatenate(([0], days))[: len(seconds)]
 
 
 def _kind(match: re.Match[str]) -> str:
-    """Return what a time is, as errors call it."""
+    """Return the kind of a time, as used in errors."""
     return f"{'a date' if match[1] else CLOCK_TIME} {'with' if match[6] else 'without'} an offset from UTC"
 
 

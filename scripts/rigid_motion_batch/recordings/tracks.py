@@ -1,7 +1,8 @@
-"""From the columns of a table to the trajectories of its bodies: the way that all tables go, whatever wrote them.
+"""Trajectories of bodies from the columns of a table, the common last step for tables of all formats.
 
-Units in names are honoured: times become seconds, and the unit of the positions is `Trajectory.metres_per_unit`. Euler
-angles need their order from the user. A matrix may be transposed, and a position and its rotation in different rows.
+Units in names are honoured: times become seconds, and the unit of the positions is `Trajectory.metres_per_unit`. The
+user has to give the order of Euler angles. A matrix may be transposed. A position and its rotation may be in different
+rows.
 """
 
 from __future__ import annotations
@@ -30,27 +31,27 @@ from .tables import HeaderLine
 WXYZ = ("qw", *QUATERNION[:3])
 
 MOST_LABELS = 0.5
-"""The share of the rows up to which different texts in a column can be names of devices. Running numbers are not."""
+"""Share of the rows up to which different texts in a column can be names of devices. Row numbers exceed it."""
 
 MOST_DEVICES = 1000
-"""Different texts in a column beyond are no names of devices."""
+"""Largest number of different texts that can be names of devices."""
 
 LARGEST_RADIANS = 4.0 * np.pi
-"""Two turns. Angles beyond, of which nothing says that they are radians, are degrees."""
+"""Two turns. Larger angles are degrees, unless they are stated to be radians."""
 
 SMALLEST_DEGREES = np.pi
-"""Angles that are all below this, and said to be degrees, may be radians."""
+"""Angles that are all below this, and stated to be degrees, may be radians."""
 
 MAX_SKEW_SINE = 0.02
-"""How far from right angles, as a sine, axes may be that are those of a rotation, in files of few digits."""
+"""Sine of the deviation from right angles allowed for the axes of a rotation, in files of few digits."""
 
 MAX_RIGID_SCALE_RATIO = 1e-3
-"""Part by which a matrix may scale and does not."""
+"""Ratio by which a matrix may scale and still count as unscaled."""
 
 
 @dataclass(frozen=True, eq=False)
 class _TrackedBody:
-    """One body of the file: its columns, and its rows."""
+    """One body of a file: its columns and rows."""
 
     header: HeaderLine
     layout: RowLayout
@@ -63,16 +64,16 @@ class _TrackedBody:
     rows: np.ndarray | slice
 
     def label(self, meaning: str) -> str:
-        """Return what errors call a column."""
+        """Return the name of a column for errors."""
         return f"{self.prefix} {meaning}".strip()
 
     @property
     def metres(self) -> list[float]:
-        """The metres of a unit along x, y and z."""
+        """Metres per unit along x, y and z."""
         return metres_of(self.header, self.layout, self.columns, self.options)
 
     def trajectory(self, times: np.ndarray, held: Mapping[str, np.ndarray]) -> Trajectory:
-        """Return what its columns hold, by their meanings."""
+        """Return the trajectory from `held`, which has the values of its columns by meaning."""
         header, options, metres = self.header, self.options, self.metres
         positions = np.column_stack([held[axis] for axis in POSITION])
         warnings: tuple[ClipWarning, ...] = header.warnings
@@ -80,20 +81,20 @@ class _TrackedBody:
         if "qw" in held:
             quaternions = np.column_stack([held[item] for item in WXYZ])
         elif "m00" in held:
-            positions, quaternions, scales = _of_matrices(header, positions, held)
+            positions, quaternions, scales = _matrix_poses(header, positions, held)
         else:
             angles, more = self._radians(np.column_stack([held[item] for item in self._angles]))
             quaternions, warnings = quaternions_from_intrinsic_eulers(angles, options.intrinsic_order), warnings + more
         if len(set(metres)) > 1:
             positions, metres = positions * metres, [1.0]
-        times, poses, remark = _together(times, Poses(positions, quaternions, scales))
+        times, poses, remark = _paired(times, Poses(positions, quaternions, scales))
         if header.inverted:
             with np.errstate(invalid="ignore", over="ignore"):
                 poses = inverse(poses)
         return Trajectory(self.name, times, poses, metres[0], remark, warnings, axes=header.axes)
 
     def numbers(self, held: Mapping[str, np.ndarray], poses: Poses) -> dict[int, np.ndarray]:
-        """Return what holds poses, by columns, where these were held: what `trajectory` does, the other way round."""
+        """Return the values of each column for other poses, the inverse of `trajectory`; `held` are the old values."""
         poses = inverse(poses) if self.header.inverted else poses
         places = poses.positions / (self.metres if len(set(self.metres)) > 1 else 1.0)
         made = dict(zip(POSITION, places.T, strict=True))
@@ -116,7 +117,7 @@ class _TrackedBody:
 
     @property
     def _angles(self) -> list[str]:
-        """The meanings of the angles, in the order of the turns."""
+        """Meanings of the angles, in the order of the turns."""
         return [f"r{axis.lower()}" for axis in self.options.intrinsic_order]
 
     @property
@@ -128,7 +129,7 @@ class _TrackedBody:
         return self.options.degrees or "deg" in self._units
 
     def _radians(self, angles: np.ndarray) -> tuple[np.ndarray, tuple[ClipWarning, ...]]:
-        """Return angles of shape (n, 3) as radians, and what is hard to believe of them."""
+        """Return angles of shape (n, 3) in radians, and warnings of implausible ones."""
         largest = float(np.nanmax(np.abs(angles), initial=0.0, where=np.isfinite(angles)))
         warnings: tuple[ClipWarning, ...] = ()
         if self.options.degrees and len(angles) and 0.0 < largest <= SMALLEST_DEGREES:
@@ -143,7 +144,7 @@ class _TrackedBody:
 
 
 def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine, way_out: str) -> list[Trajectory]:
-    """Read the requested bodies of the rows below a header; `way_out` is what to do with devices that are mixed."""
+    """Read the requested bodies of the rows below a header; `way_out` is the advice for rows of mixed devices."""
     layout = layout_of(header, options)
     write = header.write or (lambda target, numbers: write_text(header, target, numbers))
     bodies = _bodies(header, layout, options)
@@ -161,7 +162,7 @@ def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine
         held = {one: numbers[body.label(one)][body.rows] for one in body.columns if one != "t"}
         seconds, rows = clock.seconds[body.rows], np.arange(count)[body.rows]
         if header.names is None and len(layout.bodies) > 1:
-            # Topics of a log share its rows, and need not be in every one.
+            # Topics of a log share its rows, and may be missing in some.
             there = ~np.isnan([*held.values()]).all(axis=0)
             seconds, held = seconds[there], {one: column[there] for one, column in held.items()}
             rows = rows[there]
@@ -179,7 +180,7 @@ def read_below(selection: Selection, options: ReadingOptions, header: HeaderLine
 
 
 def _bodies(header: HeaderLine, layout: RowLayout, options: ReadingOptions) -> list[_TrackedBody]:
-    """Return all bodies in the order of columns and rows."""
+    """Return all bodies, in the order of columns and rows."""
     groups = _devices(header, layout.devices, "device" in dict(options.columns))
     bodies = [
         (f"{device} {prefix}".strip() or header.path.stem, prefix, columns, rows)
@@ -194,7 +195,7 @@ def _bodies(header: HeaderLine, layout: RowLayout, options: ReadingOptions) -> l
 
 
 def _devices(header: HeaderLine, columns: Sequence[int], named: bool) -> dict[str, np.ndarray | slice]:
-    """Return the rows of each device, by the first column that tells several apart, or else that tells one."""
+    """Return the rows of each device, by the first column that distinguishes several, or else has one name."""
     only = ""
     for column in columns:
         codes, of_rows = _codes(header.cells_below(column))
@@ -212,14 +213,14 @@ def _devices(header: HeaderLine, columns: Sequence[int], named: bool) -> dict[st
 
 
 def _codes(cells: Iterator[tuple[int, str]]) -> tuple[dict[str, int], np.ndarray]:
-    """Return a number for each text, of up to so many as there may be devices and one more, and those of the rows."""
+    """Return a number for each text, up to one more than the limit of devices, and the numbers of the rows."""
     codes: dict[str, int] = {}
     rows = takewhile(lambda _: len(codes) <= MOST_DEVICES, cells)
     return codes, np.fromiter((codes.setdefault(text, len(codes)) for _, text in rows), np.int64)
 
 
 def _times_written(clock: Clock, column: int, rows: np.ndarray) -> Callable[[np.ndarray], dict[int, np.ndarray]] | None:
-    """Return a function of times (n,) that returns what stands for them in their column; None where no number does."""
+    """Return a function that converts times (n,) to numbers of their column; None if the column has no numbers."""
     if not clock.per_second:
         return None
     ticks, seconds = clock.ticks[rows], clock.seconds[rows]
@@ -232,15 +233,15 @@ def _times_written(clock: Clock, column: int, rows: np.ndarray) -> Callable[[np.
 
 
 def _is_transposed(held: Mapping[str, np.ndarray]) -> bool:
-    """Return whether the translation of matrices is in their last row."""
+    """Return whether the translation of matrices is in the last row."""
     below, beside = ([held[item] for item in where if item in held] for where in (BOTTOM, POSITION))
     return bool(np.any(np.nan_to_num(below)) and not np.any(np.nan_to_num(beside)))
 
 
-def _of_matrices(
+def _matrix_poses(
     header: HeaderLine, positions: np.ndarray, held: Mapping[str, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Return positions (n, 3), quaternions and scales of matrices, whichever way round; NaN where one is no pose."""
+    """Return positions (n, 3), quaternions and scales of matrices, transposed or not; NaN where one is not a pose."""
     rotations = np.stack([held[item] for item in MATRIX], axis=-1).reshape(-1, 3, 3)
     if _is_transposed(held):
         rotations = rotations.transpose(0, 2, 1)
@@ -260,10 +261,10 @@ def _of_matrices(
     return positions, quaternions, np.where(good, scales, np.nan) if scaled else None
 
 
-def _together(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, str]:
-    """Return times (n,) and poses with a rotation beside each position, also where they stand in different rows.
+def _paired(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, str]:
+    """Return times (n,) and poses with a rotation for each position, even if they are in different rows.
 
-    Of the one of which there is more every row is left, and the other is filled in. The text is what to say of that.
+    The rows of the more frequent one are kept, and the other is interpolated at them. The text is a remark on that.
     """
     there = np.isfinite(times)
     placed, turned = (np.isfinite(part).all(axis=-1) & there for part in (poses.positions, poses.quaternions))
