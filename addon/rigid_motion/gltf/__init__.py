@@ -1,7 +1,7 @@
-"""glTF files with fewer keys: what they show stays within a tolerance, in the world, of what they showed.
+"""glTF files with fewer keys: the animation stays within a tolerance of the original, measured in world space.
 
-`documents` are files, `accessors` their numbers, `tracks` and `nodes` what moves; `rewriting` puts other tracks into a
-document. NumPy and the standard library alone.
+`documents` reads and writes files, `accessors` their numbers. `tracks` and `nodes` describe the animation. `rewriting`
+replaces the tracks of a document. Depends on NumPy and the standard library only.
 """
 
 from .clips import Options, ReducedClip

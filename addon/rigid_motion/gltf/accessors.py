@@ -1,7 +1,7 @@
-"""Accessors: the numbers of a glTF document, decoded from views of its buffers; and those that are added to it.
+"""glTF accessors: decoding numbers from the buffer views of a document, and adding new accessors.
 
-Rows are elements, columns components: shape (count, components). Whole numbers that are normalised become floats as
-the specification has it (glTF 2.0, sections 3.6 and 3.11): -1 to 1, or 0 to 1.
+Rows are elements, columns are components: shape (count, components). Normalised integers become floats from -1 to 1, or
+from 0 to 1 (glTF 2.0 specification, sections 3.6 and 3.11).
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ import numpy as np
 from .documents import Document, GltfError, Json, bytes_of, entry, shown, whole
 
 NUMBER_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-"""Types of components, as NumPy names them."""
+"""NumPy types by glTF component type."""
 
 COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 MOST_ZEROS = 2**22
-"""How many numbers an accessor may have more than the file has bytes: one without a view is made of zeros."""
+"""Limit on how far an accessor's numbers may exceed the bytes of the file: an accessor without a view is all zeros."""
 
 COMPRESSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
-"""What bytes of a view are not what its accessors say."""
+"""Extensions that compress the bytes of a view, so accessors cannot read them directly."""
 
 ALL_ROWS = slice(None)
 
@@ -32,25 +32,25 @@ TYPE_BY_COUNT = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 COMPONENT_TYPES = {kind.lstrip("<"): number for number, kind in NUMBER_TYPES.items()}
 
 ALIGNMENT_BYTES = 4
-"""Bytes: where numbers begin."""
+"""Bytes to which numbers are aligned."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """The numbers of an accessor, read where they are sliced: like an array of shape (n, *shape), float64."""
+    """The numbers of an accessor, read from the file when sliced: like an array of shape (n, *shape), float64."""
 
     document: Document
     number: int
     count: int
-    """How many rows there are, each of as many elements as make it."""
+    """Number of rows; a row may combine several elements."""
 
     shape: tuple[int, ...]
     order: list[int] | slice
-    """Of the columns."""
+    """Order of the columns."""
 
     @property
     def size(self) -> int:
-        """How many numbers these are."""
+        """The number of values."""
         return self.count * math.prod(self.shape)
 
     def __getitem__(self, rows: slice) -> np.ndarray:
@@ -61,15 +61,15 @@ class Rows:
 
 
 def raw_numbers(document: Document, number: object, rows: slice = ALL_ROWS) -> np.ndarray:
-    """Return the numbers of an accessor, or of some of its elements, as they are kept, shape (count, components).
+    """Return the stored numbers of an accessor, or of some of its elements, shape (count, components).
 
     Raises
     ------
     GltfError
-        Where it does not fit its buffer, or is compressed.
+        If the accessor does not fit its buffer, or is compressed.
     """
     accessor = entry(document.json, "accessors", number)
-    kind, columns, count = _kind(accessor), _columns(accessor), whole(accessor, "count", least=1)
+    kind, columns, count = _number_type(accessor), _column_count(accessor), whole(accessor, "count", least=1)
     if count * columns > MOST_ZEROS + bytes_of(document):
         raise GltfError(f"accessor {number} has {count} elements, more than are read")
     if "bufferView" in accessor:
@@ -85,7 +85,7 @@ def numbers(document: Document, number: object, rows: slice = ALL_ROWS) -> np.nd
     Raises
     ------
     GltfError
-        As `raw_numbers`, and for what is not finite.
+        As `raw_numbers`, and for numbers that are not finite.
     """
     raw = raw_numbers(document, number, rows)
     if not np.isfinite(raw).all():
@@ -95,12 +95,12 @@ def numbers(document: Document, number: object, rows: slice = ALL_ROWS) -> np.nd
 
 
 def denormalised(raw: np.ndarray) -> np.ndarray:
-    """Return what normalised whole numbers stand for."""
+    """Return the floats that normalised integers represent."""
     return np.maximum(raw / np.iinfo(raw.dtype).max, -1.0)
 
 
 def parts_of(json: Json, number: int) -> Iterator[tuple[Json, int, int]]:
-    """Yield what of an accessor names a view, and which bytes of it: the first, and that behind the last."""
+    """Yield each part of an accessor that names a view, with its byte range in the view: first byte and end."""
     for part, width, count in _parts(json, number):
         first = whole(part, "byteOffset", 0)
         stride = whole(entry(json, "bufferViews", part["bufferView"]), "byteStride", width)
@@ -108,14 +108,14 @@ def parts_of(json: Json, number: int) -> Iterator[tuple[Json, int, int]]:
 
 
 def stored_size(json: Json, number: int) -> int:
-    """How many bytes the numbers of an accessor take, without what lies between them."""
+    """Return the bytes that the numbers of an accessor take, without gaps between them."""
     return sum(width * count for _, width, count in _parts(json, number))
 
 
 def _parts(json: Json, number: int) -> Iterator[tuple[Json, int, int]]:
-    """Yield what of an accessor names a view, the bytes of each element there, and how many there are."""
+    """Yield each part of an accessor that names a view, its bytes per element and its number of elements."""
     accessor = entry(json, "accessors", number)
-    size, columns = _kind(accessor).itemsize, _columns(accessor)
+    size, columns = _number_type(accessor).itemsize, _column_count(accessor)
     if accessor["type"].startswith("MAT"):  # Each column of a matrix begins aligned.
         rows = math.isqrt(columns)
         width = rows * -(-rows * size // ALIGNMENT_BYTES) * ALIGNMENT_BYTES
@@ -125,18 +125,18 @@ def _parts(json: Json, number: int) -> Iterator[tuple[Json, int, int]]:
         yield accessor, width, whole(accessor, "count")
     if "sparse" in accessor:
         sparse = accessor["sparse"]
-        yield sparse["indices"], _kind(sparse["indices"]).itemsize, whole(sparse, "count")
+        yield sparse["indices"], _number_type(sparse["indices"]).itemsize, whole(sparse, "count")
         yield sparse["values"], width, whole(sparse, "count")
 
 
-def _kind(accessor: Json) -> np.dtype:
+def _number_type(accessor: Json) -> np.dtype:
     kind = accessor.get("componentType")
     if not isinstance(kind, int) or kind not in NUMBER_TYPES:
         raise GltfError(f"an accessor has components of the type {shown(kind)}, which glTF does not know")
     return np.dtype(NUMBER_TYPES[kind])
 
 
-def _columns(accessor: Json) -> int:
+def _column_count(accessor: Json) -> int:
     kind = accessor.get("type")
     if not isinstance(kind, str) or kind not in COMPONENT_COUNTS:
         raise GltfError(f"an accessor is of the type {shown(kind)}, which glTF does not know")
@@ -146,7 +146,7 @@ def _columns(accessor: Json) -> int:
 def _in_view(
     document: Document, part: Json, kind: np.dtype, columns: int, count: int, what: str, rows: slice = ALL_ROWS
 ) -> np.ndarray:
-    """Return the elements, or some of them, that a part of the document names by its view and an offset in it."""
+    """Return elements of a part of the document that names a view and an offset; `rows` selects some of them."""
     view = entry(document.json, "bufferViews", part.get("bufferView"))
     extensions = view.get("extensions")
     if isinstance(extensions, dict) and any(name in extensions for name in COMPRESSIONS):
@@ -169,11 +169,11 @@ def _in_view(
 
 
 def _with_sparse(document: Document, accessor: Json, result: np.ndarray, what: str, rows: slice) -> np.ndarray:
-    """Return some of the elements with those put in that a sparse accessor keeps apart."""
+    """Return the selected elements with the values of a sparse accessor filled in."""
     sparse = accessor["sparse"]
     if not all(isinstance(part, dict) for part in (sparse, sparse.get("indices"), sparse.get("values"))):
         raise GltfError(f"{what} is sparse, and does not say what is where")
-    count, kind = whole(sparse, "count", least=1), _kind(sparse["indices"])
+    count, kind = whole(sparse, "count", least=1), _number_type(sparse["indices"])
     indices = _in_view(document, sparse["indices"], kind, 1, count, what)[:, 0].astype(np.int64)
     values = _in_view(document, sparse["values"], result.dtype, result.shape[1], count, what)
     if kind.kind != "u" or np.max(indices) >= whole(accessor, "count") or np.any(np.diff(indices) <= 0):
@@ -186,9 +186,9 @@ def _with_sparse(document: Document, accessor: Json, result: np.ndarray, what: s
 
 
 class GrowingView:
-    """A view behind all that a document has, and its bytes, which are to be put into a buffer.
+    """A new last buffer view of a document, with the bytes that will go into a buffer.
 
-    Views and accessors are added to the lists of the document.
+    The view and its accessors are added to the lists of the document.
     """
 
     def __init__(self, json: Json) -> None:
@@ -200,9 +200,9 @@ class GrowingView:
         self._known: dict[tuple[str, int, bytes], int] = {}
 
     def add(self, numbers: np.ndarray, *, bounds: bool = False) -> int:
-        """Return the number of an accessor of these (count, columns), the same where there is one already.
+        """Return the number of an accessor for these numbers (count, columns), reusing an equal accessor.
 
-        Whole numbers with a sign are normalised ones.
+        Signed integers are marked as normalised.
         """
         kind, content = numbers.dtype.str.lstrip("<|"), numbers.tobytes()
         known = (kind, numbers.shape[1], content)
@@ -218,7 +218,7 @@ class GrowingView:
         return self._known[known]
 
     def placed(self, content: bytes) -> Json:
-        """Return what an accessor says of where these bytes are, which come behind the others."""
+        """Append these bytes, and return the members of an accessor that say where they are."""
         self.data += bytes(-len(self.data) % ALIGNMENT_BYTES)
         offset = len(self.data)
         self.data += content

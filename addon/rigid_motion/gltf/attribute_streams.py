@@ -1,7 +1,7 @@
-"""Streams of elements as meshopt packs them: of each byte of an element the differences from one element to the next.
+"""Meshopt attribute streams: encoding and decoding the differences between consecutive elements, byte by byte.
 
-Elements are arrays of bytes, shape (count, stride). Differences are packed in groups of 16, in as few bits as a group
-needs; what does not fit follows in whole bytes. Version 0 is written, and both versions are read.
+Elements are arrays of bytes, shape (count, stride). Differences are packed in groups of 16, with as few bits as a group
+needs; larger differences follow as whole bytes. Version 0 is written, both versions are read.
 Source: the specification of KHR_meshopt_compression, Khronos 2026, appendix A, mode 0.
 """
 
@@ -12,32 +12,32 @@ from collections.abc import Iterator
 import numpy as np
 
 VERSION_BY_FIRST_BYTE = {0xA0: 0, 0xA1: 1}
-"""By the first byte of a stream."""
+"""Stream version by first byte."""
 
 BLOCK_BYTES, BLOCK_ELEMENTS, GROUP_ELEMENTS = 8192, 256, 16
 
 MIN_TAIL_BYTES = 32, 24
-"""The least bytes at the end of a stream, of which the first element is a part, by version."""
+"""Least bytes of the tail of a stream, which includes the first element, by version."""
 
 DIFFERENCE_BITS = (0, 2, 4, 8), (0, 1, 2, 4), (1, 2, 4, 8)
-"""Of a difference in a group, by the kind of the group: in version 0, and by the control mode in version 1."""
+"""Bits of a difference, by the kind of its group: in version 0, then for each control mode of version 1."""
 
 ZERO_CONTROL, LITERAL_CONTROL = 2, 3
-"""Control modes without groups: all differences are 0, and all are whole bytes."""
+"""Control modes without groups: all differences are 0, or all are whole bytes."""
 
 MAX_GROUP_BYTES = 24
-"""Bytes of a group at most: 16 differences of 4 bits, each of them too large."""
+"""Most bytes of a group: 16 differences of 4 bits, all of them too large."""
 
 
 def encoded(elements: np.ndarray) -> bytes:
-    """Return the stream of elements (count, stride); the stride is a multiple of 4, and 256 at most."""
+    """Return the stream of elements (count, stride); the stride must be a multiple of 4, at most 256."""
     stride = elements.shape[1]
     tail = bytes(max(MIN_TAIL_BYTES[0] - stride, 0)) + elements[0].tobytes()
     return b"".join((b"\xa0", *map(_encoded_block, _blocks(elements)), tail))
 
 
 def encoded_size(elements: np.ndarray) -> int:
-    """Return how many bytes the stream of elements has."""
+    """Return the number of bytes of the stream of elements."""
     sizes = 0
     for block in _blocks(elements):
         groups, stride = block.shape[0], block.shape[1]
@@ -46,7 +46,7 @@ def encoded_size(elements: np.ndarray) -> int:
 
 
 def likely_size(elements: np.ndarray) -> float:
-    """Return about how many bytes they take in a stream with many others."""
+    """Return about how many bytes the elements take in a stream with many other elements."""
     result, stride = 0.0, elements.shape[1]
     for block in _blocks(elements):
         result += float(_group_sizes(block).min(axis=0).sum()) + stride * len(block) / 4
@@ -54,9 +54,9 @@ def likely_size(elements: np.ndarray) -> float:
 
 
 def differences(elements: np.ndarray) -> np.ndarray:
-    """Return how far each byte is from that of the element before, the sign in the lowest bit: shape (count, stride).
+    """Return the difference of each byte from the element before, sign in the lowest bit, shape (count, stride).
 
-    The first are 0.
+    The first row is 0.
     """
     steps = np.diff(elements, axis=0, prepend=elements[:1])
     return (steps << 1) ^ (0 - (steps >> 7))
@@ -77,7 +77,7 @@ def _block_elements(stride: int) -> int:
 
 
 def _group_sizes(block: np.ndarray) -> np.ndarray:
-    """Return the bytes of each group in each of its kinds, shape (4, groups, stride)."""
+    """Return the bytes of each group for each of the four kinds, shape (4, groups, stride)."""
     nothing = np.where(block.any(axis=-1), GROUP_ELEMENTS + 1, 0)
     packed = [2 * bits + np.count_nonzero(block >= 2**bits - 1, axis=-1) for bits in DIFFERENCE_BITS[0][1:3]]
     return np.stack((nothing, *packed, np.full(nothing.shape, GROUP_ELEMENTS)))
@@ -114,7 +114,7 @@ def decoded(data: bytes, count: int, stride: int) -> np.ndarray:
     Raises
     ------
     IndexError, KeyError, ValueError
-        Where the stream is none of so many.
+        If the data is no stream of that many elements.
     """
     version = VERSION_BY_FIRST_BYTE[data[0]]
     result, place = np.empty((count, stride), dtype=np.uint8), 1
@@ -137,7 +137,7 @@ def decoded(data: bytes, count: int, stride: int) -> np.ndarray:
 
 
 def _decoded_column(data: bytes, place: int, count: int, control: int, version: int) -> tuple[np.ndarray, int]:
-    """Return differences (count,) that begin at a place, and the place behind them."""
+    """Return the differences (count,) that begin at a place in the data, and the place after them."""
     if control == ZERO_CONTROL:
         return np.zeros(count, dtype=np.uint8), place
     if control == LITERAL_CONTROL:
@@ -163,11 +163,11 @@ def _decoded_column(data: bytes, place: int, count: int, control: int, version: 
 PART_SHIFTS = {1: np.arange(8, dtype=np.uint8)} | {
     bits: np.arange(8 - bits, -1, -bits, dtype=np.uint8) for bits in DIFFERENCE_BITS[0][1:3]
 }
-"""Of the parts of a byte, the first one first, by their bits."""
+"""Bit shifts of the parts of a byte, first part first, by the bits of a part."""
 
 
 def _summed(steps: np.ndarray, last: np.ndarray, mode: int) -> np.ndarray:
-    """Return the bytes (n, 4) that steps (n, 4) lead to from those of the element before."""
+    """Return the bytes (n, 4) that result from adding steps (n, 4) to the last element before them."""
     if mode & 15 > 2 or (mode & 15 < 2 and mode > 1):
         raise ValueError
     kind = np.dtype(("<u1", "<u2", "<u4")[mode & 15])

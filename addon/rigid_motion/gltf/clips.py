@@ -1,6 +1,6 @@
-"""The reduction of one clip: keys that are needed, stored as small as they may be, and the proof of what they show.
+"""Key reduction of one glTF clip: finds the needed keys, stores them compactly and proves the tolerance.
 
-A clip that would not become smaller stays as it was.
+A clip that would not become smaller stays unchanged.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from .settling import SettledChannel, settled, shared_times
 from .tracks import CUBICSPLINE, LINEAR, ROTATION, TRANSLATION, WEIGHTS, Clip, Target, Track, Tracks
 
 OF_INTEGERS = 0.85
-"""The share of the tolerance that rotations may take that are stored as 16-bit integers."""
+"""Most that the error from storing rotations as 16-bit integers may take, as a fraction of the tolerance."""
 
 MORE_SLIDE = 0.001 / 1.7
-"""How much farther feet may slide than before, of the size of the body: a millimetre of a grown-up."""
+"""How much farther feet may slide than before, as a fraction of the body's size: a millimetre for an adult."""
 
 TIGHTER_TOLERANCE_RATIO = 0.7
-"""How much smaller the tolerance of the next search is, where no keys that are put back help."""
+"""Factor on the tolerance for the next search, when putting keys back does not help."""
 
 FEET_WEIGH = (1.0, 4.0, 16.0, 64.0)
-"""How many times the errors of feet that stand count in the search for so many key poses, one after the other."""
+"""Weights for the errors of standing feet in the search for a given number of key poses, tried in turn."""
 
 MAX_PUT_BACK_ROUNDS = 24
-"""How often keys are put back where the proof fails."""
+"""Most rounds of putting keys back when the proof fails."""
 
 MIN_TOLERANCE_RATIO = 0.1
-"""The share of the tolerance that is worth a search."""
+"""Least fraction of the tolerance that is worth a search."""
 
 NEEDED_CHANNELS, ALL_CHANNELS, MOVING_CHANNELS = CHANNELS = ("needed", "all", "moving")
 
@@ -48,72 +48,72 @@ NEEDED_REASON, LARGER_REASON = "all of its keys are needed", "fewer keys would t
 
 @dataclass(frozen=True)
 class Options:
-    """How few keys are wanted. Lengths are in the unit of the document."""
+    """Options of the key reduction. Lengths are in the unit of the document."""
 
     tolerance: float | None = None
-    """How far off any point within the radius of any node may be in the world; a share of the size where None."""
+    """Largest world-space displacement of any point within a node's radius; None: a fraction of the size."""
 
     radius: float | None = None
-    """The least radius of a node's ball, which holds all that the node carries; a share of the size where None."""
+    """Least radius of a node's ball, which encloses all that the node carries; None: a fraction of the size."""
 
     shared: bool = False
-    """Whether all nodes of a clip get their keys at the same times."""
+    """Whether all nodes of a clip have keys at the same times."""
 
     count: int | None = None
-    """So many key poses of each clip instead of a tolerance."""
+    """Number of key poses for each clip, instead of a tolerance."""
 
     channels: str = NEEDED_CHANNELS
-    """One of CHANNELS: whether those in which a node is as it rests keep a key, also where nothing else moves it."""
+    """One of CHANNELS: which channels keep a key though their node stays at rest."""
 
     feet: bool = True
-    """Whether feet that stand keep to where they stand, but for `MORE_SLIDE`, however large the tolerance is."""
+    """Whether standing feet may slide only `MORE_SLIDE` farther than before, however large the tolerance."""
 
     meshopt: bool = False
-    """Whether the document is compressed by meshopt; one that came so is in any case."""
+    """Whether to compress the document with meshopt; a compressed document stays compressed in any case."""
 
     curves: bool = False
-    """Whether cubic curves take the place of lines where these need more keys: see `curves`."""
+    """Whether to use cubic curves instead of lines, where lines need more keys: see `curves`."""
 
     run: Run = map
-    """What has stretches of long clips searched, called as `map` is, with functions of modules."""
+    """Function that runs the search over stretches of long clips: called like `map`, with module-level functions."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedClip:
-    """What became of a clip; lengths are in the unit of the document."""
+    """Result of reducing a clip; lengths are in the unit of the document."""
 
     number: int
     name: str
     tracks: tuple[StoredTrack, ...] | None
-    """None where the clip stays as it was."""
+    """None if the clip stays unchanged."""
 
     reason: str
-    """Why it does; otherwise empty."""
+    """Why the clip stays unchanged; otherwise empty."""
 
     before: Amount
     after: Amount
     error: float = 0.0
-    """The largest displacement of what is seen, in the world."""
+    """The largest displacement of visible geometry, in world space."""
 
     where: str = ""
-    """What is displaced so far, and when."""
+    """The node with the largest displacement, and its time."""
 
     slides: tuple[float, float] = (0.0, 0.0)
-    """How far joints slide that stand on the ground, before and after."""
+    """How far standing joints slide, before and after."""
 
     between: float = 0.0
-    """Of curves: the largest displacement of what is seen between frames, from lines from one to the next."""
+    """For curves: the largest displacement between frames, compared with lines from frame to frame."""
 
     lines: int = 0
-    """Of curves: how many keys these channels would have needed with lines."""
+    """For curves: the number of keys that these channels would have needed with lines."""
 
 
 class _LargerError(Exception):
-    """Other tracks take no fewer bytes than those of the clip."""
+    """The new tracks take no fewer bytes than the tracks of the clip."""
 
 
 def kept(number: int, name: str, before: Amount, reason: str) -> ReducedClip:
-    """Return what there is to say of a clip that stays as it was."""
+    """Return the result for a clip that stays unchanged."""
     return ReducedClip(number, name, None, reason, before, before)
 
 
@@ -123,18 +123,18 @@ class ClipReduction:
     Parameters
     ----------
     world : World
-        As the clip moves it, with moments that are those of its keys at least.
+        Moved by the clip, with moments at least at all of its keys.
     clip : Clip
     needed : container of Target
-        Channels that keep a key also where nodes are as they rest.
+        Channels that keep a key even if their node stays at rest.
     joints : iterable of int
-        Nodes that are joints, some of which may be feet.
+        Nodes that are joints, and may be feet.
     size : float
-        Of the body.
+        Size of the body.
     options : Options
         With a tolerance.
     before : Amount
-        What of the clip goes where other keys take its place.
+        Keys and bytes of the clip that new keys would replace.
     """
 
     def __init__(
@@ -155,28 +155,28 @@ class ClipReduction:
         times = self._moments(world, channels)
         self.world = world if np.array_equal(times, world.times) else replace(world, times=times)
         self.given = by_target(clip.pointers)
-        """The tracks that stay."""
+        """Tracks that stay unchanged."""
         result = settled(channels[: len(clip.tracks)], needed)
         self.settled = {target: track for target, track in result.items() if track is not None}
         moving = [target for target, track in {**self.settled, **self.given}.items() if len(track.times) > 1]
         self.stepping = {node for node, path in moving if path in (TRANSLATION, ROTATION)}
-        """The nodes that are left out of the search."""
+        """Nodes left out of the search."""
         rest = {target: track for target, track in by_target(clip.tracks).items() if target not in result}
         self.settled |= {target: track.whole for target, track in rest.items() if target[0] in self.stepping}
         self.dense = {target: track for target, track in rest.items() if target[0] not in self.stepping}
-        """The tracks that are to have fewer keys."""
+        """Tracks that will have fewer keys."""
         self.feet = Feet(self.world, joints)
         self.more_slide = MORE_SLIDE * size if options.feet else np.inf
 
     def reduced(self) -> ReducedClip:
-        """Return the clip with fewer keys, or as it was."""
+        """Return the clip with fewer keys, or unchanged."""
         count = self.options.count
         try:
-            result = self._so_many(count) if self.dense and count else self._within_tolerance()
+            result = self._with_key_pose_count(count) if self.dense and count else self._within_tolerance()
         except _LargerError:
-            return self._kept(LARGER_REASON)
+            return self._unchanged(LARGER_REASON)
         if result is None:
-            return self._kept(NEEDED_REASON)
+            return self._unchanged(NEEDED_REASON)
         return self._result(*result)
 
     def _result(self, tracks: list[StoredTrack], worst: Worst) -> ReducedClip:
@@ -201,7 +201,7 @@ class ClipReduction:
         return f"{node} at {worst.time:.4g} s"
 
     def _amount(self, tracks: list[StoredTrack]) -> Amount:
-        """Return how much tracks are. Raises _LargerError where that is no less than before."""
+        """Return the keys and bytes of tracks. Raises _LargerError if the bytes are no fewer than before."""
         result = amount(tracks)
         if self.options.meshopt:
             arrays = [part for track in tracks for part in track.accessors]
@@ -210,11 +210,11 @@ class ClipReduction:
             raise _LargerError
         return result
 
-    def _kept(self, reason: str) -> ReducedClip:
+    def _unchanged(self, reason: str) -> ReducedClip:
         return kept(self.clip.number, self.clip.name, self.before, reason)
 
-    def _so_many(self, count: int) -> tuple[list[StoredTrack], Worst]:
-        """Tracks with so many key poses, those under which feet slide least, and the largest error."""
+    def _with_key_pose_count(self, count: int) -> tuple[list[StoredTrack], Worst]:
+        """Return tracks with `count` key poses, chosen so that feet slide least, and the largest error."""
         search = self._search()
         best, farthest = [], np.inf
         for weight in FEET_WEIGH:
@@ -229,7 +229,7 @@ class ClipReduction:
         return best, self.world.worst(self._shown(best), self.morphed)[0]
 
     def _packed(self) -> tuple[list[StoredTrack], Worst] | None:
-        """Tracks that meshopt packs into few bytes and that keep to the tolerance, and the largest error."""
+        """Return tracks that meshopt packs into few bytes within the tolerance, and the largest error, or None."""
         held = {
             target: track
             for target, track in self.settled.items()
@@ -259,11 +259,11 @@ class ClipReduction:
         return None
 
     def _key_poses(self, keys: np.ndarray) -> list[StoredTrack]:
-        """All tracks as they are to be stored, with these samples as key poses."""
+        """Return all tracks as stored, with key poses at these samples."""
         return self._stored([keys] * len(self.dense))
 
     def _within_tolerance(self) -> tuple[list[StoredTrack], Worst] | None:
-        """Tracks with few keys that keep to the tolerance, and the largest error; None where none do."""
+        """Return tracks with few keys within the tolerance, and their largest error; None if there are none."""
         if self.options.meshopt and not self.options.shared and (result := self._packed()) is not None:
             return result
         if not self.dense:
@@ -273,7 +273,7 @@ class ClipReduction:
             if self.options.shared:
                 samples = [search.key_poses(allowed)] * len(self.dense)
             else:
-                samples = self._samples(search.keys(allowed))
+                samples = self._key_samples(search.keys(allowed))
             result = self._proven(samples)
             if result is not None:
                 return result
@@ -281,21 +281,21 @@ class ClipReduction:
         return None
 
     def _search(self) -> NodeSearch:
-        """Return a search for the keys of nodes, but for those whose steps are kept."""
+        """Return a search for the keys of nodes, except nodes with a settled or given track of several keys."""
         fixed = np.isin(self.world.moving, list(self.stepping))
         return NodeSearch(self.world, {**self.given, **self.settled, **self.dense}, fixed, self.options.run)
 
     @cached_property
     def morphed(self) -> tuple[Worst, np.ndarray]:
-        """How far off morph targets are, which need no search."""
+        """Errors of the morph targets, which need no search."""
         weights = [stored(track, integers=False) for (_, path), track in self.settled.items() if path == WEIGHTS]
         return self.world.morphed(self._shown(weights))
 
     @cached_property
     def storing(self) -> tuple[frozenset[Target], float]:
-        """The rotations that are stored as integers, and how far off all is with all keys, by that and what is settled.
+        """Rotations stored as integers, and the error with keys at all samples, from storing and settled tracks.
 
-        What moves least by its own rotation comes first.
+        Rotations that move the least geometry are stored as integers first.
         """
         reaches, rows = self.world.reaches, self.world.rows
         turned = [target for target in (*self.dense, *self.settled) if target[1] == ROTATION]
@@ -319,15 +319,15 @@ class ClipReduction:
     def _stored_track(self, track: Track) -> StoredTrack:
         return stored(track, integers=(track.node, track.path) in self.storing[0])
 
-    def _samples(self, keys: Sequence[SeparateKeys]) -> list[np.ndarray]:
-        """Those that are keys of each dense track."""
+    def _key_samples(self, keys: Sequence[SeparateKeys]) -> list[np.ndarray]:
+        """Return the key samples of each dense track."""
         of_nodes = [(path, keys[self.world.rows[node]]) for node, path in self.dense]
         return [own.rotation if path == ROTATION else own.location for path, own in of_nodes]
 
     def _proven(self, samples: list[np.ndarray]) -> tuple[list[StoredTrack], Worst] | None:
-        """Return stored tracks with keys at these samples, more where the proof fails, and their largest error.
+        """Return stored tracks with keys at these samples, and more where the proof fails, and their largest error.
 
-        None where the proof fails with more and more of them.
+        None if the proof still fails after several rounds.
         """
         sound: dict[int, tuple[int, Worst]] = {}
         for _ in range(MAX_PUT_BACK_ROUNDS):
@@ -337,14 +337,14 @@ class ClipReduction:
             if not len(rows):
                 worst = max(self.world.morphed(self._shown(tracks))[0], *(worst for _, worst in sound.values()))
                 return (tracks, worst) if worst.error <= self.tolerance else None
-            samples = self._with_more(samples, rows, eighths)
+            samples = self._with_more_keys(samples, rows, eighths)
         return None
 
     def _failures(self, tracks: Tracks, sound: dict[int, tuple[int, Worst]]) -> tuple[np.ndarray, np.ndarray]:
-        """Where tracks break what is promised: rows of nodes, and eighths of moments.
+        """Return where tracks exceed the tolerance or slide: rows of nodes, and times in eighths of a sample.
 
-        What is quickly seen comes first, and hides the rest. Of stretches that are sound, their digest and their
-        largest error are noted: they are not looked at again for as long as they stay the same.
+        Sliding feet are checked first and hide other failures. Stretches without failures are recorded in `sound`
+        with their digest and largest error: they are not checked again while the digest stays the same.
         """
         world = self.world
         rows, samples = self.feet.slips(tracks, self.more_slide)
@@ -364,8 +364,8 @@ class ClipReduction:
         all_rows, all_numbers = map(np.concatenate, zip(*failures, strict=True))
         return all_rows, all_numbers
 
-    def _with_more(self, samples: list[np.ndarray], rows: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
-        """Return samples with those around some eighths, for the nodes of these rows and all that they hang on."""
+    def _with_more_keys(self, samples: list[np.ndarray], rows: np.ndarray, eighths: np.ndarray) -> list[np.ndarray]:
+        """Return samples with more keys around these eighths, for the nodes of these rows and all their ancestors."""
         desired = np.zeros((len(self.world.moving), len(self.world.times)), dtype=bool)
         desired[rows, eighths // PARTS_PER_GAP] = desired[rows, -(-eighths // PARTS_PER_GAP)] = True
         desired = Skeleton(self.world.parents).most_below(desired)
@@ -379,7 +379,7 @@ class ClipReduction:
         ]
 
     def _stored(self, samples: Sequence[np.ndarray]) -> list[StoredTrack]:
-        """All tracks as they are to be stored, the dense ones with keys at these samples."""
+        """Return all tracks as stored, with dense tracks keyed at these samples."""
         times, tracks = self.world.times, []
         keys = dict(zip(self.dense, samples, strict=True))
         moving = [target for target, own in keys.items() if len(own) > 1]
@@ -388,13 +388,13 @@ class ClipReduction:
         together = dict(zip(moving, shared, strict=True))
         for target, track in self.dense.items():
             thinned = track.keyed(times[keys[target]])
-            # Keys for the sake of others change nothing of what is shown.
+            # Keys added only to share times do not change the animation.
             more = thinned.keyed(times[together[target]]) if target in together else replace(thinned, times=times[:1])
             tracks.append(self._stored_track(more))
         return self._spanning(tracks + [self._stored_track(track) for track in self.settled.values()])
 
     def _spanning(self, tracks: list[StoredTrack]) -> list[StoredTrack]:
-        """Return the same with keys at both ends of the clip in one of them at least: it lasts as long as before."""
+        """Return the tracks, one of them extended to both ends of the clip if needed: its duration stays the same."""
         ends = self.world.times[[0, -1]]
         times = [*(track.times for track in tracks), *(track.times for track in self.given.values())]
         seen = np.concatenate([own[[0, -1]] for own in times]) if times else ends[:0]

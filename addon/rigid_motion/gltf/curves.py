@@ -1,7 +1,7 @@
-"""Clips as the fewest cubic curves through their frames: CUBICSPLINE where it needs fewer keys than lines.
+"""Key reduction with cubic curves: CUBICSPLINE channels where these need fewer keys than lines.
 
-The promise is another one than that of lines: it holds at the file's frames. What lies between them is measured, and
-said. Channels of scales and of weights, and whatever needs no search, are as they are with lines.
+Unlike with lines, the tolerance holds at the frames of the file. The error between frames is measured and reported.
+Channels of scales and weights, and channels that need no search, are treated as with lines.
 """
 
 from __future__ import annotations
@@ -25,34 +25,34 @@ from .settling import SettledChannel
 from .tracks import CUBICSPLINE, LINEAR, ROTATION, TRANSLATION, WEIGHTS, Target, Track, Tracks
 
 STRETCH_FRAMES, MIN_STRETCHES = 500, 2
-"""Frames that are searched in one go, where there are more than so many times as many."""
+"""Frames searched in one go, if there are more than MIN_STRETCHES times as many."""
 
 MAX_LINE_ERROR = 1e-6
-"""What values may differ by where as many keys as wanted are given: what is a line then is one."""
+"""Largest error of values when keys are given: a curve within it is stored as lines."""
 
 MAX_FRAME_GAP_S = 1 / 20
-"""Seconds: frames that are farther apart are keys, with lines in between that count as well."""
+"""Seconds between frames at most: longer gaps between keys are divided into more frames."""
 
 MAX_PROOF_ROUNDS = 12
-"""How often less is allowed where the proof fails."""
+"""Most rounds of tightening the tolerance when the proof fails."""
 
 TIGHTER_ALLOWANCE_RATIO, TIGHTER_REACH_FRAMES = 0.5, 2
-"""How much less, and so many frames around; where feet slide, for as long as they stand."""
+"""Factor on the tolerance, and frames around a failure that get it; for sliding feet, all the time that they stand."""
 
 
 class CurveReduction(ClipReduction):
     """The search for the curves of one clip."""
 
     lines = 0
-    """How many keys lines would need."""
+    """Number of keys that lines would need."""
 
     @cached_property
     def _known(self) -> dict[tuple[int, bytes], list[JointCurves]]:
-        """The curves of stretches, by their numbers and what is allowed there."""
+        """Curves of stretches, by number and allowed errors of the stretch."""
         return {}
 
     def _moments(self, world: World, channels: Sequence[SettledChannel]) -> np.ndarray:
-        """Return the frames: those of keys, and some between keys that are far apart."""
+        """Return the frames: those with keys, and some in between where keys are far apart."""
         moving = [channel for channel in channels if channel.track.path != WEIGHTS and not channel.track.is_constant]
         splines = [channel.times for channel in moving if channel.is_curved]
         keys = np.unique(np.concatenate([world.times, *splines, *(channel.track.times for channel in moving)]))
@@ -92,7 +92,7 @@ class CurveReduction(ClipReduction):
         return self._spanning(tracks)
 
     def _slips(self, shown: Tracks) -> set[tuple[int, int, int]]:
-        """Return rows of joints that slide too far, and the samples on which these stand: first, and behind last."""
+        """Return spans in which joints stand but slide too far: row, first sample, and the sample after the last."""
         rows, samples = self.feet.slips(shown, self.more_slide)
         spans = self.feet.spans.tolist()
         return {
@@ -112,7 +112,7 @@ class CurveReduction(ClipReduction):
         return frozenset(), 0.0
 
     def _curved(self, allowed: np.ndarray) -> list[StoredTrack]:
-        """All tracks as they are to be stored, where so much is allowed (n, m)."""
+        """Return all tracks as stored, given the allowed errors (n, m)."""
         world = self.world
         some = self._stretches()
         tasks = [(number, allowed[:, own].tobytes()) for number, own in enumerate(some)]
@@ -131,7 +131,7 @@ class CurveReduction(ClipReduction):
         return self._spanning(tracks)
 
     def _stretches(self) -> list[slice]:
-        """Return the frames whose curves are searched in one go: all channels have keys where they meet."""
+        """Return the frame ranges that are searched one by one: all channels have keys where they meet."""
         count = len(self.world.times)
         return stretches(count, STRETCH_FRAMES) if count > MIN_STRETCHES * STRETCH_FRAMES else [slice(0, count)]
 

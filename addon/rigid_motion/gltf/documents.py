@@ -1,7 +1,7 @@
-"""glTF files, read and written whole: the JSON as it is, the bytes of buffers, and what else a GLB holds.
+"""glTF and GLB files: reading and writing the JSON, the buffers and other GLB chunks unchanged.
 
-Nothing is interpreted here but where bytes are. Unknown chunks, members and nulls stay. Files beside a document are
-read from its folder and below alone.
+Only the places of bytes are interpreted. Unknown chunks, members and nulls stay. External files are read only from the
+folder of the document and below.
 Source: the glTF 2.0 specification, Khronos 2021, sections 3.6 and 4.
 """
 
@@ -27,21 +27,21 @@ import numpy as np
 MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 
 MOST_VALUES = 2**22
-"""In the JSON that is read: a hundred times as many as a body of thousands of joints has."""
+"""Most values in the JSON: a hundred times as many as a body with thousands of joints needs."""
 
 MOST_TEXT = 2**30
-"""Bytes of that JSON, which may hold whole buffers."""
+"""Most bytes of the JSON, which may contain whole buffers."""
 
 DEEPEST_JSON = 128
-"""How many lists and objects of the JSON may be in one another: a document alone has ten."""
+"""Most levels of nested lists and objects in the JSON: a plain document has ten."""
 
 MOST_BYTES = 2**32 - 1
-"""Of a GLB, which counts them in 32 bits."""
+"""Most bytes of a GLB, which stores its length in 32 bits."""
 
 MOST_CHUNKS = 1000
 
 MAX_WHOLE_NUMBER = 2**53
-"""Whole numbers are below it."""
+"""Integers must be below this."""
 
 EXPORT_AGAIN = "export it again"
 
@@ -49,7 +49,7 @@ Json = dict[str, Any]
 
 
 class GltfError(ValueError):
-    """What is wrong with a file or with what is asked of it, in one line, and what to do about it."""
+    """An error in a file or a request, in one line, and what to do about it."""
 
     def __init__(self, problem: str, way_out: str = EXPORT_AGAIN) -> None:
         super().__init__(f"{problem}; {way_out}")
@@ -58,7 +58,7 @@ class GltfError(ValueError):
 
 @contextmanager
 def damage_refused() -> Iterator[None]:
-    """Raise a `GltfError` where what the block reads of a document leads to another error."""
+    """Raise a `GltfError` in place of the other errors that a damaged document leads to in the block."""
     try:
         yield
     except GltfError:
@@ -69,7 +69,7 @@ def damage_refused() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class FileBytes:
-    """Bytes of a file that are read where `bytes` is made of them. Slices are of the same kind."""
+    """Bytes of a file, read when `bytes` is called on them. Slices are FileBytes as well."""
 
     path: Path
     first: int
@@ -77,7 +77,7 @@ class FileBytes:
 
     @classmethod
     def of(cls, path: Path) -> FileBytes:
-        """All of a file."""
+        """Return all bytes of a file."""
         return cls(path, 0, path.stat().st_size)
 
     def __len__(self) -> int:
@@ -97,25 +97,25 @@ class FileBytes:
 
 
 Chunk = tuple[bytes, bytes | FileBytes]
-"""Of a GLB: its kind and what is in it."""
+"""A chunk of a GLB: its kind and content."""
 
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """A glTF document and the bytes that belong to it.
+    """A glTF document and its bytes.
 
     Parameters
     ----------
     json : dict
-        As it is in the file.
+        As in the file.
     buffers : tuple of bytes, FileBytes or None
-        What each buffer holds; None for one that stands for compressed data alone.
+        Content of each buffer; None for a placeholder of compressed data.
     chunks : tuple of (bytes, bytes or FileBytes), optional
-        Kinds and contents of all chunks of a GLB, in their order. None for a .gltf file.
+        Kinds and contents of all chunks of a GLB, in order. None for a .gltf file.
     changed : frozenset of int
-        The buffers that are not what their files hold.
+        Buffers that differ from their files.
     original : int, optional
-        The bytes of all the files that it was read from, where it is what they hold.
+        Bytes of all files that the document was read from, if unchanged.
     """
 
     json: Json
@@ -126,19 +126,19 @@ class Document:
 
     @cached_property
     def size(self) -> int:
-        """Bytes of the document and its buffers as they were read, or else as they are written."""
+        """Bytes of the document and its buffers, as they were read or else as they will be written."""
         if self.original is not None:
             return self.original
         text = as_text(self.json)
-        parts = () if self.chunks is None else self._parts(text)
+        parts = () if self.chunks is None else self._glb_chunks(text)
         return size_beside(self.json, self.buffers) + (12 + sum(map(_chunk_size, parts)) if parts else len(text))
 
     def files(self, name: str) -> dict[str, bytes]:
-        """Return what is to be written where the document is written as `name`: names of files, and what is in them.
+        """Return the files to write when the document is saved as `name`: file contents by name.
 
-        Buffers that have changed get a file of their own, beside it and called as it is.
+        Changed buffers get files of their own, named after the document.
         """
-        beside, buffers, taken = {}, [], {file.casefold() for file in self._files()}
+        beside, buffers, taken = {}, [], {file.casefold() for file in self._external_names()}
         for number, (buffer, data) in enumerate(zip(objects(self.json, "buffers"), self.buffers, strict=True)):
             if number in self.changed and data is not None and "uri" in buffer and not is_data(buffer["uri"]):
                 file = f"{Path(name).stem}{number or ''}.bin"
@@ -150,15 +150,15 @@ class Document:
         text = as_text(document)
         if self.chunks is None:
             return beside | {name: text}
-        parts = self._parts(text)
+        parts = self._glb_chunks(text)
         length = 12 + sum(map(_chunk_size, parts))
         if length > MOST_BYTES:
             raise GltfError(f"{length} bytes are more than a GLB can hold", "export it as .gltf, with files beside it")
         return beside | {name: b"".join((struct.pack("<4sII", MAGIC, 2, length), *map(_chunk, parts)))}
 
-    def _parts(self, text: bytes) -> list[Chunk]:
+    def _glb_chunks(self, text: bytes) -> list[Chunk]:
         """Return the chunks of a GLB with this JSON."""
-        # What the first buffer holds, where it is the one inside of the GLB.
+        # Content of the first buffer, if it is inside the GLB.
         first = objects(self.json, "buffers")[:1]
         binary = self.buffers[0] if first and "uri" not in first[0] else None
         parts: list[Chunk] = [(JSON_CHUNK, text)]
@@ -170,55 +170,55 @@ class Document:
         return parts if binary is None else [parts[0], (BINARY_CHUNK, binary), *parts[1:]]
 
     def reread(self) -> Document:
-        """Return what is read of the document where it has been written."""
+        """Return the document as it would be read after writing."""
         name = "file.gltf" if self.chunks is None else "file.glb"
         return _document(self.files(name)[name], lambda number, _: self.buffers[number])
 
     def companions(self, folder: Path) -> dict[str, Path | None]:
-        """Files beside it that the document names and that have not changed: names, and where they are.
+        """Return the paths of unchanged external files that the document names, by name.
 
-        None where that is not its folder or below.
+        The path is None for a file outside the folder and its subfolders.
         """
-        paths = {name: place_inside(folder, name) for name in self._files()}
+        paths = {name: place_inside(folder, name) for name in self._external_names()}
         return {name: path for name, path in paths.items() if path is None or isfile(path)}
 
-    def _files(self) -> list[str]:
-        """Return the names of files beside it that have not changed."""
+    def _external_names(self) -> list[str]:
+        """Return the names of unchanged external files."""
         buffers = [buffer for number, buffer in enumerate(objects(self.json, "buffers")) if number not in self.changed]
         uris = [part.get("uri") for part in (*buffers, *objects(self.json, "images"))]
         return sorted({unquote(uri) for uri in uris if isinstance(uri, str) and not is_data(uri) and "://" not in uri})
 
 
 def read_document(path: Path, *, in_memory: bool = False) -> Document:
-    """Read a .glb or .gltf file, and of the files that its buffers are in what is needed, when it is.
+    """Read a .glb or .gltf file; bytes of buffers are read when needed.
 
-    With `in_memory` all is read at once, of a file that will not stay where it is.
+    With `in_memory` the whole file is read at once, for a file that will not stay in place.
 
     Raises
     ------
     GltfError
-        For what is damaged, too large, missing or outside of the folder.
+        If data is damaged, too large, missing or outside the folder.
     OSError
-        Where the file cannot be read.
+        If the file cannot be read.
     """
     content = path.read_bytes() if in_memory else FileBytes.of(path)
     return _document(content, lambda number, uri: FileBytes.of(file_of(path.parent, number, uri)))
 
 
 def _document(content: bytes | FileBytes, file: Callable[[int, object], bytes | FileBytes | None]) -> Document:
-    """Return a document, with `file` for what is in files beside it, by the numbers and URIs of buffers."""
+    """Return a document; `file` returns the content of an external buffer, given its number and URI."""
     chunks = chunks_of(content) if bytes(content[:4]) == MAGIC else None
     document = parsed(bytes(content if chunks is None else next(data for kind, data in chunks if kind == JSON_CHUNK)))
     binary = next((data for kind, data in chunks or () if kind == BINARY_CHUNK), None)
     buffers = [
-        _buffer(file, number, buffer, binary if number == 0 else None)
+        _buffer_content(file, number, buffer, binary if number == 0 else None)
         for number, buffer in enumerate(objects(document, "buffers"))
     ]
     return Document(document, tuple(buffers), chunks, original=len(content) + size_beside(document, buffers))
 
 
 def chunks_of(content: bytes | FileBytes) -> tuple[Chunk, ...]:
-    """Return the kinds and contents of all chunks of a GLB file, the JSON among them."""
+    """Return the kinds and contents of all chunks of a GLB file, including the JSON."""
     result: list[Chunk] = []
     offset, whole = 12, len(content)
     if whole >= offset:
@@ -243,7 +243,7 @@ def chunks_of(content: bytes | FileBytes) -> tuple[Chunk, ...]:
 
 
 def parsed(text: bytes) -> Json:
-    """Return the JSON of a document, which is an object."""
+    """Return the JSON object of a document."""
     values = sum(map(text.count, (b",", b"[", b"{")))
     for count, most, kind in ((values, MOST_VALUES, "values"), (len(text), MOST_TEXT, "bytes")):
         if count > most:
@@ -257,7 +257,7 @@ def parsed(text: bytes) -> Json:
             "export it without its custom properties",
         )
     try:
-        document = json.loads(text.decode("utf-8-sig"), parse_float=_finite, parse_constant=_finite)
+        document = json.loads(text.decode("utf-8-sig"), parse_float=_finite_number, parse_constant=_finite_number)
     except (RecursionError, ValueError) as error:
         raise GltfError(f"this is not glTF (its JSON cannot be read: {' '.join(str(error).split())[:80]})") from None
     if not isinstance(document, dict):
@@ -266,12 +266,12 @@ def parsed(text: bytes) -> Json:
 
 
 def bytes_of(document: Document) -> int:
-    """Return how many bytes the buffers of a document have."""
+    """Return the total number of bytes in the buffers of a document."""
     return sum(len(data) for data in document.buffers if data is not None)
 
 
 def objects(parent: Json, name: str) -> list[Json]:
-    """Return the objects in a list of the document; empty where there is none."""
+    """Return the objects of a list in the document; empty if there is no list."""
     result = parent.get(name)
     if result is None:
         return []
@@ -281,7 +281,7 @@ def objects(parent: Json, name: str) -> list[Json]:
 
 
 def entry(parent: Json, name: str, number: Any) -> Json:
-    """Return the object of a number in a list of the document."""
+    """Return an object by its number in a list of the document."""
     result = parent.get(name, [])
     is_number = isinstance(number, int) and not isinstance(number, bool)
     if not isinstance(result, list) or not is_number or not 0 <= number < len(result):
@@ -291,7 +291,7 @@ def entry(parent: Json, name: str, number: Any) -> Json:
 
 
 def _depth(text: bytes) -> int:
-    """How many lists and objects of a JSON text are in one another, at most."""
+    """Return the deepest nesting of lists and objects in a JSON text."""
     outside = re.sub(rb'"[^"]*"', b"", text.replace(rb"\\", b"").replace(rb"\"", b""))
     signs = np.frombuffer(outside, dtype=np.uint8) & ~np.uint8(ord("[") ^ ord("{"))
     steps = (signs == ord("[")).astype(np.int8) - (signs == ord("]")).astype(np.int8)
@@ -299,7 +299,7 @@ def _depth(text: bytes) -> int:
 
 
 def whole(parent: Json, name: str, default: int | None = None, least: int = 0) -> int:
-    """Return a member that is a whole number, and not below the least."""
+    """Return a member that must be an integer of at least `least`."""
     number = parent.get(name, default)
     if isinstance(number, float) and number.is_integer():
         number = int(number)
@@ -309,7 +309,7 @@ def whole(parent: Json, name: str, default: int | None = None, least: int = 0) -
 
 
 def shown(value: object) -> str:
-    """Return a value of a file as a message has it: short, on one line."""
+    """Return a value of a file for use in a message: short, on one line."""
     return repr(value)[:60]
 
 
@@ -318,7 +318,7 @@ def is_data(uri: object) -> bool:
 
 
 def bytes_of_uri(uri: str) -> bytes:
-    """Return what a data URI holds. Raises ValueError where it is not in base64."""
+    """Return the content of a data URI. Raises ValueError if it is not base64."""
     head, _, data = uri.partition(",")
     if not head.endswith(";base64"):
         raise ValueError("not in base64")
@@ -326,29 +326,29 @@ def bytes_of_uri(uri: str) -> bytes:
 
 
 def size_beside(json: Json, buffers: Sequence[bytes | FileBytes | None]) -> int:
-    """Return the bytes of buffers that are in files beside a document."""
+    """Return the total bytes of external buffers."""
     described = zip(objects(json, "buffers"), buffers, strict=True)
     return sum(len(data) for buffer, data in described if data and "uri" in buffer and not is_data(buffer["uri"]))
 
 
 def place_inside(folder: Path, name: str) -> Path | None:
-    """Return where a path leads, links followed; None where that is not in the folder or below, on whatever system."""
+    """Return where a path leads, following links; None if that is outside the folder, by the rules of any system."""
     if ":" in name or PureWindowsPath(name).anchor or ntpath.normpath(name).split("\\")[0] == "..":
         return None
     try:
         path = (folder / name).resolve()
         return path if path.is_relative_to(folder.resolve()) else None
-    except (OSError, RuntimeError, ValueError):  # Links in a circle, names that no system has.
+    except (OSError, RuntimeError, ValueError):  # Circular links, or names that no system allows.
         return None
 
 
 def file_of(folder: Path, number: int, uri: object) -> Path:
-    """Return the file that a buffer is in.
+    """Return the path of a buffer's file.
 
     Raises
     ------
     GltfError
-        Where it is not in the folder or below, or is no file.
+        If the path is outside the folder, or is not a file.
     """
     path = place_inside(folder, unquote(uri)) if isinstance(uri, str) else None
     if path is None:
@@ -370,11 +370,11 @@ def data_uri(data: bytes) -> str:
 def as_text(document: Json) -> bytes:
     try:
         return json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode()
-    except UnicodeEncodeError:  # Halves of signs, which JSON can have as numbers alone.
+    except UnicodeEncodeError:  # Surrogate halves, which JSON can only contain as escaped numbers.
         return json.dumps(document, allow_nan=False, separators=(",", ":")).encode()
 
 
-def _buffer(
+def _buffer_content(
     file: Callable[[int, object], bytes | FileBytes | None],
     number: int,
     buffer: Json,
@@ -407,7 +407,7 @@ def _chunk_size(part: Chunk) -> int:
     return 8 + -(-len(part[1]) // 4) * 4
 
 
-def _finite(text: str) -> float:
+def _finite_number(text: str) -> float:
     number = float(text) if text[-1:].isdigit() else math.nan
     if not math.isfinite(number):
         raise ValueError(f"{text[:20]} is not a number")

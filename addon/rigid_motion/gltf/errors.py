@@ -1,9 +1,9 @@
-"""How far off what is seen is in the world, where other tracks move the nodes: proven between keys, too.
+"""Largest displacement of visible geometry in world space between two sets of tracks, proven between keys as well.
 
-What counts is a ball around each node that holds all that the node carries, and a shell around it at least: no point of
-it is off by more. The ball is in the node's own space, so it grows and shrinks with the node. What morph targets add to
-that is bounded by their largest displacement. Of a long clip no more is looked at at once than a stretch of it.
-Joints that stand on the ground are feet: how far they slide there counts, and when too far.
+Each node has a ball that encloses all that the node carries, with a least radius, its shell. No point of the ball is
+displaced by more than the error. The ball is in the node's own space, so it scales with the node. Morph targets are
+bounded by their largest displacement. Long clips are checked one stretch at a time.
+Joints that stand on the ground are feet: this module also measures how far they slide there, and when it is too far.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ from .seen import Seen
 from .tracks import SCALE, WEIGHTS, Tracks
 
 PARTS_PER_GAP = 8
-"""Of every gap between keys: that is how closely it is looked at."""
+"""Parts into which every gap between moments is divided for the check."""
 
 STRETCH_SAMPLES, MIN_STRETCHES = 1500, 2
-"""Samples of a clip that are looked at and searched at once, where there are more than so many times as many."""
+"""Samples of a clip that are checked and searched at once, if there are more than MIN_STRETCHES times as many."""
 
 AT_ONCE = 2**15
-"""Poses that are looked at in one go."""
+"""Poses evaluated in one go."""
 
 EXACT_BATCH_POSES = 64
-"""Poses whose displacement is worked out at once, those with the largest bounds first."""
+"""Poses whose exact displacement is computed at once, largest bounds first."""
 
 MAX_EVEN_SCALE_RATIO = 1e-4
-"""Of a scale: its axes differ by no more where it is even. Programs write some with rounding."""
+"""Largest relative difference between the axes of an even scale. Some programs write scales with rounding errors."""
 
 NO_SAMPLES = np.empty(0, dtype=np.int64)
 
 UP_AXIS = 1
-"""The axis of glTF that is."""
+"""The up axis of glTF."""
 
 
 @dataclass(frozen=True, order=True)
 class Worst:
-    """The largest displacement, of what a node carries and when."""
+    """The largest displacement, with its node and time."""
 
     error: float = 0.0
     node: int = -1
@@ -54,16 +54,16 @@ class Worst:
 
 @dataclass(frozen=True, eq=False)
 class SeenBlock:
-    """What is seen of nodes at some moments that follow one another."""
+    """The nodes at consecutive moments."""
 
     first: int
-    """The number of the first of them."""
+    """Number of the first moment."""
 
     times: np.ndarray
     """Shape (m,)."""
 
     maps: tuple[AffineMaps, ...]
-    """Where the nodes are, as each of several tracks move them, shape (n, m)."""
+    """World transforms of the nodes for each of several sets of tracks, shape (n, m)."""
 
     @property
     def samples(self) -> slice:
@@ -73,41 +73,41 @@ class SeenBlock:
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """Nodes that move, and what they are measured by. Lengths are in the unit of the document."""
+    """The moving nodes and how their displacement is measured. Lengths are in the unit of the document."""
 
     nodes: Nodes
     seen: Seen
     moving: np.ndarray
-    """The numbers of those that move, parents before their children, shape (n,)."""
+    """Numbers of the moving nodes, parents before children, shape (n,)."""
 
     shells: np.ndarray
-    """The least radii of their balls, in the world where a node is largest, shape (n,)."""
+    """Least radii of the balls, in world space where a node is largest, shape (n,)."""
 
     truth: Tracks
     times: np.ndarray
-    """The moments between which all tracks run evenly, shape (m,)."""
+    """Moments between which all tracks run evenly, shape (m,)."""
 
     @cached_property
     def rows(self) -> dict[int, int]:
-        """The row of each node among those that move."""
+        """The row of each moving node."""
         return {node: row for row, node in enumerate(self.moving.tolist())}
 
     @cached_property
     def parents(self) -> np.ndarray:
-        """The row of each node's parent, -1 where that does not move, shape (n,)."""
+        """The row of each node's parent, -1 if the parent does not move, shape (n,)."""
         above = self.nodes.parents[self.moving].tolist()
         return np.array([self.rows.get(parent, -1) for parent in above], dtype=np.int64)
 
     @cached_property
     def stretches(self) -> list[slice]:
-        """Moments that are looked at in one go, each from the last of those before on; all, if they are few."""
+        """Ranges of moments checked in one go, each from the end of the last; one range for short clips."""
         count = len(self.times)
         return stretches(count, STRETCH_SAMPLES) if count > MIN_STRETCHES * STRETCH_SAMPLES else [slice(0, count)]
 
     def blocks(self, *tracks: Tracks, parts: int = 1, among: Collection[int] | None = None) -> Iterator[SeenBlock]:
-        """Yield what moments look like as each of these tracks move the nodes, and so many parts of gaps between.
+        """Yield the nodes as moved by each of these sets of tracks, with all gaps between moments divided into `parts`.
 
-        Where that is asked for, among some of the stretches alone, by their numbers.
+        `among` limits the stretches, given by their numbers.
         """
         step = max(1, AT_ONCE // (parts * max(1, len(self.moving))))
         last = len(self.times) - 1
@@ -115,41 +115,41 @@ class World:
             if among is not None and number not in among:
                 continue
             end = stretch.stop if stretch.stop > last else stretch.stop - 1
-            near = [self._near(some, stretch) for some in tracks]
+            near = [self._tracks_near(some, stretch) for some in tracks]
             for first in range(stretch.start, end, step):
                 times = self.parted(first, min(first + step, end), parts)
                 yield SeenBlock(parts * first, times, tuple(self.worlds(some, times) for some in near))
 
     def digests(self, tracks: Tracks) -> list[int]:
-        """Return what tells apart, of each stretch, whether tracks have the same keys there."""
-        near = (self._near(tracks, stretch) for stretch in self.stretches)
+        """Return a digest of the keys of tracks in each stretch, to detect changes."""
+        near = (self._tracks_near(tracks, stretch) for stretch in self.stretches)
         return [
             hash(tuple(part.tobytes() for track in some.values() for part in (track.times, track.values)))
             for some in near
         ]
 
-    def _near(self, tracks: Tracks, stretch: slice) -> Tracks:
-        """Return the keys of tracks that say what is shown in a stretch."""
+    def _tracks_near(self, tracks: Tracks, stretch: slice) -> Tracks:
+        """Return the keys of tracks that affect a stretch."""
         ends = self.times[[stretch.start, stretch.stop - 1]].tolist()
         return {target: track.near(*ends) for target, track in tracks.items()}
 
     def parted(self, first: int, end: int, parts: int) -> np.ndarray:
-        """Return some of the moments, and so many parts of the gaps behind them."""
+        """Return some of the moments, with the gaps after them divided into `parts`."""
         times = parted(self.times[first : end + 1], parts)
         return times if end >= len(self.times) else times[:-1]
 
     def worlds(self, tracks: Tracks, times: np.ndarray) -> AffineMaps:
-        """Where the nodes are at times (m,) as tracks move them, shape (n, m)."""
+        """Return the world transforms of the nodes at times (m,), shape (n, m)."""
         return self.nodes.worlds(self.moving, tracks, times)
 
     def lengths_above(self, times: np.ndarray) -> np.ndarray:
-        """How long the axes of each node's parent are in the world at times (m,), shape (n, m, 3), or (n, 1, 3)."""
+        """Return the world lengths of the axes of each node's parent at times (m,), shape (n, m, 3) or (n, 1, 3)."""
         if any(path == SCALE and len(track.times) > 1 for (_, path), track in self.truth.items()):
-            return self._above(np.linalg.norm(self.worlds(self.truth, times).axes, axis=-2))
-        return self._above(self._extremes[0][:, None])
+            return self._of_parents(np.linalg.norm(self.worlds(self.truth, times).axes, axis=-2))
+        return self._of_parents(self._extremes[0][:, None])
 
-    def _above(self, lengths: np.ndarray) -> np.ndarray:
-        """Those of nodes' parents, where these are of the nodes, shape (n, ..., 3)."""
+    def _of_parents(self, lengths: np.ndarray) -> np.ndarray:
+        """Return for each node the lengths of its parent's axes, given those of all nodes, shape (n, ..., 3)."""
         result = lengths[self.parents]
         for row in np.flatnonzero(self.parents < 0).tolist():
             parent = self.nodes.parents[self.moving[row]]
@@ -158,7 +158,7 @@ class World:
 
     @property
     def _shapes_change(self) -> bool:
-        """Whether nodes may grow, or become sheared, between moments: by scales that change or are uneven."""
+        """Whether nodes may grow or shear between moments, because scales change or are uneven."""
         scales = [track.points for (_, path), track in self.truth.items() if path == SCALE]
         every = [*scales, *self.nodes.rest[SCALE][:, None]]
         return bool(self.nodes.matrices) or any(
@@ -167,8 +167,8 @@ class World:
 
     @cached_property
     def _extremes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """How long the axes of each node get in the world (n, 3), how long anything of length 1 does, and how far the
-        node gets from its parent, shapes (n,).
+        """The longest axes of each node in world space (n, 3), the largest scaling of any length, and the largest
+        distance from the parent, shapes (n,).
         """
         count = len(self.moving)
         lengths, largest, away = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
@@ -176,40 +176,40 @@ class World:
         for block in self.blocks(self.truth, parts=PARTS_PER_GAP if self._shapes_change else 1):
             (maps,) = block.maps
             lengths = np.maximum(lengths, np.linalg.norm(maps.axes, axis=-2).max(axis=1))
-            largest = np.maximum(largest, _largest(maps.axes).max(axis=1))
+            largest = np.maximum(largest, _largest_scaling(maps.axes).max(axis=1))
             from_parents = maps.origins[hangs] - maps.origins[self.parents[hangs]]
             away[hangs] = np.maximum(away[hangs], np.linalg.norm(from_parents, axis=-1).max(axis=1))
         return lengths, largest, away
 
     @property
     def largest(self) -> np.ndarray:
-        """How long anything of length 1 in a node's space gets in the world at most, shape (n,)."""
+        """Largest world length of a vector of length 1 in each node's space, shape (n,)."""
         return self._extremes[1]
 
     @property
     def distances(self) -> np.ndarray:
-        """How far each node gets from its parent in the world at most, shape (n,); 0 where that does not move."""
+        """Largest distance of each node from its parent in world space, shape (n,); 0 if the parent does not move."""
         return self._extremes[2]
 
     @cached_property
     def balls(self) -> np.ndarray:
-        """The radii of the balls in the spaces of the nodes, shape (n,)."""
+        """Radii of the balls in the spaces of the nodes, shape (n,)."""
         shells = np.divide(self.shells, self.largest, out=np.zeros(len(self.moving)), where=self.largest > 0.0)
         return np.maximum(self.seen.reaches[self.moving], shells)
 
     @cached_property
     def radii(self) -> np.ndarray:
-        """The radii of the balls in the world, where the nodes are largest, shape (n,)."""
+        """Radii of the balls in world space, where the nodes are largest, shape (n,)."""
         return self.balls * self.largest
 
     @cached_property
     def longest_above(self) -> np.ndarray:
-        """How long any axis of each node's parent gets in the world, shape (n,)."""
-        return self._above(self._extremes[0]).max(axis=-1)
+        """Longest axis of each node's parent in world space, shape (n,)."""
+        return self._of_parents(self._extremes[0]).max(axis=-1)
 
     @cached_property
     def reaches(self) -> np.ndarray:
-        """How far what hangs on each node is from it at most, with the balls around it, shape (n,); an upper bound."""
+        """Upper bound on the distance from each node to its descendants including their balls, shape (n,)."""
         result, away = self.radii.copy(), self._extremes[2]
         for row in range(len(result) - 1, -1, -1):
             if (parent := self.parents[row]) >= 0:
@@ -217,15 +217,15 @@ class World:
         return result
 
     def morph_scale(self, node: int) -> float:
-        """By how much the morph targets of a node's mesh are larger in the world than in it, at most."""
+        """Return how much larger the morph targets of a node's mesh are in world space than in the mesh, at most."""
         morph = self.seen.morphs[node]
-        largest = _largest(self.nodes.resting.axes[morph.carriers])
+        largest = _largest_scaling(self.nodes.resting.axes[morph.carriers])
         moves = np.isin(morph.carriers, self.moving)
         largest[moves] = self.largest[[self.rows[carrier] for carrier in morph.carriers[moves].tolist()]]
         return float((largest * morph.factors).max())
 
     def morphed(self, shown: Tracks) -> tuple[Worst, np.ndarray]:
-        """Return where morph targets displace vertices most, and how far at most on each of the nodes, shape (n,)."""
+        """Return the largest displacement by morph targets, and the largest on each of the nodes, shape (n,)."""
         worst, besides = Worst(), np.zeros(len(self.moving))
         for (node, path), track in self.truth.items():
             if path != WEIGHTS or node not in self.seen.morphs:
@@ -250,23 +250,23 @@ class World:
         parts: int = PARTS_PER_GAP,
         among: Collection[int] | None = None,
     ) -> tuple[Worst, np.ndarray, np.ndarray]:
-        """Return the largest displacement of what is seen, at the moments and at parts of the gaps between them.
+        """Return the largest displacement of visible geometry, at the moments and at parts of the gaps between them.
 
         Parameters
         ----------
         shown : Tracks
         morphed : tuple
-            What they make of morph targets: see `morphed`.
+            Errors of morph targets for these tracks: see `morphed`.
         tolerance : float, optional
         parts : int, optional
         among : collection of int, optional
-            The stretches that are looked at, by their numbers.
+            Numbers of the stretches to check.
 
         Returns
         -------
         largest : Worst
         rows, numbers : array, shape (k,)
-            Of nodes, and of the times, where the displacement is over the tolerance and a peak.
+            Rows of nodes and numbers of times at which the displacement is above the tolerance and a peak.
         """
         largest, besides = morphed
         rows, numbers = [NO_SAMPLES], [NO_SAMPLES]
@@ -293,16 +293,16 @@ class World:
         return largest, np.concatenate(rows), np.concatenate(numbers)
 
 
-def _largest(axes: np.ndarray) -> np.ndarray:
-    """Return how long vectors of length 1 become at most, shape (...), by axes (..., 3, 3).
+def _largest_scaling(axes: np.ndarray) -> np.ndarray:
+    """Return an upper bound on the length that vectors of length 1 get from axes (..., 3, 3), shape (...).
 
-    It is Gershgorin's bound of the largest singular value, and exact for perpendicular axes.
+    Uses Gershgorin's bound of the largest singular value, exact for perpendicular axes.
     """
     return np.sqrt(np.abs(np.swapaxes(axes, -1, -2) @ axes).sum(axis=-1).max(axis=-1))
 
 
 def parted(times: np.ndarray, parts: int) -> np.ndarray:
-    """Return moments, and so many parts of the gaps behind them."""
+    """Return moments with the gaps between them divided into `parts`."""
     gaps = times[:-1, None] + np.diff(times)[:, None] * np.arange(parts) / parts
     return np.append(gaps.ravel(), times[-1])
 
@@ -323,7 +323,7 @@ class Feet:
 
     @cached_property
     def stand(self) -> np.ndarray:
-        """Which joints stand, and when, shape (rows, m)."""
+        """Whether each joint stands at each moment, shape (rows, m)."""
         world, times, shape = self.world, self.world.times, (len(self.rows), len(self.world.times))
         if not len(self.rows) or len(times) < 2:
             return np.zeros(shape, dtype=bool)
@@ -346,33 +346,33 @@ class Feet:
 
     @cached_property
     def spans(self) -> np.ndarray:
-        """The row of a joint, and the first and the last sample of a time in which it stands, shape (s, 3)."""
+        """Spans in which a joint stands: row of the joint, first and last sample, shape (s, 3)."""
         result = np.array(spans(self.stand), dtype=np.int64).reshape(-1, 3)
         result[:, 0] = self.rows[result[:, 0]]
         return result
 
     @cached_property
     def _before(self) -> list[np.ndarray]:
-        return self._ways(self.world.truth)
+        return self._slide_distances(self.world.truth)
 
     def slides(self, tracks: Tracks) -> tuple[float, float]:
-        """Return the farthest that any of them gets from where it stood at first, before and after."""
-        before, after = (max(map(np.max, ways), default=0.0) for ways in (self._before, self._ways(tracks)))
+        """Return the largest distance of any foot from where it first stood in a span, before and after."""
+        before, after = (max(map(np.max, ways), default=0.0) for ways in (self._before, self._slide_distances(tracks)))
         return float(before), float(after)
 
     def farther(self, tracks: Tracks) -> float:
-        """How much farther than before any of them slides, at most."""
+        """Return by how much more than before any foot slides, at most."""
         return float(self.more(tracks).max(initial=0.0))
 
     def more(self, tracks: Tracks) -> np.ndarray:
-        """How much farther than before each slides in each of the spans, shape (s,)."""
-        ways = zip(self._before, self._ways(tracks), strict=True)
+        """Return by how much more than before the joint of each span slides, shape (s,)."""
+        ways = zip(self._before, self._slide_distances(tracks), strict=True)
         return np.array([after.max() - before.max() for before, after in ways])
 
     def slips(self, tracks: Tracks, more: float) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of joints and samples at which one slides by more than this farther than before, and began to."""
+        """Return rows and samples where joints slide `more` farther than before, and where these spans begin."""
         rows, samples = [NO_SAMPLES], [NO_SAMPLES]
-        for (row, first, _), before, after in zip(self.spans, self._before, self._ways(tracks), strict=True):
+        for (row, first, _), before, after in zip(self.spans, self._before, self._slide_distances(tracks), strict=True):
             padded = np.pad(after, 1)
             peaks = (after > before.max() + more) & (after >= padded[:-2]) & (after >= padded[2:])
             if peaks.any():
@@ -382,15 +382,15 @@ class Feet:
 
     @cached_property
     def _chains(self) -> tuple[World, np.ndarray]:
-        """The joints that ever stand and all that they hang on, and the rows of the spans' joints among them, (s,)."""
+        """The joints that stand at any time with their ancestors, and the rows of the spans' joints in it, (s,)."""
         world, wanted = self.world, np.zeros(len(self.world.moving), dtype=bool)
         wanted[self.spans[:, 0]] = True
         wanted = Skeleton(world.parents).most_below(wanted)
         chains = replace(world, moving=world.moving[wanted], shells=world.shells[wanted])
         return chains, (np.cumsum(wanted) - 1)[self.spans[:, 0]]
 
-    def _ways(self, tracks: Tracks) -> list[np.ndarray]:
-        """How far each gets from where it stood at first, an array for each span."""
+    def _slide_distances(self, tracks: Tracks) -> list[np.ndarray]:
+        """Return distances from where the joint first stood, one array for each span."""
         if not len(self.spans):
             return []
         (world, rows), (_, firsts, lasts) = self._chains, self.spans.T

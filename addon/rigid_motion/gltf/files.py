@@ -1,4 +1,4 @@
-"""A whole file with fewer keys: every clip of it, and what there is to say of each."""
+"""Key reduction of a whole glTF file: all of its clips, with a report for each."""
 
 from __future__ import annotations
 
@@ -24,48 +24,48 @@ from .sizes import OF_A_BODY, OF_KEY_POSES, joints_of, shells_of, size_of
 from .tracks import NUMBERS_PER_KEY, PATHS, WEIGHTS, Clip, Target, read_clips
 
 MAX_TOLERANCE_PER_SIZE = 0.1
-"""A tolerance above this share of the size is a mistake, mostly of the unit."""
+"""Largest sensible tolerance as a fraction of the size; a larger one is a mistake, mostly of the unit."""
 
 SIZELESS_TOLERANCE = 1e-3
-"""The tolerance where nothing has a size."""
+"""The tolerance if nothing has a size."""
 
 NOTE_KEY = "rigid_motion"
-"""What the tolerance is noted under, in the extras of the asset."""
+"""Key in the asset's extras under which the tolerance is noted."""
 
 SINGLE_EPS = 1e-6
-"""What numbers of single precision that are equal may differ by."""
+"""Largest difference between single-precision numbers that count as equal."""
 
 MOVING_EXTENSIONS = ("VRMC_node_constraint",)
-"""Extensions of nodes by which these follow others."""
+"""Node extensions that make a node follow others."""
 
 UNCLEAR = "an extension that is not known here may say where its bytes are, and meshopt moves them: do it without"
 """Why a document is not compressed."""
 
 NewTracks = Mapping[int, Sequence[StoredTrack]]
-"""By the numbers of clips; of others they stay."""
+"""New tracks by clip number; other clips keep their tracks."""
 
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What became of a file. Lengths are in its unit, which glTF means to be the metre."""
+    """Result of reducing a file. Lengths are in the file's unit, which glTF defines as the metre."""
 
     size: float
-    """Of its joints, or of what its nodes carry."""
+    """Size of the joints, or of the geometry that nodes carry."""
 
     tolerance: float
     clips: tuple[ReducedClip, ...]
     document: Document
-    """With fewer keys; the same where no clip needs fewer."""
+    """The document with fewer keys; the given document if no clip could be reduced."""
 
     before: int
     after: int
-    """Bytes of all its files."""
+    """Bytes of all files, before and after."""
 
     left_alone: str = ""
-    """Why nothing of it was reduced."""
+    """Why nothing was reduced."""
 
     reduced_before: float | None = None
-    """The tolerance of an earlier reduction, whose errors are in it."""
+    """The tolerance of an earlier reduction, whose errors add to this one's."""
 
 
 def reduced(document: Document, options: Options) -> Report:
@@ -74,7 +74,7 @@ def reduced(document: Document, options: Options) -> Report:
     Raises
     ------
     GltfError
-        For what is damaged, and where the tolerance makes no sense.
+        If the document is damaged or the tolerance makes no sense.
     """
     given, before = document, document.size
     with damage_refused():
@@ -83,7 +83,7 @@ def reduced(document: Document, options: Options) -> Report:
         document = shortened(document)
         nodes = Nodes(document)
         clips, references = read_clips(document), References(document.json)
-        earlier, joints = _noted(document), set(itertools.chain.from_iterable(joints_of(document)))
+        earlier, joints = _noted_tolerance(document), set(itertools.chain.from_iterable(joints_of(document)))
 
         def left_alone(reason: str, size: float = 0.0, clips: Sequence[ReducedClip] = ()) -> Report:
             return Report(size, options.tolerance or 0.0, tuple(clips), given, before, before, reason, earlier)
@@ -91,7 +91,7 @@ def reduced(document: Document, options: Options) -> Report:
         if reason := unread(nodes, clips) or (options.meshopt and not are_clear(document.json) and UNCLEAR) or "":
             return left_alone(reason)
         seen = Seen.of(nodes, clips)
-        size = size_of(nodes, seen, _moved(nodes, clips, PATHS), clips)
+        size = size_of(nodes, seen, _moved_nodes(nodes, clips, PATHS), clips)
     tolerance = options.tolerance
     if tolerance is None:
         tolerance = (OF_KEY_POSES if options.shared else OF_A_BODY) * size or SIZELESS_TOLERANCE
@@ -99,13 +99,13 @@ def reduced(document: Document, options: Options) -> Report:
         reason = f"a tolerance of {tolerance:.3g} m is more than a tenth of the size, which is {size:.3g} m"
         return left_alone(f"{reason}: give one below {MAX_TOLERANCE_PER_SIZE * size:.2g} m", size)
     options = replace(options, tolerance=tolerance)
-    # What shows nothing is a library of clips for bodies that may rest in other ways.
+    # A file that shows nothing is a library of clips, for bodies whose rest poses may differ.
     keeps_all = options.channels == ALL_CHANNELS or (options.channels == NEEDED_CHANNELS and not seen.reaches.any())
-    moved_by = {} if keeps_all else _moved_by(nodes, clips)
+    moved_by = {} if keeps_all else _moving_clips(nodes, clips)
     result = []
     for clip in clips:
         if clip.tracks:
-            own = _moved(nodes, (clip,))
+            own = _moved_nodes(nodes, (clip,))
             shells = shells_of(nodes, own, size, tolerance)
             if options.radius is not None:
                 shells[:] = options.radius
@@ -143,8 +143,8 @@ def unread(nodes: Nodes, clips: Sequence[Clip]) -> str:
     return ""
 
 
-def _noted(document: Document) -> float | None:
-    """Return the tolerance that an earlier reduction has noted in a document."""
+def _noted_tolerance(document: Document) -> float | None:
+    """Return the tolerance that an earlier reduction noted in the document."""
     extras = document.json.get("asset", {}).get("extras")
     note = extras.get(NOTE_KEY) if isinstance(extras, dict) else None
     tolerance = note.get("tolerance") if isinstance(note, dict) else None
@@ -152,7 +152,7 @@ def _noted(document: Document) -> float | None:
 
 
 def _with_note(document: Document, tolerance: float) -> Document:
-    """Return a document that says within which tolerance it was reduced, where there is room for extras."""
+    """Return the document with the tolerance noted in its extras, if extras are possible."""
     asset = document.json.get("asset", {})
     extras = asset.get("extras", {})
     if not isinstance(extras, dict):
@@ -162,16 +162,17 @@ def _with_note(document: Document, tolerance: float) -> Document:
 
 
 def _key_times(clip: Clip) -> np.ndarray:
-    """Return the ends of a clip, and all times at which what moves nodes has keys."""
+    """Return the ends of a clip, and all times at which a track that moves a node has keys."""
     ends = [track.times[end] for track in clip.tracks for end in (0, -1)]
     moved = [track.times for track in clip.all_tracks if track.path != WEIGHTS and not track.is_constant]
     return np.unique(np.concatenate([np.unique(ends)[[0, -1]], *moved]))
 
 
-def _moved_by(nodes: Nodes, clips: Sequence[Clip]) -> dict[Target, set[int]]:
-    """Return the numbers of the clips that have channels elsewhere than where their nodes rest.
+def _moving_clips(nodes: Nodes, clips: Sequence[Clip]) -> dict[Target, set[int]]:
+    """Return for each target the numbers of the clips that move it away from its rest value.
 
-    These keep a key in all clips: what shows clips one after the other leaves a node where the clip before had it.
+    These targets keep a key in the other clips: a player that shows clips one after the other leaves a node where the
+    last clip put it.
     """
     result: dict[Target, set[int]] = defaultdict(set)
     for clip in clips:
@@ -183,12 +184,12 @@ def _moved_by(nodes: Nodes, clips: Sequence[Clip]) -> dict[Target, set[int]]:
 
 
 def _require_proven(document: Document, nodes: Nodes, seen: Seen, clips: Sequence[Clip], tracks: NewTracks) -> None:
-    """Read a document as it is to be written: it has to show what was proven, and carry what was carried.
+    """Check the document as written: it must show the proven tracks and carry the same geometry.
 
     Raises
     ------
     GltfError
-        Where it does not.
+        If it does not.
     """
     document = decompressed(document.reread())
     written, own = read_clips(document), Nodes(document)
@@ -205,9 +206,9 @@ def _require_proven(document: Document, nodes: Nodes, seen: Seen, clips: Sequenc
 
 
 def reduce_file(path: Path, output: Path, options: Options) -> Report:
-    """Write a .glb or .gltf file with fewer keys, and the file of its buffer beside a .gltf: see `reduced`.
+    """Write a .glb or .gltf file with fewer keys, and the buffer file next to a .gltf: see `reduced`.
 
-    What is at the place of the output is replaced once all is written. Files that a .gltf names are not copied.
+    An existing output is replaced only after everything is written. Other files that a .gltf names are not copied.
     """
     report = reduced(read_document(path), options)
     files = {output.name: path.read_bytes()} if report.left_alone else report.document.files(output.name)
@@ -221,7 +222,7 @@ def reduce_file(path: Path, output: Path, options: Options) -> Report:
     return report
 
 
-def _moved(nodes: Nodes, clips: Iterable[Clip], paths: Collection[str] = tuple(NUMBERS_PER_KEY)) -> np.ndarray:
-    """Return the nodes of which clips move one of the paths, and all that hang on them, parents first."""
+def _moved_nodes(nodes: Nodes, clips: Iterable[Clip], paths: Collection[str] = tuple(NUMBERS_PER_KEY)) -> np.ndarray:
+    """Return the nodes for which clips animate one of the paths, and all of their descendants, parents first."""
     targets = {track.node for clip in clips for track in clip.all_tracks if track.path in paths}
     return nodes.below(np.array(sorted(targets), dtype=np.int64))

@@ -1,4 +1,4 @@
-"""Filters of meshopt: numbers as whole ones of as few bits as are asked for, and back, element by element.
+"""Meshopt filters: storing numbers as integers of few bits and restoring them, element by element.
 
 Elements are arrays of bytes, shape (count, stride).
 Source: the specification of KHR_meshopt_compression, Khronos 2026, appendix B.
@@ -13,19 +13,19 @@ import numpy as np
 QUATERNION, EXPONENTIAL = "QUATERNION", "EXPONENTIAL"
 
 MAX_SMALL_COMPONENT = np.sqrt(0.5)
-"""No other component of a unit quaternion than the largest is beyond it."""
+"""Largest magnitude of any component of a unit quaternion except its largest one."""
 
 MOST_BITS, FEWEST_BITS = 15, 4
-"""Of a component of a quaternion, so that what is shown says which bits are stored."""
+"""Bits of a quaternion component, limited so that the restored numbers determine the stored bits."""
 
 MAX_INT16 = np.iinfo(np.int16).max
 
 MAX_MANTISSA = 2**23 - 1
-"""The largest, of either sign."""
+"""Largest magnitude of a mantissa."""
 
 
 def quaternions_of(elements: np.ndarray) -> np.ndarray:
-    """Return normalised integers (count, 4), x, y, z, w, of three components and which is the fourth."""
+    """Return quaternions as normalised integers (count, 4), x, y, z, w, from three components and an index."""
     given = _typed(elements, "<i2").reshape(-1, 4).astype(np.int64)
     parts = given[:, :3] / (given[:, 3:] | 3) * MAX_SMALL_COMPONENT
     fourth = np.sqrt(np.maximum(1.0 - np.sum(parts**2, axis=1), 0.0))
@@ -36,9 +36,9 @@ def quaternions_of(elements: np.ndarray) -> np.ndarray:
 
 
 def with_quaternions(values: np.ndarray, bits: int, rank: int = 0) -> np.ndarray:
-    """Return elements (count, 8) for unit quaternions (count, 4), x, y, z, w, in so many bits.
+    """Return elements (count, 8) for unit quaternions (count, 4), x, y, z, w, with components of `bits` bits.
 
-    What is left out of each is its largest component, or with a rank of 1 the second largest, where they are as large.
+    The largest component is left out; with a rank of 1 the second largest, for quaternions in which both are as large.
     """
     largest = np.argsort(-np.abs(values), axis=1, kind="stable")[:, rank, None]
     turned = np.take_along_axis(values, (largest + np.arange(4)) % 4, axis=1)
@@ -49,20 +49,20 @@ def with_quaternions(values: np.ndarray, bits: int, rank: int = 0) -> np.ndarray
 
 
 def floats_of(elements: np.ndarray) -> np.ndarray:
-    """Return floats (count, stride / 4) of mantissas of 24 bits and their exponents."""
+    """Return floats (count, stride / 4) from 24-bit mantissas and their exponents."""
     given = _typed(elements, "<i4")
     return np.ldexp((given << 8 >> 8).astype(np.float64), given >> 24).astype("<f4")
 
 
 def with_floats(values: np.ndarray, exponents: np.ndarray | int) -> np.ndarray:
-    """Return elements (count, 4 * width) for numbers (count, width), as multiples of powers of 2 (broadcast)."""
+    """Return elements (count, 4 * width) for numbers (count, width) as multiples of 2**exponents (broadcast)."""
     mantissas = np.clip(np.rint(np.ldexp(values, -np.asarray(exponents))), -MAX_MANTISSA, MAX_MANTISSA).astype(np.int64)
     parts = mantissas & 0xFFFFFF | (np.asarray(exponents, dtype=np.int64) & 0xFF) << 24
     return parts.astype("<u4").view(np.uint8)
 
 
 def _octahedral(elements: np.ndarray) -> np.ndarray:
-    """Return unit vectors, and a fourth number as it is."""
+    """Return unit vectors, with the fourth number unchanged."""
     integers = _typed(elements, f"<i{elements.shape[1] // 4}")
     given, largest = integers.astype(np.float64), np.iinfo(integers.dtype).max
     xy = given[:, :2] / np.where(given[:, 2:3] == 0.0, 1.0, given[:, 2:3])
@@ -74,7 +74,7 @@ def _octahedral(elements: np.ndarray) -> np.ndarray:
 
 
 def _colours(elements: np.ndarray) -> np.ndarray:
-    """Return red, green, blue and alpha of luma, two chromas and alpha."""
+    """Return red, green, blue and alpha from luma, two chroma components and alpha."""
     kind = f"{elements.shape[1] // 4}"
     luma, _, _, alpha = _typed(elements, f"<u{kind}").astype(np.int64).T
     _, orange, green, _ = _typed(elements, f"<i{kind}").astype(np.int64).T
@@ -98,4 +98,4 @@ UNDO_BY_FILTER = {
     EXPONENTIAL: ((), floats_of),
     "COLOR": ((4, 8), _colours),
 }
-"""The strides that each may have, where these are few, and what undoes it."""
+"""For each filter: the strides it allows (empty for any), and the function that undoes it."""

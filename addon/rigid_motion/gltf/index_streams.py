@@ -1,4 +1,4 @@
-"""Streams of the corners of triangles, and of other indices, as meshopt packs them: read, not written.
+"""Decoder for meshopt index streams: corners of triangles, and other indices. There is no encoder.
 
 Source: the specification of KHR_meshopt_compression, Khronos 2026, appendix A, modes 1 and 2.
 """
@@ -8,19 +8,19 @@ from __future__ import annotations
 import numpy as np
 
 TRIANGLE_BYTE, INDEX_BYTE = 0xE1, 0xD1
-"""The first bytes of streams."""
+"""First byte of a stream, for triangles and for other indices."""
 
 CODE_TABLE_BYTES, PADDING_BYTES = 16, 4
-"""Bytes at the ends of streams of either kind."""
+"""Bytes at the end of a stream, for triangles and for other indices."""
 
 FULL_CODE, MASK_32 = 15, 0xFFFFFFFF
 
 RECENT_EDGES = 16
-"""Edges, and corners, that a triangle may name."""
+"""Number of recent edges, and of recent corners, that a triangle may refer to."""
 
 
 class _Numbers:
-    """Numbers of 7 bits a byte, read one after the other."""
+    """Reader of numbers stored in 7 bits per byte."""
 
     def __init__(self, data: bytes, place: int, end: int) -> None:
         self.data, self.place, self.end = data, place, end
@@ -47,7 +47,7 @@ def decoded_indices(data: bytes, count: int, stride: int) -> np.ndarray:
     Raises
     ------
     IndexError, ValueError
-        Where the stream is none of so many.
+        If the data is no stream of that many indices.
     """
     numbers, last, result = _Numbers(data, 1, len(data) - PADDING_BYTES), [0, 0], np.empty(count, dtype=np.uint32)
     if data[0] != INDEX_BYTE:
@@ -65,7 +65,7 @@ def decoded_triangles(data: bytes, count: int, stride: int) -> np.ndarray:
     Raises
     ------
     IndexError, ValueError
-        Where the stream is none of so many.
+        If the data is no stream of that many corners.
     """
     end = len(data) - CODE_TABLE_BYTES
     codes, table = data[1 : 1 + count // 3], data[end:]
@@ -89,7 +89,7 @@ def decoded_triangles(data: bytes, count: int, stride: int) -> np.ndarray:
         return last
 
     def corner(part: int) -> tuple[int, bool]:
-        """Return what half a byte says, and whether it is a corner that was not recent."""
+        """Return the corner for a half-byte code, and whether it was not recent."""
         if part == FULL_CODE:
             return explicit(), True
         return (corners[-part], False) if part else (fresh(), True)

@@ -1,7 +1,7 @@
-"""Documents that meshopt compressed, made plain, and plain ones made small: the numbers are the same, bit by bit.
+"""Meshopt compression of glTF documents: decompressing and compressing without loss, bit by bit.
 
-What is read: all modes and filters of both names that the extension has. What is written: attributes, with the filters
-of quaternions and floats where these give the same numbers back; streams that came with a document stay as they were.
+Reads all modes and filters of both names of the extension. Writes attributes, with the filters for quaternions and
+floats where these restore the same numbers; streams of the original document are kept.
 Source: the specifications of EXT_meshopt_compression, Khronos 2021, and KHR_meshopt_compression, Khronos 2026.
 """
 
@@ -36,67 +36,67 @@ from .references import References, other_slots, sampler_slots, view_slots
 INVERSE_BINDS = "inverseBindMatrices"
 
 MAX_ELEMENT_BYTES = 256
-"""Bytes of an element at most."""
+"""Most bytes of an element."""
 
 MAX_EXPANSION_RATIO = 1024
-"""Bytes that one of compressed ones is at most."""
+"""Most bytes that one compressed byte may expand to."""
 
 MAX_DOCUMENT_BYTES = 2**30
-"""Bytes that all of a document may become."""
+"""Most bytes of a document after decompression."""
 
 NO_FILTER, ATTRIBUTES_MODE = "NONE", "ATTRIBUTES"
 
 MODES = {"TRIANGLES": decoded_triangles, "INDICES": decoded_indices}
 
 TRANSFORMS = ("translation", "rotation", "scale", "matrix")
-"""What a node may have."""
+"""Transform members of a node."""
 
 STREAM_OVERHEAD_BYTES = 1 + MIN_TAIL_BYTES[0]
-"""Bytes of a stream beside its elements, but for long ones."""
+"""Bytes of a stream besides its elements, except for large elements."""
 
 LEAST_EXPONENT = -100
 
 TIME_EXPONENT = -15
-"""Times are multiples of 2 to the power of it, where they may be."""
+"""Times are multiples of 2 to this power, if they can be."""
 
 SINGLE_BITS = 24
-"""Of the mantissa of a float."""
+"""Bits of the mantissa of a float."""
 
 
 @dataclass(frozen=True, eq=False)
 class Streams:
-    """The streams that a document came with."""
+    """The streams of the original document."""
 
     name: str = COMPRESSIONS[0]
-    """Of the extension."""
+    """Name of the extension."""
 
     known: dict[bytes, tuple[str, Json, bytes]] = field(default_factory=dict)
-    """By the bytes of a view: the name of the extension, what it says, and the stream."""
+    """By the bytes of a view: the name of the extension, its content, and the stream."""
 
     shares: dict[int, float] = field(default_factory=dict)
-    """By the number of a view: the bytes of its stream, of its own."""
+    """Bytes of the stream as a fraction of the view's bytes, by view number."""
 
 
 def decompressed(document: Document) -> Document:
-    """Return a document with all views that meshopt compressed in one more buffer; the same where it did none.
+    """Return a document with all meshopt views decompressed into an additional buffer; unchanged if there are none.
 
-    Views of meshes alone that are damaged stay as they are.
+    Damaged views that only meshes use stay unchanged.
 
     Raises
     ------
     GltfError
-        For other views that are.
+        If another view is damaged.
     """
     return unpacked(document)[0]
 
 
 def unpacked(document: Document) -> tuple[Document, Streams]:
-    """Return the same as `decompressed`, and the streams that were there."""
+    """Return the same as `decompressed`, and the streams of the document."""
     views = objects(document.json, "bufferViews")
     found = {number: how for number, view in enumerate(views) if (how := _compression(view))}
     if not found:
         return document, Streams()
-    json, data, room, of_meshes = copy.copy(document.json), bytearray(), MAX_DOCUMENT_BYTES, _of_meshes(document.json)
+    json, data, room, of_meshes = copy.copy(document.json), bytearray(), MAX_DOCUMENT_BYTES, _mesh_views(document.json)
     streams = Streams(max(name for name, _ in found.values()))
     json["bufferViews"] = list(views)
     for number, (name, own) in found.items():
@@ -119,8 +119,8 @@ def unpacked(document: Document) -> tuple[Document, Streams]:
     return replace(document, json=json, buffers=(*document.buffers, bytes(data))), streams
 
 
-def _of_meshes(json: Json) -> set[int]:
-    """Return the numbers of the views that have numbers of meshes, and none of animations or skins."""
+def _mesh_views(json: Json) -> set[int]:
+    """Return the numbers of the views whose accessors belong to meshes, none to animations or skins."""
     views = [accessor.get("bufferView") for accessor in objects(json, "accessors")]
     samplers = [sampler for animation in objects(json, "animations") for sampler in objects(animation, "samplers")]
     named = {sampler.get(name) for sampler in samplers for name in ("input", "output")}
@@ -130,14 +130,14 @@ def _of_meshes(json: Json) -> set[int]:
 
 
 def _compression(view: Json) -> tuple[str, Json] | None:
-    """Return the name of the extension by which a view is compressed, and what it says."""
+    """Return the name and content of the extension that compresses a view."""
     extensions = view.get("extensions")
     names = [name for name in COMPRESSIONS if isinstance(extensions, dict) and name in extensions]
     return (names[0], view["extensions"][names[0]]) if names else None
 
 
 def _stream(document: Document, own: Json, room: int) -> bytes:
-    """Return the bytes that a view is compressed to, where there is room for those that it has."""
+    """Return the compressed bytes of a view, after checking that its decompressed size fits into `room`."""
     if not isinstance(own, dict):
         raise GltfError("it does not say how")
     size = whole(own, "count", least=1) * whole(own, "byteStride", least=1)
@@ -152,7 +152,7 @@ def _stream(document: Document, own: Json, room: int) -> bytes:
 
 
 def _content(own: Json, stream: bytes) -> bytes:
-    """Return the bytes of a view of its stream."""
+    """Return the bytes of a view, decoded from its stream."""
     mode, name = own.get("mode"), own.get("filter", NO_FILTER)
     count, stride = whole(own, "count"), whole(own, "byteStride")
     strides, undone = UNDO_BY_FILTER.get(name, ((), None)) if isinstance(name, str) else ((), None)
@@ -174,17 +174,17 @@ def _content(own: Json, stream: bytes) -> bytes:
 
 
 class Packed(NamedTuple):
-    """Numbers as elements, from which a filter gives them back."""
+    """Numbers as elements for a filter, which restores them."""
 
     filter: str
     elements: np.ndarray
-    """Shape (count, stride), bytes."""
+    """Bytes, shape (count, stride)."""
 
 
 def filtered(numbers: np.ndarray, most: int = 0) -> Packed | None:
-    """Return numbers (count, columns) as elements that take few bytes; None for those that are not packed.
+    """Return numbers (count, columns) as elements that take few bytes; None if they cannot be packed.
 
-    Floats are multiples of 2 to the power of `most`, or of a smaller one.
+    Floats are stored as multiples of 2 to the power of `most`, or of a smaller power.
     """
     numbers = np.ascontiguousarray(numbers)
     plain = Packed(NO_FILTER, numbers.view(np.uint8))
@@ -204,7 +204,7 @@ def filtered(numbers: np.ndarray, most: int = 0) -> Packed | None:
 
 
 def _exponent(numbers: np.ndarray) -> int:
-    """Return the largest power of 2 of which floats are multiples."""
+    """Return the exponent of the largest power of 2 that all floats are multiples of."""
     mantissas, exponents = np.frexp(numbers[numbers != 0.0].astype(np.float64))
     integers = np.ldexp(mantissas, SINGLE_BITS).astype(np.int64)
     lowest = np.frexp((integers & -integers).astype(np.float64))[1] - 1
@@ -212,20 +212,20 @@ def _exponent(numbers: np.ndarray) -> int:
 
 
 class Group(NamedTuple):
-    """Accessors that are in one view."""
+    """Accessors that share a view."""
 
     filter: str
     numbers: list[int]
-    """Of the accessors, in their order there."""
+    """Numbers of the accessors, in their order in the view."""
 
     elements: np.ndarray
     """Shape (count, stride)."""
 
 
 def grouped(arrays: Mapping[int, np.ndarray], times: Iterable[int]) -> list[Group]:
-    """Return numbers of accessors (count, columns) in groups that are packed alike, those that are times apart.
+    """Return accessor numbers in groups that share a filter and a stride; times get groups of their own.
 
-    Without those that are not packed.
+    Arrays have shape (count, columns). Accessors that cannot be packed are left out.
     """
     times = set(times)
     groups: dict[tuple[bool, str, int], dict[int, np.ndarray]] = defaultdict(dict)
@@ -242,7 +242,7 @@ def grouped(arrays: Mapping[int, np.ndarray], times: Iterable[int]) -> list[Grou
 
 
 def _chained(members: Mapping[int, np.ndarray]) -> list[int]:
-    """Return the numbers in an order in which each begins near to where the one before ends."""
+    """Return the numbers in an order in which each array begins close to the end of the one before."""
     numbers = np.array(list(members))
     firsts, lasts = (np.stack([elements[end] for elements in members.values()]) for end in (0, -1))
     waiting = np.ones(len(numbers), dtype=bool)
@@ -259,7 +259,7 @@ def _chained(members: Mapping[int, np.ndarray]) -> list[int]:
 
 
 def packed_size(arrays: Sequence[np.ndarray], times: Iterable[int]) -> int:
-    """Return how many bytes numbers (count, columns), some of which are times, take in streams with others."""
+    """Return the bytes that arrays (count, columns) take in streams shared with others; `times` numbers the times."""
     times = set(times)
     unique = {(n in times, array.dtype.str, array.shape, array.tobytes()): n for n, array in enumerate(arrays)}
     return sum(
@@ -269,7 +269,7 @@ def packed_size(arrays: Sequence[np.ndarray], times: Iterable[int]) -> int:
 
 
 class _Buffers:
-    """The buffers of a document that grows: one with bytes, and one that stands for compressed views, by extension."""
+    """Buffers of a document under construction: one with bytes, and a placeholder for each compression extension."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -283,7 +283,7 @@ class _Buffers:
         return place
 
     def add(self, view: Json, content: bytes) -> int:
-        """Add a view of plain bytes, and return its number."""
+        """Add a view of uncompressed bytes, and return its number."""
         self.views.append(_without_place(view) | self.put(content))
         return len(self.views) - 1
 
@@ -305,15 +305,15 @@ def _without_place(view: Json) -> Json:
     return {key: value for key, value in view.items() if key not in ("buffer", "byteOffset", "byteLength")}
 
 
-def _own(name: str, elements: np.ndarray) -> Json:
-    """Return what an extension says of elements that it compresses."""
+def _extension_content(name: str, elements: np.ndarray) -> Json:
+    """Return the content of the extension for compressed elements."""
     count, stride = elements.shape
     own = {"count": count, "byteStride": stride, "mode": ATTRIBUTES_MODE}
     return own if name == NO_FILTER else own | {"filter": name}
 
 
 def packed(document: Document, streams: Streams) -> Document:
-    """Return a plain document with its numbers compressed, in one buffer; no reference in it may be unclear."""
+    """Return an uncompressed document with its numbers compressed, in one buffer; see `are_clear` for the condition."""
     json, buffers, numbers = copy.deepcopy(document.json), _Buffers(), {}
     accessors = objects(json, "accessors")
     elsewhere = {container[key] for container, key in other_slots(json)}
@@ -338,7 +338,7 @@ def packed(document: Document, streams: Streams) -> Document:
             container["bufferView"] = new
     for group in groups:
         stream, offset = encoded(group.elements), 0
-        view = buffers.add_stream({}, streams.name, _own(group.filter, group.elements), stream)
+        view = buffers.add_stream({}, streams.name, _extension_content(group.filter, group.elements), stream)
         for number in group.numbers:
             accessor = accessors[number]
             accessor["bufferView"] = view
@@ -350,7 +350,7 @@ def packed(document: Document, streams: Streams) -> Document:
 
 
 def shortened(document: Document) -> Document:
-    """Return a document that says how its nodes rest in as few digits as single precision needs."""
+    """Return a document in which the rest transforms of nodes have only the digits that single precision needs."""
     with np.errstate(over="ignore"):
         nodes = [
             {
@@ -363,7 +363,7 @@ def shortened(document: Document) -> Document:
 
 
 def _short(number: float) -> float:
-    """Return the number with the fewest digits that is the same in single precision, where it is one of these."""
+    """Return the shortest decimal number with the same single-precision value; unchanged if it has no exact one."""
     if not isinstance(number, float) or float(single := np.float32(number)) != number:
         return number
     return float(str(single))
@@ -372,9 +372,9 @@ def _short(number: float) -> float:
 def _repacked(
     document: Document, number: int, containers: list[Json], streams: Streams, buffers: _Buffers, are_indices: bool
 ) -> int:
-    """Add a view as small as it may be without a loss, and return its number among the new ones."""
+    """Add a view compressed as far as possible without loss, and return its new number."""
     view = document.json["bufferViews"][number]
-    if (compression := _compression(view)) is not None:  # Damaged, and of a mesh.
+    if (compression := _compression(view)) is not None:  # Damaged, and used by meshes only.
         name, own = compression
         return buffers.add_stream(view, name, own, _stream(document, own, MAX_DOCUMENT_BYTES))
     data, first, length = document.buffers[view["buffer"]], whole(view, "byteOffset", 0), whole(view, "byteLength")
@@ -386,14 +386,14 @@ def _repacked(
     stride = _stride(document, view, containers)
     if stride and not are_indices and stride % 4 == 0 and stride <= MAX_ELEMENT_BYTES and length % stride == 0:
         elements = np.frombuffer(content, np.uint8).reshape(-1, stride)
-        stream, own = encoded(elements), _own(NO_FILTER, elements)
+        stream, own = encoded(elements), _extension_content(NO_FILTER, elements)
         if len(stream) + len(as_text({streams.name: own})) < length:
             return buffers.add_stream(view, streams.name, own, stream)
     return buffers.add(view, content)
 
 
 def _stride(document: Document, view: Json, containers: list[Json]) -> int:
-    """Return the bytes from element to element that all accessors of a view have; 0 where they differ."""
+    """Return the stride that all accessors of a view share; 0 if they differ."""
     if not all("componentType" in it and "count" in it and "sparse" not in it for it in containers):
         return 0
     accessors = objects(document.json, "accessors")
@@ -405,7 +405,7 @@ def _stride(document: Document, view: Json, containers: list[Json]) -> int:
 
 
 def _with_buffers(document: Document, json: Json, buffers: _Buffers) -> Document:
-    """Return a document with these buffers, that says what it needs to be read."""
+    """Return the document with these buffers, and with its lists of extensions updated."""
     own: Json = {"byteLength": max(len(buffers.data), 1)}
     given = objects(document.json, "buffers")
     if document.chunks is None:
@@ -425,6 +425,6 @@ def _with_buffers(document: Document, json: Json, buffers: _Buffers) -> Document
 
 
 def are_clear(json: Json) -> bool:
-    """Whether all places of a document are known that name its views and buffers."""
+    """Whether all places that name views and buffers of the document are known."""
     references = References(json)
     return not references.unclear and not references.buffers_are_named

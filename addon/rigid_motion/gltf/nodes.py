@@ -1,4 +1,4 @@
-"""The node tree of a glTF document: how nodes hang on one another, how they rest, and where tracks put them.
+"""The node tree of a glTF document: hierarchy, rest transforms, and world transforms under tracks.
 
 Arrays have the nodes first. Quaternions are w, x, y, z.
 Source: the glTF 2.0 specification, Khronos 2021, section 3.5.
@@ -19,10 +19,10 @@ from .documents import Document, GltfError, Json, entry, objects, shown
 from .tracks import LINEAR, MAX_NUMBER, NUMBERS_PER_KEY, ROTATION, SCALE, TO_WXYZ, TRANSLATION, Track, Tracks
 
 REST_VALUES = {TRANSLATION: (0.0, 0.0, 0.0), ROTATION: (0.0, 0.0, 0.0, 1.0), SCALE: (1.0, 1.0, 1.0)}
-"""Of a node that says nothing."""
+"""Defaults of glTF, rotation as x, y, z, w."""
 
 MAX_NODE_DEPTH = 1000
-"""How many nodes one may hang on."""
+"""Most ancestors of a node."""
 
 
 class Nodes:
@@ -31,26 +31,26 @@ class Nodes:
     Raises
     ------
     GltfError
-        For nodes that hang on themselves or on two others, and transforms that are none.
+        For cycles, nodes with two parents, and invalid transforms.
     """
 
     def __init__(self, document: Document) -> None:
         self.document = document
         nodes = objects(document.json, "nodes")
         self.parents = _parents(nodes)
-        self.rest = {path: _rest(nodes, path) for path in NUMBERS_PER_KEY}
+        self.rest = {path: _rest_values(nodes, path) for path in NUMBERS_PER_KEY}
         """Translation (nodes, 3), rotation (nodes, 4) and scale (nodes, 3)."""
         self.matrices = {
             number: _matrix(node["matrix"], number) for number, node in enumerate(nodes) if "matrix" in node
         }
-        """Of nodes that have one instead, (4, 4)."""
+        """Matrices (4, 4) of nodes that have one instead."""
 
     @cached_property
     def skeleton(self) -> Skeleton:
         return Skeleton(self.parents)
 
     def rest_of(self, node: int, path: str) -> np.ndarray:
-        """Return what a track of the node's takes the place of, shape (width,)."""
+        """Return the value that a track of the node replaces, shape (width,)."""
         if path in self.rest:
             return self.rest[path][node]
         described = self.document.json["nodes"][node]
@@ -66,7 +66,7 @@ class Nodes:
         return result
 
     def below(self, moved: np.ndarray) -> np.ndarray:
-        """Return the nodes that move where these (m,) do, parents before their children, shape (n,)."""
+        """Return these nodes (m,) and all of their descendants, parents before children, shape (n,)."""
         moves = np.zeros(len(self.parents), dtype=bool)
         moves[moved] = True
         for nodes in self.skeleton.levels[1:]:
@@ -80,9 +80,9 @@ class Nodes:
         return self.worlds(nodes, {}, np.zeros(1))[np.argsort(nodes), 0]
 
     def worlds(self, nodes: np.ndarray, tracks: Tracks, times: np.ndarray) -> AffineMaps:
-        """Where nodes are at times (m,) as tracks move them, shape (nodes, m).
+        """Return the world transforms of nodes at times (m,), shape (nodes, m).
 
-        `nodes` (n,) has parents before their children; a parent that is not among them rests.
+        `nodes` (n,) has parents before children; a parent that is not in it is at rest.
         """
         seen: dict[int, AffineMaps] = {}
         result = AffineMaps(np.empty((len(nodes), len(times), 3, 3)), np.empty((len(nodes), len(times), 3)))
@@ -93,14 +93,14 @@ class Nodes:
         return result
 
     def channel(self, node: int, path: str, tracks: Tracks, times: np.ndarray) -> np.ndarray:
-        """Return what a node has at times (m,) as tracks move it, shape (m, width), or (1, width) where it rests."""
+        """Return a node's values at times (m,), shape (m, width), or (1, width) if they are constant."""
         if (node, path) not in tracks:
             return self.rest[path][None, node]
         track = tracks[node, path]
         return track.at(times[:1] if len(track.times) == 1 else times)
 
     def _local(self, node: int, tracks: Tracks, times: np.ndarray) -> AffineMaps:
-        """In its parent's space, shape (m,), or (1,) where it rests."""
+        """Return the transforms in the parent's space, shape (m,), or (1,) if they are constant."""
         if node in self.matrices:
             matrix = self.matrices[node][None]
             return AffineMaps(matrix[:, :3, :3], matrix[:, :3, 3])
@@ -114,7 +114,7 @@ def by_target(tracks: tuple[Track, ...]) -> Tracks:
 
 
 def steadied(tracks: tuple[Track, ...]) -> Tracks:
-    """Return the same by node and path, where what is constant has one key."""
+    """Return the tracks by node and path; constant tracks get a single key."""
     kept = [
         replace(track, times=track.times[[0]], values=track.points[[0]], interpolation=LINEAR)
         for track in tracks
@@ -143,7 +143,7 @@ def _parents(nodes: list[Json]) -> np.ndarray:
     return parents
 
 
-def _rest(nodes: list[Json], path: str) -> np.ndarray:
+def _rest_values(nodes: list[Json], path: str) -> np.ndarray:
     rows = [_vector(node.get(path, REST_VALUES[path]), number, path) for number, node in enumerate(nodes)]
     result = np.array(rows, dtype=np.float64).reshape(len(nodes), NUMBERS_PER_KEY[path])
     if path != ROTATION:
