@@ -1,6 +1,6 @@
-"""Keys of one track in few bits: values that are fitted to what it shows between them as well, rounded, and mended.
+"""Keys of one track in few bits: fitted to the motion between keys as well, rounded, and repaired where needed.
 
-Where rounding, or the fit, takes a track too far off at a few samples, keys near to these are rounded in other ways.
+Where rounding or the fit displaces a track too far at a few samples, nearby keys are rounded differently.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from .filters import MAX_INT16, MAX_SMALL_COMPONENT, MOST_BITS, floats_of, quate
 from .tracks import TO_WXYZ, TO_XYZW
 
 MAX_MENDED_RATIO = 0.05
-"""The share of samples at which keys are too far off, and may be mended."""
+"""Largest fraction of samples that may be too far off and still be repaired."""
 
 MAX_REFITS, FAR_SAMPLE_WEIGHT, FAR_ERROR_RATIO = 3, 4.0, 0.8
-"""How often keys are fitted again, and how many times as much samples count then that are so far off, or farther."""
+"""Most refits of keys, and the weight factor for samples whose error is above this fraction of the limit."""
 
 MENDING_ROUNDS, MAX_FAR_RATIO, MAX_FAR_ERROR_RATIO = 3, 0.01, 1.6
-"""Of mending, the share of samples up to which it is tried, and how far off these may be."""
+"""Rounds of repair, the largest fraction of samples that may be too far off, and their largest error ratio."""
 
 FIT_SWEEPS, KEY_SAMPLE_WEIGHT = 12, 0.02
-"""Of a fit, and how much it is drawn to what is shown at a key itself."""
+"""Relaxation sweeps of a fit, and the weight that draws a key to the motion at the key itself."""
 
 WHOLE_BITS = range(4, MOST_BITS + 1)
 
@@ -37,32 +37,32 @@ ROUNDING_MOVES = [(column, step) for column in range(3) for step in (-1, 1)]
 SHARED_TIMES, OWN_TIMES, SINGLE_KEY = "shared", "own", "single"
 
 Measure = Callable[[np.ndarray, np.ndarray | slice], np.ndarray]
-"""From what is shown at some of the samples (k, width), and which these are, to how far off that is, shape (k,)."""
+"""Function of the values at some samples (k, width) and the indices of those samples: returns errors, shape (k,)."""
 
 ALL_SAMPLES = slice(None)
 
 
 class PackedKeys(NamedTuple):
-    """Keys of a track as they are stored, and what they are worth."""
+    """Keys of a track as stored, with their size and the motion they give."""
 
     times: np.ndarray
     """Shape (n,)."""
 
     stored: np.ndarray
-    """Of rotations, x, y, z, w, (n, 4); floats of translations, (n, 3)."""
+    """Rotations as x, y, z, w, (n, 4), or translations as floats, (n, 3)."""
 
     shown: np.ndarray
-    """What they show at the samples, (m, 4) or (m, 3)."""
+    """Values at the samples, (m, 4) or (m, 3)."""
 
     size: float
     """About how many bytes the values take."""
 
     kind: str
-    """SHARED with other tracks, OWN_TIMES or SINGLE_KEY."""
+    """SHARED_TIMES with other tracks, OWN_TIMES or SINGLE_KEY."""
 
 
 def fitted(times: np.ndarray, samples: np.ndarray, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return values at times (k,) whose lines are nearest to those (m, width) at samples (m,), in the least squares."""
+    """Return key values at times (k,) whose lines fit values (m, width) at samples (m,), by weighted least squares."""
     if len(times) == 1:
         return values.mean(axis=0)[None]
     count = len(times)
@@ -87,18 +87,18 @@ def fitted(times: np.ndarray, samples: np.ndarray, values: np.ndarray, weights: 
 
 @dataclass(eq=False)
 class Aim:
-    """What a track is to show.
+    """The motion that a track should have.
 
     Parameters
     ----------
     samples : array, shape (m,)
     values : array, shape (m, width)
     reach : float
-        How far off a difference of 1 is, at most.
+        Largest error for a difference of 1 in the values.
     measure : Measure
-        1 is what is allowed.
+        Returns 1 for the allowed error.
     turns : bool
-        Whether these are quaternions.
+        Whether the values are quaternions.
     """
 
     samples: np.ndarray
@@ -111,7 +111,7 @@ class Aim:
         self._fits: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
 
     def between(self, keys: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
-        """Return what keys show at times (k,), shape (k, width)."""
+        """Return the interpolated values of keys at times (k,), shape (k, width)."""
         if len(keys) == 1:
             return np.repeat(values, len(times), axis=0)
         if self.turns:
@@ -119,11 +119,11 @@ class Aim:
         return np.stack([np.interp(times, keys, column) for column in values.T], axis=1)
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """Return what it is to show at these times (k,), shape (k, width)."""
+        """Return the desired values at times (k,), shape (k, width)."""
         return self.between(self.samples, self.values, times)
 
     def fit(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the best values at these times, and how far off they are at the samples without being rounded."""
+        """Return the best key values at these times, and their errors at the samples before rounding."""
         known = times.tobytes()
         if known not in self._fits:
             weights = np.ones(len(self.samples))
@@ -139,11 +139,11 @@ class Aim:
         return self._fits[known]
 
     def failing(self, times: np.ndarray) -> float:
-        """Return at which share of the samples keys at these times are too far off."""
+        """Return the fraction of samples with too large an error, for keys at these times."""
         return float((self.fit(times)[1] > 1.0).mean())
 
     def keys(self, times: np.ndarray, kind: str) -> PackedKeys | None:
-        """Return keys at these times in as few bits as keep to what is allowed, or None."""
+        """Return keys at these times, in the fewest bits within the allowed error; None if impossible."""
         values, off = self.fit(times)
         if (off > 1.0).mean() > MAX_MENDED_RATIO:
             return None
@@ -160,13 +160,13 @@ class Aim:
         return result
 
     def _rounding(self, bits: int) -> float:
-        """About how far off rounding takes it."""
+        """Return about how large the error from rounding is."""
         return self.reach * (0.7 * MAX_SMALL_COMPONENT / (2 ** (bits - 1) - 1) if self.turns else 0.4 * 2.0**bits)
 
     def _rounded(self, times: np.ndarray, values: np.ndarray, bits: int, kind: str) -> PackedKeys | None:
         elements = with_quaternions(values[:, TO_XYZW], bits) if self.turns else with_floats(values, bits)
         shown = self.between(times, self._played(elements), self.samples)
-        if (mended := self._mended(times, elements, shown, bits)) is None:
+        if (mended := self._repaired(times, elements, shown, bits)) is None:
             return None
         elements = mended
         stored = quaternions_of(elements) if self.turns else floats_of(elements)
@@ -177,10 +177,10 @@ class Aim:
             return (quaternions_of(elements) / MAX_INT16)[:, TO_WXYZ]
         return floats_of(elements).astype(np.float64)
 
-    def _moved(
+    def _shifted(
         self, elements: np.ndarray, bits: int, keys: np.ndarray, columns: np.ndarray | int, steps: np.ndarray | int
     ) -> np.ndarray:
-        """Return the elements with some numbers of some keys moved by so many of the smallest steps there are."""
+        """Return the elements with `columns` of some keys moved by `steps`, in units of the smallest increment."""
         if self.turns:
             parts = elements.view("<i2").copy()
             largest = parts[keys, 3] | 3
@@ -190,8 +190,8 @@ class Aim:
         numbers[keys, columns] += np.ldexp(steps, bits)
         return with_floats(numbers, bits)
 
-    def _mended(self, times: np.ndarray, elements: np.ndarray, shown: np.ndarray, bits: int) -> np.ndarray | None:
-        """Return the elements with keys moved near to samples that are too far off; None where some still are."""
+    def _repaired(self, times: np.ndarray, elements: np.ndarray, shown: np.ndarray, bits: int) -> np.ndarray | None:
+        """Return the elements with keys adjusted near samples with too large errors; None if some errors remain."""
         off, count = self.measure(shown, ALL_SAMPLES), len(times)
         if count < 3 or off.max() > MAX_FAR_ERROR_RATIO or (off > 1.0).mean() > MAX_FAR_RATIO:
             return elements if off.max() <= 1.0 else None
@@ -211,7 +211,7 @@ class Aim:
             owner = near[segments + 1][some] - 1
             best, least = np.full(len(chosen), -1), own[chosen]
             for number, (column, step) in enumerate(ROUNDING_MOVES):
-                played = self._played(self._moved(elements, bits, chosen, column, step))
+                played = self._played(self._shifted(elements, bits, chosen, column, step))
                 after = np.zeros(len(chosen))
                 np.maximum.at(after, owner, self.measure(self.between(times, played, self.samples[some]), some))
                 best[after < least], least = number, np.minimum(after, least)
@@ -219,13 +219,13 @@ class Aim:
             if not better.any():
                 return None
             columns, steps = np.array(ROUNDING_MOVES)[best[better]].T
-            elements = self._moved(elements, bits, chosen[better], columns, steps)
+            elements = self._shifted(elements, bits, chosen[better], columns, steps)
             shown[:] = self.between(times, self._played(elements), self.samples)
             off = self.measure(shown, ALL_SAMPLES)
         return elements if off.max() <= 1.0 else None
 
     def finest(self, times: np.ndarray) -> PackedKeys:
-        """Return keys at these times as exact as they may be."""
+        """Return keys at these times, with the most bits possible."""
         measure, self.measure = self.measure, lambda shown, _: np.zeros(len(shown))
         result = self._rounded(
             times, self.fit(times)[0], (WHOLE_BITS if self.turns else GRID_EXPONENTS)[-1], SHARED_TIMES

@@ -1,9 +1,10 @@
-"""The search for the tracks of a clip that meshopt packs into the fewest bytes within a tolerance in the world.
+"""Search for the tracks of a clip that take the fewest meshopt bytes within a tolerance in world space.
 
-Each track has samples at an even rate, or sparse keys, in as few bits as do. Parents come first, and what hangs on them
-knows how they are stored: a joint turns so that what it carries gets to where it should be, as far as a turn does that.
-So errors do not add up, and each joint may use up much of the tolerance: those with many below them less.
-Times are whole numbers of 2**-15 s, many of them a multiple of 2**-7 s apart, which leaves a byte that never changes.
+Each track gets samples at an even rate or sparse keys, in as few bits as possible. Parents come first, and children
+take the stored keys into account: a joint turns so that what it carries ends up in the right place, as far as a
+rotation can do that. So errors do not add up, and each joint may use much of the tolerance: less for joints with many
+joints below them.
+Times are multiples of 2**-15 s, many of them multiples of 2**-7 s, which leaves a byte that never changes.
 """
 
 from __future__ import annotations
@@ -28,63 +29,63 @@ SAMPLE_STEPS_S = [steps * 2.0**-exponent for exponent in range(7, -3, -1) for st
 """Seconds between samples at even rates, rising."""
 
 MAX_SEARCH_SAMPLES = 2 * 10**5
-"""Of all nodes together: about so many are looked at in a search."""
+"""About how many samples of all nodes together are checked in a search."""
 
 JUMP_FRAME_STRIDE, MIN_JUMP_ERROR_RATIO, FRAMES_PER_JUMP = 4, 2.0, 60
-"""A jump is where a track with every fourth frame is so many times as far off as it is nearly everywhere, and among the
-worst of so many frames."""
+"""A jump: with every JUMP_FRAME_STRIDE-th frame as a key, the error is so many times as large as its 98th percentile,
+and among the worst, one in FRAMES_PER_JUMP frames."""
 
 MIN_USUAL_ERROR = 1e-9
 
 OF_TIME = {True: 1.5, False: 0.95}
-"""About how many bytes the time of a key of its own takes, on a frame or on a multiple of KEY_TIME_STEP_S."""
+"""About how many bytes a separate key time takes: True for a frame, False for a multiple of KEY_TIME_STEP_S."""
 
 OF_RATE = 0.8
-"""The same of one that tracks share."""
+"""The same for key times that tracks share."""
 
 MAX_MENDINGS, MENDING_ERROR_RATIO = 3, 0.9
-"""How often keys are put in where too few are, and the share of what is allowed from which it is needed."""
+"""Most rounds of inserting keys into too coarse a grid, and the error ratio at which one is needed."""
 
 MAX_FAR_SAMPLES_RATIO = 0.01
-"""The share of samples at which keys of a grid may be too far off before these are rounded."""
+"""Largest fraction of samples that may be too far off with keys on a grid, before rounding."""
 
 MAX_SPARSE_BYTES_RATIO = 1.2
-"""How many times as many bytes sparse keys may take, and are tried again."""
+"""Sparse keys are tried again for a track if they took at most so many times the bytes of the best keys."""
 
 SPARSE_LINE_FACTORS = (1.6, 1.15, 0.8)
-"""How much farther off than it may be a line is through sparse keys before these are fitted, in turn."""
+"""Factors on the allowed error for lines through sparse keys before the keys are fitted, tried in turn."""
 
 CARRIED_TOLERANCE_RATIOS = ((0.4, 0.85), (0.6, 0.92))
-"""The shares of the tolerance that what the root of a body carries may use up, and at most what others carry that turns
-itself, in turn."""
+"""Fractions of the tolerance allowed for turning nodes that a joint carries: at the root of a body, and at the end of
+its chains; tried in turn."""
 
 OF_PLACE = 0.5
-"""Of that, what a translation may."""
+"""Fraction of this that a translation may use."""
 
 AIMED_TOLERANCE_RATIO, STRICTER_TOLERANCE_RATIO, MIN_TOLERANCE_RATIO = 0.985, 0.93, 0.3
-"""The share of the tolerance that is aimed at, and how much smaller it gets, down to what, where the proof fails."""
+"""Fraction of the tolerance to aim at, its factor after a failed proof, and its lower limit."""
 
 OF_SLIDE = 0.5
-"""The share of what a foot may slide that it may be off while it stands."""
+"""Largest error of a standing foot, as a fraction of the slide it is allowed."""
 
 TURN_WEIGHT = 4.0
-"""How much what turns with a node counts beside where the nodes are that it carries."""
+"""Weight of a node's rotation, compared with the positions of the nodes that it carries."""
 
 
 class Packing:
-    """The search of one clip.
+    """The search for one clip.
 
     Parameters
     ----------
     world : World
     tracks : mapping
-        Those that are to be packed.
+        Tracks to pack.
     fixed : mapping
-        All others, as they are shown.
+        All other tracks, as shown.
     tolerance : float
     feet : Feet
     slide : float
-        How much farther these may slide than before.
+        How much farther feet may slide than before.
     """
 
     def __init__(self, world: World, tracks: Tracks, fixed: Tracks, tolerance: float, feet: Feet, slide: float) -> None:
@@ -98,20 +99,20 @@ class Packing:
         )
         self.truth = world.worlds(world.truth, self.samples)
         self.users: Counter[bytes] = Counter()
-        """How many tracks have keys at the same times, by these."""
+        """Number of tracks by their key times."""
         self.sparse: dict[Target, bool] = {}
-        """Whether sparse keys are worth a trial."""
+        """Whether sparse keys are worth trying."""
 
     @cached_property
     def frames(self) -> np.ndarray:
-        """The moments as they may be stored."""
+        """The moments, as times that can be stored."""
         times = self.world.times
         exponent = max(TIME_EXPONENT, int(np.frexp(np.abs(times).max())[1]) - 23)
         return np.unique(np.ldexp(np.rint(np.ldexp(times, -exponent)), exponent))
 
     @cached_property
     def grids(self) -> list[np.ndarray]:
-        """Times of samples at even rates, the highest first: frames, every second of them..., and SAMPLE_STEPS_S."""
+        """Times of samples at even rates, finest first: all frames, every second and so on, and SAMPLE_STEPS_S."""
         first, last, frames = self.frames[0], self.frames[-1], self.frames
         gap = float(np.median(np.diff(frames)))
         even = [frames, *(np.append(frames[:-1:every], last) for every in (2, 3, 4, 5, 6, 8))]
@@ -121,12 +122,12 @@ class Packing:
 
     @cached_property
     def of_frames(self) -> list[np.ndarray]:
-        """Those of the grids that have keys on frames alone."""
+        """The grids with keys on frames only."""
         return [times for times in self.grids if np.isin(times, self.frames).all()]
 
     @cached_property
     def cuts(self) -> np.ndarray:
-        """The frames around sudden jumps, which keys at even rates would smooth away."""
+        """Frames around sudden jumps, which keys at even rates would smooth away."""
         frames, sudden = self.frames, np.zeros(len(self.frames))
         for target, track in self.tracks.items() if len(frames) > 2 * JUMP_FRAME_STRIDE else ():
             values = track.at(frames)
@@ -140,26 +141,26 @@ class Packing:
 
     @cached_property
     def bases(self) -> list[tuple[np.ndarray, float]]:
-        """Times of which sparse keys have some, and about how many bytes each of them takes."""
+        """Possible times of sparse keys, each with the approximate bytes per key time."""
         first, last, frames = self.frames[0], self.frames[-1], self.frames
         steps = np.union1d(np.append(np.arange(first, last - KEY_TIME_STEP_S / 8, KEY_TIME_STEP_S), last), self.cuts)
         return [(steps, OF_TIME[False]), (frames, OF_TIME[True])]
 
     @cached_property
     def turned(self) -> list[np.ndarray]:
-        """What each node's own rotation is, shapes (m, 4)."""
-        return [self._own(row, self.world.truth) for row in range(len(self.world.moving))]
+        """Each node's own rotation, shapes (m, 4)."""
+        return [self._own_rotations(row, self.world.truth) for row in range(len(self.world.moving))]
 
     @cached_property
     def aimed(self) -> list[np.ndarray]:
-        """Its rotation in the world."""
+        """Each node's rotation in world space."""
         result: list[np.ndarray] = []
         for row, parent in enumerate(self.world.parents.tolist()):
             result.append(multiply(self._resting(row) if parent < 0 else result[parent], self.turned[row]))
         return result
 
     def _resting(self, row: int) -> np.ndarray:
-        """Return how the parent of a node is turned in the world that does not move, shape (m, 4)."""
+        """Return the world rotation of a node's parent that does not move, shape (m, 4)."""
         parent = int(self.world.nodes.parents[self.world.moving[row]])
         own = np.array((1.0, 0.0, 0.0, 0.0))
         if parent >= 0:
@@ -167,18 +168,18 @@ class Packing:
             own = from_matrices((axes / np.linalg.norm(axes, axis=0))[None])[0]
         return np.broadcast_to(own, (len(self.samples), 4))
 
-    def _own(self, row: int, tracks: Tracks) -> np.ndarray:
+    def _own_rotations(self, row: int, tracks: Tracks) -> np.ndarray:
         own = self.world.nodes.channel(int(self.world.moving[row]), ROTATION, tracks, self.samples)
         return np.broadcast_to(normalise(own), (len(self.samples), 4))
 
     @cached_property
     def turns(self) -> list[bool]:
-        """Whether each node turns by a track that is packed."""
+        """Whether each node has a rotation track to pack."""
         return [(node, ROTATION) in self.tracks for node in self.world.moving.tolist()]
 
     @cached_property
     def carried(self) -> list[list[int]]:
-        """The nodes that each of them carries, without what these carry where they turn themselves."""
+        """The nodes that each node carries, down to and including the next nodes with a rotation track."""
         parents = self.world.parents.tolist()
         result: list[list[int]] = [[] for _ in self.turns]
         for row, parent in enumerate(parents):
@@ -189,7 +190,7 @@ class Packing:
 
     @cached_property
     def allowed(self) -> list[np.ndarray]:
-        """How far off each node may be, of what others may, shapes (m,): less while feet stand."""
+        """Factors on the allowed error of each node, shapes (m,): smaller while feet stand."""
         result = [np.broadcast_to(1.0, self.samples.shape)] * len(self.turns)
         for row, first, last in self.feet.spans.tolist() if np.isfinite(self.slide) else ():
             stands = (self.samples >= self.world.times[first]) & (self.samples <= self.world.times[last])
@@ -198,7 +199,7 @@ class Packing:
 
     @cached_property
     def depths(self) -> np.ndarray:
-        """How far down each node is on the longest way through it, from 0 for roots to 1, shape (n,)."""
+        """Relative depth of each node in the longest chain through it, from 0 at roots to 1 at ends, shape (n,)."""
         count, parents = len(self.world.moving), self.world.parents.tolist()
         above, below = np.zeros(count), np.zeros(count)
         for row, parent in enumerate(parents):
@@ -210,16 +211,16 @@ class Packing:
 
     @property
     def may_aim(self) -> bool:
-        """Whether rotations alone say how nodes are turned in the world."""
+        """Whether the rotations alone determine how nodes are turned in world space."""
         rest = self.world.nodes.rest[SCALE][self.world.moving]
         scales = [rest, *(track.points for (_, path), track in self.world.truth.items() if path == SCALE)]
         even = all(bool((np.ptp(some, axis=1) <= MAX_EVEN_SCALE_RATIO * some.min(axis=1)).all()) for some in scales)
         return even and not self.world.nodes.matrices
 
     def trials(self) -> Iterator[dict[Target, PackedKeys]]:
-        """Yield keys of all tracks that may keep to the tolerance, the smallest first; then ever more exact ones.
+        """Yield keys of all tracks that may stay within the tolerance, smallest first, then more exact ones.
 
-        None where no turn makes up for another.
+        Yields nothing if scales are uneven or nodes have matrices: then no rotation compensates for another.
         """
         if not self.may_aim:
             return
@@ -239,7 +240,7 @@ class Packing:
         return packed_size([*arrays, *(own.stored for own in keys.values())], range(len(arrays)))
 
     def _trial(self, shares: tuple[float, float], strict: float) -> dict[Target, PackedKeys]:
-        """Return keys of all tracks, where no node may be farther off than a strict share of the tolerance."""
+        """Return keys of all tracks, where the allowed error is the fraction `strict` of the tolerance."""
         world, keys, most = self.world, {}, strict * self.tolerance
         rotations: list[np.ndarray] = []
         off: list[np.ndarray] = []
@@ -257,15 +258,15 @@ class Packing:
                 aim = Aim(
                     self.samples, values - rotate(conjugate(above), here) / length, length / within, measure, False
                 )
-                keys[target] = own = self._best(target, aim)
+                keys[target] = own = self._smallest_keys(target, aim)
                 here = here + rotate(above, own.shown - values) * length
             off.append(here)
-            turned = self._own(row, self.fixed)
+            turned = self._own_rotations(row, self.fixed)
             if (target := (node, ROTATION)) in self.tracks:
                 within = float(allowed[row])
                 measure = partial(self._turn_off, row, above, here, within, most)
                 goal = align_signs(multiply(conjugate(above), self._turned_to(row, here)))
-                keys[target] = own = self._best(
+                keys[target] = own = self._smallest_keys(
                     target, Aim(self.samples, goal, 2.0 * self.lengths[row] / within, measure, True)
                 )
                 turned = own.shown
@@ -275,7 +276,7 @@ class Packing:
 
     @cached_property
     def lengths(self) -> np.ndarray:
-        """How long the longest bone of each node is, or the radius of its ball, shape (n,)."""
+        """The length of each node's longest bone, or the radius of its ball if larger, shape (n,)."""
         origins = self.truth.origins
         return np.array(
             [
@@ -294,7 +295,7 @@ class Packing:
         shown: np.ndarray,
         some: np.ndarray | slice,
     ) -> np.ndarray:
-        """Return how far off a node is whose translations these are, shape (k,); it is off by that besides (m, 3)."""
+        """Return the relative error of a node with these translations, shape (k,); `off` (m, 3) is the error so far."""
         there = off[some] + rotate(above[some], shown - values[some]) * self.world.longest_above[row]
         return np.linalg.norm(there, axis=1) / (within * self.allowed[row][some])
 
@@ -308,7 +309,7 @@ class Packing:
         shown: np.ndarray,
         some: np.ndarray | slice,
     ) -> np.ndarray:
-        """Return how far off a node is whose rotations these are, and what it carries, shape (k,)."""
+        """Return the relative error of a node with these rotations, and of what it carries, shape (k,)."""
         off, origins, radii = off[some], self.truth.origins, self.world.radii
         turn = multiply(multiply(above[some], shown), conjugate(self.aimed[row][some]))
         chord = 2.0 * np.linalg.norm(turn[:, 1:], axis=1)
@@ -324,7 +325,7 @@ class Packing:
         return result
 
     def _turned_to(self, row: int, off: np.ndarray) -> np.ndarray:
-        """Return how a node is to turn so that what it carries is where it should, if it is off by that (m, 3)."""
+        """Return the rotation of a node that puts what it carries in the right place, if the node is off by `off`."""
         origins, radii = self.truth.origins, self.world.radii
         carried = self.carried[row]
         if not carried or not off.any():
@@ -339,10 +340,10 @@ class Packing:
         turn = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
         return normalise(multiply(np.column_stack((np.ones(len(off)), turn / 2.0)), self.aimed[row]))
 
-    def _best(self, target: Target, aim: Aim) -> PackedKeys:
-        """Return the keys that take the fewest bytes, of those that are tried.
+    def _smallest_keys(self, target: Target, aim: Aim) -> PackedKeys:
+        """Return the keys with the fewest bytes among those tried.
 
-        What carries others that turn has keys on frames alone: those have to make up for it on frames.
+        Nodes that carry turning nodes have keys on frames only: the children compensate for them on frames.
         """
         one, row = self.frames[:1], self.world.rows[target[0]]
         if not aim.failing(one) and (own := aim.keys(one, SINGLE_KEY)) is not None:
@@ -350,11 +351,13 @@ class Packing:
         is_free = not any(self.turns[child] for child in self.carried[row])
         found, low, grids = [], 0, self.grids if is_free else self.of_frames
         high = len(grids)
-        while low < high:  # How many of the grids are fine enough.
+        while low < high:  # Find how many of the grids are fine enough.
             middle = (low + high) // 2
             low, high = (middle + 1, high) if aim.failing(grids[middle]) < MAX_FAR_SAMPLES_RATIO else (low, middle)
-        found += [(aim.keys(times, SHARED_TIMES), self._dear(times)) for times in grids[max(low - 4, 0) : low]]
-        found += self._mended(aim, grids, low)
+        found += [
+            (aim.keys(times, SHARED_TIMES), self._shared_time_bytes(times)) for times in grids[max(low - 4, 0) : low]
+        ]
+        found += self._with_inserted_keys(aim, grids, low)
         if self.sparse.setdefault(target, True):
             found += self._sparse(aim, self.bases if is_free else self.bases[1:])
         good = [(own.size + dear, own) for own, dear in found if own is not None]
@@ -366,8 +369,10 @@ class Packing:
         )
         return best
 
-    def _mended(self, aim: Aim, grids: list[np.ndarray], low: int) -> Iterator[tuple[PackedKeys | None, float]]:
-        """Yield keys of grids that are too coarse in few places, with all frames there, as `_sparse` does."""
+    def _with_inserted_keys(
+        self, aim: Aim, grids: list[np.ndarray], low: int
+    ) -> Iterator[tuple[PackedKeys | None, float]]:
+        """Yield keys of grids that are too coarse in few places, with the frames there added; see `_sparse`."""
         high = len(grids)
         while low < high:
             middle = (low + high) // 2
@@ -392,8 +397,8 @@ class Packing:
                     yield own, each * len(times)
                     break
 
-    def _dear(self, times: np.ndarray) -> float:
-        """About how many bytes of times a track takes that shares these."""
+    def _shared_time_bytes(self, times: np.ndarray) -> float:
+        """Return about how many bytes the key times take for one track, if it shares them with others."""
         return OF_RATE * len(times) / max(self.users[times.tobytes()], 1 + len(self.tracks) / 6)
 
 

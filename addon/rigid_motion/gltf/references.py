@@ -1,8 +1,8 @@
-"""What names accessors and views of buffers in a glTF document: the places that are known, and what may be others.
+"""References to accessors and buffer views in a glTF document: known places, and numbers that may be references.
 
-Extensions that are not known here may name them in ways of their own. Any whole number in what they say may be that of
-an accessor or a view, so nothing is renumbered beside them, and what has such a number stays with all of its bytes.
-Where they name a buffer, no byte of any goes. `extras` name nothing: they are of applications, not of the format.
+Unknown extensions may refer to them in their own way. Any integer in their content may be the number of an accessor or
+a view, so with such extensions nothing is renumbered, and anything with such a number keeps all of its bytes. If such
+an extension names a buffer, no bytes are removed. `extras` contain no references: they belong to applications.
 Source: the registry of glTF extensions, Khronos 2025.
 """
 
@@ -25,26 +25,26 @@ KNOWN_REFERENCES = re.compile(
     "|MSFT_(?:lod|texture_dds|packing_.*)|FB_ngon_encoding|VRM"
     "|VRMC_(?:vrm|vrm_animation|node_constraint|springBone|springBone_extended_collider|materials_.*)"
 )
-"""Extensions that name no accessors but by `INSTANCING_EXTENSION`, and views as `bufferView` alone."""
+"""Extensions that refer to accessors only by `INSTANCING_EXTENSION`, and to views only as `bufferView`."""
 
 NO_ANIMATION = -1
-"""What is no animation, or a channel that moves no node."""
+"""Stands for any user of an accessor other than animation channels that move nodes."""
 
 NUMBER_PATTERN = re.compile(r"(?<!\d)\d{1,9}(?!\d)")
 
 Slot = tuple[Json, str]
-"""A place that names something: what it is in, and by which key."""
+"""A place with a reference: its container and key."""
 
 
 def sampler_slots(json: Json) -> Iterator[Slot]:
-    """Yield every place of animations that names an accessor."""
+    """Yield all places in animations that name an accessor."""
     for animation in objects(json, "animations"):
         for sampler in objects(animation, "samplers"):
             yield from ((sampler, key) for key in ("input", "output"))
 
 
 def other_slots(json: Json) -> Iterator[Slot]:
-    """Yield every other place that does."""
+    """Yield all other known places that name an accessor."""
     for mesh in objects(json, "meshes"):
         for primitive in objects(mesh, "primitives"):
             if "indices" in primitive:
@@ -60,7 +60,7 @@ def other_slots(json: Json) -> Iterator[Slot]:
 
 
 def view_slots(json: Json) -> Iterator[Slot]:
-    """Yield every place that names a view, in extensions as well: all that are known name it alike."""
+    """Yield all places that name a view, including in extensions: all known ones use the same key."""
     waiting: list[Any] = [json]
     while waiting:
         part = waiting.pop()
@@ -73,7 +73,7 @@ def view_slots(json: Json) -> Iterator[Slot]:
 
 
 def unknown(part: Any) -> Iterator[Any]:
-    """Yield what extensions say that are not known here."""
+    """Yield the contents of unknown extensions."""
     waiting = [part]
     while waiting:
         part = waiting.pop()
@@ -88,16 +88,16 @@ def unknown(part: Any) -> Iterator[Any]:
 
 
 class References:
-    """Who names the accessors of a document, and what nobody may touch in it."""
+    """Users of the accessors of a document, and the numbers that must not change."""
 
     def __init__(self, json: Json) -> None:
         self.unclear: set[int] = set()
-        """Numbers that an extension names which is not known: of accessors, of views, or of something else."""
+        """Numbers in unknown extensions: they may be accessors, views, or something else."""
         self.buffers_are_named = False
-        """Whether such an extension says where bytes are."""
-        self._look_at(list(unknown(json)))
+        """Whether an unknown extension names a buffer."""
+        self._collect_numbers(list(unknown(json)))
         self.users: dict[int, set[int]] = defaultdict(set)
-        """By the number of an accessor: the animations where tracks may take its place, and NO_ANIMATION."""
+        """By accessor number: the animations whose tracks may be replaced, and NO_ANIMATION for other users."""
         for container, key in other_slots(json):
             self.users[container[key]].add(NO_ANIMATION)
         for number in self.unclear:
@@ -111,7 +111,7 @@ class References:
                     if sampler_number in stay:
                         self.users[sampler[key]].add(NO_ANIMATION)
 
-    def _look_at(self, waiting: list[Any]) -> None:
+    def _collect_numbers(self, waiting: list[Any]) -> None:
         while waiting:
             part = waiting.pop()
             if isinstance(part, dict):

@@ -1,10 +1,10 @@
-"""Documents with other animations: nothing else changes but the numbers of accessors, views and where bytes are.
+"""Replacing the animations of a glTF document: nothing else changes but numbers of accessors and views, and offsets.
 
-What animations alone used goes out of the buffers, also out of views that meshes are in, and what they use now comes in
-behind the rest, in one view. Views and images that stay have the same bytes. Of files with extensions that are not
-known here, see `references`.
+Bytes that only animations used are removed from the buffers, also from views shared with meshes. The new ones are
+appended at the end, in one view. Views and images that stay have the same bytes. For files with unknown extensions see
+`references`.
 
-How tracks are stored, what they show then, and how many bytes that takes, is told as well.
+This module also converts tracks to their stored form and back, and computes their sizes in bytes.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from .references import NO_ANIMATION, References, Slot, other_slots, sampler_slo
 from .tracks import CUBICSPLINE, LINEAR, NUMBERS_PER_KEY, ROTATION, TO_WXYZ, TO_XYZW, WEIGHTS, Clip, Track, moves_node
 
 ALIGNMENT_BYTES = 8
-"""Bytes go out of buffers in multiples of it, so that what stays is aligned as it was."""
+"""Bytes are removed in multiples of this, so that the rest stays aligned."""
 
 Range = tuple[int, int]
-"""The first byte, and that behind the last."""
+"""First byte and end (exclusive)."""
 
 Ranges = dict[int, list[Range]]
-"""By the number of a buffer."""
+"""Byte ranges by buffer number."""
 
 MAX_INT16 = np.iinfo(np.int16).max
-"""What stands for 1 where 16-bit integers are normalised."""
+"""Value that stands for 1 in normalised 16-bit integers."""
 
 FLOAT_BYTES, SHORT_BYTES = 4, 2
-"""Bytes."""
+"""Bytes of a float and of a 16-bit integer."""
 
 
 @dataclass(frozen=True, eq=False)
 class StoredTrack:
-    """A track as it is to be stored, for a channel of an animation."""
+    """A track in stored form, for a channel of an animation."""
 
     channel: int
     interpolation: str
@@ -51,22 +51,21 @@ class StoredTrack:
     """Shape (n,), float32."""
 
     values: np.ndarray
-    """Shape (rows, columns), float32 or int16, which is normalised; quaternions are x, y, z, w."""
+    """Shape (rows, columns), float32 or normalised int16; quaternions are x, y, z, w."""
 
     @property
     def accessors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of keys and of values, each (count, columns)."""
+        """Arrays (count, columns) for the accessors of key times and of values."""
         return self.times[:, None], self.values
 
 
 def with_tracks(
     document: Document, references: References, tracks: Mapping[int, Sequence[StoredTrack]]
 ) -> tuple[Document, frozenset[int]]:
-    """Return the document with these tracks in its animations, by their numbers, and those that have theirs.
+    """Return the document with these tracks by animation number, and the numbers of the changed animations.
 
-    Animations with extensions that are not known stay as they are. Channels of the others that are not among the tracks
-    go, but for those that move no node or that extensions define. What several animations share goes with the last of
-    them that uses it.
+    Animations with unknown extensions stay unchanged. In the others, channels without a new track are removed, except
+    channels that move no node or belong to extensions. Data shared by several animations is removed with the last user.
     """
     animations = objects(document.json, "animations")
     chosen = {number: new for number, new in tracks.items() if not any(unknown(animations[number]))}
@@ -81,13 +80,13 @@ class _Rewriting:
         self.accessors, self.views = self.json["accessors"], self.json["bufferViews"]
         self.first_new = len(document.json.get("accessors", ()))
         self.view_users: dict[int, list[int]] = defaultdict(list)
-        """By the number of a view: the accessors in it, and ELSEWHERE for all else that names it."""
+        """By view number: the accessors in it, and NO_ANIMATION for anything else that names it."""
         of_accessors = [(slot, number) for number, part in enumerate(self.accessors) for slot in view_slots(part)]
         owners = {id(container): number for (container, _), number in of_accessors}
         for container, key in view_slots(self.json):
             self.view_users[container[key]].append(owners.get(id(container), NO_ANIMATION))
         for number, animation_tracks in tracks.items():
-            self._put(objects(self.json, "animations")[number], animation_tracks)
+            self._set_tracks(objects(self.json, "animations")[number], animation_tracks)
         used_after = {container[key] for container, key in sampler_slots(self.json)}
         self.unused = {
             number for number, users in references.users.items() if users <= set(tracks) and number not in used_after
@@ -97,13 +96,13 @@ class _Rewriting:
         removed = self._views_that_go()
         slots = [*sampler_slots(self.json), *other_slots(self.json)]
         document = self._with_bytes(removed)
-        self._take_out("accessors", self.unused, slots, {"componentType": 5126, "count": 1, "type": "SCALAR"})
+        self._remove_entries("accessors", self.unused, slots, {"componentType": 5126, "count": 1, "type": "SCALAR"})
         nothing = {"buffer": self.view.json["buffer"], "byteLength": 1}
-        self._take_out("bufferViews", removed, list(view_slots(self.json)), nothing)
+        self._remove_entries("bufferViews", removed, list(view_slots(self.json)), nothing)
         return document
 
-    def _put(self, animation: Json, tracks: Sequence[StoredTrack]) -> None:
-        """Give an animation these tracks and no others."""
+    def _set_tracks(self, animation: Json, tracks: Sequence[StoredTrack]) -> None:
+        """Replace the tracks of an animation by these."""
         new = {track.channel: track for track in tracks}
         channels: list[Json] = []
         samplers: list[Json] = []
@@ -114,7 +113,7 @@ class _Rewriting:
                 times, values = new[number].accessors
                 sampler |= {"input": self.view.add(times, bounds=True), "output": self.view.add(values)}
                 sampler["interpolation"] = new[number].interpolation
-                if sampler["interpolation"] == LINEAR:  # goes without saying
+                if sampler["interpolation"] == LINEAR:  # The default of glTF.
                     del sampler["interpolation"]
             elif moves_node(channel["target"]):
                 continue
@@ -125,12 +124,12 @@ class _Rewriting:
         animation["channels"], animation["samplers"] = channels, samplers
 
     def _views_that_go(self) -> set[int]:
-        """Return the views in which there is nothing but numbers that are not used any more."""
+        """Return the views that contain only unused numbers."""
         views = self.view_users.keys() - self.references.unclear
         return {view for view in views if self.unused.issuperset(self.view_users[view])}
 
-    def _take_out(self, name: str, unused: set[int], slots: list[Slot], nothing: Json) -> None:
-        """Take entries out of a list, and say so wherever others are named, or have nothing in their places."""
+    def _remove_entries(self, name: str, unused: set[int], slots: list[Slot], nothing: Json) -> None:
+        """Remove entries from a list and update all references, or put `nothing` in their places."""
         listed = self.json[name]
         if self.references.unclear:
             for number in unused:
@@ -146,7 +145,7 @@ class _Rewriting:
             del self.json[name]
 
     def _with_bytes(self, removed: set[int]) -> Document:
-        """Return the document with its bytes: without those that are not used any more, and with the new ones."""
+        """Return the document with its bytes: unused bytes removed, new bytes added."""
         contents: list[Any] = list(self.before.buffers)
         goes, stays = self._ranges(removed)
         target = max(
@@ -155,7 +154,7 @@ class _Rewriting:
             default=len(contents),
         )
         if target == len(contents):
-            # A first buffer may be that inside of a GLB.
+            # A first buffer may be the one inside the GLB.
             has_room = self.before.chunks is not None and not contents
             self.json.setdefault("buffers", []).append({"byteLength": 0} | ({} if has_room else {"uri": data_uri(b"")}))
             contents.append(b"")
@@ -164,9 +163,9 @@ class _Rewriting:
             buffer: [] if self.references.buffers_are_named else _cuts(goes.get(buffer, []), stays.get(buffer, []))
             for buffer in changed
         }
-        self._close_up(cuts)
+        self._update_offsets(cuts)
         for buffer in changed:
-            contents[buffer] = _without(contents[buffer], cuts[buffer])
+            contents[buffer] = _without_ranges(contents[buffer], cuts[buffer])
         view = self.view.json
         view |= {"buffer": target, "byteLength": len(self.view.data)}
         padded = contents[target] + bytes(-len(contents[target]) % ALIGNMENT_BYTES)
@@ -188,7 +187,7 @@ class _Rewriting:
         )
 
     def _ranges(self, removed: set[int]) -> tuple[Ranges, Ranges]:
-        """Return what may go of each buffer and what stays, which may be the same."""
+        """Return for each buffer the ranges that may be removed and the ranges that stay; they may overlap."""
         goes: Ranges = defaultdict(list)
         stays: Ranges = defaultdict(list)
         for number, view in enumerate(self.views[:-1]):
@@ -210,8 +209,8 @@ class _Rewriting:
                     ]
         return goes, stays
 
-    def _close_up(self, cuts: Ranges) -> None:
-        """Say where all is once these bytes have gone out of buffers."""
+    def _update_offsets(self, cuts: Ranges) -> None:
+        """Update all offsets and lengths for these bytes removed from buffers."""
         moved = {buffer: _Moved(ranges) for buffer, ranges in cuts.items() if ranges}
         for accessor in self.accessors[: self.first_new]:
             for part, _ in view_slots(accessor):
@@ -229,7 +228,7 @@ class _Rewriting:
 
 
 class _Moved:
-    """Where bytes of a buffer are once some are gone: by where they were."""
+    """New offsets in a buffer after ranges have been removed, by old offset."""
 
     def __init__(self, cuts: list[Range]) -> None:
         self.firsts, self.ends = ([cut[side] for cut in cuts] for side in (0, 1))
@@ -246,7 +245,7 @@ def _set_offset(part: Json, offset: int) -> None:
 
 
 def _spans(view: Json) -> Iterator[Json]:
-    """Yield what names bytes of a buffer: a view, and the compressed form of it."""
+    """Yield the parts of a view that name bytes of a buffer: the view itself, and its compressed form."""
     yield view
     for extension in view.get("extensions", {}).values():
         if isinstance(extension, dict) and {"buffer", "byteLength"} <= extension.keys():
@@ -259,7 +258,7 @@ def _range(view: Json) -> Range:
 
 
 def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
-    """Return what can go out of a buffer: ranges without those that stay, aligned, rising."""
+    """Return the ranges that can be removed from a buffer: without the kept ranges, aligned, rising."""
     edges = sorted({offset for some in (removed, kept) for item in some for offset in item})
     if not edges:
         return []
@@ -271,7 +270,7 @@ def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
             counts[row, np.searchsorted(offsets, end)] -= 1
     goes, stays = np.cumsum(counts, axis=1) > 0
     free = goes & ~stays
-    # Padding between two ranges that go, which nothing names, goes with them.
+    # Padding between two removed ranges, which nothing refers to, is removed with them.
     free[1:-1] |= ~stays[1:-1] & free[:-2] & free[2:] & (np.diff(offsets)[1:] < ALIGNMENT_BYTES)
     result: list[Range] = []
     for first, end in zip(offsets[:-1][free[:-1]].tolist(), offsets[1:][free[:-1]].tolist(), strict=True):
@@ -285,14 +284,14 @@ def _cuts(removed: list[Range], kept: list[Range]) -> list[Range]:
     return [(first, end) for first, end in aligned if first < end]
 
 
-def _without(data: bytes | FileBytes, cuts: list[Range]) -> bytes:
+def _without_ranges(data: bytes | FileBytes, cuts: list[Range]) -> bytes:
     begins, ends = [0, *(end for _, end in cuts)], [*(first for first, _ in cuts), len(data)]
     return b"".join(bytes(data[first:end]) for first, end in zip(begins, ends, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
 class EveryKey:
-    """The values of a track with a key at all of these times (n,), as they are shown: like an array (n, width)."""
+    """Values as shown by a track with a key at each of these times (n,): like an array (n, width)."""
 
     track: Track
     times: np.ndarray
@@ -305,17 +304,17 @@ class EveryKey:
 
 @dataclass(frozen=True)
 class Amount:
-    """How much there is of a clip."""
+    """The keys and bytes of a clip."""
 
     keys: int
-    """Of all channels together."""
+    """Number of keys of all channels together."""
 
     size: int
     """Bytes of key times and values."""
 
 
 def stored(track: Track, *, integers: bool) -> StoredTrack:
-    """Return a track as it is stored; rotations as 16-bit integers where these are asked for."""
+    """Return a track in stored form, rotations as 16-bit integers if `integers` is set."""
     values = track.values[..., TO_XYZW] if track.path == ROTATION else track.values
     values = values.reshape(-1, 1 if track.path == WEIGHTS else values.shape[-1])
     if integers and track.path == ROTATION and track.interpolation == LINEAR:
@@ -326,7 +325,7 @@ def stored(track: Track, *, integers: bool) -> StoredTrack:
 
 
 def shown(track: Track, stored: StoredTrack) -> Track:
-    """Return what is shown by a track as it is stored."""
+    """Return the track that is shown for a stored track."""
     values = denormalised(stored.values) if stored.values.dtype.kind == "i" else stored.values.astype(np.float64)
     values = values.reshape(
         (len(stored.times), 3, -1) if stored.interpolation == CUBICSPLINE else (len(stored.times), -1)
@@ -337,12 +336,12 @@ def shown(track: Track, stored: StoredTrack) -> Track:
 
 
 def key_size(path: str, *, integers: bool) -> int:
-    """Return the bytes of the value of a key of rotation or translation."""
+    """Return the bytes of one key's value, for rotation or translation."""
     return (SHORT_BYTES if integers and path == ROTATION else FLOAT_BYTES) * NUMBERS_PER_KEY[path]
 
 
 def amount(tracks: Iterable[StoredTrack]) -> Amount:
-    """Keys and bytes of tracks that are to be stored; what is the same is stored once."""
+    """Return keys and bytes of stored tracks; equal arrays are stored once."""
     tracks = tuple(tracks)
     parts = {(part.dtype.str, part.tobytes()) for track in tracks for part in track.accessors}
     return Amount(sum(len(track.times) for track in tracks), sum(len(content) for _, content in parts))
@@ -351,9 +350,9 @@ def amount(tracks: Iterable[StoredTrack]) -> Amount:
 def amount_before(
     document: Document, references: References, clip: Clip, shares: Mapping[int, float] | None = None
 ) -> Amount:
-    """Keys and bytes of the tracks of a clip as it is in the file, without bytes that other things use as well.
+    """Return keys and bytes of the tracks of a clip in the file, without bytes that other things use as well.
 
-    Of views that are compressed, what `shares` says by their numbers.
+    Bytes in compressed views are scaled by `shares`, by view number.
     """
     animation = document.json["animations"][clip.number]
     samplers = [animation["samplers"][animation["channels"][track.channel]["sampler"]] for track in clip.tracks]

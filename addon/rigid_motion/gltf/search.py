@@ -1,8 +1,8 @@
-"""Few keys for the nodes of a clip, found by the search for keys of bodies.
+"""Search for few keys for the nodes of a clip, using the key search for bodies.
 
-That search knows joints of one size. So nodes are taken as they are large in the world: their translations along the
-axes of their parents are as long as these make them. It is the same motion where scales do not change and are even,
-and near to it otherwise: what is promised is proven afterwards, on the nodes themselves.
+That search assumes joints without scale. So nodes are used at their world size: translations are multiplied by the
+world length of the parent's axes. The motion is the same if scales are constant and even, and similar otherwise: the
+tolerance is proven afterwards, on the nodes themselves.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .errors import World
 from .tracks import ROTATION, TRANSLATION, Tracks
 
 GLTF_MODE = "lerp_slerp"
-"""What glTF calls LINEAR."""
+"""The interpolation that glTF calls LINEAR."""
 
 
 class NodeSearch:
@@ -30,18 +30,18 @@ class NodeSearch:
     ----------
     world : World
     tracks : mapping
-        The tracks that are to have fewer keys, which may be less noisy than the truth.
+        Tracks that will have fewer keys; they may be less noisy than the truth.
     fixed : array of bool, shape (n,)
-        Nodes whose keys are not asked for.
+        Nodes that need no keys.
     run : callable
-        What has stretches searched.
+        Runs the search over stretches.
     """
 
     def __init__(self, world: World, tracks: Tracks, fixed: np.ndarray, run: Run) -> None:
         self.world, self.tracks, self.fixed, self.run = world, tracks, fixed, run
 
     def keys(self, tolerance: float) -> tuple[SeparateKeys, ...]:
-        """Return the samples that are keys of each node."""
+        """Return the key samples of each node."""
         world = self.world
         if len(world.stretches) == 1:
             keys = self._reduced(ALL_ROWS, tolerance=tolerance, separate=True, fixed=self.fixed)
@@ -58,12 +58,12 @@ class NodeSearch:
         return cast(tuple[SeparateKeys, ...], keys)
 
     def key_poses(self, tolerance: float) -> np.ndarray:
-        """Return the samples that are keys of all nodes, those where stretches meet among them."""
+        """Return the key samples shared by all nodes, including those where stretches meet."""
         result = [some.start + self._shared(some, tolerance=tolerance) for some in self.world.stretches]
         return np.unique(np.concatenate(result))
 
     def so_many_key_poses(self, count: int, weights: np.ndarray) -> np.ndarray:
-        """Return the samples that are keys of all nodes, whose errors count so many times (n, m)."""
+        """Return `count` key samples shared by all nodes, with errors multiplied by `weights` (n, m)."""
         return self._shared(ALL_ROWS, budget=min(count, len(self.world.times)), weights=weights)
 
     def _shared(self, samples: slice, **options: Any) -> np.ndarray:
@@ -75,7 +75,7 @@ class NodeSearch:
         return reduce_skeleton_keys(times, poses, world.parents, GLTF_MODE, radius=world.radii, **options)
 
     def poses(self, samples: slice) -> Poses:
-        """Return those of the nodes at some of the moments."""
+        """Return the poses of the nodes at some of the moments."""
         world, times = self.world, self.world.times[samples]
         shape = (len(world.moving), len(times))
         positions, quaternions = np.empty((*shape, 3)), np.empty((*shape, 4))

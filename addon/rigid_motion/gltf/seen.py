@@ -1,8 +1,8 @@
-"""What is seen of a glTF document: how far what nodes carry reaches, how far morph targets move it.
+"""Geometry that the nodes of a glTF document carry: its extent around each node, and displacement by morph targets.
 
-A node carries its mesh and the instances of it; a joint carries every vertex of skins that has a weight of it. Of a
-mesh that is compressed the bounds of its accessors count, and any joint may carry all of it. Lengths are in the unit of
-the document, which glTF means to be the metre, and in the node's own space, before its scale, unless said otherwise.
+A node carries its mesh and instances; a joint carries all vertices of skins with a weight for it. For compressed meshes
+the bounds of their accessors count, and any joint may carry the whole mesh. Lengths are in the document's unit, which
+glTF defines as the metre, and in the node's own space, before its scale, unless said otherwise.
 Source: the glTF 2.0 specification, Khronos 2021, sections 3.7 and 3.8; EXT_mesh_gpu_instancing.
 """
 
@@ -24,7 +24,7 @@ from .references import INSTANCING_EXTENSION
 from .tracks import CUBICSPLINE, TO_WXYZ, WEIGHTS, Clip, Track
 
 MAX_CUBIC_OVERSHOOT = 4.0 / 27.0
-"""How far a cubic leaves its end values, at most, for a tangent of 1 at one end."""
+"""Largest overshoot of a cubic beyond its end values, for a tangent of 1 at one end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,31 +32,31 @@ class Morph:
     """How far the morph targets of a node's mesh move its vertices."""
 
     deltas: np.ndarray
-    """The farthest that any vertex is moved by a weight of 1, in the space of the mesh, shape (targets,)."""
+    """Largest displacement of any vertex by a weight of 1, in the space of the mesh, shape (targets,)."""
 
     carriers: np.ndarray
     """The nodes that carry the vertices, shape (c,)."""
 
     factors: np.ndarray
-    """By how much the mesh is larger in the spaces of the carriers, shape (c,)."""
+    """Scale factors of the mesh in the spaces of the carriers, shape (c,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What the nodes of a document carry."""
+    """The geometry that the nodes of a document carry."""
 
     reaches: np.ndarray
-    """The distance of the farthest vertex that each node carries from its origin, shape (nodes,); 0 without any."""
+    """Distance of the farthest vertex carried by each node from its origin, shape (nodes,); 0 without vertices."""
 
     boxes: np.ndarray
-    """The lowest and highest coordinates of these without morph targets, shape (2, nodes, 3); infinite without any."""
+    """Lowest and highest coordinates of carried vertices, without morph targets, shape (2, nodes, 3); else infinite."""
 
     morphs: dict[int, Morph]
     """By node."""
 
     @classmethod
     def of(cls, nodes: Nodes, clips: Iterable[Clip]) -> Seen:
-        """Return what nodes carry, with morph targets as far as any of these clips takes them."""
+        """Return the geometry of nodes, with morph targets as far as any of these clips moves them."""
         document, count = nodes.document, len(nodes.parents)
         boxes = np.full((2, count, 3), np.inf)
         boxes[1] = -np.inf
@@ -75,7 +75,7 @@ class Seen:
         return result
 
     def add(self, document: Document, number: int, weights: np.ndarray) -> None:
-        """Add the mesh of a node, with weights of its morph targets of up to so much (targets,)."""
+        """Add the mesh of a node, with these largest weights (targets,) of its morph targets."""
         node, deltas = document.json["nodes"][number], np.zeros(len(weights))
         factors: dict[int, float] = {}
         primitives = objects(entry(document.json, "meshes", node["mesh"]), "primitives")
@@ -104,13 +104,13 @@ class Seen:
             self.morphs[number] = Morph(deltas, np.array([*factors]), np.array([*factors.values()]))
 
     def add_alike(self, number: int, first: int) -> None:
-        """Add to a node what another one carries, whose mesh is the same."""
+        """Add the geometry of another node with the same mesh to a node."""
         self.reaches[number], self.boxes[:, number] = self.reaches[first], self.boxes[:, first]
         if first in self.morphs:
             self.morphs[number] = replace(self.morphs[first], carriers=np.array([number]))
 
     def is_same(self, other: Seen) -> bool:
-        """Whether the nodes of another document carry the same, number by number."""
+        """Whether the nodes of another document carry the same geometry, number by number."""
         mine, theirs = (
             [some.reaches, some.boxes, *(array for morph in some.morphs.values() for array in vars(morph).values())]
             for some in (self, other)
@@ -124,7 +124,7 @@ def corners_of(low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def _largest_weights(nodes: Nodes, number: int, tracks: list[Track]) -> np.ndarray:
-    """How large the weights of a node's morph targets get, shape (targets,)."""
+    """Return the largest weights of a node's morph targets, shape (targets,)."""
     result = np.abs(nodes.rest_of(number, WEIGHTS))
     for track in tracks:
         values = np.abs(track.points)
@@ -139,9 +139,9 @@ def _largest_weights(nodes: Nodes, number: int, tracks: list[Track]) -> np.ndarr
 
 
 def _carried(document: Document, number: int, primitive: Json) -> Iterator[tuple[int, Any, AffineMaps]]:
-    """Yield what carries vertices of a node's mesh: a node, which vertices, and the maps from the mesh to the node.
+    """Yield the carriers of vertices of a node's mesh: node, indices of the vertices, and maps from mesh to node.
 
-    The maps are of shape (1, 1), or (instances, 1).
+    The maps have shape (1, 1), or (instances, 1).
     """
     node = document.json["nodes"][number]
     if "skin" not in node:
@@ -156,12 +156,12 @@ def _carried(document: Document, number: int, primitive: Json) -> Iterator[tuple
     maps, attributes = AffineMaps(inverse[:, :3, :3], inverse[:, :3, 3]), primitive["attributes"]
     names = [name for name in attributes if name.startswith("JOINTS_")]
     if any(_is_compressed(document, attributes[name]) for name in names):
-        # Any joint may carry all of it.
+        # Any joint may carry the whole mesh.
         yield from ((joint, ALL_ROWS, maps[[row], None]) for row, joint in enumerate(joints.tolist()))
     elif names:
         of_joints = np.hstack([raw_numbers(document, attributes[name]) for name in names]).astype(np.int64)
         shares = np.hstack([numbers(document, attributes[name.replace("JOINTS", "WEIGHTS")]) for name in names])
-        shares[~shares.any(axis=1), 0] = 1.0  # What nothing carries goes with its first joint.
+        shares[~shares.any(axis=1), 0] = 1.0  # Vertices without weights go with their first joint.
         vertices, columns = np.nonzero(shares)
         rows = of_joints[vertices, columns]
         order = np.argsort(rows, kind="stable")
@@ -175,7 +175,7 @@ def _has_instances(node: Json) -> bool:
 
 
 def _instances(document: Document, node: Json) -> AffineMaps:
-    """Where instances of a node's mesh are in its space, shape (instances, 1); itself, where there are none."""
+    """Return the transforms of instances of a node's mesh in its space, shape (instances, 1); identity without any."""
     attributes = node["extensions"][INSTANCING_EXTENSION]["attributes"] if _has_instances(node) else {}
     given = {name: numbers(document, accessor) for name, accessor in attributes.items() if not name.startswith("_")}
     count = max(map(len, given.values()), default=1)
@@ -187,7 +187,7 @@ def _instances(document: Document, node: Json) -> AffineMaps:
 
 
 def _is_compressed(document: Document, accessor: object) -> bool:
-    """Whether the numbers of an accessor of a mesh are where they cannot be read: by Draco or meshopt."""
+    """Whether the numbers of a mesh accessor cannot be read because Draco or meshopt compressed them."""
     described = entry(document.json, "accessors", accessor)
     if "bufferView" not in described:
         return "sparse" not in described

@@ -1,6 +1,6 @@
-"""What of a clip needs no search for keys: channels that are constant, stepped, or depend on nothing else.
+"""Channels of a clip that need no key search: constant, stepped, or with no influence on other channels.
 
-Channels share key times where that saves bytes.
+Also finds channels that should share key times to save bytes.
 """
 
 from __future__ import annotations
@@ -18,34 +18,34 @@ TIME_BYTES = 4
 """Bytes of a key's time."""
 
 AT_ONCE = 2**13
-"""Samples that are looked at in one go."""
+"""Samples processed in one go."""
 
 MAX_CONSTANT_RATIO = 0.01
-"""A channel that changes by less than this share of the tolerance is constant."""
+"""A channel is constant if its effect stays below this fraction of the tolerance."""
 
 OF_CHANNELS = 0.1
-"""The share of the tolerance that a channel of scales or weights may take."""
+"""Fraction of the tolerance that a channel of scales or weights may use."""
 
 WITHIN_WEIGHTS = 0.005
-"""How far off weights of morph targets may be: half a percent of the whole target."""
+"""Largest error of morph target weights: half a percent of the whole target."""
 
 MAX_GAP_TURN_RAD = np.radians(15.0)
-"""A gap between samples in which a node turns farther is halved: what hangs on it runs in a bow."""
+"""Gaps between samples in which a node turns farther are halved: its descendants move on an arc."""
 
 MAX_BOW_RATIO = 0.02
-"""The share of the tolerance by which a spline may leave the line between two samples."""
+"""Largest distance of a spline from the line between two samples, as a fraction of the tolerance."""
 
 MAX_GAP_HALVINGS = 8
 
 MIN_SAMPLES_PER_SPLINE_KEY = 20
-"""Samples for each key of a spline: one that needs more takes fewer bytes as a spline than as lines."""
+"""Samples per key of a spline: a spline that needs more takes fewer bytes as a spline than as lines."""
 
 Measure = Callable[[np.ndarray], np.ndarray]
-"""From differences of values (m, width) to how much of what is allowed they are, shape (m,)."""
+"""Function of value differences (m, width): returns the fraction of the allowed error, shape (m,)."""
 
 
 def on_lines(times: np.ndarray, values: np.ndarray, measure: Measure, within: float) -> np.ndarray:
-    """Return the keys that straight lines need to stay within a distance of values (n, width), rising, shape (k,).
+    """Return the rising keys (k,) with which straight lines stay within a distance of values (n, width).
 
     From each key the line goes as far as it can.
     """
@@ -69,15 +69,16 @@ def on_lines(times: np.ndarray, values: np.ndarray, measure: Measure, within: fl
 
 
 def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int) -> list[np.ndarray]:
-    """Keys of channels, with more of them where channels that then have the same need fewer bytes for their times.
+    """Return the keys of channels, with keys added where sharing times with another channel saves bytes.
 
     Parameters
     ----------
     keys : sequence of array of int
-        Which of so many samples are keys of each channel.
+        Key samples of each channel.
     widths : sequence of int
-        The bytes of a key's value.
+        Bytes of a key's value, for each channel.
     samples : int
+        Number of samples.
 
     Returns
     -------
@@ -91,7 +92,7 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
     counts, sizes = marked.sum(axis=1), np.array(widths, dtype=np.float64)
 
     def in_common(rows: np.ndarray) -> np.ndarray:
-        """How many keys each channel has that are among those of the rows."""
+        """Return how many keys each channel has in common with the rows."""
         result = np.zeros((len(marked), *rows.shape[:-1]))
         for first in range(0, samples, AT_ONCE):
             some = slice(first, first + AT_ONCE)
@@ -101,7 +102,7 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
     both = in_common(marked)
 
     def saved(first: int) -> np.ndarray:
-        """Return the bytes that each other group needs less together with this one."""
+        """Return the bytes saved by merging each other group with this one."""
         needed_by_first, needed_by_others = counts - both[first], counts[first] - both[first]
         result = TIME_BYTES * both[first] - sizes[first] * needed_by_first - sizes * needed_by_others
         result[[number == first or not group for number, group in enumerate(groups)]] = -np.inf
@@ -125,12 +126,12 @@ def shared_times(keys: Sequence[np.ndarray], widths: Sequence[int], samples: int
 
 
 class SettledChannel:
-    """A track, and how much of what is allowed differences of its values are, at moments between which it runs evenly.
+    """A track with moments between which it runs evenly, and the effect of differences in its values.
 
     Parameters
     ----------
     world : World
-        Whose moments are those of keys at least.
+        With moments at least at all keys.
     track : Track
     tolerance : float
     """
@@ -140,9 +141,9 @@ class SettledChannel:
         self.row = world.rows.get(track.node, -1)
         self.is_curved = track.interpolation == CUBICSPLINE
         self.times, self.stays = track.times, False
-        """Whether it stays a spline."""
+        """Whether the track stays a spline."""
         for _ in range(MAX_GAP_HALVINGS if track.interpolation != STEP else 0):
-            halved = self._halved(track.at(self.times))
+            halved = self._wide_gaps(track.at(self.times))
             middles = ((self.times[:-1] + self.times[1:]) / 2)[halved].astype(np.float32).astype(np.float64)
             more = np.union1d(self.times, middles)
             if len(more) == len(self.times):
@@ -154,15 +155,15 @@ class SettledChannel:
 
     @property
     def values(self) -> np.ndarray:
-        """What it shows at these moments, shape (m, width); worked out anew, for that of all channels is much."""
+        """The values at these moments, shape (m, width); computed each time, as all channels together are large."""
         return self.track.at(self.times)
 
-    def _halved(self, values: np.ndarray) -> np.ndarray:
-        """Which gaps between the moments are too wide."""
+    def _wide_gaps(self, values: np.ndarray) -> np.ndarray:
+        """Return which gaps between the moments are too wide."""
         result = np.zeros(len(self.times) - 1, dtype=bool)
         if self.track.path == ROTATION:
             cosines = np.einsum("ij,ij->i", values[1:], values[:-1])
-            # A spline that passes near 0 comes out on the other side: nearly a whole turn in no time.
+            # A spline that passes near 0 emerges with the opposite sign: nearly a whole turn in no time.
             result = (cosines if self.is_curved else np.abs(cosines)) < np.cos(MAX_GAP_TURN_RAD / 2)
         for share in (0.25, 0.5, 0.75) if self.is_curved else ():
             line = (1.0 - share) * values[:-1] + share * values[1:]
@@ -173,17 +174,17 @@ class SettledChannel:
         return result
 
     def is_at(self, value: np.ndarray, values: np.ndarray) -> bool:
-        """Whether these of its values (m, width) are one value, but for noise."""
+        """Whether these values (m, width) of the track equal `value`, apart from noise."""
         if self.stays or len(value) != values.shape[1]:
             return False
         off = self.measured(values - value)
         if self.track.path == ROTATION:
-            # Of both signs, for noise is smaller than what is left of 1 less a cosine.
+            # Try both signs: the noise is smaller than the rounding of 1 minus a cosine.
             off = np.minimum(off, self.measured(values + value))
         return float(off.max()) <= MAX_CONSTANT_RATIO
 
     def measured(self, differences: np.ndarray) -> np.ndarray:
-        """How far what the node carries, and what hangs on it, is moved by differences (m, width), of the tolerance."""
+        """Return how far differences (m, width) move anything below the node, as a fraction of the tolerance."""
         off, world = np.abs(differences), self.world
         if self.track.path == WEIGHTS:
             return np.maximum(off @ self._displaced / self.tolerance, OF_CHANNELS / WITHIN_WEIGHTS * off.max(axis=1))
@@ -196,21 +197,21 @@ class SettledChannel:
 
     @cached_property
     def _displaced(self) -> np.ndarray:
-        """How far a weight of 1 of each morph target moves anything in the world, at most, shape (width,)."""
+        """Largest world displacement by a weight of 1 of each morph target, shape (width,)."""
         node, morphs = self.track.node, self.world.seen.morphs
         return morphs[node].deltas * self.world.morph_scale(node) if node in morphs else np.zeros(self.values.shape[1])
 
     @cached_property
     def _largest(self) -> np.ndarray:
-        """How large each of the scales gets, shape (3,)."""
+        """Largest magnitude of each scale component, shape (3,)."""
         result = np.abs(self.track.points).max(axis=0)
         return np.where(result > 0.0, result, 1.0)
 
 
 def settled(channels: Iterable[SettledChannel], needed: Container[Target]) -> dict[Target, Track | None]:
-    """Return the tracks that need no search, and what takes their places: None where the node rests.
+    """Return the replacements of tracks that need no search; None for a channel that can be removed.
 
-    Those that are needed keep a key there as well.
+    A channel is removed if its node stays at rest and the channel is not needed.
     """
     result: dict[Target, Track | None] = {}
     for channel in channels:
@@ -223,7 +224,7 @@ def settled(channels: Iterable[SettledChannel], needed: Container[Target]) -> di
         elif channel.stays:
             result[target] = track.whole
         elif track.interpolation == STEP:
-            # The first, and those that bring another value.
+            # The first key, and keys with a new value.
             keys = np.flatnonzero(np.append(True, np.any(track.points[1:] != track.points[:-1], axis=1)))
             result[target] = replace(track, times=track.times[keys], values=track.points[keys])
         elif track.path in (SCALE, WEIGHTS):

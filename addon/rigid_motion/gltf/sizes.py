@@ -1,6 +1,6 @@
-"""How large things are in a glTF document: what tolerances are judged by, in its unit, which is the metre.
+"""Sizes in a glTF document, for choosing tolerances; in its unit, the metre.
 
-Size is that of joints, which are heads of bones, or of what nodes carry: where bones end is made up by importers.
+The size is that of joints, which are heads of bones, or of carried geometry: tails of bones are made up by importers.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from .seen import Seen, corners_of
 from .tracks import SCALE, Clip
 
 OF_A_BODY = 0.003
-"""The tolerance that the keys of a body are reduced to where none is given, of its size: 5 mm for a grown-up."""
+"""Default tolerance for the keys of a body, as a fraction of its size: 5 mm for an adult."""
 
 OF_KEY_POSES = 0.02
-"""The same for key poses, which are to be few: 35 mm."""
+"""Default tolerance for key poses, of which there should be few: 35 mm for an adult."""
 
 MIN_BALL_RADIUS_RATIO = 0.03 / 1.7
-"""The least radius of a node's ball, of the size: three centimetres of a grown-up."""
+"""Least radius of a node's ball as a fraction of the size: 3 cm for an adult."""
 
 SIZELESS_TURN_RAD = np.radians(0.5)
-"""How far off rotations may be where nothing has a size."""
+"""Largest error of rotations if nothing has a size."""
 
 
 def joints_of(document: Document) -> list[list[int]]:
-    """Return the nodes that are joints of each skin."""
+    """Return the joint nodes of each skin."""
     skins = [skin["joints"] for skin in objects(document.json, "skins") if isinstance(skin.get("joints"), list)]
     for joint in itertools.chain.from_iterable(skins):
         entry(document.json, "nodes", joint)
@@ -37,9 +37,9 @@ def joints_of(document: Document) -> list[list[int]]:
 
 
 def size_of(nodes: Nodes, seen: Seen, moved: np.ndarray, clips: Iterable[Clip]) -> float:
-    """Return the largest extent along any axis of what moves: joints, or what is carried, or nodes that carry nothing.
+    """Return the largest extent along any axis of moving joints, or else of carried geometry, or else of nodes.
 
-    They rest, but with their scales as large as any clip has them.
+    Measured in the rest pose, but with the largest scales of any clip.
     """
     scales = nodes.rest[SCALE].copy()
     for track in (track for clip in clips for track in clip.all_tracks if track.path == SCALE):
@@ -56,10 +56,10 @@ def size_of(nodes: Nodes, seen: Seen, moved: np.ndarray, clips: Iterable[Clip]) 
 
 
 def shells_of(nodes: Nodes, moved: np.ndarray, size: float, tolerance: float) -> np.ndarray:
-    """Return the least radius of the ball around each of these nodes (n,) in the world, shape (n,).
+    """Return the least ball radius of each of these nodes (n,) in world space, shape (n,).
 
-    Of what looks or shines it is the size of the whole, and of all else a share of it; where nothing has a size, such
-    that rotations are kept within an angle.
+    For cameras and lights it is the whole size, for others a fraction of it. If nothing has a size, it limits rotations
+    to an angle.
     """
     if not size:
         return np.full(len(moved), tolerance / SIZELESS_TURN_RAD)
@@ -69,6 +69,6 @@ def shells_of(nodes: Nodes, moved: np.ndarray, size: float, tolerance: float) ->
 
 
 def shines(node: dict) -> bool:
-    """Whether a node is a camera or a light, which look along their own -z."""
+    """Whether a node is a camera or a light, which point along their own -z."""
     extensions = node.get("extensions")
     return "camera" in node or (isinstance(extensions, dict) and "KHR_lights_punctual" in extensions)

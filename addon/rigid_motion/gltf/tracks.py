@@ -1,6 +1,6 @@
-"""Animations of a glTF document as typed tracks: what moves which node, and what it shows at any time.
+"""Animations of a glTF document as typed tracks: which nodes they move, and their values at any time.
 
-Times are seconds, lengths are those of the document, which glTF means to be metres. Quaternions are w, x, y, z here,
+Times are in seconds, lengths in the document's unit, which glTF defines as the metre. Quaternions are w, x, y, z here,
 as everywhere in this program; files have x, y, z, w.
 Source: the glTF 2.0 specification, Khronos 2021, section 3.11 and appendix C.
 """
@@ -23,26 +23,26 @@ TRANSLATION, ROTATION, SCALE, WEIGHTS = PATHS = ("translation", "rotation", "sca
 LINEAR, STEP, CUBICSPLINE = INTERPOLATIONS = ("LINEAR", "STEP", "CUBICSPLINE")
 
 NUMBERS_PER_KEY = {TRANSLATION: 3, ROTATION: 4, SCALE: 3}
-"""Numbers of a key."""
+"""Number of values in a key."""
 
 TO_WXYZ, TO_XYZW = [3, 0, 1, 2], [1, 2, 3, 0]
 
 AT_ONCE = 2**14
-"""Keys of a track that are looked at in one go."""
+"""Keys of a track processed in one go."""
 
 MOST_SHARED = 4
-"""Numbers of all tracks together, for each byte of a file: a key of 16-bit integers that eight tracks share."""
+"""Most values in all tracks together, for each byte of a file: a key of 16-bit integers shared by eight tracks."""
 
 MAX_NUMBER = 1e30
-"""Numbers beyond it are damage: their squares would be no floats in single precision."""
+"""Larger numbers are damage: their squares would overflow single precision."""
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """What one channel of an animation does to a node."""
+    """The animation of one node property by a channel."""
 
     channel: int
-    """Its number in the animation."""
+    """Number of the channel in the animation."""
 
     node: int
     path: str
@@ -52,54 +52,54 @@ class Track:
     """One of INTERPOLATIONS."""
 
     times: np.ndarray
-    """Of the keys in seconds, shape (n,), strictly rising."""
+    """Key times in seconds, shape (n,), strictly rising."""
 
     values: Any
-    """An array, or what is read where it is sliced like one, shape (n, width).
+    """An array, or an object that is read when sliced like one, shape (n, width).
 
-    Of a cubic spline (n, 3, width): tangent before the key, its value, tangent after it.
+    For a cubic spline (n, 3, width): tangent before the key, value, tangent after it.
     """
 
     @property
     def size(self) -> int:
-        """How many numbers its keys are."""
+        """Number of values in its keys, including times."""
         return len(self.times) + int(self.values.size)
 
     @property
     def points(self) -> np.ndarray:
-        """The values of the keys without their tangents, shape (n, width)."""
+        """The values of the keys without tangents, shape (n, width)."""
         values = self.values[:]
         return values[:, 1] if self.interpolation == CUBICSPLINE else values
 
     @property
     def whole(self) -> Track:
-        """The same with all its values read."""
+        """The same track with all values read."""
         return replace(self, values=self.values[:])
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is the same at all times."""
+        """Whether the value is the same at all times."""
         tangents = self.interpolation == CUBICSPLINE and len(self.times) > 1 and self.values[:][:, [0, 2]].any()
         points = self.points
         return not tangents and bool(np.all(points == points[0]))
 
     def shows(self, other: Track) -> bool:
-        """Whether it has the same keys as another."""
+        """Whether another track has the same keys."""
         same = self.interpolation == other.interpolation and np.array_equal(self.times, other.times)
         return same and np.array_equal(self.values[:], other.values[:])
 
     def near(self, first: float, last: float) -> Track:
-        """Return the keys that say what is shown from one time to another, which are read where they are not yet."""
+        """Return the keys that affect a time range; they are read from the file if needed."""
         begin = max(int(np.searchsorted(self.times, first, side="right")) - 1, 0)
         some = slice(begin, max(int(np.searchsorted(self.times, last)) + 1, begin + 1))
         return replace(self, times=self.times[some], values=self.values[some])
 
     def keyed(self, times: np.ndarray) -> Track:
-        """Return what it shows at these times (m,), with lines in between."""
+        """Return a track with keys at these times (m,) and lines in between."""
         return replace(self, interpolation=LINEAR, times=times, values=self.at(times))
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """Return what is shown at `times`, which rise, shape (m, width). Quaternions are normalised."""
+        """Return the values at rising `times`, shape (m, width). Quaternions are normalised."""
         first, last = np.searchsorted(self.times, times[[0, -1]]).tolist()
         if last - first > AT_ONCE and len(times) > 1:
             return np.concatenate([self.at(some) for some in np.array_split(times, 2)])
@@ -133,10 +133,10 @@ class Track:
 NODE_POINTER = re.compile(r"/nodes/(\d{1,9})/(translation|rotation|scale|weights)")
 
 MAY_MOVE = re.compile(r"/(nodes|meshes|skins)/(?!.*/extensions/)")
-"""Pointers of which what is seen may depend."""
+"""Pointers that may affect visible geometry."""
 
 Target = tuple[int, str]
-"""A node, and its path."""
+"""A node and its path."""
 
 Tracks = Mapping[Target, Track]
 
@@ -148,13 +148,13 @@ class Clip:
     number: int
     name: str
     tracks: tuple[Track, ...]
-    """What moves nodes: channels without a node are not among them."""
+    """Channels that move nodes."""
 
     pointers: tuple[Track, ...] = ()
-    """The same by KHR_animation_pointer."""
+    """The same for channels of KHR_animation_pointer."""
 
     unread: str = ""
-    """A pointer that may move what is seen, in a way that is not known here."""
+    """A pointer that may move visible geometry in an unknown way."""
 
     @property
     def all_tracks(self) -> tuple[Track, ...]:
@@ -162,12 +162,12 @@ class Clip:
 
 
 def read_clips(document: Document) -> tuple[Clip, ...]:
-    """All animations of a document.
+    """Return all animations of a document.
 
     Raises
     ------
     GltfError
-        That names the animation and the channel that cannot be read.
+        Names the animation and the channel that cannot be read.
     """
     most = MOST_ZEROS + MOST_SHARED * bytes_of(document)
     times: dict[int, np.ndarray] = {}
@@ -179,7 +179,7 @@ def read_clips(document: Document) -> tuple[Clip, ...]:
 
 
 def moves_node(target: Json) -> bool:
-    """Whether what a channel is of is a node, moved in a way that glTF itself knows."""
+    """Whether a channel target is a node with a path of core glTF."""
     return "node" in target and target.get("path") in PATHS
 
 
@@ -216,7 +216,7 @@ def _clip(document: Document, number: int, times: dict[int, np.ndarray], most: i
 
 
 def _pointer(target: Json) -> str:
-    """Return what a channel of KHR_animation_pointer is of; empty for another."""
+    """Return the pointer of a KHR_animation_pointer channel; empty for other channels."""
     extensions = target.get("extensions")
     own = extensions.get("KHR_animation_pointer") if isinstance(extensions, dict) else None
     pointer = own.get("pointer") if isinstance(own, dict) else None
@@ -226,7 +226,7 @@ def _pointer(target: Json) -> str:
 def _track(
     document: Document, animation: Json, index: int, channel: Json, node: int, path: str, known: dict[int, np.ndarray]
 ) -> Track:
-    """Return a channel as a track, with the times that are known of the accessor, or that are so from now on."""
+    """Return a channel as a track; key times are cached by accessor in `known`."""
     moved = entry(document.json, "nodes", node)
     if "matrix" in moved and path != WEIGHTS:
         raise GltfError(f"node {node} has a matrix, and glTF moves nodes without one alone")
@@ -254,9 +254,9 @@ def _track(
 
 
 def _times(document: Document, number: object) -> np.ndarray:
-    """Those of keys, shape (n,).
+    """Return key times, shape (n,).
 
-    Two at one time are a cut: the first of them is taken as earlier, by a step of single precision.
+    Two keys at the same time are a cut: the first is moved earlier, by one step of single precision.
     """
     times = numbers(document, number)
     if times.shape[1] != 1:
