@@ -1,7 +1,7 @@
-"""What is streamed: rigid bodies and skeletons, as one forest of joints.
+"""Streamed bodies: rigid bodies and skeletons, combined into one forest of joints.
 
-A rigid body is a joint that hangs on nothing; a skeleton is a tree of joints. All bodies of a sender are sampled at the
-same moments, and are one array: poses of shape (joints,), each in its parent's space, metres and Blender's axes.
+A rigid body is a joint without a parent; a skeleton is a tree of joints. All bodies of a sender are sampled at the same
+moments and stored in one array: poses of shape (joints,), each in its parent's space, metres and Blender's axes.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from ..motion.poses import joined
 from ..motion.quaternions import normalise
 
 DEFAULT_RADIUS_M = 0.03
-"""Of the ball at every joint, in metres, unless it is given."""
+"""Default radius of the ball around every joint, in metres."""
 
 MIN_LENGTH_M, MAX_LENGTH_M = 1e-6, 1e4
-"""Metres of radii and tolerances at least; and metres that these are less than, and coordinates of places."""
+"""Smallest radius and tolerance in metres; and the upper limit of radii, tolerances and coordinates in metres."""
 
 MIN_SAMPLE_GAP_S, MAX_CLOCK_S = 1e-6, 2e11
-"""Seconds between two samples at least; and those of a clock, either way: beyond, floats do not tell ticks apart."""
+"""Shortest time between samples in seconds; and largest clock value in seconds, where floats still resolve ticks."""
 
 MOST_BODIES, MOST_JOINTS, LONGEST_NAME = 255, 1024, 255
-"""Of a sender; and bytes of a name in UTF-8."""
+"""Limits of a sender; the length of a name is in bytes of UTF-8."""
 
 MOST_NAMED = 40
-"""Joints or bodies that are named to somebody who asks for one that is not there."""
+"""Most names of joints or bodies listed in an error message."""
 
 LEVER_LEVELS = 144
-"""How far what is held is from the joint that holds it: `MIN_LENGTH_M` times the fourth root of a power of two, which
-is below this one."""
+"""Levels of the distance between a held object and its holder: `MIN_LENGTH_M` times 2 ** (level / 4), with level
+below this number."""
 
 
 def checked(poses: Poses, names: Sequence[str]) -> Poses:
-    """Return poses (joints,) with quaternions of length 1, however long they were.
+    """Return poses (joints,) with quaternions normalised to length 1.
 
-    Raises ValueError with the name of a joint that is nowhere, or turned by nothing.
+    Raises ValueError with the name of a joint whose position is out of range or whose quaternion is invalid.
     """
     longest = np.abs(poses.quaternions).max(axis=-1, initial=0.0)
     are_sound = (np.abs(poses.positions) < MAX_LENGTH_M).all(axis=-1) & (longest > 0.0) & np.isfinite(longest)
@@ -57,8 +57,8 @@ def checked(poses: Poses, names: Sequence[str]) -> Poses:
 class StreamBody:
     """A rigid body or a skeleton, at rest.
 
-    Raises ValueError where names, parents, radii and poses are not as many or out of range, or a joint comes before its
-    parent.
+    Raises ValueError if the numbers of names, parents, radii and poses differ or values are out of range, or if a joint
+    comes before its parent.
     """
 
     name: str
@@ -66,18 +66,18 @@ class StreamBody:
     joints: tuple[str, ...]
 
     parents: np.ndarray
-    """The number of each joint's parent in this body, lower than its own, -1 for roots. Shape (joints,)."""
+    """Number of each joint's parent in this body, lower than the joint's own, -1 for roots. Shape (joints,)."""
 
     rest: Poses
-    """Each joint in its parent's space, shape (joints,)."""
+    """Rest pose of each joint in its parent's space, shape (joints,)."""
 
     radius: float | np.ndarray = DEFAULT_RADIUS_M
-    """Of the ball at every joint within which nothing may move off by more than the tolerance, in metres. One for all,
-    or one for each, shape (joints,), as what it carries is large.
+    """Radius in metres of the ball at every joint in which no point may move off by more than the tolerance. One for
+    all joints, or one for each, shape (joints,), by the size of what the joint carries.
     """
 
     sliding: np.ndarray | None = None
-    """Which joints change their places in their parents' space, shape (joints,). None for roots alone."""
+    """Whether each joint changes its position in its parent's space, shape (joints,). None: roots only."""
 
     def __post_init__(self) -> None:
         parents, count = np.asarray(self.parents, dtype=np.int64), len(self.joints)
@@ -101,26 +101,26 @@ class StreamBody:
 
     @cached_property
     def skeleton(self) -> Skeleton:
-        """Which joint hangs on which."""
+        """The hierarchy of the joints."""
         return Skeleton(self.parents)
 
     @cached_property
     def labels(self) -> list[str]:
-        """What joints are called where there are others."""
+        """Names of joints for messages, with the body's name."""
         return [self.name if joint == self.name else f"{self.name}, {joint}" for joint in self.joints]
 
     def in_root_space(self, poses: Poses) -> Poses:
-        """Return poses (joints,) of the joints, each in its parent's space, as they are in that of the roots."""
+        """Return poses (joints,) in parents' spaces converted to the space of the roots."""
         return self.skeleton.in_root_space(poses[:, None])[:, 0]
 
     @classmethod
     def rigid(cls, name: str, pose: Poses | None = None, radius: float = DEFAULT_RADIUS_M) -> StreamBody:
-        """Return a single rigid body, at rest at `pose` (1,), or in the middle of everything."""
+        """Return a single rigid body, at rest at `pose` (1,), or at the origin."""
         return cls(name, (name,), np.array([-1]), pose or Poses([[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0, 0.0]]), radius)
 
 
 class Hold(NamedTuple):
-    """A body that is held: its number, that of the joint that holds it, and the level of how far it is from it."""
+    """A held body: its number, the number of the joint that holds it, and the level of their distance."""
 
     body: int
     joint: int
@@ -128,7 +128,7 @@ class Hold(NamedTuple):
 
 
 class Forest:
-    """All bodies of a sender, as one array of joints, some of them perhaps held by others."""
+    """All bodies of a sender as one array of joints; some bodies may be held by joints of others."""
 
     def __init__(self, bodies: Sequence[StreamBody]) -> None:
         self.bodies, self.names = tuple(bodies), {body.name for body in bodies}
@@ -147,27 +147,28 @@ class Forest:
         self.labels = [label for body in bodies for label in body.labels]
         self.holds: tuple[Hold, ...] = ()
         self.holders = np.full(len(self), -1, dtype=np.int16)
-        """The joint that holds each, -1 for none, shape (joints,)."""
-        self._arms = np.linalg.norm(self.rest.positions, axis=1)
-        """How far each is from what it hangs on, shape (joints,)."""
+        """The joint that holds each joint, -1 for none, shape (joints,)."""
+        self._bone_lengths = np.linalg.norm(self.rest.positions, axis=1)
+        """Distance of each joint from its parent, shape (joints,)."""
 
     def __len__(self) -> int:
         return len(self.parents)
 
     def holding(self, holds: tuple[Hold, ...]) -> Forest:
-        """Return these bodies, of which nothing is held, with the roots of some in the space of joints that hold them.
+        """Return these bodies with the given holds: roots of held bodies are in the space of their holders.
 
-        Raises ValueError where one holds itself, if only through others, or has a root that never changes its place.
+        This forest must hold nothing. Raises ValueError if a body holds itself, even indirectly, or has a root that
+        never changes its position.
         """
         forest, _ = copy(self), self.groups
         forest.__dict__.pop("reaches", None)
         forest.holds, forest.rest = holds, self.rest.copy()
-        forest.holders, forest._arms = self.holders.copy(), self._arms.copy()
+        forest.holders, forest._bone_lengths = self.holders.copy(), self._bone_lengths.copy()
         for body, joint, level in holds:
             roots = self._roots(body)
             if not self.sliding[roots].all():
                 raise ValueError(f"{self.bodies[body].name}: what never changes its place cannot be held")
-            forest.holders[roots], forest._arms[roots] = joint, MIN_LENGTH_M * 2.0 ** (level / 4.0)
+            forest.holders[roots], forest._bone_lengths[roots] = joint, MIN_LENGTH_M * 2.0 ** (level / 4.0)
             forest.rest.positions[roots], forest.rest.quaternions[roots] = 0.0, (1.0, 0.0, 0.0, 0.0)
         forest.parents = np.where(forest.holders >= 0, forest.holders, self.parents)
         forest.skeleton = Skeleton(forest.parents)
@@ -178,7 +179,7 @@ class Forest:
         return first + np.flatnonzero(self.bodies[body].parents < 0)
 
     def joint(self, body: str, joint: str | None = None) -> int:
-        """Return the number of a joint, or of a body's only one. Raises ValueError where there is none."""
+        """Return the number of a joint, or of a body's only joint. Raises ValueError if it does not exist."""
         number = self.body(body)
         joints = self.bodies[number].joints
         if joint is None and len(joints) == 1:
@@ -188,29 +189,29 @@ class Forest:
         return int(self._ends[number]) - len(joints) + joints.index(joint)
 
     def body(self, name: str) -> int:
-        """Return the number of a body. Raises ValueError where there is none."""
+        """Return the number of a body. Raises ValueError if it does not exist."""
         names = [body.name for body in self.bodies]
         if name not in names:
             raise ValueError(f"{name}: no such body; there are {', '.join(names[:MOST_NAMED])}")
         return names.index(name)
 
     def held(self, holders: np.ndarray) -> dict[str, tuple[str, str]]:
-        """Return the body and the joint that hold each body that is held, by its name, of who holds each (joints,)."""
+        """Return the body and joint that hold each held body, by name, given the holders (joints,)."""
         hands = {body.name: int(holders[self._roots(row)[0]]) for row, body in enumerate(self.bodies)}
-        return {name: self._name(joint) for name, joint in hands.items() if joint >= 0}
+        return {name: self._joint_name(joint) for name, joint in hands.items() if joint >= 0}
 
-    def _name(self, joint: int) -> tuple[str, str]:
+    def _joint_name(self, joint: int) -> tuple[str, str]:
         number = int(np.searchsorted(self._ends, joint, side="right"))
         body = self.bodies[number]
         return body.name, body.joints[joint - int(self._ends[number])]
 
     def level(self, body: int, poses: Poses) -> int:
-        """Return the level of how far a body is from the joint that holds it, where it has poses (joints,) there."""
+        """Return the level of a held body's distance from its holder, given its poses (joints,) in that space."""
         far = max(np.linalg.norm(poses.positions[self._roots(body)], axis=1).max(), MIN_LENGTH_M)
         return min(math.ceil(4.0 * math.log2(far / MIN_LENGTH_M)), LEVER_LEVELS - 1)
 
     def in_hands(self, poses: Poses) -> Poses:
-        """Return poses (joints,) with what is held in the space of what holds it; they have it where roots are."""
+        """Return poses (joints,) with held bodies converted from the roots' space to the space of their holders."""
         parents = np.where(self.holders >= 0, -1, self.parents)
         result, held = poses.copy(), self.holders >= 0
         if held.any():
@@ -219,7 +220,7 @@ class Forest:
         return result
 
     def out_of_hands(self, poses: Poses, holders: np.ndarray) -> Poses:
-        """Return poses (joints, n) with what is held where roots are. Who holds each has the same shape, or (1, n)."""
+        """Return poses (joints, n) with held bodies in the roots' space. `holders` has shape (joints, n) or (1, n)."""
         if not (holders >= 0).any():
             return poses
         result = poses.copy()
@@ -230,17 +231,17 @@ class Forest:
         return result
 
     def joined(self, poses: Mapping[str, Poses]) -> Poses:
-        """Return the poses of all joints (joints,), of those of each body by its name."""
+        """Return the poses of all joints (joints,), given those of each body by name."""
         return joined([poses[body.name] for body in self.bodies])
 
     def parted(self, poses: Poses) -> dict[str, Poses]:
-        """Return the poses of each body by its name, of those of all joints (joints, ...)."""
+        """Return the poses of each body by name, given those of all joints (joints, ...)."""
         return {
             body.name: poses[end - len(body.joints) : end] for body, end in zip(self.bodies, self._ends, strict=True)
         }
 
     def errors(self, shown: Poses, truth: Poses) -> np.ndarray:
-        """Return how far off any point of each joint's ball is at most, in metres, of poses (joints, n) in their
+        """Return the largest displacement of any point in each joint's ball, in metres, for poses (joints, n) in their
         parents' spaces, shape (joints, n).
         """
         in_root_space = self.skeleton.in_root_space
@@ -248,9 +249,9 @@ class Forest:
 
     @cached_property
     def groups(self) -> list[tuple[int, int, int]]:
-        """What is said of a pose, in its order: the joint, 1 for its place and 0 for its turn, and the group above.
+        """The groups of numbers that describe a pose, in order: joint, 1 for position or 0 for turn, and parent group.
 
-        That is the one of the same kind of the joint's parent or, where it has none, the parent's turn; -1 for roots.
+        The parent group is that of the same kind at the joint's parent, or else the parent's rotation; -1 for roots.
         """
         groups = [(joint, slide) for joint, slides in enumerate(self.sliding.tolist()) for slide in range(1 + slides)]
         numbers, parents = {group: number for number, group in enumerate(groups)}, self.parents.tolist()
@@ -259,8 +260,8 @@ class Forest:
 
     @cached_property
     def reaches(self) -> np.ndarray:
-        """How far from each joint anything is that hangs on it, with the balls around it, shape (joints,)."""
+        """Largest distance from each joint to anything below it, including the balls around joints, shape (joints,)."""
         reaches = self.radii.copy()
         for joints in self.skeleton.levels[:0:-1]:
-            np.maximum.at(reaches, self.parents[joints], self._arms[joints] + reaches[joints])
+            np.maximum.at(reaches, self.parents[joints], self._bone_lengths[joints] + reaches[joints])
         return reaches

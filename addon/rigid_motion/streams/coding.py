@@ -1,13 +1,13 @@
-"""From the whole numbers of a message to bytes and back: in as few bytes as tables say that they are worth.
+"""Entropy coder for messages: converts integers to few bytes and back, using tables of frequencies.
 
 A group is the three numbers of a joint at a knot: a turn, or a slide. Groups come knot by knot, the last knot first,
-then those within; in each knot joint by joint. By which table a number is coded depends on what both sides know then.
+then those within; in each knot joint by joint. The table for a number depends on what both sides already know.
 
-The coder is of integers of 32 bits and nothing else, so that every language decodes the same: after the
-carry-propagating range coder of G. N. N. Martin (1979), in the form of LZMA. `low` and `size` say the interval, bytes
-leave it from the top. Tables are cumulative frequencies that rise from 0 to `FREQUENCY_TOTAL`. To write and to read go
-by the same two methods, so that what is said is written down once: `symbol` takes a table's number and `flat` how many
-numbers are as likely; both return the number, which has to be given only where it is written.
+The coder uses only 32-bit integers, so that every language decodes the same. It follows the carry-propagating range
+coder of G. N. N. Martin (1979), in the form of LZMA. `low` and `size` define the interval; bytes leave it from the top.
+Tables are cumulative frequencies that rise from 0 to `FREQUENCY_TOTAL`. Writing and reading use the same two methods,
+so the format is written down only once: `symbol` takes the number of a table, `flat` the number of equally likely
+values. Both return the number, which only has to be given for writing.
 """
 
 from __future__ import annotations
@@ -21,42 +21,42 @@ from importlib.resources import files
 from .bodies import Forest
 
 NEAR_KNOT, FAR_KNOT, STALE_KNOT, UNKNOWN_KNOT, MIDDLE_KNOT, FINER_KNOT, STILL_KNOT = range(7)
-"""Kinds of knots. The end of a window is coded against how the message before it goes on, or one before that; against
-an old pose; against rest. Then come the first knot within, the others; and those behind an old pose or rest."""
+"""Kinds of knots. The end of a window is coded against the extrapolated motion of the message before, or of an earlier
+one; against an old pose; or against rest. Then the first inner knot, the others, and those after an old or rest
+pose."""
 
 FIRST_LONG_MAGNITUDE, LAST_TABLE_BITS, MAX_EXTRA_BITS = 14, 20, 32
-"""Magnitudes from the first on are written in full. The last width that tables say, in bits, stands for itself and
-fewer than so many more: 2^51 of the finest steps of the smallest tolerance are further than anything is.
+"""Magnitudes from the first value on are written in full. The last bit width in the tables stands for itself and for up
+to MAX_EXTRA_BITS - 1 more: 2^51 of the finest steps of the smallest tolerance are farther than anything is.
 """
 
 HISTORY_COUNT, NEIGHBOUR_COUNT, SIZE_COUNT = 8, 5, 6
 
 FLAG_TABLE_COUNT = 7 * 2 * HISTORY_COUNT * NEIGHBOUR_COUNT
-"""Tables that say, for each kind of knot, turns and slides, whether a group is anything but zeros. Behind them are
-those of magnitudes, and then single ones:"""
+"""Number of tables that say, for each kind of knot, turns and slides, whether a group is not all zeros. The tables of
+magnitudes follow, and then these single ones:"""
 
 KNOT_COUNTS = FLAG_TABLE_COUNT + 7 * 2 * HISTORY_COUNT * SIZE_COUNT
 WIDTHS_TABLE, FINENESS_TABLE, BASES_TABLE, ODD_TABLE, HANDS_TABLE = (KNOT_COUNTS + number for number in (1, 2, 4, 5, 6))
-"""How many knots a window has besides its end; how many binary digits what is above `FIRST_LONG_MAGNITUDE` has; how
-fine steps are, of rigid bodies alone, and in the next table where joints hang on others; what a message builds on;
-whether its end is between two moments of the grid; and whether anything is in other hands than where the message builds
-on."""
+"""Tables for: number of inner knots of a window; number of bits above `FIRST_LONG_MAGNITUDE`; fineness of steps, for
+rigid bodies only and in the next table for joints with parents; which message this one builds on; whether the end is
+between two moments of the grid; and whether holders have changed since the message it builds on."""
 
 MAX_STEP_HALVINGS, MAX_KNOTS = 3, 32
-"""So many times steps are halved at most; and knots of a window."""
+"""Most halvings of steps; and most inner knots of a window."""
 
 MOST_GROUPS = 4096
-"""Of all knots of a message together, unless the end alone has more: so much work a datagram can make."""
+"""Most groups in all knots of a message, unless the end alone has more: limits the work that a datagram can cause."""
 
 FREQUENCY_BITS = 12
 FREQUENCY_TOTAL = 1 << FREQUENCY_BITS
 """The frequencies of every table add up to this."""
 
 MIN_INTERVAL = 1 << 24
-"""Below this the interval is widened by a byte."""
+"""Smaller intervals are widened by a byte."""
 
 TABLE_FILE = files(__package__) / "tables.json"
-"""The tables of the wire's version, which scripts/research/making/stream_tables.py makes."""
+"""The tables of this wire version, made by scripts/research/making/stream_tables.py."""
 
 
 @cache
@@ -66,9 +66,9 @@ def standard_tables() -> list[list[int]]:
 
 
 class Coder:
-    """Numbers to bytes or, where bytes are given, to numbers.
+    """Encoder from numbers to bytes or, if bytes are given, decoder to numbers.
 
-    Any bytes are some numbers: nothing is raised, and nothing read beyond the end but zeros.
+    Any bytes decode to some numbers: nothing is raised, and beyond the end only zeros are read.
     """
 
     def __init__(self, data: bytes | None = None, tables: Sequence[Sequence[int]] | None = None) -> None:
@@ -76,9 +76,9 @@ class Coder:
         self._reads, self._data = data is not None, data or b""
         self._size = (1 << 32) - 1
         self._at = 4 if self._reads else 0
-        """The byte that comes next; how many left the interval."""
+        """Index of the next byte to read; or number of bytes written."""
         self._low = -int.from_bytes(self._data[:4].ljust(4, b"\0"), "big")
-        """The lower end of the interval, all bytes of it, less what is read."""
+        """The lower end of the interval, in all of its bytes, minus the value read."""
 
     def symbol(self, table: int, value: int = 0) -> int:
         own, part = self._tables[table], self._size >> FREQUENCY_BITS
@@ -88,7 +88,7 @@ class Coder:
         return value
 
     def flat(self, count: int, value: int = 0) -> int:
-        """Write or read a number below a count of at most 2^20, all of them as likely."""
+        """Write or read a number below `count`, at most 2^20, with all numbers equally likely."""
         part = self._size // count
         if self._reads:
             value = self._share(part, count)
@@ -96,14 +96,14 @@ class Coder:
         return value
 
     def digits(self, count: int, value: int = 0) -> int:
-        """Write or read a number of so many binary digits, up to 16 at a time, the highest first."""
+        """Write or read a number of `count` bits, up to 16 at a time, highest first."""
         read = 0
         for shift in range((count - 1) // 16 * 16, -1, -16):
             read |= self.flat(1 << min(count - shift, 16), value >> shift & 0xFFFF) << shift
         return read
 
     def _share(self, part: int, count: int) -> int:
-        """Return in which part of the interval the value is: beyond the last are only bytes that nobody wrote."""
+        """Return the part of the interval that contains the value; invalid bytes count as the last part."""
         self._low = max(self._low, 1 - part * count)
         return -self._low // part
 
@@ -116,7 +116,7 @@ class Coder:
             self._at += 1
 
     def finish(self) -> bytes:
-        """Return the shortest bytes that are read as what was written: what is behind their end counts as zeros."""
+        """Return the shortest bytes that decode to the written numbers: bytes after their end count as zeros."""
         length = self._at + 4
         for kept in range(length + 1):
             free = 8 * (length - kept)
@@ -127,17 +127,17 @@ class Coder:
 
 
 def bucket(value: int, most: int) -> int:
-    """0, 1, 2, 3 to 4, 5 to 8, ...: a number in few classes."""
+    """Return the class of a number, of `most` classes: 0, 1, 2, 3 to 4, 5 to 8 and so on."""
     return min((value - 1).bit_length() + 1 if value > 0 else 0, most - 1)
 
 
 def code(
     coder: Coder, forest: Forest, groups: list[list[list[int]]], kind: int, memory: Sequence[int]
 ) -> tuple[int, ...]:
-    """Write or read the groups of a message, and return what is remembered of each group.
+    """Write or read the groups of a message, and return the new memory of each group.
 
-    They are of each knot and group three numbers, which what is read overwrites. `kind` is that of the last knot, and
-    `memory` what is remembered of each group with the pose that the message is coded against.
+    `groups` has three numbers for each knot and group, which reading overwrites. `kind` is that of the last knot, and
+    `memory` the memory of each group with the pose that the message is coded against.
     """
     sums: list[list[int]] = []
     for number, knot in enumerate(groups):

@@ -1,9 +1,9 @@
-"""Messages: what their whole numbers are in metres and radians, what the next one builds on, and their bytes.
+"""Messages of a stream: their integers in metres and radians, what the next message builds on, and their bytes.
 
-A message says the poses of all joints at the end of a window, and at moments within it where that is not enough. The
-end is coded against what the motion did so far, each other knot against the straight way between those around it that
-were said before. Residuals of a turn are a rotation vector in the joint's own axes, those of a slide are in its
-parent's space; both are counted in steps.
+A message has the poses of all joints at the end of a window, and at moments within it if needed. The end is coded
+against the motion so far, each inner knot against the straight path between the knots around it that came before.
+Residuals of a turn are a rotation vector in the joint's own axes, residuals of a slide are in its parent's space; both
+in steps.
 """
 
 from __future__ import annotations
@@ -35,28 +35,28 @@ from .paths import KnotPath
 from .wire import TICKS_PER_S, Terms
 
 OLD_POSE_TICKS = TICKS_PER_S // 2
-"""Ticks after which a pose says nothing any more about how the motion goes on."""
+"""Ticks after which a pose no longer tells how the motion goes on."""
 
 MAX_MESSAGES_BACK, MAX_TICKS_BACK = 129, 3 * TICKS_PER_S
-"""What a message builds on is so many messages before it at most, and its end so many ticks."""
+"""Most messages, and most ticks between the ends, from a message to the one it builds on."""
 
 TURN_STEP, SLIDE_STEP = 1.0, 0.5
-"""Steps, in tolerances: at the end of what hangs on a joint, and of its place."""
+"""Steps as fractions of the tolerance: at the farthest point below a turning joint, and of a joint's position."""
 
 HELD_STEP = 0.125
-"""Steps of what is held, in those of the same body where nobody holds it: it is said once, and then goes along."""
+"""Steps of held objects, as a fraction of the steps when not held: the pose is sent once and then moves along."""
 
 NEVER_TICK = -(1 << 62)
-"""The tick since which all is in the same hands, where nobody ever took anything."""
+"""Tick of the last change of holders, if there was none."""
 
 MAX_DISTANCE_M = 1e5
-"""Metres from the middle of everything at which nothing is any more."""
+"""Distance from the origin in metres beyond which poses are invalid."""
 
 
 class Codec:
-    """Messages of a forest: their steps, to bytes and back.
+    """Coder for messages of a forest: their steps, and conversion to bytes and back.
 
-    That of the forest as it is described, where nothing is held, reads and writes them all.
+    The codec of the forest as described, without holds, reads and writes all messages.
     """
 
     def __init__(self, forest: Forest, terms: Terms) -> None:
@@ -64,27 +64,27 @@ class Codec:
         self.tolerance = terms.tolerance
         slides = np.array([slide for _, slide, _ in forest.groups], dtype=bool)
         self._turns, self._slides = np.flatnonzero(~slides), np.flatnonzero(slides)
-        """The groups of each kind: all joints turn."""
+        """Groups of each kind: all joints turn, some slide."""
         parts = np.where(forest.holders >= 0, HELD_STEP, 1.0)
         self.turn_steps = TURN_STEP * self.tolerance / forest.reaches * parts
         self.slide_steps = SLIDE_STEP * self.tolerance * parts
         self._fineness = FINENESS_TABLE + bool((forest.parents >= 0).any())
         self.rest = Message(self)
-        """What is known before any message."""
+        """The state before any message."""
 
     def holding(self, holds: tuple[Hold, ...]) -> Codec:
-        """Return that of the same forest with what is held. Raises ValueError where that cannot be."""
+        """Return the codec of the same forest with these holds. Raises ValueError if they are impossible."""
         return Codec(self.forest.holding(holds), self.terms) if holds else self
 
     def moved(self, poses: Poses, numbers: np.ndarray, factor: float) -> Poses:
-        """Return poses (joints,) moved by whole numbers (groups, 3), in steps times a factor."""
+        """Return poses (joints,) moved by integers (groups, 3), in steps times a factor."""
         places, turns = poses.positions.copy(), numbers[self._turns] * (self.turn_steps * factor)[:, None]
         sliding = self.forest.sliding
         places[sliding] += numbers[self._slides] * (self.slide_steps[sliding] * factor)[:, None]
         return Poses(places, turned(poses.quaternions, turns))
 
     def rounded(self, poses: Poses, desired: Poses, factor: float) -> np.ndarray:
-        """Return the whole numbers (groups, 3) that move poses (joints,) nearest to others."""
+        """Return the integers (groups, 3) that move poses (joints,) closest to the desired ones."""
         slides = (desired.positions - poses.positions) / (self.slide_steps * factor)[:, None]
         turns = turns_between(poses.quaternions, desired.quaternions) / (self.turn_steps * factor)[:, None]
         numbers = np.zeros((len(self.forest.groups), 3), dtype=np.int64)
@@ -100,10 +100,10 @@ class Codec:
     def code(
         self, coder: Coder, known: Callable[[int], Message | None], message: Message | None = None
     ) -> Message | None:
-        """Write a message, or read one where none is given.
+        """Write a message, or read one if none is given.
 
-        `known` has the message so many before it. None for what nobody can have written, or what builds on something
-        that is not known.
+        `known` returns the message a given number of messages back. Returns None for invalid data, or if the message
+        builds on an unknown one.
         """
         terms, size, said = self.terms, len(self.forest.groups), message or self.rest
         back = coder.symbol(BASES_TABLE, min(said.back, 2))
@@ -118,8 +118,8 @@ class Codec:
             end += coder.flat(terms.grid, odd) if coder.symbol(ODD_TABLE, int(odd > 0)) else 0
         else:
             end = coder.digits(48, said.end)
-            end -= end >> 47 << 48  # of either sign
-        hands = self._code_hands(coder, base, end, message)
+            end -= end >> 47 << 48  # Sign extension.
+        hands = self._code_holds(coder, base, end, message)
         if hands is None:
             return None
         codec, since = hands
@@ -137,7 +137,7 @@ class Codec:
             return None
         read.memory = code(coder, self.forest, groups, read.kind, base.memory)
         if holders := read.codec.forest.holds and read.codec.forest.holders.tolist():
-            # What is held is said once, and then stays where it is.
+            # Held objects are sent once, and then keep their place.
             joints = (joint for joint, *_ in self.forest.groups)
             read.memory = tuple(
                 0 if holders[joint] >= 0 else old for joint, old in zip(joints, read.memory, strict=True)
@@ -147,10 +147,10 @@ class Codec:
                 read.say(cell, np.array(numbers))
         return read if read.is_somewhere else None
 
-    def _code_hands(self, coder: Coder, base: Message, end: int, message: Message | None) -> tuple[Codec, int] | None:
-        """Write or read who holds what, and since which tick; None for what nobody can have written.
+    def _code_holds(self, coder: Coder, base: Message, end: int, message: Message | None) -> tuple[Codec, int] | None:
+        """Write or read the holds, and the tick since which they are valid; None for invalid data.
 
-        It is the same as where the base ends, or else all of it is there.
+        They are either the same as at the base's end, or written in full.
         """
         delay, forest = self.terms.delay, self.forest
         since, holds = (message.since, message.codec.forest.holds) if message else (NEVER_TICK, ())
@@ -173,11 +173,11 @@ class Codec:
 
 
 class Message:
-    """What a message says of a window: the poses at its knots, the end first, then others between those that are there.
+    """The content of a message for a window: poses at its knots, the end first, then inner knots.
 
-    It builds on `base`, which is so many messages `back`, 0 for what is known before any; its window ends at the tick
-    `end`, and steps are halved `finer` times. All is in the hands that its codec's forest says since a tick, and the
-    window does not begin before. Others can build on it.
+    It builds on `base`, which is `back` messages before it, 0 for the state before any message. Its window ends at the
+    tick `end`, and steps are halved `finer` times. The holds of its codec's forest are valid since the tick `since`,
+    and the window does not start earlier. Other messages can build on it.
     """
 
     def __init__(
@@ -193,21 +193,21 @@ class Message:
         self.start = max(end - codec.terms.delay, since)
         """The tick at which the window starts."""
         self.factor = 0.5**finer
-        """Of the steps."""
+        """Factor on the steps."""
         self.kind, self._goes_on = UNKNOWN_KNOT, False
-        """How the end is coded, a kind of `coding`; and whether that is against what the motion did so far."""
+        """How the end is coded, a kind of knot in `coding`; and whether it is coded against the extrapolated motion."""
         self.cells: list[int] = []
-        """Of each knot, in the order in which they came, how many cells of the grid it is before the end."""
+        """For each knot, in order of coding, the number of grid cells before the end."""
         self.supports: list[tuple[float, float, float]] = []
-        """Of each the moments between which it has a say, its own in between."""
+        """For each knot the moments between which it has an effect, with its own moment in the middle."""
         self.numbers: list[np.ndarray] = []
-        """Of each the whole numbers (groups, 3)."""
+        """For each knot the integers (groups, 3)."""
         self.memory: tuple[int, ...] = (0,) * len(codec.forest.groups)
-        """How large the residuals of each group were."""
+        """Magnitudes of the residuals of each group."""
         self.path = KnotPath(np.zeros(1), codec.forest.rest[:, None])
-        self._taken: np.ndarray | None = None
-        """Which joints are in other hands than in the base (joints,), if any are."""
-        """From the start of the window to its end: what the motion would do if nothing new came, until that is said."""
+        self._changed_hands: np.ndarray | None = None
+        """Whether each joint has another holder than in the base (joints,), if any has."""
+        """The path of the window, extrapolated until poses are set by `say`."""
         if base:
             moments = np.array((self.start, end)) / TICKS_PER_S
             if back:
@@ -216,13 +216,13 @@ class Message:
             poses = base.path.at(moments) if self._goes_on else base.path.poses[:, [-1, -1]]
             forest, taken = codec.forest, codec.forest.holders != base.codec.forest.holders
             if taken.any():
-                self._taken = taken
+                self._changed_hands = taken
                 poses[taken] = forest.rest[:, None][taken][:, [0, 0]]
             self.path = KnotPath(moments, poses, holders=forest.holders[:, None])
 
     @property
     def is_somewhere(self) -> bool:
-        """Return whether it puts all joints where something can be; otherwise nobody reads it."""
+        """Whether all joints are at valid positions; otherwise no receiver reads the message."""
         return bool(np.abs(self.path.poses.positions).max() < MAX_DISTANCE_M)
 
     def say(
@@ -232,9 +232,9 @@ class Message:
         samples: KnotPath | None = None,
         stays: np.ndarray | slice = slice(0),
     ) -> None:
-        """Move the end, which comes first and is cell 0, or else a new knot, by whole numbers (groups, 3).
+        """Set the end, which comes first and is cell 0, or a new knot, by adding integers (groups, 3).
 
-        Without numbers it is moved as near to what samples have there as these bring it, but for groups that stay.
+        Without integers, the pose is moved as close as possible to the samples, except for groups that stay.
         """
         at, moment = 1, (self.end - cell * self.codec.terms.grid) / TICKS_PER_S
         moments, poses = self.path.moments, self.path.poses
@@ -251,13 +251,13 @@ class Message:
         self.numbers.append(numbers)
         poses[:, at] = self.codec.moved(poses[:, at], numbers, self.factor)
         if not (cell or self._goes_on):
-            # How the motion got there is not known.
+            # The motion before the end is unknown.
             poses[:, 0] = poses[:, 1]
-        if self._taken is not None:
-            # Nor how it got into these hands.
-            poses[self._taken, 0] = poses[self._taken, 1]
+        if self._changed_hands is not None:
+            # The motion into these hands is unknown.
+            poses[self._changed_hands, 0] = poses[self._changed_hands, 1]
         poses = Poses(poses.positions, normalise(poses.quaternions))
         self.path = KnotPath(moments, poses, holders=self.path.holders[:, :1]).going_on()
-        # What is held goes along, and no way of its own.
+        # Held objects move along with the hand, without velocities of their own.
         held = self.codec.forest.holders >= 0
         self.path.velocities[held] = self.path.spins[held] = 0.0

@@ -1,6 +1,6 @@
-"""Open Sound Control 1.0: messages and bundles as bytes, and back. Whatever comes: what is not OSC is no message.
+"""Open Sound Control 1.0: messages and bundles to bytes, and back. Invalid data reads as no message.
 
-Source: "The Open Sound Control 1.0 Specification" (Wright, 2002). Big-endian, everything in steps of four bytes.
+Source: "The Open Sound Control 1.0 Specification" (Wright, 2002). Big-endian, everything in multiples of four bytes.
 """
 
 from __future__ import annotations
@@ -14,24 +14,24 @@ from typing import NamedTuple
 BUNDLE = b"#bundle\0"
 
 IMMEDIATELY = struct.pack(">Q", 1)
-"""The time tag of a bundle that is for now."""
+"""Time tag of a bundle for immediate use."""
 
 MAX_BUNDLE_DEPTH, MAX_MESSAGES = 4, 2048
-"""Bundles in one another, and messages of a datagram."""
+"""Most levels of nested bundles, and most messages of a datagram."""
 
 FORMATS = {"i": ">i", "f": ">f", "h": ">q", "d": ">d"}
-"""Types of numbers, as `struct` has them. Beside them are strings: of other types VMC has none."""
+"""`struct` formats of number types. Besides them VMC has only strings."""
 
 
 class OscMessage(NamedTuple):
-    """An address, and what is said to it."""
+    """An address and arguments."""
 
     address: str
     arguments: tuple[object, ...]
 
 
 def write_message(address: str, *arguments: float | str) -> bytes:
-    """Return a message of strings, whole numbers, and floats in single precision."""
+    """Return a message with strings, integers, and single-precision floats as arguments."""
     tags, data = ",", b""
     for argument in arguments:
         tag = "s" if isinstance(argument, str) else "i" if isinstance(argument, int) else "f"
@@ -41,19 +41,19 @@ def write_message(address: str, *arguments: float | str) -> bytes:
 
 
 def write_bundle(messages: Iterable[bytes]) -> bytes:
-    """Messages that belong together, for now."""
+    """Return a bundle of messages, for immediate use."""
     return BUNDLE + IMMEDIATELY + b"".join(struct.pack(">I", len(message)) + message for message in messages)
 
 
 def is_osc(datagram: bytes) -> bool:
-    """Whether a datagram begins as OSC does."""
+    """Whether a datagram begins like OSC."""
     return datagram.startswith((b"/", BUNDLE))
 
 
 def read(datagram: bytes) -> list[OscMessage]:
-    """All messages of a datagram, but for those that are damaged or have arguments of other types."""
+    """Return all messages of a datagram, except damaged ones and ones with other argument types."""
     result: list[OscMessage] = []
-    for part in islice(_parts(datagram, MAX_BUNDLE_DEPTH), MAX_MESSAGES):
+    for part in islice(_unbundled(datagram, MAX_BUNDLE_DEPTH), MAX_MESSAGES):
         with suppress(KeyError, ValueError, struct.error):
             result.append(_message(part))
     return result
@@ -64,15 +64,15 @@ def _padded(text: str) -> bytes:
     return data + bytes(4 - len(data) % 4)
 
 
-def _parts(data: bytes, depth: int) -> Iterator[bytes]:
-    """Yield the messages of all bundles in one another."""
+def _unbundled(data: bytes, depth: int) -> Iterator[bytes]:
+    """Yield the messages of nested bundles."""
     if not data.startswith(BUNDLE):
         yield data
     elif depth:
         at = len(BUNDLE) + len(IMMEDIATELY) + 4
         while at <= len(data):
             end = at + int.from_bytes(data[at - 4 : at], "big")
-            yield from _parts(data[at:end], depth - 1)
+            yield from _unbundled(data[at:end], depth - 1)
             at = end + 4
 
 
@@ -93,6 +93,6 @@ def _message(data: bytes) -> OscMessage:
 
 
 def _text(data: bytes, at: int) -> tuple[str, int]:
-    """Return the string at a place, and where what follows begins."""
+    """Return the string at an offset, and the offset after it."""
     end = data.index(b"\0", at)
     return data[at:end].decode(), end + 4 - end % 4

@@ -1,11 +1,11 @@
-"""Paths: what is shown of some messages, at any moment.
+"""Knot paths: the motion shown at any moment, given the messages received so far.
 
-All joints share the moments of their knots. Between two knots places go straight and turns go about one axis; beyond
-the last knot the motion goes on as it was going, and comes to rest. Rotation vectors are radians in the joint's own
-axes. Seconds.
+All joints share the moments of their knots. Between two knots positions move straight and rotations turn about one
+axis. Beyond the last knot the motion continues and comes to rest. Rotation vectors are radians in the joint's own axes.
+Seconds.
 
-Where somebody takes a body in hand, or lets go of it, two knots are at one moment: the last in the one space, and the
-first in the other, so that nothing is ever between numbers of two spaces.
+When a holder takes a body or lets go of it, two knots share one moment: the last in the old space, and the first in the
+new one, so nothing is interpolated between numbers of two spaces.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from ..motion.poses import joined
 from ..motion.quaternions import turned, turns_between
 
 CARRY_S = 0.15
-"""Seconds: a motion of velocity v goes on by v * CARRY_S * (1 - exp(-t / CARRY_S)) beyond the last knot."""
+"""Time constant in seconds: beyond the last knot a velocity v moves by v * CARRY_S * (1 - exp(-t / CARRY_S))."""
 
 Side = Literal["left", "right"]
 
 
 def carried(after: np.ndarray | float) -> np.ndarray:
-    """By how many seconds of its velocity a motion goes on, so many seconds after its last knot."""
+    """Return for how many seconds of its velocity a motion continues, `after` seconds after its last knot."""
     return np.asarray(CARRY_S * -np.expm1(-np.maximum(after, 0.0) / CARRY_S))
 
 
 @dataclass(frozen=True, eq=False)
 class KnotPath:
-    """Knots of all joints: rising moments (knots,), poses (joints, knots), and how the joints move at the last of them,
-    by velocities of places and angular velocities (joints, 3), a second.
+    """Knots of all joints: rising moments (knots,), poses (joints, knots), and the motion at the last knot as
+    velocities and angular velocities (joints, 3) per second.
 
-    `holders` has the joint that holds each at each knot, whose space its pose is in, shape (joints, knots); -1 for what
-    is in its own parent's space.
+    `holders` is the joint that holds each joint at each knot, shape (joints, knots); the pose is in its space. It is -1
+    for joints in their own parent's space.
     """
 
     moments: np.ndarray
@@ -49,16 +49,16 @@ class KnotPath:
         holders = np.broadcast_to(self.holders, (len(self.holders), len(self.moments)))
         object.__setattr__(self, "holders", holders)
 
-    def _before(self, moments: np.ndarray, side: Side) -> np.ndarray:
-        """Return the last knots that are not after moments (n,) or, from the left, the last before them."""
+    def _knots_before(self, moments: np.ndarray, side: Side) -> np.ndarray:
+        """Return the last knots at or before moments (n,); with side "left", strictly before them."""
         return np.clip(np.searchsorted(self.moments, moments, side=side) - 1, 0, len(self.moments) - 1)
 
     def at(self, moments: np.ndarray, side: Side = "right") -> Poses:
-        """Return the poses at moments (n,), shape (joints, n). Before the first knot those of the first.
+        """Return the poses at moments (n,), shape (joints, n). Before the first knot they are those of the first knot.
 
-        Where a body changes hands, they are those from that moment on or, from the left, until then.
+        When a body changes hands at a moment, they are the poses after the change or, with side "left", before it.
         """
-        last, before = len(self.moments) - 1, self._before(moments, side)
+        last, before = len(self.moments) - 1, self._knots_before(moments, side)
         after = np.minimum(before + 1, last)
         span = self.moments[after] - self.moments[before]
         span[span <= 0.0] = 1.0
@@ -70,20 +70,21 @@ class KnotPath:
         return Poses(first.positions + slides, turned(first.quaternions, vectors))
 
     def pose(self, moment: float) -> Poses:
-        """Return the poses of a moment, shape (joints,)."""
+        """Return the poses at a moment, shape (joints,)."""
         return self.at(np.array([moment]))[:, 0]
 
     def held_at(self, moment: float) -> np.ndarray:
-        """Return which joint holds each at a moment, shape (joints,); a single -1 where nothing is ever held."""
-        return self.holders[:, self._before(np.array([moment]), "right")[0]]
+        """Return the joint that holds each joint at a moment, shape (joints,); a single -1 if nothing is ever held."""
+        return self.holders[:, self._knots_before(np.array([moment]), "right")[0]]
 
     def followed(self, other: KnotPath, lost: int = 0) -> KnotPath:
-        """Return this path until the start of another, and from there straight to the knots of that.
+        """Return this path until the start of another, continued straight to the knots of the other.
 
-        Where as many windows between them are lost, the motion went on as it was going until the first of these, and
-        what it did then is not known: it goes straight from there.
+        If `lost` windows between them are missing, the motion continued until the first of these windows; what happened
+        then is unknown, so the path goes straight from there.
 
-        What is in other hands from the start of the other path on is there as that has it, and until then as it was.
+        Joints with another holder from the start of the other path on have the other path's pose there, and this path's
+        before.
         """
         start, holders = other.moments[0], other.holders[:, :1]
         elsewhere = np.flatnonzero((self.holders != holders).any(axis=0))
@@ -96,8 +97,8 @@ class KnotPath:
         if len(elsewhere):
             differs = self.held_at(start)[:, None] != holders
             first[differs] = other.poses[:, :1][differs]
-            # It is in the old hands up to the last knot before, or beyond all knots.
-            until = self.holders[:, self._before(begin, "left")]
+            # It has the old holder up to the last knot before, or beyond all knots.
+            until = self.holders[:, self._knots_before(begin, "left")]
             if (until != holders).any():
                 moments.insert(1, begin)
                 poses.insert(1, self.at(begin, "left"))
@@ -107,11 +108,11 @@ class KnotPath:
         )
 
     def extended(self, moment: float, poses: Poses) -> KnotPath:
-        """Return this path with another knot behind the others, of poses (joints,), with nothing ever held."""
+        """Return this path with another knot at the end, of poses (joints,), for paths without holders."""
         return KnotPath(np.append(self.moments, moment), joined((self.poses, poses[:, None]), axis=1))
 
     def going_on(self) -> KnotPath:
-        """Return the same, with the motion going on beyond the last knot as it went since the one before."""
+        """Return the same path, with the velocity of its last segment continuing beyond the last knot."""
         if len(self.moments) < 2:
             return self
         before, last, span = self.poses[:, -2], self.poses[:, -1], self.moments[-1] - self.moments[-2]
@@ -119,6 +120,6 @@ class KnotPath:
         return KnotPath(self.moments, self.poses, (last.positions - before.positions) / span, spins, self.holders)
 
     def since(self, moment: float) -> KnotPath:
-        """Return the same without knots that nothing from this moment on depends on."""
+        """Return the same path without knots that no moment from this one on depends on."""
         kept = max(int(np.searchsorted(self.moments, moment, side="right")) - 1, 0)
         return KnotPath(self.moments[kept:], self.poses[:, kept:], self.velocities, self.spins, self.holders[:, kept:])

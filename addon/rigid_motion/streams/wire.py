@@ -1,6 +1,6 @@
-"""Datagrams: descriptions, motions and answers. docs/wire.md draws their bytes. Little-endian throughout.
+"""Wire format of datagrams: descriptions, motions and answers. docs/wire.md shows their bytes. Always little-endian.
 
-Reading never raises: what is no datagram of this version is None.
+Reading never raises: it returns None for anything that is not a datagram of this version.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from .bodies import MAX_LENGTH_M, MIN_LENGTH_M, Forest, StreamBody
 WIRE_VERSION = 7
 
 TICKS_PER_S = 3600
-"""A second, in the unit of all times on the wire: whole numbers of it are the frames of 24, 25, 30, 60, 72, 90, 120."""
+"""Ticks per second; all times on the wire are in ticks, which fit frames of 24, 25, 30, 60, 72, 90 and 120 fps."""
 
 NEEDS_DESCRIPTION, NEEDS_REFRESH = 1, 2
 
 MAX_BYTES = 65_000
-"""Bytes of a datagram, as UDP carries them: a message of 4096 groups is never longer."""
+"""Most bytes of a datagram, by the limit of UDP: a message of 4096 groups is never longer."""
 
 MOST_DESCRIBED = 1 << 17
-"""Bytes of a description, unpacked."""
+"""Most bytes of an unpacked description."""
 
 LONGEST_DELAY = 8 * TICKS_PER_S
-"""Ticks of the delay and the grid."""
+"""Longest delay and grid step, in ticks."""
 
 RAW_BITS = -15
-"""Of zlib: its DEFLATE alone."""
+"""Window bits for zlib: raw DEFLATE without a header."""
 
 
 class Terms(NamedTuple):
-    """What sender and receivers agree on: the tolerance in metres; ticks by which what is shown is behind what is sent;
-    and ticks between the moments at which knots may be, counted back from the end of a window.
+    """Parameters shared by sender and receivers: the tolerance in metres; the delay in ticks of the shown moment behind
+    the sent one; and the ticks between possible knots, counted back from the end of a window.
     """
 
     tolerance: float
@@ -62,7 +62,7 @@ class EncodedMotion(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What a receiver says of a stream: the newest sequence, and in `before` bit i where newest - 1 - i is there."""
+    """A receiver's report on a stream: the newest sequence, and in `before` bit i if newest - 1 - i has arrived."""
 
     identity: bytes
     receiver: bytes
@@ -71,7 +71,7 @@ class Answer(NamedTuple):
     needs: int
 
     def has(self, sequence: int) -> bool:
-        """Whether a sequence is there, as far as this says."""
+        """Whether a sequence has arrived, as far as this answer tells."""
         back = (self.newest - sequence) & 0xFFFF
         there = (self.before << 1 | 1) >> back & 1 if back <= 32 else 0
         return bool(there) and not self.needs & NEEDS_DESCRIPTION
@@ -81,7 +81,7 @@ Datagram = Description | EncodedMotion | Answer
 
 KINDS: tuple[type[Datagram], ...] = (Description, EncodedMotion, Answer)
 LAYOUTS = (Struct("<3s"), Struct("<3sH"), Struct("<3s3sHIB"))
-"""Of each kind its fields behind the byte of version and kind, but for the data at the end."""
+"""Fields of each kind, after the byte with version and kind, and before any data."""
 
 
 def write(datagram: Datagram) -> bytes:
@@ -101,7 +101,7 @@ def read(datagram: bytes) -> Datagram | None:
 
 
 def other_version(datagram: bytes) -> int | None:
-    """Return the version of what is a description of another version, by all that is known of it; None for all else."""
+    """Return the version of a description in another version of the format, as far as known; otherwise None."""
     version, kind = divmod(datagram[0], 16) if datagram else (0, 0)
     if kind or version in (0, WIRE_VERSION):
         return None
@@ -112,7 +112,7 @@ def other_version(datagram: bytes) -> int | None:
 
 
 def describe(forest: Forest, terms: Terms) -> bytes:
-    """Return bodies and terms, packed."""
+    """Return the packed bodies and terms."""
     bodies, digits = [], max(3 - math.floor(math.log10(terms.tolerance)), 6)
     for body in forest.bodies:
         names = [own.encode(errors="replace").decode() for own in (body.name, *body.joints)]
@@ -123,7 +123,7 @@ def describe(forest: Forest, terms: Terms) -> bytes:
 
 
 def read_description(data: bytes) -> tuple[Forest, Terms] | None:
-    """Return the bodies and the terms of a description, or None."""
+    """Return the bodies and terms of a description, or None."""
     try:
         tolerance, delay, grid, bodies = json.loads(zlib.decompressobj(RAW_BITS).decompress(data, MOST_DESCRIBED))
         terms, forest = Terms(float(tolerance), int(delay), int(grid)), Forest([_body(*body) for body in bodies])
@@ -136,7 +136,7 @@ def read_description(data: bytes) -> tuple[Forest, Terms] | None:
 
 
 def _body(radii: list[float], names: list[str], parents: object, sliding: object, rest: object) -> StreamBody:
-    """Return a body that is described. Raises whatever is wrong with it."""
+    """Return a body from its description. Raises various errors if it is invalid."""
     for name in names:
         name.encode()
     rows = np.array(rest, dtype=np.float64)
