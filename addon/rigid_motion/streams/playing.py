@@ -1,9 +1,9 @@
-"""Playing out: which moment of a stream is shown when, and how the picture goes on where something came late.
+"""Playback timing of streams: which moment is shown when, and how the display continues after late messages.
 
-The moment that is shown is behind the newest that can have come: by the delay of the stream, and by the longest that a
-datagram took lately. It never goes back. Where the network takes longer for good, it waits; where it takes less for
-good, it hurries; a clock that was set is neither. Seconds; `transit` is arrival by our clock less sending by the
-sender's, so it is right up to what the clocks are apart.
+The shown moment is behind the newest one that can have arrived: by the delay of the stream, and by the longest recent
+transit time. It never goes back. If the network becomes slower for good, playback waits; if faster for good, it
+hurries; a clock that was set causes neither. Seconds; `transit` is arrival by our clock minus sending by the sender's,
+so it includes the difference between the clocks.
 """
 
 from __future__ import annotations
@@ -22,59 +22,59 @@ from .steady import Steady
 from .wire import TICKS_PER_S
 
 LOOK_BACK, MOST_TRANSITS = 3.0, 512
-"""Seconds of which the longest transit counts, and of how many datagrams at most."""
+"""Seconds over which the longest transit counts, and the most datagrams that count."""
 
-# The network is quicker now, and does not only vary, where datagrams all came sooner than usual:
-MIN_QUICK_DATAGRAMS = 4  # at so many times in a row
-MIN_QUICK_S = 0.3  # over so long
-MIN_SOONER_S = 0.05  # by so much sooner than the longest
-MAX_SOONER_RATIO = 0.1  # and sooner than all but this part of those before
+# The network has become faster, and does not only vary, if datagrams all arrived sooner than usual:
+MIN_QUICK_DATAGRAMS = 4  # at so many sending times in a row
+MIN_QUICK_S = 0.3  # over so many seconds
+MIN_SOONER_S = 0.05  # by so many seconds sooner than the longest transit
+MAX_SOONER_RATIO = 0.1  # and sooner than all but this fraction of those before
 
 CLOCK_SET_S = 1.0
-"""A transit that differs by more than this many seconds is that of another clock; a display may not leap further."""
+"""Seconds: a transit that differs by more is due to a clock that was set; the display may not leap further."""
 
 CLOCK_AHEAD_S = 0.25
-"""Seconds by which something comes sooner than all that came lately where the sender's clock was set ahead."""
+"""Seconds by which a datagram arrives sooner than all recent ones if the sender's clock was set ahead."""
 
 SETTLING_S, MAX_HURRY_RATIO = 0.15, 0.6
-"""Seconds in which a third of a difference to the moment that should be shown is left; and by which part faster than
-time the moment goes on at most."""
+"""Seconds in which the difference to the desired moment shrinks to about a third; and the largest fraction by which
+playback runs faster than time."""
 
 FADE_S, MAX_FORWARD_RATIO = 0.04, 0.8
-"""Seconds: as critically damped springs of this time constant, differences to what should be shown fade. And the part
-of the motion that a difference may take away: what was shown too far ahead waits, and never goes back."""
+"""Time constant in seconds with which differences to the desired poses fade, like critically damped springs. And the
+fraction of the motion that a difference may take away: poses shown too far ahead wait, and never go back."""
 
 MAX_REST_SPEED, MIN_DIFFERENCE = 0.05, 1e-5
-"""Metres or radians a second: a motion that is slower is at rest, and differences along it fade as all others. And
-metres or radians: differences that are smaller are over."""
+"""Metres or radians per second: slower motion counts as rest, where differences along it fade like all others. And
+metres or radians: smaller differences count as zero."""
 
 MAX_SILENCE_S = 10.0
 """Seconds of silence after which a stream is forgotten."""
 
 MOST_KNOTS, MOST_JOINT_KNOTS = 256, 1 << 14
-"""Knots of a stream that wait for `keys`, or as many more as a body of few joints has in so many poses of joints."""
+"""Knots of a stream kept for `keys`; for bodies of few joints more, up to so many poses of single joints."""
 
 NO_HOLDERS = np.full(1, -1, dtype=np.int16)
-"""Who holds each joint where nothing is held."""
+"""Holder of each joint if nothing is held."""
 
 
 class Playing:
-    """The moment of a stream that is shown."""
+    """The moment of a stream to show."""
 
     def __init__(self, delay: float) -> None:
         self.delay = delay
         self.longest: float | None = None
-        """The transit that is waited for."""
+        """The longest recent transit, which playback waits for."""
         self._transits: deque[tuple[float, float]] = deque(maxlen=MOST_TRANSITS)
         self._moment: float | None = None
         self._last = self._heard = -np.inf
         self._unsure = False
-        """Whether our clock leapt, and nothing came since."""
+        """Whether our clock leapt, and nothing has arrived since."""
         self._leap: tuple[float, float] | None = None
-        """The moment behind which so many seconds are left out, by which the sender's clock was set ahead."""
+        """A moment, and seconds to skip after it, because the sender's clock was set ahead."""
 
     def heard(self, sent: float, arrival: float) -> None:
-        """Take into account when something was sent and came."""
+        """Record when a datagram was sent and arrived."""
         transit = arrival - sent
         known = self._transits
         if known and (abs(transit - known[-1][1]) > CLOCK_SET_S or arrival < known[-1][0] - CLOCK_SET_S):
@@ -82,9 +82,9 @@ class Playing:
         known.append((arrival, transit))
         while known[0][0] < arrival - LOOK_BACK:
             known.popleft()
-        # As they were sent: those of a quick way overtake.
+        # By sending time: datagrams on a quick route overtake others.
         by_sent = sorted((when - took, when, took) for when, took in known)
-        # What somebody who seldom looks takes out of a socket came at one time.
+        # A receiver that seldom polls its socket sees several arrivals at one time.
         last_left = {when: left for left, when, _ in by_sent}
         begun = min(sorted(last_left.values())[-MIN_QUICK_DATAGRAMS:][0], by_sent[-1][0] - MIN_QUICK_S)
         recent = [took for left, _, took in by_sent if left >= begun]
@@ -100,23 +100,23 @@ class Playing:
         self._heard, self._unsure = arrival, False
 
     def set_ahead(self, sent: float, arrival: float) -> float:
-        """Return by how much the sender's clock was set ahead, 0 if it was not, where this was sent next."""
+        """Return by how much the sender's clock was set ahead, 0 if it was not, given the next datagram."""
         before = [(when, took) for when, took in self._transits if when < arrival]
-        # Somebody who seldom looks does not know when it came, and a clock of ours that goes back says nothing.
+        # A receiver that seldom polls does not know arrival times, and a clock of ours that goes back proves nothing.
         if not before or self._transits[-1][0] > arrival or arrival - before[-1][0] > CLOCK_AHEAD_S:
             return 0.0
         step = min(took for _, took in before) - (arrival - sent)
         return step if step > CLOCK_AHEAD_S else 0.0
 
     def leap(self, moment: float, step: float) -> None:
-        """Leave out so many seconds behind a moment, as soon as it was shown."""
+        """Skip so many seconds after a moment, once it has been shown."""
         if self._leap and self._moment is not None:
             self._moment += self._leap[1]
         self._transits = deque(((when, took - step) for when, took in self._transits), MOST_TRANSITS)
         self._leap = moment, step
 
     def moment(self, now: float) -> float | None:
-        """Return the moment to be shown now; None before anything came."""
+        """Return the moment to be shown now; None before anything arrived."""
         if self.longest is None:
             return None
         desired = now - self.longest - self.delay
@@ -137,54 +137,55 @@ class Playing:
         if abs(gap) > CLOCK_SET_S:
             self._moment = desired
         else:
-            # Somebody who seldom looks is not to overshoot.
+            # A receiver that seldom polls must not overshoot.
             self._moment += passed + min(max(gap / max(SETTLING_S, passed), -1.0), MAX_HURRY_RATIO) * passed
         return self._moment
 
 
 class Fading:
-    """What is shown of a path that changes under it: the difference fades, but does not turn the motion back.
+    """The poses shown of a path that changes during playback: differences fade, without turning the motion back.
 
-    What is in other hands than before is in these at once.
+    Joints with a new holder change at once.
     """
 
     def __init__(self) -> None:
         self._shown: Poses | None = None
         self._path: Poses | None = None
-        """What the path has where that was shown."""
+        """Poses of the path at the last shown moment."""
         self._last = 0.0
         self._left, self._rate = np.zeros((2, 2, 1, 3))
-        """Differences of places and turns, the latter as rotation vectors, and by how much they change a second. Shape
-        (2, joints, 3)."""
+        """Remaining differences of positions and rotations, the latter as rotation vectors, and their change per
+        second. Shape (2, joints, 3).
+        """
         self._holders = NO_HOLDERS
-        """Which joints held each as that was shown."""
+        """Holder of each joint when last shown."""
 
     def changed(self, poses: Poses, holders: np.ndarray = NO_HOLDERS) -> None:
-        """Go on from what was shown last, where a new path has poses (joints,) in the hands of holders (joints,)."""
+        """Continue from the last shown poses, given the poses (joints,) of a new path and their holders (joints,)."""
         if self._shown is not None:
-            self._path, self._left = poses, _between(poses, self._shown)
-            self._take_over(holders)
+            self._path, self._left = poses, _differences(poses, self._shown)
+            self._drop_changed_holders(holders)
 
-    def _take_over(self, holders: np.ndarray) -> None:
-        """Forget the differences of what is in other hands."""
+    def _drop_changed_holders(self, holders: np.ndarray) -> None:
+        """Forget the differences of joints whose holder has changed."""
         differs = self._holders != holders
         if differs.any():
             self._left, self._rate = (np.where(differs[:, None], 0.0, each) for each in (self._left, self._rate))
         self._holders = holders
 
     def show(self, poses: Poses, now: float, holders: np.ndarray = NO_HOLDERS) -> Poses:
-        """Poses (joints,) of the path, in the hands of holders (joints,), with what is left of differences."""
-        self._take_over(holders)
+        """Return poses (joints,) of the path, with holders (joints,), plus the remaining differences."""
+        self._drop_changed_holders(holders)
         passed, self._last = max(now - self._last, 0.0), now
         if self._path is not None and passed > 0.0 and self._left.any():
-            self._fade(_between(self._path, poses), passed)
+            self._fade(_differences(self._path, poses), passed)
         slides, turns = self._left
         self._path = poses
         self._shown = Poses(poses.positions + slides, normalise(turned(poses.quaternions, turns)))
         return self._shown
 
     def _fade(self, step: np.ndarray, passed: float) -> None:
-        """Let so many seconds pass, in which the path goes on by steps (2, joints, 3)."""
+        """Fade the differences over `passed` seconds, in which the path moves by `step` (2, joints, 3)."""
         before, decay = self._left, np.exp(-passed / FADE_S)
         pull = self._rate + before / FADE_S
         left = (before + pull * passed) * decay
@@ -197,22 +198,20 @@ class Fading:
         self._rate[over] = self._left[over] = 0.0
 
 
-def _between(first: Poses, second: Poses) -> np.ndarray:
+def _differences(first: Poses, second: Poses) -> np.ndarray:
     turns = turns_between(first.quaternions, second.quaternions)
     return np.stack((second.positions - first.positions, turns))
 
 
 class Stream(NamedTuple):
-    """What tells streams apart."""
+    """Identity of a stream."""
 
     source: Hashable
     identity: bytes
 
 
 class HeldPoses(NamedTuple):
-    """Where a body is held: the body and the joint that hold it, and its poses (joints,) with roots in that joint's
-    space.
-    """
+    """A held body: the body and joint that hold it, and its poses (joints,) with roots in that joint's space."""
 
     body: str
     joint: str
@@ -220,10 +219,10 @@ class HeldPoses(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """What a stream shows: the moment in seconds by the sender's clock, and of each body by its name poses (joints,),
-    each joint in its parent's space, and roots in the world, held or not.
+    """The poses of a stream at a moment in seconds by the sender's clock. For each body by name poses (joints,), each
+    joint in its parent's space, and roots in world space, held or not.
 
-    `held` has what is held, by its name.
+    `held` has the held bodies by name.
     """
 
     stream: Stream
@@ -234,11 +233,11 @@ class Shown(NamedTuple):
 
 
 class ReceivedKeys(NamedTuple):
-    """What was sent, to be recorded: rising moments (k,) in seconds by the sender's clock, and poses (joints, k).
+    """Received keys, for recording: rising moments (k,) in seconds by the sender's clock, and poses (joints, k).
 
-    Roots are in the world, held or not. Where a body changes hands, there is a key just before it. `held` has what is
-    held at any of these moments, by its name: the body and the joint that hold it at each (k,), None where nothing
-    does, and its poses (joints, k) with roots in that joint's space.
+    Roots are in world space, held or not. When a body changes hands, there is a key just before. `held` has, by name,
+    the bodies held at any of these moments: the body and joint that hold it at each moment (k,), or None, and its poses
+    (joints, k) with roots in that joint's space.
     """
 
     stream: Stream
@@ -249,10 +248,10 @@ class ReceivedKeys(NamedTuple):
 
 
 class Playback:
-    """A stream that is shown: its bodies, the path of what came, and the moment of that which is due.
+    """A stream that is shown: its bodies, the path received so far, and the moment due.
 
-    `heard` is when something new came, `begins` and `ends` are the first and the last moment that can be shown, and
-    `settled` is that until which the path is not going to change any more.
+    `heard` is when new data last arrived, `begins` and `ends` are the first and last moment that can be shown, and the
+    path will not change any more before `settled`.
     """
 
     silent = MAX_SILENCE_S
@@ -260,27 +259,27 @@ class Playback:
     def __init__(self, stream: Stream, delay: float, heard: float, forest: Forest | None = None) -> None:
         self.stream, self.heard, self.playing = stream, heard, Playing(delay)
         self.forest: Any = forest
-        """The Forest of all bodies, None for as long as nothing is known of them."""
+        """The Forest of all bodies, or None while nothing is known of them."""
         self.path: KnotPath | None = None
         self.begins, self.ends, self.settled = -np.inf, np.inf, np.inf
         self.fading, self._steady = Fading(), Steady()
         self.moment: float | None = None
         self.kept = -np.inf
-        """Until this moment keys were handed out."""
+        """Keys have been returned up to this moment."""
 
     def put(self, path: KnotPath) -> None:
-        """Show a path from now on, of which the knots remain that are to be shown or handed out."""
+        """Show this path from now on; keep only the knots that are still to be shown or recorded."""
         self.ends = np.inf
         count = min(max(MOST_JOINT_KNOTS // len(self.forest), MOST_KNOTS), len(path.moments))
         shown = path.moments[0] if self.moment is None else self.moment
         self.path = path.since(max(min(self.kept, shown) - 1e-6, path.moments[-count]))
 
     def end(self) -> None:
-        """Show nothing behind what came, as the sender has left, unless more comes."""
+        """Show nothing after the received path, because the sender has left, unless more arrives."""
         self.ends, self.settled = float(self.path.moments[-1]) if self.path else -np.inf, np.inf
 
     def show(self, now: float, steady: bool = False) -> Shown | None:
-        """Return what is shown now, without its trembling where asked for."""
+        """Return the poses shown now, with jitter removed if `steady`."""
         self.moment = self.playing.moment(now)
         if self.moment is None or self.path is None or not self.begins <= self.moment <= self.ends:
             return None
@@ -293,13 +292,13 @@ class Playback:
         return Shown(self.stream, self.moment, forest.bodies, shown, held)
 
     def keys(self) -> ReceivedKeys | None:
-        """Return the knots that are settled and were not handed out yet."""
+        """Return the settled knots that have not been returned yet."""
         moments = self.path.moments if self.path else np.empty(0)
         rows = np.flatnonzero((moments > self.kept) & (moments <= self.settled))
         if self.path is None or not len(rows):
             return None
         self.kept = float(moments[rows[-1]])
-        # Of knots at one moment the first is what was until then, and the last what is from then on.
+        # Of knots at one moment, the first is the pose before it, and the last the pose from it on.
         is_last = np.diff(moments[rows], append=np.inf) > 0.0
         is_first = np.insert(is_last[:-1], 0, True)
         moments = (moments[rows] - np.where(is_last, 0.0, 0.5 / TICKS_PER_S))[is_first | is_last]

@@ -1,7 +1,7 @@
-"""From datagrams to what is shown. Whatever comes, from whomever: it is a message of a stream, or it changes nothing.
+"""Receiver of streams: from datagrams to shown poses. Invalid data is ignored.
 
-Streams are told apart by where they come from and by their senders' identities, and know nothing of one another. What
-is remembered of each is bounded.
+Streams are told apart by source and by the identity of their senders, and do not affect one another. The memory of each
+stream is bounded.
 """
 
 from __future__ import annotations
@@ -25,44 +25,44 @@ from .vmc import VMC, Performance
 from .wire import NEEDS_DESCRIPTION, NEEDS_REFRESH, TICKS_PER_S, Answer, EncodedMotion, Terms
 
 MOST_STREAMS, MOST_ALL_JOINTS = 64, 4096
-"""That are remembered, the streams without descriptions for a new one as well; and joints of all streams together."""
+"""Most remembered streams, also of streams still without a description; and most joints of all streams together."""
 
 MOST_MESSAGES, MOST_WINDOWS, MOST_WAITING = 40, 8, 4
-"""Messages of a stream that others may build on, those that others built on last; windows that one that came late can
-be put among; and messages that wait for the description."""
+"""Messages of a stream kept for others to build on, least recently used ones dropped first; windows among which a late
+one can be inserted; and messages that wait for the description."""
 
 MOST_GONE = 256
-"""Streams that are gone, and known again where somebody replays them."""
+"""Ended streams that are remembered, to recognise replayed data."""
 
 
 class Receiver:
-    """Takes datagrams of any number of streams, and shows them until they were silent for long.
+    """Receives datagrams of any number of streams, and shows each until it has been silent for long.
 
-    Other programs' VMC is taken as well: it has no delay of its own, and is shown `delay` seconds later. What trembles
-    is shown without that where it is to be `steady`, and no later for it.
+    VMC from other programs is accepted as well: it has no delay of its own, and is shown `delay` seconds later. With
+    `steady`, jitter is removed without additional delay.
     """
 
     def __init__(self, delay: float = 0.1, steady: bool = False) -> None:
         self.delay, self.steady = delay, steady
         self.own = secrets.token_bytes(3)
-        """Who answers."""
+        """Identity of this receiver in answers."""
         self._streams: dict[Stream, Any] = {}
         self._gone: deque[Stream] = deque(maxlen=MOST_GONE)
         self._waiting: OrderedDict[Stream, deque[tuple[EncodedMotion, float]]] = OrderedDict()
-        """Messages that came before the description, and when."""
+        """Messages that arrived before the description, with arrival times."""
         self._complained: dict[Hashable, int] = {}
-        """Who sends another version of the wire, and which."""
+        """Sources with another version of the wire format, and their versions."""
         self._complaints: list[str] = []
         self._unanswered: dict[Stream, None] = {}
-        """Of which something came since the last answers, in that order."""
+        """Streams with new data since the last answers, in order."""
 
     @property
     def streams(self) -> list[Stream]:
-        """Those that can be shown, or soon can."""
+        """The streams that can be shown now or soon."""
         return list(self._streams)
 
     def take(self, datagram: bytes, arrival: float, source: Hashable = None) -> None:
-        """Take a datagram that came at a time, by the clock of `show`, from somewhere."""
+        """Process a datagram from a source, with its arrival time by the clock of `show`."""
         if is_osc(datagram):
             known = self._streams.get(stream := Stream(source, VMC))
             if not known and len(self._streams) < MOST_STREAMS:
@@ -72,7 +72,7 @@ class Receiver:
             return
         read = wire.read(datagram)
         if read is None:
-            self._complain(wire.other_version(datagram), source)
+            self._add_complaint(wire.other_version(datagram), source)
         if read is None or isinstance(read, Answer):
             return
         known = self._streams.get(stream := Stream(source, read.identity))
@@ -91,8 +91,8 @@ class Receiver:
                 for motion, when in waiting:
                     self._streams[stream].take(motion, when)
 
-    def _complain(self, version: int | None, source: Hashable) -> None:
-        """Note once of each source that it sends another version of the wire."""
+    def _add_complaint(self, version: int | None, source: Hashable) -> None:
+        """Add a complaint, once for each source, that it sends another version of the wire format."""
         if version and source not in self._complained and len(self._complained) < MOST_STREAMS:
             self._complained[source] = version
             own, older = wire.WIRE_VERSION, "this program" if version > wire.WIRE_VERSION else "the sender"
@@ -100,40 +100,40 @@ class Receiver:
             self._complaints.append(f"{who} sends version {version} of the wire, not {own}: update {older}")
 
     def complaints(self) -> list[str]:
-        """Return lines on who cannot be understood, and the way out, since the last call."""
+        """Return lines about senders that cannot be understood, and the remedy, since the last call."""
         complaints, self._complaints = self._complaints, []
         return complaints
 
     def answers(self) -> list[tuple[Hashable, bytes]]:
-        """Return what came since the last call, to be sent to where it came from."""
+        """Return answers for data received since the last call, each with the source to send it to."""
         nothing = 0, 0, NEEDS_DESCRIPTION | NEEDS_REFRESH
         there = {own: self._streams[own].there() if own in self._streams else nothing for own in self._unanswered}
         self._unanswered.clear()
         return [(own.source, wire.write(Answer(own.identity, self.own, *said))) for own, said in there.items()]
 
     def show(self, now: float) -> dict[Stream, Shown]:
-        """Return what every stream shows."""
+        """Return the shown poses of every stream."""
         self._forget_silent(now)
         shown = {stream: it.show(now, self.steady) for stream, it in self._streams.items()}
         return {stream: what for stream, what in shown.items() if what}
 
     def leave(self, source: Hashable) -> None:
-        """Show nothing of a source behind what it sent, as it has left."""
+        """Show nothing of a source after its last message, because it has left."""
         for stream, it in self._streams.items():
             if stream.source == source:
                 it.end()
 
     def keys(self) -> list[ReceivedKeys]:
-        """Return what came since the last call and is not going to change any more."""
+        """Return the settled keys received since the last call."""
         return [keys for it in self._streams.values() if (keys := it.keys())]
 
     def _has_room_for(self, stream: Stream, forest: Forest, now: float) -> bool:
-        """Forget a stream that this one is instead of, and say whether there is room for it."""
+        """Forget streams that a new one replaces, and return whether there is room for it."""
         self._forget_silent(now)
         described = {other: it.forest for other, it in self._streams.items() if it.forest}
         same = [other for other, it in described.items() if other.source == stream.source and it.names == forest.names]
         if same and stream in self._gone:
-            return False  # Somebody replays what was sent before the sender began again.
+            return False  # A replay of data from before the sender restarted.
         self._forget(same)
         joints = sum(len(it) for other, it in described.items() if other not in same)
         return len(self._streams) < MOST_STREAMS and joints + len(forest) <= MOST_ALL_JOINTS
@@ -148,20 +148,20 @@ class Receiver:
 
 
 class _Coded(Playback):
-    """A stream with its description."""
+    """A stream with a description, in our wire format."""
 
     def __init__(self, stream: Stream, forest: Forest, terms: Terms, heard: float) -> None:
         super().__init__(stream, terms.delay / TICKS_PER_S, heard, forest)
         self._codec = Codec(forest, terms)
         self._messages: OrderedDict[int, Message] = OrderedDict()
-        """Of messages by their sequence numbers, those that others built on last behind."""
+        """Messages by sequence number; messages that others built on recently come last."""
         self._newest, self._needs = -1, NEEDS_REFRESH
         self._end, self._transit = -np.inf, np.inf
-        """Seconds of the newest message: its end, and what it took."""
+        """Seconds: end of the newest message, and its transit time."""
         self.begins = np.inf
 
     def take(self, motion: EncodedMotion, arrival: float) -> bool:
-        """Take a message, if it can be read, and say whether it is a new one."""
+        """Read a message if possible, and return whether it is new."""
         sequence = motion.sequence
         if sequence in self._messages or self._newest - sequence > MOST_MESSAGES:
             return False
@@ -184,16 +184,16 @@ class _Coded(Playback):
         if lost >= 0:
             self._newest, self._needs, self._end, self._transit = sequence, 0, end, arrival - end
             self.heard = max(self.heard, arrival)
-        # What builds on nothing may be the copy, which is sent later.
+        # A message without a base may be the copy, which is sent later.
         if read.back or self.playing.longest is None:
             self.playing.heard(end, arrival)
-        self._put(read.path, lost)
+        self._add_window(read.path, lost)
         return True
 
-    def _put(self, window: KnotPath, lost: int) -> None:
-        """Let a window take part in what is shown; before it so many are lost, or it came late where that is < 0."""
+    def _add_window(self, window: KnotPath, lost: int) -> None:
+        """Add a window to the path; `lost` windows before it are missing, or it is late if `lost` is negative."""
         if self.path is None or (lost >= 0 and window.moments[0] < self.begins):
-            # How the motion got to the first knot is not known.
+            # The motion before the first knot is unknown.
             self.begins = float(window.moments[1])
         windows = {number: self._messages[number].path for number in sorted(self._messages)[-MOST_WINDOWS:]}
         path, first = self.path, next(iter(windows.values()))
@@ -206,6 +206,6 @@ class _Coded(Playback):
             self.fading.changed(path.pose(self.moment), path.held_at(self.moment))
 
     def there(self) -> tuple[int, int, int]:
-        """Return what an answer says: the newest message, which there are of those before it, and what is needed."""
+        """Return the fields of an answer: newest message, received ones among those before it, and needs."""
         before = sum(1 << back for back in range(32) if self._newest - 1 - back in self._messages)
         return max(self._newest, 0), before, self._needs

@@ -1,15 +1,15 @@
-"""A sender that sends when it must: it knows every pose, and what its receivers show of what they were sent.
+"""Sender of streams: knows every pose and the motion that receivers show, and sends only when necessary.
 
-What is shown is a delay behind. When it gets to where a joint's ball would leave the tolerance, all of the window since
-then is known here, and is said at once. Until then nothing is sent, for the motion goes on at the receivers as it was
-going, and a body at rest costs a keepalive.
+The shown motion is a delay behind. When it reaches a moment at which a joint's ball would leave the tolerance, the
+whole window up to now is known here, and is sent at once. Until then nothing is sent: receivers continue the motion,
+and a body at rest costs only a keepalive.
 
-What is held is sent in the space of the joint that holds it: what is off there goes with the hand. Where a body changes
-hands, all until then is said in the old ones, and the window of what comes next starts there. Every message has who
-holds what, unless that is so where the message builds on: whatever is lost, what can be read is right.
+Held objects are sent in the space of the joint that holds them: their errors move with the hand. When a body changes
+hands, the motion before is sent with the old holder, and the next window starts at the change. Every message contains
+the holders, unless they are the same as in the message it builds on: whatever is lost, readable messages are right.
 
-A message builds on one that is there: the newest that all receivers who answer have; where nobody answers, the last
-refresh, a message that builds on nothing and is sent twice.
+A message builds on one that has arrived: the newest that all answering receivers have; without answers, the last
+refresh, which is a message that builds on nothing and is sent twice.
 """
 
 from __future__ import annotations
@@ -38,56 +38,57 @@ from .wire import (
 )
 
 KEEPALIVE_S, REFRESH_S = 0.5, 1.0
-"""Seconds of silence after which something is said in any case; and, where nobody answers, between messages that build
-on nothing."""
+"""Seconds of silence after which a message is always sent; and, without answers, between messages that build on
+nothing."""
 
 REPEAT_S, PATIENCE_S = 0.03, 0.15
-"""Seconds after which a refresh, or who holds what from now on, is sent a second time, so that one loss does not lose
-both; and that it has to arrive, before another is sent to somebody who asks for one."""
+"""Seconds after which a refresh or a change of holders is sent again, so that one loss does not lose both; and seconds
+it gets to arrive before another is sent on request."""
 
 MAX_SILENCE_S, MAX_RECEIVERS = 2.0, 256
-"""Seconds after which somebody who does not answer any more is not waited for; and for so many at most."""
+"""Seconds without answers after which a receiver is forgotten; and the most receivers."""
 
 GRID_TICKS = 3
-"""Ticks of the grid of knots for samples at any moments."""
+"""Ticks between possible knots if samples have no even rate."""
 
 MAX_EARLY_TICKS, CLOCK_UNEVENNESS_S, OVERDUE_S = 1e-3, 1e-4, 2e-4
-"""Ticks by which a sample may be before the one that it is at; seconds by which clocks are not more even than that; and
-that are waited for a sample, instead of sending without it."""
+"""Ticks by which a sample may be earlier than its tick; seconds of unevenness to expect from clocks; and seconds to
+wait for an overdue sample before sending without it."""
 
 MAX_SEQUENCE_NUMBER = 0xFFFF
-"""The largest sequence number: behind it the sender begins again, with another identity."""
+"""The largest sequence number: after it, the sender restarts with another identity."""
 
 CLOCK_SET_S = 1.0
-"""Seconds between two samples that are no pause, but a clock that was set."""
+"""Seconds between two samples from which on it is not a pause, but a clock that was set."""
 
 PAUSE_S = 0.25
-"""Seconds between two samples beyond what is usual, before which all is said: for a receiver it may be a clock."""
+"""Seconds beyond the usual interval before a late sample at which all samples so far are sent: receivers may take the
+pause for a clock that was set."""
 
 CERTAIN_INTERVAL_RATIO, INTERVAL_DECAY_RATIO = 0.99, 0.9
-"""Part of an interval that it surely takes; what is left of the longest with every sample that came sooner."""
+"""Fraction of an interval that surely passes before the next sample; and decay of the longest interval per sample."""
 
 ANSWERED_MESSAGES, MAX_BASE_AGE_S = 33, 2.0
-"""Messages that an answer speaks of; and seconds: what is older is not worth building on, and all is said anew."""
+"""Messages that an answer reports on; and seconds: older messages are not worth building on, all is sent anew."""
 
 MIN_LOST_MESSAGES, LOSSLESS_S = 2, 5.0
-"""Messages of the last 32: where so many are missing, each is sent twice until none is for some seconds."""
+"""Lost messages among the last 32 from which on each message is sent twice, until none is lost for some seconds."""
 
 
 class Sender:
-    """Samples in, and out come the datagrams that are needed, each as soon as it is.
+    """Takes samples and returns the datagrams that are needed, each as soon as it is.
 
     Parameters
     ----------
-    bodies : sequence of Body
+    bodies : sequence of StreamBody
     tolerance : float
-        Metres: no point within a joint's radius is shown further off, at any moment, where nothing is lost or late.
+        Metres: no point within a joint's radius is shown farther off, at any moment, if nothing is lost or late.
     delay : float
-        Seconds by which what is shown is behind, beside what the network takes.
+        Seconds by which the shown motion is behind, in addition to network delays.
     rate : float, optional
-        Samples a second, where they are even.
+        Samples per second, if they are even.
     keepalive : float
-        Seconds of silence at most.
+        Longest silence in seconds.
 
     Raises
     ------
@@ -116,67 +117,66 @@ class Sender:
         terms, self._keepalive = Terms(tolerance, round(delay * TICKS_PER_S), grid), keepalive
         self._delay = terms.delay / TICKS_PER_S
         self._packed = wire.describe(Forest(bodies), terms)
-        # The bodies as receivers read them, in so many digits.
+        # The bodies as receivers read them, with rounded numbers.
         read = wire.read_description(self._packed)
         if read is None or len(self._packed) > wire.MAX_BYTES - 4:
             raise ValueError("the bodies have too many joints or too long names to be described")
         self.codec = self._codec = Codec(*read)
-        """As described; and with what is held."""
+        """As described; and with the current holds."""
         self._wanted: tuple[tuple[int, int], ...] = ()
-        """The numbers of bodies that are held from the next sample on, and of the joints that hold them."""
-        self._since, self._takes = NEVER_TICK, False
-        """The tick since which all is in the same hands; and whether that is still to be said."""
+        """Numbers of bodies that will be held from the next sample on, and of the joints that hold them."""
+        self._since, self._changes = NEVER_TICK, False
+        """The tick since which holders have not changed; and whether the change still has to be sent."""
         self._slip = 0.0
-        """What is added to the times of samples, so that a clock that was set makes no difference."""
+        """Seconds added to the times of samples, so that a clock that was set makes no difference."""
         none = np.empty((len(read[0]), 0, 4))
         self._samples = KnotPath(np.empty(0), Poses(none[..., :3], none))
         self._next = math.inf
         self._interval = 0.0
-        """Within which the next sample is expected."""
+        """Seconds within which the next sample is expected."""
         self._begin()
 
     def _begin(self) -> None:
         """Begin with a new identity."""
         self.identity = secrets.token_bytes(3)
         self._messages: dict[int, Message] = {}
-        """Of messages that others may build on, by their sequence numbers."""
+        """Messages that others may build on, by sequence number."""
         self._sequence = 0
         self._path: KnotPath | None = None
-        """What the receivers show who have everything."""
+        """The motion shown by receivers that got all messages."""
         self._shown = -math.inf
-        """Until this moment it is known to be within the tolerance."""
-        self._good: float | None = None
-        """The moment behind which it is not."""
+        """The shown motion is known to be within the tolerance before this moment."""
+        self._good_until: float | None = None
+        """The last moment within the tolerance, if a later one is not."""
         self._receivers: dict[bytes, tuple[Answer, float]] = {}
-        """What those who answer have, and when they said so."""
+        """Latest answers of receivers, and when they arrived."""
         self._refreshed = self._sent = -math.inf
         """The ends of the last refresh and of the last message."""
         self._copy: tuple[int, float, bytes] | None = None
-        """What is to be sent a second time: its sequence number, and when it was sent."""
+        """Datagram to be sent again: sequence number, time when sent, and bytes."""
         self._base: int | None = None
         """The last refresh."""
         self._desired = False
-        """Whether somebody cannot read what is sent."""
+        """Whether a refresh was requested."""
         self._missed = -math.inf
-        """When somebody said last that so much is lost that all is to be sent twice."""
+        """When an answer last reported so many losses that all is to be sent twice."""
 
     def hold(self, tool: str, body: str | None, joint: str | None = None) -> None:
-        """Say that a body is in the hand of a joint of another from the next sample on, or in nobody's any more.
+        """Put a body into the hand of another body's joint from the next sample on, or let go of it if `body` is None.
 
-        The poses of its roots are given in the world all the same, and shown there. The more rigidly it is held, the
-        less it costs.
+        The poses of its roots are still given and shown in world space. The more rigidly it is held, the less it costs.
 
         Parameters
         ----------
         tool : str
         body : str, optional
         joint : str, optional
-            Not needed of a body with a single joint.
+            Not needed for a body with a single joint.
 
         Raises
         ------
         ValueError
-            Where there is no such body or joint, and where it would hold itself, if only through others.
+            If the body or joint does not exist, or if the body would hold itself, even indirectly.
         """
         forest = self.codec.forest
         wanted = {held: holder for held, holder in self._wanted if held != forest.body(tool)}
@@ -190,20 +190,20 @@ class Sender:
         self._wanted = pairs
 
     def add(self, time: float, poses: Poses | Mapping[str, Poses]) -> list[bytes]:
-        """Take a sample, and return what is to be sent now.
+        """Add a sample, and return the datagrams to send now.
 
         Parameters
         ----------
         time : float
-            Seconds. Where it goes back or jumps ahead by more than a second, a clock was set: the motion goes on.
+            Seconds. If it goes back or jumps ahead by more than a second, a clock was set: the motion goes on.
         poses : Poses, shape (joints,), or Poses for each body's name
-            Each joint in its parent's space, and roots in the world, held or not.
+            Each joint in its parent's space, and roots in world space, held or not.
 
         Raises
         ------
         ValueError
-            Where poses are not as many as joints; and where a place is 10 km away or further, a quaternion is 0, or any
-            number is not finite. It is as if there had been no such sample.
+            If the numbers of poses and joints differ; or if a position is 10 km away or farther, a quaternion is 0, or
+            any number is not finite. The sample is then ignored.
         """
         forest = self._codec.forest
         poses = poses if isinstance(poses, Poses) else forest.joined(poses)
@@ -224,7 +224,7 @@ class Sender:
         return said + self._due(now, self._interval)
 
     def _take_over(self, now: float, poses: Poses) -> list[bytes]:
-        """Go on in other hands from a sample (joints,) on, and return what is to be sent of the motion until then."""
+        """Change holders from a sample (joints,) on, and return the datagrams for the motion before it."""
         before, old, described, said = self._samples, self._codec.forest, self.codec.forest, list[bytes]()
         holds, known = tuple(Hold(*pair) for pair in self._wanted), {hold[:2]: hold for hold in old.holds}
         placed = described.holding(holds).in_hands(poses)
@@ -232,44 +232,48 @@ class Sender:
         codec = self.codec.holding(tuple(new))
         taken, begun = old.holders != codec.forest.holders, KnotPath(np.array([now]), placed[:, None])
         if len(before.moments):
-            # In the old hands it goes on as it went, and how it got into the new ones is not known.
+            # With the old holders the motion continues; the motion into the new hands is unknown.
             until, last = old.in_hands(poses), before.poses[:, -1].copy()
             until[taken], last[taken] = before.going_on().pose(now)[taken], placed[taken]
             self._samples = before.extended(now, until)
             said = self._due(now, math.inf)
             begun = KnotPath(before.moments[-1:], last[:, None]).extended(now, placed)
-            self._since, self._takes, self._good = math.floor(now * TICKS_PER_S + MAX_EARLY_TICKS), True, now - REPEAT_S
+            self._since, self._changes, self._good_until = (
+                math.floor(now * TICKS_PER_S + MAX_EARLY_TICKS),
+                True,
+                now - REPEAT_S,
+            )
         self._codec, self._samples = codec, begun
         return said
 
     def poll(self, time: float) -> list[bytes]:
-        """Return what is to be sent at a time at which no sample came: worth asking at `next`, where one is overdue."""
+        """Return the datagrams to send at a time without a sample: call it at `next` if a sample is overdue."""
         now, times = time + self._slip, self._samples.moments
         if not len(times) or not now <= times[-1] + CLOCK_SET_S:
-            return []  # Somebody set the clock, as the next sample will tell; or no sample is going to come.
+            return []  # The clock was set, as the next sample will show; or samples have ended.
         return self._before_pause(now) + self._due(max(now, float(times[-1])), 0.0)
 
     @property
     def next(self) -> float:
-        """When what is shown gets to a sample behind which it is off: by then something has to be sent."""
+        """When the shown motion reaches the last sample within the tolerance: by then a datagram has to be sent."""
         return self._next - self._slip
 
     def finish(self) -> list[bytes]:
-        """Return what is still needed where no more samples are to come."""
+        """Return the datagrams that are still needed after the last sample."""
         times = self._samples.moments
         return self._due(float(times[-1]), math.inf) if len(times) else []
 
     def describe(self) -> list[bytes]:
-        """Names, parents and rest poses, for those who join."""
+        """Return names, parents and rest poses, for new receivers."""
         return [wire.write(Description(self.identity, self._packed))]
 
     def join(self) -> list[bytes]:
-        """Return what somebody who joins needs: the description. The next message then builds on nothing."""
+        """Return the description, for a new receiver. The next message then builds on nothing."""
         self._desired = True
         return self.describe()
 
     def take_answer(self, datagram: bytes, now: float) -> list[bytes]:
-        """Take an answer, at a time by the clock of the samples, and return what is to be sent for it."""
+        """Process an answer, at a time by the clock of the samples, and return the datagrams it asks for."""
         answer = wire.read(datagram)
         if not isinstance(answer, Answer) or answer.identity != self.identity:
             return []
@@ -285,19 +289,19 @@ class Sender:
         return self.describe() if answer.needs & NEEDS_DESCRIPTION else []
 
     def _before_pause(self, now: float) -> list[bytes]:
-        """Return what is to be sent of the samples that there are before one that comes late."""
+        """Return the datagrams for the samples so far, if the next sample is late."""
         last = float(self._samples.moments[-1]) if len(self._samples.moments) else now
         is_pause = now - last > PAUSE_S + self._interval and self._sent < last and self._sequence <= MAX_SEQUENCE_NUMBER
         return [self._message(last)] if is_pause else []
 
     def _due(self, now: float, interval: float) -> list[bytes]:
-        """Return what is to be sent now, where nobody asks again before the interval is over."""
+        """Return the datagrams to send now, if the next call may come only after the interval."""
         if self._sequence > MAX_SEQUENCE_NUMBER:
             self._begin()
         due, self._next = [], math.inf
         if self._copy and now - self._copy[1] >= REPEAT_S:
             sequence, _, datagram = self._copy
-            due, self._copy = [] if self._answered(now) and self._have(sequence) else [datagram], None
+            due, self._copy = [] if self._answered(now) and self._all_have(sequence) else [datagram], None
         if not self._answered(now) and now - self._refreshed >= REFRESH_S:
             due += [*self.describe(), self._message(now, refresh=True)]
         elif self._desired:
@@ -312,42 +316,42 @@ class Sender:
         return due * (2 if self._is_lossy(now) else 1)
 
     def _is_shown_until(self, now: float) -> float | None:
-        """Return the moment before one that is shown further off than the tolerance; None where there is none yet."""
+        """Return the last moment before the shown motion leaves the tolerance; None if it does not yet."""
         times = self._samples.moments
-        if self._good is None and self._path is not None and self._shown < times[-1]:
+        if self._good_until is None and self._path is not None and self._shown < times[-1]:
             moments = closely(times[max(int(np.searchsorted(times, self._shown, side="right")) - 1, 0) :])
             moments = moments[moments > max(self._shown, now - self._delay)]
             errors = self._codec.forest.errors(self._path.at(moments), self._samples.at(moments))
             off = errors.max(axis=0) > self.codec.tolerance
             if off.any():
-                self._good = float(np.append(self._shown, moments)[np.argmax(off)])
+                self._good_until = float(np.append(self._shown, moments)[np.argmax(off)])
             self._shown = float(times[-1])
-        return self._good
+        return self._good_until
 
     def _is_lossy(self, now: float) -> bool:
-        """Return whether so much was lost lately that all is sent twice."""
+        """Whether so much was lost lately that everything is sent twice."""
         return now - self._missed < LOSSLESS_S
 
     def _answered(self, now: float) -> bool:
-        """Whether anybody answers; those who do not any more are forgotten."""
+        """Whether any receiver answers; receivers that no longer answer are forgotten."""
         self._receivers = {own: it for own, it in self._receivers.items() if now - it[1] < MAX_SILENCE_S}
         return bool(self._receivers)
 
-    def _have(self, sequence: int) -> bool:
-        """Whether all who answer have a message."""
+    def _all_have(self, sequence: int) -> bool:
+        """Whether all answering receivers have a message."""
         return all(answer.has(sequence) for answer, _ in self._receivers.values())
 
     def _usable(self, now: float) -> int | None:
-        """Return the message to build on, or None."""
+        """Return the number of the message to build on, or None."""
         number = self._base
         if self._answered(now):
-            number = next((it for it in sorted(self._messages, reverse=True) if self._have(it)), None)
+            number = next((it for it in sorted(self._messages, reverse=True) if self._all_have(it)), None)
         if number is None or self._sequence - number > MAX_MESSAGES_BACK:
             return None
         return number if now - self._messages[number].end / TICKS_PER_S < MAX_BASE_AGE_S else None
 
     def _message(self, now: float, refresh: bool = False) -> bytes:
-        """Say the window until now. Where no sample is there yet, the motion is taken to go on as it went."""
+        """Return a message for the window until now. If there is no sample yet, the motion is assumed to continue."""
         samples, last = self._samples, float(self._samples.moments[-1])
         now = max(now, self._sent, (self._since + 1) / TICKS_PER_S)
         if now - last > CLOCK_UNEVENNESS_S:
@@ -356,7 +360,7 @@ class Sender:
                 now, Poses(np.clip(there.positions, -MAX_LENGTH_M, MAX_LENGTH_M), there.quaternions)
             )
         end = math.floor(now * TICKS_PER_S + MAX_EARLY_TICKS)
-        # What goes on from a leap of kilometres may be nowhere: then it builds on nothing.
+        # The motion after a leap of kilometres may leave the valid range: then the message builds on nothing.
         for number in (None if refresh else self._usable(now), None):
             base = self.codec.rest if number is None else self._messages[number]
             back = 0 if number is None else self._sequence - number
@@ -369,11 +373,11 @@ class Sender:
         self._messages = {number: old for number, old in self._messages.items() if number in kept}
         start = float(message.path.moments[0])
         self._path = message.path if self._path is None else self._path.followed(message.path).since(start - 0.05)
-        self._shown, self._good = min(end / TICKS_PER_S, last) if is_within else start, None
+        self._shown, self._good_until = min(end / TICKS_PER_S, last) if is_within else start, None
         self._sent = end / TICKS_PER_S
         if number is None:
             self._refreshed, self._desired, self._base = now, False, self._sequence
-        if number is None or self._takes:
-            self._copy, self._takes = (self._sequence, now, datagram), False
+        if number is None or self._changes:
+            self._copy, self._changes = (self._sequence, now, datagram), False
         self._sequence += 1
         return datagram

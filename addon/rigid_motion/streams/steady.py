@@ -1,8 +1,8 @@
-"""Steady: what is shown of a stream without its trembling, by what has come of the moments behind it already.
+"""Jitter removal for shown streams, using the samples that have already arrived after the shown moment.
 
-The likeliest motion through the last samples and those that wait to be shown: its jerk is as large as it is around
-there. Of values y with noise s and third derivatives j the sum of (x - y)^2 / s^2 and h j^2 / J^2 is made least, the
-density J^2 found as in `motion.corrections`. Nothing is shown any later for it.
+Finds the likeliest motion through the last samples and the next ones, with a jerk as large as around them. For values y
+with noise s and third derivatives j it minimises the sum of (x - y)^2 / s^2 and h j^2 / J^2, with the density J^2 found
+as in `motion.corrections`. This adds no delay.
 """
 
 from __future__ import annotations
@@ -17,44 +17,44 @@ from ..motion.trembling import trembling
 from .paths import KnotPath
 
 MIN_NOISE_SAMPLES, MAX_NOISE_SAMPLES, SAMPLES_PER_LOOK = 60, 240, 4
-"""The fewest and the most samples that say how much something trembles, and as how many are shown one joint is looked
-at, as that takes long."""
+"""The fewest and the most samples for measuring the noise; and the number of shown poses after which the next joint is
+measured, as this is slow."""
 
 SAMPLES_BEFORE, SAMPLES_AFTER, MIN_SAMPLES = 12, 8, 12
-"""Samples before and behind the moment that is shown that count, and the fewest of both."""
+"""Samples before and after the shown moment that count, and the fewest of both together."""
 
 MIN_KEY_GAP_S = 0.04
-"""Seconds from sample to sample from which on there are keys, and not all that was seen: these do not tremble."""
+"""Seconds between samples from which on these count as keys, not as all captured samples: keys have no jitter."""
 
 JERK_ORDER, JERK_REACH_SAMPLES, JERK_ROUNDS = 3, 3, 10
-"""Of the derivative that is small; samples on either side over which it is as large; rounds in which that is found."""
+"""Order of the derivative that is kept small; samples on either side that share its density; rounds to find it."""
 
 MIN_JERK_RATIO = 1e-9
-"""Of the jerk that noise makes is always allowed."""
+"""Fraction of the jerk caused by noise that is always allowed."""
 
 MAX_TURN_RAD, FAR_TURN_WEIGHT = 2.0, 1e-4
-"""Radians: what is turned further from the rotation that is shown counts by so little."""
+"""Radians: rotations farther from the shown one get this small weight."""
 
 
 class Steady:
-    """What a stream's joints were, and how much each of them trembles."""
+    """Recent samples of a stream's joints, and the noise of each joint."""
 
     def __init__(self) -> None:
         self._times = np.empty(0)
         self._poses: Poses = Poses(np.empty((0, 0, 3)), np.empty((0, 0, 4)))
         self._holders = np.empty((0, 0), dtype=np.int16)
         self._noise = np.empty((2, 0))
-        """Of places and of rotations of the joints, as standard deviations along an axis; shape (2, joints)."""
+        """Noise of positions and rotations, as standard deviations along an axis; shape (2, joints)."""
         self._shown, self._settled = 0, np.inf
 
     def __call__(self, path: KnotPath, moment: float, settled: float) -> Poses:
-        """Return the poses (joints,) of a moment of a path, which is not going to change until `settled`."""
+        """Return the poses (joints,) at a moment of a path that will not change before `settled`."""
         poses, count = path.pose(moment), path.poses.shape[0]
         if self._poses.shape[0] != count or (len(self._times) and path.moments[0] > self._times[-1]):
             self._times, self._poses = np.empty(0), path.poses[:, :0]
             self._holders = np.empty((count, 0), dtype=np.int16)
             self._noise = np.zeros((2, count)) if self._noise.shape[1] != count else self._noise
-        self._take(path, settled)
+        self._store_samples(path, settled)
         at = int(np.searchsorted(self._times, moment)) - 1
         window = slice(max(at - SAMPLES_BEFORE, 0), at + 1 + SAMPLES_AFTER)
         times = self._times[window]
@@ -85,8 +85,8 @@ class Steady:
         quaternions[joints] = turned(quaternions[joints], turns)
         return Poses(positions, quaternions)
 
-    def _take(self, path: KnotPath, settled: float) -> None:
-        """Remember the samples that are new, those at one moment once, and those anew that might have changed."""
+    def _store_samples(self, path: KnotPath, settled: float) -> None:
+        """Store new samples, one per moment, and replace samples that may have changed."""
         stop = int(np.searchsorted(self._times, self._settled, side="right"))
         kept, last = slice(max(stop - MAX_NOISE_SAMPLES, 0), stop), self._times[stop - 1] if stop else -np.inf
         is_new = (path.moments > last) & (np.diff(path.moments, append=np.inf) > 0.0)
@@ -98,8 +98,8 @@ class Steady:
 
 
 def steadied(times: np.ndarray, values: np.ndarray, noise: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Return the likeliest of values (channels, n, 3) at times (n,) with noise (channels,), where `near` (channels, n)
-    counts.
+    """Return the likeliest values (channels, n, 3) at times (n,), given noise (channels,); samples that are not `near`
+    (channels, n) hardly count.
     """
     c, count = coefficients(times, JERK_ORDER), len(times)
     rows = np.arange(count - JERK_ORDER)

@@ -1,8 +1,8 @@
-"""The Virtual Motion Capture protocol (VMC): performers' humanoid bones and tracked devices by OSC, in and out.
+"""The Virtual Motion Capture protocol (VMC): sends and receives humanoid bones and tracked devices over OSC.
 
-What VSeeFace, SlimeVR, Warudo and Unity speak: every frame, the pose of each bone in its parent's space, seen from a
-T-pose in which nothing is turned; then the time. Unity's axes are left-handed, y up, z forward; a performer that looks
-along z there looks along -y in Blender, as characters do. Metres.
+VSeeFace, SlimeVR, Warudo and Unity use it: for every frame, the pose of each bone in its parent's space, relative to a
+T-pose without rotations; then the time. Unity's axes are left-handed, y up, z forward; a performer that looks along z
+there looks along -y in Blender, as characters do. Metres.
 Source: https://protocol.vmc.info/marionette-spec
 """
 
@@ -24,40 +24,40 @@ from .paths import KnotPath
 from .playing import CLOCK_SET_S, Playback, Stream
 
 VMC_PORT = 39539
-"""That programs which show a performer listen on."""
+"""The port that programs which show a performer listen on."""
 
 VMC, ROOT, PERFORMER = b"/VMC", "Root", "VMC"
-"""The identity of all streams; the joint that the hips hang on; and the name of a performer's body."""
+"""The identity of all VMC streams; the parent joint of the hips; and the name of a performer's body."""
 
 JOINTS = (ROOT, *HUMANOID)
 PARENTS = {ROOT: "", **{bone: above or ROOT for bone, above in HUMANOID.items()}}
 
 Joint = tuple[str, str]
-"""The name of the body, which is its serial number if it is a device, and that of the joint."""
+"""Name of the body, which for a device is its serial number, and name of the joint."""
 
 DEVICES = {f"/VMC/Ext/{kind}/Pos" for kind in ("Tra", "Con", "Hmd")}
-"""Trackers, controllers and headsets: rigid bodies in the world, by their serial numbers."""
+"""Trackers, controllers and headsets: rigid bodies in world space, by serial number."""
 
 MOST_DEVICES, AT_ONCE = 32, 12
-"""Devices of a program; and bones of a datagram, which stays below what networks carry in one piece."""
+"""Most devices of a program; and bones per datagram, small enough for networks to send it in one piece."""
 
 MAX_FRAMES, MAX_LATE_FRAMES = 8, 3
-"""Frames of a datagram: what else it has is dropped. And frames in a row, each sent behind the one before, that are
-before what came already: they are not late, but the sender's clock was set back."""
+"""Most frames of a datagram: the rest is dropped. And consecutive frames in sending order, all older than received
+frames, from which on they are not late, but the sender's clock was set back."""
 
 _TO_BLENDER = np.array(((-1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
-"""Unity's axes as Blender's: a mirror."""
+"""From Unity's axes to Blender's: a mirror."""
 
 
 def write(time: float, poses: Mapping[str, Poses]) -> list[bytes]:
-    """Return the datagrams of a frame: the pose () of each bone in its parent's space, with that of `ROOT`."""
+    """Return the datagrams of a frame: the pose () of each bone in its parent's space, and of `ROOT`."""
     root = [_pose("/VMC/Ext/Root/Pos", "root", poses[ROOT])] if ROOT in poses else []
     bones = [_pose("/VMC/Ext/Bone/Pos", bone, poses[bone]) for bone in HUMANOID if bone in poses]
     return _bundles([*root, *bones, write_message("/VMC/Ext/OK", 1), write_message("/VMC/Ext/T", float(time))])
 
 
 def write_trackers(poses: Mapping[str, Poses]) -> list[bytes]:
-    """Return the datagrams of the poses () of trackers in the world, by their names."""
+    """Return the datagrams with the world-space poses () of trackers, by name."""
     return _bundles([_pose("/VMC/Ext/Tra/Pos", name, pose) for name, pose in poses.items()])
 
 
@@ -72,11 +72,11 @@ def _bundles(messages: list[bytes]) -> list[bytes]:
 
 
 class Performer:
-    """A skeleton of any kind as VMC: joints, parents first, at rest at poses (joints,) in the space of the roots."""
+    """A skeleton of any kind as VMC: joints, parents first, with rest poses (joints,) in the space of the roots."""
 
     def __init__(self, joints: tuple[str, ...], rest: Poses) -> None:
         self.bones = humanoid_bones(joints)
-        """The joint that each humanoid bone is."""
+        """The joint for each humanoid bone."""
         self._numbers = list(self.bones.values())
         aligned = alignments(self.bones, rest.positions)
         turns = np.array([conjugate(aligned[bone]) if bone in aligned else (1.0, 0.0, 0.0, 0.0) for bone in self.bones])
@@ -84,14 +84,14 @@ class Performer:
         self._follows = np.array(_parents(list(self.bones)))
 
     def __call__(self, poses: Poses) -> dict[str, Poses]:
-        """Return the pose () of each bone in its parent's space, of poses (joints,) in the space of the roots."""
+        """Return the pose () of each bone in its parent's space, given poses (joints,) in the space of the roots."""
         there = poses[self._numbers]
         local = beside(Poses(there.positions, multiply(there.quaternions, self._from_rest)), self._follows)
         return {ROOT: Poses(np.zeros(3), [1.0, 0.0, 0.0, 0.0]), **dict(zip(self.bones, local, strict=True))}
 
 
 def _parents(names: Sequence[str]) -> list[int]:
-    """Return which of some joints each of them hangs on, -1 for none."""
+    """Return the number of each joint's nearest ancestor among these joints, -1 for none."""
     result = []
     for name in names:
         while (name := PARENTS.get(name, "")) and name not in names:
@@ -101,27 +101,27 @@ def _parents(names: Sequence[str]) -> list[int]:
 
 
 class Performance(Playback):
-    """What one program sends: a performer, devices, or both. Its keys are all samples."""
+    """The stream of one program: a performer, devices, or both. All of its samples are keys."""
 
     silent = 2.0
 
     def __init__(self, stream: Stream, delay: float, heard: float) -> None:
         super().__init__(stream, delay, heard)
         self._newest: dict[Joint, list[float]] = {(PERFORMER, ROOT): [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]}
-        """Place and turn of all that was ever said, in Unity's axes."""
+        """Latest position and rotation of every joint received so far, in Unity's axes."""
         self._joints: list[Joint] = []
-        """Which of these the joints of all bodies are."""
+        """The joints of all bodies, in order."""
         self._frame: dict[Joint, list[float]] = {}
-        """What was said of this frame, and when it began."""
+        """Joints of the current frame; its start time follows."""
         self._begun = 0.0
         self._has_time = False
         self._slip = self._sent = 0.0
-        """What is added to the sender's times, as often as its clock is set; and the last of them."""
+        """Seconds added to the sender's times, changed whenever its clock is set; and the last sent time."""
         self._late = self._frames = 0
-        """Frames in a row that are before what came already; and frames of this datagram."""
+        """Consecutive frames older than received ones; and frames of this datagram."""
 
     def take(self, datagram: bytes, arrival: float) -> None:
-        """Take a datagram."""
+        """Process a datagram."""
         self._frames = 0
         for message in read(datagram):
             if self._frames < MAX_FRAMES:
@@ -130,18 +130,18 @@ class Performance(Playback):
     def _take_message(self, message: OscMessage, arrival: float) -> None:
         address, (name, *numbers) = message.address, message.arguments or (None,)
         if address == "/VMC/Ext/Root/Pos":
-            self._place((PERFORMER, ROOT), numbers, arrival)
+            self._store_joint((PERFORMER, ROOT), numbers, arrival)
         elif address == "/VMC/Ext/Bone/Pos" and name in HUMANOID:
-            self._place((PERFORMER, str(name)), numbers, arrival)
+            self._store_joint((PERFORMER, str(name)), numbers, arrival)
         elif address in DEVICES and isinstance(name, str) and name != PERFORMER:
             devices = {body for body, _ in (*self._newest, *self._frame)} - {PERFORMER}
             if 0 < len(name.encode()) <= LONGEST_NAME and (name in devices or len(devices) < MOST_DEVICES):
-                self._place((name, name), numbers, arrival)
+                self._store_joint((name, name), numbers, arrival)
         elif address == "/VMC/Ext/T" and not numbers and isinstance(name, float | int) and abs(name) <= MAX_CLOCK_S:
             self._has_time = True
-            self._sample(float(name), arrival)
+            self._finish_frame(float(name), arrival)
 
-    def _place(self, joint: Joint, numbers: list[Any], arrival: float) -> None:
+    def _store_joint(self, joint: Joint, numbers: list[Any], arrival: float) -> None:
         try:
             x, y, z, w = numbers[3:7]
             length = math.sqrt(x * x + y * y + z * z + w * w)
@@ -151,13 +151,13 @@ class Performance(Playback):
         if not is_sound:
             return
         if joint in self._frame and not self._has_time:
-            self._sample(self._begun, self._begun)
+            self._finish_frame(self._begun, self._begun)
         if not self._frame:
             self._begun = arrival
         self._frame[joint] = [*numbers[:3], w / length, x / length, y / length, z / length]
 
-    def _sample(self, sent: float, arrival: float) -> None:
-        """Take the frame that is complete."""
+    def _finish_frame(self, sent: float, arrival: float) -> None:
+        """Add the completed frame to the path."""
         self._frames += 1
         if not self._frame.keys() - {(PERFORMER, ROOT)}:
             return
@@ -176,14 +176,14 @@ class Performance(Playback):
         self.heard = arrival
 
     def _moment(self, sent: float, arrival: float) -> float | None:
-        """Return when a frame was, by a clock that is never set; None for one that came late, or twice."""
+        """Return the time of a frame, by a clock that is never set; None for a late or duplicate frame."""
         is_next, self._sent = sent > self._sent, sent
         if self.path is None:
             return sent + self._slip
         last, self._slip = float(self.path.moments[-1]), self._slip - self.playing.set_ahead(sent + self._slip, arrival)
         self._late = (self._late * is_next + 1) if sent + self._slip < last + MIN_SAMPLE_GAP_S else 0
         if self._late >= MAX_LATE_FRAMES or sent + self._slip < last - CLOCK_SET_S:
-            # As long behind the last as it came behind that.
+            # Its distance from the last frame is the difference of their arrivals.
             self._slip, self._late = last + max(arrival - self.heard, MIN_SAMPLE_GAP_S) - sent, 0
         moment = sent + self._slip
         return moment if moment > last and not self._late else None
@@ -193,7 +193,7 @@ class Performance(Playback):
         return in_other_axes(Poses(rows[:, :3], rows[:, 3:]), _TO_BLENDER)
 
     def _describe(self) -> None:
-        """Have bodies of all that was ever said; those of which nothing is new stay the same."""
+        """Create bodies for all joints received so far; unchanged bodies are kept."""
         before = {(body.name, body.joints): body for body in self.forest.bodies} if self.forest else {}
         bones = [bone for bone in JOINTS if (PERFORMER, bone) in self._newest]
         bodies = [StreamBody.rigid(name) for name, _ in self._newest if name != PERFORMER]
