@@ -1,4 +1,4 @@
-"""glTF files of every feature that animations may have, made by hand."""
+"""Builder of glTF files with every animation feature, for tests."""
 
 import base64
 import json
@@ -17,7 +17,7 @@ TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
 @dataclass
 class Making:
-    """A document that grows: what is added gets a number."""
+    """A document under construction: the methods add parts and return their numbers."""
 
     json: dict[str, Any] = field(default_factory=dict)
     buffers: list[bytearray] = field(default_factory=lambda: [bytearray()])
@@ -40,7 +40,7 @@ class Making:
         return len(self.json["bufferViews"]) - 1
 
     def accessor(self, numbers: np.ndarray, buffer: int = 0, **more: object) -> int:
-        """An accessor in a view of its own."""
+        """Add an accessor with a view of its own."""
         numbers = numbers.reshape(len(numbers), -1)
         accessor = {"bufferView": self.view(numbers.tobytes(), buffer)} | self.described(numbers) | more
         self.json["accessors"].append(accessor)
@@ -59,7 +59,7 @@ class Making:
     def channel(
         self, node: int, path: str, times: int, values: int | np.ndarray, interpolation: str = "LINEAR", clip: int = 0
     ) -> None:
-        """A channel of an animation; values are a number of an accessor, or what is to be in one."""
+        """Add a channel to an animation; `values` is the number of an accessor, or the values for a new one."""
         while len(self.json["animations"]) <= clip:
             number = len(self.json["animations"])
             self.json["animations"].append({"name": f"Take{number}", "channels": [], "samplers": []})
@@ -71,7 +71,7 @@ class Making:
         animation["channels"].append({"sampler": len(animation["samplers"]) - 1, "target": target})
 
     def pointer(self, pointer: str, times: int, values: int | np.ndarray, *more: Any) -> None:
-        """A channel of whatever a JSON pointer names, as `channel`."""
+        """Add a channel that animates the target of a JSON pointer, like `channel`."""
         self.channel(0, "pointer", times, values, *more)
         extensions = {"KHR_animation_pointer": {"pointer": pointer}}
         clip = more[1] if len(more) > 1 else 0
@@ -79,11 +79,11 @@ class Making:
         self.uses("KHR_animation_pointer")
 
     def uses(self, extension: str) -> None:
-        """Say that an extension is used."""
+        """List an extension as used."""
         self.json["extensionsUsed"] = sorted({extension, *self.json.get("extensionsUsed", [])})
 
     def write(self, path: Path, chunks: Sequence[tuple[bytes, bytes]] = ()) -> Path:
-        """Write it as .glb, with other chunks behind, or as .gltf with its buffers beside it."""
+        """Write the document as .glb, with more chunks at the end, or as .gltf with external buffers."""
         described = [{"byteLength": len(data)} for data in self.buffers]
         inside = path.suffix == ".glb"
         for number, (buffer, data) in enumerate(zip(described, self.buffers, strict=True)):
@@ -98,14 +98,14 @@ class Making:
 
 
 def glb(text: bytes, binary: bytes, chunks: Sequence[tuple[bytes, bytes]] = ()) -> bytes:
-    """The bytes of a GLB."""
+    """Return the bytes of a GLB."""
     parts = [(b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", binary + bytes(-len(binary) % 4)), *chunks]
     content = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in parts)
     return struct.pack("<4sII", b"glTF", 2, 12 + len(content)) + content
 
 
 def turns(times: np.ndarray, seed: int, wide: float = 0.6) -> np.ndarray:
-    """Quaternions x, y, z, w of a smooth swing, shape (n, 4), float32."""
+    """Return quaternions x, y, z, w of a smooth swing, shape (n, 4), float32."""
     random = np.random.default_rng(seed)
     axis = random.normal(size=3)
     axis /= np.linalg.norm(axis)
@@ -114,7 +114,7 @@ def turns(times: np.ndarray, seed: int, wide: float = 0.6) -> np.ndarray:
 
 
 def walk(joints: int = 6, seconds: float = 2.0, rate: float = 30.0, unit: float = 1.0) -> Making:
-    """A chain of joints that swing, the first of which goes along, with a skin, and with constant channels too."""
+    """Return a chain of swinging joints with a moving root and a skin, including constant channels."""
     made, times = Making(), np.arange(round(seconds * rate) + 1) / rate
     made.json["nodes"] = [
         {"name": f"Joint{joint}", "translation": [0.0, 0.3 * unit, 0.0], "children": [joint + 1]}

@@ -1,6 +1,6 @@
-"""The library meshoptimizer that comes with the Blender module, from Blender 5.2 on: what the codec is held against.
+"""Reference library for tests of the codec: meshoptimizer from the Blender module, from Blender 5.2 on.
 
-`LIBRARY` is None elsewhere.
+`LIBRARY` is None if it is missing.
 """
 
 import ctypes
@@ -28,7 +28,7 @@ def _encoded(name: str, given: np.ndarray, bound: int, *more: int) -> bytes:
 
 
 def attributes(elements: np.ndarray, version: int) -> bytes:
-    """The stream of elements (count, stride) of bytes."""
+    """Return the stream of elements (count, stride) of bytes."""
     LIBRARY.meshopt_encodeVertexVersion(version)
     return _encoded("encodeVertexBuffer", np.ascontiguousarray(elements), 2 * elements.size + 2000, *elements.shape)
 
@@ -40,7 +40,7 @@ def indices(given: np.ndarray, *, are_triangles: bool) -> bytes:
 
 
 def decoded(stream: bytes, count: int, stride: int) -> np.ndarray:
-    """The elements of a stream, shape (count, stride)."""
+    """Return the elements of a stream, shape (count, stride)."""
     result = np.empty((count, stride), np.uint8)
     data = np.frombuffer(stream, np.uint8)
     assert (
@@ -51,7 +51,7 @@ def decoded(stream: bytes, count: int, stride: int) -> np.ndarray:
 
 
 def filtered(name: str, numbers: np.ndarray, stride: int, bits: int) -> np.ndarray:
-    """The elements that the library makes of floats, in so many bits, shape (count, stride)."""
+    """Return the library's elements for floats, with `bits` bits, shape (count, stride)."""
     result, function = np.zeros((len(numbers), stride), np.uint8), getattr(LIBRARY, f"meshopt_encodeFilter{name}")
     more = (3,) if name == "Exp" else ()  # Every number with an exponent of its own.
     given = np.ascontiguousarray(numbers, dtype=np.float32)
@@ -60,7 +60,7 @@ def filtered(name: str, numbers: np.ndarray, stride: int, bits: int) -> np.ndarr
 
 
 def undone(name: str, elements: np.ndarray) -> np.ndarray:
-    """The bytes that the library makes of elements by undoing a filter."""
+    """Return the bytes that the library restores from filtered elements."""
     result = elements.copy()
     getattr(LIBRARY, f"meshopt_decodeFilter{name}")(_place(result), *map(SIZE, elements.shape))
     return result

@@ -1,18 +1,18 @@
-"""What a glTF file shows at any moment, by matrices and the specification alone: nothing here is the program's own.
+"""Independent glTF player for tests: geometry at any moment, from matrices and the specification, without program code.
 
 How to use it::
 
     before, after = File(path), File(reduced)
-    after.points("Walk", times)                # What it shows by what shows it: {"mesh of node 3": (times, n, 3), ...}.
+    after.points("Walk", times)                # Points by owner: {"mesh of node 3": (times, n, 3), ...}.
     vertices(path, 0, times)                   # The same as one array, (times, all points, 3).
-    error, what, time = off(before, after, 0)  # The largest displacement in the world at eighths of the gaps of keys.
+    error, what, time = off(before, after, 0)  # The largest world displacement, at eighths of the gaps between keys.
 
-Clips are numbers or names. What is seen: the vertices of each primitive of each node of a scene (rigid, skinned,
-morphed before that, instanced by EXT_mesh_gpu_instancing; not those that Draco compresses), and the origin of each
-node. Where a radius is given, also points on a ball around each node in its own space, so far off in the world along
-its longest axis when that is longest: what shrinks takes its ball along. KHR_animation_pointer moves nodes and weights;
-its other targets do not count. What a file does not move rests. Skins ignore the transform of their node, and shares
-of joints sum to 1.
+Clips are numbers or names. The points are the vertices of each primitive of each node of a scene (rigid, skinned,
+morphed before that, instanced by EXT_mesh_gpu_instancing; without Draco compression), and the origin of each node. With
+a radius, there are also points on a ball around each node in the node's own space, at that world distance along its
+longest axis when that axis is longest: a node that shrinks shrinks its ball. KHR_animation_pointer moves nodes and
+weights; its other targets are ignored. Anything without a track is at rest. Skins ignore the transform of their node,
+and joint weights are normalised to a sum of 1.
 """
 
 import base64
@@ -41,14 +41,14 @@ BALL = 40
 """Points around a node."""
 
 AT_ONCE = 2**20
-"""Points at moments that are looked at together."""
+"""Points times moments processed together."""
 
 Track = tuple[str, np.ndarray, np.ndarray]
 """Interpolation, times (n,) and values (n or 3n, width)."""
 
 
 class Off(NamedTuple):
-    """The largest displacement: how far, of what, and when."""
+    """The largest displacement, the name of the points, and the time."""
 
     error: float
     what: str
@@ -56,7 +56,7 @@ class Off(NamedTuple):
 
 
 class File:
-    """A file and what is in it."""
+    """A glTF file with its chunks, JSON and buffers."""
 
     def __init__(self, path: Path) -> None:
         content = path.read_bytes()
@@ -90,7 +90,7 @@ class File:
         return self.buffers[view["buffer"]][first : first + view["byteLength"]]
 
     def stored(self, accessor: int) -> np.ndarray:
-        """Its numbers as they are kept, shape (count, width)."""
+        """Return the stored numbers of an accessor, shape (count, width)."""
         given = self.json["accessors"][accessor]
         kind, width = np.dtype(SIZES[given["componentType"]]), WIDTHS[given["type"]]
         result = np.zeros((given["count"], width), kind)
@@ -112,26 +112,26 @@ class File:
         return result
 
     def numbers(self, accessor: int) -> np.ndarray:
-        """What they stand for, shape (count, width)."""
+        """Return the decoded numbers of an accessor, shape (count, width)."""
         result, normalised = self.stored(accessor), self.json["accessors"][accessor].get("normalized")
         return np.maximum(result / np.iinfo(result.dtype).max, -1.0) if normalised else result.astype(np.float64)
 
     # Clips
 
     def clip(self, clip: int | str) -> int:
-        """The number of a clip."""
+        """Return the number of a clip."""
         if isinstance(clip, int):
             return clip
         return [animation.get("name") for animation in self.json["animations"]].index(clip)
 
     def tracks(self, clip: int | str | None) -> dict[tuple[int, str], Track]:
-        """Interpolation, times and values by node and path; those of meshes count as node -1 - mesh. None: at rest."""
+        """Return tracks by node and path; meshes count as node -1 - mesh. There are none for the clip None, at rest."""
         if clip is None:
             return {}
         animation, result = self.json["animations"][self.clip(clip)], {}
         for channel in animation["channels"]:
             target, sampler = channel["target"], animation["samplers"][channel["sampler"]]
-            if (key := _moved(target)) is None:
+            if (key := _moved_target(target)) is None:
                 continue
             interpolation = sampler.get("interpolation", "LINEAR")
             times, values = self.numbers(sampler["input"])[:, 0], self.numbers(sampler["output"])
@@ -141,13 +141,13 @@ class File:
         return result
 
     def moments(self, clip: int | str) -> np.ndarray:
-        """The times of all keys."""
+        """Return the times of all keys."""
         return np.unique(np.concatenate([times for _, times, _ in self.tracks(clip).values()] or [np.zeros(1)]))
 
     # Nodes
 
     def worlds(self, clip: int | str, times: np.ndarray) -> np.ndarray:
-        """Matrices of all nodes, shape (nodes, times, 4, 4)."""
+        """Return the world matrices of all nodes, shape (nodes, times, 4, 4)."""
         nodes, tracks = self.json["nodes"], self.tracks(clip)
         parents = {child: number for number, node in enumerate(nodes) for child in node.get("children", [])}
         result: dict[int, np.ndarray] = {}
@@ -161,7 +161,7 @@ class File:
         return np.array([world(node) for node in range(len(nodes))])
 
     def seen_nodes(self) -> list[int]:
-        """Those in scenes; all where there are none."""
+        """Return the nodes in scenes; all nodes if there are no scenes."""
         nodes, result = self.json.get("nodes", []), []
         waiting = [node for scene in self.json.get("scenes", []) for node in scene.get("nodes", [])]
         while waiting:
@@ -169,12 +169,12 @@ class File:
             waiting += nodes[result[-1]].get("children", [])
         return sorted(set(result)) if "scenes" in self.json else list(range(len(nodes)))
 
-    # What is seen
+    # Geometry
 
     def points(self, clip: int | str, times: np.ndarray, around: np.ndarray | None = None) -> dict[str, np.ndarray]:
-        """Where all that is seen is in the world, by what shows it, shape (times, n, 3) each.
+        """Return the world positions of all geometry by owner, shape (times, n, 3) each.
 
-        `around` are points in the space of each node, shape (nodes, n, 3).
+        `around` are additional points in the space of each node, shape (nodes, n, 3).
         """
         worlds, tracks = self.worlds(clip, times), self.tracks(clip)
         result = {}
@@ -194,7 +194,7 @@ class File:
         return result
 
     def around(self, clip: int | str, radius: float) -> np.ndarray:
-        """Points so far around each node where its longest axis is longest, in its space, shape (nodes, n, 3)."""
+        """Return points around each node, `radius` away where it is largest, in its space, shape (nodes, n, 3)."""
         worlds, random = self.worlds(clip, moments(self, clip=clip)), np.random.default_rng(5)
         ball = random.normal(size=(BALL, 3))
         ball = radius * ball / np.linalg.norm(ball, axis=1, keepdims=True)
@@ -207,7 +207,7 @@ class File:
     def _morphed(
         self, node: dict[str, Any], number: int, tracks: dict[tuple[int, str], Track], times: np.ndarray
     ) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
-        """Primitives with vertices that can be read, and those in the space of the mesh, shape (1 or times, n, 3)."""
+        """Yield readable primitives with their vertices in the space of the mesh, shape (1 or times, n, 3)."""
         mesh = self.json["meshes"][node["mesh"]]
         for primitive in mesh["primitives"]:
             if "POSITION" not in primitive["attributes"] or DRACO in primitive.get("extensions", {}):
@@ -228,7 +228,7 @@ class File:
         worlds: np.ndarray,
         world: np.ndarray,
     ) -> np.ndarray:
-        """Vertices (1 or times, n, 3) in the world, shape (times, instances * n, 3)."""
+        """Return the world positions of vertices (1 or times, n, 3), shape (times, instances * n, 3)."""
         attributes = primitive["attributes"]
         if "skin" in node and "JOINTS_0" in attributes:
             skin = self.json["skins"][node["skin"]]
@@ -252,19 +252,19 @@ class File:
 
 
 def vertices(file: Path | File, clip: int | str, times: np.ndarray, radius: float = 0.0) -> np.ndarray:
-    """All that is seen in the world, shape (times, points, 3); with a radius also points so far around each node."""
+    """Return world positions of all geometry, shape (times, points, 3); with a radius also of points around nodes."""
     file = File(file) if isinstance(file, Path) else file
     around = file.around(clip, radius) if radius else None
     return np.concatenate(list(file.points(clip, np.asarray(times), around).values()), axis=1)
 
 
 def moments(*files: File, clip: int | str) -> np.ndarray:
-    """Eighths of the gaps between all keys of all of these files in a clip, and the keys."""
+    """Return all keys of these files in a clip, and eighths of the gaps between them."""
     return eighths(np.unique(np.concatenate([file.moments(clip) for file in files])))
 
 
 def eighths(keys: np.ndarray) -> np.ndarray:
-    """Eighths of the gaps between rising times, and these; but not between neighbours in single precision: a cut."""
+    """Return rising times and eighths of their gaps, except for gaps of one single-precision step, which are cuts."""
     gaps = np.diff(keys)[:, None]
     between = (
         keys[:-1, None] + np.where(gaps > 1.5 * np.spacing(np.float32(keys[:-1, None])), gaps, 0.0) * np.arange(8) / 8
@@ -273,7 +273,7 @@ def eighths(keys: np.ndarray) -> np.ndarray:
 
 
 def off(before: File, after: File, clip: int | str, radius: float = 0.0) -> Off:
-    """How far what is seen is off at most at `moments`; with a radius also points so far around each node."""
+    """Return the largest displacement at `moments`; with a radius also of points around each node."""
     times = moments(before, after, clip=clip)
     around = before.around(clip, radius) if radius else None
     count = sum(map(np.size, before.points(clip, times[:1], around).values()))
@@ -290,7 +290,7 @@ def off(before: File, after: File, clip: int | str, radius: float = 0.0) -> Off:
 
 
 def shown(interpolation: str, times: np.ndarray, values: np.ndarray, at: np.ndarray, turns: bool) -> np.ndarray:
-    """What a track shows, by appendix C of the specification."""
+    """Return the values of a track, by appendix C of the specification."""
     cubic = interpolation == "CUBICSPLINE"
     points, at = values[1::3] if cubic else values, np.clip(at, times[0], times[-1])
     keys = np.searchsorted(times, at, side="right") - 1
@@ -317,7 +317,7 @@ def shown(interpolation: str, times: np.ndarray, values: np.ndarray, at: np.ndar
 
 
 def composed(translation: np.ndarray, rotation: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Matrices of n transforms, shape (n, 4, 4)."""
+    """Return the matrices of n transforms, shape (n, 4, 4)."""
     made = np.zeros((len(translation), 4, 4))
     made[:, 3, 3] = 1.0
     made[:, :3, :3] = Rotation.from_quat(rotation).as_matrix() * np.asarray(scale)[:, None]
@@ -337,8 +337,8 @@ def _local(node: dict[str, Any], number: int, tracks: dict[tuple[int, str], Trac
     return composed(**values)
 
 
-def _moved(target: dict[str, Any]) -> tuple[int, str] | None:
-    """The node, or -1 - mesh, and the path that a channel moves; None where it is neither."""
+def _moved_target(target: dict[str, Any]) -> tuple[int, str] | None:
+    """Return the node, or -1 - mesh, and the path that a channel moves; None for other targets."""
     if target["path"] != "pointer":
         return (target["node"], target["path"]) if "node" in target else None
     match = POINTER.fullmatch(target["extensions"]["KHR_animation_pointer"]["pointer"])
@@ -356,7 +356,7 @@ def _weights(
     tracks: dict[tuple[int, str], Track],
     times: np.ndarray,
 ) -> np.ndarray:
-    """How much of each morph target there is, shape (times, count)."""
+    """Return the weights of morph targets, shape (times, count)."""
     owner = number if (number, "weights") in tracks or "weights" in node else -1 - node["mesh"]
     rest = node.get("weights", mesh.get("weights", np.zeros(count)))
     if (owner, "weights") in tracks:
@@ -370,10 +370,10 @@ def _weights(
 
 
 def _applied(maps: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Points (n, 3) or (times, n, 3) by matrices (times, 4, 4), shape (times, n, 3)."""
+    """Return points (n, 3) or (times, n, 3) transformed by matrices (times, 4, 4), shape (times, n, 3)."""
     return places @ np.swapaxes(maps[:, :3, :3], 1, 2) + maps[:, None, :3, 3]
 
 
 def _each_applied(maps: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Points (1 or times, n, 3), each by a matrix of its own (times, n, 4, 4), shape (times, n, 3)."""
+    """Return points (1 or times, n, 3), each transformed by its own matrix (times, n, 4, 4), shape (times, n, 3)."""
     return (maps[..., :3, :3] @ places[..., None])[..., 0] + maps[..., :3, 3]

@@ -1,4 +1,4 @@
-"""Random glTF files of all that may be animated: small, made from a few choices and a seed, so that examples shrink.
+"""Random glTF files with all kinds of animation, for Hypothesis: small, made from a few choices and a seed.
 
 How to use it::
 
@@ -6,9 +6,10 @@ How to use it::
     def test_something(tmp_path_factory, choice):
         path = choice.made().write(tmp_path_factory.mktemp("random") / "made.glb")
 
-    @example(Choice(seed=3, tree="alone", shows=("skin",)))   # What a failing example prints makes it again.
+    @example(Choice(seed=3, tree="alone", shows=("skin",)))   # Reproduces a failing example, as printed.
 
-Each choice stands for a kind of files that people have, and the first of each list is the plainest.
+Each choice stands for a kind of file that occurs in practice. The first of each list is the plainest: examples shrink
+towards it.
 """
 
 from dataclasses import dataclass
@@ -24,25 +25,25 @@ from tests.gltf.player import INSTANCES, composed
 TREES = ("alone", "chain", "branches", "one place", "deep")
 
 RESTS = ("plain", "turned", "zero", "thousandth", "uneven", "negative", "matrix")
-"""How some of the nodes rest."""
+"""Rest transforms of some of the nodes."""
 
 SHOWS = ("mesh", "skin", "sword", "morph", "big morph", "instances", "whole numbers")
-"""What is to be seen, of which a file may have several or none; swords are far from their joints."""
+"""Kinds of geometry; a file may have several or none. Swords are far from their joints."""
 
 MOTIONS = ("smooth", "still", "spin", "noise", "jumps")
 
 INTERPOLATIONS = ("LINEAR", "STEP", "CUBICSPLINE", "wild", "any")
-"""Wild are splines with tangents that are larger than what they lead to."""
+"""Wild: splines with tangents larger than the differences of values."""
 
 SHARED = ("nothing", "a view with a mesh", "samplers", "accessors of clips", "accessors of pointers")
 
 POINTERS = ("none", "beside", "above", "of weights", "of materials")
 
 VENDORS = ("none", "of the file", "of a mesh", "of a primitive", "of a node")
-"""Where an extension that nobody knows names accessors."""
+"""Where an unknown extension names accessors."""
 
 MOST_NODES = 16
-"""Nodes are no longer added beyond."""
+"""No nodes are added beyond this number."""
 
 PATHS = {"translation": 3, "rotation": 4, "scale": 3}
 
@@ -55,13 +56,13 @@ NAMES = ("Walk", "Run", "Stand")
 
 @dataclass(frozen=True)
 class Choice:
-    """A random file."""
+    """The choices for a random file."""
 
     seed: int = 0
     tree: str = "alone"
     joints: int = 1
     exponent: int = 0
-    """Sizes are tens to the power of it, in metres."""
+    """Power of ten of the size in metres."""
 
     rest: str = "plain"
     shows: tuple[str, ...] = ()
@@ -79,7 +80,7 @@ class Choice:
 
 
 def choices() -> st.SearchStrategy[Choice]:
-    """Random files."""
+    """Return a strategy for random files."""
     return st.builds(
         Choice,
         seed=st.integers(0, 10**6),
@@ -114,11 +115,11 @@ class _File:
         self._tree()
         self.joints = len(self.nodes)
         for kind in choice.shows:
-            self._shown(kind)
+            self._add_geometry(kind)
         if self.meshes:
             self.made.json["meshes"] = self.meshes
         for clip in range(choice.clips):
-            self._clip(clip)
+            self._add_clip(clip)
         self._vendor()
         if choice.shared == "a view with a mesh" and self.meshes:
             self._one_view()
@@ -144,7 +145,7 @@ class _File:
             some["matrix"] = matrix[0].T.ravel().tolist()
 
     def _rest(self) -> dict[str, Any]:
-        """What a node rests with that does not rest plainly."""
+        """Return the members of a node with an unusual rest transform."""
         scales = {"zero": [0.0] * 3, "thousandth": [1e-3] * 3, "uneven": [0.5, 1.0, 2.0], "negative": [-1.0, 1.0, 1.0]}
         if self.choice.rest in scales:
             return {"scale": scales[self.choice.rest]}
@@ -155,7 +156,7 @@ class _File:
         return values / np.linalg.norm(values, axis=-1, keepdims=True)
 
     def _worlds(self) -> np.ndarray:
-        """Matrices of the joints at rest."""
+        """Return the rest matrices of the joints."""
         result = np.tile(np.eye(4), (len(self.nodes), 1, 1))
         waiting = [(0, np.eye(4))]
         while waiting:
@@ -176,7 +177,7 @@ class _File:
 
     # Meshes
 
-    def _shown(self, kind: str) -> None:
+    def _add_geometry(self, kind: str) -> None:
         primitive: dict[str, Any] = {"attributes": {}, "indices": self._indices()}
         mesh = {"primitives": [primitive]}
         self.meshes.append(mesh)
@@ -218,7 +219,7 @@ class _File:
             self.made.uses(INSTANCES)
 
     def _moved_node(self, *, new: bool) -> int:
-        """A joint, or a node of its own on one."""
+        """Return a joint, or a new child of one."""
         joint = int(self.random.integers(0, self.joints))
         if not new and self.random.random() < 0.5:
             return joint
@@ -278,7 +279,7 @@ class _File:
 
     # Clips
 
-    def _clip(self, clip: int) -> None:
+    def _add_clip(self, clip: int) -> None:
         choice, times = self.choice, self._times()
         for number, node in list(enumerate(self.nodes)):
             for path in choice.moves:
@@ -294,7 +295,7 @@ class _File:
             self.made.pointer(pointer, self._accessor_of_times(times), values, "LINEAR", clip)
         self.made.json["animations"][clip]["name"] = NAMES[clip]
         if choice.shared == "accessors of clips" and clip:
-            self._as_first(clip)
+            self._share_first_samplers(clip)
 
     def _is_moved(self, number: int, path: str) -> bool:
         if number >= self.joints and "skin" in self.nodes[number]:
@@ -317,7 +318,7 @@ class _File:
         return self.known_times[times.tobytes()]
 
     def _curve(self, width: int, motion: str) -> np.ndarray:
-        """Numbers of the size of 1, shape (keys, width)."""
+        """Return values of magnitude about 1, shape (keys, width)."""
         random, keys = self.random, self.choice.keys
         if motion == "still":
             return np.tile(random.normal(size=width) * (random.random() < 0.5), (keys, 1))
@@ -372,10 +373,10 @@ class _File:
         else:
             self.made.channel(node, path, own, output, kind, clip)
         if choice.shared in ("samplers", "accessors of pointers") and path != "weights":
-            self._shared(node, path, clip)
+            self._share_sampler(node, path, clip)
 
     def _spline(self, times: np.ndarray, values: np.ndarray, wild: bool) -> np.ndarray:
-        """Rows of the tangent before, the value and the tangent after each key, shape (3 n, width)."""
+        """Return for each key the tangent before, the value and the tangent after it, shape (3 n, width)."""
         slopes = np.gradient(values, times, axis=0)
         rows = np.stack((slopes, values, slopes), axis=1)
         if wild:
@@ -389,8 +390,8 @@ class _File:
             return "children" in self.nodes[node] and self.random.random() < 0.7
         return (pointers == "beside" and self.random.random() < 0.4) or (pointers == "of weights" and path == "weights")
 
-    def _shared(self, node: int, path: str, clip: int) -> None:
-        """Have another node moved by the last sampler too, one that nothing else moves so."""
+    def _share_sampler(self, node: int, path: str, clip: int) -> None:
+        """Let the last sampler move another, new node as well."""
         if len(self.nodes) > MOST_NODES:
             return
         animation = self.made.json["animations"][clip]
@@ -403,15 +404,15 @@ class _File:
             pointer = f"/nodes/{other}/{path}"
             self.made.pointer(pointer, same["input"], same["output"], same["interpolation"], clip)
 
-    def _as_first(self, clip: int) -> None:
-        """Have a clip take its samplers from the first where both move the same."""
+    def _share_first_samplers(self, clip: int) -> None:
+        """Let a clip share the samplers of the first clip, for some of the same targets."""
         first, second = self.made.json["animations"][0], self.made.json["animations"][clip]
         for channel in second["channels"]:
             for other in first["channels"]:
                 if other["target"] == channel["target"] and self.random.random() < 0.7:
                     second["samplers"][channel["sampler"]] = dict(first["samplers"][other["sampler"]])
 
-    # What else may be in a file
+    # Other content of files
 
     def _vendor(self) -> None:
         choice = self.choice
@@ -430,7 +431,7 @@ class _File:
         self.made.uses(VENDOR)
 
     def _one_view(self) -> None:
-        """Have what moves and the first mesh in one view, which is the whole buffer."""
+        """Put animation data and the first mesh into one view that is the whole buffer."""
         json = self.made.json
         whole = {"buffer": 0, "byteLength": len(self.made.buffers[0])}
         json["bufferViews"].append(whole)

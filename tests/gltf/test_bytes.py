@@ -1,4 +1,4 @@
-"""Files get smaller by their animations alone: what else is in them, and what may name it, stays, and none grows."""
+"""Key reduction changes only the animations of a file: other data and its references stay, and no file grows."""
 
 import json
 from dataclasses import replace
@@ -18,7 +18,7 @@ POINTER = "KHR_animation_pointer"
 
 
 def both(made: Making, folder: Path, suffix: str = ".glb") -> tuple[File, File, Report]:
-    """The file before and after it is reduced to a few keys, which is as small as it says and not larger."""
+    """Return the file before and after reduction, after checking that the reported sizes are right and none grew."""
     path, output = made.write(folder / f"walk{suffix}"), folder / f"made{suffix}"
     report = reduce_file(path, output, Options(5e-3))
     before, after = size(path), size(output)
@@ -28,13 +28,13 @@ def both(made: Making, folder: Path, suffix: str = ".glb") -> tuple[File, File, 
 
 
 def size(path: Path) -> int:
-    """Bytes of a file and of the buffers beside it."""
+    """Return the bytes of a file and its external buffers."""
     uris = {buffer.get("uri", "data:").replace("%20", " ") for buffer in File(path).json["buffers"]}
     return path.stat().st_size + sum((path.parent / uri).stat().st_size for uri in uris if uri[:5] != "data:")
 
 
 def with_mesh(made: Making) -> dict[str, Any]:
-    """The only primitive of a mesh that comes in, of accessors behind those of the animations."""
+    """Add a mesh, with accessors after those of the animations, and return its only primitive."""
     attributes = {"POSITION": made.accessor(np.random.default_rng(1).normal(size=(30, 3)).astype("<f4"))}
     primitive = {"attributes": attributes, "indices": made.accessor(np.arange(30, dtype="<u2"))}
     made.json["meshes"] = [{"primitives": [primitive]}]
@@ -43,7 +43,7 @@ def with_mesh(made: Making) -> dict[str, Any]:
 
 
 def packed(made: Making) -> Making:
-    """The same accessors in one view, in another order."""
+    """Put the same accessors into `views` views, in random order."""
     data, accessors, content = made.buffers[0], made.json["accessors"], bytearray()
     views = [made.json["bufferViews"][accessor["bufferView"]] for accessor in accessors]
     for number in np.random.default_rng(4).permutation(len(accessors)).tolist():
@@ -56,7 +56,7 @@ def packed(made: Making) -> Making:
 
 
 def point(made: Making, sampler: int, pointer: str = "/materials/0/emissiveFactor") -> None:
-    """Have a sampler of the first animation move something by a pointer, too."""
+    """Let a sampler of the first animation also move the target of a pointer."""
     made.json["extensionsUsed"] = [POINTER]
     target = {"path": "pointer", "extensions": {POINTER: {"pointer": pointer}}}
     made.json["animations"][0]["channels"].append({"sampler": sampler, "target": target})

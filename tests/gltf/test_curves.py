@@ -1,4 +1,4 @@
-"""Clips as curves: keys that were set by hand come back, and what is promised holds at the frames of the file."""
+"""Reduction to curves: keys set by hand are found again, and the tolerance holds at the frames of the file."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from tests.gltf.player import File, vertices
 RADIUS, TOLERANCE = 0.03, 1e-3
 
 ROUNDING = 1e-6
-"""Of the size: single precision."""
+"""Rounding error of single precision, as a fraction of the size."""
 
 RATE, LAST = 24, 120
 
@@ -27,7 +27,7 @@ def reduced(
 
 
 def error_at_frames(before: File, after: File) -> float:
-    """How far any point around any node is off at the keys of the file, by matrices alone."""
+    """Return the largest displacement of any point around any node at the keys of the file, computed from matrices."""
     times = before.moments(0)
     around = before.around(0, RADIUS)
     truth, result = (file.points(0, times, around) for file in (before, after))
@@ -35,7 +35,7 @@ def error_at_frames(before: File, after: File) -> float:
 
 
 def hand_made(joints: int = 8, seed: int = 0) -> tuple[Making, dict[int, np.ndarray]]:
-    """A chain of joints that was keyed by hand, on frames of their own, and baked."""
+    """Return a chain of joints keyed by hand, each on its own frames, and baked."""
     made, random = Making(), np.random.default_rng(seed)
     made.json["nodes"] = [{"translation": [0.0, 0.2, 0.0], "children": [joint + 1]} for joint in range(joints)]
     del made.json["nodes"][-1]["children"]
@@ -105,7 +105,7 @@ def test_what_moves_in_lines_stays_lines(tmp_path):
 
 
 def test_keys_that_are_far_apart_are_lines_that_count(tmp_path):
-    """Three keys make no curve: what lies between them is a line in the file, and stays near it."""
+    """Three keys make no curve: the file has lines between them, and the result stays close to these."""
     made = Making()
     made.json["nodes"] = [{"translation": [0.0, 0.0, 0.0]}]
     made.channel(0, "rotation", made.times(np.arange(61) / 30), turns(np.arange(61) / 30, 0))
@@ -128,7 +128,7 @@ def test_so_many_key_poses_have_curves_between_them(tmp_path):
 
 
 def test_feet_that_stand_slide_no_farther_than_with_lines(tmp_path):
-    """A leg swings above a knee that turns back as far, so that the foot stands."""
+    """A leg swings above a knee that turns back by the same angle, so the foot stands."""
     made, times = Making(), np.arange(121) / 30
     made.json["nodes"] = [{"name": f"Joint{joint}", "children": [joint + 1]} for joint in range(3)]
     del made.json["nodes"][2]["children"]

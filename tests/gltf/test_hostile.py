@@ -1,4 +1,4 @@
-"""Damaged and hostile glTF files: one line each that says what is wrong and what to do, and nothing is written."""
+"""Damaged and hostile glTF files: each is refused with one line, the problem and a remedy, and nothing is written."""
 
 import json
 import os
@@ -25,7 +25,7 @@ ZEROS = {"componentType": 5126, "count": 2**25, "type": "VEC3"}
 
 
 def refusal(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """The line that refuses a file, without its path; nothing is written."""
+    """Return the line that refuses a file, without its path, after checking that nothing was written."""
     before = sorted(os.listdir(path.parent))
     assert reduce.main([str(path)]) == 2
     said = capsys.readouterr()
@@ -38,7 +38,7 @@ def refusal(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def changed(path: Path, change: Callable[[dict[str, Any]], None], text: str = "") -> Path:
-    """The file with other JSON."""
+    """Write a walk with changed JSON, and return its path."""
     file = File(walk().write(path))
     change(file.json)
     path.write_bytes(glb((text or json.dumps(file.json)).encode(), file.buffers[0]))

@@ -1,4 +1,4 @@
-"""Documents that meshopt compressed are read whole, reduced and compressed again; plain ones where asked for."""
+"""Files compressed by meshopt are read, reduced and compressed again; other files are compressed on request."""
 
 import base64
 import json
@@ -31,7 +31,7 @@ def document(data: bytes, count: int, stride: int, **more: object) -> Document:
 
 
 def compressed(made: Making, path: Path, name: str = EXT) -> Path:
-    """A file of the same, every view of which is compressed."""
+    """Write the same file with all views compressed."""
     plain = read_document(made.write(path))
     parts, views = [], []
     for view in plain.json["bufferViews"]:
@@ -62,7 +62,7 @@ def test_a_recording_that_is_compressed_is_read_like_the_plain_one(tmp_path: Pat
 
 
 def with_mesh(path: Path, how: str = "", name: str = EXT) -> Path:
-    """A chain of joints with a skin that a triangle hangs on; all views are compressed, one of the mesh in some way."""
+    """Write a chain of joints with a skinned triangle; all views are compressed, one mesh view as `how` says."""
     made = walk()
     points = made.accessor(np.zeros((3, 3), dtype="<f4"))
     four = made.accessor(np.zeros((3, 4), dtype="u1")), made.accessor(np.ones((3, 4), dtype="<f4"))
@@ -100,7 +100,7 @@ def test_a_mesh_that_cannot_be_read_leaves_the_motion_alone(tmp_path: Path, how:
 
 
 def plain(path: Path, folder: Path) -> Path:
-    """A file of the same, decompressed."""
+    """Write the same file decompressed."""
     document = decompressed(read_document(path))
     json_of = {name: part for name, part in document.json.items() if not name.startswith("extensions")}
     buffers = [bytes(data or b"-") for data in document.buffers]
@@ -161,7 +161,7 @@ def test_what_came_compressed_goes_out_so(tmp_path: Path, name: str) -> None:
 
 
 def test_numbers_come_back_bit_by_bit(tmp_path: Path) -> None:
-    """Whatever they are, with the filters or without."""
+    """For all kinds of numbers, with and without filters."""
     made, times = walk(), np.arange(61) / 30
     made.channel(0, "scale", made.times(times), 1.0 + 0.1 * np.random.default_rng(1).normal(size=(61, 3)))
     whole = np.rint(turns(times, 3).astype(np.float64) * 32767).astype("<i2")

@@ -1,4 +1,4 @@
-"""Streams and filters of meshopt are read and written as its own library would have them."""
+"""Meshopt streams and filters are read and written as by the meshoptimizer library."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from rigid_motion.gltf.filters import UNDO_BY_FILTER, floats_of, quaternions_of,
 from tests.gltf import meshopt_library
 from tests.gltf.meshopt_library import LIBRARY
 
-# Where the library is: in the newest Blender.
+# Only the newest Blender has the library.
 pytestmark = pytest.mark.once
 needs_library = pytest.mark.skipif(not LIBRARY, reason="the library is in Blender from 5.2 on")
 
@@ -39,7 +39,7 @@ def test_elements_come_back_as_they_were(count: int, stride: int, wide: int) -> 
 
 def test_few_elements_take_about_their_share_of_a_stream_with_many_others() -> None:
     parts = [elements_of(count, 8, 40) for count in (5, 70, 33, 200)]
-    together = encoded_size(np.concatenate(parts))  # Where two meet, it takes more.
+    together = encoded_size(np.concatenate(parts))  # The border between two parts takes more.
     assert sum(map(likely_size, parts)) == pytest.approx(together, rel=0.15)
 
 
@@ -50,7 +50,7 @@ def test_differences_have_their_sign_in_the_lowest_bit() -> None:
 @needs_library
 @pytest.mark.parametrize("kind", ["<u2", "<u4", "<f4"])
 def test_channels_of_two_and_of_four_bytes_are_read(kind: str) -> None:
-    """The library chooses how channels are packed by what is in them."""
+    """The library chooses the packing of channels by their content."""
     random = np.random.default_rng(1)
     numbers = np.cumsum(random.normal(size=(700, 4)), axis=0) * 1000.0
     elements = np.ascontiguousarray(numbers.astype(kind)).view(np.uint8)
@@ -64,7 +64,7 @@ def test_channels_of_two_and_of_four_bytes_are_read(kind: str) -> None:
 @pytest.mark.parametrize("stride", [2, 4])
 @pytest.mark.parametrize("shuffled", [False, True])
 def test_triangles_and_indices_come_back(stride: int, shuffled: bool) -> None:
-    """Triangles may come back turned, with the same corner behind each other one."""
+    """Triangles may come back rotated, with their corners in the same cyclic order."""
     random, side = np.random.default_rng(2), np.arange(40 * 39).reshape(40, 39)
     corners = np.stack(
         (side[:-1, :-1], side[1:, :-1], side[:-1, 1:], side[:-1, 1:], side[1:, :-1], side[1:, 1:]), axis=-1
@@ -101,7 +101,7 @@ def test_triangles_and_indices_come_back(stride: int, shuffled: bool) -> None:
     ],
 )
 def test_filters_are_undone_as_by_the_library(name: str, own: str, stride: int, bits: int) -> None:
-    """To the last whole number: the library works in single precision."""
+    """Few integers differ, by 1: the library computes in single precision."""
     numbers = np.random.default_rng(3).normal(size=(1000, 4))
     numbers /= np.linalg.norm(numbers[:, : 4 if own == "Quat" else 3], axis=1, keepdims=True)
     numbers[:, 3] = numbers[:, 3] if own in ("Quat", "Exp") else 0.0

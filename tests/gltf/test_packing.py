@@ -1,4 +1,4 @@
-"""Keys of one track, fitted, rounded and mended: never farther off than allowed, and the coarser the smaller."""
+"""Keys of one track, fitted, rounded and repaired: errors stay within the limit, and a larger limit saves bytes."""
 
 import numpy as np
 import pytest

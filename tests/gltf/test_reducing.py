@@ -1,4 +1,4 @@
-"""glTF files with fewer keys: what they promise holds, and nothing else changes."""
+"""Key reduction of glTF files: the tolerance holds, and nothing else changes."""
 
 import json
 from pathlib import Path
@@ -13,7 +13,7 @@ from tests.gltf.player import File, off
 RADIUS = 0.03
 
 ROUNDING = 1e-6
-"""Of the size: single precision."""
+"""Rounding error of single precision, as a fraction of the size."""
 
 
 def both(
@@ -26,7 +26,7 @@ def both(
 
 
 def holds(before: File, after: File, report: Report, clip: int = 0) -> float:
-    """The largest error of a clip, which is no larger than promised and as large as is said."""
+    """Return the largest error of a clip, after checking that the tolerance and the report bound it."""
     error = off(before, after, clip, RADIUS).error
     assert error <= report.tolerance + ROUNDING * report.size
     assert error <= report.clips[clip].error + ROUNDING * report.size
@@ -102,7 +102,7 @@ def test_constant_channels_have_one_key_and_those_that_nobody_needs_none(tmp_pat
 
 
 def test_nodes_that_share_a_mesh_each_carry_it(tmp_path):
-    """A mesh of two materials that have the same vertices; one node is a hundred times as large as the other."""
+    """A mesh with two materials that share vertices; one node is a hundred times as large as the other."""
     made, times = Making(), np.arange(61) / 30
     places = made.accessor(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]], dtype="<f4"))
     made.json["meshes"] = [{"primitives": [{"attributes": {"POSITION": places}, "material": 0}] * 2}]

@@ -1,6 +1,6 @@
-"""What is seen of a glTF file with fewer keys: no vertex is off by more than promised, and nothing else is touched.
+"""Visible geometry after key reduction: no vertex moves by more than the tolerance, and nothing else changes.
 
-`tests.gltf.player` plays both files, `tests.gltf.random_files` makes them; `failing` are files that broke this before.
+`tests.gltf.player` plays both files, `tests.gltf.random_files` makes them; `failing` has files that failed before.
 """
 
 from collections.abc import Iterator
@@ -21,13 +21,13 @@ from tests.thoroughness import tried
 FAILING = Path(__file__).parent / "failing"
 
 ULP = 2.0**-23
-"""Of what is seen far out: files keep single precision, in which one place is so far from the next."""
+"""Relative rounding of far coordinates: the spacing of single-precision numbers near 1."""
 
 NOTE = "rigid_motion"
-"""What files that were reduced may say in the extras of their asset."""
+"""Key in the asset's extras that reduced files may have."""
 
 TURN = np.radians(0.5)
-"""The angle that rotations keep within where nothing has a size."""
+"""Angle that limits rotations if nothing has a size."""
 
 
 def clips_of(file: File) -> list[dict[str, Any]]:
@@ -39,7 +39,7 @@ def largest_coordinate(file: File, clip: int) -> float:
 
 
 def keeps_to(report: Report, before: File, after: File) -> None:
-    """Every clip shows within the tolerance what it showed, and no more than is said."""
+    """Check that every clip stays within the tolerance, and within its reported error."""
     said = {clip.number: clip.error for clip in report.clips}
     assert len(clips_of(after)) == len(clips_of(before))
     for clip, animation in enumerate(clips_of(before)):
@@ -52,7 +52,7 @@ def keeps_to(report: Report, before: File, after: File) -> None:
 
 
 def turns_within_an_angle(report: Report, before: File, after: File) -> None:
-    """Frames without a mesh on them are within the tolerance around, or within an angle where nothing has a size."""
+    """Check that frames of nodes without a mesh stay within the tolerance, or within an angle if nothing has a size."""
     if not before.has_meshes():
         radius = 0.03 / 1.7 * report.size or 1.0
         for clip in range(len(clips_of(before))):
@@ -62,14 +62,14 @@ def turns_within_an_angle(report: Report, before: File, after: File) -> None:
 
 
 def lasts(file: File, clip: int) -> tuple[float, float]:
-    """The first and the last time of a clip, whatever it moves."""
+    """Return the first and last time of a clip, over all of its channels."""
     samplers = file.json["animations"][clip]["samplers"]
     times = np.concatenate([file.numbers(sampler["input"])[:, 0] for sampler in samplers] or [np.zeros(1)])
     return float(times.min()), float(times.max())
 
 
 def channels_stay(before: File, after: File) -> None:
-    """What goes is in a file with meshes, and at rest in all other clips."""
+    """Check that removed channels are in files with meshes, and at rest in all other clips."""
     clips = [before.tracks(clip) for clip in range(len(clips_of(before)))]
     for clip, tracks in enumerate(clips):
         for node, path in tracks.keys() - after.tracks(clip).keys():
@@ -79,7 +79,7 @@ def channels_stay(before: File, after: File) -> None:
 
 
 def rests(file: File, node: int, path: str, track: Track) -> bool:
-    """Whether a track shows what is shown without it, to single precision."""
+    """Whether a track shows the rest value of its node, to single precision."""
     described = file.json["nodes"][node]
     weights = file.json["meshes"][described["mesh"]].get("weights") if "mesh" in described else None
     rest, at = described.get(path, REST.get(path, weights)), eighths(track[1])
@@ -87,7 +87,7 @@ def rests(file: File, node: int, path: str, track: Track) -> bool:
 
 
 def named(part: Any, inside: bool = False) -> Iterator[int]:
-    """Accessors that extensions name that are unknown."""
+    """Yield the accessors that unknown extensions name."""
     if isinstance(part, dict):
         for name, below in part.items():
             yield from named(below, inside or name == VENDOR)
@@ -99,7 +99,7 @@ def named(part: Any, inside: bool = False) -> Iterator[int]:
 
 
 def all_else_stays(before: File, after: File) -> None:
-    """Meshes, skins, instances and what unknown extensions name are the same numbers; the rest of the JSON is equal."""
+    """Check that meshes, skins, instances and data of unknown extensions are the same, and the other JSON is equal."""
     assert _content(after, after.json) == _content(before, before.json)
     for number in named(before.json):
         assert np.array_equal(after.stored(number), before.stored(number))
@@ -107,7 +107,7 @@ def all_else_stays(before: File, after: File) -> None:
 
 
 def _content(file: File, part: Any, name: str = "") -> Any:
-    """JSON with the numbers that accessors stand for, but for that of animations."""
+    """Return JSON with the content of accessors in place of their numbers, without animations."""
     if isinstance(part, dict):
         if name in ("attributes", "targets"):
             return {key: _numbers(file, number) for key, number in part.items()}
@@ -118,7 +118,7 @@ def _content(file: File, part: Any, name: str = "") -> Any:
     if isinstance(part, list):
         return [_content(file, below, name) for below in part]
     if isinstance(part, float) and name in (*REST, "matrix") and str(np.float32(part)) == str(part):
-        return float(np.float32(part))  # in as few digits as single precision needs
+        return float(np.float32(part))  # Shortened to the digits that single precision needs.
     return _numbers(file, part) if name in ("indices", "inverseBindMatrices") else part
 
 
@@ -151,7 +151,7 @@ GROWS_BETWEEN_KEYS = Choice(
     keys=5,
     shared="samplers",
 )
-"""What morph targets move grows by a spline between its keys."""
+"""The geometry moved by morph targets grows by a spline between its keys."""
 
 
 @settings(max_examples=tried(200), deadline=None)
@@ -160,7 +160,7 @@ GROWS_BETWEEN_KEYS = Choice(
 def test_no_vertex_of_any_file_is_off_by_more_than_the_tolerance(
     tmp_path_factory, choice: Choice, share: float | None, shared: bool, stretch: int
 ):
-    """Tolerances are shares of the size of what is seen, as tens to a power; the default where that is too much."""
+    """Tolerances are powers of ten times the size of the geometry; the default if that is too much."""
     path = choice.made().write(tmp_path_factory.mktemp("random") / "made.glb")
     with mock.patch.object(errors, "STRETCH_SAMPLES", stretch):
         report = holds(path, None if share is None else 10.0 ** (share + choice.exponent), shared=shared)
@@ -169,10 +169,10 @@ def test_no_vertex_of_any_file_is_off_by_more_than_the_tolerance(
 
 
 DEFAULT = ("cubic_weights_blink", "cubic_weights_ease")
-"""What was reduced by the default tolerance; the others by a millimetre."""
+"""Files reduced with the default tolerance; the others use a millimetre."""
 
 LEFT_ALONE = ("cubic_weights_blink", "cubic_weights_ease", "pointer_only", "small_weights", "static", "tiny")
-"""Nothing moves a node, all is hardly larger than the tolerance, or other keys would take more bytes."""
+"""Files where no track moves a node, all is hardly larger than the tolerance, or other keys would take more bytes."""
 
 
 @pytest.mark.parametrize("path", sorted(FAILING.glob("*.glb")), ids=lambda path: path.stem)

@@ -1,4 +1,4 @@
-"""Long clips, stretch by stretch: the promise holds across, feet stand across, and memory stays flat."""
+"""Long clips reduced in stretches: tolerance and standing feet hold across the borders, and memory stays low."""
 
 import tracemalloc
 from pathlib import Path
@@ -13,7 +13,7 @@ from tests.gltf.player import File, off
 RADIUS, TOLERANCE = 0.03, 3e-3
 
 SINGLE = 1e-6
-"""Metres, of single precision."""
+"""Rounding error of single precision, in metres."""
 
 STRETCH = 40
 
@@ -34,7 +34,7 @@ def test_all_that_moves_has_keys_where_stretches_meet_and_few_more_elsewhere(tmp
 
 
 def standing_body(path: Path) -> tuple[Path, float, float]:
-    """A body whose leg turns to and fro below its hips, which go along: its foot stands from one time to another."""
+    """Write a body whose leg swings below moving hips; return the path, and the times between which its foot stands."""
     made = Making()
     begin, end, times = 1.0, 6.0, np.arange(241) / 30.0
     made.json["nodes"] = [
@@ -54,7 +54,7 @@ def standing_body(path: Path) -> tuple[Path, float, float]:
 
 
 def slide(file: File, begin: float, end: float) -> float:
-    """How far the foot gets from where it is at first, at the samples from one time to another."""
+    """Return the largest distance of the foot from its first position, at the samples of a time range."""
     samples = np.arange(round(30 * begin) + 1, round(30 * end)) / 30.0
     places = file.worlds(0, samples)[2, :, :3, 3]
     return float(np.linalg.norm(places - places[0], axis=1).max())
@@ -88,5 +88,5 @@ def test_memory_hardly_grows_with_the_length(tmp_path, monkeypatch):
         tracemalloc.stop()
         return result
 
-    # The 31 numbers that a frame has in the file, in double precision: not even they are all there at once.
+    # The file has 31 numbers per frame; in double precision, even these are never all in memory at once.
     assert peak(140.0) - peak(30.0) < 110 * 30 * 31 * 8

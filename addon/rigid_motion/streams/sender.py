@@ -125,7 +125,7 @@ class Sender:
         """As described; and with the current holds."""
         self._wanted: tuple[tuple[int, int], ...] = ()
         """Numbers of bodies that will be held from the next sample on, and of the joints that hold them."""
-        self._since, self._changes = NEVER_TICK, False
+        self._since, self._holders_changed = NEVER_TICK, False
         """The tick since which holders have not changed; and whether the change still has to be sent."""
         self._slip = 0.0
         """Seconds added to the times of samples, so that a clock that was set makes no difference."""
@@ -238,7 +238,7 @@ class Sender:
             self._samples = before.extended(now, until)
             said = self._due(now, math.inf)
             begun = KnotPath(before.moments[-1:], last[:, None]).extended(now, placed)
-            self._since, self._changes, self._good_until = (
+            self._since, self._holders_changed, self._good_until = (
                 math.floor(now * TICKS_PER_S + MAX_EARLY_TICKS),
                 True,
                 now - REPEAT_S,
@@ -377,7 +377,7 @@ class Sender:
         self._sent = end / TICKS_PER_S
         if number is None:
             self._refreshed, self._desired, self._base = now, False, self._sequence
-        if number is None or self._changes:
-            self._copy, self._changes = (self._sequence, now, datagram), False
+        if number is None or self._holders_changed:
+            self._copy, self._holders_changed = (self._sequence, now, datagram), False
         self._sequence += 1
         return datagram
