@@ -34,7 +34,7 @@ def size(path: Path) -> int:
 
 
 def with_mesh(made: Making) -> dict[str, Any]:
-    """Add a mesh, with accessors after those of the animations, and return its only primitive."""
+    """Add a mesh, with accessors after the accessors of the animations, and return its only primitive."""
     attributes = {"POSITION": made.accessor(np.random.default_rng(1).normal(size=(30, 3)).astype("<f4"))}
     primitive = {"attributes": attributes, "indices": made.accessor(np.arange(30, dtype="<u2"))}
     made.json["meshes"] = [{"primitives": [primitive]}]

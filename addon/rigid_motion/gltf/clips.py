@@ -63,7 +63,7 @@ class Options:
     """Number of key poses for each clip, instead of a tolerance."""
 
     channels: str = NEEDED_CHANNELS
-    """One of CHANNELS: which channels keep a key though their node stays at rest."""
+    """One of CHANNELS: whether channels of resting nodes keep a key even if no other clip moves the node."""
 
     feet: bool = True
     """Whether standing feet may slide only `MORE_SLIDE` farther than before, however large the tolerance."""

@@ -149,7 +149,7 @@ class World:
         return self._of_parents(self._extremes[0][:, None])
 
     def _of_parents(self, lengths: np.ndarray) -> np.ndarray:
-        """Return for each node the lengths of its parent's axes, given those of all nodes, shape (n, ..., 3)."""
+        """Return the axis lengths of each node's parent, given the axis lengths of all nodes, shape (n, ..., 3)."""
         result = lengths[self.parents]
         for row in np.flatnonzero(self.parents < 0).tolist():
             parent = self.nodes.parents[self.moving[row]]

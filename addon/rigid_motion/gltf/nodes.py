@@ -75,7 +75,7 @@ class Nodes:
 
     @cached_property
     def resting(self) -> AffineMaps:
-        """Where all nodes are without tracks, shape (nodes,)."""
+        """World transforms of all nodes without tracks, shape (nodes,)."""
         nodes = np.concatenate(self.skeleton.levels)
         return self.worlds(nodes, {}, np.zeros(1))[np.argsort(nodes), 0]
 

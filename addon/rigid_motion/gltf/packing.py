@@ -1,7 +1,7 @@
 """Search for the tracks of a clip that take the fewest meshopt bytes within a tolerance in world space.
 
 Each track gets samples at an even rate or sparse keys, in as few bits as possible. Parents come first, and children
-take the stored keys into account: a joint turns so that what it carries ends up in the right place, as far as a
+take the stored keys into account: a joint turns so that the nodes it carries get to their places, as far as a
 rotation can do that. So errors do not add up, and each joint may use much of the tolerance: less for joints with many
 joints below them.
 Times are multiples of 2**-15 s, many of them multiples of 2**-7 s, which leaves a byte that never changes.
@@ -32,8 +32,8 @@ MAX_SEARCH_SAMPLES = 2 * 10**5
 """About how many samples of all nodes together are checked in a search."""
 
 JUMP_FRAME_STRIDE, MIN_JUMP_ERROR_RATIO, FRAMES_PER_JUMP = 4, 2.0, 60
-"""A jump: with every JUMP_FRAME_STRIDE-th frame as a key, the error is so many times as large as its 98th percentile,
-and among the worst, one in FRAMES_PER_JUMP frames."""
+"""A jump: with every JUMP_FRAME_STRIDE-th frame as a key, the error is MIN_JUMP_ERROR_RATIO times its 98th percentile,
+and among the worst, at most one in FRAMES_PER_JUMP frames."""
 
 MIN_USUAL_ERROR = 1e-9
 
@@ -50,7 +50,7 @@ MAX_FAR_SAMPLES_RATIO = 0.01
 """Largest fraction of samples that may be too far off with keys on a grid, before rounding."""
 
 MAX_SPARSE_BYTES_RATIO = 1.2
-"""Sparse keys are tried again for a track if they took at most so many times the bytes of the best keys."""
+"""Largest bytes of sparse keys, as a ratio to the best keys, at which sparse keys are tried again for a track."""
 
 SPARSE_LINE_FACTORS = (1.6, 1.15, 0.8)
 """Factors on the allowed error for lines through sparse keys before the keys are fitted, tried in turn."""
@@ -93,7 +93,7 @@ class Packing:
         # Parents first.
         self.tracks = dict(sorted(tracks.items(), key=lambda item: world.rows[item[0][0]]))
         self.fixed, count = fixed, len(world.times) * len(world.moving)
-        # With all times that keys may have.
+        # Includes all possible key times.
         self.samples = np.union1d(
             parted(world.times, max(min(PARTS_PER_GAP, MAX_SEARCH_SAMPLES // count), 1)), self.bases[0][0]
         )
@@ -309,7 +309,7 @@ class Packing:
         shown: np.ndarray,
         some: np.ndarray | slice,
     ) -> np.ndarray:
-        """Return the relative error of a node with these rotations, and of what it carries, shape (k,)."""
+        """Return the relative error of a node with these rotations, and of the nodes that it carries, shape (k,)."""
         off, origins, radii = off[some], self.truth.origins, self.world.radii
         turn = multiply(multiply(above[some], shown), conjugate(self.aimed[row][some]))
         chord = 2.0 * np.linalg.norm(turn[:, 1:], axis=1)
@@ -325,7 +325,7 @@ class Packing:
         return result
 
     def _turned_to(self, row: int, off: np.ndarray) -> np.ndarray:
-        """Return the rotation of a node that puts what it carries in the right place, if the node is off by `off`."""
+        """Return the rotation of a node that puts the nodes it carries in place, if it is off by `off` (m, 3)."""
         origins, radii = self.truth.origins, self.world.radii
         carried = self.carried[row]
         if not carried or not off.any():

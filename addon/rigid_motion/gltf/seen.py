@@ -52,7 +52,7 @@ class Seen:
     """Lowest and highest coordinates of carried vertices, without morph targets, shape (2, nodes, 3); else infinite."""
 
     morphs: dict[int, Morph]
-    """By node."""
+    """Morph targets by node."""
 
     @classmethod
     def of(cls, nodes: Nodes, clips: Iterable[Clip]) -> Seen:
@@ -79,7 +79,7 @@ class Seen:
         node, deltas = document.json["nodes"][number], np.zeros(len(weights))
         factors: dict[int, float] = {}
         primitives = objects(entry(document.json, "meshes", node["mesh"]), "primitives")
-        # Primitives of several materials often have the vertices of all of them.
+        # Primitives of several materials often share the vertices of all materials.
         for primitive in {str((own.get("attributes"), own.get("targets"))): own for own in primitives}.values():
             if "POSITION" not in primitive.get("attributes", {}):
                 continue

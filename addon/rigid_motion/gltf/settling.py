@@ -1,4 +1,4 @@
-"""Channels of a clip that need no key search: constant, stepped, or with no influence on other channels.
+"""Channels of a clip that need no key search: constant, stepped, or reducible independently of others.
 
 Also finds channels that should share key times to save bytes.
 """

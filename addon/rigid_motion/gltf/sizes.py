@@ -19,7 +19,7 @@ OF_A_BODY = 0.003
 """Default tolerance for the keys of a body, as a fraction of its size: 5 mm for an adult."""
 
 OF_KEY_POSES = 0.02
-"""Default tolerance for key poses, of which there should be few: 35 mm for an adult."""
+"""Default tolerance for key poses, as a fraction of the size, chosen for few poses: 35 mm for an adult."""
 
 MIN_BALL_RADIUS_RATIO = 0.03 / 1.7
 """Least radius of a node's ball as a fraction of the size: 3 cm for an adult."""

@@ -2,7 +2,8 @@
 
 A sender knows what its receivers show, a delay behind, and sends only when a joint would leave the tolerance:
 
-    sender = Sender([StreamBody.rigid("left hand"), StreamBody("performer", joints, parents, rest)], 0.005, delay=0.1)
+    bodies = [StreamBody.rigid("left hand"), StreamBody("performer", joints, parents, rest)]
+    sender = Sender(bodies, tolerance=0.005, delay=0.1)
     for datagram in sender.add(time, poses):      # at every sample; poses (joints,), or a Poses for each body's name
         transport.send(datagram)
     if now > sender.next:                         # a sample is overdue: the sender has to go on without it

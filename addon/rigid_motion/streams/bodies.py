@@ -231,11 +231,11 @@ class Forest:
         return result
 
     def joined(self, poses: Mapping[str, Poses]) -> Poses:
-        """Return the poses of all joints (joints,), given those of each body by name."""
+        """Return the poses of all joints (joints,), given the poses of each body by name."""
         return joined([poses[body.name] for body in self.bodies])
 
     def parted(self, poses: Poses) -> dict[str, Poses]:
-        """Return the poses of each body by name, given those of all joints (joints, ...)."""
+        """Return the poses of each body by name, given the poses of all joints (joints, ...)."""
         return {
             body.name: poses[end - len(body.joints) : end] for body, end in zip(self.bodies, self._ends, strict=True)
         }

@@ -1,4 +1,4 @@
-"""Messages of a stream: their integers in metres and radians, what the next message builds on, and their bytes.
+"""Messages of a stream: converting poses to integers and bytes, coded against an earlier message, and back.
 
 A message has the poses of all joints at the end of a window, and at moments within it if needed. The end is coded
 against the motion so far, each inner knot against the straight path between the knots around it that came before.
@@ -203,7 +203,7 @@ class Message:
         self.numbers: list[np.ndarray] = []
         """For each knot the integers (groups, 3)."""
         self.memory: tuple[int, ...] = (0,) * len(codec.forest.groups)
-        """Magnitudes of the residuals of each group."""
+        """Smoothed magnitudes of the residuals of each group."""
         self.path = KnotPath(np.zeros(1), codec.forest.rest[:, None])
         self._changed_hands: np.ndarray | None = None
         """Whether each joint has another holder than in the base (joints,), if any has."""

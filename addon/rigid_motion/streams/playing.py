@@ -25,10 +25,10 @@ LOOK_BACK, MOST_TRANSITS = 3.0, 512
 """Seconds over which the longest transit counts, and the most datagrams that count."""
 
 # The network has become faster, and does not only vary, if datagrams all arrived sooner than usual:
-MIN_QUICK_DATAGRAMS = 4  # at so many sending times in a row
-MIN_QUICK_S = 0.3  # over so many seconds
-MIN_SOONER_S = 0.05  # by so many seconds sooner than the longest transit
-MAX_SOONER_RATIO = 0.1  # and sooner than all but this fraction of those before
+MIN_QUICK_DATAGRAMS = 4  # sending times in a row
+MIN_QUICK_S = 0.3  # duration
+MIN_SOONER_S = 0.05  # sooner than the longest transit, at least
+MAX_SOONER_RATIO = 0.1  # and sooner than all but this fraction of the earlier datagrams
 
 CLOCK_SET_S = 1.0
 """Seconds: a transit that differs by more is due to a clock that was set; the display may not leap further."""
@@ -52,7 +52,7 @@ MAX_SILENCE_S = 10.0
 """Seconds of silence after which a stream is forgotten."""
 
 MOST_KNOTS, MOST_JOINT_KNOTS = 256, 1 << 14
-"""Knots of a stream kept for `keys`; for bodies of few joints more, up to so many poses of single joints."""
+"""Knots of a stream kept for `keys`; for few joints more, up to MOST_JOINT_KNOTS poses of joints."""
 
 NO_HOLDERS = np.full(1, -1, dtype=np.int16)
 """Holder of each joint if nothing is held."""
@@ -109,7 +109,7 @@ class Playing:
         return step if step > CLOCK_AHEAD_S else 0.0
 
     def leap(self, moment: float, step: float) -> None:
-        """Skip so many seconds after a moment, once it has been shown."""
+        """Skip `step` seconds after a moment, once it has been shown."""
         if self._leap and self._moment is not None:
             self._moment += self._leap[1]
         self._transits = deque(((when, took - step) for when, took in self._transits), MOST_TRANSITS)

@@ -206,6 +206,6 @@ class _Coded(Playback):
             self.fading.changed(path.pose(self.moment), path.held_at(self.moment))
 
     def there(self) -> tuple[int, int, int]:
-        """Return the fields of an answer: newest message, received ones among those before it, and needs."""
+        """Return the fields of an answer: newest message, received messages before it, and needs."""
         before = sum(1 << back for back in range(32) if self._newest - 1 - back in self._messages)
         return max(self._newest, 0), before, self._needs

@@ -159,7 +159,7 @@ class Sender:
         self._desired = False
         """Whether a refresh was requested."""
         self._missed = -math.inf
-        """When an answer last reported so many losses that all is to be sent twice."""
+        """When an answer last reported enough losses to send everything twice."""
 
     def hold(self, tool: str, body: str | None, joint: str | None = None) -> None:
         """Put a body into the hand of another body's joint from the next sample on, or let go of it if `body` is None.
@@ -329,7 +329,7 @@ class Sender:
         return self._good_until
 
     def _is_lossy(self, now: float) -> bool:
-        """Whether so much was lost lately that everything is sent twice."""
+        """Whether recent losses are high enough to send everything twice."""
         return now - self._missed < LOSSLESS_S
 
     def _answered(self, now: float) -> bool:

@@ -101,7 +101,7 @@ def read(datagram: bytes) -> Datagram | None:
 
 
 def other_version(datagram: bytes) -> int | None:
-    """Return the version of a description in another version of the format, as far as known; otherwise None."""
+    """Return the version of a description in another version of the format, if recognisable; otherwise None."""
     version, kind = divmod(datagram[0], 16) if datagram else (0, 0)
     if kind or version in (0, WIRE_VERSION):
         return None
