@@ -1,7 +1,7 @@
 """Entropy coder for messages: converts integers to few bytes and back, using tables of frequencies.
 
 A group is the three numbers of a joint at a knot: a turn, or a slide. Groups come knot by knot, the last knot first,
-then those within; in each knot joint by joint. The table for a number depends on what both sides already know.
+then the inner ones; in each knot joint by joint. The table for a number depends on what both sides already know.
 
 The coder uses only 32-bit integers, so that every language decodes the same. It follows the carry-propagating range
 coder of G. N. N. Martin (1979), in the form of LZMA. `low` and `size` define the interval; bytes leave it from the top.

@@ -120,6 +120,6 @@ class KnotPath:
         return KnotPath(self.moments, self.poses, (last.positions - before.positions) / span, spins, self.holders)
 
     def since(self, moment: float) -> KnotPath:
-        """Return the same path without knots that no moment from this one on depends on."""
+        """Return the same path without the knots that only affect earlier moments."""
         kept = max(int(np.searchsorted(self.moments, moment, side="right")) - 1, 0)
         return KnotPath(self.moments[kept:], self.poses[:, kept:], self.velocities, self.spins, self.holders[:, kept:])

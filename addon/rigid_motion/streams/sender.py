@@ -59,7 +59,7 @@ MAX_SEQUENCE_NUMBER = 0xFFFF
 """The largest sequence number: after it, the sender restarts with another identity."""
 
 CLOCK_SET_S = 1.0
-"""Seconds between two samples from which on it is not a pause, but a clock that was set."""
+"""Longest pause between two samples in seconds: anything longer means that a clock was set."""
 
 PAUSE_S = 0.25
 """Seconds beyond the usual interval before a late sample at which all samples so far are sent: receivers may take the
@@ -72,7 +72,7 @@ ANSWERED_MESSAGES, MAX_BASE_AGE_S = 33, 2.0
 """Messages that an answer reports on; and seconds: older messages are not worth building on, all is sent anew."""
 
 MIN_LOST_MESSAGES, LOSSLESS_S = 2, 5.0
-"""Lost messages among the last 32 from which on each message is sent twice, until none is lost for some seconds."""
+"""Least losses in the last 32 messages for sending each twice, until nothing is lost for LOSSLESS_S seconds."""
 
 
 class Sender:

@@ -24,7 +24,7 @@ SAMPLES_BEFORE, SAMPLES_AFTER, MIN_SAMPLES = 12, 8, 12
 """Samples before and after the shown moment that count, and the fewest of both together."""
 
 MIN_KEY_GAP_S = 0.04
-"""Seconds between samples from which on these count as keys, not as all captured samples: keys have no jitter."""
+"""Seconds: samples farther apart count as keys, not as all captured samples; keys have no jitter."""
 
 JERK_ORDER, JERK_REACH_SAMPLES, JERK_ROUNDS = 3, 3, 10
 """Order of the derivative that is kept small; samples on either side that share its density; rounds to find it."""

@@ -42,8 +42,8 @@ MOST_DEVICES, AT_ONCE = 32, 12
 """Most devices of a program; and bones per datagram, small enough for networks to send it in one piece."""
 
 MAX_FRAMES, MAX_LATE_FRAMES = 8, 3
-"""Most frames of a datagram: the rest is dropped. And consecutive frames in sending order, all older than received
-frames, from which on they are not late, but the sender's clock was set back."""
+"""Most frames of a datagram: the rest is dropped. And late frames in a row, in sending order, after which the
+sender's clock counts as set back."""
 
 _TO_BLENDER = np.array(((-1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
 """From Unity's axes to Blender's: a mirror."""
@@ -112,7 +112,7 @@ class Performance(Playback):
         self._joints: list[Joint] = []
         """The joints of all bodies, in order."""
         self._frame: dict[Joint, list[float]] = {}
-        """Joints of the current frame; its start time follows."""
+        """Joints of the current frame; `_begun` is when it began."""
         self._begun = 0.0
         self._has_time = False
         self._slip = self._sent = 0.0
