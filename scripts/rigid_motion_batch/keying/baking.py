@@ -1,4 +1,4 @@
-"""What `bake.py` does to the objects and bones of the open file: baking, and taking it back."""
+"""Baking and unbaking the objects and bones of the open file, for `bake.py`."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.keying.jobs import Operation, Result
 
 MAX_NAMED_BONES = 4
-"""As many bones are named; of more it is said how many they are."""
+"""The most bones that are named; of more, only the count is given."""
 
 
 def baking(step: float, interpolation: str) -> Operation:
-    """Return the action that makes keys of this interpolation on every `step` frames."""
+    """Return the operation that bakes keys with this interpolation on every `step` frames."""
 
     def bake(targets: Sequence[Transform]) -> Result:
         problems = {target: problem for target in targets if (problem := animation.problem_of(target))}
@@ -35,7 +35,7 @@ def baking(step: float, interpolation: str) -> Operation:
 
 
 def unbaking() -> Operation:
-    """Return the action that brings back the keys from before."""
+    """Return the operation that restores the keys from before baking."""
 
     def unbake(targets: Sequence[Transform]) -> Result:
         refusals: list[Refused] = []
@@ -54,9 +54,7 @@ def _result(
 
 
 def _by_target(refusals: Iterable[Refused], targets: Sequence[Transform]) -> dict[Transform, str]:
-    """Return which target each refusal is about: it begins with the name,
-    and of names that begin alike with the longest.
-    """
+    """Return the refusal of each target. A refusal begins with the target's name; the longest matching name counts."""
     longest_first = sorted(targets, key=lambda target: -len(target.name))
     result = {}
     for text in map(str, refusals):
@@ -66,13 +64,13 @@ def _by_target(refusals: Iterable[Refused], targets: Sequence[Transform]) -> dic
 
 
 def with_rigid_segments(targets: Sequence[Transform]) -> list[Transform]:
-    """Return those that are to move otherwise than by Blender's own in-betweens, in any segment and possible or not."""
+    """Return the targets with a segment that does not use Blender's own in-betweens, whether or not it can be baked."""
     rigid = {user for place in bindings_of(targets) if _has_rigid_segments(place) for user in place.users}
     return [target for target in targets if target in rigid]
 
 
 def _has_rigid_segments(binding: Binding) -> bool:
-    """Return whether a segment of a slot has another mode than Blender's own, be it one that nobody knows."""
+    """Return whether a segment of a slot has another mode than Blender's own, even an unknown one."""
     modes = modes_said(binding)
     if isinstance(modes, Marks):
         return bool(modes.numbers[:-1].any())
@@ -80,7 +78,7 @@ def _has_rigid_segments(binding: Binding) -> bool:
 
 
 def modes_of(targets: Sequence[Transform]) -> dict[Transform, str]:
-    """Return the modes of each target's segments as Blender's menus show them, each once."""
+    """Return the modes of each target's segments, once each, as Blender's menus show them."""
     modes: dict[Transform, dict[str, None]] = {target: {} for target in targets}
     for place in bindings_of(targets):
         for user in place.users:
@@ -93,7 +91,7 @@ def modes_of(targets: Sequence[Transform]) -> dict[Transform, str]:
 
 
 def described(modes: Mapping[Transform, str]) -> str:
-    """Return which modes targets have: one by itself, several bones by mode, and few of them by name."""
+    """Return text on the modes of targets: that of a single one, or of several bones by mode, named if they are few."""
     if len(modes) == 1:
         return f", {next(iter(modes.values()))}"
     if len(modes) > MAX_NAMED_BONES:

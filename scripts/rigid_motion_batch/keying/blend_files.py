@@ -1,4 +1,4 @@
-"""Opening .blend files without running what is in them, what they lack of libraries, and saving them whole."""
+"""Opening .blend files without running their scripts, finding missing library data, and saving files completely."""
 
 from __future__ import annotations
 
@@ -18,33 +18,33 @@ from rigid_motion_batch.silencing import silenced
 from .records import FileProblem, InputRecord, Unreadable, changed_at, not_written
 
 THIS_VERSION = bpy.app.version[:2]
-"""The Blender that this runs in."""
+"""The version (major, minor) of the running Blender."""
 
 MAGIC = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
-"""The bytes that .blend files begin with: as they are, compressed, and compressed by a Blender before 3.0."""
+"""The first bytes of .blend files: uncompressed, compressed, and compressed by a Blender before 3.0."""
 
 MAX_NAMED_DATA = 5
-"""As many of the data that are missing from a library are named."""
+"""How many of the data-blocks missing from a library are named."""
 
 MAY_HOLD_OBJECTS = (bpy.types.Collection, bpy.types.Scene)
 
 
 @dataclass
 class Missing:
-    """What the open file wants of libraries and cannot have."""
+    """The library data that the open file lacks."""
 
     libraries: list[str] = field(default_factory=list)
-    """For each library that something is missing from: which, what, and the way out."""
+    """For each library with missing data: a message with the library, the data-blocks, and what the user can do."""
 
     reasons: dict[bpy.types.Object, str] = field(default_factory=dict)
-    """Objects of which one cannot know whether rigid motion moves them, for they or their Actions are missing."""
+    """Objects whose motion is unknown because they or their Actions are missing, with the reason."""
 
     hides_objects: bool = False
-    """True if there may be more of those, in collections or scenes that are missing."""
+    """True if collections or scenes are missing that may hold more such objects."""
 
 
 def open_file(path: Path) -> None:
-    """Open a .blend file, without running anything that is in it. Raises `Unreadable`."""
+    """Open a .blend file without running its scripts. Raises `Unreadable`."""
     if os.path.exists(path) and not os.path.isfile(path):
         raise Unreadable("this is not a file on a disk: save it as one first")
     try:
@@ -65,16 +65,14 @@ def open_file(path: Path) -> None:
             f"Blender cannot read this file, which looks damaged ({reason}): take a copy of it, or its NAME.blend1"
         ) from None
     if (newer := cast(Any, bpy.data.version)[:2]) > THIS_VERSION:
-        # Blender opens it all the same, and would leave out on saving what it does not know.
+        # Blender opens it anyway, but on saving it would drop the data that it does not know.
         raise Unreadable(
             f"this was saved by Blender {named(newer)}, and this is {named(THIS_VERSION)}: take that one or a later one"
         )
 
 
 def missing_data() -> Missing:
-    """Return what the open file wants of libraries and cannot have,
-    which Blender puts nothing but names in the place of.
-    """
+    """Return the library data that the open file lacks; Blender keeps only placeholders with their names."""
     result = Missing()
     for library in bpy.data.libraries:
         blocks = [block for block in library.users_id if block.is_missing]
@@ -97,11 +95,11 @@ def missing_data() -> Missing:
 
 
 def _reasons(blocks: list[bpy.types.ID], path: str) -> dict[bpy.types.Object, str]:
-    """Return why these objects cannot be known, of which something is among what is missing from a library."""
+    """Return the objects that depend on data missing from a library, with the reasons."""
     reasons = {block: f"it is missing from {path}" for block in blocks if isinstance(block, bpy.types.Object)}
     for obj in bpy.data.objects:
         if obj.override_library is not None and obj.override_library.reference in blocks:
-            # What is changed would not be saved as a change, without that to compare it with.
+            # Without the original to compare with, Blender would not save the changes of the override.
             reasons[obj] = f"what it overrides is missing from {path}"
     actions = [block for block in blocks if isinstance(block, bpy.types.Action)]
     if actions:
@@ -113,9 +111,7 @@ def _reasons(blocks: list[bpy.types.ID], path: str) -> dict[bpy.types.Object, st
 
 
 def only_overridden() -> set[bpy.types.Object]:
-    """Return the linked objects that are in the open file for the sake of overrides of them,
-    and are not shown themselves.
-    """
+    """Return the linked objects that the open file holds only as sources of overrides, and does not show."""
     overrides = [obj.override_library for obj in bpy.data.objects if obj.override_library is not None]
     references = (override.reference for override in overrides)
     linked = {reference for reference in references if isinstance(reference, bpy.types.Object)}
@@ -126,19 +122,20 @@ def only_overridden() -> set[bpy.types.Object]:
 
 
 def write_file(output: Path, record: InputRecord | None, opened: int | None = None) -> None:
-    """Save what is open, whole or not at all; in place of its file, which is kept as NAME.blend1, without a record.
+    """Save the open file, completely or not at all. Without a record it replaces the opened file, which is kept as
+    NAME.blend1.
 
     Parameters
     ----------
     output : Path
     record : Record, optional
     opened : int, optional
-        When the file was changed last before it was opened, in nanoseconds, where it is to be replaced.
+        When the file was last changed before it was opened, in nanoseconds, if it is to be replaced.
 
     Raises
     ------
     FileProblem
-        Where it cannot be written, or was changed meanwhile.
+        If the file cannot be written, or has been changed since.
     """
     try:
         with silenced(errors=True), record.writing(output) if record else written_beside(output) as beside:
@@ -154,5 +151,5 @@ def write_file(output: Path, record: InputRecord | None, opened: int | None = No
 
 
 def named(version: tuple[int, ...]) -> str:
-    """Return a version of Blender as people write it."""
+    """Return a version of Blender as text."""
     return ".".join(map(str, version))

@@ -1,4 +1,4 @@
-"""What `clean` does to a recording: all of its bodies, in a file like it beside it."""
+"""The `clean` command: cleans all bodies of a recording, and writes a file of the same format beside it."""
 
 from __future__ import annotations
 
@@ -23,31 +23,31 @@ from .records import FileProblem, is_made
 from .work import RunningJob
 
 SUFFIX = "-cleaned"
-"""Ending of the names of files that are written."""
+"""Name ending of written files."""
 
 MAX_WRITTEN_ROUNDING = 1e-6
-"""Of the unit of a file: how far what was written may be from what was meant, for it has so many digits."""
+"""How far written samples may be from the cleaned ones, in the unit of the file: its numbers have limited digits."""
 
 TABLES = (".csv", ".tum")
-"""What any rigid motion can become."""
+"""The table formats that any rigid motion can be written to."""
 
 
 @dataclass(frozen=True)
 class Cleaning:
-    """How far what may be moved: plain data."""
+    """Settings for cleaning: plain data."""
 
     tolerance: Tolerance | None
-    """None where anything may be moved by any length."""
+    """How far a sample may be moved; None for any distance."""
 
     radius: float | None
-    """Metres around each body or joint; None for what others take."""
+    """Radius around each body or joint, in metres; None for the default."""
 
     axes: str | None
     reading: ReadingOptions
 
 
 class CleanedBody(NamedTuple):
-    """A body that was cleaned: its samples are these rows of the trajectory with this number."""
+    """A cleaned body: its samples are rows `rows` of trajectory number `number`."""
 
     clip: Clip
     found: Cleaned
@@ -57,7 +57,7 @@ class CleanedBody(NamedTuple):
 
 
 def do_cleaning(doing: RunningJob, how: Cleaning) -> None:
-    """Clean the bodies of a recording that are meant, and write the file with them."""
+    """Clean the requested bodies of a recording, and write the file with them."""
     job = doing.job
     if job.file.stem.endswith(SUFFIX) and is_made(job.file):
         doing.leave_alone("this was cleaned before")
@@ -100,7 +100,7 @@ def _clean(doing: RunningJob, how: Cleaning, recording: Recording) -> None:
 
 
 def _write(beside: Path, recording: Recording, done: list[CleanedBody], how: Cleaning, output: Path) -> None:
-    """Write a file like the recording, or a table where that is what its name says, and see whether it reads so."""
+    """Write a file like the recording, or a table if the output is named so, and check that it reads back the same."""
     clip, found = done[0].clip, done[0].found
     if output.suffix.lower() != recording.path.suffix.lower():
         if clip.rest_body or len(done) > 1:

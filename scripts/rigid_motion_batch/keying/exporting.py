@@ -1,4 +1,4 @@
-"""What `reduce.py --glb` does to .blend and FBX files: Blender's own glTF exporter, and then only the keys needed."""
+"""Exporting .blend and FBX files for `reduce.py --glb`: Blender's glTF exporter, then a reduction of the keys."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ GLTF_ADDON = "io_scene_gltf2"
 
 
 def export_glb(path: Path) -> None:
-    """Write the open file as GLB, every animation sampled on every frame, a clip for an Action. Raises FileProblem."""
+    """Write the open file as GLB, sampled on every frame, with one clip per Action. Raises FileProblem."""
     try:
-        with enabled(path, GLTF_ADDON), _asking_extension():
+        with enabled(path, GLTF_ADDON), _listed_extension():
             run_operator(path, "export", lambda: bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB"))
     except TrajectoryError as error:
         raise FileProblem(error.problem) from None
 
 
 @contextmanager
-def _asking_extension() -> Iterator[None]:
-    """Have the exporter leave out clips of differences and of dense keys that are kept: it asks the listed add-ons."""
+def _listed_extension() -> Iterator[None]:
+    """List the extension as an add-on, so that the exporter asks it which clips to skip: differences and dense keys."""
     addons = cast(bpy.types.Preferences, bpy.context.preferences).addons
     entry = addons.new()
     entry.module = rigid_motion.__name__
@@ -48,7 +48,7 @@ def _asking_extension() -> Iterator[None]:
 
 
 def export_file(doing: RunningJob, how: Reductions) -> None:
-    """Open or import a .blend or FBX file, and write what it shows as GLB with few keys."""
+    """Open or import a .blend or FBX file, and write its animation as GLB with few keys."""
     job = doing.job
 
     def export(path: Path) -> None:
@@ -67,7 +67,7 @@ def export_file(doing: RunningJob, how: Reductions) -> None:
 
 
 def _import_fbx(path: Path) -> None:
-    """Import a file into an empty one, meshes and images with it. Raises Unreadable."""
+    """Import an FBX file, with meshes and images, into an empty file. Raises Unreadable."""
     try:
         refuse_too_large(path)
         refuse_damaged(path)

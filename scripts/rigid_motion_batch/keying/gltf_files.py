@@ -1,4 +1,4 @@
-"""What `reduce.py` does to glTF files: the same file with fewer keys in all of its clips. No Blender is needed here."""
+"""Reducing glTF files for `reduce.py`: the same file with fewer keys in all clips. No Blender is needed here."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .work import ClipNumbers, Numbers, RunningJob
 
 
 def do_gltf(doing: RunningJob, how: Reductions, export: Callable[[Path], None] | None = None) -> None:
-    """Read a file, or what `export` makes of it at a path, reduce its clips, and write it."""
+    """Read a file, or the file that `export` writes to a path, reduce its clips, and write it."""
     with doing.failing():
         doing.require_free(doing.job.output)
         reduce_gltf(doing, how, doing.job.output, export)
@@ -39,9 +39,9 @@ def reduce_gltf(
     export: Callable[[Path], None] | None = None,
     per_unit: float = 1.0,
 ) -> None:
-    """Reduce without refusals of places; raises FileProblem. A tolerance without a unit is in `per_unit` metres.
+    """Reduce without checking the output path; raises FileProblem. A tolerance without a unit is in `per_unit` metres.
 
-    What was exported is written also where nothing of it could be reduced.
+    An exported file is written even if nothing in it could be reduced.
     """
     job, outcome = doing.job, doing.outcome
     try:
@@ -53,7 +53,7 @@ def reduce_gltf(
             report = reduced(document, Options(tolerance, **own, run=run))
     except GltfError as error:
         raise Unreadable(str(error)) from None
-    except OSError as error:  # Also while it is worked on.
+    except OSError as error:  # Can also occur during the reduction.
         raise Unreadable(f"this cannot be read ({error.strerror}): see to its path, and who may read it") from None
     length = how.tolerance or as_length(report.tolerance)
     for clip in report.clips:
@@ -66,7 +66,7 @@ def reduce_gltf(
         doing.say(f"reduced before within {within}: errors add up; reduce the original instead")
     done = 0 if report.left_alone else sum(clip.tracks is not None for clip in report.clips)
     outcome.clips += done
-    _note(outcome.numbers, report)
+    _add_numbers(outcome.numbers, report)
     reason = "" if done else printable(report.left_alone)
     if reason and export is None:
         doing.leave_alone(reason)
@@ -98,23 +98,23 @@ def _write(doing: RunningJob, output: Path, document: Document, report: Report) 
         place = output.parent / name
         if place != output:
             doing.outcome.beside.append(place)
-            if _holds(place, content):
+            if _has_content(place, content):
                 continue  # Several files may share an image.
             doing.record.refuse_to_replace(place)
         with doing.record.writing(place) as beside:
             beside.write_bytes(content)
 
 
-def _holds(path: Path, content: bytes) -> bool:
-    """Return whether a file has this content already."""
+def _has_content(path: Path, content: bytes) -> bool:
+    """Return whether a file already has this content."""
     try:
         return path.read_bytes() == content
     except OSError:
         return False
 
 
-def _note(numbers: Numbers, report: Report) -> None:
-    """Add what became of a file to what is known of its input."""
+def _add_numbers(numbers: Numbers, report: Report) -> None:
+    """Add the numbers of a reduced file to those of its input."""
     numbers.size, numbers.tolerance = report.size, report.tolerance
     numbers.bytes_before = (numbers.bytes_before or 0) + report.before
     numbers.bytes_after = (numbers.bytes_after or 0) + report.after
@@ -124,7 +124,7 @@ def _note(numbers: Numbers, report: Report) -> None:
 
 
 def _joints(document: Document) -> int:
-    """Return how many joints the largest skin has."""
+    """Return the number of joints of the largest skin."""
     return max((len(skin["joints"]) for skin in objects(document.json, "skins")), default=0)
 
 
@@ -136,7 +136,7 @@ def _exported(export: Callable[[Path], None]) -> Document:
 
 
 def _summary(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: str, *, by_number: bool) -> str:
-    """Return what became of a clip."""
+    """Return a sentence on the outcome of a clip."""
     if clip.tracks is None:
         return f"stays as it was, {clip.before.keys} keys in {clip.before.size} bytes: {clip.reason}"
     before, after = clip.before, clip.after
@@ -157,12 +157,12 @@ def _summary(clip: ReducedClip, tolerance: Tolerance, per_unit: float, would: st
 
 @contextmanager
 def side_by_side(processes: int) -> Iterator[Run]:
-    """Give what is called as `map` is. Processes are started with its first call, arguments made as they are needed."""
+    """Yield a parallel `map`. Processes start with its first call, and arguments are made only as they are needed."""
     pool: ProcessPoolExecutor | None = None
 
     def run(function: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
         nonlocal pool
-        pool = pool or ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin)
+        pool = pool or ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _init_worker)
         waiting: deque[Future[Any]] = deque()
         for argument in arguments:
             waiting.append(pool.submit(function, argument))
@@ -178,7 +178,7 @@ def side_by_side(processes: int) -> Iterator[Run]:
             pool.shutdown(cancel_futures=True)
 
 
-def _begin() -> None:
-    """Leave Ctrl-C to the parent, and end with it."""
+def _init_worker() -> None:
+    """Set up a worker: ignore Ctrl-C, and end together with the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()

@@ -1,4 +1,4 @@
-"""Doing something to .blend files: to which objects and bones, where the result goes, and what is said of it."""
+"""Operations on .blend files: which objects and bones they act on, where the result goes, and what is reported."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rigid_motion_batch.keying.work import ClipNumbers, Outcome, RunningJob
 
 
 def do_blend(doing: RunningJob, action: Operation) -> None:
-    """Open a file, do what is in it, and write it. Where that fails, nothing in it counts as done."""
+    """Open a file, process its objects, and write it. If that fails, nothing in the file counts as done."""
     with doing.failing():
         _do_file(doing, action)
     if doing.outcome.failed:
@@ -74,14 +74,14 @@ def _do_objects(doing: RunningJob, action: Operation, missing: dict[bpy.types.Ob
 
 
 def _begin(doing: RunningJob, fitting: set[str]) -> None:
-    """Note which names and patterns there is something to do for."""
-    if not doing.outcome.matched:  # Only a file in which there is something to do is written.
+    """Record which names and patterns matched something to do."""
+    if not doing.outcome.matched:  # Only files with something to do are written.
         refuse_read_only(doing.job.output)
     doing.outcome.matched |= fitting
 
 
 def _do_targets(doing: RunningJob, action: Operation, targets: Sequence[Transform]) -> None:
-    """Do an object, or bones of a rig."""
+    """Act on an object, or on bones of a rig."""
     library = targets[0].animated.library
     if library is not None:
         reason = f"it is linked from {library.filepath}: use --in-place on that file, or make it local"
@@ -103,25 +103,25 @@ def _do_targets(doing: RunningJob, action: Operation, targets: Sequence[Transfor
 
 @dataclass
 class Result:
-    """What came of acting on several targets."""
+    """The outcome of acting on several targets."""
 
     done: list[Transform] = field(default_factory=list)
 
     refused: dict[Transform, str] = field(default_factory=dict)
-    """The reason why each could not be done, and the way out."""
+    """Why each of these failed, and what the user can do."""
 
     left: dict[Transform, str] = field(default_factory=dict)
-    """The reason why there was nothing to do to each after all."""
+    """Why these were left unchanged after all."""
 
     summary: str = ""
-    """Text about those that were done; begins with a comma or a semicolon."""
+    """Text about the targets that were done; begins with a comma or a semicolon."""
 
     numbers: list[ClipNumbers] = field(default_factory=list)
-    """Of their keys, where these are counted."""
+    """The numbers of their keys, if counted."""
 
     def refusals(self) -> Iterator[tuple[str, str, int]]:
-        """Yield which targets were refused, why, and how many they are:
-        all bones of a rig at once where it is the rig's.
+        """Yield the name of each refused target, the reason, and a count. All bones of a rig are one entry if they
+        share the reason.
         """
         reasons = set(self.refused.values())
         if len(reasons) == 1 < len(self.refused) and not (any(item.is_part for item in self.done) or self.left):
@@ -130,7 +130,7 @@ class Result:
             yield from ((target.name, reason, 1) for target, reason in self.refused.items())
 
     def describe_kept(self) -> str:
-        """Return which targets were left as they are, and why; of several bones the reason of one."""
+        """Return which targets were left as they are, and why; for several bones, the reason of the first."""
         (first, reason), *others = self.left.items()
         example = f", such as {first.name}" if any(other != reason for _, other in others) else ""
         left = "are left as they are" if others else "is left as it is"
@@ -139,22 +139,22 @@ class Result:
 
 @dataclass(frozen=True)
 class Operation:
-    """What is done to targets, such as baking."""
+    """An operation on targets, such as baking."""
 
     concerned: Callable[[Sequence[Transform]], list[Transform]]
-    """Returns those of several that there is something to do to, possible or not."""
+    """Returns the targets that the operation applies to, whether or not it can succeed."""
 
     act: Callable[[Sequence[Transform]], Result]
-    """Do it to several of one object, in one go."""
+    """Acts on several targets of one object together."""
 
     whole_rigs: bool = False
-    """True if the bones of a rig and its own motion are done in one go."""
+    """True if the bones of a rig and its own motion are handled together."""
 
 
 def groups_of(obj: bpy.types.Object, *, whole_rigs: bool) -> Iterator[list[Transform]]:
-    """Yield what is done in one go of an object: all bones of a rig, and with them or after them its own motion.
+    """Yield the targets of an object that are handled together: all bones of a rig, then (or with them) its own motion.
 
-    The other way round each bone would be compared with what it was in the Action of which a copy is there already.
+    In the other order, each bone would be compared with its motion in the Action that has been copied already.
     """
     bones = [transform_of(bone) for bone in obj.pose.bones] if obj.pose is not None else []
     if bones and not whole_rigs:
@@ -164,14 +164,14 @@ def groups_of(obj: bpy.types.Object, *, whole_rigs: bool) -> Iterator[list[Trans
 
 
 def matching(target: Transform, asked: Iterable[str]) -> set[str]:
-    """Return the names and patterns that a target fits. Those of a rig mean its bones too,
-    and RIG/BONE means a bone.
+    """Return the names and patterns that match a target. The name of a rig matches its bones too; RIG/BONE matches one
+    bone.
     """
     return {item for item in asked for name in {target.name, target.animated.name} if _fits(name, item)}
 
 
 def matching_missing(obj: bpy.types.Object, asked: Iterable[str]) -> set[str]:
-    """Return the names and patterns that an object fits, or may have bones for that cannot be looked at."""
+    """Return the names and patterns that match an object, or may match its bones, which cannot be read."""
     return {item for item in asked if _fits(obj.name, item) or _fits(obj.name, item.rpartition("/")[0])}
 
 
@@ -180,8 +180,8 @@ def _fits(name: str, pattern: str) -> bool:
 
 
 def title_of(targets: Sequence[Transform]) -> str:
-    """Return one target by its name, several bones by how many they are of which rig,
-    and the rig itself along with them.
+    """Return a title for targets: the name of a single one, else the rig, its number of bones, and whether its own
+    keys.
     """
     rig, bones = targets[0].animated.name, sum(target.is_part for target in targets)
     if len(targets) == 1:

@@ -1,6 +1,6 @@
-"""Recorded motions as .blend files of their own: an object or a rig with few keys, and the mode on them.
+"""New .blend files of recorded motions: an object or a rig with few keys and a mode.
 
-In metres and Blender's axes, where it was recorded; the first sample is on frame 1.
+Poses are in metres and Blender's axes, at the recorded place; the first sample is on frame 1.
 """
 
 from __future__ import annotations
@@ -23,22 +23,20 @@ from rigid_motion_batch.scenes.armature import RestFigure, Rig
 from rigid_motion_batch.silencing import silenced
 
 MIN_KEY_GAP_FRAMES = 0.01
-"""Frames between keys that Blender takes for two."""
+"""Closer keys, in frames, are one key to Blender."""
 
 ON_A_FRAME = 1e-3
-"""The distance from a whole frame within which samples are put on it."""
+"""Samples this near a whole frame, in frames, are put on it."""
 
 SINGLE_PRECISION_RATIO = float(np.finfo(np.float32).eps)
-"""By what share numbers of Blender are off."""
+"""Relative rounding error of Blender's single-precision numbers."""
 
 AXES_LENGTH_M = 0.2
-"""Metres: how large the axes are drawn that move as a rigid body did."""
+"""Display size, in metres, of the axes that stand for a rigid body."""
 
 
 def rate_of(clip: Clip) -> float:
-    """Return frames a second with a sample on every frame; of one that is not even,
-    the whole number next to its rate.
-    """
+    """Return the frame rate that puts a sample on every frame; for uneven sampling, the nearest whole rate."""
     whole = float(np.clip(round(clip.samples_a_second), *FRAME_RATE_RANGE))
     even = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0])
     return (
@@ -54,18 +52,18 @@ def _are_on_frames(clip: Clip, rate: float) -> bool:
 
 
 def frames_of(clip: Clip, rate: float) -> np.ndarray:
-    """Return on which frames the samples are, shape (n,), the first on frame 1."""
+    """Return the frames of the samples, shape (n,), beginning with frame 1."""
     frames = 1.0 + (clip.times - clip.times[0]) * rate
     return np.where(np.abs(frames - np.round(frames)) < ON_A_FRAME, np.round(frames), frames)
 
 
 def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
-    """Begin a file for a recording, and return on which frames its samples are, shape (n,).
+    """Begin an empty file for a recording, and return the frames of its samples, shape (n,).
 
     Raises
     ------
     FileProblem
-        Where Blender has no room for it: it is too long, too fast, or too far away to be within the tolerance (metres).
+        If the recording is too long, too fast, or too far from the origin to be within the tolerance (metres).
     """
     rate = fps or rate_of(clip)
     frames = frames_of(clip, rate)
@@ -89,7 +87,7 @@ def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
 
 
 def key_densely(clip: Clip, frames: np.ndarray, name: str) -> bpy.types.Object:
-    """Put axes or a rig into the open file that move as a recording did, with a key for every sample, frames (n,)."""
+    """Add axes or a rig to the open file that move as recorded, with a key for every sample, on frames (n,)."""
     if clip.rest_body is not None:
         return _rig(clip, frames, name).obj
     obj = _axes(name)
@@ -98,7 +96,7 @@ def key_densely(clip: Clip, frames: np.ndarray, name: str) -> bpy.types.Object:
 
 
 def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name: str) -> bpy.types.Object:
-    """Put axes into the open file that move as a rigid body did, with keys at these samples (k,) of all frames (n,)."""
+    """Add axes to the open file that move as a rigid body did, keyed at samples `keys` (k,) of all `frames` (n,)."""
     obj = _axes(name)
     poses = clip.in_blender(clip.poses[keys])
     animation.bake_poses(obj, frames[keys], poses, key_type="KEYFRAME")
@@ -107,12 +105,12 @@ def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name
 
 
 def key_body(clip: Clip, frames: np.ndarray, how: Reductions, name: str) -> Result:
-    """Put axes or a rig into the open file that move as a recording did, its samples on frames (n,), with few keys.
+    """Add axes or a rig with few keys to the open file that move as recorded, the samples on frames (n,).
 
     Returns
     -------
     Result
-        What became of what moves; bones that were left play straight from sample to sample.
+        What became of the moving targets. Bones left as they are keep a key for every sample.
     """
     obj = key_densely(clip, frames, name)
     keyed = [
@@ -136,7 +134,7 @@ def _axes(name: str) -> bpy.types.Object:
 
 
 def _rig(clip: Clip, frames: np.ndarray, name: str) -> Rig:
-    """Return a rig in the open file with a key for every sample of a whole body, on frames (n,)."""
+    """Return a new rig in the open file with a key for every sample of a whole body, on frames (n,)."""
     scene, rest_body = cast(bpy.types.Scene, bpy.context.scene), clip.whole_body
     rest = RestFigure.of(clip)
     rig = Rig(name, rest, rest_body.joints, scene.collection)

@@ -1,4 +1,4 @@
-"""Options that the commands have in common that key files. No Blender is needed here."""
+"""Command-line options shared by the commands that key files. No Blender is needed here."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Exit code: 0 all done, or nothing to do, 1 some objects, bones or files could no
 (the others are done), 2 a wrong option, or no file could be read, 130 stopped by Ctrl-C, and 143 by SIGTERM, within
 2 s: the files written by then are complete, nothing else was changed.
 """
-"""What the help of these commands ends with."""
+"""The last paragraph of the help of these commands."""
 
 
 def add_target_options(parser: argparse.ArgumentParser, which: str) -> None:
-    """Add --objects, which says of "all" bones which those are, and --dry-run."""
+    """Add --objects, whose help says with `which` what "all" means, and --dry-run."""
     parser.add_argument(
         "--objects",
         type=_names,
@@ -54,7 +54,7 @@ def add_file_options(parser: argparse.ArgumentParser, *, blend: bool = True) -> 
 
 
 def refuse_odd_places(options: argparse.Namespace) -> None:
-    """Raise ValueError where the options of that group do not go together."""
+    """Raise ValueError if the options for places contradict each other."""
     if options.in_place and options.output:
         raise ValueError("--in-place saves the files themselves, --output writes others: give one of them")
 

@@ -1,4 +1,4 @@
-"""Which inputs there are, and where the result of each goes: files and folders as they were named.
+"""Planning a session: the inputs found in the named files and folders, and where each result goes.
 
 No Blender is needed here.
 """
@@ -17,37 +17,37 @@ from rigid_motion_batch.recordings.reading import JSON, TEXT, split_source
 from .records import is_made
 
 ALL = ":*"
-"""Behind a recording: all of its bodies."""
+"""Suffix of a recording's path that means all of its bodies."""
 
 NAMES_OF_FILES = {".blend", ".bvh", *TEXT, *JSON, *GLTF}
-"""Endings that the name of a folder does not have."""
+"""Endings that mark a name as a file, not a folder."""
 
 
 @dataclass(frozen=True)
 class InputJob:
-    """An input to be done."""
+    """An input to process."""
 
     source: str
-    """The file as it was named, and of a recording the body, where one was."""
+    """The file as the user named it, with the body of a recording if one was named."""
 
     folder: Path
-    """The folder that the result goes to."""
+    """The folder for the result."""
 
     output: Path
-    """The file that is written, the same as the source where it is done in place; of a recording without its ending."""
+    """The file to write: the source itself if it is replaced in place; without an ending for a recording."""
 
     endings: tuple[str, ...] = ("",)
     """Endings that the output may get."""
 
     ending: str = ""
-    """The one of them that the user has named."""
+    """The ending that the user has named."""
 
     is_recording: bool = False
     is_found: bool = False
-    """True if it was found in a folder, and not named."""
+    """True if the file was found in a folder, not named by the user."""
 
     problem: str = ""
-    """The reason why it cannot be done, and the way out."""
+    """Why the input cannot be processed, and what the user can do."""
 
     @property
     def file(self) -> Path:
@@ -63,7 +63,7 @@ class InputJob:
 
 
 def file_and_body(source: str) -> tuple[Path, str | None]:
-    """Return the file of a recording, and which body of it is meant; all of it where there is no such file."""
+    """Return the file of a recording and the requested body, if any; the text as a path if there is no such file."""
     try:
         return split_source(source)
     except TrajectoryError:
@@ -73,9 +73,9 @@ def file_and_body(source: str) -> tuple[Path, str | None]:
 def results_below(
     folder: Path, endings: tuple[str, ...], made: Callable[[Path], bool], problems: list[OSError]
 ) -> Iterator[Path]:
-    """Yield the files of a folder and of those below it, but for hidden ones, results, and links that lead out.
+    """Yield the files in and below a folder, except hidden files, results, and links that lead outside.
 
-    Why folders cannot be read is added to the problems.
+    Errors of unreadable folders are added to `problems`.
     """
     root = os.path.realpath(folder)
     for place, folders, names in os.walk(folder, onerror=problems.append):
@@ -93,20 +93,19 @@ def planned(
     made: Callable[[Path], bool],
     job_of: Callable[[str, Path], InputJob],
 ) -> list[InputJob]:
-    """Return what is to be done, in the order of the inputs and of the paths in folders;
-    a file that is named twice is one.
+    """Return the jobs in the order of the inputs, sorted by path within folders; a file named twice is one job.
 
     Parameters
     ----------
     inputs : sequence of str
     output : Path, optional
-        The folder for all results, with the folders that lie in those of the inputs; beside each input otherwise.
+        The folder for all results, with the same subfolders as the inputs; None writes beside each input.
     endings : tuple of str
-        Of the files that are taken of a folder.
+        Endings of the files to take from folders.
     made : callable
-        Whether a file is a result.
+        Returns whether a file is a result.
     job_of : callable
-        Given an input and the folder of its result.
+        Returns the job for an input and the folder of its result.
     """
     jobs: dict[object, InputJob] = {}
     for given in inputs:
@@ -126,16 +125,16 @@ def planned(
             problems = {given: nothing}
         for place, problem in problems.items():
             jobs.setdefault(place, InputJob(place, Path(place), Path(place), problem=problem))
-    return list(_settled(list(jobs.values())))
+    return list(_without_conflicts(list(jobs.values())))
 
 
 def named_file(output: Path | None, inputs: Sequence[str], endings: Collection[str]) -> Path | None:
-    """Return the output where it is the name of a file, for the one input that there is; None where it is a folder.
+    """Return the output if it names a file (for a single input); None if it is a folder.
 
     Raises
     ------
     ValueError
-        Where there are several inputs, or none that becomes such a file.
+        If there are several inputs, or the input cannot become such a file.
     """
     if output is None or output.is_dir() or not (output.exists() or output.suffix.lower() in NAMES_OF_FILES):
         return None
@@ -147,7 +146,7 @@ def named_file(output: Path | None, inputs: Sequence[str], endings: Collection[s
 
 
 def place_of(path: Path) -> str:
-    """Return where a path leads to; the same for all paths that lead there."""
+    """Return the real location of a path: the same text for all paths that lead to it."""
     return os.path.normcase(os.path.realpath(path))  # Path.resolve of Python 3.11 fails where links go in circles.
 
 
@@ -155,8 +154,8 @@ def _identity(job: InputJob) -> object:
     return (place_of(job.file), file_and_body(job.source)[1]) if job.is_recording else place_of(job.file)
 
 
-def _settled(jobs: list[InputJob]) -> Iterator[InputJob]:
-    """Yield the jobs without what this program made of others; what would be written over another is a problem."""
+def _without_conflicts(jobs: list[InputJob]) -> Iterator[InputJob]:
+    """Yield the jobs except for results of other inputs; a job that would overwrite an input or result has a problem."""
     outputs = {place_of(path) for job in jobs if not job.in_place for path in _outputs(job)}
     jobs = [job for job in jobs if place_of(job.file) not in outputs or not is_made(job.file)]
     sources = {place_of(job.file) for job in jobs}
@@ -173,6 +172,6 @@ def _settled(jobs: list[InputJob]) -> Iterator[InputJob]:
 
 
 def _outputs(job: InputJob) -> list[Path]:
-    """Return the files that may be written, as far as one can say before a recording is read."""
+    """Return the files that may be written, as far as known before a recording is read."""
     some = not job.source.endswith(ALL)
     return [job.output.with_name(f"{job.output.name}{ending}") for ending in job.endings if some]

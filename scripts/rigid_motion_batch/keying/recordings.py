@@ -1,4 +1,4 @@
-"""What `reduce.py` does to recordings: the few samples that a mode needs as keys, in a table or in a .blend file.
+"""Reducing recordings for `reduce.py`: writes the few samples that a mode needs as keys to a table or .blend file.
 
 A rigid motion becomes NAME-keys.csv, in the recording's own axes and units, and on request NAME-keys.blend; a whole
 body becomes NAME-keys.blend, with a rig. With --glb either becomes NAME-reduced.glb instead.
@@ -42,17 +42,17 @@ def do_recording(doing: RunningJob, how: Reductions) -> None:
 
 
 class _Clip:
-    """A body whose keys are written."""
+    """A recorded body whose keys are written."""
 
     def __init__(self, doing: RunningJob, how: Reductions, clip: Clip, name: str) -> None:
         self.doing, self.clip, self.name = doing, clip, name
-        # Key poses are few by what is large for the body.
+        # Without a tolerance, key poses of a rig use one in proportion to the body.
         self.given, self.tolerance = how.tolerance, how.tolerance or TOLERANCE
         self.how = how if how.shared else replace(how, tolerance=self.tolerance)
         self.radius = how.radius or RIGID_RADIUS_M
 
     def do(self, output: Path) -> None:
-        """Write the keys, into files that are called as `output` and may have to end as the job says."""
+        """Write the keys to files named like `output`, with the ending that the job requires, if any."""
         clip, ending = self.clip, self.doing.job.ending
         for repair in clip.repairs:
             self.doing.say(repair)
@@ -152,7 +152,7 @@ class _Clip:
 
 
 def _names(file: Path, clips: Sequence[Clip]) -> list[str]:
-    """Return what the files of bodies of a recording are called."""
+    """Return the base names for the files of a recording's bodies."""
     if len(clips) == 1:
         return [name_of(file, clips[0].body)]
     return [f"{file.stem}-{body}" for body in folder_names(clip.name.removeprefix(f"{file.stem}-") for clip in clips)]

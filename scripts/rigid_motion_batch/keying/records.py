@@ -1,8 +1,8 @@
-"""What was made of an input, beside it: so a command that is run again goes on, and replaces nothing of others.
+"""Records of results and their inputs: a repeated command continues, and never replaces files it did not make.
 
-A folder that something was written to has a file with lines of JSON, `.rigid-motion/keyed.jsonl`: of every file its
-digest and the input that it was made of, before it is moved into place; and of every input that is done its key, which
-is that of a task, and what else was read for it. No Blender is needed here.
+Every folder with results has a file with lines of JSON, `.rigid-motion/keyed.jsonl`. Before a file is moved into place,
+its digest and its input are recorded. When an input is done, its key (that of its task) and the other files it read are
+recorded. No Blender is needed here.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ NAME = "keyed.jsonl"
 
 
 class InputRecord:
-    """What was made of an input.
+    """The record of the results made from one input.
 
     Parameters
     ----------
     folder : Path
-        Where to, or above it.
+        The folder that results go to, or one above it.
     source : path or str
-        The file, and the body where one is meant.
+        The file, and the body if the user named one.
     overwrite : bool
-        Whether files may be replaced that were not made of it, or edited since.
+        Whether to replace files that were made from another input, or edited since.
     """
 
     def __init__(self, folder: Path, source: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         self.folder, self.overwrite = folder, overwrite
         self._file = folder / OWN_FOLDER / NAME
-        self._source = _from(folder, source)
+        self._source = _relative(folder, source)
 
     def refuse_to_replace(self, path: Path) -> None:
-        """Raise `FileProblem` where there is something already that is not to be replaced."""
+        """Raise `FileProblem` if the path exists and may not be replaced."""
         if os.path.isdir(path):
             raise FileProblem(f"{path} is a folder: rename it, or give another --output")
         if os.path.lexists(path) and not self._may_replace(path):
@@ -47,15 +47,15 @@ class InputRecord:
 
     @contextmanager
     def writing(self, path: Path) -> Iterator[Path]:
-        """Yield a path for a file that takes its place at `path` when the block ends well: see `written_beside`.
+        """Yield a temporary path for a file that moves to `path` when the block succeeds: see `written_beside`.
 
-        Raises `FileProblem` where it cannot be written, or another run has put something there meanwhile.
+        Raises `FileProblem` if the file cannot be written, or another run has written `path` in the meantime.
         """
         try:
             with written_beside(path, overwrite=self._may_replace(path)) as beside:
                 yield beside
-                # Killed from here on, what was moved is known to be the program's own.
-                line = {"file": _from(self.folder, path), "sha256": sha256_of(beside), "source": self._source}
+                # Recorded before the move: even if this process is killed, the file is known to be the program's own.
+                line = {"file": _relative(self.folder, path), "sha256": sha256_of(beside), "source": self._source}
                 append_lines(self._file, [line])
         except OSError as error:
             if isinstance(error, FileExistsError) and error.filename == str(path):
@@ -66,20 +66,22 @@ class InputRecord:
     def keep(
         self, key: str, written: Sequence[Path], beside: Iterable[Path], read: Iterable[Path], facts: Mapping[str, Any]
     ) -> None:
-        """Note that the input is done: what was written, and beside that, what was read, and facts for JSON."""
+        """Record that the input is done: the files written, those that belong to them, the files read, and facts for
+        JSON.
+        """
         line = {
             "source": self._source,
             "key": key,
-            "written": [_from(self.folder, path) for path in written],
-            "files": {_from(self.folder, path): sha256_in(path) for path in (*written, *beside, *read)},
+            "written": [_relative(self.folder, path) for path in written],
+            "files": {_relative(self.folder, path): sha256_in(path) for path in (*written, *beside, *read)},
             "facts": dict(facts),
         }
         with suppress(OSError):
             append_lines(self._file, [line])
 
     def done(self, key: str) -> tuple[list[Path], Mapping[str, Any]] | None:
-        """Return the files that were made under a key, and facts; None where one, or what was read,
-        is not as it was.
+        """Return the files recorded under a key, and their facts; None if any of them, or a file that was read, has
+        changed.
         """
         with suppress(LookupError, TypeError, AttributeError):
             line = [line for line in self._lines if line.get("key") == key][-1]
@@ -88,8 +90,10 @@ class InputRecord:
         return None
 
     def _may_replace(self, path: Path) -> bool:
-        """Return whether a file may be replaced: as a rule, where it is as it was made of this input."""
-        return self.overwrite or _is_among(path, _from(self.folder, path), self._lines)
+        """Return whether a file may be replaced: always with `overwrite`, otherwise if it is this input's unchanged
+        result.
+        """
+        return self.overwrite or _is_among(path, _relative(self.folder, path), self._lines)
 
     @property
     def _lines(self) -> list[dict[str, Any]]:
@@ -97,18 +101,18 @@ class InputRecord:
 
 
 def is_made(path: Path) -> bool:
-    """Return whether a file is as this program has written it, by the record of its folder."""
+    """Return whether this program wrote the file, unchanged since, according to the record of its folder."""
     return _is_among(path, path.name, _lines_of(path.parent / OWN_FOLDER / NAME))
 
 
 def _is_among(path: Path, name: str, lines: Iterable[Mapping[str, Any]]) -> bool:
-    """Return whether a file is as lines of a record say under its name."""
+    """Return whether a file has a digest that the record has under its name."""
     digests = {line.get("sha256") for line in lines if line.get("file") == name}
     return bool(digests) and sha256_in(path) in digests
 
 
 def _lines_of(file: Path) -> Sequence[dict[str, Any]]:
-    """Return the lines of a record, read anew when it has grown."""
+    """Return the lines of a record; cached until the file changes in size."""
     try:
         return _read(file, file.stat().st_size)
     except OSError:
@@ -120,8 +124,8 @@ def _read(file: Path, _size: int) -> Sequence[dict[str, Any]]:
     return tuple(lines_of(file))
 
 
-def _from(folder: Path, path: str | os.PathLike[str]) -> str:
-    """Return a path as it counts from a folder, so that both can be moved."""
+def _relative(folder: Path, path: str | os.PathLike[str]) -> str:
+    """Return a path relative to a folder, so that both can be moved together."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:  # On another drive.
@@ -129,20 +133,20 @@ def _from(folder: Path, path: str | os.PathLike[str]) -> str:
 
 
 class FileProblem(Exception):
-    """Why a file cannot be done, and the way out."""
+    """Why a file cannot be processed, and what the user can do."""
 
 
 class Unreadable(FileProblem):
-    """Why a file cannot be opened, and the way out."""
+    """Why a file cannot be opened, and what the user can do."""
 
 
 def not_written(path: str | Path, reason: object) -> FileProblem:
-    """Return why a file was begun, and is not there."""
+    """Return the problem for a file that could not be written."""
     return FileProblem(f"{path} could not be written ({reason}): write elsewhere with --output")
 
 
 def changed_at(path: Path) -> int | None:
-    """Return when a file was changed last, in nanoseconds; None where there is none."""
+    """Return when a file was last changed, in nanoseconds; None if there is no file."""
     try:
         return path.stat().st_mtime_ns
     except OSError:
@@ -150,7 +154,7 @@ def changed_at(path: Path) -> int | None:
 
 
 def refuse_read_only(path: Path) -> None:
-    """Raise `FileProblem` where a file or its folder cannot be written: better said before hours go into it."""
+    """Raise `FileProblem` if a file or its folder is read-only, before hours of work go into it."""
     place = Path(os.path.realpath(path))
     if not os.path.exists(place):
         place = next(parent for parent in place.parents if os.path.exists(parent))

@@ -1,4 +1,4 @@
-"""What `reduce.py` does to the objects and bones of the open file: Reduce Keys to Poses, as in Blender's window."""
+"""Reducing objects and bones of the open file for `reduce.py`: Reduce Keys to Poses, as in Blender's window."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from rigid_motion_batch.keying.sessions import counted
 from rigid_motion_batch.keying.work import ClipNumbers
 
 MIN_KEYS = 2
-"""So many keys are as few as a motion has."""
+"""The fewest keys that a motion has."""
 
 
 def reducing(how: Reductions, asked: Sequence[str] | None = None) -> Operation:
-    """Return the action that makes fewer keys for what has more than two; and for what was asked for by its very name,
-    if only to say why not.
+    """Return the operation that reduces targets with more than two keys. It includes targets requested by their exact
+    names, if only to report why they cannot be reduced.
     """
 
     def concerned(targets: Sequence[Transform]) -> list[Transform]:
@@ -39,11 +39,11 @@ def reducing(how: Reductions, asked: Sequence[str] | None = None) -> Operation:
 
 
 def reduced(targets: Sequence[Transform], how: Reductions) -> Result:
-    """Leave targets of the open file the few keys that they need."""
+    """Reduce targets of the open file to the few keys that they need."""
     scene = cast(bpy.types.Scene, bpy.context.scene)
     unit = metres_per_unit(scene)
     tolerance = how.tolerance or as_length(first_tolerance(scene, targets, shared=how.shared) * unit)
-    before = list(map(_bakes, targets))
+    before = list(map(_bake_count, targets))
     refusals: list[Refused] = []
     animation.reduce_keys_of(
         targets,
@@ -54,8 +54,8 @@ def reduced(targets: Sequence[Transform], how: Reductions) -> Result:
         count=how.count,
         refused=refusals,
     )
-    done = [target for target, count in zip(targets, before, strict=True) if _bakes(target) > count]
-    # Refusals come in the order of what refused. What shares its keys with another one has fewer all the same.
+    done = [target for target, count in zip(targets, before, strict=True) if _bake_count(target) > count]
+    # Refusals come in the order of the targets. A target that shares its keys with another one is reduced anyway.
     problems = dict(zip([target for target in targets if target not in done], refusals, strict=False))
     doubt = _doubt(targets, how.tolerance, unit)
     left = {target for target, refusal in problems.items() if isinstance(refusal, NeedsItsKeys)}
@@ -77,9 +77,7 @@ def reduced(targets: Sequence[Transform], how: Reductions) -> Result:
 
 
 def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_number: bool) -> str:
-    """Return how many keys there were and are, and how far off they are;
-    lengths of the reduction are of `unit` metres.
-    """
+    """Return text on the numbers of keys and the error of a reduction, whose lengths are in units of `unit` metres."""
     rig = reduction.rig
     summary = f", {reduction.before} -> {reduction.after} keys"
     summary += f" on {counted(rig.frames, 'frame')}" if rig else ""
@@ -107,26 +105,24 @@ def _named(mode: str) -> str:
 
 
 def _doubt(targets: Sequence[Transform], tolerance: Tolerance | None, unit: float) -> str:
-    """Return what to think of where a tolerance is in metres, and a rig hardly is:
-    importers leave it in units of its own.
-    """
+    """Return a hint if a tolerance is in metres but a rig probably is not: importers keep units of their own."""
     rig = targets[0].animated
     if not targets[0].is_part or rig.pose is None:
         return ""
     return doubt(rig_size(rig) * unit, len(rig.pose.bones), tolerance, unit)
 
 
-def _bakes(target: Transform) -> int:
+def _bake_count(target: Transform) -> int:
     return len(cast(Any, target.motion).bakes)
 
 
 def _has_bones(target: Transform) -> bool:
-    """Return whether the name of an object stands for the bones of a rig."""
+    """Return whether the name of an object stands for the bones of its rig."""
     return not target.is_part and target.animated.pose is not None
 
 
 def _reason(target: Transform, refusal: Refused) -> str:
-    """Return a refusal without the name that it begins with: the target's, or that of its rig."""
+    """Return a refusal without the leading name of the target or its rig."""
     names = (f"{name}{end}" for name in (target.name, target.animated.name) for end in (": ", " "))
     begin = next((name for name in names if str(refusal).startswith(name)), "")
     return str(refusal).removeprefix(begin)

@@ -1,4 +1,4 @@
-"""Reducing keys: how few, of what and how written, and how they are spoken of. No Blender is needed here."""
+"""Settings for reducing keys, and how errors and lengths are worded. No Blender is needed here."""
 
 from __future__ import annotations
 
@@ -11,77 +11,78 @@ from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.rest_bodies import unit_of
 
 FRAME_RATE_RANGE = 1, 240
-"""Frames a second that a .blend file may be given for the rate of its recording."""
+"""The frame rates (frames per second) that a .blend file may take from its recording."""
 
 MIN_TOLERANCE_MM = 1e-6
-"""Millimetres: no tolerance is smaller."""
+"""The smallest tolerance, in millimetres."""
 
 TOLERANCE = Tolerance("5mm")
-"""The tolerance where none is given, of tables and .blend files."""
+"""The default tolerance for tables and .blend files."""
 
 SUFFIX, GLB_SUFFIX = "-keys", "-reduced"
-"""Endings of the names of files that are written, and of GLB files."""
+"""Name endings of written files, and of written GLB files."""
 
 MIN_BODY_JOINTS = 8
-"""So many joints or bones make a body, whose size says something of its unit; a prop has any size."""
+"""From this many joints or bones on, the size suggests the unit of a body; a prop can have any size."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reductions:
-    """How few keys are to be kept, of what, and how they are written: plain data."""
+    """Settings for reducing keys: how many keys to keep, and how to write them. Plain data."""
 
     mode: str
     curves: bool
-    """True for Blender's own curves in place of a mode."""
+    """True for Blender's own F-curves in place of a mode."""
 
     fewest: bool
-    """True where neither was asked for: whole bodies get what needs fewer keys."""
+    """True if neither was requested: each whole body gets whichever needs fewer keys."""
 
     tolerance: Tolerance | None
-    """The tolerance; where None, what each thing begins with in Blender's window, or `reduce.py` with recordings."""
+    """The tolerance; None for the initial value in Blender's window, or for recordings the default of `reduce.py`."""
 
     radius: float | None
-    """The radius of the shell in metres; what each object and bone measures,
-    or what `compare` takes of recordings, where None."""
+    """The radius of the shell in metres; None for the measured size of each object and bone, or for recordings the
+    radius that `compare` uses.
+    """
 
     shared: bool
     """True if all bones of a rig get keys on the same frames."""
 
     discard: bool
-    """True if the dense keys go out of the file, so that Restore Keys cannot give them back."""
+    """True if the dense keys are removed from the file, so that Restore Keys cannot bring them back."""
 
     count: int | None
-    """So many keys of each object, or key poses of each rig, instead of a tolerance."""
+    """The number of keys per object, or of key poses per rig, instead of a tolerance."""
 
     channels: str
-    """Of glTF files: which channels keep a key though they leave a node as it rests."""
+    """For glTF files: which channels keep a key even if they leave a node at rest."""
 
     feet: bool
-    """Of glTF files: True if feet that stand keep to where they stand, however large the tolerance is."""
+    """For glTF files: True if planted feet stay in place, however large the tolerance is."""
 
     meshopt: bool
-    """Of glTF files: True if they are compressed by meshopt."""
+    """For glTF files: True to compress them with meshopt."""
 
     axes: str | None
-    """Of recordings; None for those of each format."""
+    """The axes of recordings; None for the default of each format."""
 
     reading: ReadingOptions
 
     blend: bool
-    """True if rigid motions become .blend files too."""
+    """True if rigid motions are also written as .blend files."""
 
     fps: int | None
-    """Of files that are made of recordings; None for the rate of each."""
+    """The frame rate of .blend files made from recordings; None for the recorded rate."""
 
     glb: bool
-    """True if GLB files are written, and nothing else."""
+    """True if only GLB files are written."""
 
     report: bool
-    """True if a page shows what glTF files were and are."""
+    """True if a page compares glTF files before and after."""
 
 
 def name_of(file: Path, body: str | None) -> str:
-    """Return what the files of a body are called: as the recording, and where the body was named, as that too."""
+    """Return the base name for files of a body: the recording's, and the body's if it was named."""
     return "-".join([file.stem, *(folder_names([body]) if body else [])])
 
 
@@ -92,14 +93,12 @@ def as_length(metres: float) -> Tolerance:
 
 
 def as_text(metres: float) -> str:
-    """Return a length as it is spoken of."""
+    """Return a length as text for messages."""
     return as_length(metres).alike(metres, 1.0)
 
 
 def doubt(size: float, joints: int, tolerance: Tolerance | None, per_unit: float) -> str:
-    """Return what to think of where a tolerance is in metres, and a body of this size in metres hardly is;
-    mostly nothing.
-    """
+    """Return a hint if a tolerance is in metres but a body of this size probably is not; usually an empty string."""
     name, length = unit_of(size)
     if joints < MIN_BODY_JOINTS or tolerance is None or not tolerance.is_length or length == 1.0:
         return ""
@@ -108,7 +107,7 @@ def doubt(size: float, joints: int, tolerance: Tolerance | None, per_unit: float
 
 
 def off(tolerance: Tolerance, metres: float, per_unit: float, *, by_number: bool) -> str:
-    """Return how far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
+    """Return the error as text in the unit of the tolerance; a tolerance without a unit is in `per_unit` metres."""
     if by_number:
         return f", {tolerance.alike(metres, per_unit)} off at most"
     allowed = tolerance.alike(tolerance.metres(per_unit), per_unit)

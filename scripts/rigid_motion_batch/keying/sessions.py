@@ -1,8 +1,8 @@
-"""A session: inputs done one after another or side by side, each wholly or not at all, and summed up in a line.
+"""Sessions: process inputs one by one or in parallel, each completely or not at all, and sum up in one line.
 
-What an input needs is done by an executor of the pipeline, here or in a worker process. What was made of the same
-input before, by the same version and with the same options, is not made again. Ctrl-C ends a session: what was written
-by then is whole, and nothing else was touched. Where Blender does not listen, `supervising` ends it from outside.
+An executor of the pipeline processes each input, in this process or in a worker. Results that the same version made of
+the same input with the same options are not made again. Ctrl-C ends a session: files written by then are complete, and
+no other file was touched. If Blender does not react, `supervising` ends it from outside.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from .reductions import as_text
 from .work import Outcome, RunningJob, Work
 
 MAX_NAMED_FAILURES = 5
-"""The number of failed inputs that are named again at the end, where there are more inputs than that."""
+"""How many failed inputs the summary names again, if there are more inputs than that."""
 
 ROOMS = (
     "rigid_motion/animation",
@@ -45,30 +45,30 @@ ROOMS = (
     "report/reduced.py",
     "scenes/armature.py",
 )
-"""The packages that the files that are written depend on."""
+"""The packages and modules whose code determines the written files."""
 
 
 class Keyed(steps.Step, rooms=ROOMS):
-    """Do one input, wherever that is."""
+    """A pipeline step that processes one input, in whichever process it runs."""
 
     work: Work
     body: str
-    """The body that is meant of the input."""
+    """The body of the input to process."""
 
     output: str
-    """The name of what is written."""
+    """The name of the output file."""
 
     version: str
-    """The version of Blender, where it is needed."""
+    """The version of Blender, if the input needs Blender."""
 
     job: InputJob | None = None
-    """The input, which has no part in the key: the same in another place is done."""
+    """The input. It is not part of the key: the same file in another place counts as done."""
 
     def make(self, job: steps.StepJob) -> dict[str, Outcome]:
         given = cast(InputJob, self.job)
         blender: AbstractContextManager[None] = nullcontext()
         if self.work.needs_blender(given):
-            import bpy  # noqa: F401  It brings addon_utils.
+            import bpy  # noqa: F401  It makes addon_utils importable.
 
             blender = _extension()
         doing = RunningJob(self.work, given, lambda text: append_lines(job.place / "notes", [{"note": text}]))
@@ -86,19 +86,19 @@ def do_all(
     as_json: bool = False,
     page: Callable[[Sequence[Outcome]], Path] | None = None,
 ) -> int:
-    """Do all inputs, print the paths of what was written or JSON, and return the exit code.
+    """Process all inputs, print the paths of written files (or JSON), and return the exit code.
 
     Parameters
     ----------
     program : str
-        What users call it.
-    jobs : sequence of Job
+        The name of the command, for messages.
+    jobs : sequence of InputJob
     work : Work
     workers : int, optional
-        Processes; 0 for this one. One for each processor, and this one for a single input, where None.
+        Number of processes; 0 for this one only. If None, one for each processor, or this process for a single input.
     as_json : bool
     page : callable, optional
-        Writes a page on all of it, and returns its path; unless the session was stopped. Raises FileProblem.
+        Writes a report page and returns its path; not called if the session was stopped. Raises FileProblem.
     """
     stopped, unmatched = False, set()
     report(prints_paths=not as_json)
@@ -156,7 +156,7 @@ def do_all(
 
 
 class _Session:
-    """Inputs that are being done."""
+    """The state of a session: its inputs, those at work, and the outcomes so far."""
 
     def __init__(
         self, jobs: Sequence[InputJob], work: Work, executor: Executor, progress: Progress, scratch: Path
@@ -164,9 +164,9 @@ class _Session:
         self._jobs, self._work, self._executor, self._note = jobs, work, executor, progress.note
         self._scratch = scratch
         self._outcomes: dict[int, Outcome] = {}
-        """By the places of the inputs."""
+        """Outcomes by the index of the input."""
         self._at_work: dict[int, str] = {}
-        """Places of inputs to the keys of their results."""
+        """The key of the result, by the index of each input at work."""
         self._futures: dict[Future[Made], tuple[int, steps.StepJob]] = {}
 
     @property
@@ -189,7 +189,7 @@ class _Session:
         self._show(stage)
 
     def unmatched(self) -> set[str]:
-        """Return the names and patterns that were asked for, and that nothing has."""
+        """Return the requested names and patterns that matched no object or bone."""
         outcomes = self._outcomes.values()
         seen = any(not outcome.failed for outcome in outcomes)
         return set(self._work.objects or ()).difference(*(outcome.matched for outcome in outcomes)) if seen else set()
@@ -201,7 +201,7 @@ class _Session:
         report(at=", ".join(job.source for job in at_work), summary=summary)
 
     def _begin(self, place: int, job: InputJob, stage: Stage) -> None:
-        """Have an input done, unless it is done already or cannot be."""
+        """Start an input, unless it is done already or cannot be processed."""
         if job.problem:
             self._note(f"{job.source}: {job.problem}")
             self._outcomes[place] = Outcome(job.source, failed=True, unreadable=True, reason=job.problem)
@@ -223,9 +223,9 @@ class _Session:
         self._futures[self._executor.submit(request)] = place, request
 
     def _end(self, future: Future[Made], place: int, request: steps.StepJob) -> None:
-        """Take what came of an input."""
+        """Collect the outcome of an input that has ended."""
         job, key = self._jobs[place], self._at_work.pop(place)
-        for line in lines_of(request.place / "notes"):  # Also of one that was killed.
+        for line in lines_of(request.place / "notes"):  # Also the notes of a worker that was killed.
             self._note(str(line.get("note")))
         outcome = Outcome(job.source, failed=True)
         try:
@@ -244,7 +244,7 @@ class _Session:
 
 
 def _task(work: Work, job: InputJob) -> steps.Task:
-    """Return what has the key of a result: the input, these options, the version of the program and of Blender."""
+    """Return the task whose key identifies a result: input, options, version of the program and of Blender."""
     blender = ""
     if work.needs_blender(job):
         import bpy
@@ -252,14 +252,14 @@ def _task(work: Work, job: InputJob) -> steps.Task:
         blender = bpy.app.version_string
     options = replace(work, overwrite=False, dry_run=False, processes=1)
     body = job.source.removeprefix(os.fspath(job.file))
-    # An input that is to be replaced, or is no file, has no digest.
+    # An input that will be replaced, or is not a file, has no digest.
     digest = "" if job.in_place else steps.sha256_in(job.file)
     inputs = {os.fspath(job.file): digest} if digest else {}
     return steps.Task(Keyed(options, body, job.output.name, blender), job.title, inputs=inputs)
 
 
 def _executor(workers: int | None, count: int) -> Executor:
-    """Return the executor of so many inputs. Raises RunError where there cannot be that many processes."""
+    """Return the executor for `count` inputs. Raises RunError if there cannot be that many processes."""
     if workers == 0 or (workers is None and count == 1):
         return Executor()
     try:
@@ -273,7 +273,7 @@ def _executor(workers: int | None, count: int) -> Executor:
 
 
 def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted: bool) -> str:
-    """Return what came of it all, in a sentence."""
+    """Return a sentence that sums up all outcomes."""
     done = [outcome for outcome in outcomes if outcome.done]
     kinds = {kind: sum(getattr(outcome, f"{kind}s") for outcome in done) for kind in ("object", "bone", "clip")}
     what = " and ".join(counted(number, kind) for kind, number in kinds.items() if number)
@@ -298,7 +298,7 @@ def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted
 
 
 def _bytes_of(outcomes: Sequence[Outcome]) -> str:
-    """Return the bytes of all before and after, where those of all are known."""
+    """Return the total bytes before and after; nothing unless all of them are known."""
     sizes = [(outcome.numbers.bytes_before, outcome.numbers.bytes_after) for outcome in outcomes]
     if not sizes or any(None in pair for pair in sizes):
         return ""
@@ -307,7 +307,7 @@ def _bytes_of(outcomes: Sequence[Outcome]) -> str:
 
 
 def _largest_error(outcomes: Sequence[Outcome], count: int) -> str:
-    """Return how far off anything is, and where; nothing where that was not measured."""
+    """Return the largest error of all clips, and where it is; nothing if none was measured."""
     clips = [(clip, outcome) for outcome in outcomes for clip in outcome.numbers.clips if not clip.reason]
     if not clips:
         return ""
@@ -319,13 +319,13 @@ def _largest_error(outcomes: Sequence[Outcome], count: int) -> str:
 
 
 def counted(count: int, what: str) -> str:
-    """Return how many there are of something, "1 bone" or "24 bones"."""
+    """Return a count with its noun, "1 bone" or "24 bones"."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 @contextmanager
 def _extension() -> Iterator[None]:
-    """Use what the extension keeps in files and follows from this checkout, in place of one that is installed."""
+    """Register the extension's data and handlers from this checkout, in place of an installed one."""
     import addon_utils
     import bpy
 

@@ -1,8 +1,8 @@
-"""What a page shows of a reduced glTF file: where its joints are before and after, and how far it is off over time.
+"""Views of a reduced glTF file for a report page: joints before and after, and the error over time.
 
-What was written is read again, and played beside what it was made of: at keys of both, and at eighths between them. The
-error at a moment is the largest displacement, in the world, of any point that counts for the tolerance, but for what
-morph targets add. Lengths are in the unit of the document, which glTF means to be the metre.
+The written file is read again, and compared with the original at the keys of both and at eighths of the gaps between
+them. The error at a moment is the largest displacement, in the world, of any point that counts for the tolerance,
+without the offsets of morph targets. Lengths are in the unit of the document, the metre according to glTF.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ from rigid_motion_batch.report.reduced import ShownClip, clip_data
 from .reductions import MIN_BODY_JOINTS
 
 MOST_MOMENTS = 30_000
-"""At which errors are looked at; of longer clips fewer than eighths between keys."""
+"""The most moments at which errors are measured; longer clips get fewer than eight parts per gap."""
 
 MOST_JOINTS = 200
-"""That are drawn of a clip, those first that the others hang on."""
+"""The most joints that are drawn of a clip, parents first."""
 
 MAX_POSES, MAX_POSES_PER_S = 900, 60
-"""That are drawn of a clip, and how many a second at most."""
+"""The most poses that are drawn of a clip, and the most per second."""
 
 TO_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 def place_of_views(output: Path) -> Path:
-    """Return where the views of a file that is written are kept for pages."""
+    """Return the path at which the views of a written file are kept for report pages."""
     return output.parent / OWN_FOLDER / f"{output.name}.views"
 
 
 def views_of(before: Document, report: Report, radius: float | None) -> list[dict[str, Any]]:
-    """Return what a page shows of each clip that was reduced, as the data of the viewer."""
+    """Return the viewer data of each clip that was reduced."""
     after, nodes, clips = report.document.reread(), Nodes(before), read_clips(before)
     own, played, seen = Nodes(after), read_clips(after), Seen.of(nodes, clips)
     joints = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *map(np.array, joints_of(before))]))
@@ -65,7 +65,7 @@ def views_of(before: Document, report: Report, radius: float | None) -> list[dic
 
 
 def read_views(path: Path) -> list[dict[str, Any]]:
-    """Return what a page shows of a file that was written; nothing where that is no glTF file."""
+    """Return the viewer data of a written file; nothing if it is not a glTF file."""
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else []
 
 
@@ -79,19 +79,19 @@ def _key_times(*clips: Clip) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """A clip that is looked at."""
+    """A clip to compare with its reduced version."""
 
     world: World
     nodes: Nodes
-    """Those of the file that was written."""
+    """The nodes of the written file."""
 
     tracks: Tracks
-    """That move them."""
+    """The tracks that move these nodes."""
 
     joints: np.ndarray
 
     def shown(self, clip: Clip, written: Clip, made: ReducedClip) -> ShownClip:
-        """Return where joints are at moments that are drawn, and errors at all that were looked at."""
+        """Return the joint positions at the drawn moments, and the errors at all measured moments."""
         world = self.world
         parts = int(np.clip(MOST_MOMENTS // len(world.times), 1, PARTS_PER_GAP))
         times = world.parted(0, len(world.times), parts)
@@ -123,18 +123,18 @@ class _View:
         )
 
     def _errors(self, times: np.ndarray, truth: AffineMaps) -> np.ndarray:
-        """Return the largest displacement of what each node carries, shape (nodes, times)."""
+        """Return the largest displacement of the points that each node carries, shape (nodes, times)."""
         there = self.nodes.worlds(self.world.moving, self.tracks, times)
         radii = np.broadcast_to(self.world.balls[:, None], truth.origins.shape[:2])
         return ball_displacement(there, truth, radii)
 
     def _drawn(self) -> np.ndarray:
-        """Return the rows of the nodes that are drawn: the joints, or all that move where these are none."""
+        """Return the rows of the nodes to draw: the joints, or all moving nodes if there are no joints."""
         rows = np.flatnonzero(np.isin(self.world.moving, self.joints))
         return (rows if len(rows) > 1 else np.arange(len(self.world.moving)))[:MOST_JOINTS]
 
     def _parents(self, drawn: np.ndarray) -> np.ndarray:
-        """Return the place of what each of these hangs on among them, -1 without."""
+        """Return, for each drawn node, the index of its nearest drawn ancestor; -1 if there is none."""
         places, above = {row: place for place, row in enumerate(drawn.tolist())}, self.world.parents.tolist()
         result = []
         for row in drawn.tolist():
@@ -146,7 +146,7 @@ class _View:
 
 
 def _points(maps: AffineMaps, radii: np.ndarray | None) -> np.ndarray:
-    """Return origins with z up, shape (1, nodes, times, 3), and ends of axes behind them where there are radii."""
+    """Return origins with z up, shape (1, nodes, times, 3); with radii, the ends of axes follow."""
     points = [maps.origins]
     if radii is not None:
         points += [maps.origins + sign * radii[:, None, None] * maps.axes[..., k] for k in range(3) for sign in (1, -1)]
@@ -154,7 +154,7 @@ def _points(maps: AffineMaps, radii: np.ndarray | None) -> np.ndarray:
 
 
 def _with_axes(parents: np.ndarray, points: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return parents of all points, and these before and after, shape (points, times, 3)."""
+    """Return the parents of all points, and the points before and after, shape (points, times, 3)."""
     axes, count = len(points[0]) - 1, len(parents)
     parents = np.concatenate((parents, np.tile(np.arange(count), axes)))
     before, after = (some.reshape(-1, *some.shape[2:]) for some in points)

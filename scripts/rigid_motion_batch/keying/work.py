@@ -1,4 +1,4 @@
-"""What is done to inputs, an input while it is done, and what comes of it."""
+"""The work done on an input, its state while it runs, and its outcome."""
 
 from __future__ import annotations
 
@@ -24,31 +24,31 @@ Note = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Work(ABC):
-    """What is done to inputs, and how: plain data, which goes to worker processes and into the keys of results."""
+    """A kind of work and its options: plain data, passed to worker processes and included in the keys of results."""
 
     doing: ClassVar[str]
-    """As a heading: "Baking"."""
+    """The word for the heading: "Baking"."""
 
     done: ClassVar[str]
-    """The word for what becomes of objects: "baked"."""
+    """The word for finished objects: "baked"."""
 
     objects: Sequence[str] | None
-    """The names and patterns of the objects that are meant; None for all."""
+    """The names and patterns of the objects to process; None for all."""
 
     overwrite: bool
-    """True if files that were not made of an input may be replaced."""
+    """True if files that were not made from the input may be replaced."""
 
     dry_run: bool
     processes: int = field(default=1, kw_only=True)
-    """For one input, where it has parts."""
+    """Processes for one input, if it has several parts."""
 
     @classmethod
     def of(cls, options: argparse.Namespace, **own: Any) -> Self:
-        """Return what the options say, and the fields that a kind of work has of its own."""
+        """Create work from command-line options and the fields that a subclass adds."""
         return cls(options.objects, options.overwrite, options.dry_run, **own)
 
     def record_of(self, job: InputJob) -> InputRecord:
-        """Return what is known of what was made of an input."""
+        """Return the record of the results made from an input."""
         return InputRecord(job.folder, job.source, overwrite=self.overwrite)
 
     def needs_blender(self, job: InputJob) -> bool:  # noqa: ARG002 - some do
@@ -56,12 +56,12 @@ class Work(ABC):
 
     @abstractmethod
     def do(self, doing: RunningJob) -> None:
-        """Do one input, and write what comes of it."""
+        """Process one input, and write its results."""
 
 
 @dataclass(frozen=True)
 class ClipNumbers:
-    """What became of the keys of a clip, an object, a rig or a recorded body. Lengths are in metres."""
+    """The numbers of keys of a clip, an object, a rig or a recorded body. Lengths are in metres."""
 
     name: str
     keys_before: int
@@ -71,62 +71,62 @@ class ClipNumbers:
     """The place and the time of the error."""
 
     reason: str = ""
-    """Why it stays as it was."""
+    """Why it was left as it was."""
 
 
 @dataclass
 class Numbers:
-    """What is known of what was done to an input: plain data. Lengths are in metres."""
+    """Measurements of an input and its results: plain data. Lengths are in metres."""
 
     size: float | None = None
     tolerance: float | None = None
     bytes_before: int | None = None
     bytes_after: int | None = None
-    """Of whole files."""
+    """The size of whole files."""
 
     clips: list[ClipNumbers] = field(default_factory=list)
 
 
 @dataclass
 class Outcome:
-    """What became of an input."""
+    """The outcome of an input."""
 
     source: str
 
     objects: int = 0
     bones: int = 0
     clips: int = 0
-    """The number of them that were done."""
+    """The number of clips that were done."""
 
     refused: int = 0
-    """The number of objects and bones that were not."""
+    """The number of objects and bones that could not be done."""
 
     failed: bool = False
     unreadable: bool = False
     incomplete: bool = False
-    """True if there may be objects in it that cannot be looked at, for a library is missing."""
+    """True if the input may have objects that cannot be read, because a library is missing."""
 
     reason: str = ""
     """Why it failed, or was left alone."""
 
     numbers: Numbers = field(default_factory=Numbers)
     old: Mapping[str, Any] | None = None
-    """The numbers as an earlier run has noted them, where that has done the input."""
+    """The numbers recorded by an earlier run, if that has done the input."""
 
     written: list[Path] = field(default_factory=list)
     """The files that were written, or would have been."""
 
     beside: list[Path] = field(default_factory=list)
-    """Files that belong to those."""
+    """Companion files of the written files."""
 
     read: list[Path] = field(default_factory=list)
-    """The files that were read beside the input."""
+    """The other files that were read."""
 
     matched: set[str] = field(default_factory=set)
-    """The names and patterns among those requested that there was an object or a bone for."""
+    """The requested names and patterns that matched an object or a bone."""
 
     def add_written(self, path: Path) -> None:
-        """Note that a file is complete at its place."""
+        """Record that a file is complete and in place."""
         self.written.append(path)
         report(written=os.fspath(path))
 
@@ -135,26 +135,26 @@ class Outcome:
         return self.objects + self.bones + self.clips
 
     def as_data(self) -> dict[str, Any]:
-        """Return what is printed as JSON."""
+        """Return the data that is printed as JSON."""
         known = asdict(self.numbers) if self.old is None else self.old
         written = list(map(os.fspath, self.written))
         return {"source": self.source, "state": self.state, "written": written, "reason": self.reason, **known}
 
     @property
     def state(self) -> str:
-        """Return what became of it, in a word."""
+        """Return the outcome in a word or two."""
         if self.failed:
             return "failed"
         return "left alone" if not self.written else "written" if self.old is None else "already written"
 
     @property
     def is_complete(self) -> bool:
-        """Return whether something was written, and nothing is left to be done."""
+        """Return whether something was written and nothing was refused, failed or missing."""
         return bool(self.written) and not (self.failed or self.refused or self.incomplete)
 
 
 class RunningJob:
-    """An input while it is done: what is said of it, and what comes of it."""
+    """An input while it is processed: its messages and its outcome."""
 
     def __init__(self, work: Work, job: InputJob, note: Note) -> None:
         self.work, self.job, self.note = work, job, note
@@ -168,7 +168,7 @@ class RunningJob:
 
     @contextmanager
     def failing(self) -> Iterator[None]:
-        """Say why the block fails, where it does, also where that was not foreseen: others are to be done."""
+        """Report why the block fails, also for unforeseen errors, and go on: other inputs wait."""
         try:
             yield
         except FileProblem as problem:
@@ -185,7 +185,7 @@ class RunningJob:
 
     @contextmanager
     def reading(self) -> Iterator[None]:
-        """Say why the block cannot read a recording, where it cannot; what was found in a folder may hold no motion."""
+        """Report why the block cannot read a recording; a file found in a folder may hold no motion."""
         try:
             yield
         except TrajectoryError as error:
@@ -197,17 +197,17 @@ class RunningJob:
             self.note(str(error))
 
     def leave_alone(self, reason: str) -> None:
-        """Say that nothing is written, and why."""
+        """Report that nothing is written, and why."""
         self.outcome.reason = reason
         self.say(f"{reason}; left alone, nothing is written")
 
     def refuse(self, name: str, reason: str, count: int = 1) -> None:
-        """Say that so many objects or bones are not done, and why."""
+        """Report that `count` objects or bones are not done, and why."""
         self.outcome.refused += count
         self.say(f"{name}: not {self.work.done}: {reason}")
 
     def require_free(self, path: Path) -> None:
-        """Raise FileProblem where a file must not or cannot be written: better said before hours go into it."""
+        """Raise FileProblem if a file may not or cannot be written, before hours of work go into it."""
         self.record.refuse_to_replace(path)
         refuse_read_only(path)
 

@@ -1,9 +1,9 @@
-"""Streaming: `rigid_motion.streams` over a transport, and what it costs.
+"""Streaming motion over a transport with `rigid_motion.streams`, and measuring its cost.
 
-rooms       who is where, by Zenoh
-sending     recordings into a room
-receiving   what a room shows, and what is handed on to Blender
-measuring   a recording sent to another process, what was shown there, and what even streams of joints cost
-vmc         performers of other programs, in and out
-written     what was shown, as CSV, BVH or TUM
+rooms       knows who is in a room, by Zenoh
+sending     sends recordings into a room
+receiving   shows the streams of a room, and forwards them to Blender
+measuring   sends a recording to another process, and measures bytes and errors
+vmc         exchanges performers with other programs
+written     writes received motion as CSV or BVH
 """

@@ -1,12 +1,12 @@
-"""What a stream costs: a recording sent over loopback, and what a receiver in another process shows of it.
+"""Measuring a stream's cost: bytes and errors of a recording sent over loopback to a receiver in another process.
 
-The receiver has a socket, and knows nothing of the recording but when its display draws: once for every sample, a delay
-after it. Both processes go by the clock of the recording, which stands still while they work: what is measured does not
-depend on how busy the machine is.
+The receiver knows nothing of the recording except when its display draws: once for every sample, one delay after it.
+Both processes use the clock of the recording, which stands still while they work, so a busy machine does not change the
+results.
 
-Errors are the largest displacement of any point of the joints' balls, at the moments that are shown; bytes a second are
-those of the motion, without what joining takes. A slip is how far any point of a held body's ball is from its mean
-place in what holds it, as in `analysis.held`.
+Errors are the largest displacement of any point of the joints' balls, at the moments shown. Bytes per second count the
+motion without the bytes for joining. Slip is the distance of any point of a held body's ball from its mean place in its
+holder, as in `analysis.held`.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ HEADER_BYTES = 28
 """Bytes of UDP and IPv4 in front of every datagram."""
 
 PATIENCE_S = 30.0
-"""Seconds in which the other process has to answer."""
+"""How long to wait for the other process, in seconds."""
 
 ARRIVAL = Struct("<d")
-"""In front of every datagram: by the clock of the recording."""
+"""The header of every datagram: its arrival time by the clock of the recording."""
 
 
 def measure(
@@ -53,17 +53,17 @@ def measure(
     seed: int = 1,
     held: Sequence[tuple[str, Hand]] = (),
 ) -> tuple[dict[str, float], KnotPath]:
-    """Send samples (n,) of poses (joints, n) of all bodies, and return what it costs and what is shown (joints,).
+    """Send samples (n,) of poses (joints, n) of all bodies, and return the cost and the motion shown (joints,).
 
-    Datagrams take no time, and a part of them never arrives, in both directions. `joining_bytes`, with headers, are
-    those of descriptions: names, parents and rest poses. `answers_a_second` are bytes with headers, too.
+    Datagrams arrive at once, and a fraction `loss` of them is lost, in both directions. `joining_bytes`, with headers,
+    are the bytes of descriptions: names, parents and rest poses. `answers_a_second` also counts bytes with headers.
 
     Raises
     ------
     OSError
-        Where there is no loopback.
+        If there is no loopback.
     RuntimeError
-        Where the other process ended.
+        If the other process ended.
     """
     sender, random = Sender(bodies, tolerance, delay, even_rate(times)), np.random.default_rng(seed)
     for tool, hand in held:
@@ -126,12 +126,12 @@ def measure_held(
     tool: str,
     hand: Hand,
 ) -> dict[str, dict[str, float]]:
-    """Return what a tool and the body that holds it cost, and how far the tool slips, for each way to send them; the
-    same arguments as those of `measure`. Last is the cost of the holding body alone, as exact at the tool.
+    """Return the cost of a tool and its holder, and how far the tool slips, for each way to send them. The arguments
+    are those of `measure`. The last entry is the cost of the holder alone, as exact at the tool.
 
-    Raises ValueError where there are no such bodies.
+    Raises ValueError if there are no such bodies.
     """
-    Sender(bodies).hold(tool, *hand)  # or it says what is wrong
+    Sender(bodies).hold(tool, *hand)  # Raises ValueError if they do not fit.
     forest = Forest(bodies)
     pair = [bodies[forest.body(name)] for name in (hand[0], tool)]
     forest, poses = Forest(pair), joined([forest.parted(poses)[body.name] for body in pair])
@@ -139,7 +139,7 @@ def measure_held(
     radius = float(forest.radii[root])
 
     def place(shown: Poses) -> Poses:
-        """Where the tool is in the hand (n,), of poses (joints, n)."""
+        """Return the tool's pose in the hand (n,), from poses (joints, n)."""
         there = forest.skeleton.in_root_space(shown)
         return seen_from(there[joint], there[root])
 
@@ -174,7 +174,7 @@ def measure_held(
 
 
 def cost(size: float, headers: float, off: np.ndarray) -> dict[str, float]:
-    """Return what is said of any way to send, of bytes a second, those of headers, and errors (n,) in metres."""
+    """Return the reported numbers, from bytes per second, header bytes per second, and errors (n,) in metres."""
     return {
         "bytes_a_second": size,
         "bytes_a_second_with_headers": size + headers,
@@ -190,8 +190,8 @@ def _received(port: Port) -> tuple[bytes, Address]:
 
 
 def _receive(to: int, times: np.ndarray, delay: float, names: Sequence[str]) -> list[tuple[float, Poses]]:
-    """Show what comes from a port a delay behind each sample, answer, and return the moments and poses (joints,) of
-    bodies with these names.
+    """Show the motion received from a port one delay after each sample, send answers, and return the moments and poses
+    (joints,) of the named bodies.
     """
     receiver, frames, draws = Receiver(), list[tuple[float, Poses]](), (times + delay).tolist()
     with Outlet(LOOPBACK, to) as outlet:
@@ -200,7 +200,7 @@ def _receive(to: int, times: np.ndarray, delay: float, names: Sequence[str]) -> 
             data, _ = outlet.received(PATIENCE_S)[0]
             (arrival,) = ARRIVAL.unpack_from(data)
             while draws and draws[0] <= arrival:
-                # Nothing where the motion of that moment was over when the first datagram came.
+                # Nothing is shown if the motion of that moment was over when the first datagram came.
                 for shown in receiver.show(draws.pop(0)).values():
                     frames.append((shown.moment, joined([shown.poses[name] for name in names])))
             receiver.take(data[ARRIVAL.size :], arrival, to)

@@ -1,4 +1,4 @@
-"""Receiving what a room sends: what a display would have shown at every frame, and the keys that came."""
+"""Receiving the streams of a room: the poses that a display would show at every frame, and the received keys."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from rigid_motion.streams.receiver import MOST_STREAMS
 from .rooms import ANSWERS, Came, Room
 
 ANSWERS_A_SECOND = 100.0
-"""To all streams together."""
+"""The most answers per second, to all streams together."""
 
 LINGER_S = 0.3
-"""Seconds without a sender, once all that came has been shown, that are the end: another sender may follow."""
+"""How long, in seconds, to wait for another sender after all have left and everything has been shown."""
 
 
 class Receiving:
-    """A receiver in a room, which is a user there.
+    """A receiver in a room, itself a user there.
 
-    It shows so many frames a second, and waits `margin` seconds longer for each datagram. All of them go to an address
-    by UDP as well, if one is given, from a port for each user, and its answers go back to them. It shows things steady
-    where asked to.
+    It shows `fps` frames per second, and delays each datagram by `margin` seconds. If an address `to` is given, it also
+    forwards all datagrams there by UDP, from one port for each user, and returns the answers. With `steady` it reduces
+    jitter.
     """
 
     def __init__(
@@ -35,18 +35,18 @@ class Receiving:
         self._room, self._fps, self._margin, self._to = room, fps, margin, to
         self.receiver = Receiver(steady=steady)
         self.datagrams, self.bytes = Counter[str](), Counter[str]()
-        """Counts for each user."""
+        """Counts by user."""
         self.on_frame: list[Callable[[Iterable[Shown]], None]] = []
-        """Called with what each frame shows."""
+        """Called with the poses of each frame."""
         self._outlets: dict[str, Outlet] = {}
         self._heard: dict[str, float] = {}
-        """The moments when users who are sending were heard last."""
+        """When each sending user was last heard."""
         self._last = self._answer_at = -math.inf
-        """When something came last, and when the next answers are due."""
+        """When the last datagram came, and when the next answers are due."""
         room.listen(user)
 
     def listen_until(self, until: float, stopped: Sequence[int]) -> None:
-        """Show what comes until a moment of `time.monotonic`, or until all who sent have gone."""
+        """Show received motion until a moment of `time.monotonic`, or until all senders have left."""
         began, frame = time.monotonic(), 0
         while not stopped and (now := time.monotonic()) < until:
             if self._last > -math.inf and not self._heard and now - self._last > LINGER_S + self._margin:

@@ -1,8 +1,8 @@
-"""Rooms, which Zenoh runs: who is there, and what they say.
+"""Rooms over Zenoh: users join, send datagrams, and listen to each other.
 
-Keys are ROOM/USER/STREAM. A sender says its `motion`, best effort and at once, and its `skeleton`, which is sure to
-arrive; others say `answers` to it. Whoever listens has a token ROOM/USER/listening/ID, by which senders know that
-somebody came. Everything stays on loopback, and nobody is looked for, unless more is asked for.
+Keys are ROOM/USER/STREAM. A sender publishes its `motion` (best effort, sent at once) and its `skeleton` (reliable);
+receivers publish `answers` to it. Every listener has a token ROOM/USER/listening/ID, which tells senders that it has
+come. Everything stays on loopback without discovery, unless the user asks for more.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import zenoh
 
 LOOPBACK_ADDRESS, ANY_ADDRESS, ROUTER_PORT = "127.0.0.1", "0.0.0.0", 7447
-"""The port is Zenoh's own."""
+"""The port is Zenoh's default."""
 
 MOTION, SKELETON, ANSWERS, LISTENING = "motion", "skeleton", "answers", "listening"
 
@@ -30,29 +30,32 @@ USER = re.compile(r"[\w.-]+")
 ROOM = re.compile(r"[\w.-]+(/[\w.-]+)*")
 
 WAIT_MS, MOST_WAITING = 4000, 4096
-"""Milliseconds for which a router that cannot be reached is tried; and datagrams that wait to be looked at: others are
-dropped, as a network does."""
+"""How long, in milliseconds, to try an unreachable router; and how many datagrams may wait in the queue (others are
+dropped, as by a network).
+"""
 
 LIMITS = {
     "connect/retry": {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5},
     "transport/link/rx/max_message_size": 1 << 16,
-    # So many may be on the way out at once before some are dropped: in a room of many each datagram is one.
+    # How many may be on the way out before some are dropped: in a full room each datagram counts as one.
     "transport/link/tx/queue/size/data": 16,
 }
-"""Of Zenoh: the pauses between attempts to connect, and bytes of what is taken from others at once."""
+"""Zenoh's settings: pauses between attempts to connect, largest incoming message in bytes, and outgoing queue."""
 
 
 class Came(NamedTuple):
-    """What came."""
+    """A datagram received from a room, or the end of a stream."""
 
     user: str
     stream: str
     datagram: bytes | None
-    """None where somebody has gone."""
+    """None if the user has left."""
 
 
 def locator(address: str) -> str:
-    """Return HOST, HOST:PORT or [IPV6]:PORT as Zenoh writes it; its own, such as tls/HOST:PORT, stay as they are."""
+    """Return HOST, HOST:PORT or [IPV6]:PORT in Zenoh's form; Zenoh's own locators, such as tls/HOST:PORT, are
+    unchanged.
+    """
     if "/" in address:
         return address
     has_port = re.fullmatch(r"(\[[^]]*\]|[^:]*):\d+", address)
@@ -60,14 +63,14 @@ def locator(address: str) -> str:
 
 
 def is_local(address: str) -> bool:
-    """Return whether an address, as a locator or HOST:PORT, is of this machine alone."""
+    """Return whether an address (a locator or HOST:PORT) is on this machine only."""
     return is_loopback(re.sub(r"^\w+/|[?#].*$|:\d+([?#].*)?$", "", address).strip("[]"))
 
 
 def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
-    """Return what is set of Zenoh's configuration, by its keys.
+    """Return settings for Zenoh's configuration, by key.
 
-    On loopback whoever comes first keeps the port, and brings the others together. Elsewhere a router is expected.
+    On loopback the first process takes the port and connects the others. Elsewhere a router is expected.
     """
     everywhere = ANY_ADDRESS if network else LOOPBACK_ADDRESS
     place = locator(at or (everywhere if role == "router" else LOOPBACK_ADDRESS))
@@ -82,12 +85,12 @@ def settings(role: str, at: str | None, network: bool) -> dict[str, Any]:
 
 
 def opened(role: str, at: str | None = None, network: bool = False, config: Path | None = None) -> zenoh.Session:
-    """Return a session as a `peer` or a `router`. A file of Zenoh's configuration says what is not said here.
+    """Open a session as a `peer` or a `router`. A file of Zenoh's configuration supplies all other settings.
 
     Raises
     ------
     ValueError
-        Without Zenoh, for a file that it cannot read, and where no one can be reached.
+        If Zenoh is missing, cannot read the file, or cannot reach anyone.
     """
     try:
         import zenoh
@@ -121,13 +124,13 @@ def _first_line(error: Exception) -> str:
 
 
 class Room:
-    """One room of a session, as a context that closes it. What comes waits until it is looked at."""
+    """One room of a session; as a context manager it closes the session. Received datagrams wait in a queue."""
 
     def __init__(self, session: zenoh.Session, name: str) -> None:
         self.name, self._session = name, session
         self._came: queue.Queue[Came] = queue.Queue(MOST_WAITING)
         self._declared: dict[str, Any] = {}
-        """Zenoh's publishers by their keys, and what it would let go otherwise."""
+        """Zenoh's publishers by key, and other declarations that Zenoh would drop without a reference."""
 
     def __enter__(self) -> Self:
         return self
@@ -136,14 +139,14 @@ class Room:
         self._session.close()
 
     def listen(self, user: str) -> None:
-        """Take what everybody sends from now on, and let senders know that a user listens."""
+        """Receive all senders from now on, and tell them that this user listens."""
         for stream in (SKELETON, MOTION):
             self._subscribe(self._session, f"*/{stream}")
         key = f"{self.name}/{user}/{LISTENING}/{self._session.zid()}"
         self._declared[key] = self._session.liveliness().declare_token(key)
 
     def speak(self, user: str) -> None:
-        """Take the answers to a user, and whoever begins to listen, or does already."""
+        """Receive the answers to a user, and notices of present and future listeners."""
         self._subscribe(self._session, f"{user}/{ANSWERS}")
         self._subscribe(self._session.liveliness(), f"*/{LISTENING}/*", history=True)
 
@@ -151,7 +154,7 @@ class Room:
         self._declared[f"take {keys}"] = to.declare_subscriber(f"{self.name}/{keys}", self._take, **options)
 
     def send(self, user: str, stream: str, datagram: bytes | None) -> None:
-        """Say something as a user, or answers to one; None where the stream is over."""
+        """Send a datagram as a user, or an answer to one; None ends the stream."""
         import zenoh
 
         key, is_sure = f"{self.name}/{user}/{stream}", stream == SKELETON
@@ -168,7 +171,9 @@ class Room:
             self._declared[key].put(datagram)
 
     def come(self, seconds: float) -> list[Came]:
-        """Return what came since the last call or, where that is nothing, the first thing within so many seconds."""
+        """Return everything received since the last call; if that is nothing, wait up to `seconds` for the first
+        datagram.
+        """
         result = []
         with suppress(queue.Empty):
             result.append(self._came.get(seconds > 0.0, max(seconds, 0.0)))
@@ -177,7 +182,7 @@ class Room:
         return result
 
     def _take(self, sample: zenoh.Sample) -> None:
-        """Take what came: called by Zenoh, in a thread of its own."""
+        """Queue a received sample; called by Zenoh in its own thread."""
         user, stream, *_ = str(sample.key_expr).removeprefix(f"{self.name}/").split("/")
         datagram = None if str(sample.kind) == "SampleKind.DELETE" else sample.payload.to_bytes()
         if datagram is None or len(datagram) <= MAX_BYTES:

@@ -1,4 +1,4 @@
-"""Sending recordings and performers: all bodies by one sender, in real time."""
+"""Sending recordings and performers in real time: one sender for all bodies."""
 
 from __future__ import annotations
 
@@ -23,20 +23,21 @@ from rigid_motion_batch.recordings.rest_bodies import TYPICAL_HEIGHT_M, ZERO_SIZ
 from .rooms import ANSWERS, LISTENING, MOTION, SKELETON, Room
 
 MIN_SLIDE_M = 1e-4
-"""Metres by which a joint has to change its place in its parent's space to be sent with it."""
+"""How far, in metres, a joint must move in its parent's space for its position to be sent."""
 
 Hand = tuple[str, str | None]
-"""A body that holds another, and its joint that does; None where it has a single root."""
+"""A holder: a body and the joint that holds; the joint is None for a body with a single root."""
 
 LOOK_S, REPEAT_S, STAY_AFTER_S = 0.02, 0.03, 0.3
-"""Seconds after which a loop looks up, whatever comes or does not; after which the description is sent again, for many
-may ask for it at once; and for which a sender stays behind the end, beside the delay: what was lost is asked for."""
+"""In seconds: the longest wait of a loop; the pause before the description is sent again, since many receivers may ask
+at once; and how long a sender stays after the end (plus the delay), to answer requests for lost datagrams.
+"""
 
 
 def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
-    """Return the moments (n,) of a clip and its poses (joints, n), in metres and Blender's axes.
+    """Return the times (n,) of a clip and its poses (joints, n), in metres and Blender's axes.
 
-    Of a file whose keys are not at its frames those are what it shows at its frames.
+    If the keys of a file are not on its frames, the samples are its poses on the frames.
     """
     poses = clip.in_blender(clip.poses)
     times, poses = clip.times, poses if len(poses.shape) == 2 else poses[None]
@@ -49,7 +50,7 @@ def samples_of(clip: Clip) -> tuple[np.ndarray, Poses]:
 def radii_of(clip: Clip) -> np.ndarray:
     """Return the radii in metres of the balls at the joints of a whole body, shape (joints,).
 
-    They are those of a grown-up in proportion to the figure, and reach to the ends of bones that the file has.
+    They are an adult's in proportion to the figure, enlarged to the ends of bones that the file has.
     """
     figure, ends = clip.whole_body, clip.whole_body.ends
     size = size_of(figure.parents, figure.rest.positions)
@@ -58,9 +59,9 @@ def radii_of(clip: Clip) -> np.ndarray:
 
 
 def body_of(clip: Clip, poses: Poses, radius: float | None = None) -> StreamBody:
-    """Return what is streamed of a clip, with its own radii if none is given.
+    """Return the stream body of a clip, with the clip's own radii if none is given.
 
-    A rigid body is at rest as in its first sample.
+    The rest pose of a rigid body is its first sample.
     """
     if clip.rest_body is None:
         return StreamBody.rigid(clip.name, poses[:, 0], radius or DEFAULT_RADIUS_M)
@@ -75,10 +76,10 @@ def body_of(clip: Clip, poses: Poses, radius: float | None = None) -> StreamBody
 def together(
     clips: Sequence[Clip], rate: float | None = None, radius: float | None = None
 ) -> tuple[list[StreamBody], np.ndarray, Poses]:
-    """Return the bodies of clips that begin together, their moments (n,), and the poses (joints, n) of all.
+    """Return the bodies of clips that begin together, their times (n,), and the poses (joints, n) of all.
 
-    The moments are those of the first clip where all have the same or it is alone, or else even ones: so many a second,
-    or as many as the fastest has. A clip that is over stays as it is.
+    The times are those of the first clip if all clips share them or it is alone. Otherwise they are evenly spaced, at
+    `rate` or the highest rate of the clips. A clip that has ended keeps its last pose.
     """
     samples = [samples_of(clip) for clip in clips]
     bodies = [body_of(clip, poses, radius) for clip, (_, poses) in zip(clips, samples, strict=True)]
@@ -94,36 +95,36 @@ def together(
 
 
 def hand_of(text: str) -> Hand:
-    """Return what BODY or BODY:JOINT means."""
+    """Parse BODY or BODY:JOINT."""
     body, _, joint = text.partition(":")
     return body, joint or None
 
 
 def found_held(clips: Sequence[Clip]) -> list[tuple[str, Hand]]:
-    """Return which rigid bodies of recordings are held by others all the time, as is found in them."""
+    """Return the rigid bodies that others hold during the whole recording, with their holders, as detected."""
     rigid = [clip for clip in clips if clip.rest_body is None]
     return [(rigid[held].name, (rigid[holder].name, None)) for holder, held in find_held(rigid, DEFAULT_RADIUS_M)]
 
 
 def even_rate(times: np.ndarray) -> float | None:
-    """Return samples a second, where they are even."""
+    """Return the sampling rate in samples per second; None if it is no whole number."""
     rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else 0.5
     return float(round(rate)) if abs(rate - round(rate)) < 0.01 else None
 
 
 class RoomSending:
-    """A sender in a room, under the name of a user."""
+    """A sender in a room, under a user's name."""
 
     def __init__(self, room: Room, user: str, sender: Sender, ahead: float = 0.0) -> None:
         self.room, self.user, self.sender, self.ahead = room, user, sender, ahead
-        """`ahead` by so many seconds is the clock of the motion."""
+        """`ahead`: how many seconds the clock of the motion is ahead of `time.monotonic`."""
         self.datagrams = self.bytes = self.joined = 0
         self._described = -math.inf
         room.speak(user)
 
     @property
     def now(self) -> float:
-        """The time of the motion."""
+        """The current time of the motion, in seconds."""
         return time.monotonic() + self.ahead
 
     def say(self, datagrams: Iterable[bytes]) -> None:
@@ -135,7 +136,7 @@ class RoomSending:
             self.bytes += len(datagram)
 
     def answer(self, seconds: float) -> None:
-        """Deal with answers, and with receivers that join, for which it waits so long."""
+        """Wait this long for answers and joining receivers, and respond to them."""
         for came in self.room.come(seconds):
             said = []
             if came.stream == LISTENING and came.datagram is not None:
@@ -148,7 +149,7 @@ class RoomSending:
                 self.say(said)
 
     def until(self, moment: float, stopped: Sequence[int]) -> None:
-        """Wait for a moment of the motion, and meanwhile answer and say what is due without a sample."""
+        """Wait until a moment of the motion; until then, answer receivers and send datagrams due without a sample."""
         while not stopped and (now := self.now) < moment:
             self.answer(min(moment - now, max(self.sender.next - now, 0.0), LOOK_S))
             if self.sender.next <= (now := self.now) < moment:
@@ -162,7 +163,7 @@ class RoomSending:
         stopped: Sequence[int],
         reach: Callable[[float], None] = lambda _: None,
     ) -> float:
-        """Send samples (n,) of poses (joints, n) when they are due, and return the seconds that were sent."""
+        """Send samples (n,) of poses (joints, n) when they are due, and return how many seconds were sent."""
         first, last = float(moments[0]), float(moments[-1])
         self.ahead = first - time.monotonic()
         for sample, moment in enumerate(moments.tolist()):

@@ -1,4 +1,4 @@
-"""VMC for commands: recordings and streams as performers of other programs, and performers as streams."""
+"""VMC for commands: plays recordings and streams to other programs as performers, and reads performers from them."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from rigid_motion.streams import ReceivedKeys, Receiver, StreamBody
 from rigid_motion.streams.vmc import Performer, write, write_trackers
 
 MAX_FRAMES_PER_S = 90.0
-"""Frames a second at most: programs draw no faster."""
+"""The most frames per second: programs draw no faster."""
 
 
 @lru_cache(maxsize=16)
 def performer_of(body: StreamBody) -> Performer | None:
-    """Return what a skeleton is to VMC; None where it is no person."""
+    """Return the VMC performer of a skeleton; None if it is not a person."""
     performer = Performer(body.joints, body.in_root_space(body.rest))
     return performer if "Hips" in performer.bones else None
 
 
 class ToVmc(Outlet):
-    """Another program, which is shown bodies: the first skeleton of a person as its performer, for VMC has one to a
-    port, and all rigid bodies as trackers. Raises OSError where there is no such address.
+    """An outlet that shows bodies to another program: the first skeleton of a person as its performer, because VMC has
+    one per port, and all rigid bodies as trackers. Raises OSError if the address does not exist.
     """
 
     def __init__(self, to: Address) -> None:
@@ -35,7 +35,7 @@ class ToVmc(Outlet):
         self._began = time.monotonic()
 
     def show(self, bodies: Iterable[tuple[StreamBody, Poses]], moment: float | None = None) -> None:
-        """Show bodies at poses (joints,), each joint in its parent's space, at a moment, or else now."""
+        """Show bodies at poses (joints,), each joint in its parent's space, at a moment; None means now."""
         trackers, datagrams = {}, list[bytes]()
         moment = time.monotonic() - self._began if moment is None else moment
         for body, poses in bodies:
@@ -56,10 +56,10 @@ def play(
     stopped: Sequence[int] = (),
     reach: Callable[[float], None] = lambda _: None,
 ) -> int:
-    """Play samples (n,) of a body's poses (joints, n) in real time, and return how many datagrams were sent.
+    """Play samples (n,) of a body's poses (joints, n) in real time, and return the number of datagrams sent.
 
-    `stopped` ends it as soon as something is in it; `reach` is given the seconds that were played.
-    Raises OSError where `to` is no address, and ValueError where no bone of a body is a person's.
+    Playing ends as soon as `stopped` has an item; `reach` is called with the seconds played. Raises OSError if `to` is
+    not an address, and ValueError if no bone of a body is a person's.
     """
     with ToVmc(to) as outlet:
         if len(body.joints) > 1 and not performer_of(body):
@@ -76,8 +76,8 @@ def play(
 
 
 def performed(port: Port, receiver: Receiver) -> list[ReceivedKeys]:
-    """Return what another program performed to a port since the last call. Of several that is the first, until it has
-    gone. Bodies are others as soon as bones or devices come that are new.
+    """Return the keys that another program sent to a port since the last call. Of several programs only the first
+    counts, until it has left. New bones or devices make new bodies.
     """
     now = time.monotonic()
     for datagram, source in port.received():

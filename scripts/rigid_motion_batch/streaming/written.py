@@ -1,4 +1,4 @@
-"""What was shown as files: CSV and BVH."""
+"""Writing received motion to CSV and BVH files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rigid_motion_batch.recordings.rest_bodies import RestBody
 
 
 class ReceivedMotion(NamedTuple):
-    """What was shown of a body: moments (n,), and poses (joints, n), each joint in its parent's space."""
+    """The motion shown of a body: moments (n,), and poses (joints, n), each joint in its parent's space."""
 
     name: str
     body: StreamBody
@@ -28,13 +28,13 @@ class ReceivedMotion(NamedTuple):
     poses: Poses
 
     def even(self, mode: str, fps: float) -> ReceivedMotion:
-        """Return so many poses a second instead, with the in-betweens of a mode."""
+        """Return the motion resampled at `fps` poses per second, with the in-betweens of a mode."""
         times = self.times[0] + np.arange(int((self.times[-1] - self.times[0]) * fps + 1e-6) + 1) / fps
         return self._replace(times=times, poses=interpolate(self.times, self.poses, times, mode))
 
 
 class Tracks(dict[tuple[str, StreamBody], list[tuple[np.ndarray, Poses]]]):
-    """What was shown of all bodies of all users, or their keys, piece by piece."""
+    """The shown poses or received keys of all bodies of all users, piece by piece."""
 
     def add_shown(self, shown: Iterable[Shown]) -> None:
         """Add a frame."""
@@ -49,7 +49,7 @@ class Tracks(dict[tuple[str, StreamBody], list[tuple[np.ndarray, Poses]]]):
                 self.setdefault((str(keys.stream.source), body), []).append((keys.moments, keys.poses[body.name]))
 
     def motions(self) -> list[ReceivedMotion]:
-        """Return those of which there is more than a pose, at moments that rise."""
+        """Return the motions with at least two poses, at increasing moments."""
         result = []
         for (user, body), pieces in self.items():
             times = np.concatenate([moments for moments, _ in pieces])
@@ -61,9 +61,9 @@ class Tracks(dict[tuple[str, StreamBody], list[tuple[np.ndarray, Poses]]]):
 
 
 def write_motions(path: Path, motions: Sequence[ReceivedMotion], fps: float) -> list[Path]:
-    """Write a table of all, `.csv`, or a `.bvh` for each, and return what was written.
+    """Write one `.csv` table of all motions, or a `.bvh` file for each, and return the written paths.
 
-    In tables joints are where they are in the world. BVH is y up, as it is elsewhere.
+    Tables hold joints in world space. BVH is y up, as usual.
     """
     if path.suffix.lower() == ".csv":
         with replacing(path) as file:
@@ -73,7 +73,7 @@ def write_motions(path: Path, motions: Sequence[ReceivedMotion], fps: float) -> 
     paths = [path.with_name(f"{name}.bvh") for name in names]
     for place, motion in zip(paths, motions, strict=True):
         body, even = motion.body, motion.even("lerp_slerp", fps)
-        # A bone ends as far behind its joint as that is behind its parent.
+        # A bone's end has the same offset from its joint as the joint from its parent.
         rest_body = RestBody(body.joints, body.parents, body.rest, from_blender(body.rest, "opengl").positions)
         with replacing(place) as file:
             write_bvh(file, rest_body, cast(np.ndarray, body.sliding), even.times, from_blender(even.poses, "opengl"))
