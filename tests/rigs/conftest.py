@@ -1,4 +1,4 @@
-"""The human of Rigify, edits followed."""
+"""A fixture with Rigify's human, and the extension's handlers registered."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rigid_motion import animation
 
 @pytest.fixture
 def rig(human: bpy.types.Object) -> Iterator[bpy.types.Object]:
-    """Rigify's human, edits followed."""
+    """Rigify's human, with the extension's handlers registered."""
     animation.register()
     yield human
     animation.unregister()

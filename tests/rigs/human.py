@@ -1,6 +1,6 @@
-"""The human of Rigify, which comes with Blender: a rig as productions use them, of 706 bones, 216 of them controls.
+"""Rigify's human, which comes with Blender: a production-like rig of 706 bones, 216 of them controls.
 
-Rigify takes five seconds to generate it, so that is done once in a process; each `human()` is a copy of its own.
+Rigify takes five seconds to generate it, so it is generated once per process; each `human()` is a copy.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ import addon_utils
 import bpy
 
 MECHANISM = ("DEF-", "MCH-", "ORG-", "VIS_")
-"""What the names of bones begin with that no animator touches."""
+"""Name prefixes of bones that animators do not touch."""
 
 
 class NoRigify(RuntimeError):
-    """Rigify is not there, or does not generate its human."""
+    """Rigify is missing, or fails to generate its human."""
 
 
 def human() -> bpy.types.Object:
-    """Rigify's human in the present scene, in rest pose: arms and legs by IK, the widgets of its controls outside.
+    """Return Rigify's human in the current scene, in rest pose: arms and legs by IK, its control widgets in no scene.
 
     Raises
     ------
     NoRigify
-        Where this Blender has no Rigify, or it will not generate.
+        If this Blender has no Rigify, or Rigify fails to generate.
     """
     with bpy.data.libraries.load(str(_library()), link=False) as (_, expected):
         expected.objects = ["rig"]
@@ -41,13 +41,13 @@ def human() -> bpy.types.Object:
 
 
 def controls(rig: bpy.types.Object) -> list[bpy.types.PoseBone]:
-    """The bones that an animator poses."""
+    """Return the bones that an animator poses."""
     return [bone for bone in rig.pose.bones if not bone.name.startswith(MECHANISM)]
 
 
 @cache
 def _library() -> Path:
-    """A .blend with the rig in it, generated in a scene of its own; the open file is left as it was."""
+    """Write a .blend with the rig, generated in a temporary scene, and return its path; the open file is unchanged."""
     folder = Path(tempfile.mkdtemp(prefix="rigify-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     before, shown = set(bpy.data.user_map()), bpy.context.window.scene
@@ -61,7 +61,7 @@ def _library() -> Path:
 
 
 def _generate() -> bpy.types.Object:
-    # Rigify looks for its own preferences while it registers: without `default_set` there are none, and its register()
+    # Rigify reads its own preferences while it registers: without `default_set` there are none, and its register()
     # ends half-way, before the rig types have their parameters.
     said, known = io.StringIO(), set(dir(bpy.types))
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
@@ -75,7 +75,7 @@ def _generate() -> bpy.types.Object:
             raise NoRigify(f"Rigify makes no human: {error}\n{said.getvalue()[-2000:]}") from error
         finally:
             addon_utils.disable("rigify", default_set=True)
-            # It leaves panels and operators of the rig behind, which need it, and a handler that fails where it is not.
+            # Rigify leaves the rig's panels and operators behind, which need it, and a handler that fails without it.
             for name in set(dir(bpy.types)) - known:
                 bpy.utils.unregister_class(getattr(bpy.types, name))
             for handler in [item for item in bpy.app.handlers.load_post if item.__module__.startswith("rigify.")]:

@@ -1,4 +1,4 @@
-"""Rigs posed at random, and where that takes their bones."""
+"""Random keys on rigs, and the resulting bone positions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ KEYS = (1, 15, 31)
 
 
 def key_at_random(bones: Iterable[bpy.types.PoseBone]) -> None:
-    """Keys on three frames, moved and turned a little, where bones may be moved."""
+    """Key bones on three frames with small random rotations, and locations unless locked."""
     random, bones = np.random.default_rng(0), list(bones)
     for frame in KEYS:
         for bone in bones:
@@ -30,7 +30,7 @@ def key_at_random(bones: Iterable[bpy.types.PoseBone]) -> None:
 
 
 def key_controls(rig: bpy.types.Object, poses: dict[str, tuple[tuple, tuple]], frames: tuple[int, int]) -> None:
-    """Keys of controls by name, from rest to a location and angles about X, Y and Z."""
+    """Key controls by name, from rest to a location and to angles about X, Y and Z."""
     for name, (location, angles) in poses.items():
         bone = rig.pose.bones[name]
         bone.rotation_mode = "QUATERNION"
@@ -42,7 +42,7 @@ def key_controls(rig: bpy.types.Object, poses: dict[str, tuple[tuple, tuple]], f
 
 
 def ends_of_bones(rig: bpy.types.Object) -> np.ndarray:
-    """Where all bones begin and end on some frames, in armature space."""
+    """Return the heads and tails of all bones on some frames, in armature space."""
     result = []
     for frame in range(KEYS[0], KEYS[-1] + 1, 4):
         bpy.context.scene.frame_set(frame)

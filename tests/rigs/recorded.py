@@ -1,4 +1,4 @@
-"""A body with a key on every frame, as imports of motion capture have it. Also for a Blender that is a window."""
+"""A body with a key on every frame, as in imported motion capture; also runs in Blender with a window."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PARENTS = {"Spine": "Root", "Head": "Spine", "Arm.L": "Spine", "Hand.L": "Arm.L"
 
 
 def recorded_rig(rotation_mode: str = "QUATERNION", *, still: tuple[str, ...] = (), seed: int = 0) -> bpy.types.Object:
-    """A body of a few bones with a key on every frame, as imports of motion capture have them."""
+    """Return a body of a few bones with a key on every frame, as in imported motion capture."""
     rig = bpy.data.objects.new("Body", bpy.data.armatures.new("Body"))
     bpy.context.collection.objects.link(rig)
     bpy.context.view_layer.objects.active = rig
@@ -37,7 +37,7 @@ def recorded_rig(rotation_mode: str = "QUATERNION", *, still: tuple[str, ...] = 
 
 
 def record(rig: bpy.types.Object, name: str, random: np.random.Generator) -> None:
-    """A key on every frame of a bone that swings, and for the root wanders too."""
+    """Key a swinging bone on every frame; the root also wanders."""
     waves = random.uniform(0.05, 0.2, 3)[:, None] * FRAMES + random.uniform(0.0, 6.0, (3, 1))
     angles = 0.5 * np.sin(waves).T + 0.002 * random.normal(size=(len(FRAMES), 3))
     prefix = f'pose.bones["{name}"].'

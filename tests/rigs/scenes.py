@@ -1,7 +1,7 @@
-"""Scenes of Rigify's human for which screws are made, and some for which they are not, with what is to be measured.
+"""Scenes of Rigify's human, some suited to screw motion and some not, with the error to measure in each.
 
-Each scene keys controls as an animator would, by Blender's own default keys, and says which of them are to go by a
-screw and what point of the body shall stay where. The human looks along -Y; metres and frames.
+Each scene keys controls as an animator would, with Blender's default keys. It names the controls that get a screw mode,
+and the point of the body that should stay in place. The human looks along -Y; units are metres and frames.
 """
 
 from __future__ import annotations
@@ -14,34 +14,34 @@ import bpy
 from mathutils import Matrix, Quaternion, Vector
 
 GRIP = Vector((0.034, 0.088, 0.0))
-"""The middle of a fist in the space of the bone of the left hand."""
+"""The middle of a fist, in the space of the left hand's bone."""
 
 HANDSHAKE = Matrix(((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)))
 """Axes of a left hand that reaches forward, its thumb on top: palm (X), fingers (Y), thumb (Z)."""
 
 CURL = {"01": 70.0, "02": 85.0, "03": 55.0}
-"""Degrees that the three parts of a finger are bent in a fist."""
+"""Degrees by which the three parts of a finger bend in a fist."""
 
 PIVOT, LEVER = Vector((0.27, -0.20, 0.80)), 0.50
-"""What a lever turns about, and how far from there the middle of a fist holds it."""
+"""The pivot of a lever, and the distance from there to the middle of the fist that holds it."""
 
 ARM, WRIST = 0.985, 35.0
-"""How far an arm is stretched, and the degrees by which a fist is bent forward on it."""
+"""The fraction to which an arm is stretched, and the degrees by which its fist bends forward."""
 
 FRAMES = (1, 31, 61)
-"""There, at the other end, and back."""
+"""The frames of the first pose, the pose at the other end, and the return."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """One rig with its keys.
+    """A rig with its keys.
 
     Attributes
     ----------
     controls
-        The bones that are to have a mode.
+        The bones that get a mode.
     strays
-        Frame to how far, in metres, what should stay together is apart on it, as Blender evaluates it.
+        Given a frame, returns how far, in metres, points that should stay together are apart, as Blender evaluates it.
     """
 
     rig: bpy.types.Object
@@ -49,14 +49,14 @@ class Scene:
     strays: Callable[[int], float]
 
     def farthest(self) -> float:
-        """The most that it strays on any frame, in metres."""
+        """Return the largest straying on any frame, in metres."""
         return max(self.strays(frame) for frame in range(FRAMES[0], FRAMES[-1] + 1))
 
 
 def pull_a_lever(rig: bpy.types.Object, lever: bpy.types.Object) -> Scene:
-    """The left hand takes a lever from one end to the other and back. `lever` turns about its origin.
+    """The left hand moves a lever from one end to the other and back. `lever` turns about its origin.
 
-    The fist has to stay on the handle.
+    The fist must stay on the handle.
     """
     make_fist(rig, "L")
     hand, chest, torso = (rig.pose.bones[name] for name in ("hand_ik.L", "chest", "torso"))
@@ -81,7 +81,7 @@ def pull_a_lever(rig: bpy.types.Object, lever: bpy.types.Object) -> Scene:
 
 
 def twist(rig: bpy.types.Object, degrees: float = 50.0) -> Scene:
-    """Both feet turn on their balls, heels from side to side. The balls have to stay where they are on the floor."""
+    """Both feet turn on their balls, heels from side to side. The balls must stay in place on the floor."""
     feet = [rig.pose.bones[f"foot_ik.{side}"] for side in "LR"]
     torso = rig.pose.bones["torso"]
     rest = {bone.name: bone.matrix.copy() for bone in (*feet, torso)}
@@ -101,9 +101,9 @@ def twist(rig: bpy.types.Object, degrees: float = 50.0) -> Scene:
 
 
 def cut(rig: bpy.types.Object) -> Scene:
-    """The left hand swings from overhead to below, its arm stretched, by the control of the hand.
+    """The left hand swings from overhead to below with a stretched arm, moved by the hand's control.
 
-    The wrist has to stay as far from the shoulder as it is on the keys.
+    The wrist must keep the distance from the shoulder that it has on the keys.
     """
     make_fist(rig, "L")
     hand = rig.pose.bones["hand_ik.L"]
@@ -120,9 +120,9 @@ def cut(rig: bpy.types.Object) -> Scene:
 
 
 def cut_by_joints(rig: bpy.types.Object, rotation_mode: str = "QUATERNION") -> Scene:
-    """The left arm swings from overhead across the body, by FK: keys of the upper arm alone, which only turns.
+    """The left arm swings from overhead across the body by FK: only rotation keys of the upper arm.
 
-    The wrist has to stay on the circle of the one turn that leads from key to key.
+    The wrist must stay on the circle of the single turn from key to key.
     """
     make_fist(rig, "L")
     rig.pose.bones["upper_arm_parent.L"]["IK_FK"] = 1.0
@@ -147,11 +147,11 @@ def cut_by_joints(rig: bpy.types.Object, rotation_mode: str = "QUATERNION") -> S
     return Scene(rig, [arm], strays)
 
 
-# What they are built of
+# Building blocks
 
 
 def key(bone: bpy.types.PoseBone, frame: int, pose: Matrix) -> None:
-    """Key location and rotation so that a bone stands like this in its armature."""
+    """Key location and rotation so that a bone has this pose in armature space."""
     bpy.context.scene.frame_set(frame)
     path = "rotation_quaternion" if bone.rotation_mode == "QUATERNION" else "rotation_euler"
     before = getattr(bone, path).copy()
@@ -175,7 +175,7 @@ def make_fist(rig: bpy.types.Object, side: str) -> None:
 
 
 def grasp(fist: Vector, axes: Matrix) -> Matrix:
-    """The pose of a hand that has the middle of its fist here."""
+    """Return the pose of a hand whose fist has its middle here."""
     return posed(fist - axes @ GRIP, axes)
 
 
@@ -192,16 +192,16 @@ def bent(degrees: float) -> Quaternion:
 
 
 def about(place: Vector, turn: Matrix) -> Matrix:
-    """A turn about a place instead of the origin."""
+    """Return a rotation about a point instead of the origin."""
     return Matrix.Translation(place) @ turn @ Matrix.Translation(-place)
 
 
 def arm_length(rig: bpy.types.Object) -> float:
-    """From shoulder to wrist of a stretched arm."""
+    """Return the distance from shoulder to wrist of a stretched arm."""
     return sum(rig.data.bones[f"ORG-{name}.L"].length for name in ("upper_arm", "forearm"))
 
 
 def shown(rig: bpy.types.Object, frame: int) -> bpy.types.bpy_prop_collection:
-    """The bones as Blender evaluates them on a frame, in the space of their armature."""
+    """Return the evaluated bones on a frame, in armature space."""
     bpy.context.scene.frame_set(frame)
     return rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones

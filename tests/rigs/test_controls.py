@@ -1,4 +1,4 @@
-"""Modes on all controls of Rigify's human at once."""
+"""Tests of modes on all controls of Rigify's human at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the chapter on rigs says of Rigify's human, measured: where a screw helps, and where nothing is amiss."""
+"""Tests of the documentation's claims on Rigify's human: where a screw helps, and where nothing goes wrong anyway."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from rigid_motion import animation
 from tests.rigs import scenes
 
 NOTHING = 2e-4
-"""Metres. IK itself leaves the hand 0.1 mm from its control."""
+"""An error in metres that counts as none: IK itself leaves the hand 0.1 mm from its control."""
 
 
 def strays_of(scene: scenes.Scene) -> tuple[float, float]:
-    """How far at most, in metres, with Blender's in-betweens and by the screw."""
+    """Return the largest straying in metres, with Blender's in-betweens and with the screw."""
     native = scene.farthest()
     animation.set_mode(scene.controls, "dq_sclerp")
     return native, scene.farthest()

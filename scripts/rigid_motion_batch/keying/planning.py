@@ -155,7 +155,7 @@ def _identity(job: InputJob) -> object:
 
 
 def _without_conflicts(jobs: list[InputJob]) -> Iterator[InputJob]:
-    """Yield the jobs except for results of other inputs; a job that would overwrite an input or result has a problem."""
+    """Yield the jobs except for results of other inputs; a job that would overwrite another file gets a problem."""
     outputs = {place_of(path) for job in jobs if not job.in_place for path in _outputs(job)}
     jobs = [job for job in jobs if place_of(job.file) not in outputs or not is_made(job.file)]
     sources = {place_of(job.file) for job in jobs}

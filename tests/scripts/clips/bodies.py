@@ -1,4 +1,4 @@
-"""Whole bodies for the tests of the comparison: small, in centimetres with y upwards, and different for every seed."""
+"""Synthetic clips of whole bodies, for tests: small, in centimetres with y up, and different for every seed."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,7 +19,7 @@ BONES = {
     "Leg": ("Hips", (10, -5, 0)),
     "Foot": ("Leg", (0, -80, 0)),
 }
-"""Parents, and where joints are in their space. The glove moves with the hand that it is on."""
+"""Parents, and joint positions in the parents' spaces. The glove moves with its hand."""
 
 JOINTS = tuple(BONES)
 
@@ -27,7 +27,7 @@ PARENTS = np.array([-1 if parent is None else JOINTS.index(parent) for parent, _
 
 
 def turns(angles: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) of turns by angles (...) about axes (..., 3)."""
+    """Return quaternions (..., 4) of turns by angles (...) about axes (..., 3)."""
     axes = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
     return np.concatenate((np.cos(angles / 2.0)[..., None], np.sin(angles / 2.0)[..., None] * axes), axis=-1)
 
@@ -35,7 +35,7 @@ def turns(angles: np.ndarray, axes: np.ndarray) -> np.ndarray:
 def swinging_body(
     name: str = "walk", *, seconds: float = 2.0, rate: float = 30.0, seed: int = 1, joints: Sequence[str] = JOINTS
 ) -> Clip:
-    """A body that walks ahead and swings all but its glove; the foot stands for the first half second."""
+    """Return a clip of a body that walks forward and swings all joints except the glove; the foot stands for 0.5 s."""
     random = np.random.default_rng(seed)
     times = 7.0 + np.arange(round(seconds * rate) + 1) / rate
     since = np.maximum(times - times[0] - 0.5, 0.0)
@@ -55,14 +55,14 @@ def swinging_body(
 
 
 def rest_body_of(clip: Clip, joints: Sequence[str]) -> RestBody:
-    """The figure of a clip whose joints are called so, at rest as it begins."""
+    """Return the rest body of a clip, at rest in its first pose, with these joint names."""
     tails = np.tile((0.0, 10.0, 0.0), (len(joints), 1))
     unplaced = RestBody(tuple(joints), PARENTS, Poses(np.zeros((len(joints), 3)), np.eye(4)[[0] * len(joints)]), tails)
     return replace(unplaced, rest=unplaced.skeleton.in_root_space(clip.poses)[:, 0])
 
 
 def still_body(name: str = "statue") -> Clip:
-    """The same body, of which nothing moves."""
+    """Return a clip of the same body standing still."""
     clip = swinging_body(name)
     poses = Poses(
         *(np.repeat(some[:, :1], len(clip.times), axis=1) for some in (clip.poses.positions, clip.poses.quaternions))

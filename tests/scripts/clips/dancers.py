@@ -1,4 +1,4 @@
-"""Bodies that dance: clips of whole figures, made up."""
+"""Synthetic clips of dancing bodies, for tests."""
 
 from collections.abc import Sequence
 
@@ -25,7 +25,7 @@ def dancing_clip(
     still: Sequence[int] = (),
     skin: bool = False,
 ) -> Clip:
-    """A body of six joints that turn every way, and walks so many metres; some joints stay as they are."""
+    """Return a clip of six joints that turn in all directions and walk `walked` metres, but for joints in `still`."""
     times = np.arange(0.0, 1.2 + 1e-9, 1.0 / rate)
     random = np.random.default_rng(7)
     count = len(JOINTS)
@@ -54,7 +54,7 @@ def dancing_clip(
 
 
 def _skin(rest: Poses, scale: float) -> Skin:
-    """A tetrahedron around each joint, carried by it and a third by its parent."""
+    """Return a skin: a tetrahedron around each joint, weighted two thirds to it and a third to its parent."""
     around = 0.1 * np.array(((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)), dtype=float)
     faces = np.array(((0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)))
     count = len(JOINTS)

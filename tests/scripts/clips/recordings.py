@@ -1,4 +1,4 @@
-"""Recordings of a swinging tool for the tests: small, smooth, and different for every seed."""
+"""Synthetic clips of a swinging tool, for tests: small, smooth, and different for every seed."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ from rigid_motion_batch.recordings.clips import Clip
 def swinging_clip(
     name: str = "swing", *, seconds: float = 3.0, rate: float = 90.0, seed: int = 1, repairs: tuple[str, ...] = ()
 ) -> Clip:
-    """A body on a winding path that turns about a changing axis."""
+    """Return a clip of a body on a winding path that turns about a changing axis."""
     random = np.random.default_rng(seed)
     times = 100.0 + np.arange(round(seconds * rate) + 1) / rate
     waves = random.uniform(2.0, 9.0, (7, 1)) * times + random.uniform(0.0, 6.0, (7, 1))
@@ -26,13 +26,13 @@ def swinging_clip(
 
 
 def reconstruct(clip: Clip, rate: str = "10", modes: tuple[str, ...] = tuple(KEYFRAME_MODES)) -> Reconstruction:
-    """The clip thinned to `rate`, to be filled in again by the real modes."""
+    """Return a reconstruction of the clip from keys at `rate`, with the real modes."""
     return Reconstruction(
         clip, Uniform(rate), dict.fromkeys(modes, (decimate(clip.times, float(rate)),)), np.array([0.1])
     )
 
 
 def compare_clip(clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii) -> ChoiceResult | None:
-    """What a comparison finds of a clip, as one step; None where it is too short for two keys."""
+    """Return the result of comparing a clip in one step; None if it is too short for two keys."""
     made = reconstruct_modes(clip, choice, modes, radii.of(clip))
     return None if made is None else measured(made)

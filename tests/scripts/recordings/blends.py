@@ -1,4 +1,4 @@
-"""Scenes to be saved and read again: objects and rigs, with keys."""
+"""Scenes with keyed objects and rigs, for tests that save and read .blend files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,7 +15,7 @@ FPS = 50
 
 
 def empty(name: str, **settings: object) -> bpy.types.Object:
-    """An empty of the open scene."""
+    """Add an empty to the open scene."""
     obj = bpy.data.objects.new(name, None)
     bpy.context.scene.collection.objects.link(obj)
     for setting, value in settings.items():
@@ -24,7 +24,7 @@ def empty(name: str, **settings: object) -> bpy.types.Object:
 
 
 def rig(name: str, bones: Mapping[str, tuple[Sequence[float], Sequence[float], str | None]]) -> bpy.types.Object:
-    """An armature object of the open scene, its bones given by head, tail and the name of the parent or None."""
+    """Add an armature object to the open scene; bones are given by head, tail, and the name of the parent or None."""
     obj = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     bpy.context.scene.collection.objects.link(obj)
     bpy.context.view_layer.objects.active = obj
@@ -47,20 +47,20 @@ def key(animated: bpy.types.Object | bpy.types.PoseBone, frame: float, **channel
 
 
 def fcurves(obj: bpy.types.Object) -> bpy.types.ActionChannelbagFCurves:
-    """Those of its Action."""
+    """Return the F-curves of an object's Action."""
     data = obj.animation_data
     return anim_utils.action_get_channelbag_for_slot(data.action, data.action_slot).fcurves
 
 
 def linear(obj: bpy.types.Object) -> None:
-    """Let the keys of an Action be joined by straight lines."""
+    """Set all keys of an object's Action to linear interpolation."""
     for fcurve in fcurves(obj):
         for point in fcurve.keyframe_points:
             point.interpolation = "LINEAR"
 
 
 def on_frames(trajectory: Trajectory) -> Trajectory:
-    """A trajectory without what was sampled between even frames."""
+    """Return a trajectory without the samples between whole frames."""
     frames = trajectory.times * trajectory.rate
     rows = np.abs(frames - np.rint(frames)) < 1e-6
     return replace(trajectory, times=trajectory.times[rows], poses=trajectory.poses[..., rows])

@@ -1,4 +1,4 @@
-"""Small recordings and scenes made on the spot, and the check that an error is the one line that was promised."""
+"""Fixtures that write small recordings and scenes, and check that an error has the promised one-line form."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -11,7 +11,7 @@ from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError, read_
 
 @pytest.fixture
 def write(tmp_path: Path) -> Callable[[str, str | bytes], str]:
-    """Write a file of this name and content, and return its path."""
+    """A function that writes a file with a given name and content, and returns its path."""
 
     def _write(name: str, content: str | bytes) -> str:
         path = tmp_path / name
@@ -23,7 +23,7 @@ def write(tmp_path: Path) -> Callable[[str, str | bytes], str]:
 
 @pytest.fixture
 def refusal() -> Callable[..., tuple[int | None, str]]:
-    """Read what cannot be read, by these options, and return the line and the rest of the error."""
+    """A function that reads an unreadable source with given options, and returns the line and the rest of the error."""
 
     def _refusal(source: str, **options: object) -> tuple[int | None, str]:
         with pytest.raises(TrajectoryError) as caught:
@@ -39,7 +39,7 @@ def refusal() -> Callable[..., tuple[int | None, str]]:
 
 @pytest.fixture
 def scene() -> Iterator[object]:
-    """An empty scene to fill, and nothing of it left afterwards."""
+    """An empty scene to fill, cleared afterwards."""
     bpy = pytest.importorskip("bpy")
     from tests.blank import blank
     from tests.scripts.recordings.blends import FPS
@@ -53,7 +53,7 @@ def scene() -> Iterator[object]:
 
 @pytest.fixture
 def saved(scene: object, tmp_path: Path) -> Callable[..., str]:
-    """Save the scene, leave it, and return the path."""
+    """A function that saves the scene, clears it, and returns the path."""
     bpy = pytest.importorskip("bpy")
     from tests.blank import blank
 

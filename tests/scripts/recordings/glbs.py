@@ -1,4 +1,4 @@
-"""GLB files of a chain of joints, and where the glTF specification puts these joints."""
+"""GLB files of jointed bodies, with the joint positions according to the glTF specification."""
 
 import tempfile
 from collections.abc import Sequence
@@ -13,7 +13,9 @@ from tests.gltf.player import File
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """What moves a joint: `values` (n, 3) or (n, 4), quaternions x, y, z, w; of a cubic spline (3 n, ...)."""
+    """An animation channel of a joint: `values` (n, 3) or (n, 4), quaternions as x, y, z, w; (3 n, ...) for a cubic
+    spline.
+    """
 
     joint: int
     path: str
@@ -24,7 +26,7 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Joints that hang on one another below a node of some scale."""
+    """A hierarchy of joints below a scaled node."""
 
     parents: Sequence[int]
     offsets: np.ndarray
@@ -38,14 +40,14 @@ class Body:
         return np.append((keys[:-1, None] + np.diff(keys)[:, None] * np.arange(8) / 8).ravel(), keys[-1])
 
     def places(self, times: np.ndarray) -> np.ndarray:
-        """Where the joints are, shape (joints, times, 3), in Blender's axes."""
+        """Return the joint positions, shape (joints, times, 3), in Blender's axes."""
         with tempfile.TemporaryDirectory() as folder:
             worlds = File(self.write(Path(folder) / "body.glb")).worlds(0, times)
         x, y, z = np.moveaxis(worlds[: len(self.parents), :, :3, 3], -1, 0)
         return np.stack((x, -z, y), axis=-1)
 
     def write(self, path: Path) -> Path:
-        """Write it as a GLB."""
+        """Write the body as a GLB."""
         made, count = Making(), len(self.parents)
         nodes = [{"name": f"Joint{joint}", "translation": list(self.offsets[joint])} for joint in range(count)]
         nodes.append({"name": "Armature", "scale": [self.size] * 3})
@@ -58,19 +60,19 @@ class Body:
 
 
 def turning(times: np.ndarray, angles: np.ndarray, axis: Sequence[float] = (0.0, 0.0, 1.0)) -> np.ndarray:
-    """Quaternions x, y, z, w."""
+    """Return quaternions x, y, z, w of turns about an axis."""
     return np.column_stack((np.sin(angles / 2)[:, None] * np.asarray(axis), np.cos(angles / 2)))
 
 
 def chain(count: int = 20, length: float = 0.09) -> tuple[list[int], np.ndarray]:
-    """The parents and offsets of joints in a row."""
+    """Return the parents and offsets of a chain of joints."""
     offsets = np.tile((0.0, length, 0.0), (count, 1))
     offsets[0] = (0.0, 0.1, 0.0)
     return list(range(-1, count - 1)), offsets
 
 
 def mixed_rates(seconds: float = 2.0) -> Body:
-    """One joint keyed 30 times a second, which swings fast, and 19 others 5 times."""
+    """Return a body with one fast joint keyed 30 times per second, and 19 others keyed 5 times per second."""
     parents, offsets = chain()
     slow, fast = np.arange(round(5 * seconds) + 1) / 5, np.arange(round(30 * seconds) + 1) / 30
     tracks = [
@@ -83,7 +85,7 @@ def mixed_rates(seconds: float = 2.0) -> Body:
 
 
 def soldier(size: float = 0.01) -> Body:
-    """A body of 1.8 m in a unit of its own below a node that scales it, as Mixamo exports them."""
+    """Return a body of 1.8 m in its own unit below a node that scales it, as in exports of Mixamo."""
     parents = [-1, 0, 1, 2, 3, 2, 5, 0, 7, 0, 9]
     offsets = np.array(
         [
@@ -100,7 +102,7 @@ def soldier(size: float = 0.01) -> Body:
 
 
 def curved(size: float = 1.0) -> Body:
-    """Two keys a second, with tangents that are no ones that anybody would guess."""
+    """Return a body with two keys per second and arbitrary tangents that cannot be guessed from the keys."""
     parents, offsets = chain(4, 0.4 / size)
     random, times = np.random.default_rng(4), np.array([0.0, 0.5, 1.1, 1.5, 2.0])
     tracks = []

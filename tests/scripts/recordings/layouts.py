@@ -1,4 +1,4 @@
-"""One motion in the layouts of other programs: what each writes, and what has to be said to read it."""
+"""One motion in the file layouts of other programs, with the options needed to read each."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping
@@ -14,33 +14,33 @@ NUMBERS = np.arange(COUNT)
 LEFT, RIGHT = MOTIONS["left"], MOTIONS["right"]
 
 COUNTED = {"frame_rate": 50.0}
-"""Said where a file has no times: of these every row, or every number of a frame, is one."""
+"""Options for a file without times, in which every row, or every number of a frame, is a sample."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What a program writes of the motion on the left, and of that on the right where there are two bodies."""
+    """A program's file of the left motion, and of the right one if it has two bodies."""
 
     name: str
-    """That of the file."""
+    """The name of the file."""
 
     text: str | bytes
     said: Mapping[str, object] = field(default_factory=dict)
     bodies: tuple[str, ...] = ("take",)
     counted: bool = False
-    """True if the file has no times, but their rate."""
+    """True if the file has a frame rate instead of times."""
 
     warned: bool = False
     within: float = 1e-9
 
     @property
     def seconds(self) -> np.ndarray:
-        """Seconds since the first."""
+        """Seconds since the first sample."""
         return AT if self.counted or "frame_rate" in self.said else SECONDS
 
 
 def rows(*columns: Iterable, separator: str = " ", end: str = "") -> str:
-    """Columns of numbers or texts, or tables of these, as lines."""
+    """Return lines of text from columns of numbers or texts, or from tables of columns."""
     tables = [np.atleast_2d(np.array(column, dtype=object).T).T for column in columns]
     return "".join(
         separator.join(cell if isinstance(cell, str) else repr(cell) for cell in row) + f"{end}\n"
@@ -57,7 +57,7 @@ def quaternions(order: str = "xyzw", motion: Motion = LEFT) -> np.ndarray:
 
 
 def matrices(motion: Motion = LEFT, height: int = 4) -> np.ndarray:
-    """Of shape (n, height, 4)."""
+    """Return matrices, shape (n, height, 4)."""
     result = np.tile(np.eye(4), (COUNT, 1, 1))
     result[:, :3, :3], result[:, :3, 3] = motion.turns.as_matrix(), motion.positions
     return result[:, :height]
@@ -68,12 +68,12 @@ def flat(table: np.ndarray) -> np.ndarray:
 
 
 def places(template: str, height: int, base: int = 0) -> str:
-    """The names of a matrix's numbers, row by row."""
+    """Return the column names of a matrix's numbers, row by row."""
     return ",".join(template.format(row + base, column + base) for row in range(height) for column in range(4))
 
 
 def names(*templates: str) -> str:
-    """Names of a position and then of a quaternion: {} is x, y, z and w."""
+    """Return column names of a position and then of a quaternion; {} is x, y, z and w."""
     position, rotation = templates
     return ",".join([position.format(axis) for axis in "xyz"] + [rotation.format(axis) for axis in "xyzw"])
 
@@ -82,7 +82,7 @@ AT = NUMBERS / 50.0
 POSE = LEFT.positions, quaternions()
 BOTH = *POSE, RIGHT.positions, quaternions(motion=RIGHT)
 DOWN = flat(matrices().transpose(0, 2, 1))
-"""Matrices column by column."""
+"""Matrices in column-major order."""
 
 RAW: dict[str, Layout] = {
     "KITTI": Layout("take.txt", rows(flat(matrices(height=3))), COUNTED),

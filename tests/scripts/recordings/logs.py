@@ -1,4 +1,4 @@
-"""Logs as programs and people write them: the same motion under many spellings of its columns, in many units."""
+"""CSV logs of one motion under many spellings of columns, in many units."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 COUNT = 24
 MICROSECONDS = 11_111 * np.arange(COUNT) + np.arange(COUNT) % 3 * 500
-"""Since the first sample: about 90 samples a second, with jitter."""
+"""Times since the first sample: about 90 samples per second, with jitter."""
 
 EPOCH = 1_700_000_000_000_000
 """Microseconds from 1970 to a day in 2023."""
@@ -16,7 +16,7 @@ EPOCH = 1_700_000_000_000_000
 
 @dataclass(frozen=True)
 class Motion:
-    """What is recorded: metres, and quaternions x, y, z, w."""
+    """A recorded motion: metres, and quaternions x, y, z, w."""
 
     positions: np.ndarray
     turns: Rotation
@@ -36,7 +36,7 @@ TIMES = {
     "us": "t_us;timestamp (us);time [\u00b5s];timeMicroseconds",
     "ns": "timestamp_ns;t [ns];Time_ns;header.stamp (ns)",
 }
-"""By unit. {} is an axis, {!} the same as a capital."""
+"""Column names by unit. {} is an axis, {!} an axis as a capital letter."""
 
 POSITIONS = (
     "{};{!};p{};t{};pos_{};pos{!};Pos{!};PosX;position.{};position_{};Position {!};position[{}];m_LocalPosition.{};"
@@ -64,7 +64,7 @@ def spelled(template: str, axis: str) -> str:
 
 
 def time_texts(unit: str, start: int) -> list[str]:
-    """The times as a logger has them, to the microsecond; whole numbers of microseconds and nanoseconds."""
+    """Return times as a logger writes them, to the microsecond; whole numbers for microseconds and nanoseconds."""
     ticks = [start + int(step) for step in MICROSECONDS]
     digits = {"s": 6, "ms": 3}
     if unit in digits:
@@ -74,7 +74,7 @@ def time_texts(unit: str, start: int) -> list[str]:
 
 
 def pose_texts(motion: Motion, metres: float, rotations: np.ndarray) -> list[list[str]]:
-    """A row of cells for every sample: the position, in a unit of so many metres, and these numbers."""
+    """Return a row of cells for every sample: the position in units of `metres` metres, and these rotations."""
     table = np.column_stack((motion.positions / metres, rotations))
     return [[repr(number) for number in row] for row in table.tolist()]
 
@@ -86,7 +86,7 @@ def written(header: Sequence[str], rows: Sequence[Sequence[str]], separator: str
 def names(
     time: str, position: str, rotation: str, axes: str = "xyzw", unit: str = "", prefixes: Sequence[str] = ("",)
 ) -> list[str]:
-    """A header: the time, then for every prefix a position and a rotation about these axes."""
+    """Return a header: the time, then for every prefix a position and a rotation about these axes."""
     header = [time]
     for prefix in prefixes:
         header += [f"{prefix}{spelled(position, axis)}{unit}" for axis in "xyz"]
@@ -95,14 +95,14 @@ def names(
 
 
 def log(header: Sequence[str], unit: str = "s", metres: float = 1.0, start: int = 0, side: str = "left") -> str:
-    """One body with a quaternion, under this header."""
+    """Return a log of one body with a quaternion, under this header."""
     motion = MOTIONS[side]
     poses = pose_texts(motion, metres, motion.turns.as_quat())
     return written(header, [[time, *pose] for time, pose in zip(time_texts(unit, start), poses, strict=True)])
 
 
 def assert_is_the_motion(trajectory: object, motion: Motion, *, start: int = 0, unit: str = "s") -> None:
-    """A trajectory is the motion: times to the last bit that the file's have, lengths to rounding."""
+    """Check that a trajectory is the motion: times to the last bit in the file, lengths to rounding."""
     seconds = trajectory.times - trajectory.times[0]
     ticks = {"s": 1e-6, "ms": 1e-3}
     lost = np.spacing((start + MICROSECONDS[-1]) * ticks[unit]) / (ticks[unit] * 1e6) if unit in ticks else 1e-15
@@ -115,5 +115,5 @@ def assert_is_the_motion(trajectory: object, motion: Motion, *, start: int = 0, 
 
 
 def named(columns: Mapping[str, Sequence[str]]) -> tuple[list[str], list[list[str]]]:
-    """The header and the rows of columns of cells."""
+    """Return the header and the rows of columns of cells."""
     return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]

@@ -1,6 +1,6 @@
-"""Damage: what transfers, editors, exporters and ill will do to a file of text, at random but the same every time.
+"""Damage to text files, as by transfers, editors, exporters and malice: random, but the same every time.
 
-Every mutation is a function from the bytes of a file, and a source of chance, to other bytes.
+Every mutation is a function of a file's bytes and a random generator that returns other bytes.
 """
 
 import re
@@ -14,7 +14,7 @@ inf -Infinity null true - + . 1. .5 1e 0x10 0b1 1_000 1,5 1;5 1d5 1j (1+0j) 1.5.
 """
 
 NUMBERS = (*PLAIN_NUMBERS.split(), *("", " ", "1 5", "\u0663", "\u00bd", "\uff11", '"1"', "'1'", "9" * 400, "9" * 5000))
-"""In the place of numbers."""
+"""Texts that replace numbers."""
 
 PLAIN_WORDS = r"""
 * .. ../../x { } {} [ ] [] , ; : " "" ' # \ \u0000 \ud800 null true --> <script>
@@ -30,7 +30,7 @@ WORDS = (
     *("CHANNELS 7", "CHANNELS 1e9", "Frames: 1000000000", "Frames: 1e9"),
     *("", "\t", "\0", "\x1b[2J", "\u202e", "\ufeff", "\U0001f600", "x" * 300, "[" * 3000, "{" * 50, "}" * 50, '"' * 3),
 )
-"""In the place of words, and between them: what some reader gives a meaning to."""
+"""Texts that replace words or go between them; some reader gives each of them a meaning."""
 
 LINE_ENDS = (b"\n", b"\r\n", b"\r", b"\n\n", b"\x0b", b"\x0c", b"\x1c", b"\xc2\x85", b"\xe2\x80\xa8", b" \n", b",\n")
 
@@ -41,14 +41,16 @@ Mutation = Callable[[bytes, Random], bytes]
 
 
 def mutated(content: bytes, chance: Random) -> bytes:
-    """The content with one to four kinds of damage."""
+    """Return the content with one to four kinds of damage."""
     for _ in range(chance.choice((1, 1, 1, 2, 2, 3, 4))):
         content = chance.choice(MUTATIONS)(content, chance)
     return content
 
 
 def in_place(content: bytes, chance: Random) -> bytes:
-    """The content with some bytes changed, and of the same length: of binary files little else is ever read far."""
+    """Return the content with some bytes changed, in the same length: readers reject most other damage to binary files
+    at once.
+    """
     for _ in range(chance.choice((1, 1, 2, 4))):
         content = change_bytes(content, chance)
     return content
@@ -132,7 +134,7 @@ def change_encoding(content: bytes, chance: Random) -> bytes:
 
 
 def nest(content: bytes, chance: Random) -> bytes:
-    """Brackets around brackets."""
+    """Insert nested brackets."""
     first, last = chance.choice(((b"[", b"]"), (b"{", b"}"), (b'{"poses":', b"}"), (b"JOINT x {", b"}"), (b"(", b")")))
     depth = chance.choice((1, 2, 100, 20_000))
     place = chance.choice((0, chance.randint(0, len(content))))

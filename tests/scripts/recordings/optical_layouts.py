@@ -1,4 +1,4 @@
-"""One motion in the exports of Motive, Vicon and Qualisys."""
+"""One motion in the export formats of Motive, Vicon and Qualisys."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""A small body in BVH, which turns while it moves."""
+"""A small BVH file of a body that turns while it moves."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -25,10 +25,10 @@ ROOT Shoulder
 }
 MOTION
 """
-"""A shoulder and an elbow, up to where the frames begin."""
+"""The header of a BVH file with a shoulder and an elbow, up to the number of frames."""
 
 
 def bvh(times: int = 1) -> str:
-    """The frames so many times, one after the other."""
+    """Return a BVH file with the frames repeated `times` times."""
     lines = [" ".join(f"{number:.5g}" for number in row) for row in np.hstack((POSITIONS, ZXY, ZXY[::-1])).tolist()]
     return "\n".join([f"{ARM}Frames: {COUNT * times}", "Frame Time: 0.02", *(lines * times), ""])

@@ -1,4 +1,4 @@
-"""A small body that moves, with a skin, made in the open scene and exported as FBX and glTF."""
+"""A small moving body with a skin, made in the open scene and exported as FBX and glTF."""
 
 import contextlib
 import io
@@ -22,7 +22,7 @@ BONES = {
     "Hand": ((0.3, 0, 1.7), (0.6, 0.2, 1.8), "Lower"),
     "Lever": ((0, 1, 0), (0, 1.2, 0), "Root"),
 }
-"""Heads, tails and parents. The lever deforms nothing."""
+"""Heads, tails and parents of bones. The lever deforms nothing."""
 
 CARRYING = ("Root", "Upper", "Lower", "Hand")
 
@@ -32,11 +32,11 @@ TRIANGLES = [(0, 1, 2), (1, 2, 3)]
 
 
 UNEVEN = (1.2, 1.0, 0.8)
-"""A size that shears what turns in it."""
+"""An uneven object scale, which shears rotated children."""
 
 
 def body(name: str = "Body", fps: int = 24, size: tuple[float, float, float] = UNEVEN) -> bpy.types.Object:
-    """An armature that is moved and turned and not of its own size, with keys on every one of `FRAMES`."""
+    """Add a moved, turned and scaled armature with keys on each of `FRAMES`."""
     scene = bpy.context.scene
     scene.render.fps, scene.frame_start, scene.frame_end = fps, FRAMES[0], FRAMES[-1]
     obj = rig(name, BONES)
@@ -52,7 +52,7 @@ def body(name: str = "Body", fps: int = 24, size: tuple[float, float, float] = U
 
 
 def skinned(obj: bpy.types.Object) -> bpy.types.Object:
-    """A mesh of four vertices that an armature deforms, three quarters of each carried by one bone."""
+    """Add a mesh of four vertices deformed by an armature, each with a weight of three quarters on one bone."""
     mesh = bpy.data.meshes.new("Skin")
     mesh.from_pydata([(0, 0, 0), (0.1, 0, 1), (0, 0.1, 1.5), (0.6, 0.2, 1.8)], [], TRIANGLES)
     skin = bpy.data.objects.new("Skin", mesh)
@@ -67,7 +67,7 @@ def skinned(obj: bpy.types.Object) -> bpy.types.Object:
 
 
 def places_in_blender(obj: bpy.types.Object, bones: Sequence[str], frames: Iterable[int] = FRAMES) -> np.ndarray:
-    """Where the heads of bones are in the open scene on some frames, shape (bones, frames, 3)."""
+    """Return the head positions of bones in the open scene on some frames, shape (bones, frames, 3)."""
     seen = []
     for frame in frames:
         bpy.context.scene.frame_set(frame)
@@ -77,7 +77,7 @@ def places_in_blender(obj: bpy.types.Object, bones: Sequence[str], frames: Itera
 
 
 def surface_in_blender(skin: bpy.types.Object) -> np.ndarray:
-    """Where the vertices of a mesh are in the open scene on `FRAMES`, shape (vertices, frames, 3)."""
+    """Return the vertex positions of a mesh in the open scene on `FRAMES`, shape (vertices, frames, 3)."""
     seen = []
     for frame in FRAMES:
         bpy.context.scene.frame_set(frame)
@@ -87,7 +87,7 @@ def surface_in_blender(skin: bpy.types.Object) -> np.ndarray:
 
 
 def export(path: Path, **settings: object) -> Path:
-    """Export the open scene by the ending of a path, and leave it."""
+    """Export the open scene in the format of a path's ending, then clear the scene."""
     with silenced(), contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         if path.suffix == ".fbx":

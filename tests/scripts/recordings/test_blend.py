@@ -1,4 +1,4 @@
-"""Animated objects of .blend files, which bpy makes here."""
+"""Tests of reading animated objects from .blend files made with bpy."""
 
 from pathlib import Path
 

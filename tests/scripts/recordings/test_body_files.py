@@ -1,4 +1,4 @@
-"""Files of bodies as people have them: units, roots that stand, positions beside OFFSETs, names with spaces."""
+"""Tests of body files found in practice: units, still roots, positions besides OFFSETs, names with spaces."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ FILES = Path(__file__).parent / "bodies"
 
 
 def whole(name: str) -> tuple[Trajectory, np.ndarray]:
-    """A body, and where its joints are, shape (joints, n, 3)."""
+    """Return a body and its joint positions, shape (joints, n, 3)."""
     (body,) = read_trajectories(str(FILES / name)).trajectories
     return body, body.rest_body.skeleton.in_root_space(body.poses).positions
 
@@ -30,7 +30,7 @@ def test_a_root_that_stands_still_is_not_what_is_measured() -> None:
         assert np.flatnonzero(carrying(body.rest_body.parents, places)).tolist() == roots
 
 
-# A root, hips with two legs and a spine, and two things that hang on the root beside them.
+# A root, hips with two legs and a spine, and two other children of the root.
 PARENTS = np.array([-1, 0, 1, 1, 1, 0, 0])
 STANDING = np.array([[0, 0, 0], [5, 0, 0.9], [5, 0.1, 0], [5, -0.1, 0], [5, 0, 1.7], [8, 3, 0], [-2, 0, 2]])
 

@@ -1,4 +1,4 @@
-"""Pose bones of .blend files, against matrices that are worked out here."""
+"""Tests of pose bones of .blend files against matrices worked out here."""
 
 import numpy as np
 import pytest
@@ -12,10 +12,10 @@ from tests.thoroughness import sample
 bpy = pytest.importorskip("bpy")
 
 ARM = {"Upper": ((0, 0, 0), (0, 1, 0), None), "Lower": ((0, 1, 0), (0, 2, 0), "Upper")}
-"""Along y, which makes their axes those of the armature."""
+"""Bones along y, whose axes equal the armature's."""
 
 HAND = {"Hand": ((0, 2, 0), (1, 2, 0), "Lower")}
-"""Along x: a quarter turn backwards about z."""
+"""A bone along x: a quarter turn backwards about z."""
 
 BONES = ("Upper", "Lower", "Hand")
 
@@ -33,7 +33,7 @@ def read(source: str) -> Trajectory:
 
 
 def assert_are(trajectory: Trajectory, expected: list[np.ndarray]) -> None:
-    """Positions and rotations are those of the matrices, shape (4, 4) each, and scales the lengths of their axes."""
+    """Check positions, rotations and scales against matrices, shape (4, 4) each; scales are the lengths of the axes."""
     expected = np.stack(expected)
     lengths = np.linalg.norm(expected[:, :3, 0], axis=1)
     rotations = Rotation.from_matrix(expected[:, :3, :3] / lengths[:, None, None])
@@ -45,7 +45,7 @@ def assert_are(trajectory: Trajectory, expected: list[np.ndarray]) -> None:
 
 
 def waving(name: str = "Rig") -> bpy.types.Object:
-    """A rig of which two bones have keys."""
+    """Add a rig with keys on two of its bones."""
     arm = rig(name, ARM | HAND)
     for frame in (1, 9):
         key(arm.pose.bones["Lower"], frame, rotation_euler=(0, 0, frame / 9))
@@ -88,7 +88,7 @@ def test_rigs_of_libraries_can_be_read(saved, how: str) -> None:
     bpy.context.scene.collection.objects.link(arm)
     if how != "linked":
         arm = arm.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
-        arm.override_library.is_system_override = False  # Blender 5.3 sets no keys where the user may edit nothing.
+        arm.override_library.is_system_override = False  # Blender 5.3 inserts no keys into system overrides.
         arm.location, arm.pose.bones["Upper"].rotation_euler = (0, 0, 7), (0, 0, np.radians(30))
     if how == "overridden and animated anew":
         arm.animation_data_clear()
@@ -129,7 +129,7 @@ def test_a_missing_bone_is_answered_with_the_nearest_and_what_there_is(saved, re
 
 
 def places(trajectory: Trajectory) -> np.ndarray:
-    """Where the joints of a whole body are in the world, shape (joints, n, 3)."""
+    """Return the joint positions of a whole body in the world, shape (joints, n, 3)."""
     return trajectory.rest_body.skeleton.in_root_space(trajectory.poses).positions
 
 

@@ -1,6 +1,6 @@
-"""Files that want too much: what they take is bounded by what they hold, whatever they say of themselves.
+"""Tests of limits: the memory and time for reading a file depend on its size, whatever numbers it states.
 
-Memory is Python's own and NumPy's, as `tracemalloc` has it.
+Memory is that of Python and NumPy, as measured by `tracemalloc`.
 """
 
 import json
@@ -17,16 +17,16 @@ from tests.scripts.recordings.seeds import bvh as bvh_of
 from tests.scripts.recordings.written_layouts import PLAIN
 
 SIZE = 100_000
-"""Bytes of each file: enough to see how memory grows with it."""
+"""The size of each file in bytes: enough to show how memory grows with it."""
 
 BASE = 2_000_000
 OF_THE_FILE = {".json": 30.0}
 OF_ANY_OTHER = 16.0
 OF_A_LINE = 250.0
-"""Memory that reading may take: bytes, bytes for each byte of the file, and bytes for each of its lines."""
+"""Limits of memory for reading: bytes in any case, bytes per byte of the file, and bytes per line."""
 
 PATIENCE = 30.0
-"""Seconds of a processor, with `tracemalloc` looking on."""
+"""Limit of processor time in seconds, while `tracemalloc` measures."""
 
 CSV = "t,x,y,z,qx,qy,qz,qw\n"
 COLUMNS = CSV.strip().split(",")[1:]
@@ -35,7 +35,7 @@ ROOT = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n"
 
 
 def of(piece: str) -> str:
-    """As much of a piece as a file has room for."""
+    """Return a piece of text repeated to the size of a file."""
     return piece * (SIZE // len(piece))
 
 
@@ -77,7 +77,7 @@ BOMBS |= {
     "sound.json": json.dumps({"poses": 100 * json.loads(OTHERS["A-Frame of 2017"].text)}),
     "sound.bvh": bvh_of(300),
 }
-"""Recordings of which nothing is wrong, too."""
+"""Contents of files by name; some are sound recordings."""
 
 
 @pytest.mark.parametrize("name", BOMBS)

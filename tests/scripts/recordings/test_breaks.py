@@ -1,4 +1,4 @@
-"""T-poses in front of a motion, gaps, jumps, and the part that a user takes of a recording."""
+"""Tests of breaks in recordings: T-poses at the start, gaps, jumps, and the part that a user selects."""
 
 import re
 from dataclasses import replace
@@ -22,7 +22,7 @@ JOINTS = {
     "LeftFoot": (0, (0.1, -0.95, 0)),
     "RightFoot": (0, (-0.1, -0.95, 0)),
 }
-"""Parents, and where joints are at rest in their parents' space: a T in metres, y up."""
+"""Parents, and rest positions of joints in their parents' spaces: a T-pose in metres, y up."""
 
 PARENTS = np.array([parent for parent, _ in JOINTS.values()])
 OFFSETS = np.array([offset for _, offset in JOINTS.values()])
@@ -35,7 +35,7 @@ def turned(angle: np.ndarray, axis: int) -> np.ndarray:
 
 
 def dancer(rate: float = 30.0, seconds: float = 4.0, arms: float = 1.2, held: int = 0) -> Trajectory:
-    """One whose arms swing about where they hang by this angle, after so many samples of the T-pose in front."""
+    """Return a dancer whose arms swing about hanging by the angle `arms`, after `held` samples of a T-pose."""
     times = np.arange(round(seconds * rate)) / rate
     poses = Poses(np.repeat(OFFSETS[:, None], len(times), axis=1), np.zeros((len(JOINTS), len(times), 4)))
     poses.quaternions[..., 0] = 1.0

@@ -1,4 +1,4 @@
-"""BVH joints: by hand, against the matrices of Blender's importer, and wrong files."""
+"""Tests of BVH joints: worked out by hand, against the matrices of Blender's importer, and wrong files."""
 
 from itertools import permutations
 
@@ -96,7 +96,7 @@ def test_a_guessed_unit_is_told_with_how_sure_it_is(write, size: float, unit: st
 
 
 def skeleton(random: np.random.Generator, frames: int) -> str:
-    """A chain with a branch, every joint with its own order of channels, some with positions."""
+    """Return a BVH file of a branching chain; each joint has its own order of channels, some have positions."""
     orders = ["".join(order) for order in permutations("XYZ")]
     count = 0
 
@@ -119,7 +119,7 @@ def skeleton(random: np.random.Generator, frames: int) -> str:
     return f"HIERARCHY\n{hierarchy}MOTION\nFrames: {frames}\nFrame Time: 0.0333333\n{motion}\n"
 
 
-# The importer leaves its file to the garbage collector.
+# The importer does not close its file, but leaves it to the garbage collector.
 @pytest.mark.blender
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 @pytest.mark.parametrize("seed", range(4))

@@ -1,4 +1,4 @@
-"""What the names of columns say."""
+"""Tests of what column names of a CSV log mean."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Damaged FBX and glTF files: each is refused in one line or read, in a process that may be lost, and only that."""
+"""Tests of damaged FBX and glTF files: each is read, or refused in one line, or at worst crashes its own process."""
 
 import os
 import struct
@@ -26,7 +26,7 @@ def zero_run(content: bytes, chance: Random) -> bytes:
 
 
 def change_a_length(content: bytes, chance: Random) -> bytes:
-    """Four bytes that may be a length, an offset or a number of something are another."""
+    """Change four bytes that may be a length, an offset or a count."""
     place = chance.choice((8, 12, 27, 31, chance.randrange(len(content))))
     if place + 4 > len(content):
         return content
@@ -49,7 +49,7 @@ def reader() -> Iterator[Reader]:
 
 
 def read_alone(source: str, number: int) -> bool:
-    """Whether there is a recording that every mode can fill in, of which nothing is left behind."""
+    """Return whether the file holds a recording that a mode can interpolate; no data-blocks are left behind."""
     readable = read_and_fill_in(source, number)
     assert not [block for block in bpy.data.user_map() if block.name.startswith(("Body", "Skin", "Importing"))]
     return readable

@@ -1,4 +1,4 @@
-"""Dates and clock times in the column of time."""
+"""Tests of dates and clock times in the time column."""
 
 from collections.abc import Sequence
 

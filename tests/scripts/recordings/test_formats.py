@@ -1,4 +1,4 @@
-"""Motive's CSV exports, and what is said of wrong files of any text format."""
+"""Tests of Motive's CSV exports, and of the errors for wrong files of all text formats."""
 
 import json
 
@@ -27,7 +27,7 @@ def test_of_motive_bones_are_taken_by_name_and_poses_in_the_space_of_a_parent_ar
 
 
 def broken(**changes: object) -> str:
-    """A recording of A-Frame, of which the third pose of the first device is another."""
+    """Return an A-Frame recording with changes to the third pose of the first device."""
     content = json.loads(OTHERS["A-Frame"].text)
     content["left"]["poses"][2].update(changes)
     return json.dumps(content)
@@ -99,7 +99,7 @@ WRONG = {
         (f"{TUM_ROWS}1,2,3\n", 3, "1 columns where 8 are needed"),
     ],
 }
-"""Contents of files of these names, the line that is wrong, and what is said of it."""
+"""File names and contents, the line that is wrong, and the error message."""
 
 
 @pytest.mark.parametrize(

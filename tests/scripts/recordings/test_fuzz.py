@@ -1,6 +1,7 @@
-"""Damaged files, thousands of them: each is refused in one line, or becomes a recording that every mode can fill in.
+"""Fuzz tests of readers: each damaged file is refused in one line, or read as a recording that any mode can
+interpolate.
 
-RIGID_MOTION_FUZZ=20000 damages so many files of each format, instead of the few that every run of the tests has time
+RIGID_MOTION_FUZZ=20000 tries that many damaged files of each format, instead of the few that an ordinary run has time
 for. A failure names its case; RIGID_MOTION_FUZZ_FROM begins there.
 """
 
@@ -35,25 +36,25 @@ BLENDS = int(os.environ.get("RIGID_MOTION_FUZZ", "40"))
 FIRST = int(os.environ.get("RIGID_MOTION_FUZZ_FROM", "0"))
 
 FILLED_IN = max(1, CASES // 400)
-"""Of so many numbers of cases one is also filled in, which takes longer than to read it."""
+"""One in this many cases is also interpolated, which takes longer than reading."""
 
 PATIENCE = 20
-"""Seconds of a processor for one small file."""
+"""Limit of processor time for one small file, in seconds."""
 
 LONGEST_ERROR = 2000
-"""Characters, beside those of the path."""
+"""The most characters of an error message, without the path."""
 
 BONE = ":Rig/Hand"
-"""Asks for a bone."""
+"""Suffix of a source that requests a bone."""
 
 WHAT_IS_WRONG = re.compile(rf"(:\d+|:\*|{BONE})?: .+; .+")
-"""Behind the path."""
+"""The form of an error message after the path."""
 
 ROOT = Path(__file__).parents[3]
 
 
 def read_and_fill_in(source: str, number: int, options: ReadingOptions = AS_THE_FILE_SAYS) -> bool:
-    """Whether there is a recording; anything but that and a refusal in one line is an error."""
+    """Return whether the file holds a recording; any outcome other than that or a refusal in one line is an error."""
     try:
         recording = read_trajectories(source, options)
         clips = [make_clip(trajectory, source, trajectory.name, "blender") for trajectory in recording.trajectories]
@@ -90,7 +91,7 @@ def assert_is_one_line(message: str, source: str) -> None:
 
 
 def fuzz(folder: Path, ending: str, sound: bytes, cases: int, options: ReadingOptions = AS_THE_FILE_SAYS) -> int:
-    """Read damaged files, and return how many could be read nevertheless."""
+    """Read damaged files, and return how many could still be read."""
     path, readable = folder / f"take{ending}", 0
     for number in range(FIRST, FIRST + cases):
         chance = Random(f"{ending} {number}")
@@ -139,14 +140,14 @@ os._exit(0)
 
 
 class Reader:
-    """A process of its own that reads what Blender opens, begun anew where it crashed on a damaged file."""
+    """A separate process that reads files with Blender, and restarts after a damaged file has crashed it."""
 
     def __init__(self, module: str = "test_fuzz", function: str = "read_and_fill_in") -> None:
         self._code = READER % (module, function, 3 * PATIENCE)
         self._process: subprocess.Popen[str] | None = None
 
     def read(self, source: str, number: int) -> bool | str:
-        """Whether there was a recording, or what was wrong with the reading."""
+        """Return whether the file held a recording, or what went wrong."""
         if self._process is None:
             command = [sys.executable, "-c", self._code]
             pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
@@ -177,7 +178,7 @@ def reader() -> Iterator[Reader]:
 
 @pytest.fixture
 def animated_blend(tmp_path: Path) -> Path:
-    """A file with an object and a bone that move, not compressed."""
+    """An uncompressed .blend file with a moving object and a moving bone."""
     bpy = pytest.importorskip("bpy")
     from tests.scripts.recordings.blends import empty, key, rig
 
@@ -205,7 +206,7 @@ def test_a_damaged_blend_is_refused_or_read_or_the_end_of_a_process_but_never_an
         answer = reader.read(f"{path}{':*' if number % 2 else BONE}", number)
         assert answer in (True, False, "crash"), f"case {number} of .blend: {answer}"
         answers.append(answer)
-    # How many are crashes is Blender's affair: about 1 in 100 with 5.2, 1 in 6 with 5.0.
+    # The share of crashes depends on Blender: about 1 in 100 with 5.2, 1 in 6 with 5.0.
     assert True in answers
     assert False in answers
     assert reader.read(f"{animated_blend}:*", 0) is True

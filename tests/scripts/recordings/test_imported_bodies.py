@@ -1,4 +1,4 @@
-"""Whole bodies of FBX and glTF files: made and exported here, and other people's, against matrices of Blender's."""
+"""Tests of whole bodies in FBX and glTF files, exported here or by other programs, against Blender's matrices."""
 
 import base64
 import json
@@ -41,7 +41,7 @@ anim_utils = pytest.importorskip("bpy_extras.anim_utils")
 ENDINGS = [".fbx", ".glb", ".gltf"]
 
 SINGLE = 2e-6
-"""Metres, of a body of 2 m: what files and Blender keep is in single precision, through a chain of four bones."""
+"""Tolerance in metres for a body of 2 m: single precision in files and Blender, through a chain of four bones."""
 
 
 def whole(source: object) -> Trajectory:
@@ -51,7 +51,7 @@ def whole(source: object) -> Trajectory:
 
 
 def in_world(trajectory: Trajectory) -> Poses:
-    """Where the joints are, shape (joints, n)."""
+    """Return the poses of joints in the world, shape (joints, n)."""
     return trajectory.rest_body.skeleton.in_root_space(trajectory.poses)
 
 
@@ -61,7 +61,7 @@ def places(trajectory: Trajectory, joints: tuple[str, ...] = CARRYING) -> np.nda
 
 @pytest.fixture
 def exported(scene: object, tmp_path: Path):
-    """Export a body, and return the file and where its joints were in Blender."""
+    """A function that exports a body, and returns the file and the joint positions in Blender."""
 
     def _exported(ending: str, **settings: object) -> tuple[Path, np.ndarray]:
         obj = body(**settings)
@@ -104,7 +104,7 @@ def test_the_skin_moves_with_its_joints_as_in_blender(scene, tmp_path: Path, end
         [rotate(moved.quaternions[joints], skin.vertices[:, None]) for joints in skin.joints.T], axis=1
     )
     shown = np.einsum("vc,vcni->vni", skin.weights, carried)
-    # An exporter may have split vertices: each is one of Blender's.
+    # An exporter may have split vertices: each of its vertices belongs to one of Blender's.
     nearest = np.argmin(np.linalg.norm(shown[:, None, 0] - surface[None, :, 0], axis=-1), axis=1)
     np.testing.assert_allclose(shown, surface[nearest], atol=SINGLE)
     assert set(nearest[skin.triangles].ravel()) == {corner for triangle in TRIANGLES for corner in triangle}
@@ -262,7 +262,7 @@ def test_an_fbx_that_claims_more_than_it_holds_is_refused_before_room_is_made_fo
 
 
 def with_more(path: Path, **more: list) -> str:
-    """The same glTF with more parts at the end of its lists."""
+    """Append parts to the lists of a glTF file, and return its path."""
     document = json.loads(path.read_text())
     for name, parts in more.items():
         document[name] = document.get(name, []) + parts

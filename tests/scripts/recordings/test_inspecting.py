@@ -1,4 +1,4 @@
-"""What is said to be in a recording is in it, and what is wrong with it comes with the way out."""
+"""Tests of inspecting: the reported contents are right, and every problem comes with a way out."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,7 @@ from rigid_motion_batch.recordings.inspecting import inspect
 
 
 def log(rows: int = 300, rate: float = 90.0, scale: float = 1.0, up: int = 1, header: str = "t,x,y,z") -> str:
-    """A hand that swings 1 m above the floor, and turns about x by 90 degrees a second."""
+    """Return a CSV log of a hand that swings 1 m above the floor, and turns about x by 90 degrees per second."""
     times = np.arange(rows) / rate
     places = np.roll(
         np.stack((0.2 * np.cos(3 * times), 1.0 + 0.3 * np.sin(2 * times), 0.3 * np.sin(3 * times))), up - 1, 0

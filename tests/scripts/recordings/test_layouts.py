@@ -1,4 +1,4 @@
-"""One motion, written in the layouts of many programs, is that motion when it is read."""
+"""Tests of file layouts: one motion, written as many programs do, reads back as the same motion."""
 
 import numpy as np
 import pytest
@@ -56,14 +56,14 @@ CAMERAS = {
     "whole matrices by columns": ("opengl", (0, 0, -1), (0, 1, 0), (0, 1, 0)),
     "KITTI": ("opencv", (0, 0, 1), (0, -1, 0), (0, -1, 0)),
 }
-"""Axes, what a camera looks along and what is above it in its own space, and what is up in the world of the file.
+"""Axes; the view direction and up direction of a camera in its own space; the up direction of the file's world.
 
 The last two are ARKit's matrices, and KITTI's, which do not say so."""
 
 
 @pytest.mark.parametrize("name", CAMERAS)
 def test_cameras_look_along_y_of_the_object_with_z_above(write, name: str) -> None:
-    """A camera of Blender, which looks along its -z, does so as its child that is turned by 90 degrees about x."""
+    """A Blender camera looks along its -z; as a child turned by 90 degrees about x it looks as recorded."""
     layout, (axes, forward, above, up) = LAYOUTS[name], CAMERAS[name]
     source, options = write(layout.name, layout.text), ReadingOptions(**layout.said)
     said = None if name in list(CAMERAS)[:4] else axes
@@ -81,7 +81,7 @@ def test_cameras_look_along_y_of_the_object_with_z_above(write, name: str) -> No
 
 
 def about(axis: int, angle: float) -> np.ndarray:
-    """A turn about an axis, counted as Qualisys counts it: clockwise for who looks along the axis."""
+    """Return a rotation matrix in Qualisys's sense: clockwise when looking along the axis."""
     result, (one, other) = np.eye(3), [(axis + 1) % 3, (axis + 2) % 3]
     result[one, one] = result[other, other] = np.cos(angle)
     result[other, one], result[one, other] = np.sin(angle), -np.sin(angle)
@@ -90,7 +90,7 @@ def about(axis: int, angle: float) -> np.ndarray:
 
 @pytest.mark.parametrize("by_rows", [False, True])
 def test_a_body_of_qualisys_is_turned_by_roll_then_pitch_then_yaw(write, by_rows: bool) -> None:
-    """R = Rx Ry Rz takes points of the body to the room, as QTM's manual has it, however Rot[0] to Rot[8] go."""
+    """R = Rx Ry Rz takes points of the body to the room, as in QTM's manual, in either order of Rot[0] to Rot[8]."""
     angles = np.radians([[30.0, 20.0, 10.0], [-70.0, 40.0, 110.0], [5.0, -60.0, -20.0]])
     turns = np.array([about(0, roll) @ about(1, pitch) @ about(2, yaw) for roll, pitch, yaw in angles])
     header = "NO_OF_FRAMES\t3\nNO_OF_BODIES\t1\nFREQUENCY\t100\nBODY_NAMES\tTool\n"

@@ -1,4 +1,4 @@
-"""Logs in the spellings that people have: each is the motion that was recorded, or says what is to be done."""
+"""Tests of logs in common spellings: each reads as the recorded motion, or the error says what to do."""
 
 import re
 from collections.abc import Sequence
@@ -57,7 +57,7 @@ def test_degrees_that_could_be_radians_are_told(write) -> None:
 
 
 def long_log(device: str, header: Sequence[str] = ("t", "x", "y", "z", "qx", "qy", "qz", "qw"), unit: str = "s") -> str:
-    """Two devices that take turns, told by a column."""
+    """Return a log of two devices in alternating rows, named in a column."""
     lines = [log(header, unit, side=side).splitlines()[1:] for side in MOTIONS]
     rows = [f"{row},{side}" for both in zip(*lines, strict=True) for row, side in zip(both, MOTIONS, strict=True)]
     return "\n".join([f"{','.join(header)},{device}", *rows])
@@ -165,7 +165,7 @@ def test_bodies_that_share_no_rows_have_their_own_and_nothing_is_lost(write) -> 
 
 @st.composite
 def loggers(draw: st.DrawFn) -> tuple[str, ReadingOptions, str, int]:
-    """A log of both motions as somebody may have it, what has to be said of it, its unit of time and its start."""
+    """Return a log of both motions in a random spelling, the options to read it, its unit of time and its start."""
     unit = draw(st.sampled_from(list(logs.TIMES)))
     start = draw(st.sampled_from([0, logs.EPOCH]))
     length = draw(st.sampled_from(list(logs.LENGTHS)))

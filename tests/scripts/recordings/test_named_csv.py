@@ -1,4 +1,4 @@
-"""CSV with named columns."""
+"""Tests of CSV with named columns."""
 
 from pathlib import Path
 
@@ -52,7 +52,7 @@ def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str | bytes, l
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 samples = st.lists(st.tuples(*[numbers] * 9), min_size=2, max_size=MIN_MIXED_SAMPLES - 1).map(np.array)
-"""Too few to be told from those of several devices."""
+"""Too few samples for the check that looks for several mixed devices."""
 
 
 @settings(max_examples=tried(60))

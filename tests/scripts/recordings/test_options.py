@@ -1,4 +1,4 @@
-"""What a user says of recordings: checked when it is said, and the same when it has travelled with a task."""
+"""Tests of reading options: they are checked at once, and survive a journey as JSON in a task."""
 
 import json
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""What no hand, no device and no clock does is refused or said; what people record is neither."""
+"""Tests of plausibility: impossible motions, devices and clocks are refused or reported, ordinary ones are not."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,14 +16,14 @@ COUNT = 90
 
 
 def hand(side: float = 1.0, rate: float = 90.0) -> Trajectory:
-    """One that swings to and fro within half a metre."""
+    """Return a hand that swings back and forth within half a metre."""
     times = np.arange(COUNT) / rate
     positions = np.stack((side * 0.4 + 0.2 * np.sin(9.0 * times), 1.0 + 0.1 * times, 0.0 * times), axis=-1)
     return Trajectory("hand", times, Poses(positions, np.tile((1.0, 0.0, 0.0, 0.0), (COUNT, 1))))
 
 
 def mixed(bodies: list[Trajectory], delay: float, order: Callable[[np.ndarray], np.ndarray]) -> Trajectory:
-    """The rows of several in one, each body a little later than the one before, by what `order` makes of the times."""
+    """Return the rows of several bodies in one, each delayed a little more, sorted by `order` of their times."""
     times = np.concatenate([body.times + delay * place for place, body in enumerate(bodies)])
     rows = np.argsort(order(times), kind="stable")
     poses = Poses(
@@ -73,7 +73,7 @@ def test_what_nobody_records_is_said(trajectory: Trajectory, told: str) -> None:
     ("shift", "scale", "said"), [(1.7, 1.0, 0), (15.0, 1.0, 0), (170.0, 20.0, 1), (67.0, 8.0, 1), (170.0, 300.0, 1)]
 )
 def test_what_stays_far_from_its_origin_may_be_in_another_unit(shift: float, scale: float, said: int) -> None:
-    """A calm head in centimetres or inches is no faster than a quick hand in metres, but as high as a house."""
+    """A calm head in centimetres or inches is no faster than a quick hand in metres, but as high up as a house."""
     one = hand(rate=10.0)
     calm = one.poses.positions * scale / 10.0 + np.array((0.0, shift, 0.0))
     result = implausibilities(replace(one, poses=Poses(calm, one.poses.quaternions)))

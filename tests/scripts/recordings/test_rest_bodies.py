@@ -1,4 +1,4 @@
-"""Figures: what is repaired of them, apart from how they move."""
+"""Tests of rest bodies: repairs that do not depend on the motion."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from tests.scripts.clips.bodies import JOINTS, swinging_body
 
 @pytest.fixture
 def clip() -> Clip:
-    """With a skin of one triangle."""
+    """A clip with a skin of one triangle."""
     clip = swinging_body()
     skin = Skin(np.eye(3), np.array([[0, 1, 2]]), np.zeros((3, 4), dtype=int), np.eye(4)[[0, 0, 0]])
     return replace(clip, rest_body=replace(clip.rest_body, skin=skin))
@@ -44,7 +44,7 @@ def test_a_joint_that_is_nowhere_at_rest_has_no_bone_and_is_told(clip: Clip, num
 
 
 def test_the_size_of_a_body_is_that_from_where_it_branches() -> None:
-    # From a reference on the ground to the root of the body, and from there an arm and a leg.
+    # A reference on the ground, the root of the body as its child, and an arm and a leg.
     parents = np.array([-1, 0, 1, 1, 3])
     places = np.array([[0, 0, 0], [0, 50, 0], [0, 51, 0], [0, 49.5, 0], [0, 49.2, 0.4]])
     assert size_of(parents, places) == pytest.approx(1.8)

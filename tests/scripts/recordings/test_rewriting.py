@@ -1,4 +1,4 @@
-"""Numbers written where others were read: the file reads as was meant, and is the same everywhere else."""
+"""Tests of rewriting: new numbers in place of those read; the file reads as intended and is otherwise unchanged."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +16,11 @@ from tests.scripts.bvh_bodies import write_body
 from tests.scripts.recordings.test_layouts import EVERY
 
 NOT_WRITTEN = {"Record3D", "rows of positions and of rotations in turn"}
-"""Lists without names, and numbers that are not those of the file: `clean` refuses them."""
+"""Layouts that `clean` refuses to write: lists without names, and numbers that are not stored in the file as read."""
 
 
 def moved(poses: Poses) -> Poses:
-    """The same, each pose moved a little in another way."""
+    """Return the poses, each moved a little in a different way."""
     random = np.random.default_rng(1)
     noise, turns = random.normal(size=(2, *poses.positions.shape)) * 0.02
     if noise.ndim > 2:
@@ -31,7 +31,7 @@ def moved(poses: Poses) -> Poses:
 
 
 def written(source: str, path: Path, options: ReadingOptions, every: int) -> None:
-    """Move every so many-th sample of all bodies, and see what the file reads then."""
+    """Move one in `every` samples of all bodies, and check what the written file reads as."""
     before = read_trajectories(source, options).trajectories
     cells = before[0].cells
     assert cells

@@ -1,4 +1,4 @@
-"""Which moments of FBX, glTF and .blend files become samples: every key of every curve, and more where it bends."""
+"""Tests of sampling FBX, glTF and .blend files: a sample at every key of every curve, and more where curves bend."""
 
 from pathlib import Path
 
@@ -13,10 +13,10 @@ from tests.scripts.recordings.glbs import Body, Track, chain, curved, mixed_rate
 bpy = pytest.importorskip("bpy")
 
 SINGLE = 2e-5
-"""Metres: single precision in files and in Blender, through a chain of 20 joints."""
+"""Tolerance in metres: single precision in files and in Blender, through a chain of 20 joints."""
 
 WITHIN = 1e-3
-"""Metres: what may be between samples."""
+"""Allowed error between samples, in metres."""
 
 
 def read(source: object) -> Trajectory:
@@ -25,7 +25,7 @@ def read(source: object) -> Trajectory:
 
 
 def at(trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
-    """Where the joints are at some times by straight in-betweens in their parents' space, shape (joints, times, 3)."""
+    """Return joint positions with linear in-betweens in the parents' spaces, shape (joints, times, 3)."""
     local = [interpolate(trajectory.times, own, times, "lerp_slerp") for own in trajectory.poses]
     poses = Poses(*(np.stack([getattr(own, part) for own in local]) for part in ("positions", "quaternions")))
     return trajectory.rest_body.skeleton.in_root_space(poses).positions
@@ -72,7 +72,7 @@ def test_a_step_is_two_samples_and_is_told(tmp_path: Path) -> None:
 
 
 def truth(name: str, frames: np.ndarray, bone: str | None = None) -> np.ndarray:
-    """Where an object or a bone of the open scene is on some frames, shape (n, 3)."""
+    """Return the positions of an object or a bone of the open scene on some frames, shape (n, 3)."""
     obj, seen = bpy.data.objects[name], []
     for frame in frames.tolist():
         bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
@@ -83,7 +83,7 @@ def truth(name: str, frames: np.ndarray, bone: str | None = None) -> np.ndarray:
 
 
 def in_a_strip(obj: bpy.types.Object, start: float, **settings: object) -> None:
-    """Put the Action of an object into a strip, which begins there."""
+    """Move the Action of an object into an NLA strip that begins at `start`."""
     data = obj.animation_data
     strip = data.nla_tracks.new().strips.new("Strip", int(start), data.action)
     if strip.action_slot is None:
@@ -97,7 +97,7 @@ STRIPS = [{"scale": 1.5}, {"scale": 0.37, "repeat": 3.0}, {"scale": 1.5, "use_re
 
 
 def keyed_object() -> None:
-    """With Blender's own easing, every third frame, as an animator blocks it out."""
+    """Add an object keyed on every third frame with Blender's default easing, as an animator blocks it out."""
     tool = empty("Tool")
     for number, frame in enumerate(range(1, 32, 3)):
         key(tool, frame, location=(0.3 * (number % 2), 0.1 * number, 0))

@@ -1,4 +1,4 @@
-"""Bodies of files that hold a scene: props, cameras, bodies of nodes without a skin, against Blender's own import."""
+"""Tests of bodies in scene files (props, cameras, node hierarchies without a skin) against Blender's own import."""
 
 import itertools
 import json
@@ -29,11 +29,11 @@ FRAMES = range(1, 21)
 ENDINGS = (".glb", ".gltf", ".vrma", ".fbx")
 
 SINGLE = 3e-6
-"""Metres and radians, of things of a metre, in single precision."""
+"""Tolerance in metres and radians for objects of about 1 m in single precision."""
 
 
 def prop(name: str, number: int, **settings: object) -> bpy.types.Object:
-    """A box that flies and turns."""
+    """Add a triangle mesh that flies and turns."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata([(0, 0, 0), (0.2, 0, 0), (0, 0.1, 0.3)], [], [(0, 1, 2)])
     obj = bpy.data.objects.new(name, mesh)
@@ -53,7 +53,7 @@ def moved(obj: bpy.types.Object, number: int) -> None:
 
 
 def stage(path: Path) -> Path:
-    """A file of two props, one on another, one in a scaled holder that rests, and a camera."""
+    """Write a file with three props, one parented to another and one to a scaled parent at rest, and a camera."""
     first = prop("Cup", 0)
     prop("Spoon", 1, parent=first)
     prop("Ring", 2, parent=empty("Holder", location=(0, 0, 1), scale=(0.1, 0.1, 0.1), rotation_euler=(0.3, 0, 0.5)))
@@ -64,7 +64,7 @@ def stage(path: Path) -> Path:
 
 
 def figure(path: Path) -> Path:
-    """A file of a body of seven nodes without a skin, on a node that rests, beside a prop."""
+    """Write a file with a body of six nodes without a skin, below a node at rest, and a prop."""
     parents = {"Hips": "Place", "Spine": "Hips", "Head": "Spine", "Arm": "Spine", "Leg": "Hips", "Foot": "Leg"}
     nodes = {"Place": empty("Place", location=(0, 3, 0))}
     for number, (name, parent) in enumerate(parents.items()):
@@ -80,7 +80,7 @@ def figure(path: Path) -> Path:
 
 def exported(path: Path) -> Path:
     bpy.context.scene.frame_end = FRAMES[-1]
-    # Otherwise each object has an animation of its own in a glTF, and those of all objects in an FBX, and Blender plays
+    # Otherwise a glTF has one animation per object, and an FBX has all objects' animations for each, and Blender plays
     # one of them.
     if path.suffix == ".fbx":
         settings = {"bake_anim_use_all_actions": False, "bake_anim_use_nla_strips": False}
@@ -91,7 +91,7 @@ def exported(path: Path) -> Path:
 
 
 def imported(path: Path, names: Sequence[str]) -> dict[str, Poses]:
-    """Where Blender has objects from the first key on after its own import."""
+    """Return the poses of objects after Blender's own import, from the first key on."""
     bpy.context.scene.render.fps = FPS
     with silenced():
         (bpy.ops.import_scene.fbx if path.suffix == ".fbx" else bpy.ops.import_scene.gltf)(filepath=str(path))
@@ -199,7 +199,7 @@ def test_a_prop_needs_no_blender(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_vrma_names_its_joints_itself(tmp_path: Path) -> None:
-    """Three joints would be too few, and the last of them does not move."""
+    """Without the VRMA names, three moving joints would be too few for a body, and the last joint does not move."""
     made, times = Making(), np.arange(31) / 30
     made.json["nodes"] = [
         *({"name": name, "translation": [0, 0.5, 0], "children": [child]} for child, name in enumerate("abcd", 1)),
@@ -218,7 +218,7 @@ def test_a_vrma_names_its_joints_itself(tmp_path: Path) -> None:
 
 
 def test_takes_of_other_nodes_play_along_and_others_are_told(tmp_path: Path) -> None:
-    """Exporters may have an animation for each object."""
+    """Some exporters write one animation per object."""
     made, times = Making(), np.arange(31) / 30
     made.json["nodes"] = [{"name": "Cart", "children": [1]}, {"name": "Wheel", "translation": [1, 0, 0]}]
     places = np.column_stack((times, 0 * times, 0 * times))

@@ -1,4 +1,4 @@
-"""What the user names: files, bodies in them, and what is told about the rest."""
+"""Tests of sources named by the user: files, bodies in them, and messages about the rest."""
 
 import os
 import socket

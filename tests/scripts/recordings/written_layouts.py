@@ -1,4 +1,4 @@
-"""One motion as scripts, spreadsheets and editors write it: separators, encodings, ends of lines, units and orders."""
+"""One motion in layouts of scripts, spreadsheets and editors: separators, encodings, line ends, units and orders."""
 
 from collections.abc import Callable
 from itertools import permutations
@@ -27,11 +27,11 @@ PLAIN = csv(HEADER, SECONDS, *POSE)
 TUM = rows(SECONDS, *POSE)
 IN_UNITS = csv(UNITS, MICROSECONDS / 1e3, 1e3 * LEFT.positions, quaternions(), separator=";")
 GERMAN = PLAIN.replace(",", ";").replace(".", ",")
-"""As a spreadsheet writes it where numbers have decimal commas."""
+"""The CSV of a spreadsheet with decimal commas."""
 
 
 def ended(text: str, end: str = "\r\n") -> bytes:
-    """A text with other ends of lines."""
+    """Return a text with other line ends."""
     return text.replace("\n", end).encode()
 
 
@@ -82,7 +82,7 @@ def in_units(time: str, length: str) -> str:
 
 
 def angles(order: str, degrees: bool) -> np.ndarray:
-    """Euler angles about x, y and z; in small letters the order of turns about the axes of the world."""
+    """Return Euler angles about x, y and z; a lower-case order turns about the world's axes."""
     turned = LEFT.turns.as_euler(order, degrees=degrees)
     return turned[:, [order.lower().index(axis) for axis in "xyz"]]
 

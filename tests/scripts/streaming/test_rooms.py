@@ -1,4 +1,4 @@
-"""Rooms, by real processes and Zenoh over loopback: what one sends others show; strangers neither hear nor speak."""
+"""Tests of rooms with real processes and Zenoh over loopback: users see what others send, strangers are shut out."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ ROOT = Path(__file__).resolve().parents[3]
 COMMAND = (sys.executable, str(ROOT / "scripts" / "stream.py"))
 
 PATIENCE = 60.0
-"""Seconds that nothing takes, however busy the machine is."""
+"""Timeout in seconds, longer than anything takes on a busy machine."""
 
 MARGIN = ("--margin", "3")
-"""So that a busy machine is in time."""
+"""An extra delay of 3 s, for busy machines."""
 
 
 def free_port() -> int:
@@ -53,24 +53,24 @@ def free_port() -> int:
 
 @pytest.fixture
 def at() -> str:
-    """A place that is nobody else's."""
+    """A free address on loopback."""
     return f"{LOOPBACK_ADDRESS}:{free_port()}"
 
 
 @pytest.fixture(scope="module")
 def hand(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A rigid motion of two seconds."""
+    """A CSV of a rigid motion of two seconds."""
     return write_csv(tmp_path_factory.mktemp("hand") / "hand.csv", 2.0)
 
 
 @pytest.fixture(scope="module")
 def endless(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One that does not end before a busy machine has got to it."""
+    """A CSV of a motion too long to end during a test, even on a busy machine."""
     return write_csv(tmp_path_factory.mktemp("endless") / "endless.csv", 2.0 * PATIENCE)
 
 
 def write_csv(path: Path, seconds: float) -> Path:
-    """A smooth motion of a few decimetres and half turns, up to twice a second, recorded 90 times a second."""
+    """Write a smooth motion of a few decimetres and half turns, up to two cycles per second, sampled at 90 Hz."""
     random = np.random.default_rng(3)
     times = np.arange(round(seconds * 90.0) + 1) / 90.0
     frequencies, phases = random.uniform(0.1, 2.0, (7, 4, 1)), random.uniform(0.0, 2.0 * np.pi, (7, 4, 1))
@@ -84,7 +84,7 @@ def write_csv(path: Path, seconds: float) -> Path:
 
 @contextmanager
 def running(*arguments: object, cwd: Path | None = None) -> Iterator[subprocess.Popen]:
-    """A command, once it says that it runs."""
+    """Run a command, and yield its process once it has printed its first line."""
     line = [*COMMAND, *map(str, arguments)]
     process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=cwd)
     try:
@@ -104,7 +104,7 @@ def done(process: subprocess.Popen, code: int = 0) -> str:
 
 
 def run(*arguments: object, code: int = 0, cwd: Path | None = None) -> str:
-    """What a command prints; what it says where it fails."""
+    """Run a command, and return its output, or its error output if a failure is expected."""
     line = [*COMMAND, *map(str, arguments)]
     ended = subprocess.run(line, capture_output=True, text=True, timeout=PATIENCE, cwd=cwd)
     assert ended.returncode == code, ended.stderr
@@ -116,7 +116,7 @@ def largest_mm(printed: str) -> float:
 
 
 def errors_of(shown: Path, recording: Path) -> np.ndarray:
-    """Metres that points of a ball of 10 cm are off in each pose that was shown of a recording."""
+    """Return the error in metres of a 10 cm ball in each pose shown of a recording."""
     (clip,), _ = read_clips([str(shown)])
     (truth,), _ = read_clips([str(recording)])
     times, poses = samples_of(truth)
@@ -158,7 +158,7 @@ def test_a_body_goes_to_several_receivers_in_the_formats_that_they_ask_for(tmp_p
     assert clip.rest_body.parents.tolist() == own.parents.tolist()
     clips, _ = read_clips([f"{tmp_path / 'b.csv'}:*"])
     assert len(clips) == 6
-    # Frames of a thirtieth, beside those of a seventy-second.
+    # Frames at 30 per second, compared with 72 per second.
     assert len(clips[0].times) < 0.6 * len(clip.times)
 
 
@@ -203,7 +203,7 @@ def test_an_even_rate_sends_a_key_at_each_tick_and_a_mode_is_of_these(tmp_path, 
     ticks = 2 * 10
     assert ticks <= int(re.search(r"datagrams: (\d+)", sent)[1]) < 1.5 * ticks
     assert [clip.times[-1] for clip in read_clips(list(map(str, files)))[0]] == pytest.approx([2.0, 2.0], abs=0.02)
-    # What is typical, as a datagram that a busy machine drops is missed by decimetres at so low a rate.
+    # The median, because at this low rate a datagram dropped by a busy machine costs decimetres.
     errors = [np.median(errors_of(path, hand)) for path in files]
     assert errors[1] < 0.7 * errors[0]
 
@@ -242,7 +242,7 @@ def test_whoever_joins_late_sees_a_body_at_rest_within_a_third_of_a_second(tmp_p
 
 @pytest.fixture(scope="module")
 def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the example in docs/rooms, with certificates and passwords, at a port of its own."""
+    """The example folder of docs/rooms, with certificates and passwords, at its own port."""
     folder, port = tmp_path_factory.mktemp("house"), free_port()
     if not shutil.which("openssl"):
         pytest.skip("makes certificates by OpenSSL")
@@ -276,7 +276,7 @@ def test_a_stranger_without_rights_neither_hears_nor_speaks(house, hand):
 
     with running("router", "--config", "router.json5", cwd=house):
         with listening("bob", PATIENCE) as bob, listening("eve", 8.0) as eve:
-            # Neither a user of no rights, nor one who has taken somebody else's name.
+            # A user without rights cannot speak, under their own name or another's.
             send("eve", "eve")
             send("eve", "ada")
             send("bob", "ada")
@@ -300,7 +300,7 @@ def test_blender_gets_the_datagrams_as_they_are_and_its_answers_get_to_the_sende
         ):
             for _ in range(20):
                 panel.recvfrom(2048)
-            # As one that was started now: it knows nothing, and asks.
+            # A newly started receiver knows nothing, and asks.
             receiver = Receiver()
             began = time.monotonic()
             while not (shown := receiver.show(time.monotonic())) and time.monotonic() < began + PATIENCE:

@@ -1,4 +1,4 @@
-"""What of recordings is streamed: bodies, and how far around each joint the tolerance holds."""
+"""Tests of streaming recordings: bodies, and the radius around each joint within which the tolerance holds."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.scripts.bvh_bodies import TIMES, write_body
 def ends_off(
     body: StreamBody, times: np.ndarray, poses: Poses, ends: np.ndarray, tolerance: float, delay: float
 ) -> float:
-    """How far the ends of bones (joints, 3), in their joints' axes, are shown off at most, at the samples."""
+    """Return the largest error of bone ends (joints, 3), in their joints' axes, at the samples."""
     sender, receiver, off = Sender([body], tolerance, delay), Receiver(), [0.0]
     truth = Motion(times, poses)
 
@@ -47,7 +47,7 @@ def ends_off(
 
 
 def of_file(path: Path, tolerance: float, delay: float = 0.1) -> float:
-    """The same of the End Sites of a recording."""
+    """Return the largest error of the End Sites of a recording."""
     (clip,), _ = read_clips([str(path)])
     times, poses = samples_of(clip)
     sites = np.array([joint.end or (0.0, 0.0, 0.0) for joint in _read_hierarchy(path)[0]]) * clip.metres_per_unit

@@ -1,4 +1,4 @@
-"""Recordings and streams as VMC, and VMC as streams."""
+"""Tests of playing recordings and streams as VMC, and of receiving VMC as streams."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_the_command_plays_a_body_in_real_time(walk, listener):
     assert keys.moments == pytest.approx(np.arange(20) / 30, abs=1e-3)
     (body,) = keys.bodies
     assert body.joints == ("Root", "Hips", "Head", "LeftHand")
-    # Blender has the y axis of a BVH up; centimetres are found out by the size of the body.
+    # A BVH's y axis is up in Blender; the size of the body reveals centimetres.
     x, y, z = hips_at(TIMES[:20])[5]
     assert keys.poses["VMC"].positions[1, 5] == pytest.approx([x, -z, y], abs=1e-5)
 
