@@ -1,4 +1,4 @@
-"""Recordings for tests, of single bodies and skeletons, and how far off they are, by matrices of SciPy."""
+"""Synthetic recordings of single bodies and skeletons for tests, and their errors by matrices of SciPy."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -11,7 +11,7 @@ RADIUS = 0.1
 
 
 def wandering(count: int, seed: int, noise: float = 0.0, rough: float = 3.0) -> tuple[np.ndarray, Poses]:
-    """A recording at uneven times: a smooth walk of a body, with rests, and noise on top."""
+    """Return a recording at uneven times: a smooth random walk of a body, with rests, plus noise."""
     random = np.random.default_rng(seed)
     times = np.cumsum(random.uniform(0.005, 0.02, count))
     knots = np.linspace(times[0], times[-1], max(4, int(rough * (times[-1] - times[0]))))
@@ -26,12 +26,12 @@ def wandering(count: int, seed: int, noise: float = 0.0, rough: float = 3.0) -> 
 
 
 def shell_errors(times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str, radius: float = RADIUS) -> np.ndarray:
-    """The largest displacement of any point within the radius on every sample."""
+    """Return the largest displacement of any point within the radius on every sample."""
     return largest_displacements(matrices(interpolate(times[keys], poses[keys], times, mode)), matrices(poses), radius)
 
 
 def random_parents(random: np.random.Generator, joints: int) -> np.ndarray:
-    """A forest of one or more trees, its joints in any order, shape (joints,)."""
+    """Return the parents of a forest of one or more trees, its joints in any order, shape (joints,)."""
     parents = np.array([random.integers(-1, joint) if random.random() < 0.5 else joint - 1 for joint in range(joints)])
     names = random.permutation(joints)
     shuffled = np.empty(joints, dtype=np.int64)
@@ -42,7 +42,7 @@ def random_parents(random: np.random.Generator, joints: int) -> np.ndarray:
 def wandering_body(
     count: int, joints: int, seed: int, *, scaled: bool = False, resting: float = 0.2, noise: float = 0.0
 ) -> tuple[np.ndarray, Poses, np.ndarray]:
-    """Times (count,), poses (joints, count) and parents (joints,) of a body some of whose joints stand still."""
+    """Return times (count,), poses (joints, count) and parents (joints,) of a body with some joints at rest."""
     random = np.random.default_rng(seed)
     motions = [wandering(count, int(random.integers(2**16)), noise) for _ in range(joints)]
     positions, quaternions = (
@@ -59,7 +59,7 @@ def wandering_body(
 
 
 def matrices(poses: Poses) -> np.ndarray:
-    """Poses (...) as matrices (..., 4, 4)."""
+    """Return poses (...) as matrices (..., 4, 4)."""
     turns = Rotation.from_quat(poses.quaternions.reshape(-1, 4), scalar_first=True).as_matrix()
     result = np.zeros((*poses.shape, 4, 4))
     result[..., :3, :3] = turns.reshape(*poses.shape, 3, 3)
@@ -70,7 +70,7 @@ def matrices(poses: Poses) -> np.ndarray:
 
 
 def in_root_space(poses: Poses, parents: np.ndarray) -> np.ndarray:
-    """The matrices (joints, n, 4, 4) of joints in the root's space, each by going up its own chain."""
+    """Return the matrices (joints, n, 4, 4) of joints in the root's space, each by going up its chain."""
     own = matrices(poses)
     result = own.copy()
     for joint in range(len(parents)):
@@ -82,8 +82,8 @@ def in_root_space(poses: Poses, parents: np.ndarray) -> np.ndarray:
 
 
 def largest_displacements(a: np.ndarray, b: np.ndarray, radii: np.ndarray | float) -> np.ndarray:
-    """How far matrices (..., 4, 4) move any point of a ball from one another, shape (...); radii are those of the first
-    axis.
+    """Return how far apart two matrices (..., 4, 4) move any point of a ball, shape (...); radii are per item of the
+    first axis.
     """
     radii = np.reshape(radii, (-1, *[1] * (a.ndim - 1)))
     return balls.largest_displacements((a - b)[..., :3, 3], radii * (a - b)[..., :3, :3])
@@ -92,7 +92,7 @@ def largest_displacements(a: np.ndarray, b: np.ndarray, radii: np.ndarray | floa
 def body_errors(
     times: np.ndarray, poses: Poses, parents: np.ndarray, keys: tuple[np.ndarray, ...], mode: str, radii: np.ndarray
 ) -> np.ndarray:
-    """How far off a body is between keys of its joints, shape (joints, n)."""
+    """Return the errors of a body between keys of its joints, shape (joints, n)."""
     shown = [interpolate(times[own], poses[joint][own], times, mode) for joint, own in enumerate(keys)]
     scales = None if poses.scales is None else [joint.scales for joint in shown]
     shown = Poses([joint.positions for joint in shown], [joint.quaternions for joint in shown], scales)

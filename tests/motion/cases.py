@@ -1,4 +1,4 @@
-"""Pairs of poses for tests: ordinary ones, and the corners where formulas break."""
+"""Pairs of poses for tests: ordinary ones, and corner cases where formulas break."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ PAIRS = 2000
 
 
 def random_quaternions(random: np.random.Generator, *shape: int) -> np.ndarray:
-    """Uniformly distributed rotations, shape (*shape, 4)."""
+    """Return uniformly distributed rotations, shape (*shape, 4)."""
     quaternions = random.normal(size=(*shape, 4))
     return quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
 
 
 def pair(angle: np.ndarray | float, size: float = 1.0, scaled: bool = False, seed: int = 0) -> tuple[Poses, Poses]:
-    """`PAIRS` pairs of poses whose rotations differ by `angle`, with positions of the given size."""
+    """Return `PAIRS` pairs of poses whose rotations differ by `angle`, with positions of the given size."""
     random = np.random.default_rng(seed)
     half = np.broadcast_to(np.asarray(angle) / 2.0, (PAIRS,))[:, None]
     axes = random.normal(size=(PAIRS, 3))
@@ -29,7 +29,7 @@ def pair(angle: np.ndarray | float, size: float = 1.0, scaled: bool = False, see
 
 
 def corners(scaled: bool = False) -> dict[str, tuple[Poses, Poses]]:
-    """Name to pairs."""
+    """Return the corner cases: pairs by name."""
     random = np.random.default_rng(42)
     return {
         "random": pair(random.uniform(0.0, np.pi, PAIRS), scaled=scaled),
@@ -44,12 +44,12 @@ def corners(scaled: bool = False) -> dict[str, tuple[Poses, Poses]]:
 
 
 def size_of(*poses: Poses) -> float:
-    """The largest coordinate, or 1 where all are smaller: what a position's rounding is measured against."""
+    """Return the largest coordinate, at least 1: the scale for the rounding of positions."""
     return max(1.0, *(float(np.abs(p.positions).max()) for p in poses))
 
 
 def as_keys(first: Poses, second: Poses) -> Poses:
-    """Pairs as objects with two keys each, shape (pairs, 2)."""
+    """Return pairs as objects with two keys each, shape (pairs, 2)."""
     return Poses(
         np.stack((first.positions, second.positions), axis=1),
         np.stack((first.quaternions, second.quaternions), axis=1),
@@ -58,14 +58,14 @@ def as_keys(first: Poses, second: Poses) -> Poses:
 
 
 def shares() -> np.ndarray:
-    """The way gone between the keys of each pair, both ends included."""
+    """Return the fraction of the way between the keys of each pair, both ends included."""
     u = np.random.default_rng(1).uniform(size=PAIRS)
     u[0], u[1] = 0.0, 1.0
     return u
 
 
 def assert_same(poses: Poses, expected: Poses, tolerance: float = 1e-12) -> None:
-    """Equal positions to `tolerance` of their own size, equal quaternions up to sign, equal scales relatively."""
+    """Check that positions agree to `tolerance` of their size, quaternions up to sign, and scales relatively."""
     assert np.abs(poses.positions - expected.positions).max() <= tolerance * size_of(expected)
     signs = np.sign(np.sum(poses.quaternions * expected.quaternions, axis=-1, keepdims=True))
     assert np.abs(poses.quaternions - signs * expected.quaternions).max() <= tolerance

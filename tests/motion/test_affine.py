@@ -1,4 +1,4 @@
-"""How far affine maps are off: one by one as among many, and by their bounds as by all of them."""
+"""Tests of the errors of affine maps: one by one as among many, and by bounds as by all maps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ COUNT = 200
 
 @pytest.fixture
 def pairs() -> tuple[AffineMaps, AffineMaps, np.ndarray]:
-    """Balls that are turned about their origins, and half of them moved, stretched and sheared as well."""
+    """Return pairs of maps of balls: all turned about their origins, half of them also moved, stretched and sheared."""
     random = np.random.default_rng(3)
     turned = [np.moveaxis(matrices(normalise(random.normal(size=(COUNT, 4)))), -1, 0) for _ in range(2)]
     shear, moved = random.normal(size=(COUNT, 3, 3)), random.normal(size=(COUNT, 3))

@@ -1,7 +1,7 @@
-"""Every mode against libraries that were written by others: pytransform3d, kingdon, SciPy, mathutils.
+"""Tests of every mode against independent libraries: pytransform3d, kingdon, SciPy, mathutils.
 
-Positions agree to 1e-12 of their own size, for turns of 1e-9 rad as for turns of 180 degrees less 1e-9: in terms of
-unit quaternions neither is ill-conditioned, only the choice between two shortest ways at exactly 180 degrees is.
+Positions agree to 1e-12 of their own size, both for turns of 1e-9 rad and for turns of 180 degrees less 1e-9. In terms
+of unit quaternions both are well-conditioned; only the choice between two shortest ways at exactly 180 degrees is not.
 """
 
 import kingdon
@@ -19,7 +19,7 @@ BLENDS = ["pga_lerp", "cga_lerp"]
 
 
 def between(mode: str, first: Poses, second: Poses, u: np.ndarray) -> Poses:
-    """The in-betweens of the pairs."""
+    """Return the in-betweens of the pairs, by the fast form that users run or the reference in the mode's algebra."""
     return interpolate([0.0, 1.0], as_keys(first, second), u[:, None], mode)[:, 0]
 
 
@@ -64,7 +64,7 @@ def coefficients(multivector, *blades: str) -> np.ndarray:
 
 
 def carried_by(versor, points: np.ndarray) -> np.ndarray:
-    """Where a CGA versor takes points, by the sandwich product with their conformal images."""
+    """Return the points moved by a CGA versor: its sandwich product with their conformal images."""
     x, y, z = points.T
     square = 0.5 * (x * x + y * y + z * z)
     # X = x + x^2 / 2 e_inf + e_o with e_inf = e4 + e5 and e_o = (e5 - e4) / 2
@@ -98,7 +98,7 @@ def test_blends_with_scale_take_the_origin_where_the_plain_lerp_takes_it(corner)
     dilated = coefficients(versor, "e45", "e1245", "e1345", "e2345")
     w, e12, e13, e23 = (rotor / np.linalg.norm(rotor, axis=-1, keepdims=True)).T
     k = -np.sum(rotor * dilated, axis=-1) / np.sum(rotor * rotor, axis=-1)
-    # The image of a point holds the square of its distance: measured in units of its own size, no digits are lost.
+    # The image of a point holds its squared distance: in units of the point's size, no digits are lost.
     unit = size_of(first, second)
     near = [cga_versor(in_units_of(unit, p)) for p in (first, second)]
     origin = unit * carried_by(near[0] * (1 - u) + near[1] * u, np.zeros((PAIRS, 3)))
@@ -127,7 +127,7 @@ def test_rotation_of_lerp_slerp_is_scipys_slerp(corner):
     for row in range(0, PAIRS, 20):
         ends = Rotation.from_quat(np.stack((first.quaternions[row], second.quaternions[row])), scalar_first=True)
         expected = Slerp([0, 1], ends)(shares()[row])
-        # SciPy takes the logarithm of a rotation vector: near 180 degrees that is good to about 1e-8.
+        # SciPy uses a rotation vector: near 180 degrees it is exact to about 1e-8.
         near_half_turn = corner == "near 180 degrees"
         actual = Rotation.from_quat(poses.quaternions[row], scalar_first=True)
         assert (expected.inv() * actual).magnitude() < (1e-7 if near_half_turn else 1e-12)

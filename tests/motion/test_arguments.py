@@ -1,4 +1,4 @@
-"""What callers give in the wrong form: taken where it has one meaning, else refused by name, with a way out."""
+"""Tests of arguments in unusual forms: accepted if the meaning is clear, else refused by name with a way out."""
 
 import numpy as np
 import pytest

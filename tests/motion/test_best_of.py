@@ -1,4 +1,4 @@
-"""The best mode of each segment: never worse than a single mode, right where the answer is known, no change in vain."""
+"""Tests of the best mode per segment: never worse than a single mode, right in known cases, no needless changes."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ from tests.thoroughness import tried
 
 
 def errors_by_segments(times, poses, keys, modes) -> np.ndarray:
-    """The shell error of a mixed motion at all samples from the first key to the last, by matrices."""
+    """Return the shell error of a mixed motion at all samples from the first key to the last, by matrices."""
     errors = {mode: shell_errors(times, poses, keys, mode) for mode in set(modes)}
     return np.concatenate(
         [
@@ -87,7 +87,7 @@ def test_no_choice_of_equally_good_modes_has_fewer_changes(modes, segments, seed
     chosen = least_errors(shown, np.arange(0, 2 * segments + 1, 2))
     costs = shown[:, 1::2]
     assert np.array_equal(costs[chosen, np.arange(segments)], costs.min(axis=0))
-    # The fewest changes by going through all segments with the fewest that lead to each mode.
+    # The fewest changes, by dynamic programming: the fewest that lead to each mode, segment by segment.
     fewest = np.where(costs[:, 0] == costs[:, 0].min(), 0.0, np.inf)
     for cost in costs.T[1:]:
         fewest = np.where(cost == cost.min(), np.minimum(fewest, fewest.min() + 1.0), np.inf)
@@ -96,7 +96,7 @@ def test_no_choice_of_equally_good_modes_has_fewer_changes(modes, segments, seed
 
 @pytest.mark.parametrize(("tolerance", "mode"), [(0.01, "motor_spline"), (0.01, "lerp_slerp"), (0.01, "dq_sclerp")])
 def test_a_segment_at_the_very_tolerance_does_not_fall_for_a_mode_that_passes_it(tolerance, mode):
-    """Where another mode is nearer on the whole, and passes it. The keys' own may be off by rounding more than it."""
+    """Another mode may be nearer on the whole but exceed the tolerance. The keys' own mode may do so by rounding."""
     for seed in range(16):
         times, poses = wandering(300, seed)
         keys = reduce_keys(times, poses, mode, tolerance, RADIUS, tries=0)

@@ -1,4 +1,4 @@
-"""Cleaning: trembling and spikes go, hits stay, and nothing is moved by more than was allowed."""
+"""Tests of cleaning: jitter and spikes disappear, hits stay, and no sample moves by more than the tolerance."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NOISE, TURNS = 1e-3, np.radians(0.3)
 
 
 def hand(seed: int, count: int = 600, rate: float = 90.0) -> tuple[np.ndarray, Poses]:
-    """A motion of some decimetres and half turns, slower than two in a second."""
+    """Return a motion of some decimetres and half turns, below two cycles per second."""
     random = np.random.default_rng(seed)
     times = np.arange(count) / rate
     frequencies = random.uniform(0.1, 2.0, (7, 4, 1))
@@ -30,7 +30,7 @@ def hand(seed: int, count: int = 600, rate: float = 90.0) -> tuple[np.ndarray, P
 
 
 def shaken(poses: Poses, seed: int) -> Poses:
-    """The same with white noise."""
+    """Return the poses with white noise."""
     random = np.random.default_rng(seed)
     places, turns = random.normal(size=(2, len(poses), 3))
     quaternions = turned_in_world(poses.quaternions, TURNS * turns)
@@ -74,7 +74,7 @@ def test_white_noise_is_measured_as_it_is_however_short_the_recording(count):
         times, truth = hand(seed, count)
         found += trembling(times, shaken(truth, seed))[:2]
     parts = np.reshape(found, (-1, 2)) / (NOISE, TURNS)
-    # Not too little for want of samples, and no more scattered than so many numbers are.
+    # Not too low with few samples, and no more scattered than this many numbers must be.
     assert parts.mean() == pytest.approx(1.0, abs=0.02)
     assert parts.std() < 1.0 / np.sqrt(count)
     assert np.mean(np.abs(parts - 1.0) < 0.15) > (0.8 if count < 100 else 0.9)
@@ -124,7 +124,7 @@ def test_a_pose_that_comes_again_where_others_tremble_is_a_lost_sample_but_not_w
 
 def test_a_drum_stroke_keeps_its_hit():
     times = np.arange(400) / 100.0
-    # A stick that falls and bounces off every second.
+    # A stick that falls and bounces once a second.
     phase = (times % 1.0) - 0.5
     truth = Poses(np.stack([0.0 * times, 0.0 * times, 0.8 * np.abs(phase)], axis=1), np.tile([1.0, 0, 0, 0], (400, 1)))
     shaky = shaken(truth, 5)
@@ -166,7 +166,7 @@ def test_nothing_is_moved_by_more_than_the_tolerance(seed, tolerance, radius, co
     poses = Poses(walk[:, :3], align_signs(normalise(walk[:, 3:] + random.normal(size=4))))
     cleaned = clean(times, poses, tolerance, radius)
     listed = cleaned.spikes | cleaned.repeats
-    # Independently: the corners of a fine grid on the sphere.
+    # Independent check: the displacement of many points on the sphere.
     points = random.normal(size=(400, 1, 3))
     points *= radius / np.linalg.norm(points, axis=-1, keepdims=True)
     apart = rotate(cleaned.poses.quaternions, points) + cleaned.poses.positions - rotate(poses.quaternions, points)
@@ -186,7 +186,7 @@ def test_what_has_been_cleaned_is_not_moved_again(seed):
     for row in random.integers(9, count - 9, count // 200):
         positions[row : row + 2] += random.uniform(0.05, 0.3)
     shaky = Poses(positions, align_signs(turned_in_world(truth.quaternions, turn * noise[1])))
-    # Less takes out no more than a part of the trembling each time.
+    # A smaller tolerance would remove only part of the jitter each time.
     tolerance = 3.0 * (size * 3.0**0.5 + 0.1 * turn * 2.0**0.5)
     for allowed in (None, tolerance):
         cleaned = clean(times, shaky, allowed)
@@ -277,7 +277,7 @@ def test_what_stands_slides_no_further_than_it_did_and_nothing_is_moved_by_more(
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_foot_that_stood_still_stays_so_and_moves_nothing_else_further_than_it_was_to_be(seed):
-    """A hip that trembles above a foot that steps, with a leg between them that is as long as it has to be."""
+    """A jittering hip above a stepping foot, joined by a leg of the length that this requires."""
     times, still = np.arange(400) / 60.0, np.tile([1.0, 0, 0, 0], (400, 1))
     steps = np.floor(times) + np.clip(5.0 * np.mod(times, 1.0) - 4.0, 0.0, 1.0)
     foot = np.outer(0.2 * steps + 0.1, (1.0, 0, 0))

@@ -1,4 +1,4 @@
-"""Which joints stand on the ground, and how far they slide, on motions where that is known."""
+"""Tests of ground contacts: which joints stand and how far they slide, on known motions."""
 
 import numpy as np
 import pytest
@@ -10,14 +10,14 @@ HEIGHTS = np.array((1.7, 1.0, 0.05))
 
 
 def body(foot: np.ndarray) -> np.ndarray:
-    """A head and a hip that go forwards, and a foot (n, 3) that does as it is told."""
+    """Return positions of a head and a hip that move forward, and of the given foot (n, 3)."""
     forwards = np.stack((0.8 * TIMES, 0.0 * TIMES, 0.0 * TIMES), axis=1)
     head, hip = (forwards + np.array((0.0, 0.0, height)) for height in HEIGHTS[:2])
     return np.stack((head, hip, foot))
 
 
 def stepping(stands: np.ndarray, drift: float = 0.0) -> np.ndarray:
-    """A foot that goes forwards at 2 m/s, but where it stands, where it drifts."""
+    """Return a foot that moves forward at 2 m/s, or at the speed `drift` while it stands."""
     ways = np.where(stands, drift / 30.0, 2.0 / 30.0)
     return np.stack((np.cumsum(ways), 0.0 * ways, np.full(len(ways), HEIGHTS[2])), axis=1)
 

@@ -1,4 +1,4 @@
-"""The keys of hand-made curves come back from their samples, and what is promised holds for anything."""
+"""Tests of fitting cubic keys: hand-made curves get their keys back, and any curve stays within the tolerance."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ TIMES = np.arange(481) / 24
 
 
 def hand_made(width: int, seed: int = 0) -> tuple[np.ndarray, CubicKeys]:
-    """Frames of keys, and keys whose slopes go on through them; four numbers are unit quaternions."""
+    """Return frames and keys with equal slopes on both sides; keys of four numbers are unit quaternions."""
     random = np.random.default_rng(seed)
     frames = np.concatenate(([0], np.cumsum(random.integers(6, 40, size=18)), [480]))
     values = random.normal(size=(len(frames), width))
@@ -39,7 +39,7 @@ def hand_made(width: int, seed: int = 0) -> tuple[np.ndarray, CubicKeys]:
 
 
 def played(keys: CubicKeys, times: np.ndarray, *, are_turns: bool = False) -> np.ndarray:
-    """What SciPy makes of curves that are all cubic."""
+    """Return the values of all-cubic curves according to SciPy."""
     parts = [
         CubicHermiteSpline(keys.times[[key, key + 1]], keys.values[[key, key + 1]], slopes, axis=0)
         for key, slopes in enumerate(np.stack((keys.leaving[:-1], keys.arriving[1:]), axis=1))
@@ -124,7 +124,7 @@ def test_curves_that_follow_one_another_are_joined(sign):
 @given(st.integers(0, 10**6), st.integers(2, 90), st.sampled_from([1, 3, 4]), st.booleans(), st.booleans())
 @example(70, 70, 4, False, True)
 def test_no_sample_is_off_by_more_than_is_allowed(seed, count, width, steps, lines):
-    """Uneven times, noise, holds, and a different allowance at each sample."""
+    """With uneven times, noise, holds, and a different tolerance at each sample."""
     random = np.random.default_rng(seed)
     times = np.cumsum(random.uniform(0.01, 0.1, size=count))
     values = np.cumsum(random.normal(size=(count, width)) * random.integers(0, 2, size=(count, 1)), axis=0)
@@ -137,7 +137,7 @@ def test_no_sample_is_off_by_more_than_is_allowed(seed, count, width, steps, lin
     if width == 4:
         shown /= np.linalg.norm(shown, axis=1, keepdims=True)
         if lines:
-            # Such are stored as lines of turns, which all that plays them turns evenly.
+            # These are stored as lines between rotations, which every player turns evenly.
             turning = Poses(np.zeros((len(keys.times), 3)), align_signs(keys.values))
             segment = np.clip(np.searchsorted(keys.times, times, side="right") - 1, 0, None)
             even = interpolate(keys.times, turning, times, "lerp_slerp").quaternions

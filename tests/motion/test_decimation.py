@@ -1,4 +1,4 @@
-"""Uniform decimation to a rate."""
+"""Tests of uniform decimation to a rate."""
 
 import numpy as np
 import pytest

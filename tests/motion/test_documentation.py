@@ -1,4 +1,4 @@
-"""What is public says what it takes, gives and refuses, and its examples are true."""
+"""Tests of the public docstrings: arguments, results and errors are described, and examples are true."""
 
 import doctest
 import inspect
@@ -25,13 +25,13 @@ print(*sorted({name.split(".")[0] for name in sys.modules} - before - sys.stdlib
 
 
 def sections(name: str) -> dict[str, str]:
-    """Heading to text of a docstring."""
+    """Return the sections of a docstring: text by heading."""
     parts = re.split(r"^(\w[\w ]*)\n-+$", inspect.getdoc(getattr(motion, name)), flags=re.MULTILINE)
     return {heading: text.strip("\n") for heading, text in zip(parts[1::2], parts[2::2], strict=True)}
 
 
 def entries(text: str) -> list[str]:
-    """The names that a section of a docstring is about: what stands at the margin, before a colon."""
+    """Return the names that a docstring section describes: the text at the margin, before a colon."""
     heads = [line.split(" : ")[0] for line in text.splitlines() if line and not line.startswith(" ")]
     return [name for head in heads for name in head.split(", ")]
 
@@ -39,7 +39,7 @@ def entries(text: str) -> list[str]:
 @pytest.mark.parametrize("name", CALLABLES)
 def test_the_examples_of_what_is_public_are_true(name):
     documented = getattr(motion, name)
-    # In a namespace of its own, as whoever copies an example has it.
+    # In an empty namespace, as for a reader who copies the example.
     result = doctest.DocTestFinder(recurse=inspect.isclass(documented)).find(documented, name, globs={})
     runner = doctest.DocTestRunner(verbose=False)
     report: list[str] = []

@@ -1,4 +1,4 @@
-"""Euler angles against mathutils, and their continuity."""
+"""Tests of Euler angles: the rotations are SciPy's, and the angles are continuous."""
 
 import itertools
 
@@ -14,7 +14,7 @@ in_every_order = pytest.mark.parametrize("order", ORDERS)
 
 
 def rotations(angles: np.ndarray, order: str) -> Rotation:
-    """By SciPy, whose small letters turn about fixed axes, one after the other."""
+    """Return SciPy's rotations; its lower-case orders turn about fixed axes, one after the other."""
     return Rotation.from_euler(order.lower(), angles[:, ["XYZ".index(axis) for axis in order]])
 
 
@@ -59,7 +59,7 @@ def test_motions_have_no_jumps(order):
 def test_straight_through_gimbal_lock(order):
     middle = "XYZ".index(order[1])
     angles = np.full((201, 3), 0.3)
-    angles[:, middle] = np.linspace(1.0, np.pi - 1.0, 201)  # The middle one of these is a right angle exactly.
+    angles[:, middle] = np.linspace(1.0, np.pi - 1.0, 201)  # The middle angle is exactly a right angle.
     quaternions = rotations(angles, order).as_quat(scalar_first=True)
     result = extrinsic_eulers_from_quaternions(quaternions, order)
     assert_same_rotations(result, order, quaternions, 1e-7)

@@ -1,4 +1,4 @@
-"""Numbers at the ends of what floats hold: a result that is finite, or an error that says where; never a warning."""
+"""Tests of numbers at the limits of floats: the result is finite, or an error says where; never a warning."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_keys_that_no_clock_tells_apart_are_refused(step: float) -> None:
 
 
 def test_all_of_the_range_of_single_precision_can_be_filled_in() -> None:
-    """Blender holds such numbers, and a channel may."""
+    """Blender and its channels can hold such numbers."""
     largest = float(np.finfo(np.float32).max)
     keys = Poses([[-largest] * 3, [largest] * 3, [0.0] * 3], np.eye(4)[[0, 1, 0]])
     for mode in MODES:

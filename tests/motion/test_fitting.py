@@ -1,4 +1,4 @@
-"""Keys that are fitted: never worse than recorded poses, and near the truth where the recording is noisy."""
+"""Tests of fitted keys: never worse than recorded poses, and near the truth for noisy recordings."""
 
 import numpy as np
 import pytest
@@ -13,12 +13,12 @@ from tests.thoroughness import tried
 
 
 def squares(times: np.ndarray, poses: Poses, keys: np.ndarray, at_keys: Poses, mode: str, radius: float) -> float:
-    """The sum of what `fit_keys` makes small."""
+    """Return the sum of squares that `fit_keys` minimises."""
     return float(np.sum(residuals(interpolate(times[keys], at_keys, times, mode), poses, radius) ** 2))
 
 
 def residuals(shown: Poses, truth: Poses, radius: float) -> np.ndarray:
-    """How far the origins are off and, by matrices, the chords of the shell: two rotations differ by 8 sin^2."""
+    """Return the errors of the origins and, by matrices, the chords of the shell: two rotations differ by 8 sin^2."""
     turned, turns = (matrices(Poses(some.positions, some.quaternions))[:, :3, :3] for some in (shown, truth))
     chords = turned - turns
     if truth.scales is not None:

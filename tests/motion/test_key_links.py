@@ -1,4 +1,4 @@
-"""The shortest way from key to key, against all ways there are."""
+"""Tests of the shortest path from key to key against an exhaustive search."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ TOLERANCES = (0.01, 0.03, 0.08)
 
 
 def fewest_of_a_programme(times: np.ndarray, poses: Poses, mode: str, tolerance: float) -> int:
-    """How many keys a recording needs where a segment is right or wrong by itself."""
+    """Return the fewest keys for a recording, if each segment counts as right or wrong by itself."""
     needed = [1]
     for end in range(1, len(times)):
         ways = []

@@ -1,4 +1,4 @@
-"""The quick errors of splines for the search are those of the mode."""
+"""Tests that the search's fast errors of splines are the errors of the mode."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The measures of error, on motions whose errors are known."""
+"""Tests of the error measures on motions with known errors."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_a_turn_moves_the_shell_by_the_chord(angle):
 
 
 def pairs(count: int, seed: int, growing: bool) -> tuple[Poses, Poses]:
-    """Poses near one another and far apart, in place, in rotation and in scale."""
+    """Return pairs of poses that differ a little or a lot in position, rotation and scale."""
     random = np.random.default_rng(seed)
     near, nearer, nearest = 10.0 ** random.uniform((-6, -6, -8), (1, 1, 0), (count, 3)).T[..., None]
     truth = random.normal(size=(count, 3)), random_quaternions(random, count)

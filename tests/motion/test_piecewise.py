@@ -1,4 +1,4 @@
-"""Piecewise functions: however they are put together, and by power series where samples are many, they agree."""
+"""Tests of piecewise functions: prepared or not, and by power series for many samples, they agree."""
 
 import numpy as np
 import pytest

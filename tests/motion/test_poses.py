@@ -1,4 +1,4 @@
-"""Poses and arrays of quaternions."""
+"""Tests of poses and arrays of quaternions."""
 
 import tracemalloc
 

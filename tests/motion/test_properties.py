@@ -1,4 +1,4 @@
-"""What every mode promises, whatever the keys."""
+"""Property tests of what every mode guarantees for any keys."""
 
 import itertools
 
@@ -18,7 +18,7 @@ numbers = st.floats(-100.0, 100.0, width=32)
 
 @st.composite
 def motions(draw, least=2, most=6, scaled=False):
-    """Key times and keys: unevenly spaced, repeated poses and half turns among them."""
+    """Key times and keys: unevenly spaced, with repeated poses and half turns among them."""
     count = draw(st.integers(least, most))
     intervals = draw(arrays(float, count, elements=st.floats(0.015625, 8.0, width=32)))
     quaternions = draw(arrays(float, (count, 4), elements=st.floats(-1.0, 1.0, width=32)))
@@ -40,7 +40,7 @@ def assert_close(a: Poses, b: Poses, tolerance: float = 1e-9) -> None:
 
 
 def no_half_turn(keys: Poses) -> bool:
-    """Whether no two neighbours are so near 180 degrees apart that rounding decides on the way round."""
+    """Return whether no neighbouring keys are so near 180 degrees apart that rounding decides the direction."""
     dots = np.sum(keys.quaternions[1:] * keys.quaternions[:-1], axis=1)
     return bool(np.all(np.abs(dots) > 1e-6))
 
@@ -110,7 +110,7 @@ def test_a_versor_blend_with_growth_stops_half_way_to_where_it_has_no_scale():
     assert shown.scales[1:] == pytest.approx(shown.scales[1])
     blend = ((1.0 - u[1]) + u[1] * root) / ((1.0 - u[1]) + u[1] / root)
     assert shown.scales[1] == pytest.approx(blend)
-    # Where nothing grows, it never stops.
+    # Without growth it never stops.
     still = interpolate(
         [0, 1], Poses(keys.positions, keys.quaternions, [3.0, 3.0]), [50.0], "cga_lerp", extrapolate=True
     )

@@ -1,4 +1,4 @@
-"""Key reduction: what it promises of its keys, recomputed apart from it."""
+"""Tests of key reduction, with independently computed errors of the keys."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_the_root_mean_square_stays_within_the_tolerance(count, seed, tolerance,
 
 @settings(max_examples=tried(30))
 @given(st.integers(2, 200), st.integers(0, 2**16), st.integers(2, 40), st.booleans(), st.sampled_from(tuple(MODES)))
-@example(count=89, seed=89, budget=3, rms=False, mode="dq_sclerp")  # It is at rest.
+@example(count=89, seed=89, budget=3, rms=False, mode="dq_sclerp")  # The body is at rest.
 def test_a_budget_is_spent_and_not_passed(count, seed, budget, rms, mode):
     times, poses = wandering(count, seed)
     keys = reduce_keys(times, poses, mode, radius=RADIUS, budget=budget, rms=rms)
@@ -50,7 +50,7 @@ def test_a_budget_is_spent_and_not_passed(count, seed, budget, rms, mode):
 
 
 def error_of_bisecting(times: np.ndarray, poses: Poses, mode: str, budget: int, error: float) -> float:
-    """The least error of the keys of eight tolerances, about one that is known, that are no more than a budget."""
+    """Return the least error found by bisecting tolerances near a known error, for at most `budget` keys."""
     low, high, best = np.log(error / 4.0), np.log(2.0 * error), np.inf
     for _ in range(8):
         middle = 0.5 * (low + high)
@@ -82,7 +82,7 @@ def test_a_budget_is_spent_as_well_as_by_trying_tolerances(mode, budget):
 
 
 def test_blenders_curves_need_no_more_keys_within_an_error_than_a_budget_has():
-    """Of a camera as a tracker solves it: keys that are put in where its jitter is largest would follow the jitter."""
+    """The motion is a camera solved by a tracker: keys put where its jitter is largest would follow the jitter."""
     times, random = np.arange(221) / 24.0, np.random.default_rng(1)
     eased = (share := times / times[-1]) ** 2 * (3.0 - 2.0 * share)
     angle = np.radians(200.0 * eased)

@@ -1,4 +1,4 @@
-"""The repair of recordings: what is done is right, and is said."""
+"""Tests of repairing recordings: the repairs are right, and each is reported."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tests.motion.cases import random_quaternions
 
 
 def recording(count: int = 20, seed: int = 0) -> tuple[np.ndarray, Poses]:
-    """A sound one at 100 Hz."""
+    """Return a sound recording at 100 Hz."""
     random = np.random.default_rng(seed)
     quaternions = np.array((1.0, 0, 0, 0)) + 0.1 * random.normal(size=(count, 4))
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)

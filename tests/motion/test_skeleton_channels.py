@@ -1,4 +1,4 @@
-"""Keys of rotations and of locations apart, recomputed by slerp of SciPy, np.interp and matrices down the chains."""
+"""Tests of separate keys for rotations and locations, recomputed by SciPy's Slerp, np.interp and matrices."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from tests.thoroughness import tried
 def channels_shown(
     times: np.ndarray, poses: Poses, keys: tuple[SeparateKeys, ...], moments: np.ndarray | None = None
 ) -> Poses:
-    """Joints (joints, m) between keys of their channels, with the scales they begin with, at these moments (m,)."""
+    """Return poses (joints, m) between keys of the channels at these moments (m,), with each joint's first scale."""
     moments = times if moments is None else moments
     positions, quaternions = np.empty((len(keys), len(moments), 3)), np.empty((len(keys), len(moments), 4))
     for joint, (rotation, location) in enumerate(keys):
@@ -32,7 +32,7 @@ def channels_shown(
 def channel_errors(
     times: np.ndarray, poses: Poses, parents: np.ndarray, keys: tuple[SeparateKeys, ...], radii: np.ndarray
 ) -> np.ndarray:
-    """How far off a body is between keys of its channels, shape (joints, n)."""
+    """Return the errors of a body between keys of its channels, shape (joints, n)."""
     shown = channels_shown(times, poses, keys)
     return largest_displacements(in_root_space(shown, parents), in_root_space(poses, parents), radii)
 
@@ -42,7 +42,7 @@ def numbers_in(keys: tuple[SeparateKeys, ...]) -> int:
 
 
 def with_constant_channels(poses: Poses, seed: int) -> Poses:
-    """The same where a third of the rotations and a third of the locations stay what they are at first."""
+    """Return the poses with a third of the rotations and a third of the locations constant."""
     random = np.random.default_rng(seed)
     positions, quaternions = poses.positions.copy(), poses.quaternions.copy()
     for rows in (positions, quaternions):

@@ -1,4 +1,4 @@
-"""Key reduction of whole bodies: what it promises, recomputed by matrices down the chains and singular values."""
+"""Tests of key reduction for whole bodies, with errors recomputed by matrices down the chains and singular values."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_every_joint_stays_within_the_tolerance_everywhere(count, joints, seed, 
 @settings(max_examples=tried(20))
 @given(st.integers(4, 10), st.integers(0, 2**16), st.sampled_from((0.003, 0.03, 0.3)), st.sampled_from(tuple(MODES)))
 def test_keys_of_their_own_are_no_more_than_key_poses(joints, seed, tolerance, mode):
-    """In 260 bodies four had more, of one or two joints, by up to four keys: key poses are searched for longer."""
+    """In 260 bodies four of one or two joints had up to four more keys: key poses are searched for longer."""
     times, poses, parents = wandering_body(60, joints, seed)
     own, shared = (
         reduce_skeleton_keys(times, poses, parents, mode, tolerance=tolerance, shared=shared)
@@ -83,14 +83,14 @@ def test_joints_of_weight_zero_have_no_keys_for_themselves():
     times, poses, _ = wandering_body(80, 4, 3, resting=0.0)
     keys = reduce_skeleton_keys(times, poses, [-1, 0, 1, 0], tolerance=1e-3, weights=[1.0, 0.0, 0.0, 1.0])
     assert [len(own) == 1 for own in keys] == [False, True, True, False]
-    # What matters hangs on what does not, so that has to be right as well.
+    # The joint that matters is a descendant of joints that do not, so they must be right as well.
     keys = reduce_skeleton_keys(times, poses, [-1, 0, 1, 2], tolerance=1e-3, weights=[0.0, 0.0, 0.0, 1.0])
     assert all(len(own) > 2 for own in keys)
 
 
 @settings(max_examples=tried(20))
 @given(st.integers(2, 90), st.integers(1, 6), st.integers(0, 2**16), st.integers(0, 120), st.sampled_from(tuple(MODES)))
-@example(count=3, joints=1, seed=56, more=1, mode="lerp_slerp")  # at rest: two keys are enough
+@example(count=3, joints=1, seed=56, more=1, mode="lerp_slerp")  # At rest, two keys are enough.
 def test_a_budget_is_kept(count, joints, seed, more, mode):
     body = wandering_body(count, joints, seed)
     own = reduce_skeleton_keys(*body, mode, budget=2 * joints + more)

@@ -1,4 +1,4 @@
-"""Long recordings of bodies in stretches: what they promise, recomputed apart from the program."""
+"""Tests of reducing long recordings of bodies in stretches, with independently computed errors."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ TWO_WAYS = pytest.mark.parametrize("separate", [False, True])
     st.sampled_from((None, *STRAIGHT)),
 )
 def test_every_joint_stays_within_the_tolerance_everywhere(count, joints, seed, scaled, tolerance, stretch, mode):
-    """Without a mode, rotations and locations are apart."""
+    """Without a mode, rotations and locations have separate keys."""
     random = np.random.default_rng(seed)
     times, poses, parents = wandering_body(count, joints, seed, scaled=scaled, noise=(0.0, 1e-3)[seed % 2])
     if mode is None and scaled:

@@ -1,4 +1,4 @@
-"""Skeletons, against matrices multiplied up each joint's own chain."""
+"""Tests of skeletons against matrices multiplied up each joint's chain."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""How far bodies go and turn, against circles and screws of known speed, and where their velocity jumps."""
+"""Tests of path lengths, turning and velocity jumps on circles and screws of known speed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def about_z(angles: np.ndarray) -> np.ndarray:
 
 
 def screw() -> AffineMaps:
-    """Two units from the axis, a twentieth of a radian a step, and a tenth of a unit along."""
+    """Return a screw: 2 units from the axis, 0.05 radians and 0.1 units along the axis per step."""
     angles = 0.05 * TIMES
     return AffineMaps(about_z(angles), np.stack((2.0 * np.cos(angles), 2.0 * np.sin(angles), 0.1 * TIMES), axis=1))
 

@@ -1,4 +1,4 @@
-"""What the motor spline promises beside what every mode does: no corners, no say of far keys, rests that rest."""
+"""Tests of the motor spline: no corners, no influence of distant keys, rests stay at rest."""
 
 import itertools
 
@@ -20,7 +20,7 @@ every_spline = pytest.mark.parametrize("mode", SMOOTH)
 
 
 def motion(count: int = 9, seed: int = 0, scaled: bool = False) -> tuple[np.ndarray, Poses]:
-    """Uneven times and keys that turn by all angles."""
+    """Return uneven times, and keys that turn by all angles."""
     random = np.random.default_rng(seed)
     times = np.cumsum(random.uniform(0.2, 1.5, count))
     scales = np.exp(random.normal(size=count)) if scaled else None
@@ -28,7 +28,7 @@ def motion(count: int = 9, seed: int = 0, scaled: bool = False) -> tuple[np.ndar
 
 
 def twist_at(times: np.ndarray, keys: Poses, moment: float, side: int, mode: str) -> np.ndarray:
-    """The body twist just before or behind a moment, by one-sided differences of the third order."""
+    """Return the body twist just before or after a moment, by third-order one-sided differences."""
     step = 2e-4 * side
     moments = np.sort(moment + step * np.arange(4))
     poses = interpolate(times, keys, moments, mode, extrapolate=True)[:: 1 if side > 0 else -1]
@@ -70,7 +70,7 @@ def test_a_key_has_a_say_in_no_more_segments_than_the_table_tells(mode):
 def test_where_a_key_repeats_the_body_rests(mode, scaled, computed):
     times, keys = motion(9, scaled=scaled)
     keys = keys[[0, 1, 2, 3, 3, 3, 4, 5, 6]]
-    if computed:  # In single precision, as Blender does it.
+    if computed:  # In single precision, as in Blender.
         off = np.random.default_rng(4).uniform(-2e-7, 2e-7, (9, 3))
         keys = Poses(keys.positions + off, turned(keys.quaternions, off[::-1]), keys.scales)
     moments = np.linspace(times[3], times[5], 200)
@@ -96,14 +96,14 @@ def test_turns_of_almost_half_a_turn_stay_sound(mode, short):
     moments = np.linspace(times[0], times[-1], 4001)
     path = interpolate(times, keys, moments, mode)
     steps = angle_between(path.quaternions[1:], path.quaternions[:-1]) / np.diff(moments)
-    # No faster anywhere than a few half turns in the shortest segment.
+    # Never faster than a few half turns in the time of the shortest segment.
     assert steps.max() < 4.0 * np.pi / np.diff(times).min()
     assert np.abs(np.linalg.norm(path.quaternions, axis=1) - 1.0).max() < 1e-12
     assert_close(interpolate(times, keys, times, mode), keys, 1e-9)
 
 
 def slow_spline(times: np.ndarray, keys: Poses, moments: np.ndarray, mode: str) -> np.ndarray:
-    """A motor spline by SciPy's matrix functions, one moment after the other, shape (m, 4, 4)."""
+    """Return a motor spline by SciPy's matrix functions, moment by moment, shape (m, 4, 4)."""
     poses = matrices(keys)
     ways = [logm(np.linalg.inv(a) @ b).real for a, b in itertools.pairwise(poses)]
     h = np.diff(times)
@@ -128,7 +128,7 @@ def slow_spline(times: np.ndarray, keys: Poses, moments: np.ndarray, mode: str) 
         i = int(np.clip(np.searchsorted(times, moment, side="right") - 1, 0, len(h) - 1))
         u = (moment - times[i]) / h[i]
         leave, arrive = h[i] * speeds[i] - ways[i], h[i] * speeds[i + 1] - ways[i]
-        # A stream leaves a key at a twist from before it knew how late the next one is.
+        # A stream leaves a key with a twist chosen before the time of the next key was known.
         part = min(1.0, 2.0 * h[i - 1] / h[i]) if mode == CAUSAL and i else 1.0
         left = u * (1 - u / part) ** 2 if u < part else 0.0
         result.append(poses[i] @ expm(u * ways[i]) @ expm(left * leave - u**2 * (1 - u) * arrive))
@@ -161,13 +161,15 @@ def test_beyond_its_ends_it_goes_on_with_the_twist_it_has_there(mode):
 
 @st.composite
 def wild_times(draw, least: int = 3, most: int = 8) -> np.ndarray:
-    """Key times of which neighbours are up to 10 000 times as long as one another."""
+    """Key times whose neighbouring segments differ in length by factors of up to 10 000."""
     exponents = draw(st.lists(st.floats(-4.0, 0.0), min_size=least - 1, max_size=most - 1))
     return np.concatenate(((0.0,), np.cumsum(10.0 ** np.array(exponents))))
 
 
 def wild_keys(times: np.ndarray, seed: int, spread: float) -> tuple[np.ndarray, Poses]:
-    """Keys, each a turn by an angle about a body axis and an advance further than the one before."""
+    """Return the angles between keys, and keys that each follow from the one before by a turn about a body axis and an
+    advance.
+    """
     random, count = np.random.default_rng(seed), len(times) - 1
     angles, ways = 3.0 * 10.0 ** -random.uniform(0.0, spread, (2, count))
     axes, advances = random.normal(size=(3, count)), ways * random.normal(size=(3, count))
@@ -180,7 +182,7 @@ def wild_keys(times: np.ndarray, seed: int, spread: float) -> tuple[np.ndarray, 
 
 
 def filled(times: np.ndarray, keys: Poses, mode: str, count: int = 100) -> Poses:
-    """Each segment at so many equal steps and both its keys, shape (segments, count + 1)."""
+    """Return poses at `count` equal steps of each segment, both keys included, shape (segments, count + 1)."""
     progress = np.tile(np.linspace(0.0, 1.0, count + 1), len(times) - 1)
     path = in_betweens(times, keys, [count + 1] * (len(times) - 1), progress, mode)
     shape = len(times) - 1, count + 1
@@ -188,7 +190,7 @@ def filled(times: np.ndarray, keys: Poses, mode: str, count: int = 100) -> Poses
 
 
 def reseated(poses: Poses, on: Poses) -> Poses:
-    """The poses of another point and set of axes of the same body: `on` has one pose."""
+    """Return the poses of another frame fixed to the same body, whose pose in the body is `on`."""
     moved = rotate(poses.quaternions, np.broadcast_to(on.positions, poses.positions.shape))
     return Poses(
         poses.positions + moved, multiply(poses.quaternions, np.broadcast_to(on.quaternions, poses.quaternions.shape))
@@ -196,18 +198,20 @@ def reseated(poses: Poses, on: Poses) -> Poses:
 
 
 def turnings(path: Poses) -> np.ndarray:
-    """How far the body turns in each segment, in radians."""
+    """Return how far the body turns in each segment, in radians."""
     return angle_between(path.quaternions[:, 1:], path.quaternions[:, :-1]).sum(axis=-1)
 
 
 def lengths(path: Poses) -> np.ndarray:
-    """How far the body's origin goes in each segment."""
+    """Return the length of the origin's path in each segment."""
     return np.linalg.norm(np.diff(path.positions, axis=1), axis=-1).sum(axis=-1)
 
 
 @given(wild_times(), st.integers(0, 2**16), st.floats(0.0, 4.0))
 def test_whatever_the_keys_a_stream_stays_in_their_neighbourhood(times, seed, spread):
-    """It leaves a key by at most 1.31 of the twist before and half of that before it, for twice the time before."""
+    """A stream leaves a key with at most 1.31 times the previous twist and half the one before it, for twice the
+    previous time.
+    """
     angles, keys = wild_keys(times, seed, spread)
     count = len(angles)
     path, screw = (filled(times, keys, mode) for mode in (CAUSAL, "dq_sclerp"))
@@ -222,7 +226,7 @@ def test_whatever_the_keys_a_stream_stays_in_their_neighbourhood(times, seed, sp
 
 @given(wild_times(), st.integers(0, 2**16), st.floats(0.0, 4.0))
 def test_whatever_the_keys_no_point_of_the_body_leaves_their_neighbourhood(times, seed, spread):
-    """The bounds of docs/conventions.md, with steps of any size, up to 10 000 times as far as those next to them."""
+    """The bounds of docs/conventions.md hold for steps of any size, up to 10 000 times as large as their neighbours."""
     random, (angles, keys) = np.random.default_rng(seed), wild_keys(times, seed, spread)
     body = Poses(random.normal(size=3), random_quaternions(random))
     for seated in (keys, reseated(keys, body)):

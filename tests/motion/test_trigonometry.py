@@ -1,4 +1,4 @@
-"""Sines and cosines, by the tangent of half the angle and by the polynomial: whichever the processor has."""
+"""Tests of sines and cosines by the half-angle tangent and by the polynomial, whichever suits the processor."""
 
 import math
 from types import SimpleNamespace
@@ -19,10 +19,10 @@ def _sine_and_cosine(angles: np.ndarray, narrow: bool) -> tuple[np.ndarray, np.n
 
 
 def _is_exact(angles: np.ndarray, narrow: bool) -> bool:
-    """Whether sines are the C library's to three units in the last place, and cosines to two of those of 1.
+    """Return whether sines match the C library to three units in the last place, and cosines to two of those of 1.
 
-    Where NumPy's own tangent is off by more than a unit, sines may be by as many more: before NumPy 2 it is, by up to
-    three where the processor has AVX-512.
+    Sines may be off by as many more units as NumPy's own tangent is beyond one: before NumPy 2 that is up to three on
+    processors with AVX-512.
     """
     sine, cosine = _sine_and_cosine(angles, narrow)
     expected = np.array([math.sin(angle) for angle in angles])
@@ -51,7 +51,7 @@ def test_angles_have_their_sines_and_cosines_to_a_few_units_in_the_last_place(mo
 
 @pytest.mark.parametrize("turns", [1, -1, 3, 1001])
 def test_half_a_turn_is_no_pole(turns):
-    """There the tangent of half the angle has its own, which no double hits."""
+    """At half a turn the half-angle tangent has its pole, which no double hits exactly."""
     angle = turns * np.pi
     around = np.array([np.nextafter(angle, -np.inf), angle, np.nextafter(angle, np.inf)])
     assert _is_exact(around, narrow=False)
@@ -70,7 +70,7 @@ def test_without_a_word_from_numpy_the_polynomial_is_taken(monkeypatch):
 @both_ways
 @pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp", "pga_slerp", "cga_slerp"])
 def test_far_outside_of_the_keys_the_turn_goes_on(mode, monkeypatch, vector_tangent):
-    """Three whole turns and more: psi passes pi / 2 and pi, where half of it has a tangent that jumps."""
+    """More than three whole turns: psi passes pi / 2 and pi, where the tangent of psi / 2 jumps."""
     monkeypatch.setattr(trigonometry, "VECTOR_TANGENT", vector_tangent)
     half = np.radians(50.0)
     keys = Poses(

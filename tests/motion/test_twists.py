@@ -1,4 +1,4 @@
-"""Exponentials and logarithms of twists, against SciPy's of matrices."""
+"""Tests of exponentials and logarithms of twists against SciPy's of matrices."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ ANGLES = [0.0, 1e-12, 1e-6, 1e-3, 0.02999, 0.03001, 0.5, 2.0, 3.1, np.pi - 1e-9]
 
 
 def matrix_of(twist: np.ndarray) -> np.ndarray:
-    """The 4 x 4 matrix of a twist (6,)."""
+    """Return the 4 x 4 matrix of a twist (6,)."""
     (x, y, z), advance = twist[:3], twist[3:]
     matrix = np.zeros((4, 4))
     matrix[:3, :3] = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
@@ -39,5 +39,5 @@ def test_a_logarithm_leads_back(angle, sign):
     given = some_twists(angle)
     quaternions, translations = twists.exponential(given)
     result = twists.logarithm(sign * quaternions, translations)
-    # Near half a turn the axis is known to the rounding of w, and counts twice.
+    # Near half a turn the axis is only as exact as the rounding of w, and its error counts twice.
     np.testing.assert_allclose(result, given, rtol=0, atol=1e-12)

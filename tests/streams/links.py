@@ -1,4 +1,4 @@
-"""Senders and receivers on a link that a test makes up, in the time of the test."""
+"""A simulated link between sender and receiver, in the time of the test."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from rigid_motion.streams.paths import KnotPath
 from rigid_motion.streams.wire import Description, EncodedMotion, read
 
 AHEAD = 1000.0
-"""By how many seconds the receiver's clock is ahead."""
+"""How far the receiver's clock is ahead, in seconds."""
 
 
 def body(joints: int = 5, radius: float = 0.03) -> StreamBody:
-    """A chain of joints with two branches, a quarter of a metre from each to the next."""
+    """Return a chain of joints with two branches, each joint a quarter of a metre from its parent."""
     parents = np.array([-1, *(max(joint - 1 - (joint == joints - 2), 0) for joint in range(1, joints))])
     rest = Poses(np.tile((0.0, 0.0, 0.25), (joints, 1)), np.tile((1.0, 0.0, 0.0, 0.0), (joints, 1)))
     return StreamBody("performer", tuple(f"joint {joint}" for joint in range(joints)), parents, rest, radius)
 
 
 def dance(own: StreamBody, seconds: float = 6.0, rate: float = 60.0, speed: float = 1.0, seed: int = 1) -> tuple:
-    """Moments (n,) and poses (joints, n) of smooth motion."""
+    """Return moments (n,) and poses (joints, n) of smooth motion."""
     rng = np.random.default_rng(seed)
     times, joints = np.arange(round(seconds * rate)) / rate, len(own.joints)
     phases, speeds = rng.uniform(0.0, 6.0, (2, 3, joints, 3))
@@ -44,14 +44,14 @@ def dance(own: StreamBody, seconds: float = 6.0, rate: float = 60.0, speed: floa
 
 
 def backs_of(datagrams: Iterable[bytes]) -> list[int]:
-    """What the messages among datagrams build on: 0 nothing, 1 the one before, 2 an earlier one."""
+    """Return what each message among datagrams builds on: 0 nothing, 1 the one before, 2 an earlier one."""
     messages = [it for it in map(read, datagrams) if isinstance(it, EncodedMotion)]
     return [Coder(message.data).symbol(BASES_TABLE) for message in messages]
 
 
 @dataclass
 class Outcome:
-    """What a run showed."""
+    """The motion shown in a run, and its errors."""
 
     sender: Sender
     receiver: Receiver
@@ -60,15 +60,15 @@ class Outcome:
     shown: Sequence[Shown] = ()
     """What was drawn, from when the motion had begun."""
     now: np.ndarray | None = None
-    """When it was drawn, by the sender's clock, shape (n,)."""
+    """When each picture was drawn, by the sender's clock, shape (n,)."""
     moments: np.ndarray | None = None
-    """What was drawn then."""
+    """The moments of the motion drawn then, shape (n,)."""
     errors: np.ndarray | None = None
-    """The largest of any joint, metres."""
+    """The largest error of any joint, in metres, shape (n,)."""
     steps: np.ndarray | None = None
-    """How far any joint went from one picture to the next, metres, shape (n - 1,)."""
+    """How far any joint moved from one picture to the next, in metres, shape (n - 1,)."""
     turned_back: np.ndarray | None = None
-    """How far any joint went against its step before, where the motion itself did not, metres, shape (n - 2,)."""
+    """How far any joint moved against its previous step where the motion itself did not, in metres, shape (n - 2,)."""
 
     @property
     def size(self) -> float:
@@ -77,7 +77,7 @@ class Outcome:
         return sum(sizes) / (self.datagrams[-1][0] - self.datagrams[0][0])
 
     def between(self, first: float, last: float) -> np.ndarray:
-        """The errors of what was drawn from one time to another."""
+        """Return the errors of pictures drawn between two times."""
         return self.errors[(self.now >= first) & (self.now < last)]
 
 
@@ -114,7 +114,7 @@ def run(
     lag: float | None = None,
     seed: int = 1,
 ) -> Outcome:
-    """Play samples (n,) of poses (joints, n), and draw what is shown.
+    """Play samples (n,) of poses (joints, n), and draw the shown motion.
 
     At some samples it is said who holds what from then on. Of datagrams `loss` is lost, and what `lost` says by the
     time and the number of a datagram; `set_by` is what somebody added to the sender's clock; `drained` says when what
@@ -177,7 +177,7 @@ def run(
 
 
 def compare(outcome: Outcome, forest: Forest, truth: KnotPath, lag: float | None) -> None:
-    """Note how far off was what was drawn."""
+    """Record the errors of the pictures, from when the motion had begun."""
     outcome.moments = np.array([shown.moment for shown in outcome.shown])
     shown = joined([forest.joined(shown.poses)[:, None] for shown in outcome.shown], axis=1)
     there = forest.skeleton.in_root_space(shown)

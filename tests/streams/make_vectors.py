@@ -1,8 +1,8 @@
-"""Test vectors of the wire format: datagrams, and what is in them.
+"""Writes test vectors of the wire format: datagrams with their decoded contents.
 
     PYTHONPATH=addon python -m tests.streams.make_vectors
 
-writes tests/streams/vectors.json, for whoever writes a sender or a receiver in another language (docs/wire.md).
+writes tests/streams/vectors.json, for authors of senders and receivers in other languages (docs/wire.md).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ IDENTITY, RECEIVER = bytes((1, 2, 3)), bytes((7, 8, 9))
 
 
 def coding() -> list[dict]:
-    """Symbols, the numbers of their tables, or how many a flat one could have been; and their bytes."""
+    """Return cases of the coder: symbols with their table numbers, or with the size of a flat range; and the bytes."""
     rng, cases, tables = np.random.default_rng(1), [], standard_tables()
     for length in (0, 1, 5, 40):
         encoder, steps = Coder(), []
@@ -44,7 +44,7 @@ def coding() -> list[dict]:
 
 
 def noted_of(message: Message) -> dict:
-    """What a message says, in whole numbers; `cells` are those of the knots besides the end."""
+    """Return the contents of a message in whole numbers; `cells` are those of the knots other than the end."""
     said = {name: getattr(message, name) for name in ("back", "end", "start", "finer", "kind")}
     said["holds"] = [list(hold) for hold in message.codec.forest.holds]
     numbers = [own.tolist() for own in message.numbers]
@@ -52,7 +52,7 @@ def noted_of(message: Message) -> dict:
 
 
 def stream() -> dict:
-    """The datagrams of two bodies for a second, and what each message says."""
+    """Return the datagrams of two bodies for 1.2 seconds, and the contents of each message."""
     own, tool = body(6), StreamBody.rigid("tool", radius=0.1)
     times, poses = dance(own, 1.2, 30.0)
     sender, receiver, messages = Sender([own, tool], rate=30.0), Receiver(), []
@@ -67,12 +67,12 @@ def stream() -> dict:
     sender.codec.write = noted
     datagrams, answers, polled = [], [], False
     for row, time in enumerate(times.tolist()):
-        # The hand takes the tool and lets go of it; then that goes far, and then further than tables say.
+        # The hand takes the tool and lets go of it; then the tool goes far, and then further than the tables can code.
         if row in (5, 12):
             sender.hold(tool.name, own.name if row == 5 else None, own.joints[-1] if row == 5 else None)
         end, away = poses[-1:, row], (0.0, 40.0 * (row > 15) + 9000.0 * (row > 24), 0.0)
         sample = {own.name: poses[:, row], tool.name: Poses(end.positions + away, end.quaternions)}
-        # A sample that is needed does not come.
+        # A needed sample does not come.
         overdue = row > 12 and math.isfinite(sender.next) and not polled
         polled, time = polled or overdue, sender.next if overdue else time
         for datagram in sender.poll(time) if overdue else sender.add(time, sample):

@@ -1,7 +1,7 @@
-"""The One Euro filter of a body, to measure against: G. Casiez, N. Roussel, D. Vogel, CHI 2012.
+"""The One Euro filter of a body, for comparison: G. Casiez, N. Roussel, D. Vogel, CHI 2012.
 
-Places and rotations, radians, have the same parameters: a minimal cutoff in Hz, and what a metre or a radian a second
-adds to it.
+Positions (metres) and rotations (radians) share the parameters: a minimal cutoff in Hz, and what each metre or radian
+per second adds to it.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import turned, turns_between
 
 OF_SPEED = 1.0
-"""The cutoff of speeds, Hz, as its authors have it."""
+"""The cutoff for speeds in Hz, the authors' value."""
 
 
 def one_euro(times: np.ndarray, poses: Poses, least: float, beta: float) -> Poses:
-    """What it shows on each sample as that comes, of poses (n,)."""
+    """Return the filtered poses (n,), each from the samples up to it."""
 
     def share(cutoff: np.ndarray | float, step: float) -> np.ndarray | float:
         return 1.0 / (1.0 + 1.0 / (2.0 * np.pi * cutoff * step))

@@ -1,4 +1,4 @@
-"""The range coder: what is written is read, in as few bytes as tables say, and any bytes can be read."""
+"""Tests of the range coder: it reads what it writes, in as few bytes as tables allow, and reads any bytes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_what_is_written_is_read(seed: int) -> None:
         else:
             number = int(rng.integers(5))
             last = len(tables[number]) - 2
-            # The rarest and the most frequent symbols are where carries come from.
+            # Carries come from the rarest and the most frequent symbols.
             symbol = int(rng.choice([0, last, rng.integers(last + 1)]))
             written.append((None, number, encoder.symbol(number, symbol)))
     decoder = Coder(encoder.finish(), tables)

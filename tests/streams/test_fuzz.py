@@ -1,6 +1,6 @@
-"""Whatever comes: no exception, a bounded memory, and no effect on other streams.
+"""Fuzz tests of receivers: any datagram raises no exception, uses bounded memory, and leaves other streams alone.
 
-RIGID_MOTION_FUZZ=10000000 tries as many datagrams as one has time for.
+RIGID_MOTION_FUZZ=10000000 tries that many datagrams.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from .links import body, dance, run
 DATAGRAMS = int(os.environ.get("RIGID_MOTION_FUZZ", "6000"))
 
 MOST_BYTES = 128 << 20
-"""That a receiver ever holds."""
+"""The most bytes that a receiver ever holds."""
 
 TRACED = 100_000
-"""Datagrams after which allocations are not traced any more, which takes most of the time."""
+"""Number of datagrams after which allocations are no longer traced, because tracing takes most of the time."""
 
 RENEWED = 200
-"""Datagrams after which strangers take another identity: all numbers of a stream are used up soon."""
+"""Number of datagrams after which strangers take another identity: a stream's numbers are soon used up."""
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def genuine() -> list[bytes]:
 
 
 def damaged(rng: np.random.Generator, genuine: list[bytes]) -> bytes:
-    """Random bytes; or a genuine datagram with bits flipped, cut off, prolonged, or put together of two."""
+    """Return random bytes, or a genuine datagram with bits flipped, cut off, extended, or spliced from two."""
     kind = rng.integers(6)
     if kind == 0:
         head = bytes([WIRE_VERSION << 4 | int(rng.integers(5))]) if rng.random() < 0.8 else b""
@@ -128,7 +128,7 @@ def test_a_sender_far_in_the_past_or_future_is_shown() -> None:
 
 
 WRONG = (None, True, 1.5, -1, 0, 10**400, -(10**30), "", "x", [], [[]], {}, {"a": 1}, float("nan"), float("inf"))
-"""What is put in the place of parts of a description."""
+"""Values that replace parts of a description."""
 
 
 def packed(text: str) -> bytes:
@@ -164,7 +164,7 @@ def test_strangers_cannot_fill_the_memory() -> None:
     tracemalloc.start()
     for number, datagrams in enumerate(sent):
         for datagram in datagrams:
-            receiver.take(bytes(bytearray(datagram)), 0.0, number)  # memory of its own, as from a socket
+            receiver.take(bytes(bytearray(datagram)), 0.0, number)  # in new memory, as from a socket
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert 0 < 200 * len(receiver.streams) <= MOST_ALL_JOINTS

@@ -1,4 +1,4 @@
-"""What is held is sent in the space of the joint that holds it: it does not slip, and never is between two hands."""
+"""Tests of held objects, sent in the space of the holding joint: they neither slip nor hover between two hands."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from .links import body, dance, run, talk
 SLACK, SLIP = 1.02, 0.003
 TURNED = np.array((0.8, 0.3, -0.4, 0.3316624790355400))
 IN_HAND = Poses([[0.05, 0.16, 0.24]], [TURNED])
-"""Where the tool is in a hand."""
+"""The tool's pose in a hand."""
 
 LEFT, RIGHT, TOOL = (StreamBody.rigid(name, radius=0.1) for name in ("left", "right", "tool"))
 SPEED = 3.0
 
 
 def hands(seconds: float, rate: float = 60.0) -> tuple[np.ndarray, Poses, Poses]:
-    """Moments (n,), and the poses (n,) of two hands a metre apart."""
+    """Return moments (n,), and the poses (n,) of two hands a metre apart."""
     times, left = dance(StreamBody.rigid("left"), seconds, rate, SPEED, seed=1)
     _, right = dance(StreamBody.rigid("right"), seconds, rate, SPEED, seed=2)
     right.positions[..., 0] += 1.0
@@ -38,17 +38,17 @@ def hands(seconds: float, rate: float = 60.0) -> tuple[np.ndarray, Poses, Poses]
 
 
 def in_hand(hand: Poses) -> Poses:
-    """Where the tool is that a hand (n,) holds."""
+    """Return the poses of a tool held by a hand (n,)."""
     return placed(hand, IN_HAND[np.zeros(len(hand), dtype=int)])
 
 
 def places(shown: Sequence[Shown], name: str) -> Poses:
-    """Where a rigid body was shown (n,)."""
+    """Return the shown poses (n,) of a rigid body."""
     return joined([what.poses[name] for what in shown])
 
 
 def slips(shown: Sequence[Shown], hand: str) -> np.ndarray:
-    """How far the tool was shown from its place in a hand (n,), in metres."""
+    """Return how far the tool was shown from its place in a hand (n,), in metres."""
     own, there = places(shown, "tool"), in_hand(places(shown, hand))
     return shell_error(own, there, 0.1)
 
@@ -169,7 +169,7 @@ def test_what_cannot_be_held_is_refused(tool: str, holder: str, joint: str | Non
         each.hold("tool", "left")
     with pytest.raises(ValueError, match=what):
         sender.hold(tool, holder, joint)
-    # It is as if nothing had been said.
+    # A refusal changes nothing.
     rest = joined([own.rest for own in bodies])
     assert sender.add(0.0, rest) == other.add(0.0, rest)
 
@@ -230,11 +230,11 @@ def test_whoever_takes_what_whenever_all_is_shown_where_it_is_in_the_end(
     assert {name: (held.body, held.joint) for name, held in shown.held.items()} == forest.held(holders)
 
 
-# Whatever comes
+# Arbitrary datagrams
 
 
 def forged(codec: Codec, rng: np.random.Generator, holds: list[tuple[int, int, int]]) -> bytes:
-    """A message that builds on nothing, with something held."""
+    """Return a message that builds on nothing, with the given holds, followed by random bytes."""
     coder = Coder()
     coder.symbol(BASES_TABLE, 0)
     coder.digits(48, int(rng.integers(1 << 20)))

@@ -1,4 +1,4 @@
-"""OSC as python-osc has it, which is somebody else's."""
+"""Tests of OSC against python-osc, an independent implementation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which moment is shown, to somebody who seldom looks: a slow viewport, in the time of the test."""
+"""Tests of choosing the shown moment for a slow viewport, in the time of the test."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_the_picture_goes_on_however_seldom_somebody_looks(looks: float) -> None
     late = times > 8.0
     behind = times[late] - np.array(moments)[late]
     assert np.diff(moments)[late[1:]].min() > 0.9 * looks
-    # All that is shown is there, and it is no older than it has to be.
+    # The shown moment has been received, and is no older than necessary.
     assert behind.min() >= DELAY
     assert behind.max() <= DELAY + looks + 2.0 / RATE
 
@@ -33,7 +33,7 @@ def test_the_picture_goes_on_however_seldom_somebody_looks(looks: float) -> None
 @pytest.mark.parametrize("fps", [30.0, 72.0, 240.0])
 @pytest.mark.parametrize("speed", [0.3, 1.0, 4.0])
 def test_what_was_shown_too_far_ahead_waits_and_does_not_go_back(speed: float, fps: float) -> None:
-    """A hand that goes 10 cm too far, turned by half a radian too much, and then hears where it should have been."""
+    """A hand is shown 10 cm too far and turned 0.5 radians too much, and then the true pose arrives."""
     fading, places, turns = Fading(), [], []
     for now in np.arange(-0.2, 1.0 + 1.0 / speed, 1.0 / fps).tolist():
         there, half = speed * now, 0.5 * speed * now
@@ -48,7 +48,7 @@ def test_what_was_shown_too_far_ahead_waits_and_does_not_go_back(speed: float, f
     step = speed / fps
     assert np.diff(places).min() >= -step
     assert np.diff(np.unwrap(turns)).min() >= -step - 1e-9
-    # To wait takes as long as the motion takes to get there.
+    # The wait lasts as long as the motion takes to catch up.
     for off, ahead, most in ((places, 0.1, 0.005), (np.unwrap(turns), 0.5, 0.02)):
         assert np.abs(off[round((0.4 + ahead / MAX_FORWARD_RATIO / speed) * fps) :]).max() < most
 

@@ -1,4 +1,4 @@
-"""What a receiver shows, whatever the network does."""
+"""Tests of what a receiver shows under any behaviour of the network."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_latency_that_changes_for_good(latencies: tuple[float, float], answers: 
     assert outcome.between(0.0, 3.0).max() <= TOLERANCE
     assert outcome.between(changed + 1.0, 6.0).max() <= TOLERANCE
     assert np.diff(outcome.moments).min() >= 0.0
-    # A second later what is shown is as fresh as the network lets it be.
+    # A second later the shown motion is as fresh as the network allows.
     late = outcome.now > changed + 1.0
     assert (outcome.now - outcome.moments)[late].max() < after + 0.1 + 0.02
     # No picture leaps: not much faster than the body itself ever is.
@@ -81,7 +81,7 @@ def test_a_receiver_with_a_busy_processor(bursts: float, answers: bool) -> None:
     outcome = run([own], *dance(own, 8.0), drained=drained, answers=answers)
     assert outcome.between(0.0, 3.0).max() <= TOLERANCE
     adapted = outcome.between(4.0 + bursts, 8.0)
-    # A datagram may still come that waited longer than all before.
+    # A datagram may still have waited longer than all before.
     assert np.mean(adapted <= TOLERANCE) > 0.98
     assert adapted.max() <= 0.02
     assert np.diff(outcome.moments).min() >= 0.0
@@ -169,7 +169,7 @@ def test_a_sender_that_begins_again_is_told_by_its_identity_and_replays_of_the_o
     receiver, old = Receiver(), []
     first, sender = Sender([own], rate=60.0), Sender([own], rate=60.0)
     for row, time in enumerate(times.tolist()):
-        # It begins with times of its own.
+        # The second sender begins with its own times.
         datagrams = first.add(time, poses[:, row]) if time < 2.0 else sender.add(time - 2.0, poses[:, row])
         old += datagrams if time < 2.0 else []
         for datagram in datagrams:
@@ -212,7 +212,7 @@ def test_keys_can_be_recorded() -> None:
             places += keys.poses[own.name].positions[0].tolist()
     assert np.diff(moments).min() > 0.0
     assert moments[-1] > 3.6
-    # Far fewer than samples, and the motion is in them.
+    # Far fewer keys than samples, and they hold the motion.
     assert len(moments) < 0.8 * len(times)
     true = np.stack([np.interp(moments, times, column) for column in poses.positions[0].T], axis=-1)
     assert np.abs(np.array(places) - true).max() < 0.006

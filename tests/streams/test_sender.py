@@ -1,4 +1,4 @@
-"""A sender sends when it must, and what is shown is within the tolerance, between samples as well."""
+"""Tests of senders: they send only when needed, and the shown motion is within the tolerance, also between samples."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.thoroughness import combined, tried
 from .links import backs_of, body, dance, run
 
 SLACK = 1.02
-"""Samples are promised; frames lie between them, where both motions bend a little."""
+"""Factor on the tolerance: it is guaranteed at samples, but both motions bend a little at the frames between them."""
 
 
 @pytest.mark.parametrize("delay", [0.1, 0.2])
@@ -35,7 +35,7 @@ def test_what_is_shown_is_within_the_tolerance(rate: float, delay: float) -> Non
 
 
 def test_every_sample_of_a_window_may_need_a_knot() -> None:
-    """As of a tracker that trembles, at a long delay."""
+    """As from a jittery tracker, at a long delay."""
     times, rng = np.arange(240) / 120.0, np.random.default_rng(5)
     places = rng.normal(scale=0.02, size=(1, 240, 3))
     outcome = run([StreamBody.rigid("hand")], times, Poses(places, np.tile((1.0, 0, 0, 0), (1, 240, 1))), delay=0.2)
@@ -51,7 +51,7 @@ def test_messages_of_many_joints_are_as_long_as_they_have_to_be() -> None:
 
 @pytest.mark.parametrize("gap", [0.0021, 0.0028, 0.0035])
 def test_a_jump_between_two_uneven_samples_is_within_the_tolerance(gap: float) -> None:
-    """As a tracker's that was lost, at moments that are on no grid."""
+    """As from a tracker that was lost, at moments on no grid."""
     times = np.cumsum(np.random.default_rng(3).uniform(0.0105, 0.0125, 60))
     times[30:] += gap - (times[30] - times[29])
     places = np.where(np.arange(60)[:, None] < 30, 0.0, (0.037, 0.029, 0.02))
@@ -61,7 +61,7 @@ def test_a_jump_between_two_uneven_samples_is_within_the_tolerance(gap: float) -
 
 
 def swing(rate: float) -> tuple[StreamBody, np.ndarray, Poses]:
-    """A hand on a long arm that gets to 22 m/s."""
+    """Return a hand on a long arm that reaches 22 m/s."""
     times = np.arange(round(3.0 * rate)) / rate
     angles = 1.6 * np.sin(9.0 * times) ** 3
     turns = np.array(turned(np.tile((1.0, 0, 0, 0), (len(times), 1)), angles[:, None] * (0.0, 0.0, 1.0)))
@@ -71,7 +71,7 @@ def swing(rate: float) -> tuple[StreamBody, np.ndarray, Poses]:
 
 @pytest.mark.parametrize(("rate", "uneven", "answers"), combined([60.0, 91.0, 120.0], [0.0, 0.001], [True, False]))
 def test_a_fast_hand_is_within_the_tolerance_between_samples(rate: float, uneven: float, answers: bool) -> None:
-    """Knots lie on a grid, beside uneven samples; one just behind the start of a window is seen by no sample."""
+    """Knots lie on a grid between uneven samples; no sample sees a knot just after the start of a window."""
     own, times, poses = swing(rate)
     times = times + np.random.default_rng(int(rate)).uniform(0.0, uneven, len(times))
     outcome = run([own], times, poses, fps=1000.0, answers=answers)
@@ -93,7 +93,7 @@ def test_samples_from_before_what_was_sent_without_them_are_said_all_the_same() 
     own, times, poses = swing(60.0)
     sender, receiver, truth, polled, largest = Sender([own]), Receiver(), KnotPath(times, poses), 0, 0.0
     for row, time in enumerate(times.tolist()):
-        # What is overdue is sent, and then the sample comes, late.
+        # Overdue motion is sent, and then the sample comes late.
         datagrams = sender.poll(time + 0.005) if sender.next < time + 0.005 else []
         polled += len(datagrams)
         for datagram in [*datagrams, *sender.add(time, poses[:, row])]:
@@ -181,7 +181,7 @@ def test_poses_that_are_none_are_refused_by_name_and_change_nothing(place: float
 
 @pytest.mark.parametrize(("way", "answers"), combined([(2600.0, 0.005), (5.0, 1e-5), (9999.0, 1e-6)], [True, False]))
 def test_as_far_as_poses_may_be_all_is_within_the_tolerance(way: tuple[float, float], answers: bool) -> None:
-    """There and back in two seconds, and then in a sample; floats have 16 digits."""
+    """There and back in two seconds, and then within a sample; floats have 16 digits."""
     own, (away, tolerance) = body(4), way
     times, poses = dance(own, 3.0)
     share = np.where(times < 2.0, np.sin(0.5 * np.pi * times), 1.0 - times * 10.0 // 2 % 2)
@@ -198,7 +198,7 @@ NUMBERS = st.floats() | st.sampled_from([0.0, 1.0, 5e-324, 1e-310, -1e-200, 1e20
     st.lists(st.tuples(st.just(None) | NUMBERS, st.lists(NUMBERS, min_size=14, max_size=14)), max_size=6), st.booleans()
 )
 def test_whatever_numbers_poses_and_times_are_a_sender_goes_on(samples: list, answers: bool) -> None:
-    """What it takes is shown within the tolerance once it is still, and what it does not take, it says."""
+    """Samples that the sender accepts are shown within the tolerance once motion is still; it reports the others."""
     bodies, calm = (
         [StreamBody.rigid("hand"), StreamBody.rigid("tool", radius=1.0)],
         Poses([[0.5] * 3] * 2, [[0.5] * 4] * 2),
@@ -219,7 +219,7 @@ def test_whatever_numbers_poses_and_times_are_a_sender_goes_on(samples: list, an
         with nullcontext() if sound and abs(clock) <= MAX_CLOCK_S else pytest.raises(ValueError, match="needs"):
             say(sender.add(clock, Poses(pose[:, :3], pose[:, 3:])), row / 60.0)
         say(sender.poll(sender.next), row / 60.0)
-    # Clocks that are set by little again and again are followed for a while.
+    # A clock that is set by small steps again and again is followed for a while.
     for row in range(len(numbers), len(numbers) + 300):
         say(sender.add(row / 60.0, calm), row / 60.0)
         for shown in receiver.show(row / 60.0).values():

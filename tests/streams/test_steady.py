@@ -1,4 +1,4 @@
-"""Steady streams: nearer to the truth than One Euro at the same delay, no later, and no harm where nothing trembles."""
+"""Tests of steady streams: nearer to the truth than One Euro at equal delay, no later, harmless without jitter."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ CLIPS = ("hold", "pivot", "reach", "screw", "throw") if THOROUGH else ("pivot", 
 RATE, DELAY, RADIUS = 60.0, 0.05, 0.1
 SIZE, TURN = 0.001, np.radians(0.3)
 KNOWN = 2.0
-"""Seconds after which it is known how much something trembles."""
+"""Seconds after which the amount of jitter is known."""
 
 
 def recorded(name: str) -> tuple[np.ndarray, Poses]:
-    """A clip at so many frames a second, without the noise of its own device: a truth."""
+    """Return a clip at `RATE` frames per second without its device's noise, to serve as truth."""
     trajectory = read_trajectories(str(ASSETS / f"{name}.csv")).trajectories[0]
     times, poses, _ = repair(trajectory.times, trajectory.poses)
     even = np.arange(times[0], times[-1], 1.0 / RATE)
@@ -40,7 +40,7 @@ def shaken(truth: Poses) -> Poses:
 
 
 def shown(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses]:
-    """The moments that are shown as each sample comes, and what is shown then."""
+    """Return the moments shown as each sample comes, and the poses shown then."""
     steady, moments, result = Steady(), times[MIN_SAMPLES:] - DELAY, []
     one = Poses(poses.positions[None], poses.quaternions[None])
     for last, moment in enumerate(moments.tolist(), MIN_SAMPLES):
@@ -61,7 +61,7 @@ def test_it_is_nearer_to_the_truth_than_one_euro_tuned_to_each_clip_at_the_same_
     moments, steady = shown(times, poses)
     there = interpolate(times, truth, moments, "motor_spline")
     as_it_came = rms(interpolate(times, poses, moments, "lerp_slerp"), there, moments)
-    # One Euro may be shown as late as that, or sooner where its own lag is.
+    # One Euro may be shown with the same delay, or earlier to make up for its own lag.
     tuned = min(
         rms(interpolate(times, filtered, moments + late, "lerp_slerp"), there, moments)
         for least in (1.0, 2.0, 4.0, 8.0, 12.0, 20.0)

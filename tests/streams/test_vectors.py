@@ -1,4 +1,4 @@
-"""The vectors of the wire format, which others test their programs by."""
+"""Tests of the wire format's vectors, with which other implementations test themselves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""VMC in and out: what its documentation says, and back what was sent."""
+"""Tests of VMC input and output against its documentation, and of round trips."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ pytestmark = [pytest.mark.blender, pytest.mark.any_blender]
 
 
 def world(body: StreamBody, poses: Poses) -> Poses:
-    """Poses (joints, ...) of a body in the space of its roots."""
+    """Return poses (joints, ...) of a body in the space of its roots."""
     return Skeleton(body.parents).in_root_space(poses)
 
 
@@ -42,7 +42,7 @@ def about(axis: int, degrees: float) -> np.ndarray:
 
 
 def frame(seed: int) -> dict[str, Poses]:
-    """A pose of all bones, in their parents' space."""
+    """Return a random pose of all bones, in their parents' spaces."""
     turns = random_quaternions(np.random.default_rng(seed), len(NAMES))
     return {name: Poses(PLACES[row], turns[row]) for row, name in enumerate(NAMES)}
 
@@ -64,7 +64,7 @@ def test_a_frame_is_what_the_documentation_says_it_is():
     assert [address for address, _ in said] == ["/VMC/Ext/Root/Pos", "/VMC/Ext/Bone/Pos", "/VMC/Ext/OK", "/VMC/Ext/T"]
     assert said[0][1] == ["root", 0, 0, 0, 0, 0, 0, 1]
     assert said[1][1][0] == "Hips"
-    # A turn to the left about the upright is one against Unity's.
+    # A left turn about the vertical has the opposite sign in Unity.
     assert said[1][1][1:] == pytest.approx([1, 2, 3, 0, -math.sqrt(0.5), 0, math.sqrt(0.5)])
     assert said[3][1] == [1.5]
     assert max(map(len, write(0.0, {name: frame(1)["Hips"] for name in JOINTS}))) < 1400
@@ -87,7 +87,7 @@ JOY = b"/VMC/Ext/Blend/Val\0\0,sf\0Joy\0\x3f\x80\0\0"
 
 
 def bundled(*messages: bytes) -> bytes:
-    """A bundle to be done at once, as in the specification of OSC 1.0."""
+    """Return a bundle for immediate execution, as in the specification of OSC 1.0."""
     return b"#bundle\0" + b"\0\0\0\0\0\0\0\1" + b"".join(len(each).to_bytes(4, "big") + each for each in messages)
 
 
@@ -144,7 +144,7 @@ HEADSET = b"/VMC/Ext/Hmd/Pos\0\0\0\0,sfffffff\0\0\0LHR-3\0\0\0" + POSE_7
 
 @pytest.mark.parametrize("messages", [[TRACKER, CONTROLLER, HEADSET], [ROOT_7, HIPS, TRACKER, CONTROLLER, HEADSET]])
 def test_devices_are_rigid_bodies_beside_the_performer(messages):
-    """After the documentation: a serial number and a pose in the world."""
+    """As documented: a serial number and a pose in the world."""
     receiver = heard([*messages, TIME], 1.0, Receiver(delay=0.0))
     (shown,) = receiver.show(1.0).values()
     bodies = shown.bodies
@@ -180,7 +180,7 @@ def test_trackers_that_are_written_are_shown_without_times():
 
 
 def skeleton(rest_turns: np.ndarray, arms_down: float, larger: float, prefix: str) -> tuple[list[str], Poses]:
-    """A skeleton at rest in root space, its bones turned anyhow, its arms held down by degrees."""
+    """Return a skeleton at rest in root space, with its bones turned arbitrarily and an arm lowered by degrees."""
     local = np.tile((1.0, 0.0, 0.0, 0.0), (len(NAMES), 1))
     local[NAMES.index("LeftUpperArm")] = about(1, arms_down)
     held = Skeleton(PARENTS).in_root_space(Poses(PLACES[:, None] * larger, local[:, None]))[:, 0]
@@ -191,7 +191,7 @@ def test_a_skeleton_of_another_size_rest_and_naming_does_the_same():
     joints, rest = skeleton(random_quaternions(np.random.default_rng(5), len(NAMES)), 50.0, 1.25, "mixamorig:")
     performer = Performer(tuple(joints), rest)
     assert list(performer.bones) == [name for name in HUMANOID if name in NAMES]
-    # At rest its arms hang down; in a T-pose nothing is turned at all.
+    # At rest the arms hang down; in a T-pose no bone is turned.
     sent = performer(rest)
     assert sent["LeftUpperArm"].quaternions == pytest.approx(about(1, 50), abs=1e-9)
     assert sent["LeftHand"].quaternions == pytest.approx([1, 0, 0, 0], abs=1e-9)
@@ -234,7 +234,7 @@ def hips(moment: float) -> dict[str, Poses]:
 
 @pytest.mark.parametrize("step", [0.3, 0.5, 0.9, 5.0, -0.3, -0.5, -0.9, -5.0])
 def test_a_clock_that_is_set_is_no_motion(step):
-    """Within two samples of what was there a tenth of a second ago, before, then, and behind that."""
+    """The shown motion is within two samples of the motion 0.1 s ago, before, at and after the step."""
     receiver, off, moments = Receiver(delay=0.1), [], []
     for row in range(240):
         sent = row / 60.0
@@ -268,7 +268,7 @@ def test_times_that_are_none_make_no_frames(time):
 
 
 def test_of_a_datagram_a_few_frames_are_taken():
-    """As of a program that saves them up; more are somebody who wants to keep us busy."""
+    """As from a program that saves up frames; a sender of more would be trying to keep us busy."""
     frames = [row for number in range(600) for row in (HIPS, osc.write_message("/VMC/Ext/T", number / 60.0))]
     (keys,) = heard([bundled(*frames)]).keys()
     np.testing.assert_allclose(keys.moments, np.arange(MAX_FRAMES) / 60.0, atol=1e-6)
