@@ -1,4 +1,4 @@
-"""Tests of every mode against independent libraries: pytransform3d, kingdon, SciPy, mathutils.
+"""Tests of every mode against independent libraries: pytransform3d, kingdon, SciPy.
 
 Positions agree to 1e-12 of their own size, both for turns of 1e-9 rad and for turns of 180 degrees less 1e-9. In terms
 of unit quaternions both are well-conditioned; only the choice between two shortest ways at exactly 180 degrees is not.

@@ -137,7 +137,7 @@ def run(
                 arrival = now + takes if back else drained(now + takes)
                 heapq.heappush(pending, (arrival, count, back, datagram))
 
-    def come(until: float) -> None:
+    def deliver(until: float) -> None:
         while pending and pending[0][0] <= until:
             now, _, back, datagram = heapq.heappop(pending)
             if back:
@@ -167,7 +167,7 @@ def run(
             if says and row in says:
                 sender.hold(*says[row])
             post(sender.add(float(now + set_now), poses[:, row]), now)
-            come(now)
+            deliver(now)
             before = now
     if drawn:
         moments, outcome.shown = zip(*drawn, strict=True)

@@ -191,7 +191,7 @@ def test_a_skeleton_of_another_size_rest_and_naming_does_the_same():
     joints, rest = skeleton(random_quaternions(np.random.default_rng(5), len(NAMES)), 50.0, 1.25, "mixamorig:")
     performer = Performer(tuple(joints), rest)
     assert list(performer.bones) == [name for name in HUMANOID if name in NAMES]
-    # At rest the arms hang down; in a T-pose no bone is turned.
+    # At rest one arm hangs down; in a T-pose no bone is turned.
     sent = performer(rest)
     assert sent["LeftUpperArm"].quaternions == pytest.approx(about(1, 50), abs=1e-9)
     assert sent["LeftHand"].quaternions == pytest.approx([1, 0, 0, 0], abs=1e-9)

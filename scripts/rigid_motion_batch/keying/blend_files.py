@@ -128,7 +128,7 @@ def write_file(output: Path, record: InputRecord | None, opened: int | None = No
     Parameters
     ----------
     output : Path
-    record : Record, optional
+    record : InputRecord, optional
     opened : int, optional
         When the file was last changed before it was opened, in nanoseconds, if it is to be replaced.
 

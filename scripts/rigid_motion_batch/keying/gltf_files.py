@@ -45,7 +45,7 @@ def reduce_gltf(
     """
     job, outcome = doing.job, doing.outcome
     try:
-        document = read_document(job.file) if export is None else _exported(export)
+        document = read_document(job.file) if export is None else _export_document(export)
         tolerance = None if how.tolerance is None else how.tolerance.metres(per_unit)
         with side_by_side(doing.work.processes) as run:
             names = ("radius", "shared", "count", "channels", "feet", "curves", "meshopt")
@@ -60,7 +60,7 @@ def reduce_gltf(
         summary = _summary(clip, length, per_unit, doing.would, by_number=how.count is not None)
         doing.say(f"{printable(clip.name)}: {summary}")
     if report.size:
-        doing.say(f"{report.size:.3g} m large{doubt(report.size, _joints(document), how.tolerance, per_unit)}")
+        doing.say(f"{report.size:.3g} m large{doubt(report.size, _joint_count(document), how.tolerance, per_unit)}")
     if report.reduced_before is not None:
         within = as_text(report.reduced_before)
         doing.say(f"reduced before within {within}: errors add up; reduce the original instead")
@@ -123,12 +123,12 @@ def _add_numbers(numbers: Numbers, report: Report) -> None:
         numbers.clips.append(ClipNumbers(clip.name, *keys, clip.error, clip.where, reason))
 
 
-def _joints(document: Document) -> int:
+def _joint_count(document: Document) -> int:
     """Return the number of joints of the largest skin."""
     return max((len(skin["joints"]) for skin in objects(document.json, "skins")), default=0)
 
 
-def _exported(export: Callable[[Path], None]) -> Document:
+def _export_document(export: Callable[[Path], None]) -> Document:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "exported.glb"
         export(path)

@@ -63,17 +63,17 @@ def _do_objects(doing: RunningJob, action: Operation, missing: dict[bpy.types.Ob
     for obj in [obj for obj in bpy.data.objects if obj not in overridden]:
         if obj in missing:
             if fitting := {"*"} if asked is None else matching_missing(obj, asked):
-                _begin(doing, fitting)
+                _note_matches(doing, fitting)
                 doing.refuse(obj.name, missing[obj])
             continue
         for targets in groups_of(obj, whole_rigs=action.whole_rigs):
             fit = {target: {"*"} if asked is None else matching(target, asked) for target in targets}
             if concerned := action.concerned([target for target, names in fit.items() if names]):
-                _begin(doing, set().union(*(fit[target] for target in concerned)))
+                _note_matches(doing, set().union(*(fit[target] for target in concerned)))
                 _do_targets(doing, action, concerned)
 
 
-def _begin(doing: RunningJob, fitting: set[str]) -> None:
+def _note_matches(doing: RunningJob, fitting: set[str]) -> None:
     """Record which names and patterns matched something to do."""
     if not doing.outcome.matched:  # Only files with something to do are written.
         refuse_read_only(doing.job.output)
@@ -167,22 +167,20 @@ def matching(target: Transform, asked: Iterable[str]) -> set[str]:
     """Return the names and patterns that match a target. The name of a rig matches its bones too; RIG/BONE matches one
     bone.
     """
-    return {item for item in asked for name in {target.name, target.animated.name} if _fits(name, item)}
+    return {item for item in asked for name in {target.name, target.animated.name} if _is_match(name, item)}
 
 
 def matching_missing(obj: bpy.types.Object, asked: Iterable[str]) -> set[str]:
     """Return the names and patterns that match an object, or may match its bones, which cannot be read."""
-    return {item for item in asked if _fits(obj.name, item) or _fits(obj.name, item.rpartition("/")[0])}
+    return {item for item in asked if _is_match(obj.name, item) or _is_match(obj.name, item.rpartition("/")[0])}
 
 
-def _fits(name: str, pattern: str) -> bool:
+def _is_match(name: str, pattern: str) -> bool:
     return name == pattern or fnmatchcase(name, pattern)
 
 
 def title_of(targets: Sequence[Transform]) -> str:
-    """Return a title for targets: the name of a single one, else the rig, its number of bones, and whether its own
-    keys.
-    """
+    """Return a title: the name of a single target, or the rig with its number of bones and any keys of its own."""
     rig, bones = targets[0].animated.name, sum(target.is_part for target in targets)
     if len(targets) == 1:
         return targets[0].name

@@ -23,7 +23,7 @@ from rigid_motion_batch.scenes.armature import RestFigure, Rig
 from rigid_motion_batch.silencing import silenced
 
 MIN_KEY_GAP_FRAMES = 0.01
-"""Closer keys, in frames, are one key to Blender."""
+"""The smallest gap between two keys, in frames, at which Blender keeps both."""
 
 ON_A_FRAME = 1e-3
 """Samples this near a whole frame, in frames, are put on it."""
@@ -89,15 +89,15 @@ def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
 def key_densely(clip: Clip, frames: np.ndarray, name: str) -> bpy.types.Object:
     """Add axes or a rig to the open file that move as recorded, with a key for every sample, on frames (n,)."""
     if clip.rest_body is not None:
-        return _rig(clip, frames, name).obj
-    obj = _axes(name)
+        return _add_rig(clip, frames, name).obj
+    obj = _add_axes(name)
     animation.bake_poses(obj, frames, clip.in_blender(clip.poses), key_type="KEYFRAME")
     return obj
 
 
 def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name: str) -> bpy.types.Object:
     """Add axes to the open file that move as a rigid body did, keyed at samples `keys` (k,) of all `frames` (n,)."""
-    obj = _axes(name)
+    obj = _add_axes(name)
     poses = clip.in_blender(clip.poses[keys])
     animation.bake_poses(obj, frames[keys], poses, key_type="KEYFRAME")
     animation.set_mode(obj, mode)
@@ -125,7 +125,7 @@ def key_body(clip: Clip, frames: np.ndarray, how: Reductions, name: str) -> Resu
     return reduced(keyed, replace(how, discard=True))  # The recording has the dense keys.
 
 
-def _axes(name: str) -> bpy.types.Object:
+def _add_axes(name: str) -> bpy.types.Object:
     obj = bpy.data.objects.new(name, None)
     obj.empty_display_type, obj.empty_display_size = "ARROWS", AXES_LENGTH_M
     obj.rotation_mode = "QUATERNION"
@@ -133,7 +133,7 @@ def _axes(name: str) -> bpy.types.Object:
     return obj
 
 
-def _rig(clip: Clip, frames: np.ndarray, name: str) -> Rig:
+def _add_rig(clip: Clip, frames: np.ndarray, name: str) -> Rig:
     """Return a new rig in the open file with a key for every sample of a whole body, on frames (n,)."""
     scene, rest_body = cast(bpy.types.Scene, bpy.context.scene), clip.whole_body
     rest = RestFigure.of(clip)

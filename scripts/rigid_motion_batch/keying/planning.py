@@ -156,12 +156,12 @@ def _identity(job: InputJob) -> object:
 
 def _without_conflicts(jobs: list[InputJob]) -> Iterator[InputJob]:
     """Yield the jobs except for results of other inputs; a job that would overwrite another file gets a problem."""
-    outputs = {place_of(path) for job in jobs if not job.in_place for path in _outputs(job)}
+    outputs = {place_of(path) for job in jobs if not job.in_place for path in _possible_outputs(job)}
     jobs = [job for job in jobs if place_of(job.file) not in outputs or not is_made(job.file)]
     sources = {place_of(job.file) for job in jobs}
     taken: dict[str, str] = {}
     for job in jobs:
-        for path in () if job.problem or job.in_place else _outputs(job):
+        for path in () if job.problem or job.in_place else _possible_outputs(job):
             if (place := place_of(path)) in sources:
                 problem = f"this would be written over {path}, which is to be read too: leave one of them out"
                 job = replace(job, problem=problem)
@@ -171,7 +171,7 @@ def _without_conflicts(jobs: list[InputJob]) -> Iterator[InputJob]:
         yield job
 
 
-def _outputs(job: InputJob) -> list[Path]:
+def _possible_outputs(job: InputJob) -> list[Path]:
     """Return the files that may be written, as far as known before a recording is read."""
-    some = not job.source.endswith(ALL)
-    return [job.output.with_name(f"{job.output.name}{ending}") for ending in job.endings if some]
+    is_single = not job.source.endswith(ALL)
+    return [job.output.with_name(f"{job.output.name}{ending}") for ending in job.endings if is_single]

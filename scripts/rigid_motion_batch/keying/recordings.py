@@ -34,14 +34,16 @@ def do_recording(doing: RunningJob, how: Reductions) -> None:
         clips, note = read_source(job.source, how.axes, how.reading)
         if note:
             doing.note(note)
-    for clip, name in zip(clips, _names(job.file, clips), strict=True):
+    for clip, name in zip(clips, _file_names(job.file, clips), strict=True):
         suffix = GLB_SUFFIX if how.glb else SUFFIX
         doing.title = job.source if len(clips) == 1 else f"{job.source} ({clip.name})"
         with doing.failing():
-            _Clip(doing, how, clip, name).do(job.folder / f"{name}{suffix}" if job.source.endswith(ALL) else job.output)
+            _ClipJob(doing, how, clip, name).do(
+                job.folder / f"{name}{suffix}" if job.source.endswith(ALL) else job.output
+            )
 
 
-class _Clip:
+class _ClipJob:
     """A recorded body whose keys are written."""
 
     def __init__(self, doing: RunningJob, how: Reductions, clip: Clip, name: str) -> None:
@@ -60,19 +62,19 @@ class _Clip:
             raise Unreadable(problem)
         table, scene, glb = (output.with_name(f"{output.name}{end}") for end in (ending or ".csv", ".blend", ".glb"))
         if self.how.glb:
-            self._glb(glb)
+            self._write_glb(glb)
         elif clip.rest_body is not None or self.how.curves:
             if ending not in ("", ".blend"):
                 what = "what has curves" if clip.rest_body is None else "a whole body"
                 raise FileProblem(f"{what} becomes a .blend file: name that with --output, and not {ending}")
-            self._body(scene)
+            self._write_body(scene)
         else:
             if table == scene and not self.how.blend:
                 raise FileProblem("a rigid motion becomes a table: name a .csv file with --output, or add --blend")
             table = output.with_name(f"{output.name}.csv") if table == scene else table
-            self._rigid(table, scene if self.how.blend else None)
+            self._write_rigid(table, scene if self.how.blend else None)
 
-    def _rigid(self, table: Path, scene: Path | None) -> None:
+    def _write_rigid(self, table: Path, scene: Path | None) -> None:
         for path in filter(None, (table, scene)):
             self.doing.require_free(path)
         clip, mode, tolerance = self.clip, self.how.mode, self.tolerance
@@ -95,12 +97,12 @@ class _Clip:
             with self.doing.record.writing(table) as beside:
                 write_poses(beside, clip.times[keys], clip.poses[keys])
         self.doing.outcome.objects += 1
-        self._note(ClipNumbers(clip.name, len(clip.times), len(keys), largest))
+        self._add_numbers(ClipNumbers(clip.name, len(clip.times), len(keys), largest))
         self.doing.tell_written(table)
         if scene:
             self._save(scene)
 
-    def _body(self, scene: Path) -> None:
+    def _write_body(self, scene: Path) -> None:
         from .keyed_files import key_body
 
         doing = self.doing
@@ -117,14 +119,14 @@ class _Clip:
         if not (result.done or result.left):
             doing.leave_alone("nothing could be reduced" if result.refused else "nothing of this body moves")
             return
-        self._note(*(replace(numbers, name=self.clip.name) for numbers in result.numbers))
+        self._add_numbers(*(replace(numbers, name=self.clip.name) for numbers in result.numbers))
         self._save(scene)
         if self.clip.rest_body:
             doing.outcome.bones += len(result.done)
         else:
             doing.outcome.objects += len(result.done)
 
-    def _glb(self, path: Path) -> None:
+    def _write_glb(self, path: Path) -> None:
         from .exporting import export_glb
         from .keyed_files import key_densely
 
@@ -138,7 +140,7 @@ class _Clip:
 
         return new_file(self.clip, self.tolerance.tolerance(self.clip), self.how.fps)
 
-    def _note(self, *clips: ClipNumbers) -> None:
+    def _add_numbers(self, *clips: ClipNumbers) -> None:
         numbers, tolerance = self.doing.outcome.numbers, self.how.tolerance
         numbers.tolerance = tolerance.tolerance(self.clip) if tolerance else None
         numbers.clips += clips
@@ -151,7 +153,7 @@ class _Clip:
         self.doing.tell_written(scene)
 
 
-def _names(file: Path, clips: Sequence[Clip]) -> list[str]:
+def _file_names(file: Path, clips: Sequence[Clip]) -> list[str]:
     """Return the base names for the files of a recording's bodies."""
     if len(clips) == 1:
         return [name_of(file, clips[0].body)]

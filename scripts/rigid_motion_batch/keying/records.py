@@ -93,34 +93,34 @@ class InputRecord:
         """Return whether a file may be replaced: always with `overwrite`, otherwise if it is this input's unchanged
         result.
         """
-        return self.overwrite or _is_among(path, _relative(self.folder, path), self._lines)
+        return self.overwrite or _has_recorded_digest(path, _relative(self.folder, path), self._lines)
 
     @property
     def _lines(self) -> list[dict[str, Any]]:
-        return [line for line in _lines_of(self._file) if line.get("source") == self._source]
+        return [line for line in _record_lines(self._file) if line.get("source") == self._source]
 
 
 def is_made(path: Path) -> bool:
     """Return whether this program wrote the file, unchanged since, according to the record of its folder."""
-    return _is_among(path, path.name, _lines_of(path.parent / OWN_FOLDER / NAME))
+    return _has_recorded_digest(path, path.name, _record_lines(path.parent / OWN_FOLDER / NAME))
 
 
-def _is_among(path: Path, name: str, lines: Iterable[Mapping[str, Any]]) -> bool:
+def _has_recorded_digest(path: Path, name: str, lines: Iterable[Mapping[str, Any]]) -> bool:
     """Return whether a file has a digest that the record has under its name."""
     digests = {line.get("sha256") for line in lines if line.get("file") == name}
     return bool(digests) and sha256_in(path) in digests
 
 
-def _lines_of(file: Path) -> Sequence[dict[str, Any]]:
+def _record_lines(file: Path) -> Sequence[dict[str, Any]]:
     """Return the lines of a record; cached until the file changes in size."""
     try:
-        return _read(file, file.stat().st_size)
+        return _cached_lines(file, file.stat().st_size)
     except OSError:
         return ()
 
 
 @lru_cache(maxsize=8)
-def _read(file: Path, _size: int) -> Sequence[dict[str, Any]]:
+def _cached_lines(file: Path, _size: int) -> Sequence[dict[str, Any]]:
     return tuple(lines_of(file))
 
 

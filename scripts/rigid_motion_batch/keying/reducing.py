@@ -57,12 +57,12 @@ def reduced(targets: Sequence[Transform], how: Reductions) -> Result:
     done = [target for target, count in zip(targets, before, strict=True) if _bake_count(target) > count]
     # Refusals come in the order of the targets. A target that shares its keys with another one is reduced anyway.
     problems = dict(zip([target for target in targets if target not in done], refusals, strict=False))
-    doubt = _doubt(targets, how.tolerance, unit)
+    doubt = _unit_hint(targets, how.tolerance, unit)
     left = {target for target, refusal in problems.items() if isinstance(refusal, NeedsItsKeys)}
     reasons = {target: _reason(target, refusal) for target, refusal in problems.items()}
     by_number = how.count is not None
     reduction = animation.reduction_of(done)
-    summary = f"{_described(reduction, tolerance, unit, by_number=by_number)}{doubt}" if reduction else ""
+    summary = f"{_describe_reduction(reduction, tolerance, unit, by_number=by_number)}{doubt}" if reduction else ""
     if how.discard and done:
         animation.discard_dense_keys(done)
     return Result(
@@ -76,7 +76,7 @@ def reduced(targets: Sequence[Transform], how: Reductions) -> Result:
     )
 
 
-def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_number: bool) -> str:
+def _describe_reduction(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_number: bool) -> str:
     """Return text on the numbers of keys and the error of a reduction, whose lengths are in units of `unit` metres."""
     rig = reduction.rig
     summary = f", {reduction.before} -> {reduction.after} keys"
@@ -84,10 +84,10 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_nu
     summary += off(tolerance, reduction.largest_error * unit, unit, by_number=by_number)
     if reduction.between:
         summary += f" on frames, {tolerance.alike(reduction.between * unit, unit)} between them"
-    others = [(_named(mode), count) for mode, count in reduction.needed.items() if mode != reduction.mode]
+    others = [(_mode_name(mode), count) for mode, count in reduction.needed.items() if mode != reduction.mode]
     if others:
         told = " and ".join(f"{name} would leave {count} keys" for name, count in others)
-        summary += f"; {_named(reduction.mode)}, as {told}"
+        summary += f"; {_mode_name(reduction.mode)}, as {told}"
     before, after = reduction.channel_keys
     if after > before:
         summary += f"; channels have {after} keys together, and had {before}"
@@ -100,11 +100,11 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_nu
     return summary
 
 
-def _named(mode: str) -> str:
+def _mode_name(mode: str) -> str:
     return "curves of Blender's own" if mode == animation.NATIVE else mode
 
 
-def _doubt(targets: Sequence[Transform], tolerance: Tolerance | None, unit: float) -> str:
+def _unit_hint(targets: Sequence[Transform], tolerance: Tolerance | None, unit: float) -> str:
     """Return a hint if a tolerance is in metres but a rig probably is not: importers keep units of their own."""
     rig = targets[0].animated
     if not targets[0].is_part or rig.pose is None:

@@ -70,7 +70,7 @@ class Keyed(steps.Step, rooms=ROOMS):
         if self.work.needs_blender(given):
             import bpy  # noqa: F401  It makes addon_utils importable.
 
-            blender = _extension()
+            blender = _local_extension()
         doing = RunningJob(self.work, given, lambda text: append_lines(job.place / "notes", [{"note": text}]))
         with blender:
             self.work.do(doing)
@@ -177,16 +177,16 @@ class _Session:
         for place, job in enumerate(self._jobs):
             while len(self._at_work) >= self._executor.capacity:
                 self._wait(stage)
-            self._begin(place, job, stage)
+            self._start_job(place, job, stage)
         while self._at_work:
             self._wait(stage)
-        self._show(stage)
+        self._show_progress(stage)
 
     def _wait(self, stage: Stage) -> None:
         ended, _ = wait(self._futures, steps.LOOK_INTERVAL_S, FIRST_COMPLETED)
         for future in ended:
-            self._end(future, *self._futures.pop(future))
-        self._show(stage)
+            self._finish_job(future, *self._futures.pop(future))
+        self._show_progress(stage)
 
     def unmatched(self) -> set[str]:
         """Return the requested names and patterns that matched no object or bone."""
@@ -194,19 +194,19 @@ class _Session:
         seen = any(not outcome.failed for outcome in outcomes)
         return set(self._work.objects or ()).difference(*(outcome.matched for outcome in outcomes)) if seen else set()
 
-    def _show(self, stage: Stage) -> None:
+    def _show_progress(self, stage: Stage) -> None:
         at_work = [self._jobs[place] for place in self._at_work]
         stage.reach(len(self._outcomes), ", ".join(job.title for job in at_work))
         summary = _summary(self.in_order, len(self._jobs), self._work, interrupted=True)
         report(at=", ".join(job.source for job in at_work), summary=summary)
 
-    def _begin(self, place: int, job: InputJob, stage: Stage) -> None:
+    def _start_job(self, place: int, job: InputJob, stage: Stage) -> None:
         """Start an input, unless it is done already or cannot be processed."""
         if job.problem:
             self._note(f"{job.source}: {job.problem}")
             self._outcomes[place] = Outcome(job.source, failed=True, unreadable=True, reason=job.problem)
             return
-        task = _task(self._work, job)
+        task = _task_of(self._work, job)
         key = task.key if task.inputs else ""
         if key and (result := self._work.record_of(job).done(key)):
             written, facts = result
@@ -219,10 +219,10 @@ class _Session:
         step = replace(cast(Keyed, task.step), work=self._work, job=job)
         request = steps.StepJob(replace(task, step=step), self._scratch / str(place), job.folder)
         self._at_work[place] = key
-        self._show(stage)
+        self._show_progress(stage)
         self._futures[self._executor.submit(request)] = place, request
 
-    def _end(self, future: Future[Made], place: int, request: steps.StepJob) -> None:
+    def _finish_job(self, future: Future[Made], place: int, request: steps.StepJob) -> None:
         """Collect the outcome of an input that has ended."""
         job, key = self._jobs[place], self._at_work.pop(place)
         for line in lines_of(request.place / "notes"):  # Also the notes of a worker that was killed.
@@ -243,7 +243,7 @@ class _Session:
         self._outcomes[place] = outcome
 
 
-def _task(work: Work, job: InputJob) -> steps.Task:
+def _task_of(work: Work, job: InputJob) -> steps.Task:
     """Return the task whose key identifies a result: input, options, version of the program and of Blender."""
     blender = ""
     if work.needs_blender(job):
@@ -324,7 +324,7 @@ def counted(count: int, what: str) -> str:
 
 
 @contextmanager
-def _extension() -> Iterator[None]:
+def _local_extension() -> Iterator[None]:
     """Register the extension's data and handlers from this checkout, in place of an installed one."""
     import addon_utils
     import bpy

@@ -102,7 +102,7 @@ class _View:
         worst = int(np.argmax(errors))
         count = min(MAX_POSES, int(MAX_POSES_PER_S * (times[-1] - times[0])) + 2)
         even = np.searchsorted(times, np.linspace(times[0], times[-1], count), side="right") - 1
-        drawn, moments = self._drawn(), np.unique(np.append(even, worst))
+        drawn, moments = self._drawn_rows(), np.unique(np.append(even, worst))
         before = world.worlds(world.truth, times[moments])
         after = self.nodes.worlds(world.moving, self.tracks, times[moments])
         parents = self._parents(drawn)
@@ -128,7 +128,7 @@ class _View:
         radii = np.broadcast_to(self.world.balls[:, None], truth.origins.shape[:2])
         return ball_displacement(there, truth, radii)
 
-    def _drawn(self) -> np.ndarray:
+    def _drawn_rows(self) -> np.ndarray:
         """Return the rows of the nodes to draw: the joints, or all moving nodes if there are no joints."""
         rows = np.flatnonzero(np.isin(self.world.moving, self.joints))
         return (rows if len(rows) > 1 else np.arange(len(self.world.moving)))[:MOST_JOINTS]

@@ -82,7 +82,7 @@ class Numbers:
     tolerance: float | None = None
     bytes_before: int | None = None
     bytes_after: int | None = None
-    """The size of whole files."""
+    """The sizes of whole files."""
 
     clips: list[ClipNumbers] = field(default_factory=list)
 
@@ -96,7 +96,7 @@ class Outcome:
     objects: int = 0
     bones: int = 0
     clips: int = 0
-    """The number of clips that were done."""
+    """The numbers of objects, bones and clips that were done."""
 
     refused: int = 0
     """The number of objects and bones that could not be done."""
@@ -168,7 +168,7 @@ class RunningJob:
 
     @contextmanager
     def failing(self) -> Iterator[None]:
-        """Report why the block fails, also for unforeseen errors, and go on: other inputs wait."""
+        """Report any failure of the block, also an unforeseen one, so that other inputs can still be processed."""
         try:
             yield
         except FileProblem as problem:
@@ -185,7 +185,7 @@ class RunningJob:
 
     @contextmanager
     def reading(self) -> Iterator[None]:
-        """Report why the block cannot read a recording; a file found in a folder may hold no motion."""
+        """Report why the block cannot read a recording; leave a file from a folder alone if it holds no motion."""
         try:
             yield
         except TrajectoryError as error:

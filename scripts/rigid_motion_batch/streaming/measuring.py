@@ -70,8 +70,8 @@ def measure(
         sender.hold(tool, *hand)
     sent, lost, answers = list[bytes](), list[bytes](), list[bytes]()
     with Port(LOOPBACK) as port, ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as processes:
-        receiving = processes.submit(_receive, port.number, times, delay, [body.name for body in bodies])
-        _, receiver = _received(port)
+        receiving = processes.submit(_run_receiver, port.number, times, delay, [body.name for body in bodies])
+        _, receiver = _next_datagram(port)
 
         def say(datagrams: list[bytes], now: float) -> None:
             for datagram in datagrams:
@@ -80,7 +80,7 @@ def measure(
                     lost.append(datagram)
                     continue
                 port.send(ARRIVAL.pack(now) + datagram, receiver)
-                answer, _ = _received(port)
+                answer, _ = _next_datagram(port)
                 if answer:
                     answers.append(answer)
                 if answer and random.random() >= loss:
@@ -183,13 +183,13 @@ def cost(size: float, headers: float, off: np.ndarray) -> dict[str, float]:
     }
 
 
-def _received(port: Port) -> tuple[bytes, Address]:
+def _next_datagram(port: Port) -> tuple[bytes, Address]:
     if came := port.received(PATIENCE_S):
         return came[0]
     raise RuntimeError(f"the receiver's process did not answer within {PATIENCE_S:g} s")
 
 
-def _receive(to: int, times: np.ndarray, delay: float, names: Sequence[str]) -> list[tuple[float, Poses]]:
+def _run_receiver(to: int, times: np.ndarray, delay: float, names: Sequence[str]) -> list[tuple[float, Poses]]:
     """Show the motion received from a port one delay after each sample, send answers, and return the moments and poses
     (joints,) of the named bodies.
     """

@@ -32,7 +32,7 @@ class Receiving:
     def __init__(
         self, room: Room, user: str, fps: float, margin: float, to: Address | None = None, steady: bool = False
     ) -> None:
-        self._room, self._fps, self._margin, self._to = room, fps, margin, to
+        self._room, self._fps, self._margin, self._forward_to = room, fps, margin, to
         self.receiver = Receiver(steady=steady)
         self.datagrams, self.bytes = Counter[str](), Counter[str]()
         """Counts by user."""
@@ -41,7 +41,7 @@ class Receiving:
         self._outlets: dict[str, Outlet] = {}
         self._heard: dict[str, float] = {}
         """When each sending user was last heard."""
-        self._last = self._answer_at = -math.inf
+        self._last_heard = self._answer_at = -math.inf
         """When the last datagram came, and when the next answers are due."""
         room.listen(user)
 
@@ -49,7 +49,7 @@ class Receiving:
         """Show received motion until a moment of `time.monotonic`, or until all senders have left."""
         began, frame = time.monotonic(), 0
         while not stopped and (now := time.monotonic()) < until:
-            if self._last > -math.inf and not self._heard and now - self._last > LINGER_S + self._margin:
+            if self._last_heard > -math.inf and not self._heard and now - self._last_heard > LINGER_S + self._margin:
                 break
             due = began + frame / self._fps
             for came in self._room.come(min(due, until) - now):
@@ -60,17 +60,17 @@ class Receiving:
                 frame = math.floor((now - began) * self._fps) + 1
 
     def _take(self, came: Came, now: float) -> None:
-        user, datagram, self._last = came.user, came.datagram, now
+        user, datagram, self._last_heard = came.user, came.datagram, now
         if datagram is None:
-            self._leave(user)
+            self._forget(user)
         elif user in self._heard or len(self._heard) < MOST_STREAMS:
             self._heard[user] = now
             self.datagrams[user] += 1
             self.bytes[user] += len(datagram)
             self.receiver.take(datagram, now + self._margin, user)
-            if self._to:
+            if self._forward_to:
                 if user not in self._outlets:
-                    self._outlets[user] = Outlet(*self._to)
+                    self._outlets[user] = Outlet(*self._forward_to)
                 self._outlets[user].say(datagram)
 
     def _answer(self, now: float) -> None:
@@ -87,9 +87,9 @@ class Receiving:
         for act in self.on_frame:
             act(shown)
         for user in [user for user, heard in self._heard.items() if now - heard > MAX_SILENCE_S]:
-            self._leave(user)
+            self._forget(user)
 
-    def _leave(self, user: str) -> None:
+    def _forget(self, user: str) -> None:
         self._heard.pop(user, None)
         self.receiver.leave(user)
         if outlet := self._outlets.pop(user, None):
@@ -98,4 +98,4 @@ class Receiving:
     def close(self) -> None:
         """Close the ports of all users."""
         for user in list(self._outlets):
-            self._leave(user)
+            self._forget(user)

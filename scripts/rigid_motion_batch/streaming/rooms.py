@@ -37,7 +37,7 @@ dropped, as by a network).
 LIMITS = {
     "connect/retry": {"period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5},
     "transport/link/rx/max_message_size": 1 << 16,
-    # How many may be on the way out before some are dropped: in a full room each datagram counts as one.
+    # How many messages may wait to be sent before some are dropped: in a full room each datagram takes one place.
     "transport/link/tx/queue/size/data": 16,
 }
 """Zenoh's settings: pauses between attempts to connect, largest incoming message in bytes, and outgoing queue."""
@@ -128,7 +128,7 @@ class Room:
 
     def __init__(self, session: zenoh.Session, name: str) -> None:
         self.name, self._session = name, session
-        self._came: queue.Queue[Came] = queue.Queue(MOST_WAITING)
+        self._queue: queue.Queue[Came] = queue.Queue(MOST_WAITING)
         self._declared: dict[str, Any] = {}
         """Zenoh's publishers by key, and other declarations that Zenoh would drop without a reference."""
 
@@ -151,7 +151,7 @@ class Room:
         self._subscribe(self._session.liveliness(), f"*/{LISTENING}/*", history=True)
 
     def _subscribe(self, to: zenoh.Session | zenoh.Liveliness, keys: str, **options: bool) -> None:
-        self._declared[f"take {keys}"] = to.declare_subscriber(f"{self.name}/{keys}", self._take, **options)
+        self._declared[f"take {keys}"] = to.declare_subscriber(f"{self.name}/{keys}", self._queue_sample, **options)
 
     def send(self, user: str, stream: str, datagram: bytes | None) -> None:
         """Send a datagram as a user, or an answer to one; None ends the stream."""
@@ -176,15 +176,15 @@ class Room:
         """
         result = []
         with suppress(queue.Empty):
-            result.append(self._came.get(seconds > 0.0, max(seconds, 0.0)))
+            result.append(self._queue.get(seconds > 0.0, max(seconds, 0.0)))
             while True:
-                result.append(self._came.get_nowait())
+                result.append(self._queue.get_nowait())
         return result
 
-    def _take(self, sample: zenoh.Sample) -> None:
+    def _queue_sample(self, sample: zenoh.Sample) -> None:
         """Queue a received sample; called by Zenoh in its own thread."""
         user, stream, *_ = str(sample.key_expr).removeprefix(f"{self.name}/").split("/")
         datagram = None if str(sample.kind) == "SampleKind.DELETE" else sample.payload.to_bytes()
         if datagram is None or len(datagram) <= MAX_BYTES:
             with suppress(queue.Full):
-                self._came.put_nowait(Came(user, stream, datagram))
+                self._queue.put_nowait(Came(user, stream, datagram))

@@ -35,7 +35,7 @@ def turned(angle: np.ndarray, axis: int) -> np.ndarray:
 
 
 def dancer(rate: float = 30.0, seconds: float = 4.0, arms: float = 1.2, held: int = 0) -> Trajectory:
-    """Return a dancer whose arms swing about hanging by the angle `arms`, after `held` samples of a T-pose."""
+    """Return a dancer whose arms swing about the angle `arms` below a T-pose, after `held` samples of the T-pose."""
     times = np.arange(round(seconds * rate)) / rate
     poses = Poses(np.repeat(OFFSETS[:, None], len(times), axis=1), np.zeros((len(JOINTS), len(times), 4)))
     poses.quaternions[..., 0] = 1.0
@@ -136,22 +136,22 @@ def test_a_gap_longer_than_keys_are_apart_is_said_with_its_times(begin: float) -
 
 
 def test_who_is_slow_fast_or_jumps_all_the_time_is_not_warned() -> None:
-    one, jumping = hand(), hand()
-    fast = replace(one, poses=Poses(100.0 * one.poses.positions, one.poses.quaternions))
+    recorded, jumping = hand(), hand()
+    fast = replace(recorded, poses=Poses(100.0 * recorded.poses.positions, recorded.poses.quaternions))
     jumping.poses.positions[30::60] += (0.0, 0.8, 0.0)
-    for calm in (hand(rate=4.0), one, fast):
+    for calm in (hand(rate=4.0), recorded, fast):
         assert clip_of(calm).warnings == ()
     assert "jump" not in "".join(map(str, clip_of(jumping).warnings))
 
 
 def test_a_jump_is_said_with_its_time() -> None:
-    one = hand()
-    one.poses.positions[180:] += (0.0, 0.8, 0.0)
-    (warning,) = clip_of(one).warnings
+    recorded = hand()
+    recorded.poses.positions[180:] += (0.0, 0.8, 0.0)
+    (warning,) = clip_of(recorded).warnings
     assert warning.text.startswith("a jump at 1.99 s: 0.79 m in one sample, at 71.3 m/s")
-    assert (warning.start_s, warning.end_s) == (one.times[179], one.times[180])
-    assert clip_of(one, start=2.0).warnings == ()
-    assert clip_of(one, measured=False).warnings == (), "an animation may jump"
+    assert (warning.start_s, warning.end_s) == (recorded.times[179], recorded.times[180])
+    assert clip_of(recorded, start=2.0).warnings == ()
+    assert clip_of(recorded, measured=False).warnings == (), "an animation may jump"
 
 
 def test_a_joint_that_jumps_is_said() -> None:
@@ -168,15 +168,15 @@ def test_a_joint_that_jumps_is_said() -> None:
     [({}, 300), ({"start": 1.0}, 210), ({"end": 2.0}, 181), ({"start": 1.0, "end": 2.0}, 91), ({"end": 99.0}, 300)],
 )
 def test_start_and_end_count_from_the_first_sample(begin: float, options: dict, count: int) -> None:
-    one = hand(begin=begin)
+    recorded = hand(begin=begin)
     clip = clip_of(
-        replace(one, times=np.round(one.times, 6)),
+        replace(recorded, times=np.round(recorded.times, 6)),
         **{name: x - 1e-6 if name == "start" else x + 1e-6 for name, x in options.items()},
     )
     assert len(clip.times) == count
     assert clip.times[0] - begin == pytest.approx(options.get("start", 0.0), abs=1e-5)
-    one.times[0] = -1e9  # A wild time in front does not move the start.
-    assert clip_of(one, start=1.0).times[0] - begin == pytest.approx(1.0, abs=0.02)
+    recorded.times[0] = -1e9  # A wild time in front does not move the start.
+    assert clip_of(recorded, start=1.0).times[0] - begin == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(

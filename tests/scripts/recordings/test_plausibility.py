@@ -51,10 +51,10 @@ def test_devices_that_are_mixed_are_refused(order, delay: float, sides: tuple[fl
 @pytest.mark.parametrize("rate", [10.0, 90.0, 1000.0])
 @pytest.mark.parametrize("rounded_to", [0.0, 1e-4, 1e-2])
 def test_one_device_is_not_refused(scale: float, rate: float, rounded_to: float) -> None:
-    one = hand(rate=rate)
-    positions = scale * one.poses.positions
+    recorded = hand(rate=rate)
+    positions = scale * recorded.poses.positions
     positions = np.round(positions / rounded_to) * rounded_to if rounded_to else positions
-    require_one_body(replace(one, poses=Poses(positions, one.poses.quaternions)), "log.csv", "", 1)
+    require_one_body(replace(recorded, poses=Poses(positions, recorded.poses.quaternions)), "log.csv", "", 1)
 
 
 @pytest.mark.parametrize(
@@ -74,9 +74,9 @@ def test_what_nobody_records_is_said(trajectory: Trajectory, told: str) -> None:
 )
 def test_what_stays_far_from_its_origin_may_be_in_another_unit(shift: float, scale: float, said: int) -> None:
     """A calm head in centimetres or inches is no faster than a quick hand in metres, but as high up as a house."""
-    one = hand(rate=10.0)
-    calm = one.poses.positions * scale / 10.0 + np.array((0.0, shift, 0.0))
-    result = implausibilities(replace(one, poses=Poses(calm, one.poses.quaternions)))
+    recorded = hand(rate=10.0)
+    calm = recorded.poses.positions * scale / 10.0 + np.array((0.0, shift, 0.0))
+    result = implausibilities(replace(recorded, poses=Poses(calm, recorded.poses.quaternions)))
     assert len(result) == said
     assert all("--scale 0.01, if inches, --scale 0.0254" in item.way_out for item in result)
 
@@ -96,8 +96,8 @@ LOSSES = {
 
 @pytest.mark.parametrize("way_out", LOSSES)
 def test_a_quarter_of_the_rows_that_is_lost_is_a_warning_and_no_repair(way_out: str) -> None:
-    one, (times, told) = hand(), LOSSES[way_out]
-    poses = Poses(np.tile(one.poses.positions, (2, 1)), np.tile(one.poses.quaternions, (2, 1)))
+    recorded, (times, told) = hand(), LOSSES[way_out]
+    poses = Poses(np.tile(recorded.poses.positions, (2, 1)), np.tile(recorded.poses.quaternions, (2, 1)))
     clip = make_clip(Trajectory("two", times, poses), "two.csv", "two", "blender")
     (warning,) = (item for item in clip.warnings if " lost: " in item.text)
     assert warning.text.startswith(told)
@@ -108,10 +108,12 @@ def test_a_quarter_of_the_rows_that_is_lost_is_a_warning_and_no_repair(way_out: 
 
 @pytest.mark.parametrize("late", [1e-6, 1e-4])
 def test_a_stamp_that_is_too_early_or_too_late_is_no_jump(late: float) -> None:
-    one = hand(rate=1000.0)
+    recorded = hand(rate=1000.0)
     times = np.arange(1000) / 1000.0
     times[500] = times[499] + late
-    poses = Poses(np.tile(one.poses.positions, (12, 1))[:1000], np.tile(one.poses.quaternions, (12, 1))[:1000])
+    poses = Poses(
+        np.tile(recorded.poses.positions, (12, 1))[:1000], np.tile(recorded.poses.quaternions, (12, 1))[:1000]
+    )
     smooth = Poses(np.sin(times)[:, None] * np.ones(3), poses.quaternions)
     assert breaks(times, smooth, None, 1.0, 0.0) == []
     jump = smooth.positions.copy()
@@ -122,10 +124,10 @@ def test_a_stamp_that_is_too_early_or_too_late_is_no_jump(late: float) -> None:
 @pytest.mark.parametrize("row", [0, 40, COUNT - 1])
 @pytest.mark.parametrize("time", [-1e25, 0.0, 1e6, 1e25, np.nan])
 def test_one_wild_time_stamp_is_no_reason_for_doubts(row: int, time: float) -> None:
-    one = hand()
-    times = 1.7e9 + one.times
+    recorded = hand()
+    times = 1.7e9 + recorded.times
     times[row] = time
-    assert implausibilities(replace(one, times=times)) == ()
+    assert implausibilities(replace(recorded, times=times)) == ()
     assert typical_interval(times) == pytest.approx(1.0 / 90.0, rel=1e-4)
 
 
@@ -152,8 +154,8 @@ def test_times_that_cannot_be_seconds_are_in_the_unit_of_a_rate_that_devices_hav
     assert trajectory.remark.startswith(told)
     assert trajectory.remark.endswith("(otherwise: --time-unit)")
     (said,) = read_trajectories(source, ReadingOptions(time_unit=unit)).trajectories
-    for one in (trajectory, said):
-        np.testing.assert_array_equal(one.times - one.times[0], [row * 11 / 1000 for row in range(9)])
+    for recorded in (trajectory, said):
+        np.testing.assert_array_equal(recorded.times - recorded.times[0], [row * 11 / 1000 for row in range(9)])
     (trajectory,) = read_trajectories(source, ReadingOptions(time_unit="s")).trajectories
     assert typical_interval(trajectory.times) == pytest.approx(11 * ticks / 1000, rel=0.05)
 

@@ -36,17 +36,17 @@ def written(source: str, path: Path, options: ReadingOptions, every: int) -> Non
     cells = before[0].cells
     assert cells
     numbers = np.full(cells.shape, np.nan)
-    for one in before:
-        assert one.cells
-        for column, values in one.cells.numbers(moved(one.poses)).items():
-            numbers[one.cells.rows[::every], column] = values[::every]
+    for body in before:
+        assert body.cells
+        for column, values in body.cells.numbers(moved(body.poses)).items():
+            numbers[body.cells.rows[::every], column] = values[::every]
     cells.write(path, numbers)
     again = read_trajectories(source.replace(source.partition(":")[0], str(path)), options).trajectories
-    for one, other in zip(before, again, strict=True):
-        np.testing.assert_allclose(one.times, other.times, atol=1e-9)
-        expected = Poses(one.poses.positions.copy(), normalise(one.poses.quaternions))
-        expected[..., ::every] = moved(one.poses)[..., ::every]
-        read = Poses(other.poses.positions, normalise(other.poses.quaternions))
+    for body, reread in zip(before, again, strict=True):
+        np.testing.assert_allclose(body.times, reread.times, atol=1e-9)
+        expected = Poses(body.poses.positions.copy(), normalise(body.poses.quaternions))
+        expected[..., ::every] = moved(body.poses)[..., ::every]
+        read = Poses(reread.poses.positions, normalise(reread.poses.quaternions))
         assert shell_error(read, expected).max() < 1e-6
 
 

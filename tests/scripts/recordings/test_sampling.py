@@ -31,7 +31,7 @@ def at(trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
     return trajectory.rest_body.skeleton.in_root_space(poses).positions
 
 
-def off(trajectory: Trajectory, body: Body, times: np.ndarray) -> float:
+def largest_error(trajectory: Trajectory, body: Body, times: np.ndarray) -> float:
     order = [trajectory.rest_body.joints.index(f"Joint{joint}") for joint in range(len(body.parents))]
     return float(np.linalg.norm(at(trajectory, times)[order] - body.places(times), axis=-1).max())
 
@@ -41,8 +41,8 @@ def test_the_densest_curve_says_the_rate(tmp_path: Path) -> None:
     result = read(body.write(tmp_path / "mixed.glb"))
     assert result.rate == 30.0
     np.testing.assert_allclose(result.times, np.arange(61) / 30.0, atol=1e-6)
-    assert off(result, body, np.arange(61) / 30.0) < SINGLE
-    assert off(result, body, body.moments) < WITHIN
+    assert largest_error(result, body, np.arange(61) / 30.0) < SINGLE
+    assert largest_error(result, body, body.moments) < WITHIN
     assert result.warnings == ()
 
 
@@ -50,7 +50,7 @@ def test_the_densest_curve_says_the_rate(tmp_path: Path) -> None:
 def test_splines_are_read_with_their_tangents(tmp_path: Path, size: float) -> None:
     body = curved(size)
     result = read(body.write(tmp_path / "curved.glb"))
-    assert off(result, body, body.moments) < WITHIN
+    assert largest_error(result, body, body.moments) < WITHIN
     assert (result.rate, result.warnings) == (60.0, ()), "two keys a second tell no rate"
 
 
@@ -65,7 +65,7 @@ def test_a_step_is_two_samples_and_is_told(tmp_path: Path) -> None:
     result = read(body.write(tmp_path / "step.glb"))
     assert len(result.times) == 32
     times = body.moments[(body.moments < 0.4 - 0.03 / 30) | (body.moments > 0.4)]
-    assert off(result, body, times) < WITHIN
+    assert largest_error(result, body, times) < WITHIN
     (warning,) = result.warnings
     assert "it jumps" in warning.text
     assert "first at 0.3992 s" in warning.text

@@ -20,7 +20,7 @@ from tests.recordings import RECORDINGS
 from tests.scripts.bvh_bodies import TIMES, write_body
 
 
-def ends_off(
+def largest_end_error(
     body: StreamBody, times: np.ndarray, poses: Poses, ends: np.ndarray, tolerance: float, delay: float
 ) -> float:
     """Return the largest error of bone ends (joints, 3), in their joints' axes, at the samples."""
@@ -46,25 +46,25 @@ def ends_off(
     return max(off)
 
 
-def of_file(path: Path, tolerance: float, delay: float = 0.1) -> float:
+def file_end_error(path: Path, tolerance: float, delay: float = 0.1) -> float:
     """Return the largest error of the End Sites of a recording."""
     (clip,), _ = read_clips([str(path)])
     times, poses = samples_of(clip)
     sites = np.array([joint.end or (0.0, 0.0, 0.0) for joint in _read_hierarchy(path)[0]]) * clip.metres_per_unit
     ends = to_blender(Poses(sites, np.tile((1.0, 0.0, 0.0, 0.0), (len(sites), 1))), clip.axes).positions
-    return ends_off(body_of(clip, poses), times, poses, ends, tolerance, delay)
+    return largest_end_error(body_of(clip, poses), times, poses, ends, tolerance, delay)
 
 
 @pytest.mark.parametrize("unit", [1.0, 100.0])
 def test_the_ends_of_bones_are_within_the_tolerance(tmp_path: Path, unit: float) -> None:
-    assert 0.001 < of_file(write_body(tmp_path / "walk.bvh", unit=unit), 0.002) <= 0.002
+    assert 0.001 < file_end_error(write_body(tmp_path / "walk.bvh", unit=unit), 0.002) <= 0.002
 
 
 @pytest.mark.slow
 @pytest.mark.recordings
 @pytest.mark.parametrize("delay", [0.1, 0.2])
 def test_the_ends_of_bones_of_a_recording_are_within_the_tolerance(delay: float) -> None:
-    assert of_file(RECORDINGS / "beat_saber_body.bvh", 0.005, delay) <= 0.005 * 1.02
+    assert file_end_error(RECORDINGS / "beat_saber_body.bvh", 0.005, delay) <= 0.005 * 1.02
 
 
 def test_what_is_held_all_the_time_is_found() -> None:
