@@ -49,7 +49,7 @@ def test_every_joint_stays_within_the_tolerance_everywhere(count, joints, seed, 
 @settings(max_examples=tried(20))
 @given(st.integers(4, 10), st.integers(0, 2**16), st.sampled_from((0.003, 0.03, 0.3)), st.sampled_from(tuple(MODES)))
 def test_keys_of_their_own_are_no_more_than_key_poses(joints, seed, tolerance, mode):
-    """In 260 bodies four of one or two joints had up to four more keys: key poses are searched for longer."""
+    """Of 260 bodies, four had up to four more own keys, in one or two joints: key poses are searched for longer."""
     times, poses, parents = wandering_body(60, joints, seed)
     own, shared = (
         reduce_skeleton_keys(times, poses, parents, mode, tolerance=tolerance, shared=shared)

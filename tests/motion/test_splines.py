@@ -109,8 +109,8 @@ def slow_spline(times: np.ndarray, keys: Poses, moments: np.ndarray, mode: str) 
     h = np.diff(times)
     speeds = [ways[0] / h[0]]
     for i in range(1, len(h)):
-        # The slope at 0 of the parabola through what lies behind, here, and ahead, unless the shorter one's share in it
-        # is more than its part of the longer one's time; up to a sixteenth of that it has none.
+        # The slope, at this key, of the parabola through the keys before, here and after. The shorter segment's share
+        # is at most the ratio of its time to the longer one's, and 0 if that is at most 1/16.
         short, long = (i - 1, i) if h[i - 1] < h[i] else (i, i - 1)
         share = min(h[long] / (h[long] + h[short]), h[short] / h[long]) if h[short] > h[long] / 16.0 else 0.0
         speeds.append(share * ways[short] / h[short] + (1.0 - share) * ways[long] / h[long])
@@ -118,8 +118,8 @@ def slow_spline(times: np.ndarray, keys: Poses, moments: np.ndarray, mode: str) 
     if mode == CAUSAL:
         speeds = [ways[0] / h[0]] * 2
         for i in range(2, len(h) + 1):
-            # Of the parabola through the two keys before and this, the mean of its slopes here and half-way here,
-            # unless the segment before took less time.
+            # The mean of the slopes, here and half-way here, of the parabola through this key and the two before, with
+            # less bend if the segment before was shorter.
             last, here = ways[i - 2] / h[i - 2], ways[i - 1] / h[i - 1]
             bend = (here - last) * min(1.0 / (h[i - 2] + h[i - 1]), h[i - 2] / h[i - 1] ** 2)
             speeds.append(0.5 * ((here + bend * h[i - 1]) + here))
@@ -167,9 +167,7 @@ def wild_times(draw, least: int = 3, most: int = 8) -> np.ndarray:
 
 
 def wild_keys(times: np.ndarray, seed: int, spread: float) -> tuple[np.ndarray, Poses]:
-    """Return the angles between keys, and keys that each follow from the one before by a turn about a body axis and an
-    advance.
-    """
+    """Return turn angles, and keys that each follow the one before by a turn about a body axis and an advance."""
     random, count = np.random.default_rng(seed), len(times) - 1
     angles, ways = 3.0 * 10.0 ** -random.uniform(0.0, spread, (2, count))
     axes, advances = random.normal(size=(3, count)), ways * random.normal(size=(3, count))
@@ -209,8 +207,8 @@ def lengths(path: Poses) -> np.ndarray:
 
 @given(wild_times(), st.integers(0, 2**16), st.floats(0.0, 4.0))
 def test_whatever_the_keys_a_stream_stays_in_their_neighbourhood(times, seed, spread):
-    """A stream leaves a key with at most 1.31 times the previous twist and half the one before it, for twice the
-    previous time.
+    """A stream leaves a key with up to 1.31 of the twist before and half the one before that, for twice the time
+    before.
     """
     angles, keys = wild_keys(times, seed, spread)
     count = len(angles)

@@ -122,8 +122,7 @@ def only_overridden() -> set[bpy.types.Object]:
 
 
 def write_file(output: Path, record: InputRecord | None, opened: int | None = None) -> None:
-    """Save the open file, completely or not at all. Without a record it replaces the opened file, which is kept as
-    NAME.blend1.
+    """Save the open file, completely or not at all; without a record in its own place, with a copy as NAME.blend1.
 
     Parameters
     ----------

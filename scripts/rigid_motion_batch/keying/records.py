@@ -66,9 +66,7 @@ class InputRecord:
     def keep(
         self, key: str, written: Sequence[Path], beside: Iterable[Path], read: Iterable[Path], facts: Mapping[str, Any]
     ) -> None:
-        """Record that the input is done: the files written, those that belong to them, the files read, and facts for
-        JSON.
-        """
+        """Record that the input is done: the files written, their companions, the files read, and facts for JSON."""
         line = {
             "source": self._source,
             "key": key,
@@ -90,9 +88,7 @@ class InputRecord:
         return None
 
     def _may_replace(self, path: Path) -> bool:
-        """Return whether a file may be replaced: always with `overwrite`, otherwise if it is this input's unchanged
-        result.
-        """
+        """Return whether a file may be replaced: always with `overwrite`, else an unchanged result of this input."""
         return self.overwrite or _has_recorded_digest(path, _relative(self.folder, path), self._lines)
 
     @property

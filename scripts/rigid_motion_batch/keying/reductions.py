@@ -35,7 +35,7 @@ class Reductions:
     """True for Blender's own F-curves in place of a mode."""
 
     fewest: bool
-    """True if neither was requested: each whole body gets whichever needs fewer keys."""
+    """True if neither a mode nor curves were requested: each whole body gets whichever needs fewer keys."""
 
     tolerance: Tolerance | None
     """The tolerance; None for the initial value in Blender's window, or for recordings the default of `reduce.py`."""

@@ -53,9 +53,7 @@ class Came(NamedTuple):
 
 
 def locator(address: str) -> str:
-    """Return HOST, HOST:PORT or [IPV6]:PORT in Zenoh's form; Zenoh's own locators, such as tls/HOST:PORT, are
-    unchanged.
-    """
+    """Return HOST, HOST:PORT or [IPV6]:PORT in Zenoh's form; Zenoh's own forms, such as tls/HOST:PORT, stay."""
     if "/" in address:
         return address
     has_port = re.fullmatch(r"(\[[^]]*\]|[^:]*):\d+", address)
@@ -171,9 +169,7 @@ class Room:
             self._declared[key].put(datagram)
 
     def come(self, seconds: float) -> list[Came]:
-        """Return everything received since the last call; if that is nothing, wait up to `seconds` for the first
-        datagram.
-        """
+        """Return all datagrams since the last call; if there are none, wait up to `seconds` for the first."""
         result = []
         with suppress(queue.Empty):
             result.append(self._queue.get(seconds > 0.0, max(seconds, 0.0)))

@@ -107,7 +107,7 @@ def found_held(clips: Sequence[Clip]) -> list[tuple[str, Hand]]:
 
 
 def even_rate(times: np.ndarray) -> float | None:
-    """Return the sampling rate in samples per second; None if it is no whole number."""
+    """Return the sampling rate in samples per second; None if it is not a whole number."""
     rate = 1.0 / float(np.median(np.diff(times))) if len(times) > 1 else 0.5
     return float(round(rate)) if abs(rate - round(rate)) < 0.01 else None
 

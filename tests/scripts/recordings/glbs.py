@@ -13,9 +13,7 @@ from tests.gltf.player import File
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """An animation channel of a joint: `values` (n, 3) or (n, 4), quaternions as x, y, z, w; (3 n, ...) for a cubic
-    spline.
-    """
+    """An animation channel of a joint: `values` (n, 3) or (n, 4), quaternions x, y, z, w; cubic splines (3 n, ...)."""
 
     joint: int
     path: str

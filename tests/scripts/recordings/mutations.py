@@ -48,9 +48,7 @@ def mutated(content: bytes, chance: Random) -> bytes:
 
 
 def in_place(content: bytes, chance: Random) -> bytes:
-    """Return the content with some bytes changed, in the same length: readers reject most other damage to binary files
-    at once.
-    """
+    """Return the content with some bytes changed: of binary files, a changed length would be rejected too early."""
     for _ in range(chance.choice((1, 1, 2, 4))):
         content = change_bytes(content, chance)
     return content

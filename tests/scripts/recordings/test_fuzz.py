@@ -1,5 +1,4 @@
-"""Fuzz tests of readers: each damaged file is refused in one line, or read as a recording that any mode can
-interpolate.
+"""Fuzz tests of readers: a damaged file is refused in one line, or becomes a recording that modes can interpolate.
 
 RIGID_MOTION_FUZZ=20000 tries that many damaged files of each format, instead of the few that an ordinary run has time
 for. A failure names its case; RIGID_MOTION_FUZZ_FROM begins there.
