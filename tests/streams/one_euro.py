@@ -1,4 +1,4 @@
-"""The One Euro filter of a body, for comparison: G. Casiez, N. Roussel, D. Vogel, CHI 2012.
+"""The One Euro filter of a body, for comparison (Casiez, Roussel and Vogel, CHI 2012).
 
 Positions (metres) and rotations (radians) share the parameters: a minimal cutoff in Hz, and what each metre or radian
 per second adds to it.
