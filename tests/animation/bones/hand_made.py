@@ -1,4 +1,4 @@
-"""A figure of 20 bones as an animator keys it: few keys, each bone on frames of its own, and Bezier curves between."""
+"""A figure of 20 bones keyed by an animator: few keys, on different frames for each bone, with Bezier curves."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from tests.animation.keyed import curves_of, rotation_path
 from tests.animation.scenes import write
 
 LAST = 120
-"""The last frame, at 24 a second."""
+"""The last frame, at 24 fps."""
 
 THIRD, AUTOMATIC, OF_OLD = "third", "automatic", "automatic, without smoothing"
-"""Handles: by hand, a third of the segment long; as Blender sets them; and as it did in files of old."""
+"""Handles: set by hand to a third of the segment; automatic as in Blender; and automatic as in old files."""
 
 
 def _chain(first: str, names: str, head: tuple[float, float, float], step: tuple[float, float, float]) -> list[Rest]:
@@ -38,7 +38,7 @@ FIGURE = (
 
 
 def hand_made(handles: str, rotation_mode: str = "QUATERNION", seed: int = 0) -> bpy.types.Object:
-    """The figure with keys of rotation on all bones, and of location on the first one."""
+    """Return the figure with rotation keys on all bones, and location keys on the first bone."""
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = 24, 1.0
     scene.frame_start, scene.frame_end = 0, LAST
@@ -80,7 +80,7 @@ def _give_handles(fcurve: bpy.types.FCurve, handles: str) -> None:
 
 
 def keys_of(rig: bpy.types.Object) -> dict[str, np.ndarray]:
-    """The frames of the keys that each bone has."""
+    """Return the key frames of each bone."""
     return {
         bone.name: np.unique([key.co.x for fcurve in curves_of(bone).values() for key in fcurve.keyframe_points])
         for bone in rig.pose.bones
@@ -88,7 +88,7 @@ def keys_of(rig: bpy.types.Object) -> dict[str, np.ndarray]:
 
 
 def bake_each_frame(rig: bpy.types.Object) -> None:
-    """Bake as Blender's Bake Action does: a key on each frame for what is seen, rotations as unit quaternions."""
+    """Bake as Blender's Bake Action does: a key on each frame at the displayed pose, rotations as unit quaternions."""
     frames = np.arange(LAST + 1.0)
     for bone in rig.pose.bones:
         for path in {path for path, _ in curves_of(bone)}:

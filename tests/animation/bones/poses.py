@@ -1,11 +1,11 @@
-"""Where bones have to be in the armature's space, worked out apart from the program, and where Blender has them.
+"""Oracle for bone poses in armature space, computed without the program, and the poses that Blender shows.
 
-Blender says what its place at rest, its parents and its settings make of `oracle.expected_bases`. Matrices are
-(m, 4, 4) in the armature's space, frames are the scene's.
+Blender computes the effect of rest poses, parents and bone settings on `oracle.expected_bases`. Matrices are
+(m, 4, 4) in armature space, frames are the scene's.
 
-Errors are parts of a bone's reach: the largest distance of its head from the armature's origin, and at least its own
-length. Blender takes bones that have constraints through the world's space, in single precision, so the distance of
-the armature from the world's origin, in its own units, is added.
+Errors are fractions of a bone's reach: the largest distance of its head from the armature's origin, and at least its
+own length. Blender takes bones with constraints through world space, in single precision, so the distance of the
+armature from the world's origin, in the armature's units, is added.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from tests.animation.oracle import expected_bases, play, shortest_quaternion, sh
 TOLERANCE = 1e-5
 
 Poses = dict[str, np.ndarray]
-"""Matrices of bones by their names."""
+"""Matrices of bones by name."""
 
 
 def shown_poses(rigs: Iterable[bpy.types.Object], frames: Sequence[float]) -> list[Poses]:
-    """All bones of rigs by name, as the scene evaluates them. It returns to its frame."""
+    """Return all bones of rigs by name, as the scene evaluates them. The scene returns to its frame."""
     rigs, scene = list(rigs), bpy.context.scene
     before, subframe = scene.frame_current, scene.frame_subframe
     shown = [{bone.name: np.empty((len(frames), 4, 4)) for bone in rig.pose.bones} for rig in rigs]
@@ -42,24 +42,24 @@ def shown_poses(rigs: Iterable[bpy.types.Object], frames: Sequence[float]) -> li
 
 
 def shown_of(obj: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
-    """Where an object is shown, or the bones of a rig in its space, shape (k, m, 4, 4)."""
+    """Return the displayed matrices of an object, or of the bones of a rig in armature space, shape (k, m, 4, 4)."""
     return np.stack([*shown_poses([obj], frames)[0].values()] if obj.pose else shown_worlds([obj], frames))
 
 
 def placed(rig: bpy.types.Object) -> np.ndarray:
-    """Where the bones of a rig are seen now, in the space of the armature, shape (bones, 4, 4)."""
+    """Return the matrices of a rig's bones displayed now, in armature space, shape (bones, 4, 4)."""
     bpy.context.view_layer.update()
     bones = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
     return np.array([bone.matrix for bone in bones])
 
 
 def seen(rig: bpy.types.Object, name: str) -> np.ndarray:
-    """Where one of them is seen, shape (4, 4)."""
+    """Return the matrix of one bone displayed now, shape (4, 4)."""
     return placed(rig)[rig.pose.bones.find(name)]
 
 
 def expected_poses(rig: bpy.types.Object, frames: Sequence[float], bones: Iterable[str] | None = None) -> Poses:
-    """These bones by name, or all, and their parents, from their channels, modes, parents and settings."""
+    """Return the poses of these bones (default: all) and their parents, from channels, modes, parents and settings."""
     frames, result = np.asarray(frames, dtype=np.float64), {}
     asked = [rig.pose.bones[name] for name in (rig.pose.bones.keys() if bones is None else bones)]
     needed = {item.name for bone in asked for item in (bone, *bone.parent_recursive)}
@@ -71,20 +71,20 @@ def expected_poses(rig: bpy.types.Object, frames: Sequence[float], bones: Iterab
 
 
 def _placed(bone: bpy.types.Bone, basis: np.ndarray, parent: np.ndarray | None) -> np.ndarray:
-    """A bone from the matrices of its channels and those of its parent, by Blender's rule."""
+    """Return a bone's matrices from those of its channels and its parent, by Blender's rule."""
     above, at_rest, made = {}, bone.matrix_local, []
     for row, own in enumerate(basis):
         matrix = Matrix(own)
         if parent is not None:
             above = {"parent_matrix": Matrix(parent[row]), "parent_matrix_local": bone.parent.matrix_local}
-            # Blender leaves a connected bone where its parent ends.
+            # Blender keeps a connected bone at its parent's tail.
             matrix.translation *= not bone.use_connect
         made.append(bone.convert_local_to_pose(matrix, at_rest, **above))
     return np.array(made)
 
 
 def assert_posed(rig: bpy.types.Object, frames: Sequence[float], bones: Iterable[str] | None = None) -> None:
-    """The scene shows these bones of a rig, by default all, where they have to be."""
+    """Check that the scene shows these bones of a rig (by default all) where they must be."""
     (shown,) = shown_poses([rig], frames)
     assert_same_poses(rig, frames, shown, expected_poses(rig, frames, bones=bones), bones)
 
@@ -92,10 +92,10 @@ def assert_posed(rig: bpy.types.Object, frames: Sequence[float], bones: Iterable
 def assert_same_poses(
     rig: bpy.types.Object, frames: Sequence[float], shown: Poses, expected: Poses, bones: Iterable[str] | None = None
 ) -> None:
-    """To `TOLERANCE` of each bone's reach.
+    """Check that poses are equal, to `TOLERANCE` of each bone's reach.
 
-    Where Blender's own quaternion passes near zero on its way, what single precision leaves of its direction is less,
-    and no difference can mend that: the tolerance grows by the same factor.
+    Where Blender's own quaternion passes near zero, single precision leaves less of its direction, and no difference
+    can repair that: the tolerance grows by the same factor.
     """
     away = _distance_from_world(rig, frames)
     for name in expected if bones is None else bones:
@@ -113,6 +113,6 @@ def assert_same_poses(
 
 
 def _distance_from_world(rig: bpy.types.Object, frames: Sequence[float]) -> float:
-    """How far the armature is from the world's origin where it is furthest, in the units of its smallest axis."""
+    """Return the largest distance of the armature from the world's origin, in the units of its smallest axis."""
     worlds = shown_worlds([rig], [frames[0], frames[len(frames) // 2], frames[-1]])[0]
     return float(max(np.linalg.norm(world[:3, 3]) / np.linalg.norm(world[:3, :3], axis=0).min() for world in worlds))

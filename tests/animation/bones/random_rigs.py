@@ -1,4 +1,4 @@
-"""Rigs at random: every way to inherit, to turn and to be keyed, with constraints, drivers, strips and scale."""
+"""Random rigs: every way to inherit, rotate and be keyed, with constraints, drivers, strips and scale."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from tests.animation.bones.rigs import INHERIT_SCALES, ORDERS, Rest, new_rig
 from tests.animation.scenes import new_object, push_down, write
 
 LAST = 30
-"""Keys are on frames from 1 to this."""
+"""Keys are on frames from 1 to this frame."""
 
 BONES = st.builds(
     SimpleNamespace,
-    # So many bones before it; 0 for none.
+    # The parent is this many bones earlier; 0 for no parent.
     parent=st.integers(0, 3),
     seed=st.integers(0, 1 << 20),
     rotation_mode=st.sampled_from(ORDERS),
@@ -26,13 +26,13 @@ BONES = st.builds(
     inherit_scale=st.sampled_from(INHERIT_SCALES),
     local_location=st.booleans(),
     connected=st.booleans(),
-    # Frames from key to key; 0 where it has none.
+    # Frames from key to key; 0 for no keys.
     step=st.sampled_from((1.0, 1.0, 0.8, 2.0, 5.0, 0.0)),
     interpolation=st.sampled_from(("LINEAR", "LINEAR", "BEZIER", "BEZIER", "SINE", "BOUNCE", "CONSTANT")),
     location=st.booleans(),
-    # What keys of it are, or that it just is another.
+    # The type of scale keys, or a still scale.
     scale=st.sampled_from(("", "", "even", "uneven", "negative", "still")),
-    # A type of constraints, or a driver.
+    # A constraint type, or a driver.
     follows=st.sampled_from((*[""] * 8, "DAMPED_TRACK", "IK", "COPY_ROTATION", "LIMIT_ROTATION", "DRIVER")),
 )
 
@@ -43,7 +43,7 @@ RIGS = st.builds(
     object_keys=st.booleans(),
     parented=st.booleans(),
     size=st.sampled_from(((1.0, 1.0, 1.0), (0.5, 0.5, 0.5), (1.0, 2.0, 0.7))),
-    # The scale of the strip that it moves by; 0 for none.
+    # The scale of the strip of its Action; 0 for no strip.
     strip=st.sampled_from((0.0, 0.0, 1.0, 1.5, 2.0)),
     mode=st.sampled_from(("motor_spline", "lerp_slerp", "dq_sclerp", "cga_lerp")),
     shared=st.booleans(),
@@ -53,7 +53,7 @@ RIGS = st.builds(
 
 
 def build(case: SimpleNamespace, name: str = "Rig") -> bpy.types.Object:
-    """The rig of a case, in the open file."""
+    """Return the rig of a case, in the open file."""
     random = np.random.default_rng(case.seed)
     rests: list[Rest] = []
     for number, settings in enumerate(case.bones):
@@ -84,7 +84,7 @@ def frames_of(step: float) -> np.ndarray:
 
 
 def _waves(random: np.random.Generator, frames: np.ndarray, count: int) -> np.ndarray:
-    """Smooth noise of about 1, shape (n, count)."""
+    """Return smooth noise of about size 1, shape (n, count)."""
     return np.sin(random.uniform(0.05, 0.35, count) * frames[:, None] + random.uniform(0.0, 6.0, count))
 
 

@@ -1,4 +1,4 @@
-"""Armatures with keys on their bones, to be edited and looked at. Metres, radians, frames of the scene."""
+"""Armatures with keys on their bones, to be edited and played in tests. Metres, radians, frames of the scene."""
 
 from __future__ import annotations
 
@@ -15,20 +15,18 @@ from rigid_motion.animation import set_mode
 from tests.animation.scenes import key
 
 PLAYED = np.arange(-2.0, 44.0)
-"""From before the first key until after the last."""
+"""Frames from before the first key until after the last."""
 
 BETWEEN = np.arange(-2.0, 44.0, 0.375)
-"""The same at all eighths of frames, whole ones among them."""
+"""Frames over the same range in steps through all eighths, whole frames among them."""
 
 ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "AXIS_ANGLE")
 INHERIT_SCALES = ("FULL", "FIX_SHEAR", "ALIGNED", "AVERAGE", "NONE", "NONE_LEGACY")
 
 
 def in_turn(cases: Iterable, others: Sequence) -> list[tuple]:
-    """Each case with one of the others by default, which is another one on each Blender, and with about two of them in
-    thorough runs.
-    """
-    # A Blender that is a window has no Hypothesis.
+    """Pair each case with one of the others, which depends on the Blender version; in thorough runs, with about two."""
+    # A Blender with a window has no Hypothesis.
     from tests.thoroughness import THOROUGH
 
     step = max(2, (len(others) + 1) // 2) if THOROUGH else len(others)
@@ -39,7 +37,7 @@ def in_turn(cases: Iterable, others: Sequence) -> list[tuple]:
 
 @dataclass(frozen=True)
 class Rest:
-    """A bone as it is at rest, in the armature's space; `settings` are properties of `bpy.types.Bone`."""
+    """A bone in its rest pose, in armature space. `settings` are properties of `bpy.types.Bone`."""
 
     name: str
     head: tuple[float, float, float]
@@ -55,20 +53,20 @@ ARM = (
     Rest("Lower", (0.6, 0.1, 1.3), (0.8, 0.3, 1.2), "Upper", roll=2.0),
     Rest("Hand", (0.82, 0.33, 1.2), (0.9, 0.4, 1.1), "Lower", roll=0.7),
 )
-"""A body and three bones that hang on it, one behind the other."""
+"""A body and a chain of three bones."""
 
 HANDS = (
     Rest("Body", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
     Rest("Hand.L", (0.5, 0.0, 1.0), (1.0, 0.1, 1.0), "Body", roll=0.3),
     Rest("Hand.R", (-0.5, 0.0, 1.0), (-1.0, 0.1, 1.0), "Body", roll=-0.3),
 )
-"""Two bones that mirror each other."""
+"""A body and two hands that mirror each other."""
 
 
 def new_rig(
     name: str = "Rig", bones: Sequence[Rest] = ARM, rotation_mode: str = "QUATERNION", **settings: object
 ) -> bpy.types.Object:
-    """An armature in the scene. `settings` are properties of the last bone, such as `use_connect`."""
+    """Create an armature in the scene. `settings` are properties of the last bone, such as `use_connect`."""
     rig = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     bpy.context.scene.collection.objects.link(rig)
 
@@ -87,7 +85,7 @@ def new_rig(
 
 
 def with_edit_bones(rig: bpy.types.Object, edit: Callable[[bpy.types.ArmatureEditBones], None]) -> None:
-    """Go into Edit Mode with this rig alone, and back."""
+    """Edit the bones of this rig alone in Edit Mode."""
     select_only(rig)
     bpy.ops.object.mode_set(mode="EDIT")
     edit(rig.data.edit_bones)
@@ -95,7 +93,7 @@ def with_edit_bones(rig: bpy.types.Object, edit: Callable[[bpy.types.ArmatureEdi
 
 
 def select_only(*objects: bpy.types.Object) -> None:
-    """Select these, and make the first one active."""
+    """Select only these objects, and make the first one active."""
     bpy.context.view_layer.update()
     for obj in bpy.context.scene.objects:
         obj.select_set(obj in objects)
@@ -103,14 +101,14 @@ def select_only(*objects: bpy.types.Object) -> None:
 
 
 def select_bones(rig: bpy.types.Object, *names: str) -> None:
-    """Select these bones of a rig in Pose Mode, the first of them the active one."""
+    """Select only these bones of a rig in Pose Mode, and make the first one active."""
     for bone in rig.pose.bones:
         (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name in names
     rig.data.bones.active = rig.data.bones[names[0]] if names else None
 
 
 def pose_mode(rig: bpy.types.Object, *selected: str) -> bpy.types.Object:
-    """Go into Pose Mode with this rig alone, with these bones selected or all."""
+    """Enter Pose Mode with this rig alone, with these bones selected, by default all."""
     select_only(rig)
     bpy.ops.object.mode_set(mode="POSE")
     select_bones(rig, *(selected or rig.pose.bones.keys()))
@@ -119,7 +117,7 @@ def pose_mode(rig: bpy.types.Object, *selected: str) -> bpy.types.Object:
 
 @contextmanager
 def own_clipboard(folder: str | Path) -> Iterator[None]:
-    """Have copied poses apart from those of other Blenders on this machine: they are a file in the temporary folder."""
+    """Separate copied poses from those of other Blenders on this machine: they are a file in the temporary folder."""
     filepaths = bpy.context.preferences.filepaths
     before, filepaths.temporary_directory = filepaths.temporary_directory, str(folder)
     try:
@@ -136,7 +134,7 @@ def key_all(rig: bpy.types.Object, **settings: object) -> bpy.types.Object:
 
 
 def moving_rig(mode: str = "dq_sclerp", name: str = "Rig", seed: int = 0) -> bpy.types.Object:
-    """The arm with keys on all bones, all of one mode."""
+    """Return the arm with keys on all bones, all in one mode."""
     rig = key_all(new_rig(name), seed=seed)
     set_mode(list(rig.pose.bones), mode)
     return rig

@@ -1,4 +1,4 @@
-"""Whatever is edited of rigs, in whatever order, bones move as their keys and modes say, and nothing stale is left."""
+"""State machine for bones: after any edits in any order, bones move as keys and modes say, and nothing is stale."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ BONES = (
     Rest("Arm", (0.3, 0.0, 1.4), (0.6, 0.1, 1.3), "Body", roll=-1.1, settings=(("use_local_location", False),)),
     Rest("Prop", (-0.5, 0.3, 0.2), (-0.4, 0.3, 0.6), roll=0.9),
 )
-"""A chain of two bones, and one that nothing moves but its keys."""
+"""A chain of two bones, and a bone moved only by its keys."""
 
 Name = tuple[str, str]
-"""Of a rig, and of a bone of it."""
+"""The names of a rig and of one of its bones."""
 
 
 class EditingBones(WithHolds):
-    """An animator at work on the bones of rigs, by the names of both, and on armatures."""
+    """An animator at work on the bones of rigs, identified by both names, and on armatures."""
 
     @initialize(
         orders=st.lists(st.sampled_from(ORDERS), min_size=3, max_size=3),
@@ -65,7 +65,7 @@ class EditingBones(WithHolds):
         return bpy.data.objects[rig].pose.bones[bone]
 
     def _basis(self, bone: bpy.types.PoseBone) -> np.ndarray:
-        """What its channels make of it, as it is evaluated. What its parents make of that is Blender's."""
+        """Return the evaluated effect of its channels. The effect of its parents on that is Blender's."""
         rig = bone.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
         return np.array(rig.pose.bones[bone.name].matrix_basis, dtype=np.float64)
 
@@ -81,14 +81,14 @@ class EditingBones(WithHolds):
             assert_there(self._found(name), frames, bases, expected_bases(self._found(name), frames))
 
     def _may_be_held(self, name: Name) -> bool:
-        """Not what moves along other axes than it turns about: see `test_passing`."""
+        """Exclude bones whose location axes differ from their rotation axes: see `test_passing`."""
         return self._found(name).bone.use_local_location
 
-    # Bones and rigs that come and go
+    # Adding, removing and renaming bones and rigs
 
     @while_on(who=shares, other=st.none() | shares, in_edit_mode=st.booleans())
     def rename_a_bone_or_swap_names(self, who, other, in_edit_mode):
-        """Whatever is baked, all at once."""
+        """Bones may be baked, and all names change at once."""
         rig, one = self._named(who)
         others = [bone for owner, bone in self.names if owner == rig and bone != one]
         if len(self._users(bpy.data.objects[rig])) > 1 or (other is not None and not others):
@@ -158,7 +158,7 @@ class EditingBones(WithHolds):
 
     @while_on(who=shares)
     def flip_the_action(self, who):
-        """All values are mirrored, and all that there are names of two sides for goes to the other side."""
+        """All values are mirrored, and channels with names of one side move to the other side."""
         rig = self._animated(self._named(who))
         action, _ = self._linked(rig)
         if self._is_free(rig) and action is not None:

@@ -1,4 +1,4 @@
-"""Reduced to Blender's own curves, a motion has the keys of an animator, within the tolerance on the frames it had."""
+"""Reducing to Blender's own curves: the keys of an animator come back, within the tolerance on the original frames."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ FRAMES = np.arange(LAST + 1.0)
 EIGHTHS = np.arange(8 * LAST + 1) / 8.0
 TOLERANCE, RADIUS = 0.001, 0.06
 ROUNDED = 1.0 + 1e-3
-"""Of single precision, as matrices come from Blender."""
+"""Allows for the single precision of Blender's matrices."""
 
 
 def apart(a: np.ndarray, b: np.ndarray, share: float = 1.0) -> float:
-    """How far any point in the balls around things is from where it is in others, (..., 4, 4) each, of most of them."""
+    """Return a quantile of the distances of points in the carriers' balls between two sets of matrices (..., 4, 4)."""
     change = a - b
     return float(np.quantile(largest_displacements(change[..., :3, 3], RADIUS * change[..., :3, :3]), share))
 
@@ -42,7 +42,7 @@ def bones(rig: bpy.types.Object) -> list[bpy.types.PoseBone]:
 
 
 def handles_of(rig: bpy.types.Object) -> Counter[str]:
-    """How many keys of bones have handles of which type."""
+    """Return the number of keys of bones by the type of their right handle."""
     curves = [curve for bone in rig.pose.bones for curve in curves_of(bone).values()]
     return Counter(key.handle_right_type for curve in curves for key in curve.keyframe_points)
 
@@ -61,7 +61,7 @@ def test_a_hand_made_animation_comes_back_with_its_own_keys(live_file, case, rot
     found, count = keys_of(rig), sum(map(len, own.values()))
     assert reduction.after == sum(map(len, found.values())) <= share * count
     assert sum(len(np.intersect1d(own[name], found[name])) for name in own) > 0.7 * count
-    # Far less than what a baked file itself is off between frames.
+    # Far less than the error of the baked file itself between frames.
     shown = shown_of(rig, EIGHTHS)
     assert reduction.largest_error <= TOLERANCE
     assert apart(shown[:, ::8], baked) <= TOLERANCE * ROUNDED

@@ -1,4 +1,4 @@
-"""Blender's rule of what bones inherit, in NumPy: beside Blender's own pose matrices."""
+"""Bone inheritance in NumPy, compared with Blender's own pose matrices."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What reduced keys promise of rigs at random, played while the extension is switched off.
+"""The tolerance promised for reduced keys of random rigs, played while the extension is switched off.
 
-At every eighth of a frame of the Action, no point of the ball around any bone that the tolerance is promised for is off
-by more, in the world; and the largest error that is reported is the largest.
+At every eighth of a frame of the Action, no point of the ball around any bone with a promise is off by more, in the
+world, and the largest reported error is the true one.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from tests.blank import blank
 from tests.thoroughness import tried
 
 ROUNDING = 2e-5
-"""Single precision, relative to the size of a rig of about a metre, through its bones."""
+"""Single precision through all bones, relative to the size of a rig of about a metre."""
 
 
 @pytest.mark.slow
@@ -38,9 +38,9 @@ def test_no_bone_that_is_promised_is_off_by_more(tmp_path_factory, case):
 
 
 def complaints(case: SimpleNamespace, folder: Path) -> list[str]:
-    """What is amiss where a rig is reduced, saved, and played from both files without the extension.
+    """Return the problems after a rig is reduced, saved, and played from both files without the extension.
 
-    They are returned: what pytest shows of a failure, Blender may have freed by then.
+    They are returned since Blender may have freed the data by the time pytest shows a failure.
     """
     blank()
     animation.register()
@@ -50,7 +50,7 @@ def complaints(case: SimpleNamespace, folder: Path) -> list[str]:
         recorded, reduced = folder / "recorded.blend", folder / "reduced.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(recorded))
         targets = list(with_more_keys_than([transform_of(rig), *map(transform_of, rig.pose.bones)], 2))
-        # Its bones hang on the rig, and say how far it reaches.
+        # The bones depend on the rig and define its reach.
         radii = np.array([*map(animation.radius_of, rig.pose.bones), 0.0])
         radii /= np.cbrt(abs(np.linalg.det(np.array(rig.matrix_world)[:3, :3])))
         excepted = not_promised(rig)
@@ -79,7 +79,7 @@ def complaints(case: SimpleNamespace, folder: Path) -> list[str]:
 
 
 def played(path: Path, frames: np.ndarray) -> np.ndarray:
-    """Where the bones of the rig in a file are in the world, and it itself, (n, bones + 1, 4, 4)."""
+    """Return the world matrices of the bones of the rig in a file, and of the rig itself, (n, bones + 1, 4, 4)."""
     assert not hasattr(bpy.types.Object, "rigid_motion")
     bpy.ops.wm.open_mainfile(filepath=str(path))
     rig = bpy.data.objects["Rig"]
@@ -87,7 +87,7 @@ def played(path: Path, frames: np.ndarray) -> np.ndarray:
 
 
 def key_count(transform: object) -> int:
-    """On how many frames any channel of it has a key."""
+    """Return the number of frames on which any of its channels has a key."""
     data = transform.animated.animation_data
     strip = data.nla_tracks[0].strips[0] if len(data.nla_tracks) else data
     names = [transform.prefix + name for name in WIDTHS]
@@ -97,11 +97,11 @@ def key_count(transform: object) -> int:
 
 
 def largest(shown: np.ndarray, truth: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """A lower bound of how far any point of each bone's ball gets off (bones,), by many points of it."""
+    """Return a lower bound of the largest displacement of any point of each bone's ball (bones,), from many points."""
     points = np.random.default_rng(1).normal(size=(400, 3))
     points /= np.linalg.norm(points, axis=1)[:, None]
     offset = shown - truth
-    # The farthest point along the axis that is stretched the most, as well, from either end.
+    # Also both ends of the axis with the largest stretch.
     result = []
     for bone, radius in enumerate(radii):
         turns, moved = offset[:, bone, :3, :3], offset[:, bone, :3, 3]

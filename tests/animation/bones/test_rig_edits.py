@@ -1,4 +1,4 @@
-"""Whatever is done to rigs, bones show what their keys and modes say by now, and nothing stale is left."""
+"""Edits of rigs: bones always show what their keys and modes say now, and nothing stale is left."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.animation.scenes import FRAMES
 
 
 def assert_nothing_stale() -> None:
-    """Terms are as they would be planned now, and in no channels of a bone without a mode that a rig has."""
+    """Check that terms are as they would be planned now, and only on bones with a mode."""
     assert refresh() == 0
     bones = {f"{bone.path_from_id()}." for obj in bpy.data.objects if obj.pose for bone in obj.pose.bones}
     layers = [layer for action in bpy.data.actions for layer in action.layers]
@@ -38,14 +38,14 @@ def assert_nothing_stale() -> None:
 
 
 def modes_in(rig: bpy.types.Object) -> dict[str, str]:
-    """The modes that bones have from their first keys on, which their properties show."""
+    """Return the modes of bones from their first keys on, as their properties show them."""
     modes = {bone.name: modes_of(bone, np.array(FRAMES[:1]))[0] for bone in rig.pose.bones}
     assert modes == {bone.name: bone.rigid_motion.mode for bone in rig.pose.bones}
     return modes
 
 
 def new_hands(name: str) -> bpy.types.Object:
-    """A body and two hands that move along the axes of the body, so that those at rest matter."""
+    """Return a body and two hands that use the axes of the body for location, so that rest poses matter."""
     rig = new_rig(name, HANDS)
     for hand in ("Hand.L", "Hand.R"):
         rig.data.bones[hand].use_local_location = False
@@ -54,7 +54,7 @@ def new_hands(name: str) -> bpy.types.Object:
 
 @pytest.fixture
 def rig(live_file) -> bpy.types.Object:
-    """Hands that have different modes, the left one with a turn on top."""
+    """Hands with different modes, and an additional turn on the left one."""
     rig = key_all(new_hands("Rig"))
     for name, mode in (("Hand.L", "dq_sclerp"), ("Hand.R", "pga_lerp")):
         set_mode(rig.pose.bones[name], mode)
@@ -85,7 +85,7 @@ def test_bones_keep_their_modes_and_turns_and_new_ones_rest(rig, edit):
 
 
 def test_while_one_bone_is_keyed_poses_of_others_that_are_not_keyed_yet_stay(live_file):
-    """As Auto Key does it, and where all there is to the motion is written anew."""
+    """As Auto Key does, even if the whole motion is replanned."""
     rig = moving_rig("motor_spline")
     live_file.scene.frame_set(17)
     for number, bone in enumerate(rig.pose.bones):

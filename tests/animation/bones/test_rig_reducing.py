@@ -1,6 +1,6 @@
-"""The reduced keys of rigs, as Blender evaluates them: the tolerance holds at every bone, through all it hangs on.
+"""Reduced keys of rigs as Blender evaluates them: the tolerance holds at every bone, through all its parents.
 
-It is not promised of what follows constraints and drivers, which is named.
+Nothing is promised for bones that follow constraints and drivers. They are named.
 """
 
 from __future__ import annotations
@@ -54,13 +54,13 @@ def bones(rig: bpy.types.Object, *names: str) -> list[bpy.types.PoseBone]:
 
 
 def matrices(rig: bpy.types.Object, frames: np.ndarray = MOMENTS) -> dict[str, np.ndarray]:
-    """Where Blender shows every bone in the world, (n, 4, 4)."""
+    """Return the displayed world matrices of every bone, (n, 4, 4)."""
     (worlds,), (poses,) = shown_worlds([rig], frames), shown_poses([rig], frames)
     return {name: worlds @ shown for name, shown in poses.items()}
 
 
 def largest(shown: np.ndarray, truth: np.ndarray, radius: float = RADIUS) -> np.ndarray:
-    """How far any point of the ball is off on each frame, by singular values."""
+    """Return the largest error of any point of the ball on each frame, by singular values."""
     return largest_displacements((shown - truth)[:, :3, 3], radius * (shown - truth)[:, :3, :3])
 
 
@@ -75,7 +75,7 @@ def errors(rig: bpy.types.Object, truth: dict[str, np.ndarray], frames: np.ndarr
 def test_a_rig_that_moves_itself_has_its_keys_on_the_key_poses_and_their_error_is_what_is_said(
     live_file, monkeypatch, case, rotation_mode
 ):
-    """Also where not all of a recording is looked at at once. Of Blender's own curves it is that on whole frames."""
+    """A recording may also be processed in parts. For Blender's own curves, the error is that on whole frames."""
     (count, mode), moments = case, FRAMES if NATIVE in case else MOMENTS
     monkeypatch.setattr(search, "AT_ONCE", 60 * len(NAMES))
     rig = recorded_rig(rotation_mode)
@@ -119,9 +119,9 @@ def test_a_bone_that_hardly_moves_is_left_with_one_key(live_file):
 
 @pytest.mark.parametrize("carried", [False, True])
 def test_a_foot_that_stands_is_held(live_file, carried):
-    """Under a hip that sways. Carried, the rig moves on, and the hip goes as far back in it."""
+    """The hip above it sways. If carried, the rig moves on, and the hip moves back by the same amount."""
     rig = new_rig("Leg", LEG)
-    # A pendulum that hangs from the swaying hip, with its end where it is.
+    # A pendulum that hangs from the swaying hip, with its end fixed.
     sway = 0.08 * np.sin(0.2 * FRAMES)
     on = 0.02 * FRAMES if carried else 0.0 * FRAMES
     along = rig.data.bones["Hip"].x_axis.x
@@ -137,7 +137,7 @@ def test_a_foot_that_stands_is_held(live_file, carried):
     for hold in (False, True):
         reduce_keys_of(every, "lerp_slerp", 0.02, 0.02, hold=hold)
         reduction, kept = reduction_of(every).rig, matrices(rig, FRAMES)["Foot"][:, :3, 3]
-        # It stands all the time: what it slides is how far it gets from where it stood at first.
+        # It stands all the time, so its slide is its largest distance from its first place.
         for places, slide in ((recorded, reduction.slide_before), (kept, reduction.slide_after)):
             assert np.linalg.norm(places - places[0], axis=1).max() == pytest.approx(slide, abs=1e-5)
         slides.append(reduction.slide_after)
@@ -223,7 +223,7 @@ def test_a_bone_of_a_rig_that_another_one_holds_is_reduced_in_its_hand_along_wit
         bpy.context.scene.frame_set(frame)
         facts.append(hold_facts(head).now)
     assert (facts[0], facts[1].name) == (None, "Hand.R")
-    # In the hand, wherever that is by now, it is within the tolerance.
+    # Relative to the hand, wherever the hand is now, it is within the tolerance.
     assert largest(in_holder(head, hand, held), local).max() <= TOLERANCE * (1.0 + 1e-4)
     restore_keys(bones(rig))
     assert len(key_frames(head)) == len(FRAMES)
