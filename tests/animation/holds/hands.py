@@ -1,4 +1,4 @@
-"""Hands that hold things and things that are held, as animators have them. Metres, frames of the scene."""
+"""Hands of many kinds and the props they hold, set up as animators do. Metres, frames of the scene."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ ARMS = (
     Rest("Prop", (0.3, -0.3, 1.0), (0.35, -0.2, 1.1), "Body", roll=1.3),
     Rest("Twin", (0.3, -0.3, 1.0), (0.35, -0.2, 1.1), "Body", roll=1.3),
 )
-"""An arm on a body, and a bone on it, twice, that is a prop."""
+"""An arm on a body, and twice the same bone on the body, which is a prop."""
 
 
 def wander(carrier: Carrier, seed: int, reach: float = 0.3, *, turns: bool = True, scale: bool = False) -> None:
-    """Key location (but none of bones where reach is 0) and rotation at random."""
+    """Key location (not of bones if `reach` is 0) and rotation at random."""
     random = np.random.default_rng(seed)
     group = "" if carrier == carrier.id_data else carrier.name
     carrier.rotation_mode = "QUATERNION"
@@ -47,7 +47,7 @@ def wander(carrier: Carrier, seed: int, reach: float = 0.3, *, turns: bool = Tru
 
 
 def arm(name: str, seed: int = 0, **settings: object) -> bpy.types.Object:
-    """A rig with a hand, keyed by FK."""
+    """Return a rig with a hand, keyed by FK."""
     rig = new_rig(name, ARMS, **settings)
     for number, bone in enumerate(("Body", "Upper", "Lower", "Hand")):
         wander(rig.pose.bones[bone], seed + number, 0.2 if bone == "Body" else 0.0)
@@ -60,7 +60,7 @@ def by_fk(name: str, seed: int) -> Carrier:
 
 
 def by_ik(name: str, seed: int) -> Carrier:
-    """A hand at the end of an arm that reaches for something."""
+    """Return a hand at the end of an IK arm with a moving target."""
     rig, goal = arm(name, seed), new_object(f"{name} goal")
     wander(goal, seed + 7)
     goal.delta_location = 0.6, 0.1, 1.2
@@ -82,7 +82,7 @@ def by_an_object(name: str, seed: int) -> Carrier:
 
 
 def on_a_scaled_parent(name: str, seed: int) -> Carrier:
-    """An object on one that moves and is scaled, and is scaled itself."""
+    """Return a scaled object on a moving and scaled parent."""
     hand, parent = by_an_object(name, seed), new_object(f"{name} parent")
     wander(parent, seed + 5, 0.2)
     parent.scale = 3 * (1.7,)
@@ -98,7 +98,7 @@ def on_one_that_grows(name: str, seed: int) -> Carrier:
 
 
 def in_a_scaled_rig(name: str, seed: int) -> Carrier:
-    """A rig as importers of FBX leave it: bones in centimetres, and an object that is scaled for it."""
+    """Return a hand of a rig as FBX importers leave it: bones in centimetres, and an object scaled to compensate."""
     rig = arm(name, seed)
     wander(rig, seed + 9, 0.2)
     rig.scale = 3 * (0.01,)
@@ -129,7 +129,7 @@ def free(order: str = "QUATERNION") -> tuple[Carrier, Carrier]:
 
 
 def parented(order: str = "XYZ", scale: float = 1.0) -> tuple[Carrier, Carrier]:
-    """An object on one that moves, with a parent inverse."""
+    """Return an object on a moving parent, with a parent inverse."""
     parent, pair = new_object("Table"), free(order)
     wander(parent, 91, 0.2)
     parent.scale = 3 * (scale,)
@@ -150,7 +150,7 @@ def on_a_bone(order: str = "QUATERNION") -> tuple[Carrier, Carrier]:
 
 
 def bone(order: str = "QUATERNION", **settings: object) -> tuple[Carrier, Carrier]:
-    """A bone on another one that moves; settings are those of `bpy.types.Bone`."""
+    """Return a bone on a moving bone. `settings` are properties of `bpy.types.Bone`."""
     rig = arm("Quiver", 60)
     wander(rig, 65, 0.2)
     for name in ("Prop", "Twin"):
@@ -181,22 +181,22 @@ PROPS: dict[str, Callable[[], tuple[Carrier, Carrier]]] = {
     "bone without Local Location": lambda: bone("XYZ", use_local_location=False),
     "bone of a scaled rig": bone_of_a_scaled_rig,
 }
-"""What is held, and a twin of each that rests at the origin of the space of its channels."""
+"""Props, and for each a twin that rests at the origin of the space of the prop's channels."""
 
 
 def pairs(cases: dict, others: dict) -> list[tuple[str, str]]:
-    """Each of both at least once."""
+    """Pair the keys of both, each used at least once."""
     count = max(len(cases), len(others))
     return list(itertools.islice(zip(itertools.cycle(cases), itertools.cycle(others), strict=False), count))
 
 
 def units(prop: Carrier) -> float:
-    """How many of the units of a prop's channels are a metre."""
+    """Return the length of a metre in the units of a prop's channels."""
     return 100.0 if prop != prop.id_data and prop.id_data.scale[0] < 0.1 else 1.0
 
 
 def place(prop: Carrier, seed: int = 3, reach: float = 0.4, *, frame: float | None = None) -> None:
-    """Put something somewhere in the space of its channels, with a key on a frame or without."""
+    """Put a prop at a random place in the space of its channels, and key it if a frame is given."""
     random = np.random.default_rng(seed)
     turn = Quaternion(random.normal(size=4)).normalized()
     prop.matrix_basis = Matrix.LocRotScale(units(prop) * random.uniform(-reach, reach, 3), turn, None)
@@ -207,7 +207,7 @@ def place(prop: Carrier, seed: int = 3, reach: float = 0.4, *, frame: float | No
 
 
 def take(prop: Carrier, holder: Carrier | None, frame: float, *, frames: int | None = None, seed: int = 3) -> None:
-    """Hold something in a hand from a frame on, some centimetres from where the hand is."""
+    """Hold a prop in a hand from a frame on, some centimetres from the hand."""
     bpy.context.scene.frame_set(int(frame))
     hold_in(prop, holder, frames=frames)
     place(prop, seed, 0.05, frame=frame)

@@ -1,4 +1,4 @@
-"""What animators do with what they hold, as steps of a machine that edits: hold, let go, pass, match."""
+"""Steps of the editing state machine for holds: hold, let go, pass on, match grips."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from tests.animation.path_steps import WithPaths
 
 
 class WithHolds(WithPaths):
-    """An animator who also has things be held."""
+    """An animator who also uses holds."""
 
     @property
     def holders(self) -> list[Name]:
-        """The names of what something may be held in."""
+        """Return the names of the possible holders."""
         return self.names
 
     def _is_held(self, name: Name) -> bool:
-        """Whether its keys say that it is held in anything."""
+        """Whether its keys say that it is held."""
         source = animation.queries.keyed.source_of(self._found(name))
         return source is not None and source.held is not None
 
@@ -43,7 +43,7 @@ class WithHolds(WithPaths):
         return np.empty(0) if self._is_held(name) else super()._frames_to_go_by(name)
 
     def _keyed(self) -> dict[Name, dict]:
-        """Without what follows from the keys, and without what they are held in, which others may come to say."""
+        """Return snapshots without influences, which follow from keys, and holders, which other edits may change."""
         result = {}
         for name in self.names:
             channels = snapshot(self._found(name))
@@ -58,17 +58,17 @@ class WithHolds(WithPaths):
         return result
 
     def _originals(self, name: Name) -> dict:
-        """To what the keys are held in, and without what follows from them."""
+        """Return the original keys without the influences, which follow from them."""
         kept = super()._originals(name)
         return {channel: keys for channel, keys in kept.items() if not channel[0].startswith("constraints")}
 
     def _is_live(self, name: Name) -> bool:
-        """What is passed on goes nowhere else between the keys of two holders, also where Blender has it move."""
+        """Passing moves a prop between the keys of two holders, also in Blender's own mode, so it counts as live."""
         source = animation.queries.keyed.source_of(self._found(name))
         return super()._is_live(name) or (source is not None and bool(source.switches))
 
     def _baked(self, name: Name, frames: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Also where it is in the world; and how it passes may be baked in what it passes from."""
+        """Return world matrices, too. A pass may be baked in the old holder, so matrices there may differ."""
         ((chosen, poses),) = super()._baked(name, frames)
         if not self._is_held(name):
             return [(chosen, poses)]
@@ -77,14 +77,14 @@ class WithHolds(WithPaths):
         return [(chosen & ~np.any(passing, axis=0), poses), (chosen, *shown_worlds([self._found(name)], frames))]
 
     def _snaps(self, name: Name) -> bool:
-        """Blender moves what passes by a part of it alone, and snaps what is held to where it would be in the world."""
+        """Blender moves passing props only partly, and snaps held props as if they were in the world."""
         return not self._is_held(name)
 
     def _assert_held(self, name: Name, frames: np.ndarray) -> None:
-        """It is where its keys say on some frames, in what they say."""
+        """Check that it is where its keys say on some frames, in the holders that they say."""
         prop = self._found(name)
         keys = key_frames(prop)
-        # Blender's own curves go on outside of the keys.
+        # Blender's own extrapolation goes on outside the keys.
         inside = frames[(frames >= keys[0]) & (frames <= keys[-1])] if len(keys) and goes_on(prop) else frames
         if len(keys) and len(inside):
             assert_held([prop], inside)
@@ -108,7 +108,7 @@ class WithHolds(WithPaths):
         self._assert_seen_at(name, seen)
 
     def _assert_seen_at(self, name: Name, then: np.ndarray) -> None:
-        """It is still seen where it was in the world."""
+        """Check that it is still seen in the same place in the world."""
         bpy.context.view_layer.update()
         now = world_of(self._found(name))
         error = np.abs(now - then).max()
@@ -122,9 +122,9 @@ class WithHolds(WithPaths):
         self._if_possible(self._named(who), lambda prop: animation.pass_frames(prop, over))
 
     def _brought(self, name: str, *, link: bool, is_local: bool) -> bpy.types.Object:
-        """An object from a copy of this file, which is there a second time with all that it needs, in the scene.
+        """Return an object from a copy of this file. All its dependencies come with it into the scene.
 
-        Linked it may be made local with its Action; what it needs otherwise stays linked.
+        A linked object may be made local with its Action; its other dependencies stay linked.
         """
         library = str(Path(self.folder.name) / f"library {self.fresh}.blend")
         self.fresh += 1
@@ -143,7 +143,7 @@ class WithHolds(WithPaths):
 
     @while_on(who=shares, is_local=st.booleans())
     def link_it_for_a_while(self, who, is_local):
-        """It moves as the one that is here, also when it is made local with its Action."""
+        """It moves like the original, also when it is made local with its Action."""
         name = self._named(who)
         frames = self._frames_that_are_seen([name])
 

@@ -1,4 +1,4 @@
-"""Where props have to be: what a fresh reading of their keys says, in the space of what Blender shows them held in."""
+"""Model of props: where their keys, freshly read, put them relative to the displayed holders."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from tests.animation.keyed import Carrier, rotation_path
 from tests.animation.oracle import matrices, shown_worlds
 
 OVER = 1e-3
-"""How far off something may be that passes over to where it moves: `test_passing` has what is promised of passes."""
+"""Tolerance while an object passes to a moving holder: `test_passing` tests the precision of passes."""
 
 HALF_A_TURN = 0.02
-"""Quaternions whose cosine is less turn either way."""
+"""Between quaternions with a smaller absolute dot product, the rotation may go either way."""
 
 
 def assert_held(props: Iterable[Carrier], frames: Sequence[float], tolerance: float = 1e-5) -> None:
-    """Props are shown where their keys say, to a share of what is largest, and to `OVER` while they pass over."""
+    """Check that props are displayed where their keys say, relative to the largest value, to `OVER` while passing."""
     frames = np.asarray(frames, float)
     for prop in props:
         expected, tolerances = expected_worlds(prop, frames, tolerance)
@@ -36,7 +36,7 @@ def assert_held(props: Iterable[Carrier], frames: Sequence[float], tolerance: fl
 
 
 def poses_in_holders(prop: Carrier, frames: Sequence[float]) -> np.ndarray:
-    """Where its channels have to put a prop in what holds it on frames, (m, 4, 4)."""
+    """Return the matrices of a prop relative to its holder that its channels must produce on frames, (m, 4, 4)."""
     source, frames = read(active_binding(transform_of(prop))), np.asarray(frames, float)
     result = np.empty((len(frames), 4, 4))
     for run in source.runs:
@@ -47,7 +47,7 @@ def poses_in_holders(prop: Carrier, frames: Sequence[float]) -> np.ndarray:
 
 
 def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) -> tuple[np.ndarray, np.ndarray]:
-    """Where a prop has to be on frames, (m, 4, 4), and to which share of its size."""
+    """Return a prop's expected matrices on frames, (m, 4, 4), and the tolerances as fractions of its size."""
     transform = transform_of(prop)
     source = read(active_binding(transform))
     holders = {holder.number: holder for holder in animation.hold_facts(prop).holders}
@@ -61,7 +61,7 @@ def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) 
             spaces[number] = (
                 _spaces(prop, frames)
                 if holder is None
-                # What holds it takes it along, also where it changes its size from what that was at first.
+                # Its holder moves it, also with changes of the holder's scale.
                 else shown_worlds([holder.target.pose.bones[holder.bone] if holder.bone else holder.target], frames)[0]
                 @ np.array(holder.offset)
             )
@@ -76,9 +76,9 @@ def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) 
         if over.any():
             share = np.minimum((frames[over] - switch.begin) / (switch.there - switch.begin), 1.0)
             both = zip(carried(place, over), carried(place + 1, over), share, strict=True)
-            mixed = [_between(Matrix(one), Matrix(other), s * s * (3.0 - 2.0 * s)) for one, other, s in both]
+            mixed = [_mixed_matrices(Matrix(one), Matrix(other), s * s * (3.0 - 2.0 * s)) for one, other, s in both]
             result[over] = [matrix for matrix, _ in mixed]
-            # Channels have no shear, so what passes to something of uneven scale is sheared, until it is there.
+            # Channels have no shear. A prop that passes to a holder of uneven scale is sheared until it arrives.
             holder = holders.get(numbers[place + 1])
             is_even = holder is None or unevenness_of(holder.offset) < 1e-5
             tolerances[over] = [OVER if is_sure and is_even else np.inf for _, is_sure in mixed]
@@ -88,13 +88,13 @@ def expected_worlds(prop: Carrier, frames: np.ndarray, tolerance: float = 1e-5) 
 def _poses(prop: Carrier, run: HoldRun | KeyedTransform, frames: np.ndarray) -> np.ndarray:
     order = np.argsort(frames, kind="stable")
     rows = np.empty((10, len(frames)))
-    # What is never passed on may also go on before and behind its keys.
+    # A prop that is never passed on may extrapolate before and after its keys.
     rows[:, order] = (
         seen_values(run, frames[order])
         if isinstance(run, KeyedTransform)
         else (seen_values(run.source, run.moments(frames[order])))
     )
-    # What has no keys is as it is.
+    # Unkeyed channels keep their values.
     transform = transform_of(prop)
     source = run if isinstance(run, KeyedTransform) else run.source
     for row, one in enumerate(transform.components().tolist()):
@@ -111,7 +111,7 @@ def _poses(prop: Carrier, run: HoldRun | KeyedTransform, frames: np.ndarray) -> 
 
 
 def _spaces(prop: Carrier, frames: np.ndarray) -> np.ndarray:
-    """The spaces of the channels of what nothing holds, (m, 4, 4)."""
+    """Return the spaces of the channels without a holder, (m, 4, 4)."""
     if prop != prop.id_data:
         rest = np.array(prop.bone.matrix_local)
         if prop.parent is None:
@@ -122,7 +122,7 @@ def _spaces(prop: Carrier, frames: np.ndarray) -> np.ndarray:
     return shown_worlds([prop.parent], frames)[0] @ np.array(prop.matrix_parent_inverse)
 
 
-def _between(one: Matrix, other: Matrix, share: float) -> tuple[np.ndarray, bool]:
+def _mixed_matrices(one: Matrix, other: Matrix, share: float) -> tuple[np.ndarray, bool]:
     (place, q, size), (there, r, other_size) = one.decompose(), other.decompose()
     alike = q.dot(r)
     turned = q.slerp(r if alike > 0.0 else -r, share)

@@ -1,6 +1,6 @@
-"""Where what is held has to be, worked out with NumPy alone: from where Blender shows its holders, and from raw keys.
+"""Oracle for held props, in NumPy alone: their world matrices from Blender's displayed holders and raw keys.
 
-Nothing of the program is in here. Matrices are (m, 4, 4), in double precision; frames are the scene's, seconds are not.
+It uses no code of the program. Matrices are (m, 4, 4), in double precision; frames are the scene's, not seconds.
 """
 
 from __future__ import annotations
@@ -16,32 +16,32 @@ from tests.animation.oracle import shown_worlds
 __all__ = ["Carrier"]
 
 POINTS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * (*3 * (0.1 / 3**0.5,), 1.0)
-"""Points on what is held, 10 cm from its origin."""
+"""Points on a held prop, 10 cm from its origin."""
 
 
 class Held(NamedTuple):
-    """What a key says: from its frame on something is in the space of this holder, None for its parent or the world."""
+    """A hold from one key: from its frame on, the prop is in this holder's space. None is its parent or the world."""
 
     frame: float
     holder: Carrier | None
     frames: int = 0
-    """Over how many frames before the key it passes over."""
+    """The number of frames before the key over which the prop passes."""
 
 
 def rigid(matrices: np.ndarray) -> np.ndarray:
-    """These without their scales."""
+    """Return matrices without their scales."""
     result = np.array(matrices, float)
     result[:, :3, :3] /= np.linalg.norm(result[:, :3, :3], axis=1, keepdims=True)
     return result
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> float:
-    """The farthest that any point within 10 cm of a prop is from where it is by other matrices."""
+    """Return the largest distance of any point within 10 cm of a prop between two sets of matrices."""
     return float(np.linalg.norm(((rigid(one) - rigid(other)) @ POINTS.T)[:, :3], axis=1).max(initial=0.0))
 
 
 def quaternions(matrices: np.ndarray) -> np.ndarray:
-    """Unit quaternions (m, 4), w first, of rotations: by the eigenvector, which has no special cases."""
+    """Return unit quaternions (m, 4), w first, of rotations: by an eigenvector, which needs no special cases."""
     r = np.moveaxis(rigid(matrices)[:, :3, :3], 0, -1)
     k = np.empty((len(matrices), 4, 4))
     k[:, 0, 0] = np.trace(r)
@@ -54,7 +54,7 @@ def quaternions(matrices: np.ndarray) -> np.ndarray:
 
 
 def lerp_slerp(one: np.ndarray, other: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Locations straight, rotations the shortest way at an even rate, these shares (m,) of the way."""
+    """Interpolate locations linearly, and rotations the shortest way at constant speed, at these fractions (m,)."""
     p, q = quaternions(one), quaternions(other)
     q = np.where(np.einsum("mi,mi->m", p, q)[:, None] < 0.0, -q, q)
     half = 2.0 * np.arctan2(np.linalg.norm(p - q, axis=1), np.linalg.norm(p + q, axis=1))
@@ -80,10 +80,10 @@ Motion = Callable[[np.ndarray], np.ndarray]
 def carried(
     twin: Carrier, holds: Sequence[Held], motions: Sequence[Motion], frames: np.ndarray, *, soon: float = 1.0 / 64.0
 ) -> np.ndarray:
-    """Where something is on frames (m,) by what its keys say, and by how it moves in each of its holders.
+    """Return world matrices of a prop on frames (m,), from the holds of its keys and its motion in each holder.
 
-    `twin` is another thing with the same parent that rests, at the origin of the space of the channels. Channels keep
-    their units in all holders: those that they have there, at the first key in each.
+    `twin` is an object with the same parent that rests at the origin of the space of the channels. In every holder,
+    channels keep the units that they have at the first key in this holder.
     """
     holders = [twin if hold.holder is None else hold.holder for hold in holds]
     spaces = list(shown_worlds(holders, frames))
@@ -102,7 +102,7 @@ def carried(
         begin = max(hold.frame - hold.frames, before.frame)
         on = (begin <= frames) & (frames < hold.frame)
         if on.any() and begin < hold.frame:
-            # It is there so soon before its key.
+            # It arrives shortly before its key.
             u = np.minimum((frames[on] - begin) / (hold.frame - soon - begin), 1.0)
             both = [spaces[i][on] @ motions[i](frames[on]) for i in (place, place + 1)]
             result[on] = lerp_slerp(*both, u * u * (3.0 - 2.0 * u))

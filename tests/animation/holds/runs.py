@@ -1,4 +1,4 @@
-"""How something moves in one holder: by a copy of the keys that are held there, which there are no others beside."""
+"""The motion of a prop in one holder, from a copy with only the keys of that hold."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ AUTOMATIC = {"AUTO", "AUTO_CLAMPED"}
 
 
 def motion_of(prop: Carrier, first: float, until: float, *, comes: bool, goes: bool) -> Motion:
-    """The motion of the keys from a frame until another one; before and behind them as fast as there, or at rest."""
+    """Return the motion of the keys from one frame until another. Outside them it extrapolates, or rests."""
     copy = copy_of(prop, first, until, comes=comes, goes=goes)
     frames = [key.co.x for curve in curves_of(copy).values() for key in curve.keyframe_points]
     low, high = -np.inf if comes else min(frames), np.inf if goes else max(frames)
@@ -35,7 +35,7 @@ def motion_of(prop: Carrier, first: float, until: float, *, comes: bool, goes: b
 
 
 def copy_of(prop: Carrier, first: float, until: float, *, comes: bool, goes: bool) -> Carrier:
-    """Another thing that has these keys alone."""
+    """Return another object that has only these keys."""
     copy = bpy.data.objects.new("Copy", None)
     copy.rotation_mode = prop.rotation_mode
     action = bpy.data.actions.new("Copy")
@@ -57,7 +57,7 @@ def copy_of(prop: Carrier, first: float, until: float, *, comes: bool, goes: boo
                     setattr(new, name, getattr(key, name))
             made.update()
             if (comes or goes) and len(keys) > 1 and not everywhere:
-                # Those inside stay as they are where it rests at both ends.
+                # Inner keys stay unchanged where the motion rests at both ends.
                 automatic = [{key.handle_left_type, key.handle_right_type} <= AUTOMATIC for key in keys]
                 for key in made.keyframe_points:
                     key.handle_left_type = key.handle_right_type = "FREE"
@@ -71,7 +71,7 @@ def copy_of(prop: Carrier, first: float, until: float, *, comes: bool, goes: boo
 
 
 def _aim(key: bpy.types.Keyframe, other: bpy.types.Keyframe, *, level: bool) -> None:
-    """Have both handles of a key in line with another one, or be level."""
+    """Align both handles of a key with another key, or make them level."""
     third, rise = (other.co.x - key.co.x) / 3, 0.0 if level else (other.co.y - key.co.y) / 3
     near, far = ("right", "left") if third > 0.0 else ("left", "right")
     setattr(key, f"handle_{near}", (key.co.x + third, key.co.y + rise))

@@ -1,4 +1,4 @@
-"""Something that is picked up, passed on and put down again, and what animators do to its keys."""
+"""A stage for tests of holds: a prop that is picked up, passed on and put down, and edits of its keys."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def go_to(frame: float) -> None:
 
 @pytest.fixture
 def stage(live_file) -> Callable[[str], Carrier]:
-    """Something that is picked up, passed on and put down again, by its name."""
+    """Return a function that sets up a prop that is picked up, passed on and put down, by its name."""
 
     def set_stage(name: str = "Tool", *, held: bool = True) -> Carrier:
         rests = (
@@ -60,7 +60,7 @@ def update() -> None:
 
 
 def spaces(prop: Carrier) -> list[tuple[float, int]]:
-    """The frames of switches, and the numbers of what it passes to."""
+    """Return the frames of switches, and the numbers of the new holders."""
     return [(switch.frame, switch.after) for switch in animation.queries.keyed.source_of(prop).switches]
 
 
@@ -88,7 +88,7 @@ def delete(prop: Carrier, frame: float) -> None:
 
 
 def copy(prop: Carrier, frame: float, by: float) -> None:
-    """As Shift D does."""
+    """Duplicate keys as Shift D does."""
     for fcurve in moving(prop):
         there = next(point for point in fcurve.keyframe_points if abs(point.co.x - frame) < 0.01)
         fields = {field: getattr(there, field) for field in ("co", "back", "amplitude", "period")}

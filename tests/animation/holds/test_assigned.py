@@ -1,4 +1,4 @@
-"""Poses of the world that scripts and add-ons assign to held things are seen there; nothing else is taken for one."""
+"""World matrices that scripts assign to held objects are shown there; other edits are not mistaken for them."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_what_has_no_keys_or_is_unlinked_is_so_too(stage):
 @pytest.mark.parametrize("name", PROPS[:2])
 @pytest.mark.parametrize("keyed", [False, True])
 def test_undone_and_redone_it_is_where_it_was(stage, name, keyed):
-    """Blender takes its undo step before it tells of the edit."""
+    """Blender pushes its undo step before it reports the edit."""
     stage(name)
     go_to(25.0)
     bpy.ops.ed.undo_push(message="Frame")
@@ -127,7 +127,7 @@ def seen_as_channels(prop: bpy.types.Object) -> None:
 @pytest.mark.parametrize("edit", [identities, seen_as_channels])
 @pytest.mark.parametrize("stand", ["anywhere", "in the origin of the world", "in the origin of the hand"])
 def test_channels_that_are_set_are_taken_as_they_are(live_file, edit, stand):
-    """Even where they are, by chance, those of what is seen: as Alt G has them of what is in the world's origin."""
+    """Even if they happen to equal the displayed matrix, as Alt G makes them for an object at the world origin."""
     hand, prop = new_object("Hand"), new_object("Tool", "QUATERNION")
     hand.location = (1.0, 0.5, 0.2)
     update()
@@ -154,7 +154,7 @@ def test_channels_that_are_set_are_taken_as_they_are(live_file, edit, stand):
 
 
 def test_a_file_that_is_opened_is_as_it_was_saved(live_file, tmp_path):
-    """Its matrices are those of nothing evaluated yet, as are the channels of what is held in the origin of a hand."""
+    """Its matrices are not evaluated yet, and an object held at the origin of a hand has the same channels."""
     hand, prop = new_object("Hand"), new_object("Tool", "QUATERNION")
     hand.location = (1.0, 0.5, 0.2)
     update()

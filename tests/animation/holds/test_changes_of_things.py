@@ -1,4 +1,4 @@
-"""What is done to held things and to what holds them, beside their keys: repaired, or said in a line."""
+"""Changes of held objects and their holders other than key edits: they are repaired, or reported in one line."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from tests.animation.scenes import key, new_object, push_down
 
 __all__ = ["stage"]
 
-# What is done to the things themselves
+# Changes of the objects themselves
 
 
 def single_user(prop: bpy.types.Object) -> None:
@@ -65,7 +65,7 @@ def test_what_is_held_is_so_whatever_is_done_to_it(stage, name, change, tmp_path
 
 
 def test_keys_that_say_nothing_let_it_go(stage):
-    """An Action of its own from before it was held, on what has been held since."""
+    """The object gets an Action of its own, from before it was held."""
     prop = stage()
     prop.animation_data.action = None
     key(prop, (1.0, 40.0), seed=3)
@@ -75,7 +75,7 @@ def test_keys_that_say_nothing_let_it_go(stage):
 
 
 def test_two_strips_pass_each_in_its_own_way(stage):
-    """A constraint shows the poses of one Action alone."""
+    """A constraint shows the poses of only one Action."""
     prop = stage()
     action, slot = prop.animation_data.action, prop.animation_data.action_slot
     inside = FRAMES[(FRAMES > 4.0) & (FRAMES < 60.0)]
@@ -91,7 +91,7 @@ def test_two_strips_pass_each_in_its_own_way(stage):
     strip.action_slot, strip.extrapolation = slot, "HOLD_FORWARD"
     update()
     assert np.abs(shown_worlds([prop], inside)[0] - second).max() < 1e-5
-    # Three rounds of the hands later.
+    # After three cycles of the hands.
     assert np.abs(shown_worlds([prop], inside + 177.0)[0] - first).max() < 1e-4
 
 
@@ -115,7 +115,7 @@ def test_a_mirrored_bone_is_held_when_it_is_keyed(stage):
     assert_held([found("Rig/Bone.R")], FRAMES[FRAMES > 30.0])
 
 
-# What cannot be repaired is said
+# Problems that cannot be repaired are reported
 
 
 def mute_influence(prop: bpy.types.Object) -> None:
@@ -168,7 +168,7 @@ def test_what_is_amiss_is_said_in_a_line(stage, what):
 
 
 def test_a_constraint_that_was_deleted_and_is_nowhere_else_is_missed(stage):
-    """Others that are held in the same tell what it was."""
+    """Other objects with the same holder identify the missing target."""
     prop, other = stage(), new_object("Second", "QUATERNION")
     prop.constraints.remove(prop.constraints["Held In Hand"])
     update()
@@ -188,7 +188,7 @@ def test_two_cannot_hold_each_other(stage):
 
 
 def hang(prop: bpy.types.Object, kind: str) -> None:
-    """On the first vertex, or at the beginning of the path, of something that moves."""
+    """Parent the prop to the first vertex of a moving mesh, or to the start of a moving path."""
     points = [(0.3, 0.1, 0.2), (1.0, 0.0, 0.0)]
     if kind == "VERTEX":
         data = bpy.data.meshes.new("Shape")
@@ -235,7 +235,7 @@ def test_where_no_constraint_can_place_it_nothing_is_keyed(stage, name, change, 
 
 
 def test_keys_are_only_moved_while_blender_moves_keys(stage, monkeypatch):
-    """It remembers where in memory they are."""
+    """Blender remembers the keys' addresses in memory."""
     prop = stage()
     monkeypatch.setattr(refreshing, "is_keying_safe", lambda: False)
     places = {key.as_pointer() for key in influence(prop, "Held In Hand").keyframe_points}

@@ -1,4 +1,4 @@
-"""What animators do to keys of what is held: the motion in one holder is that of the keys there, whatever they are."""
+"""Edge cases of keys of held objects: the motion in each holder depends only on the keys there."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import push_down
 
 KEPT = 2e-6
-"""Metres: how far something may be after an edit that is to change nothing."""
+"""Tolerance in metres for edits that must not move the prop."""
 
 
 def thrown(frames: tuple[int, ...] = (3, 4, 4, 3), order: str = "QUATERNION") -> tuple[Carrier, Carrier, list[Held]]:
@@ -34,7 +34,7 @@ def keys_on(prop: Carrier, frame: float) -> list[bpy.types.Keyframe]:
 
 
 def edited(prop: Carrier) -> None:
-    """Have Blender and us see an edit by script."""
+    """Let Blender and the extension see an edit by script."""
     for curve in curves_of(prop).values():
         curve.update()
     bpy.context.view_layer.update()
@@ -141,7 +141,7 @@ def test_what_is_held_in_a_strip_is_held_and_passed_on_its_frames(live_file, sca
     def in_scene(frames: np.ndarray) -> np.ndarray:
         return 1.0 + scale * (frames - 1.0)
 
-    # As seen in the scene, all takes so much longer.
+    # In the scene, everything is stretched by the scale.
     held = [hold._replace(frame=in_scene(hold.frame), frames=scale * hold.frames) for hold in holds]
     slow = [lambda at, motion=motion: motion(1.0 + (at - 1.0) / scale) for motion in motions]
     frames = in_scene(np.arange(1.0, 82.0, 0.25))
@@ -158,5 +158,5 @@ def test_blur_just_before_a_switch_is_of_the_old_hand(live_file):
 def test_blur_around_the_end_of_a_pass_has_no_pop(live_file):
     prop, twin, holds = thrown((4, 4, 4, 4))
     near = np.concatenate([frame + np.array([-0.05, -0.01, -0.001, 0.001, 0.01, 0.02, 0.05]) for frame in (20, 44, 66)])
-    # Between eighths of frames the poses in which it arrives run straight.
+    # Between eighths of frames, the poses near the end of a pass are interpolated linearly.
     assert off(prop, twin, holds, near) < 5e-5

@@ -1,4 +1,4 @@
-"""What animators do to what is held and to what holds it: keys take their space along, or a line says what is amiss."""
+"""Edits of held objects and their holders: keys keep their spaces, or one line reports the problem."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def test_what_is_hidden_holds_and_what_is_not_there_is_refused(stage, hide):
 
 @pytest.mark.parametrize(("seed", "name"), in_turn(range(6), PROPS))
 def test_a_setting_that_is_typed_takes_no_hold_and_no_mode_off(stage, name, seed):
-    """*Back*, *Amplitude* or *Period* of the active key, in the sidebar of the Graph Editor: one key of one channel."""
+    """*Back*, *Amplitude* or *Period* of the active key, in the Graph Editor's sidebar: one key of one channel."""
     prop, random = stage(name), np.random.default_rng(seed)
     frames = animation.key_frames(prop)
     before, expected, modes = shown_worlds([prop], FRAMES)[0], spaces(prop), animation.modes_of(prop, frames)
@@ -193,5 +193,5 @@ def test_a_setting_that_all_keys_get_at_once_takes_no_hold_off(stage, name, sett
     update()
     assert spaces(prop) == expected
     if setting != "back":
-        # The mode is in there, too.
+        # `back` also stores the mode.
         assert np.abs(shown_worlds([prop], FRAMES)[0] - before).max() < 1e-5

@@ -1,4 +1,4 @@
-"""Keys that are inserted of what is held leave it where it was: between keys in a hand, behind, and as it passes."""
+"""Keys inserted on held objects leave them where they were: between keys in a hand, after them, and during a pass."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from tests.animation.keyed import curve_of, rotation_path
 from tests.animation.oracle import shown_worlds
 
 PLACES = 6, 15, 18, 26, 37, 42, 43.5, 46, 60, 64.5, 68, 77
-"""Frames between keys, behind the last key in something, and of the passing from there."""
+"""Frames between keys, after the last key in a holder, and during the pass from there."""
 
 PASSES = (0, 0, 0, 0), (3, 4, 4, 3)
-"""Over how many frames it passes each time: at once, or smoothly."""
+"""Number of frames of each pass: instant, or smooth."""
 
 
 def calm(prop: Carrier) -> None:
-    """Have keys turn it so little that it never is half a turn away from where it was, however far it goes on."""
+    """Reduce rotations between keys so that extrapolation never gets half a turn away from the start."""
     curves = [curve_of(prop, "rotation_quaternion", index) for index in range(4)]
     values = 0.15 * np.array([[key.co.y for key in curve.keyframe_points] for curve in curves])
     values += np.array((1.0, 0.3, 0.2, -0.1))[:, None]
@@ -36,7 +36,7 @@ def calm(prop: Carrier) -> None:
 
 
 def with_key(prop: Carrier, at: float, index: int = -1) -> float:
-    """How far something is, at most, from where it was before a key was inserted of its location and rotation."""
+    """Insert a key of location and rotation, and return how far the object moved at most."""
     (before,) = shown_worlds([prop], MOMENTS)
     bpy.context.scene.frame_set(int(at), subframe=at % 1)
     for path in ("location", rotation_path(prop)) if index < 0 else ("location",):

@@ -1,4 +1,4 @@
-"""What passes from one holder to another is where both carry it, smoothly from one to the other: by an oracle."""
+"""Passing from holder to holder: the prop moves smoothly between the places where both would carry it, by an oracle."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from tests.animation.scenes import new_object
 from tests.thoroughness import THOROUGH
 
 MOMENTS = np.arange(0.0, 84.0, 0.625)
-"""Whole frames among them, and all eighths between, at which the poses of passes are made."""
+"""Frames in steps through all eighths, at which the poses of passes are made, whole frames among them."""
 
 LENGTHS = 0, 1, 3, 4, 10
 MODES = "motor_spline", "dq_sclerp", "lerp_slerp", "BLENDER"
 RESTING, MOVING = 2e-6, 1e-5
-"""Metres; where channels move, what terms may be off comes on top."""
+"""Tolerances in metres. While channels move, the error of terms is added."""
 
 
 def keys_of(prop: Carrier, frames: Sequence[float], seed: int, reach: float = 0.1) -> None:
-    """More keys of a prop, in the space that it is in then."""
+    """Key further random poses of a prop, in its space at that time."""
     for number, frame in enumerate(frames):
         place(prop, 10 * seed + number, reach, frame=frame)
 
 
 def motions_of(prop: Carrier, holds: Sequence[Held], goes_on: bool = False) -> list[Motion]:
-    """How it moves in each of these by the keys there."""
+    """Return the motion of a prop in each hold, from the keys there."""
     ends = [*(hold.frame for hold in holds[1:]), np.inf]
     passes = [goes_on, *(hold.frames > 0 for hold in holds[1:]), goes_on]
     return [
@@ -46,14 +46,14 @@ def motions_of(prop: Carrier, holds: Sequence[Held], goes_on: bool = False) -> l
 def off(
     prop: Carrier, twin: Carrier, holds: Sequence[Held], frames: np.ndarray = MOMENTS, goes_on: bool = False
 ) -> float:
-    """How far it is from where it has to be, in metres."""
+    """Return the largest distance from the expected place, in metres."""
     expected = carried(twin, holds, motions_of(prop, holds, goes_on), frames)
     (seen,) = shown_worlds([prop], frames)
     return apart(seen, expected)
 
 
 def juggled(prop: Carrier, holders: Sequence[Carrier], frames: Sequence[int], *, moves: bool) -> list[Held]:
-    """Something that is picked up, passed on, let go, and held once more."""
+    """Have a prop picked up, passed on, let go, and held once more."""
     keys_of(prop, (1, 11) if moves else (1,), 1, 0.5)
     holds = [Held(1, None)]
     for at, holder, over in zip((20, 44, 66, 75), (*holders, None, holders[0]), frames, strict=True):
@@ -81,14 +81,14 @@ def test_all_things_rest_in_all_hands_and_pass_between_them(live_file, by, what)
     holds = juggled(prop, holders, (3, 4, 10, 3), moves=False)
     moved = [np.ptp(worlds[:, :3, 3], axis=0).max() for worlds in shown_worlds(holders, MOMENTS[::8])]
     assert min(moved) > 0.05, "the hands move, or this test says nothing"
-    # What inherits its location otherwise than its rotation has no space of its own in the world.
+    # A bone that inherits its location differently from its rotation has no space of its own in the world.
     in_hands = (MOMENTS >= 20.0) & (MOMENTS < 56.0)
     frames = MOMENTS[in_hands] if "without" in what else MOMENTS
     assert off(prop, twin, holds, frames) < RESTING
 
 
 def test_a_hand_near_gimbal_lock_holds_as_well(live_file):
-    """Blender's own Child Of turns by angles where it leaves out scale, which is off by 0.3 mm there."""
+    """Blender's own Child Of uses Euler angles if it leaves out scale, which causes an error of 0.3 mm here."""
     hand, tool = new_object("Hand"), new_object("Tool")
     frames = np.arange(1.0, 121.0)
     turns = [

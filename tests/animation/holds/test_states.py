@@ -1,4 +1,4 @@
-"""Whatever is edited of what is held, in whatever order, it is where its keys say, in the space that they say."""
+"""State machine for held objects: after any edits in any order, they are where their keys say, in that holder."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HANDS = "Hand", "Other", "Rig/Grip"
 
 
 class Holding(WithHolds):
-    """An animator at work on props: an object, one with a parent that moves, and a bone; and on what holds them."""
+    """An animator at work on props (an object, one with a moving parent, and a bone) and on their holders."""
 
     @initialize(
         orders=st.lists(st.sampled_from(ORDERS), min_size=3, max_size=3),
@@ -74,7 +74,7 @@ class Holding(WithHolds):
             self._assert_held(name, frames)
 
     mute_a_channel = look_at_it_with_modifiers_and_take_them_off = let_it_repeat_for_a_while = None
-    """What is muted of a rotation leaves the rest of it to Blender, which is none of holding; nor is what repeats."""
+    """A rotation with a muted channel is left to Blender, and so cannot be held. Cycles cannot, either."""
 
     @while_on(who=shares, which=shares, what=st.sampled_from(("delete keys", "remove", "move", "value")))
     def tamper_with_influences(self, who, which, what):
@@ -96,7 +96,7 @@ class Holding(WithHolds):
 
     @while_on(who=shares, which=shares, by=st.sampled_from((-3.0, 0.5, 2.0, 60.0)))
     def retime(self, who, which, by):
-        """As the Dope Sheet does with all channels: those of influences move along."""
+        """As the Dope Sheet does with all channels: keys of influences move along."""
         name = self._named(who)
         frames = key_frames(self._found(name))
         if not len(frames):
@@ -124,7 +124,7 @@ class Holding(WithHolds):
 
     @while_on(which=st.sampled_from(("Parent", "Other")), parented=st.booleans(), by_command=st.booleans())
     def parent_the_tool(self, which, parented, by_command):
-        """What holds it now goes on with that: it does not move."""
+        """A prop in a holder goes on with it: it does not move."""
         tool, is_held = self._found("Tool"), animation.hold_facts(self._found("Tool")).now is not None
         if is_held and not self._is_passing("Tool"):
             bpy.context.view_layer.update()
@@ -152,7 +152,7 @@ class Holding(WithHolds):
 
     @while_on(which=st.sampled_from(HANDS))
     def rename_a_hand_for_a_while(self, which):
-        """As long as that takes, all is held in it."""
+        """While the hand has another name, it still holds everything."""
         found, before = self._found(which), which.split("/")[-1]
 
         def change() -> None:
@@ -167,9 +167,9 @@ class Holding(WithHolds):
     @precondition(lambda self: self.on and len(self.names) < 5)
     @rule(who=shares, link=st.booleans())
     def append(self, who, link):
-        """From a copy of this file, with its holders, which are those that are here by no more than their names.
+        """Append from a copy of this file, with holders that equal the existing ones in nothing but their names.
 
-        It may also be linked and made local, with holders that are not.
+        The prop may also be linked and made local, with linked holders.
         """
         name = self._named(who).split("/")[0]
 
@@ -216,7 +216,7 @@ class Holding(WithHolds):
         self._edit(change)
 
     def _may_be_unbaked(self, name: str, *new: str) -> None:
-        """What is made of an object with an Action of its own has the way back from its baked keys, too."""
+        """Objects made from one with an Action of its own can also be un-baked."""
         self.before_bake |= {
             one.replace(name, other, 1): kept
             for one, kept in self.before_bake.items()
@@ -226,7 +226,7 @@ class Holding(WithHolds):
 
     @while_on(who=shares, start=st.integers(1, 30), scale=st.sampled_from((1.0, 2.0)), by=st.sampled_from(HANDS))
     def hold_in_a_strip(self, who, start, scale, by):
-        """In tweak mode as anywhere, and what is seen stays as it is when the strip goes."""
+        """As outside strips. The displayed pose stays when the strip is removed."""
         prop = self._found(self._named(who))
         name, obj = self._named(who), prop.id_data
         if obj.animation_data.action is None or not len(key_frames(prop)) or not self._is_free(obj):

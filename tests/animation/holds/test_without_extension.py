@@ -1,4 +1,4 @@
-"""What is held is held by Blender alone: with the extension off, in files that never see it again, and exported."""
+"""Held objects are held by Blender alone: with the extension off, in a Blender without it, and in exports."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from tests.blank import blank
 
 @pytest.fixture
 def file_to_switch(live_file) -> Iterator[None]:
-    """A file in which the extension may be switched off; it is on again afterwards."""
+    """A file in which the extension may be switched off. It is on again afterwards."""
     yield
     if not hasattr(bpy.types.Object, "rigid_motion"):
         animation.register()
 
 
 def move_by_hand(hand: Carrier) -> None:
-    """What animators do to a hand: other keys, another place of the arm, and a constraint."""
+    """Edit a hand as animators do: other keys, another place of the arm, and a constraint."""
     rig = hand.id_data
     rig.location, rig.rotation_euler = (0.3, -0.2, 0.1), (0.2, 0.5, -0.3)
     for frame, turn in ((20, (0.8, 0.1, -0.3, 0.2)), (52, (0.7, -0.4, 0.1, 0.3))):
@@ -75,7 +75,7 @@ def test_files_are_played_by_a_blender_without_it_as_with_it(live_file, tmp_path
 
 
 def baked_out(objects: list[bpy.types.Object], path: Path, how: Format) -> dict[str, bpy.types.Object]:
-    """Export what there is and import it into a new file; the objects there by names."""
+    """Export everything and import it into a new file. Return the imported objects by name."""
     save, load, options, loading = how
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 80

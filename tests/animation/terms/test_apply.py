@@ -1,4 +1,4 @@
-"""Modifiers of F-curves are the terms that were planned, and no others."""
+"""Applied terms: the F-curve modifiers are exactly the planned terms."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key, new_object
 
 BY_HAND = {"mute": True, "use_influence": True, "blend_in": 5.0, "blend_out": 5.0, "name": "Mine"}
-"""What is set of terms, one after the other."""
+"""Settings changed in terms, one after the other."""
 
 MOVED = ((1.0, 17.0), (1e-3, 17.0), (30.0, 17.0), (3000.0, 17.0), (1.0, 14.0))
-"""The value of a key and its frame, one after the other."""
+"""The value and the frame of a key, one after the other."""
 
 
 def test_what_is_changed_in_terms_by_hand_is_undone_by_the_next_edit_and_names_tell_mode_and_frames(live_file):

@@ -1,4 +1,4 @@
-"""Terms follow polynomials in single precision, by as few products as can be."""
+"""Terms follow polynomials in single precision, with as few products as possible."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TOLERANCE = 1e-6
 
 
 def evaluate(terms: Sequence[Term], frames: np.ndarray) -> np.ndarray:
-    """What Blender adds on frames for terms, shape (m,)."""
+    """Return what Blender adds on frames for these terms, shape (m,)."""
     with as_fcurve(keys_of((0.0,), (0.0,))) as fcurve:
         for term in terms:
             write(fcurve.modifiers.new("GENERATOR"), term)
@@ -27,13 +27,13 @@ def evaluate(terms: Sequence[Term], frames: np.ndarray) -> np.ndarray:
 
 
 def error(terms: Sequence[Term], wanted: Callable[[np.ndarray], np.ndarray], frames: np.ndarray) -> float:
-    """How far off terms are at most, on frames in single precision."""
+    """Return the largest error of terms, on frames in single precision."""
     frames = np.unique(np.float32(frames)).astype(float)
     return abs(evaluate(terms, frames) - wanted(frames)).max()
 
 
 def smooth(seed: int, degree: int, size: float = 0.2, decay: float = 0.5, zero_ends: bool = True) -> np.ndarray:
-    """A polynomial at random, as most differences are: with coefficients that fall, 0 at both ends."""
+    """Return a random polynomial similar to most differences: decreasing coefficients, 0 at both ends."""
     series = np.random.default_rng(seed).normal(size=degree + 1) * decay ** np.arange(degree + 1) * size
     if zero_ends:
         at_first, at_last = Chebyshev(series)(np.array((-1.0, 1.0)))
@@ -47,7 +47,7 @@ def carried(series: np.ndarray, first: float, last: float) -> list[Term]:
 
 
 def frames_of(first: float, last: float) -> np.ndarray:
-    """The whole frames of a piece, eighths, and others at random, both ends included."""
+    """Return the whole frames of a piece, eighths, and random frames, both ends included."""
     eighths = np.arange(np.ceil(first * 8), last * 8 + 1)[:20_000] / 8
     others = np.random.default_rng(0).uniform(first, last, 300)
     frames = np.float32(np.concatenate([[first, last], eighths, others]))
@@ -69,7 +69,7 @@ def off(terms: list[Term], series: np.ndarray, first: float, last: float) -> flo
     zero_ends=st.booleans(),
 )
 def test_any_polynomial_is_followed_at_any_frame_by_exact_factors(seed, degree, first, length, size, zero_ends):
-    """Within the tolerance, or what products of so many factors leave of values of this size."""
+    """The error is within the tolerance, or within the rounding of products of that many factors at this size."""
     series, last = smooth(seed, degree, size, zero_ends=zero_ends), float(np.float32(first + length))
     terms = carried(series, first, last)
     assert off(terms, series, first, last) <= max(TOLERANCE, 5e-6 * size)
@@ -81,13 +81,13 @@ def test_any_polynomial_is_followed_at_any_frame_by_exact_factors(seed, degree, 
         slopes, offsets = coefficients.reshape(-1, 2).T
         assert slopes[-1] == 0.0
         assert np.all(np.frexp(abs(slopes[:-1]))[0] == 0.5)
-        # With and without a fused multiplication.
+        # With and without fused multiply-add.
         fused = np.float32(slopes * frames.astype(float) + offsets)
         assert np.array_equal(fused, np.float32(slopes) * frames + np.float32(offsets))
 
 
 def test_two_terms_carry_any_degree_and_each_more_what_rounding_has_left():
-    """On frames far away; Bernstein terms, one more than the degree, come last."""
+    """On distant frames. One Bernstein term more than the degree is the last choice."""
     assert {len(carried(smooth(n, n, 0.1, zero_ends=False), 0.0, 16.0)) for n in range(3, 13)} == {2}
     counts = [len(carried(smooth(3, 12, 0.4), first, first + 20.0)) for first in (0.0, 500.0, 20_000.0, 500_000.0)]
     assert counts == [2, 3, MAX_CHAIN_PRODUCTS, 11]

@@ -1,4 +1,4 @@
-"""Plans follow the differences of channels on every frame, whatever these are: here they are written out."""
+"""Planned terms follow any difference of channels on every frame. The differences are written as functions here."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LOCATION, ROTATION = 0, 4
 
 @dataclass
 class Written:
-    """A source whose differences are the same function of frames in each row that a span has."""
+    """A source whose difference is the same function of frames in each row of its spans."""
 
     spans: list[Span]
     difference: Callable[[np.ndarray], np.ndarray]
@@ -32,7 +32,7 @@ class Written:
 
 @pytest.fixture(autouse=True, scope="module")
 def written():
-    """Plan from what is written out here, and not from keys."""
+    """Plan from the differences written here instead of keys."""
 
     def channel_differences(sources, frames):
         result = []
@@ -60,7 +60,7 @@ def planned(*spans: Span, difference, native: float = 0.0) -> dict[int, list[Ter
 
 
 def off(terms: list[Term], difference, first: float = 1.0, last: float = 21.0, step: float = 1 / 16) -> float:
-    """How far off terms are, at most, on frames strictly inside."""
+    """Return the largest error of terms, on frames strictly inside."""
     frames = np.float32(np.arange(np.ceil(first / step), last / step) * step)
     return error(terms, difference, frames[(frames > first) & (frames < last)])
 
@@ -94,7 +94,7 @@ FOLLOWED: dict[str, tuple] = {
     "steep between": (lambda frames: np.cbrt(frames - 11.0) * hump(frames), (), EIGHTHS, 99),
     "fast waves": (lambda frames: 0.1 * np.sin(3.0 * frames) + 0.1, (), EIGHTHS, 99),
 }
-"""A difference and its breaks, on which frames terms have to follow it, and how many may be taken for that."""
+"""A difference and its breaks, the frames on which terms must follow it, and the maximum number of terms."""
 
 
 @pytest.mark.parametrize("ends", [(1.0, 21.0), (1.25, 20.6)])
@@ -119,7 +119,7 @@ def after(frame: float) -> np.float32:
 
 
 def test_parts_are_split_at_breaks_each_on_its_own():
-    """Several values of all angles turn alike, and one row's must be of the same as the others' are."""
+    """Different angles can give the same rotation, so all rows of a rotation must use the same set of angles."""
 
     def difference(frames: np.ndarray) -> np.ndarray:
         return np.stack([hump(frames), hump(frames), bounce(frames), np.zeros_like(frames)])
