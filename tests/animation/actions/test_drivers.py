@@ -1,4 +1,4 @@
-"""What drivers move, what is muted or sampled is left alone, and all else keeps its mode."""
+"""Drivers keep their channels, muted or sampled channels are left alone, and all other channels keep their mode."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SILENT = {
 
 
 def shown(obj) -> np.ndarray:
-    """Location, angles and scale on each frame, shape (m, 3, 3)."""
+    """Return location, angles and scale on each frame, shape (m, 3, 3)."""
     result = []
     for frame in FRAMES.tolist():
         bpy.context.scene.frame_set(int(frame))
@@ -47,7 +47,7 @@ def shown(obj) -> np.ndarray:
     ),
 )
 def test_what_is_left_alone_is_blenders_and_the_rest_moves_as_if_it_were_still(live_file, case, when):
-    """A constant added to a coordinate moves a whole path along: the others cannot know what it is."""
+    """A constant added to a coordinate shifts the whole path. The other channels cannot know that constant."""
     (how, (path, index)), (is_later, mode) = case, when
     obj, still = (key(new_object(name, "XYZ"), scale="even") for name in ("Tool", "Still"))
     for (name, row), fcurve in curves_of(still).items():

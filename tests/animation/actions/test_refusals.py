@@ -1,4 +1,4 @@
-"""Where a mode cannot work it is refused: the message names object, hindrance and way out, and nothing changes."""
+"""Refusals: a mode that cannot work names the object, the cause and the way out, and nothing changes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DELTAS = ("delta_location", "delta_rotation_quaternion", "delta_rotation_euler",
 
 
 def state_of(obj: bpy.types.Object) -> tuple:
-    """All that choosing a mode may ever touch, and what is to be seen."""
+    """Return everything that setting a mode could change, and the displayed matrices."""
     action = obj.animation_data.action
     return (
         repr(snapshot(obj)),
@@ -59,11 +59,11 @@ HINDRANCES = {
         "repeats, but its channels differ",
     ),
 }
-"""What to do to an object, and what it is told."""
+"""What to do to an object, and the refusal it causes."""
 
 
 def hindered(name: str, mode: str = "") -> tuple[bpy.types.Object, bpy.types.Object, str]:
-    """Two objects, of which one has a hindrance, in its mode or without one, and what it is told."""
+    """Return another object, an object with a hindrance (with a mode, if given), and the expected message."""
     other, obj = key(new_object("Other"), scale="even"), new_object()
     give_own_deltas(obj)
     key(obj, scale="even")

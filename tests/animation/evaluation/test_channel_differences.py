@@ -1,4 +1,4 @@
-"""What is added to channels, in the channels themselves. Every channel is a list of keys, with one interpolation."""
+"""Channel differences: what modes add to channels. Every channel is a list of keys with one interpolation."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def keys_of(track: Track, interpolation: str = "LINEAR", **others: object) -> Ke
 def source_of(
     tracks: dict[int, Track], order: str | None = None, interpolation: str = "LINEAR", **others: object
 ) -> KeyedTransform:
-    """A source with a channel for each row, which goes on in a straight line, or round, if so given."""
+    """Return a source with one channel per row, linearly extrapolated or cyclic if requested."""
     of_keys = {name: others.pop(name) for name in ("linear", "cycles") if name in others}
     channels = tuple(([row], keys_of(track, interpolation, **of_keys)) for row, track in tracks.items())
     keyed = frozenset(PART_OF[row] for row in tracks)
@@ -56,19 +56,19 @@ def source_of(
 
 
 def tracks_of(part: str, frames: Iterable[float], rows: np.ndarray) -> dict[int, Track]:
-    """Tracks of all components of a part, from values (., n)."""
+    """Return the tracks of all components of a part, from values (., n)."""
     frames = list(frames)
     return {ROWS[part].start + row: list(zip(frames, values, strict=True)) for row, values in enumerate(rows.tolist())}
 
 
 def inside(source: KeyedTransform, count: int = 23) -> np.ndarray:
-    """Frames inside of all spans."""
+    """Return frames strictly inside all spans."""
     steps = np.arange(1, count) / count
     return np.unique(np.concatenate([span.first + (span.last - span.first) * steps for span in spans(source)]))
 
 
 def channels(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
-    """The values that channels are to have, (10, m)."""
+    """Return the expected values of the channels, (10, m)."""
     ((difference, native),) = channel_differences([source], [frames])
     unfilled = [row for row in range(10) if row not in source.filled_rows]
     assert not difference[unfilled].any()
@@ -77,7 +77,7 @@ def channels(source: KeyedTransform, frames: np.ndarray) -> np.ndarray:
 
 
 def rotations(order: str | None, count: int, seed: int = 0) -> np.ndarray:
-    """Channels of rotations, less than half a turn from each to the next: lengths and signs differ. Shape (., n)."""
+    """Return rotation channels (., n), less than half a turn from key to key, with varying lengths and signs."""
     random = np.random.default_rng(seed)
     if order is None:
         values = np.cumsum(random.normal(size=(4, count)), axis=1)
@@ -118,7 +118,7 @@ def test_values_are_continuous_from_the_first_key_on_whichever_frames_are_asked_
                 lengths = [np.linalg.norm(at_keys(tracks, key)[ROWS[ROTATION]]) for key in (span.first, span.last)]
                 evenly = np.interp(frames, (span.first, span.last), lengths)
                 np.testing.assert_allclose(np.linalg.norm(rows[ROWS[ROTATION]], axis=0), evenly, atol=1e-6)
-            # The same whichever frames are asked for along with it.
+            # The values do not depend on the other frames requested in the same call.
             for some in (frames[400:], frames[[17, 550]], frames[[300]]):
                 np.testing.assert_allclose(channels(source, some), rows[:, np.isin(frames, some)], atol=1e-9)
 
@@ -137,7 +137,7 @@ def test_keys_at_gimbal_lock_begin_alike_whichever_frames_are_asked_for(order):
 @pytest.mark.parametrize("order", ["XYZ", "ZXY", "AXIS_ANGLE"])
 @pytest.mark.parametrize("turns", [-3.5, 1.25, 12.0])
 def test_angles_that_turn_far_are_what_they_are_without_a_mode(order, turns):
-    """About one axis there is nothing to mend, and no angle is off by whole turns."""
+    """About a single axis nothing needs correcting, and no angle is off by whole turns."""
     axis = np.array((0.0, 0.0, 2.0, 0.0)) if order == "AXIS_ANGLE" else np.zeros(3)
     rows = np.stack((axis, axis), axis=1)
     rows[0] = 0.5, 0.5 + 2.0 * np.pi * turns

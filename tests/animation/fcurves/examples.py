@@ -1,4 +1,4 @@
-"""F-curves to test with: drawn at random or written out, and the same ones in Blender."""
+"""F-curves for tests, random or written out, and the same F-curves in Blender."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MODES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")
 
 @contextmanager
 def as_fcurve(keys: Keys, *, update: bool = True) -> Iterator[bpy.types.FCurve]:
-    """The only curve of `keys` as an F-curve of Blender's. Without an update handles stay as they are given."""
+    """Yield a Blender F-curve with the only curve of `keys`. Without `update`, handles stay exactly as given."""
     with spare_fcurve() as fcurve:
         points, count = fcurve.keyframe_points, len(keys.times)
         points.add(count)
@@ -56,19 +56,19 @@ def read_one(fcurve: bpy.types.FCurve) -> Keys:
 
 
 def evaluate_one(keys: Keys, frames: np.ndarray) -> np.ndarray:
-    """The values of the only curve of these keys, shape (m,)."""
+    """Return the values of the only curve of `keys`, shape (m,)."""
     ((values,),) = evaluate([keys], [frames])
     return values
 
 
 def assert_as_blender(keys: Keys, frames: np.ndarray, *, update: bool = True) -> None:
-    """The values are Blender's, within 2e-6 of the size of the curve, its handles and its swings."""
+    """Check that the values are Blender's, within 2e-6 of the size of the curve, its handles and its elastic swings."""
     with as_fcurve(keys, update=update) as fcurve:
         read = read_one(fcurve)
         result = evaluate_one(read, frames)
         expected = np.array([fcurve.evaluate(frame) for frame in frames.tolist()])
     handles = [rows for rows in (read.left, read.right) if rows is not None]
-    # What swings elastically has a size even where every frame happens on a zero of the sine.
+    # An elastic segment has a size even if every frame falls on a zero of the sine.
     swings = [] if read.easing_settings is None else read.easing_settings[1][read.interpolation == ELASTIC].tolist()
     size = max(
         1e-30, np.abs(expected).max(), *(np.abs(rows[..., 1]).max() for rows in (read.points, *handles)), *swings
@@ -88,12 +88,12 @@ def keys_of(
 
 
 def frames_about(keys: Keys) -> np.ndarray:
-    """Frames on and between the keys, and far before and after them. Sixteenths are exact in single precision."""
+    """Return frames on, between, far before and far after the keys. Sixteenths are exact in single precision."""
     return np.arange(16.0 * (keys.times[0] - 60.0), 16.0 * (keys.times[-1] + 60.0), 7.0) / 16.0
 
 
 def numbers(limit: float) -> st.SearchStrategy[float]:
-    """Of all sizes up to the limit, none so small that it vanishes in single precision."""
+    """Numbers of all magnitudes up to the limit, none so small that it vanishes in single precision."""
     whole = st.integers(-1024, 1024).map(lambda number: number / 1024.0)
     return st.tuples(whole, st.sampled_from((1.0, 0.1, 1e-3))).map(lambda pair: limit * pair[0] * pair[1])
 
@@ -102,7 +102,7 @@ def numbers(limit: float) -> st.SearchStrategy[float]:
 def curves(
     draw: st.DrawFn, kinds: Sequence[str] = tuple(CODES), gaps: Sequence[float] = (0.25, 1.0, 10.0, 37.5)
 ) -> Keys:
-    """Curves of up to six keys, with handles that are short, long, or reach past the next key."""
+    """Curves of up to six keys. Their handles may be short, long, or reach past the next key."""
     count = draw(st.integers(1, 6))
 
     def each(strategy: st.SearchStrategy, *shape: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""F-curves evaluated in NumPy, against Blender's own evaluation of the same curve."""
+"""F-curves evaluated in NumPy, compared with Blender's own evaluation of the same curve."""
 
 from __future__ import annotations
 

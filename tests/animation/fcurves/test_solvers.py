@@ -1,4 +1,4 @@
-"""Bezier segments: the parameter that belongs to a time, and handles with which they run through given values."""
+"""Bezier segments: the parameter for a given time, and handles fitted to given values."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ lengths = st.integers(0, 64).map(lambda number: number / 64.0)
 @example(0.0, 1.0)
 @example(1.0, 0.0)
 def test_solving_finds_the_parameter_of_every_time(first, second):
-    """With handles that are so long, as a share of the segment."""
+    """The handles have these lengths, as fractions of the segment."""
     c1, c2, c3 = 3.0 * first, 3.0 * (1.0 - second - 2.0 * first), 3.0 * first + 3.0 * second - 2.0
     t = solve_cubics(T, np.array((c1, c2, c3))[:, None].repeat(len(T), axis=1))
     assert np.all((t > -1e-5) & (t < 1.0 + 1e-5))
@@ -33,7 +33,7 @@ def test_solving_finds_the_parameter_of_every_time(first, second):
 
 
 def segment(handles: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """The values of a segment from (0, 0) to (1, 1)."""
+    """Return the values of a segment from (0, 0) to (1, 1)."""
     first, last = handles
     return evaluate_one(keys_of((0, 1), (0, 1), "BEZIER", left=((0, 0), last), right=(first, (1, 1))), times)
 

@@ -1,4 +1,4 @@
-"""What Blender tells of edits, and which channels they were about."""
+"""Changes that Blender reports: which objects and channels were edited."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_of_two_objects_with_one_name_that_is_found_which_was_edited(tmp_path: P
     namesakes[number].update_tag()
     bpy.context.view_layer.update()
     bpy.app.handlers.depsgraph_update_pre.remove(note)
-    # An evaluated copy does not say safely which library it is of: that may be gone.
+    # The library of an evaluated copy cannot be read safely, since it may be gone.
     assert namesakes[number] in found
     namesakes[1].update_tag()
     bpy.data.libraries.remove(bpy.data.libraries[0])
@@ -48,7 +48,7 @@ def test_what_was_made_single_user_is_followed_at_once_or_with_another_frame(liv
     live_file.view_layer.update()
     live_file.scene.frame_set(15)
     select_only(single)
-    # As Object > Relations > Make Single User > Object Animation does.
+    # Like Object > Relations > Make Single User > Object Animation.
     bpy.ops.object.make_single_user(
         type="SELECTED_OBJECTS", animation=True, obdata_animation=False, object=False, obdata=False
     )

@@ -1,4 +1,4 @@
-"""Keys inserted in between, where what was on the screen is not what it was at first."""
+"""Keys inserted between keys when the displayed pose differs from the original motion."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ORDERS = ("QUATERNION", "XYZ", "ZXY", "AXIS_ANGLE")
 
 
 def moving(order: str = "QUATERNION") -> bpy.types.Object:
-    """An object that moves by screws, in the middle of a segment."""
+    """Return an object with screw motion, in the middle of a segment."""
     obj = key(new_object("Tool", order))
     set_mode(obj, "dq_sclerp")
     bpy.context.scene.frame_set(15)
@@ -29,7 +29,7 @@ def moving(order: str = "QUATERNION") -> bpy.types.Object:
 
 
 def insert(obj: bpy.types.Object) -> None:
-    """Key all of it as it is."""
+    """Key all transform channels at their current values."""
     for path in transform_paths(obj):
         obj.keyframe_insert(path)
 
@@ -42,8 +42,8 @@ def test_a_pose_pasted_by_copy_global_transform_with_auto_key_is_where_it_lands(
     select_only(obj)
     matrix = Matrix.LocRotScale((1.0, 5.0, -2.0), Euler((0.3, 0.2, 0.1)), (1.0, 1.0, 1.0))
     live_file.scene.tool_settings.use_keyframe_insert_auto = True
-    # What the operator does, which has no clipboard to paste from without a window.
-    # An add-on that comes with Blender until 4.5, a part of Blender since.
+    # Does the operator's work: the operator itself has no clipboard to paste from without a window.
+    # An add-on bundled with Blender until 4.5, built into Blender since.
     in_blender = "bl_operators." if bpy.app.version >= (5, 0) else ""
     importlib.import_module(f"{in_blender}copy_global_transform").set_matrix(live_file, matrix)
     assert np.abs(world_now() - np.array(matrix)).max() < 2e-5

@@ -1,4 +1,4 @@
-"""A key inserted between Bezier keys leaves the motion as it was: in every mode, with any handles."""
+"""A key inserted between Bezier keys leaves the motion unchanged, in every mode and with any handles."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ POSES = [
     ((3.0, 1.0, 1.2), (0.1, 0.2, -0.5, 0.78)),
 ]
 POINTS = np.array(((0.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0))).T
-"""The origin, and three points 1 m out."""
+"""The origin, and three points 1 m away."""
 
 MILLIMETRE = 1e-3
 PLAYED = np.arange(1.0, 60.25, 0.25)
 
 
 def keyed(carrier, frames=FRAMES, poses=POSES):
-    """Something with keys as I sets them, with Blender's default handles."""
+    """Key the carrier as I does, with Blender's default handles."""
     for frame, (location, quaternion) in zip(frames, poses, strict=False):
         carrier.location, carrier.rotation_quaternion = location, quaternion / np.linalg.norm(quaternion)
         insert(carrier, frame)
@@ -38,7 +38,7 @@ def keyed(carrier, frames=FRAMES, poses=POSES):
 
 
 def insert(carrier, frame: float | None = None) -> None:
-    """Key all of it, at this frame or at that of the scene."""
+    """Key all of its transform, at this frame or at that of the scene."""
     for path in ("location", "rotation_quaternion", "scale"):
         carrier.keyframe_insert(path, **({} if frame is None else {"frame": frame}))
 
@@ -50,7 +50,7 @@ def keys_of(carrier):
 
 
 def pulled(*, apart: bool) -> Callable:
-    """Handles set by hand, on frames that the channels share or each on its own."""
+    """Return an edit that sets handles by hand, on frames that the channels share or on frames of their own."""
 
     def pull(carrier) -> None:
         random = np.random.default_rng(4)
@@ -86,7 +86,7 @@ HANDLES = {
 
 
 def shown(obj: bpy.types.Object) -> np.ndarray:
-    """Where Blender shows them, shape (m, 3, 4)."""
+    """Return the displayed points, shape (m, 3, 4)."""
     return (shown_worlds([obj], PLAYED)[0] @ POINTS)[:, :3]
 
 
@@ -103,7 +103,7 @@ def key_on(carrier, frame: int) -> None:
 
 @pytest.mark.parametrize(("mode", "handles"), in_turn(MODE_IDS, [*HANDLES]))
 def test_a_key_in_between_leaves_the_motion_as_it_was(live_file, mode, handles):
-    """As a breakdown where another key would make another path; in Blender's own segments as Blender has it."""
+    """It is a breakdown where a regular key would change the path. Blender's own segments may change as in Blender."""
     obj = keyed(new_object())
     HANDLES[handles](obj)
     set_mode(obj, mode)
@@ -130,7 +130,7 @@ def test_the_handles_beside_it_are_kept(live_file):
 
 
 def test_a_breakdown_that_is_moved_is_hit_and_takes_along_what_is_beside_it_alone(live_file):
-    """And a key beside it then changes no more than the motion up to the keys around it."""
+    """A key beside it then changes the motion only up to the surrounding keys."""
     obj = keyed(new_object())
     set_mode(obj, "motor_spline")
     key_on(obj, 31)
@@ -156,7 +156,7 @@ def test_a_breakdown_that_is_moved_is_hit_and_takes_along_what_is_beside_it_alon
 @pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
 @pytest.mark.parametrize("interpolation", ["BEZIER", "LINEAR"])
 def test_it_rests_where_a_pose_was_computed_twice(live_file, mode, interpolation):
-    """Off by rounding of single precision, of which handles that swing beyond their keys make nothing more."""
+    """The poses differ by rounding in single precision, which handles that overshoot their keys must not amplify."""
     place, angles = POSES[1]
     twice = (np.nextafter(np.float32(place), np.float32(9.0)), angles)
     obj = keyed(new_object(), (1.0, 25.0, 49.0, 73.0), [POSES[0], POSES[1], twice, POSES[2]])

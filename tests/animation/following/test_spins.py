@@ -1,4 +1,4 @@
-"""Whole turns between two keys: those that Euler angles say, and those of the channel Turns."""
+"""Whole turns between two keys: from Euler angles, and from the channel Turns."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ EACH = np.arange(1.0, 50.0)
 
 
 def rotations(angles, axis: int) -> np.ndarray:
-    """Turns by angles (m,) about one of the axes of space, as matrices (m, 3, 3)."""
+    """Return rotations by angles (m,) about one of the space axes, as matrices (m, 3, 3)."""
     return np.array([Matrix.Rotation(angle, 3, "XYZ"[axis]) for angle in angles])
 
 
 def shown(obj: bpy.types.Object, frames=EACH) -> np.ndarray:
-    """The matrices (m, 4, 4) of an object on frames."""
+    """Return the displayed matrices (m, 4, 4) of an object on frames."""
     return shown_worlds([obj], frames)[0]
 
 
@@ -43,7 +43,7 @@ def test_three_turns_between_two_keys_are_the_angle_over_time(live_file, mode, a
 
 
 def propeller(mode: str) -> bpy.types.Object:
-    """An object that turns by quaternions about a slanted axis, and moves along a bent path."""
+    """Return an object that turns by quaternions about a slanted axis, and moves along a bent path."""
     obj, frames = new_object(), EACH[::24]
     turned = [Quaternion((1.0, 2.0, 2.0), angle) for angle in (0.0, 0.7, 1.4)]
     write_channel(obj, "rotation_quaternion", frames, np.array(turned), interpolation="LINEAR")
@@ -109,7 +109,7 @@ def test_any_angles_turn_as_the_oracle_has_it(live_file, mode, order):
     for path, size in (("location", 0.5), (rotation_path(obj), 4.0)):
         values = size * np.random.default_rng(len(order)).normal(size=(4, WIDTHS[path]))
         if order == "AXIS_ANGLE" and path != "location":
-            # Far round about one axis, and the shortest way to another one.
+            # Several turns about one axis, then the shortest way to another axis.
             values[:3, 1:] = values[0, 1:]
         write_channel(obj, path, np.array(frames), values, interpolation=interpolation)
     set_mode(obj, mode)
@@ -141,7 +141,7 @@ def test_keys_in_between_keep_the_path_and_without_them_turns_are_whole_again(li
     assert np.abs(shown(obj) - before).max() < 1e-4
     keys = curve_of(obj, "rigid_motion.turns").keyframe_points
     if mode == "lerp_slerp":
-        # Its turns stay whole; only parts of turns are put together again.
+        # Its turns stay whole; only fractional turns are merged again.
         return
     assert keys[0].co[1] % 1.0
     for curve in curves_of(obj).values():

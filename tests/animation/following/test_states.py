@@ -1,4 +1,4 @@
-"""Whatever is edited of objects, in whatever order, in-betweens are what a fresh computation gives, keys as keyed."""
+"""State machine for objects: after any edits in any order, in-betweens equal a fresh computation, and keys stay."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas,
 
 
 class EditingObjects(WithHolds):
-    """An animator at work on a few objects, by their names."""
+    """An animator at work on a few objects, identified by name."""
 
     @initialize(
         orders=st.lists(st.sampled_from(ORDERS), min_size=1, max_size=3),
@@ -103,7 +103,7 @@ class EditingObjects(WithHolds):
         frame, name = scene.frame_current_final, obj.name
         if obj.parent is not None or obj.matrix_world.is_negative or self._is_held(name):
             return
-        # What is flat has no rotation in its matrix, and what is keyed in a muted channel is not seen.
+        # A flat matrix has no rotation, and keys in muted channels are not seen.
         if min(map(abs, obj.matrix_world.to_scale())) < 1e-6:
             return
         if any(fcurve.mute for (path, _), fcurve in curves_of(obj).items() if path in WIDTHS):
@@ -161,7 +161,7 @@ class EditingObjects(WithHolds):
         seed=seeds,
     )
     def push_down_tweak_and_delete_the_strip(self, who, start, scale, which, seed):
-        """In a strip it moves as it did, and as its keys are edited there."""
+        """In a strip the object moves as before, and follows edits of its keys."""
         obj = self._found(self._named(who))
         name, (action, slot) = obj.name, self._linked(obj)
         if action is None or not self._is_free(obj) or not len(key_frames(obj)) or goes_on(obj):
@@ -170,7 +170,7 @@ class EditingObjects(WithHolds):
             return
         strip = push_down(obj, start)
         strip.scale = scale
-        # Only in tweak mode the Action is the object's.
+        # Only in tweak mode is the Action the object's.
         tweak(obj, strip)
         fcurve = None if which is None else self._curve(obj, which)
         if fcurve is not None:
@@ -186,7 +186,7 @@ class EditingObjects(WithHolds):
         obj.animation_data.nla_tracks.remove(obj.animation_data.nla_tracks[0])
         self._link(obj, action, slot)
         bpy.context.view_layer.update()
-        # What was edited needs an undo step of its own.
+        # The edited state needs an undo step of its own.
         self._edit(lambda: None)
 
 

@@ -1,4 +1,4 @@
-"""Poses without keys stay while something else is keyed, as in Blender, and go with the next frame."""
+"""Unkeyed poses stay while another channel is keyed, as in Blender, and vanish on the next frame."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ORDERS = ("QUATERNION", "ZXY", "AXIS_ANGLE")
 
 
 def posed(order: str) -> bpy.types.Object:
-    """An object that was moved, turned, scaled and given another property between two keys."""
+    """Return an object that was moved, turned, scaled and given another property between two keys."""
     obj = key(new_object("Tool", order), scale="even")
     obj["speed"] = 1.0
     obj.keyframe_insert('["speed"]', frame=1)
@@ -44,7 +44,7 @@ def test_what_is_not_keyed_stays_until_the_next_frame(live_file, keyed, order):
     for path in paths:
         error = np.abs(np.subtract(getattr(obj, path), pose[path]))
         is_keyed = np.isin(np.arange(len(error)), index if index >= 0 else range(4)) & (path == paths[part])
-        # Fellows of what was keyed have keys there, too, with the values that the motion had.
+        # Channels keyed along with it have keys there, too, with the values of the motion.
         assert error[is_keyed].max(initial=0.0) < 1e-5
         assert is_keyed.all() or error[~is_keyed].max() > 0.01
     assert {len(curve_of(obj, paths[part], each).keyframe_points) for each in range(3)} == {5}

@@ -1,4 +1,4 @@
-"""What is told of the segment at a frame."""
+"""The facts reported about the segment at a frame."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ FACTS = {
     "nothing behind them": ({}, 32, None),
     "nothing with a single one": ({"degrees": (0,), "frames": FRAMES[:1]}, 1, None),
 }
-"""How an object is turned, a frame, and what is told of the segment there if there is one, angles in degrees."""
+"""The rotation of an object, a frame, and the facts reported about the segment there, if any, angles in degrees."""
 
 
 @pytest.mark.parametrize("what", FACTS)
