@@ -1,6 +1,6 @@
-"""What modes make of the keys of one carrier: which of its channels run between which keys, and along what path.
+"""Oracle for one carrier: which of its channels modes fill, between which keys, and along what path.
 
-`FCurve.evaluate` is asked for keys and timing, `interpolate` for the motion of each segment. Terms have to be muted.
+It uses `FCurve.evaluate` for keys and timing, and `interpolate` for the motion of each segment. Terms must be muted.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from tests.animation.spin_oracle import Spin, about_one_axis, spin_and_end
 from tests.animation.timing_oracle import evaluated, progress
 
 DEPENDS_ON_KEYS = {"pga_lerp", "cga_lerp", "motor_spline"}
-"""Another key on the path of one of these would make another path of it."""
+"""In these modes a further key on the path would change the path."""
 
 
 @dataclass(frozen=True)
 class Own:
-    """Delta transforms that an object has of its own."""
+    """Delta transforms of the object's own."""
 
     location: tuple[float, ...] = (0.0, 0.0, 0.0)
     quaternion: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
@@ -45,9 +45,9 @@ class Own:
 
 
 class Body:
-    """The channels of a carrier that modes fill, and the frames of the keys that segments run between: theirs.
+    """The channels of a carrier that modes fill, and the frames of the keys between which segments run.
 
-    `keys` are other frames: cycles have more.
+    `keys` replaces the frames of the channels' own keys: cycles have more.
     """
 
     def __init__(self, obj: Carrier, own: Own, keys: np.ndarray | None = None) -> None:
@@ -68,7 +68,7 @@ class Body:
         self.shaping = np.array([key for number, key in enumerate(keys) if not self._is_passed(number)])
 
     def components(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Location, quaternion and scale on frames."""
+        """Return location, quaternion and scale on frames."""
         location, quaternion, scale = self.native(frames)
         location = location + self.own.location
         quaternion = multiply(np.array(self.own.quaternion), quaternion)
@@ -89,7 +89,7 @@ class Body:
             location[inside], quaternion[inside] = poses.positions @ location_axes(self.obj), poses.quaternions
             if self.scaled:
                 scale[inside] = poses.scales[:, None] * self.own.scale
-        # What is muted is not moved; without one of its components Blender's own is left of a rotation or a scale.
+        # Muted channels do not move. A rotation or scale with a muted component is Blender's own.
         places, turned, sizes = native(self.obj, frames)
         fixed, is_turn_muted, is_scale_muted = self.muted
         location[:, fixed] = (places + self.own.location)[:, fixed]
@@ -97,7 +97,7 @@ class Body:
         return location, quaternion, sizes * self.own.scale if is_scale_muted else scale
 
     def native(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Location, unit quaternion and scale of the channels that have a say."""
+        """Return location, unit quaternion and scale of the unmuted channels."""
         location, quaternion, scale = native(self.obj, frames)
         if self.muted[1]:
             quaternion[:] = 1.0, 0.0, 0.0, 0.0
@@ -112,12 +112,12 @@ class Body:
         )
 
     def turns(self, first: float) -> float:
-        """The turns of the channel in the segment that begins on this frame."""
+        """Return the turns of the channel in the segment that begins on this frame."""
         turns = 0.0 if self.muted[1] else turns_at(self.obj, first)
         return turns if abs(turns - round(turns)) >= 1e-5 else round(turns)
 
     def may_spin(self) -> bool:
-        """Whether it has turns, or an angle that goes by half a turn or more from one key to the next."""
+        """Whether it has turns, or an angle that changes by half a turn or more between two keys."""
         turns = curve_of(self.obj, "rigid_motion.turns")
         if turns is not None and len(turns.keyframe_points) and not turns.mute:
             return True
@@ -129,7 +129,7 @@ class Body:
         return max((np.abs(change).max() for change in changes), default=0.0) >= np.pi - 1e-4
 
     def _is_passed(self, number: int) -> bool:
-        """Whether a key lies on a path that it does not shape."""
+        """Whether a key is a breakdown: on the path, but without influence on its shape."""
         keys = self.keys
         before, mode = (mode_at(self.obj, frame) for frame in keys[[number - 1, number]])
         if not 0 < number < len(keys) - 1 or before != mode or mode not in DEPENDS_ON_KEYS or self.may_spin():
@@ -140,23 +140,23 @@ class Body:
         return not repeats and types == {"BREAKDOWN"}
 
     def is_beside_path(self, frame: float) -> bool:
-        """Whether a breakdown beside this frame has a pose of its own, off the path of the keys around it."""
+        """Whether a breakdown beside this frame has a pose off the path of the surrounding keys."""
         before, behind = self.keys[self.keys < frame], self.keys[self.keys > frame]
         if not len(before) or not len(behind):
             return False
         around = np.array((before[-1], behind[0]))
         path = Path(self, around[0], mode_at(self.obj, around[0]))
-        # By rounding alone it is not.
+        # Rounding errors alone do not count.
         return (path.first, path.last) != (*around,) and bool(np.abs(path.nearest(around)[1]).max() > 1e-4)
 
     def spin(self, first: float, last: float, *, channel: bool = True) -> Spin:
-        """The whole turns more from one key to the next, of the angles and of the channel."""
+        """Return the additional whole turns from one key to the next, of the angles and of the channel."""
         return self.spin_and_end(first, last, channel=channel, whole=True)[0]
 
     def spin_and_end(
         self, first: float, last: float, *, channel: bool = True, whole: bool = False
     ) -> tuple[Spin, np.ndarray]:
-        """The turns more from one key to the next, and where the body turns to without them."""
+        """Return the additional turns from one key to the next, and the end rotation without them."""
         ends, order = np.array((first, last)), self.obj.rotation_mode
         by_angles = {}
         if order != "QUATERNION" and not self.muted[1]:
@@ -165,7 +165,7 @@ class Body:
         return spin_and_end(self.key_poses(ends).quaternions, turns, **by_angles, own=self.own.quaternion, whole=whole)
 
     def codes(self, frame: float) -> set[str]:
-        """The interpolations of all channels in the segment that begins on this frame."""
+        """Return the interpolations of all channels in the segment that begins on this frame."""
         result = set()
         for fcurve in self.curves.values():
             points = fcurve.keyframe_points
@@ -189,7 +189,7 @@ def _has_turns(obj: Carrier) -> bool:
 
 
 def location_axes(obj: Carrier) -> np.ndarray:
-    """The axes that location runs along, as columns in those of the body: a bone may have its parent's."""
+    """Return the axes of location as columns, in the body's axes: a bone may use its parent's axes."""
     if isinstance(obj, bpy.types.Object) or obj.bone.use_local_location:
         return np.eye(3)
     above = obj.bone.parent.matrix_local.to_3x3() if obj.bone.parent else np.eye(3)
@@ -197,11 +197,11 @@ def location_axes(obj: Carrier) -> np.ndarray:
 
 
 def native(obj: Carrier, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Location, unit quaternion and scale from the object's channels alone."""
+    """Return location, unit quaternion and scale from the object's channels alone."""
     location, turned, scale = (channels(obj, path, frames) for path in transform_paths(obj))
     if obj.rotation_mode == "QUATERNION":
         lengths = np.linalg.norm(turned, axis=1)
-        # Blender's own way with a quaternion that has no length.
+        # Blender's own rule for a quaternion of length zero.
         turned[lengths == 0.0] = (0.0, 1.0, 0.0, 0.0)
         turned /= np.where(lengths == 0.0, 1.0, lengths)[:, None]
     elif obj.rotation_mode == "AXIS_ANGLE":
@@ -213,7 +213,7 @@ def native(obj: Carrier, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
-    """One turn after the other about the axes in their order."""
+    """Rotate about one axis after the other, in their order."""
     turned = np.zeros((len(angles), 4))
     turned[:, 0] = 1.0
     for axis in map("XYZ".index, order):
@@ -233,7 +233,7 @@ def channels(obj: Carrier, path: str, frames: np.ndarray) -> np.ndarray:
 
 
 def _scales_evenly(obj: Carrier) -> bool:
-    """Whether scale is animated, and on every key the same along all axes and positive."""
+    """Whether scale is animated, and positive and the same along all axes on every key."""
     curves = moving_in(obj, "scale").values()
     scales = channels(obj, "scale", key_frames(obj) if any(map(_changes, curves)) else np.empty(0))
     return len(scales) > 1 and bool(

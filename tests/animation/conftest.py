@@ -1,4 +1,4 @@
-"""A new file with live in-betweens, in which a handler that fails makes the test fail."""
+"""Fixture for a new file with live in-betweens. Handlers that fail make the test fail."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.complaints import complaints
 
 @pytest.fixture
 def live_file(empty_file, caplog: pytest.LogCaptureFixture) -> Iterator[bpy.types.Context]:
-    """A new file without objects, edits followed."""
+    """A new file without objects, with edits followed."""
     animation.register()
     try:
         with caplog.at_level(logging.WARNING):

@@ -1,4 +1,4 @@
-"""An animator at work on keys, modes and frames, in whatever order: what machines that edit have in common."""
+"""Base of the state machines that edit: an animator at work on keys, modes and frames, in any order."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ INTERPOLATIONS, EASINGS, HANDLES = (
 SAME_FRAME = 0.005
 
 periods = st.just(0.0) | st.floats(0.1, 10.0)
-"""Of ELASTIC, in frames. Of many thousand swings in a segment, single precision makes noise, also in Blender itself."""
+"""Period of ELASTIC, in frames. Thousands of swings in a segment are noise in single precision, also in Blender."""
 
 
 def without_turns(keys: dict) -> dict:
-    """A snapshot without the channel of turns."""
+    """Return a snapshot without the channel of turns."""
     return {channel: kept for channel, kept in keys.items() if channel[0] != "rigid_motion.turns"}
 
 
 def assert_only_completed(made: dict, after: dict, frame: float) -> None:
-    """Between these snapshots no key changed but on this frame, where others than the components that were keyed may
-    have one by now, as on the keys of others before and behind it; and handles, as Blender has them follow a key.
+    """Check that only keys on this frame changed: more components may be keyed there, and on the keys before and after.
 
-    Those of the keys beside it may be set. Turns are shared out between the parts of a segment.
+    Handles may change as Blender adapts them to a key, and handles of the adjacent keys may be set. Turns are split
+    between the parts of a segment.
     """
     made, after = without_turns(made), without_turns(after)
     frames = {key[0] for *_, keys in made.values() for key in keys}
@@ -72,14 +72,14 @@ def assert_only_completed(made: dict, after: dict, frame: float) -> None:
         now = {key[0]: key for key in keys}
         for near, key in kept.items():
             assert (*now[near][:2], *now[near][6:10]) == (*key[:2], *key[6:10])
-            # Handles that are free are the animator's; only those beside new keys are shortened with their segment.
+            # Free handles are the animator's. Only those next to new keys are shortened with their segment.
             if near not in beside:
                 assert now[near][10:12] == key[10:12]
                 assert now[near] == key or key[10:12] != ("FREE", "FREE")
 
 
 def is_timed_together(carrier: Carrier, frame: float) -> bool:
-    """Whether all channels go from key to key on the same frames here, with handles on the same frames or none."""
+    """Whether all channels have keys and handles (or no handles) on the same frames in the segment at this frame."""
     timings = set()
     for fcurve in moving_curves(carrier):
         points = fcurve.keyframe_points
@@ -96,10 +96,10 @@ def is_timed_together(carrier: Carrier, frame: float) -> bool:
 
 
 class Editing(Machine):
-    """An animator at work on carriers of keys. What they are, machines say that are derived from it."""
+    """An animator at work on carriers of keys. Subclasses define the carriers."""
 
     def _expected(self, name: Name, frames: Sequence[float]) -> np.ndarray:
-        """What its channels have to make of it on frames, (m, 4, 4)."""
+        """Return the matrices that its channels must produce on frames, (m, 4, 4)."""
         return expected_bases(self._found(name), frames, self.owns.get(name))
 
     def _curve(self, obj: Carrier, share: float) -> bpy.types.FCurve | None:
@@ -137,7 +137,7 @@ class Editing(Machine):
         *,
         one_channel: bool = False,
     ) -> None:
-        """Change the keys of all channels on one of the frames with keys, or that of one channel."""
+        """Change the keys of all channels, or of one channel, on one of the frames with keys."""
 
         def change_them() -> None:
             obj = self._found(name)
@@ -150,12 +150,12 @@ class Editing(Machine):
         self._edit(change_them)
 
     def _chosen(self, name: Name, which: set[int]) -> list[float]:
-        """Some of the frames with keys."""
+        """Return some of the frames with keys."""
         keys = key_frames(self._found(name))
         return sorted({float(keys[number % len(keys)]) for number in which}) if len(keys) else []
 
     def _completes(self, frame: float) -> Callable[[dict, dict], None]:
-        """Keys are as the edit made them, but for what goes with keys that were inserted on this frame."""
+        """Return a check that keys are as edited, except for changes caused by keys inserted on this frame."""
 
         def settle(made: dict, after: dict) -> None:
             for name in self.names:
@@ -173,7 +173,7 @@ class Editing(Machine):
         seed=seeds,
     )
     def insert_a_key_at_the_current_frame(self, who, what, index, posed, seed):
-        """Of all, or of parts of it or one component, as Auto Key does. It takes what is seen, and nothing jumps."""
+        """Key all channels, some parts or one component, as Auto Key does, at the displayed pose. Nothing jumps."""
         name, frame = self._named(who), bpy.context.scene.frame_current_final
         obj = self._found(name)
         bpy.context.view_layer.update()
@@ -209,7 +209,7 @@ class Editing(Machine):
             assert error.max() < 1e-3 * max(1.0, np.abs(before).max()), f"{name} moves by {error.max()} on {worst}"
 
     def _assert_in_place(self, seen: dict) -> None:
-        """Things are still shown as they were."""
+        """Check that carriers are still displayed in the same place."""
         bpy.context.view_layer.update()
         for name, then in seen.items():
             now = self._basis(self._found(name))
@@ -217,26 +217,26 @@ class Editing(Machine):
             assert error < 1e-5 * max(1.0, np.abs(then).max()), f"{name} jumped from\n{then}\nto\n{now}"
 
     def _frames_to_go_by(self, name) -> np.ndarray:
-        """Frames on which a key of all that is keyed, inserted now, leaves the motion as it is."""
+        """Return the frames on which the motion must stay if all keyed channels get a key now."""
         obj, frame = self._found(name), bpy.context.scene.frame_current_final
         keys, mode, body = key_frames(obj), mode_at(obj, frame), Body(obj, self.owns.get(name, Own()))
         is_between = len(keys) > 1 and keys[0] < frame < keys[-1] and np.abs(keys - frame).min() >= 0.01
         if not is_between or not is_timed_together(obj, frame) or (mode in DEPENDS_ON_KEYS and body.may_spin()):
             return np.empty(0)
         # In Blender's own segments, as in those of an uneven scale, handles do not always keep the curve.
-        # A smooth segment beside one of another mode has the new key for its neighbour.
+        # A smooth segment next to one of another mode gets the new key as its neighbour.
         modes = {mode_at(obj, key) for key in keys}
         if mode == "BLENDER" or body.is_uneven or (len(modes) > 1 and "motor_spline" in modes):
             return np.empty(0)
         goes_by = np.arange(keys[0], keys[-1], 0.5)
         if body.is_beside_path(frame):
-            # The new key is nearest to another moment of the path: up to the keys around it the motion may change.
+            # The new key is nearest to another point of the path: up to the surrounding keys, the motion may change.
             first, last = keys[keys < frame][-1], keys[keys > frame][0]
             goes_by = goes_by[(goes_by <= first) | (goes_by >= last)]
         return goes_by
 
     def _is_posed(self, obj: Carrier) -> bool:
-        """Whether it was posed by hand on this frame."""
+        """Whether it has an unkeyed pose on this frame."""
         frame = bpy.context.scene.frame_current_final
         return any(
             abs(getattr(obj, path)[index] - fcurve.evaluate(frame)) > 1e-5 * max(1.0, abs(fcurve.evaluate(frame)))
@@ -246,7 +246,7 @@ class Editing(Machine):
 
     @while_on(who=shares, other=shares, by=st.sampled_from((0.0, 4.0, 0.25)))
     def paste_keys_of_another(self, who, other, by):
-        """As the Dope Sheet does: each key is inserted with all that it has, its mode among it."""
+        """Like the Dope Sheet: each key is inserted with all its settings, including its mode."""
         name, other = self._named(who), self._named(other)
         model, both = self._found(other), [snapshot(self._found(one)) for one in (name, other)]
         keyed = [{channel for channel, (*_, keys) in channels.items() if keys} for channels in both]
@@ -351,7 +351,7 @@ class Editing(Machine):
         def change(_: bpy.types.FCurve, point: bpy.types.Keyframe) -> None:
             point.interpolation, point.easing = interpolation, easing
             if not self._is_held(self._named(who)):
-                # Keys that say what they are held in do so by settings that only some eases have.
+                # Keys store their holders in settings that only some interpolations have.
                 point.back, point.amplitude, point.period = shape
 
         self._edit_keys(self._named(who), which, change, one_channel=one_channel)
@@ -384,7 +384,7 @@ class Editing(Machine):
             self._edit_curve(name, which, change)
 
     def _let_be_heard(self, name: Name) -> None:
-        """Unmute all channels of what has no other ones left: modes say that they cannot act there, as they should."""
+        """Unmute all channels if all keyed ones are muted: modes rightly report that they cannot act on these."""
         obj = self._found(name)
         for fcurve in curves_of(obj).values() if not moving_curves(obj) else ():
             fcurve.mute = False

@@ -1,4 +1,4 @@
-"""A Blender that has never heard of the extension: another process at factory settings, without this program."""
+"""A Blender without the extension: another process at factory settings, without this program."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ SAVE = "bpy.ops.wm.save_as_mainfile(filepath=found)"
 
 
 class Played(NamedTuple):
-    """World matrices of objects as a file is opened (n, 4, 4) and on all frames played (n, frames, 4, 4), and those of
-    the bones of rigs among them in the space of their armature (., frames, 4, 4).
+    """World matrices of objects when the file is opened (n, 4, 4) and on all frames played (n, frames, 4, 4), and
+    matrices of the bones of all rigs in armature space (., frames, 4, 4).
     """
 
     opened: np.ndarray
@@ -50,7 +50,7 @@ class Played(NamedTuple):
 
 
 def on_a_farm(program: str, *arguments: object) -> None:
-    """Run a program in a Blender that has never heard of the extension."""
+    """Run a program in a Blender without the extension."""
     done = subprocess.run(
         [sys.executable, "-c", FARM + program, *map(str, arguments)],
         capture_output=True,
@@ -62,7 +62,7 @@ def on_a_farm(program: str, *arguments: object) -> None:
 
 
 def played_on_a_farm(path: Path, names: Sequence[str], frames: np.ndarray) -> Played:
-    """Play a file there."""
+    """Play a file in a Blender without the extension."""
     found = path.with_suffix(".npy")
     np.save(found, frames)
     on_a_farm(PLAY, path, found, *names)

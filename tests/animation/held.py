@@ -1,4 +1,4 @@
-"""Props and the hands that hold them, and where Blender shows both in the world. Metres, frames of the scene."""
+"""Props and the hands that hold them, and their displayed world matrices. Metres, frames of the scene."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ WITH_PROP = (*HANDS, Rest("Prop", (0.1, 0.4, 0.8), (0.1, 0.5, 0.9), "Body", roll
 
 
 def worlds(carrier: Carrier, frames: Sequence[float] = PLAYED) -> np.ndarray:
-    """Where Blender shows an object or a bone, (m, 4, 4)."""
+    """Return the displayed world matrices of an object or a bone, (m, 4, 4)."""
     return shown_worlds([carrier], frames)[0]
 
 
 def in_holder(prop: Carrier, holder: Carrier, frames: Sequence[float]) -> np.ndarray:
-    """Where a prop is in what holds it."""
+    """Return a prop's matrices relative to its holder."""
     return np.linalg.inv(worlds(holder, frames)) @ worlds(prop, frames)
 
 
 def new_prop(kind: str) -> Carrier:
-    """An object by quaternions, one by angles on a parent that moves (and is scaled, or a bone), or a bone of a rig."""
+    """Return a quaternion object, an object with angles on a moving parent (possibly scaled, or a bone), or a bone."""
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 90
     if kind == "bone":
         rig = new_rig("Quiver", WITH_PROP)
@@ -53,7 +53,7 @@ KINDS = ("free", "parented", "scaled", "hung", "bone")
 
 
 def wander(carrier: Carrier, seed: int, frames: Sequence[float] = (1.0, 20.0, 37.0, 60.0, 90.0)) -> None:
-    """Key something on its way."""
+    """Key random poses."""
     random = np.random.default_rng(seed)
     for frame in frames:
         put(
@@ -65,7 +65,7 @@ def wander(carrier: Carrier, seed: int, frames: Sequence[float] = (1.0, 20.0, 37
 
 
 def put(carrier: Carrier, frame: float, location: Sequence[float], turn: Quaternion) -> None:
-    """Key a pose of channels."""
+    """Key location and rotation of channels."""
     path = rotation_path(carrier)
     carrier.location, turn = location, turn.normalized()
     setattr(carrier, path, turn if path == "rotation_quaternion" else turn.to_euler(carrier.rotation_mode))
@@ -74,14 +74,14 @@ def put(carrier: Carrier, frame: float, location: Sequence[float], turn: Quatern
 
 
 def new_hands() -> tuple[Carrier, Carrier]:
-    """Two hands of a rig that moves them."""
+    """Return two hands of a rig that moves them."""
     rig = key_all(new_rig("Hands", HANDS), frames=(1.0, 17.0, 36.0, 52.0, 71.0, 90.0))
     set_mode(list(rig.pose.bones), "dq_sclerp")
     return rig.pose.bones["Hand.L"], rig.pose.bones["Hand.R"]
 
 
 def handled(prop: Carrier, *hands: Carrier, throw: int = 3) -> None:
-    """Have a prop move, be picked up at 20, turned in the hand at 28, passed on over 36 to 40, and thrown at 60."""
+    """Make a prop move, get picked up at 20, turned in the hand at 28, passed over 36 to 40, and thrown at 60."""
     wander(prop, 7, (1.0, 9.0, 15.0))
     scene = bpy.context.scene
     for frame, hand, frames in ((20, hands[0], 0), (40, hands[1], 4), (60, None, throw)):

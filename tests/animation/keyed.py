@@ -1,4 +1,4 @@
-"""What is keyed of objects and bones, read from their F-curves with nothing of the extension."""
+"""Keys and F-curves of objects and bones, read without the extension's code."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.modified import is_term
 
 Carrier = bpy.types.Object | bpy.types.PoseBone
-"""What has location, rotation and scale. Pose bones have no delta transforms of their own."""
+"""An object or pose bone with location, rotation and scale. Pose bones have no delta transforms of their own."""
 
 MODE_IDS = ("BLENDER", *KEYFRAME_MODES)
 BY_NUMBER = {0: "BLENDER", **{mode.number: name for name, mode in KEYFRAME_MODES.items()}}
 WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotation_axis_angle": 4, "scale": 3}
 KEY_FIELDS = "interpolation", "easing", "period", "type", "handle_left_type", "handle_right_type"
 MARKED_FIELDS = "back", "amplitude"
-"""In the lowest six bits of these keys say their modes: in the former 16 more than a number, and 32 where the period
-says what they are held in, in the latter 42."""
+"""The lowest six bits of these fields store the mode of a key: in `back` the number plus 16, and plus 32 if `period`
+stores a holder; in `amplitude` always 42."""
 
 HOLD_BITS = 16383
-"""And in these bits of `period` what they are held in, where the former has 32 more."""
+"""These bits of `period` store the holder, if `back` has the additional 32."""
 
 
 def curves_of(carrier: Carrier) -> dict[tuple[str, int], bpy.types.FCurve]:
-    """The F-curves of an object's slot, or those of a pose bone in it. Data paths are from object or bone on."""
+    """Return the F-curves of an object's slot, or of a pose bone in it. Data paths start at the object or bone."""
     channelbag, prefix = _channelbag(carrier), _prefix(carrier)
     curves = () if channelbag is None else ((curve.data_path, curve) for curve in channelbag.fcurves)
     return {(path.removeprefix(prefix), c.array_index): c for path, c in curves if path.startswith(prefix)}
 
 
 def curve_of(carrier: Carrier, path: str, index: int = 0) -> bpy.types.FCurve | None:
-    """One of them, which Blender finds much sooner than all."""
+    """Return one F-curve, which Blender finds much faster than all of them."""
     channelbag = _channelbag(carrier)
     return None if channelbag is None else channelbag.fcurves.find(f"{_prefix(carrier)}{path}", index=index)
 
@@ -47,7 +47,7 @@ def _channelbag(carrier: Carrier) -> bpy.types.ActionChannelbag | None:
 
 
 def _prefix(carrier: Carrier) -> str:
-    """What the data paths of a pose bone begin with."""
+    """Return the prefix of a pose bone's data paths."""
     return "" if isinstance(carrier, bpy.types.Object) else f"{carrier.path_from_id()}."
 
 
@@ -62,7 +62,7 @@ def transform_paths(obj: Carrier) -> tuple[str, str, str]:
 
 
 def snapshot(obj: Carrier) -> dict[tuple[str, int], tuple]:
-    """All that the animator keyed, to the last handle, and no modes: every channel without its in-betweens."""
+    """Return all that the animator keyed, including handles, but no modes: every channel without its in-betweens."""
     return {
         name: (
             fcurve.extrapolation,
@@ -86,18 +86,18 @@ def _bits(key: bpy.types.Keyframe, field: str) -> int:
 
 
 def mark_of(key: bpy.types.Keyframe) -> int:
-    """The number of the mode that a key says it has, from 1 on, or 0."""
+    """Return the mode number stored in a key, from 1 on, or 0."""
     back, amplitude = (_bits(key, field) & 63 for field in MARKED_FIELDS)
     return back % 32 - 16 if amplitude == 42 and back % 32 > 16 else 0
 
 
 def moving_curves(obj: Carrier) -> list[bpy.types.FCurve]:
-    """The F-curves with keys of its location, rotation and scale, in this order."""
+    """Return the F-curves with keys of its location, rotation and scale, in this order."""
     return [curve for path in transform_paths(obj) for curve in moving_in(obj, path).values()]
 
 
 def moving_in(obj: Carrier, path: str) -> dict[int, bpy.types.FCurve]:
-    """Those of one property by index, none that are muted; a rotation or scale with one of these is left alone."""
+    """Return the unmuted keyed F-curves of a property by index; none for a rotation or scale with a muted channel."""
     curves = {index: curve_of(obj, path, index) for index in range(WIDTHS[path])}
     if path != "location" and muted_in(obj, path):
         return {}
@@ -105,24 +105,24 @@ def moving_in(obj: Carrier, path: str) -> dict[int, bpy.types.FCurve]:
 
 
 def muted_in(obj: Carrier, path: str) -> list[int]:
-    """The indices of the channels of a property that are muted."""
+    """Return the indices of the muted channels of a property."""
     curves = ((index, curve_of(obj, path, index)) for index in range(WIDTHS[path]))
     return [index for index, curve in curves if curve is not None and curve.mute]
 
 
 def distinct(frames: Iterable[float]) -> np.ndarray:
-    """Frames of keys, rising; those less than a hundredth of a frame apart are one."""
+    """Return key frames in ascending order. Frames less than a hundredth of a frame apart are merged."""
     frames = sorted(set(frames))
     return np.array([frame for i, frame in enumerate(frames) if i == 0 or frame - frames[i - 1] > 0.01])
 
 
 def key_frames(obj: Carrier) -> np.ndarray:
-    """Where any transform channel has a key."""
+    """Return the frames on which any transform channel has a key."""
     return distinct(key.co[0] for curve in moving_curves(obj) for key in curve.keyframe_points)
 
 
 def mode_at(obj: Carrier, frame: float) -> str:
-    """The mode of the segment that begins on this frame: what the last key says that says any, or else the first."""
+    """Return the mode of the segment that begins on this frame: from the last key with a mode, or else the first."""
     said = [
         (key.co[0], -number, mark)
         for number, curve in enumerate(moving_curves(obj))
@@ -131,13 +131,13 @@ def mode_at(obj: Carrier, frame: float) -> str:
     ]
     if not said:
         return "BLENDER"
-    # On one frame the channel that comes first has it.
+    # On the same frame, the first channel counts.
     *_, mark = max((key for key in said if key[0] < frame + 0.005), default=min(said))
     return BY_NUMBER[mark - 1]
 
 
 def turns_at(obj: Carrier, first: float) -> float:
-    """The turns of the channel in the segment that begins on this frame."""
+    """Return the turns of the channel in the segment that begins on this frame."""
     fcurve = curve_of(obj, "rigid_motion.turns")
     if fcurve is None or fcurve.mute or mode_at(obj, first) == "BLENDER":
         return 0.0

@@ -1,4 +1,4 @@
-"""Things with a motion and an offset layer, and where they have to be: matrices by Blender's own, nothing of ours."""
+"""Carriers with a motion and an offset layer, and their expected matrices, computed with Blender's functions alone."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.balls import largest_displacements
 KEYS = (1.0, 11.0, 24.0, 40.0)
 OFFSET_KEYS = (1.0, 15.0, 33.0)
 FRAMES = np.arange(-2.0, 46.0, 0.375)
-"""At all eighths of frames, before and behind the keys, too."""
+"""Steps through all eighths of frames, also before and after the keys."""
 
 KINDS = ("object", "child", "on a bone", "root", "bone", "connected")
 
@@ -28,7 +28,7 @@ def moving_parent() -> bpy.types.Object:
 
 
 def new(kind: str, order: str) -> Carrier:
-    """Something of a kind with nothing keyed, of which all that carries it moves."""
+    """Return an unkeyed carrier of this kind, on moving parents."""
     if kind == "object":
         return new_object("Tool", order)
     if kind == "child":
@@ -49,7 +49,7 @@ def new(kind: str, order: str) -> Carrier:
 
 
 def key_base(carrier: Carrier, mode: str, frames: Sequence[float] = KEYS, **how) -> Carrier:
-    """Key it at random, by unit quaternions without a flip, as posing does."""
+    """Key it at random. Unit quaternions do not flip signs, as in posing."""
     key(carrier, frames, **how)
     if carrier.rotation_mode == "QUATERNION":
         turns = random_values(carrier, "rotation_quaternion", len(frames))
@@ -62,7 +62,7 @@ def key_base(carrier: Carrier, mode: str, frames: Sequence[float] = KEYS, **how)
 
 
 def key_offset(carrier: Carrier, mode: str = "BLENDER", frames: Sequence[float] = OFFSET_KEYS, size: float = 0.3):
-    """Key a layer whose strip is edited: at rest on the first of these frames."""
+    """Key a layer whose strip is in tweak mode. At the first of these frames the layer is at rest."""
     random, path = np.random.default_rng(5), rotation_path(carrier)
     turns = size * random.normal(size=(len(frames), 3))
     turns[0] = 0.0
@@ -85,7 +85,7 @@ def key_influence(obj: bpy.types.Object, *points: tuple[float, float]) -> None:
 
 
 def seen(carrier: Carrier, frames: np.ndarray = FRAMES) -> np.ndarray:
-    """Where something is: an object in the world, a bone relative to its parent bone or the rig, shape (m, 4, 4)."""
+    """Return displayed matrices, (m, 4, 4): objects in the world, bones relative to their parent bone or the rig."""
     scene, result = bpy.context.scene, []
     for frame in frames:
         scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
@@ -101,7 +101,7 @@ def seen(carrier: Carrier, frames: np.ndarray = FRAMES) -> np.ndarray:
 
 
 def offsets(carrier: Carrier, frames: np.ndarray = FRAMES) -> np.ndarray:
-    """What a layer whose strip is edited adds, to the power of its influence, shape (m, 4, 4)."""
+    """Return the offsets of a layer whose strip is in tweak mode, to the power of its influence, shape (m, 4, 4)."""
     curves, path, order = curves_of(carrier), rotation_path(carrier), carrier.rotation_mode
     influence = carrier.id_data.animation_data.nla_tracks["Rigid Motion Layer"].strips[0].fcurves.find("influence")
     connected = isinstance(carrier, bpy.types.PoseBone) and carrier.bone.use_connect
@@ -122,6 +122,6 @@ def offsets(carrier: Carrier, frames: np.ndarray = FRAMES) -> np.ndarray:
 
 
 def displaced(one: np.ndarray, other: np.ndarray, radius: float) -> np.ndarray:
-    """How far any point of a ball is from one place to the other, (m, 4, 4) each, shape (m,)."""
+    """Return how far any point of a ball moves from one matrix (m, 4, 4) to the other, shape (m,)."""
     off = one - other
     return largest_displacements(off[:, :3, 3], radius * off[:, :3, :3])

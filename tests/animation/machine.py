@@ -1,6 +1,6 @@
-"""What a machine of edits does around them: undo steps, files, the extension on and off; and what always holds.
+"""Base of the editing state machines: undo steps, files, switching the extension on and off, and invariants.
 
-Every edit is an operator with undo, as in a window. Blender pushes its undo step before handlers get to see the edit.
+Every edit is an operator with undo, as in a window. Blender pushes its undo step before handlers see the edit.
 """
 
 from __future__ import annotations
@@ -38,28 +38,28 @@ SETTINGS = settings(
     database=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
-"""Of every machine."""
+"""Settings of every machine."""
 
 TURNS = "rigid_motion.turns", 0
 
 Name = Hashable
-"""What the carriers of keys are told apart by, in a machine."""
+"""Identifies a carrier of keys in a machine."""
 
 
 def while_on(**given: st.SearchStrategy) -> Callable:
-    """A rule for as long as the extension is on."""
+    """Return a decorator for a rule that applies only while the extension is on."""
     return lambda step: precondition(lambda self: self.on)(rule(**given)(step))
 
 
 def goes_on(obj: Carrier) -> bool:
-    """Whether any of its channels goes on at its slope outside of its keys."""
+    """Whether any of its channels extrapolates linearly."""
     return any(fcurve.extrapolation == "LINEAR" for fcurve in moving_curves(obj))
 
 
 def assert_keys_kept(name: Name, made: dict, after: dict) -> None:
-    """No key was changed. Channels without keys may be gone; and components that a mode needs have a first one.
+    """Check that no key changed. Unkeyed channels may be removed, and components that a mode needs may get a first key.
 
-    Parts of turns are put together where the key between them goes.
+    Fractional turns are merged when the key between them is deleted.
     """
     is_shared = {
         channel for channel, (*_, keys) in made.items() if channel == TURNS and any(key[1] % 1 for key in keys)
@@ -89,7 +89,7 @@ class Edit(bpy.types.Operator):
 
 
 class Machine(RuleBasedStateMachine):
-    """Carriers of keys that are edited. What they are, and how, machines say that are derived from it."""
+    """Base class for edits of carriers. Subclasses define the carriers and the edits."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -97,7 +97,7 @@ class Machine(RuleBasedStateMachine):
         bpy.utils.register_class(Edit)
         animation.register()
         self.on = True
-        # What handlers write down instead of raising it into Blender.
+        # Handlers log these errors instead of raising them into Blender.
         self.complaints = BufferingHandler(1000)
         self.complaints.setLevel(logging.ERROR)
         logging.getLogger("rigid_motion.animation").addHandler(self.complaints)
@@ -110,7 +110,7 @@ class Machine(RuleBasedStateMachine):
         self.place = -1
         self.steps = 0
         self.playing: dict[Name, np.ndarray] | None = None
-        """What played when the extension was switched off, until something is edited."""
+        """The poses shown when the extension was switched off, until the next edit."""
 
     def teardown(self) -> None:
         if self.on:
@@ -119,34 +119,34 @@ class Machine(RuleBasedStateMachine):
         logging.getLogger("rigid_motion.animation").removeHandler(self.complaints)
         self.folder.cleanup()
 
-    # What machines say of their carriers
+    # Defined by subclasses for their carriers
 
     def _found(self, name: Name) -> Carrier:
         raise NotImplementedError
 
     def _basis(self, carrier: Carrier) -> np.ndarray:
-        """How it is shown now, in its parent's space."""
+        """Return the matrix displayed now, in its parent's space."""
         raise NotImplementedError
 
     def _sharing(self, name: Name) -> set[Name]:
-        """The names of what moves by the same channels as this one, itself among them."""
+        """Return the names of the carriers that share its channels, including itself."""
         raise NotImplementedError
 
     @property
     def owns(self) -> dict[Name, Own]:
-        """Delta transforms of their own."""
+        """Return the objects' own delta transforms, by name."""
         return {}
 
     def _is_held(self, name: Name) -> bool:
-        """Whether its keys say that it is held in anything."""
+        """Whether its keys say that it is held."""
         return False
 
     def _is_passed_on(self, name: Name) -> bool:
-        """Whether it goes to another holder on the frame that is shown."""
+        """Whether it passes to another holder on the current frame."""
         return False
 
     def _assert_shown(self, names: Sequence[Name], frames: np.ndarray) -> None:
-        """These are where they have to be on some frames."""
+        """Check that these carriers are where they must be on these frames."""
         raise NotImplementedError
 
     def _named(self, share: float) -> Name:
@@ -168,7 +168,7 @@ class Machine(RuleBasedStateMachine):
             data.action_slot = slot
 
     def _bases(self, names: Iterable[Name], frames: Sequence[float]) -> dict[Name, np.ndarray]:
-        """How things are shown on frames, (m, 4, 4) each."""
+        """Return the displayed matrices on frames, (m, 4, 4) each, by name."""
         scene = bpy.context.scene
         before, result = (scene.frame_current, scene.frame_subframe), {name: [] for name in names}
         for frame in frames:
@@ -192,7 +192,7 @@ class Machine(RuleBasedStateMachine):
         return {name: snapshot(self._found(name)) for name in self.names}
 
     def _edit(self, change: Callable[[], None], settle: Callable[[dict, dict], None] | None = None) -> None:
-        """Do it, and let the handlers see it: they leave keys as the edit made them, unless `settle` says otherwise."""
+        """Make an edit and let handlers see it. They must leave its keys alone, unless `settle` checks them instead."""
         self.playing = None
         made: dict[str, dict] = {}
 
@@ -238,7 +238,7 @@ class Machine(RuleBasedStateMachine):
         assert not animation.is_baked(self._found(name))
 
     def _originals(self, name: Name) -> dict:
-        """What Un-Bake gives back."""
+        """Return the keys that Un-Bake restores."""
         return snapshot(self._found(name))
 
     @rule()
@@ -256,14 +256,14 @@ class Machine(RuleBasedStateMachine):
         self.on, self.playing = False, self._play()
 
     def _play(self) -> dict[Name, np.ndarray]:
-        """How all is shown on some frames."""
+        """Return the displayed matrices of all carriers on some frames."""
         return self._bases(self.names, np.arange(self.shift, self.shift + LAST, 5.375))
 
     @precondition(lambda self: not self.on)
     @rule()
     def switch_the_extension_on(self):
         if self.playing is not None:
-            # Without the extension all plays as it did with it.
+            # Without the extension everything plays as before.
             played = self._play()
             for name, then in self.playing.items():
                 assert np.abs(played[name] - then).max() < 1e-6 * max(1.0, np.abs(then).max())
@@ -277,8 +277,8 @@ class Machine(RuleBasedStateMachine):
         self._start_history()
 
     def _frames_that_are_seen(self, names: Sequence[Name]) -> np.ndarray:
-        """Some eighths of frames, and those of keys, as far as in-betweens are there: before and behind the keys of
-        curves that go on, within the frame range of the scene.
+        """Return some eighths of frames and key frames within the range that has in-betweens. For curves with linear
+        extrapolation, that range extends before and after the keys, within the scene's frame range.
         """
         objects = list(map(self._found, names))
         first, last, keys = self.shift - 1.0, self.shift + LAST + 5.0, np.concatenate([key_frames(o) for o in objects])
@@ -292,7 +292,7 @@ class Machine(RuleBasedStateMachine):
         frames = np.concatenate((eighths, np.floor(eighths[:5]), random.permutation(keys)[:5]))
         return np.unique(frames[(frames >= first) & (frames <= last)])
 
-    # What holds all the time
+    # Invariants
 
     @precondition(lambda self: self.on and self.history)
     @invariant()

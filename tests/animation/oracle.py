@@ -1,7 +1,7 @@
-"""Where objects have to be, worked out apart from `rigid_motion.animation`, and where Blender shows them.
+"""Oracle for objects: where they must be, computed without `rigid_motion.animation`, and where Blender shows them.
 
-`expected_bases` asks Blender's own `FCurve.evaluate` for keys and timing and `interpolate` for the motion of
-each segment. Nothing here looks at delta transforms in the file: the ones an object has of its own are given.
+`expected_bases` uses Blender's own `FCurve.evaluate` for keys and timing, and `interpolate` for the motion of each
+segment. Nothing here reads delta transforms from the file: callers pass an object's own deltas.
 Matrices are (m, 4, 4), frames are the scene's.
 """
 
@@ -25,10 +25,10 @@ __all__ = ["Own"]
 def expected_bases(
     obj: Carrier, frames: Sequence[float], own: Own | None = None, keys: np.ndarray | None = None
 ) -> np.ndarray:
-    """What moves the object in its parent's space. `FCurve.evaluate` is asked on each frame, extrapolation included.
+    """Return the object's matrices in its parent's space, by `FCurve.evaluate` on each frame, extrapolation included.
 
-    Segments run between `keys`, by default the object's own: cycles have more. Stepped modifiers hold the poses, and
-    other modifiers of the animator's act on what location and scale have; those of rotations are left out.
+    Segments run between `keys`, by default the object's own; cycles have more. Stepped modifiers hold the poses. Other
+    modifiers of the animator act on location and scale; those of rotations are ignored.
     """
     own, fcurves = own or Own(), [fcurve for (path, _), fcurve in curves_of(obj).items() if path in WIDTHS]
     held = held_frames(fcurves, frames)
@@ -45,7 +45,7 @@ def expected_bases(
 
 
 def expected_worlds(obj: bpy.types.Object, frames: Sequence[float], owns: dict[str, Own] | None = None) -> np.ndarray:
-    """The same in the world, parents moving along. `owns` is by the objects' names."""
+    """Return the object's world matrices, with moving parents. `owns` has deltas by object name."""
     owns = owns or {}
     bases = expected_bases(obj, frames, owns.get(obj.name))
     if obj.parent is None:
@@ -54,7 +54,7 @@ def expected_worlds(obj: bpy.types.Object, frames: Sequence[float], owns: dict[s
 
 
 def matrices(location: np.ndarray, quaternion: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Scaled first, then turned, then moved, shape (m, 4, 4)."""
+    """Return matrices that scale, then rotate, then translate, shape (m, 4, 4)."""
     made = np.zeros((len(location), 4, 4))
     made[:, :3, :3] = np.moveaxis(quaternions.matrices(quaternions.normalise(quaternion)), 2, 0) * scale[:, None, :]
     made[:, :3, 3], made[:, 3, 3] = location, 1.0
@@ -64,9 +64,9 @@ def matrices(location: np.ndarray, quaternion: np.ndarray, scale: np.ndarray) ->
 def play(carriers: Iterable[Carrier], frame: float) -> None:
     """Go to a frame, as playback does.
 
-    A driver of one component of a channel may run while Blender's animation still writes the others, which then are
-    those of the frame before: of Location Y and Z with a driver on X, once in 50 000 to a million frames, without this
-    extension, too (4.5 to 5.2). So where something is driven a frame is evaluated twice.
+    A driver of one component of a channel may run while Blender's animation still writes the other components, which
+    then have their values of the previous frame. With a driver on Location X this happens to Y and Z once in 50 000 to
+    a million frames, also without this extension (4.5 to 5.2). So frames are evaluated twice if anything is driven.
     """
     whole = int(np.floor(frame))
     data = [carrier.id_data.animation_data for carrier in carriers]
@@ -76,7 +76,7 @@ def play(carriers: Iterable[Carrier], frame: float) -> None:
 
 
 def shown_worlds(carriers: Iterable[Carrier], frames: Sequence[float]) -> list[np.ndarray]:
-    """The world matrices of objects and bones as the scene evaluates them. It returns to its frame."""
+    """Return the world matrices of objects and bones as the scene evaluates them. The scene returns to its frame."""
     carriers, scene = list(carriers), bpy.context.scene
     before, subframe = scene.frame_current, scene.frame_subframe
     shown = [np.empty((len(frames), 4, 4)) for _ in carriers]
@@ -89,14 +89,14 @@ def shown_worlds(carriers: Iterable[Carrier], frames: Sequence[float]) -> list[n
 
 
 def world_of(carrier: Carrier) -> np.ndarray:
-    """The world matrix of an object or a bone as it is evaluated now, multiplied in double precision."""
+    """Return the world matrix of an object or a bone as evaluated now, multiplied in double precision."""
     shown = carrier.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get())
     world = np.array(shown.matrix_world, float)
     return world if carrier == carrier.id_data else world @ np.array(shown.pose.bones[carrier.name].matrix, float)
 
 
 def world_now(name: str = "Tool") -> np.ndarray:
-    """The world matrix of an object as it is on the screen."""
+    """Return the world matrix of an object as displayed now."""
     bpy.context.view_layer.update()
     return world_of(bpy.data.objects[name])
 
@@ -104,20 +104,20 @@ def world_now(name: str = "Tool") -> np.ndarray:
 def assert_shown(
     objects: Iterable[bpy.types.Object], frames: Sequence[float], owns: dict[str, Own] | None = None
 ) -> None:
-    """The scene shows these objects where they have to be, to 1e-5 of their size.
+    """Check that the scene shows these objects where they must be, to 1e-5 of their size.
 
-    Where Blender's own quaternion passes near zero on its way, what single precision leaves of its direction is less,
-    and no delta transform can mend that: the tolerance grows by the same factor.
+    Where Blender's own quaternion passes near zero, single precision leaves less of its direction, and no delta
+    transform can repair that: the tolerance grows by the same factor.
     """
     objects = list(objects)
     for obj, shown in zip(objects, shown_worlds(objects, frames), strict=True):
-        assert_there(obj, frames, shown, expected_worlds(obj, frames, owns), _reach(obj, frames))
+        assert_there(obj, frames, shown, expected_worlds(obj, frames, owns), _native_size(obj, frames))
 
 
 def assert_there(
     carrier: Carrier, frames: Sequence[float], shown: np.ndarray, expected: np.ndarray, size: float = 1.0
 ) -> None:
-    """These matrices are those expected on frames, to 1e-5 of what is largest."""
+    """Check that these matrices are as expected on frames, to 1e-5 of the largest value."""
     size = max(1.0, np.abs(expected).max(initial=0.0), size)
     error = np.abs(shown - expected).max(axis=(1, 2), initial=0.0) / size * shortest_quaternion(carrier, frames)
     worst = int(np.argmax(error))
@@ -127,22 +127,22 @@ def assert_there(
     )
 
 
-def _reach(obj: Carrier, frames: Sequence[float]) -> float:
-    """How large Blender's own in-betweens get, which single precision has to hold beside their difference."""
+def _native_size(obj: Carrier, frames: Sequence[float]) -> float:
+    """Return the size of Blender's own in-betweens, which shares single precision with the difference added to them."""
     location, _, scale = native(obj, np.asarray(frames))
     own = max(np.abs(location).max(initial=0.0), np.abs(scale).max(initial=0.0))
-    return own if obj.parent is None else own * max(1.0, _reach(obj.parent, frames))
+    return own if obj.parent is None else own * max(1.0, _native_size(obj.parent, frames))
 
 
 def shortest_quaternion(obj: Carrier, frames: Sequence[float]) -> np.ndarray:
-    """How long Blender's own quaternion is on each frame, the shortest of the object and its parents, at most 1."""
+    """Return the length of Blender's own quaternion on each frame: the shortest of object and parents, at most 1."""
     values = channels(obj, rotation_path(obj), np.asarray(frames))
     own = np.minimum(np.linalg.norm(values, axis=1), 1.0) if obj.rotation_mode == "QUATERNION" else 1.0
     return own if obj.parent is None else own * shortest_quaternion(obj.parent, frames)
 
 
 def as_quaternion(angles: Sequence[float], order: str) -> tuple[float, ...]:
-    """What an object's own Euler delta is as a quaternion."""
+    """Return an object's own Euler delta as a quaternion."""
     return tuple(Euler(angles, order).to_quaternion())
 
 

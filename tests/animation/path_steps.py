@@ -1,4 +1,4 @@
-"""What animators do with keys on paths, as steps of a machine that edits: in the world, in time, evenly."""
+"""Steps of the editing state machine for keys on paths: edits in world space, of timing and of speed."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from tests.animation.oracle import shown_worlds
 from tests.animation.tool_steps import WithTools
 
 VALUE_AND_SETTINGS = 1, *range(6, 14)
-"""Of a key in a snapshot."""
+"""Indices of the fields of a key in a snapshot."""
 
 NOT_EVENED = "passes from hand to hand", "no two keys", "only some channels have a key", "does not move"
 
 
 def assert_keys_at(before: dict, after: dict, moved: Callable[[float], float], settings: tuple[int, ...]) -> None:
-    """All keys are on other frames, None where they are gone, with their values and these of their settings."""
+    """Check that all keys moved to the expected frames (None if deleted), with these of their fields unchanged."""
     for channel, (*rest, keys) in before.items():
         moves = channel[0] in WIDTHS or channel == TURNS
         kept = [(key, x) for key in keys if (x := moved(key[0]) if moves else key[0]) is not None]
@@ -103,11 +103,11 @@ class WithPaths(WithTools):
         elif how == "delete":
             assert_keys_at(before, after, lambda x: None if is_chosen(x) else x, VALUE_AND_SETTINGS)
         elif how in ("move", "turn") and self._is_whole(name):
-            # Where other keys lack a channel, they are on its way to the chosen ones.
+            # Where other keys lack a channel, that channel is on its way to the chosen keys.
             kept = chosen | (len(self._timings(name)) == 1)
             there = np.where(chosen[:, None, None], delta @ worlds, worlds)[kept]
             (now,) = shown_worlds([obj], keys[kept])
-            # What is in a space of uneven scale cannot be turned in the world: it comes as near as it can.
+            # In a space of uneven scale, a key cannot be turned exactly in the world. It comes as near as it can.
             scales = np.swapaxes(spaces.maps.axes, 1, 2) @ spaces.maps.axes
             is_even = np.allclose(scales, scales[:, :1, :1] * np.eye(3), atol=1e-5 * np.abs(scales).max())
             error = np.abs(now - there)[:, :3, 0 if is_even or how == "move" else 3 :].max()
@@ -124,7 +124,7 @@ class WithPaths(WithTools):
         slope=st.sampled_from((0.0, 0.4, 1.0, 2.5)),
     )
     def set_its_speed_at_a_key(self, who, which, side, slope):
-        """Its keys stay, and so does all of its motion but on one side of one of them."""
+        """The keys stay, and so does all of the motion except on one side of one key."""
         name = self._named(who)
         keys = key_frames(self._found(name))
         if len(keys) < 2 or self._sharing(name) != {name}:
@@ -158,18 +158,18 @@ class WithPaths(WithTools):
             fcurve.update()
 
     def _timings(self, name: Name) -> set[tuple[float, ...]]:
-        """The frames of keys that its channels have."""
+        """Return the different sets of key frames that the channels have."""
         curves = moving_curves(self._found(name))
         return {tuple(np.round([key.co[0] for key in curve.keyframe_points], 4)) for curve in curves}
 
     def _is_whole(self, name: Name) -> bool:
-        """Whether all of its location and rotation is keyed, and seen."""
+        """Whether all channels of location and rotation are keyed and unmuted."""
         carrier = self._found(name)
         curves = [curve_of(carrier, path, i) for path in transform_paths(carrier)[:2] for i in range(WIDTHS[path])]
         return all(curve in moving_curves(carrier) for curve in curves)
 
     def _spaces(self, name: Name, frames: np.ndarray) -> KeySpaces | None:
-        """What its channels are in on frames, by where it is shown; None where that is flat."""
+        """Return the spaces of the channels on frames, from the displayed pose; None if a basis is singular."""
         carrier = self._found(name)
         (worlds,), bases = shown_worlds([carrier], frames), self._expected(name, frames)
         if np.abs(np.linalg.det(bases[:, :3, :3])).min() < 1e-3:
@@ -187,7 +187,7 @@ class WithPaths(WithTools):
         )
 
     def _frames_that_stay(self, name: Name, how: str, chosen: np.ndarray) -> np.ndarray:
-        """Frames on which the motion has to stay as it is, whatever becomes of the chosen keys (n,)."""
+        """Return the frames on which the motion must not change, whatever happens to the chosen keys (n,)."""
         carrier = self._found(name)
         keys, modes = key_frames(carrier), {mode_at(carrier, key) for key in key_frames(carrier)}
         if how == "insert":
@@ -217,7 +217,7 @@ class WithPaths(WithTools):
         between_frames=st.booleans(),
     )
     def equalise_its_speed(self, who, which, ease, turning, between_frames):
-        """Its first key and its last one stay, and so does all but the timing of those between."""
+        """The first and last keys stay, and everything but the timing of the keys between them."""
         name = self._named(who)
         frames, before = None if which is None else self._chosen(name, which), self._keyed()
         refused: list[animation.Refused] = []

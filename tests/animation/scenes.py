@@ -1,4 +1,4 @@
-"""Objects with keys, to be edited and looked at. Frames are the scene's, angles radians."""
+"""Objects with keys, to be edited and played in tests. Frames are the scene's, angles radians."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FRAMES = (1.0, 11.0, 24.0, 40.0)
 
 
 def new_object(name: str = "Tool", rotation_mode: str = "QUATERNION", data: bpy.types.ID | None = None):
-    """An object in the scene; an empty unless it is given data."""
+    """Create an object in the scene: an empty, unless data is given."""
     obj = bpy.data.objects.new(name, data)
     obj.rotation_mode = rotation_mode
     bpy.context.scene.collection.objects.link(obj)
@@ -27,7 +27,7 @@ def new_object(name: str = "Tool", rotation_mode: str = "QUATERNION", data: bpy.
 
 
 def random_values(obj: Carrier, path: str, count: int, seed: int = 0, even: bool = True) -> np.ndarray:
-    """Values for the keys of a property, none of them half a turn apart."""
+    """Return values for the keys of a property, none of them half a turn apart."""
     random = np.random.default_rng((seed, sum(map(ord, path))))
     values = random.normal(size=(count, WIDTHS[path]))
     if path == "scale":
@@ -47,7 +47,7 @@ def key(
     interpolation: str = "BEZIER",
 ) -> Carrier:
     """Key location, rotation and (with scale "even" or "uneven") scale at random on these frames."""
-    # Bones of a rig move each in its own way.
+    # Each bone of a rig moves differently.
     seed += 0 if isinstance(carrier, bpy.types.Object) else sum(map(ord, carrier.name))
     for path in (*(["location"] if location else []), rotation_path(carrier), *(["scale"] if scale else [])):
         values = random_values(carrier, path, len(frames), seed, scale == "even")
@@ -56,7 +56,7 @@ def key(
 
 
 def write(carrier: Carrier, path: str, frames: np.ndarray, values: np.ndarray, interpolation: str = "LINEAR") -> None:
-    """Replace a property's channels, which the Dope Sheet lists under a bone as it does those keyed by hand."""
+    """Replace a property's channels. Those of a bone get its group in the Dope Sheet, as with keys set by hand."""
     group = "" if isinstance(carrier, bpy.types.Object) else carrier.name
     write_channel(carrier.id_data, carrier.path_from_id(path), frames, values, interpolation=interpolation, group=group)
 
@@ -64,7 +64,7 @@ def write(carrier: Carrier, path: str, frames: np.ndarray, values: np.ndarray, i
 def turning(
     name: str, degrees: Sequence[float], frames: Sequence[float], rotation_mode: str = "QUATERNION", sign: float = 1.0
 ) -> bpy.types.Object:
-    """An object turned about z by these angles, and moved 2 along x, from key to key; `sign` is of every second key."""
+    """Return an object that turns about z to these angles and moves 2 along x per key; `sign` applies to every second."""
     obj, angles, count = new_object(name, rotation_mode), np.radians(degrees), np.arange(len(frames))
     write_channel(obj, "location", np.array(frames), np.outer(count, (2.0, 0.0, 0.0)))
     if rotation_mode == "QUATERNION":
@@ -81,7 +81,7 @@ def turning(
 
 
 def key_densely(obj: Carrier) -> None:
-    """Give an object or a bone linear keys on all eighths of frames instead, of what channels have; and no modes."""
+    """Replace a carrier's keys by linear ones on all eighths of frames, at the displayed values, without modes."""
     curves = list(curves_of(obj).values())
     first, last = curves[0].range()
     frames = np.arange(first, last + 0.125, 0.125)
@@ -93,7 +93,7 @@ def key_densely(obj: Carrier) -> None:
 
 
 def give_own_deltas(obj: bpy.types.Object, seed: int = 0) -> Own:
-    """Delta transforms of the object's own, at random."""
+    """Give the object random delta transforms of its own, and return them."""
     random = np.random.default_rng(seed)
     obj.delta_location = random.normal(size=3)
     obj.delta_scale = np.full(3, np.exp(0.3 * random.normal()))
@@ -103,7 +103,7 @@ def give_own_deltas(obj: bpy.types.Object, seed: int = 0) -> Own:
 
 
 def own_deltas(obj: bpy.types.Object) -> Own:
-    """What an object without in-betweens has for delta transforms."""
+    """Return the delta transforms of an object without in-betweens."""
     if obj.rotation_mode == "QUATERNION":
         turned = unit(obj.delta_rotation_quaternion)
     elif obj.rotation_mode == "AXIS_ANGLE":
@@ -140,14 +140,14 @@ def tweak(obj: bpy.types.Object, strip: bpy.types.NlaStrip) -> None:
 def new_strip(
     obj: bpy.types.Object, start: int, action: bpy.types.Action, slot: bpy.types.ActionSlot, last: int = 40
 ) -> bpy.types.NlaStrip:
-    """A strip in its own track, of frames 1 to `last`: Blender makes it one frame long where several slots fit."""
+    """Add a strip of frames 1 to `last` in its own track. Blender makes it one frame long if several slots fit."""
     strip = obj.animation_data.nla_tracks.new().strips.new(slot.name_display, start, action)
     strip.action_slot, strip.action_frame_start, strip.action_frame_end = slot, 1, last
     return strip
 
 
 def linked(library: Path, name: str) -> bpy.types.Object:
-    """An object of another file, in the scene."""
+    """Link an object of another file into the scene."""
     with bpy.data.libraries.load(str(library), link=True) as (_, expected):
         expected.objects = [name]
     (obj,) = expected.objects
@@ -158,7 +158,7 @@ def linked(library: Path, name: str) -> bpy.types.Object:
 
 @contextmanager
 def enabled(*addons: str) -> Iterator[None]:
-    """Blender's own add-ons of these names switched on; those that were off are so again afterwards."""
+    """Switch on Blender's own add-ons of these names in the context."""
     switched_on = [name for name in addons if addon_utils.check(name) != (True, True)]
     for name in switched_on:
         addon_utils.enable(name)
@@ -171,7 +171,7 @@ def enabled(*addons: str) -> Iterator[None]:
 
 @contextmanager
 def editor(kind: str, mode: str | None = None) -> Iterator[bpy.types.Space]:
-    """Have operators run in an editor of this kind."""
+    """Run operators in an editor of this kind in the context."""
     window = bpy.context.window_manager.windows[0]
     area = window.screen.areas[0]
     before, area.type = area.type, kind

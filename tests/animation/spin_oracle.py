@@ -1,4 +1,4 @@
-"""How many turns a body makes between two keys, worked out one segment at a time, by `mathutils`."""
+"""Oracle for the number of turns between two keys, worked out one segment at a time with `mathutils`."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from rigid_motion.motion.quaternions import multiply
 
 
 class Spin(NamedTuple):
-    """Turns about an axis that stands still in space, or in the body."""
+    """Turns about an axis that is fixed in space or in the body."""
 
     turns: float = 0
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     in_space: bool = False
 
     def add_to(self, poses: Poses, shares: np.ndarray) -> Poses:
-        """Poses (m,) turned as far as these shares (m,) of the segment say."""
+        """Return poses (m,), turned in proportion to these fractions (m,) of the segment."""
         spun = np.array([Quaternion(self.axis, 2.0 * np.pi * self.turns * share) for share in shares]).reshape(-1, 4)
         first, second = (spun, poses.quaternions) if self.in_space else (poses.quaternions, spun)
         return Poses(poses.positions, multiply(first, second), poses.scales)
 
     def twist(self, quaternion: Sequence[float]) -> np.ndarray:
-        """The angular velocity in unit time, with a twist's places for what it does not move, (7,)."""
+        """Return the angular velocity per unit of time, padded with zeros to a twist, shape (7,)."""
         axis = Vector(self.axis)
         if self.in_space:
             axis.rotate(Quaternion(quaternion).inverted())
@@ -34,9 +34,9 @@ class Spin(NamedTuple):
 
 
 def shortest(first: Sequence[float], second: Sequence[float]) -> np.ndarray:
-    """The rotation from one quaternion to another as a vector along the axes of the body.
+    """Return the rotation from one quaternion to another as a vector along the axes of the body.
 
-    At half a turn it is the one that `interpolate` takes, of which rounding errors decide.
+    At half a turn, return the direction that `interpolate` takes, which depends on rounding errors.
     """
     aligned = -np.array(second) if np.dot(first, second) < 0.0 else np.array(second)
     w, *xyz = multiply(np.array(first) * (1.0, -1.0, -1.0, -1.0), aligned)
@@ -45,7 +45,7 @@ def shortest(first: Sequence[float], second: Sequence[float]) -> np.ndarray:
 
 
 def about_one_axis(first: Sequence[float], second: Sequence[float]) -> float:
-    """By how much an angle about an axis (4,) changes to another one, 0 where the axes are not parallel."""
+    """Return the change of the angle from one angle and axis (4,) to another; 0 if the axes are not parallel."""
     lengths = np.linalg.norm(first[1:]) * np.linalg.norm(second[1:])
     dot = float(np.dot(first[1:], second[1:]))
     is_parallel = lengths > 0.0 and abs(dot) >= (1.0 - 1e-6) * lengths
@@ -55,9 +55,9 @@ def about_one_axis(first: Sequence[float], second: Sequence[float]) -> float:
 def _axis_of_angles(
     angles: np.ndarray, order: str, quaternions: np.ndarray, own: Sequence[float]
 ) -> tuple[float, Vector, bool]:
-    """How far that of two sets of Euler angles (2, 3) goes which goes furthest; its axis, and whether in space.
+    """Return the largest change among Euler angles (2, 3), its axis, and whether the axis is fixed in space.
 
-    Or of angles about axes (2, 4).
+    Angles and axes (2, 4) are accepted, too.
     """
     if order == "AXIS_ANGLE":
         return about_one_axis(*angles), Vector(angles[0, 1:]).normalized(), False
@@ -76,8 +76,8 @@ def _axis_of_angles(
     return float(change[which]), axis, stands
 
 
-def _about(spin: Spin, first: Sequence[float], second: Sequence[float]) -> float:
-    """How far the shortest rotation goes about the axis of a spin."""
+def _angle_about_spin_axis(spin: Spin, first: Sequence[float], second: Sequence[float]) -> float:
+    """Return the angle of the shortest rotation about the axis of a spin."""
     turn = Vector(shortest(first, second))
     if spin.in_space:
         turn.rotate(Quaternion(first))
@@ -93,39 +93,41 @@ def spin_and_end(
     own: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
     whole: bool = False,
 ) -> tuple[Spin, np.ndarray]:
-    """The spin between two quaternions (2, 4), and where the body turns to without it, (4,).
+    """Return the spin between two quaternions (2, 4), and the end rotation without the spin, (4,).
 
-    With the turns that Euler angles (2, 3), or angles and axes (2, 4), say, and those of the channel on top; what is
-    not whole of these is a part of the rotation, unless `whole` turns are wanted.
+    Turns come from Euler angles (2, 3), or from angles and axes (2, 4), plus `turns` of the channel. A fraction of a
+    turn is part of the rotation, unless `whole` turns are requested.
     """
     first, second = quaternions
     part = 0.0 if abs(turns - round(turns)) < 1e-5 else turns - round(turns)
     spin, sense, change = Spin(), 0, 0.0
     if angles is not None:
         change, about, stands = _axis_of_angles(angles, order, quaternions, own)
-        # A key that took what was seen is off by what in-betweens are.
+        # A key inserted at the displayed pose has the error of the in-betweens.
         if (part and abs(change) > 1e-5) or abs(change) > np.pi - 1e-4:
             spin, sense = Spin(0, tuple(about), stands), 1 if change > 0.0 else -1
     if sense:
-        end = _without(spin._replace(turns=sense * part), second)
-        lacking = round((change - 2.0 * np.pi * sense * part - _about(spin, first, end)) / (2.0 * np.pi))
+        end = _turned_back(spin._replace(turns=sense * part), second)
+        lacking = round(
+            (change - 2.0 * np.pi * sense * part - _angle_about_spin_axis(spin, first, end)) / (2.0 * np.pi)
+        )
         sense = sense if lacking or part else 0
         spin = spin._replace(turns=lacking + sense * turns)
     if not sense and turns:
         turn = shortest(first, second)
         length = np.linalg.norm(turn)
         spin = Spin(turns, tuple(turn / length)) if length >= 1e-4 else Spin(turns)
-        end = _without(spin._replace(turns=part), second)
+        end = _turned_back(spin._replace(turns=part), second)
     elif not sense:
         end = second
     if part and whole:
-        total = _about(spin, first, end) + 2.0 * np.pi * spin.turns
-        return spin._replace(turns=round((total - _about(spin, first, second)) / (2.0 * np.pi))), second
+        total = _angle_about_spin_axis(spin, first, end) + 2.0 * np.pi * spin.turns
+        return spin._replace(turns=round((total - _angle_about_spin_axis(spin, first, second)) / (2.0 * np.pi))), second
     return spin, end
 
 
-def _without(spin: Spin, quaternion: np.ndarray) -> np.ndarray:
-    """A quaternion turned back by a spin; to the last bit where that is by nothing."""
+def _turned_back(spin: Spin, quaternion: np.ndarray) -> np.ndarray:
+    """Return a quaternion turned back by a spin; exactly the same quaternion if the spin has no turns."""
     if not spin.turns:
         return quaternion
     angle = -2.0 * np.pi * spin.turns

@@ -1,6 +1,6 @@
-"""Baked poses are shown as before, whatever there is beside keys, and the way back from them leaves no trace.
+"""Baking: baked poses are shown as before, with any modifiers or cycles, and Un-Bake restores all keys.
 
-All is read back from the evaluated scene. Bones, Actions and names may have changed meanwhile.
+Poses are read back from the evaluated scene. Bones, Actions and names may change before Un-Bake.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ OF_BOTH = pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bon
 def moving(
     of_bones: bool, mode: str = "dq_sclerp", name: str = "Mover", order: str = "QUATERNION", **settings: object
 ) -> tuple[bpy.types.Object, list]:
-    """A rig or an object that has a mode, and what has it. `settings` are those of `key` and `key_all`."""
+    """Return a rig or an object, and its carriers with this mode. `settings` are those of `key` and `key_all`."""
     make, give = (new_rig, key_all) if of_bones else (new_object, key)
     obj = give(make(name, rotation_mode=order), **settings)
     targets = list(obj.pose.bones) if of_bones else [obj]
@@ -54,7 +54,7 @@ def moving(
 
 
 def motion() -> tuple[np.ndarray, Poses]:
-    """Frames and wild poses: half of the keys have the other sign."""
+    """Return frames and wild poses. Every second frame has the quaternion of the other sign."""
     random = np.random.default_rng(11)
     keys = Poses(random.normal(size=(8, 3)), random.normal(size=(8, 4)), np.exp(random.normal(size=8)))
     frames = np.arange(1.0, 201.0)
@@ -75,7 +75,7 @@ def test_poses_are_shown_however_an_object_turns_and_between_frames_it_goes_no_o
     obj, other = (new_object(name, order) for name in ("Tool", "Other"))
     frames, poses = motion()
     bake_poses(obj, frames, poses)
-    # A shared Action keeps what others have in it.
+    # A shared Action keeps the channels of its other users.
     data = other.animation_data_create()
     data.action = obj.animation_data.action
     data.action_slot = data.action.slots.new("OBJECT", "Other")
@@ -220,12 +220,12 @@ def test_what_plays_in_strips_or_several_slots_is_baked_there_and_gets_its_keys_
 
 
 def keys_in(action: bpy.types.Action) -> list[int]:
-    """How many keys each F-curve of an Action has."""
+    """Return the number of keys of each F-curve of an Action."""
     return [len(fcurve.keyframe_points) for bag in action.layers[0].strips[0].channelbags for fcurve in bag.fcurves]
 
 
 def clips_of(obj: bpy.types.Object, folder: Path) -> tuple[set[str], set[bytes]]:
-    """The names of what Blender's exporters write with their default settings."""
+    """Return the names of the animations that Blender's exporters write with their default settings."""
     path = str(folder / obj.name)
     with enabled("io_scene_gltf2", "io_scene_fbx"):
         bpy.ops.export_scene.gltf(filepath=f"{path}.gltf", export_format="GLTF_SEPARATE")
@@ -246,7 +246,7 @@ def test_what_is_kept_is_no_clip_of_an_export(live_file, tmp_path, of_bones):
 
 
 def holders_on(prop: Carrier, frames: tuple[float, ...] = (10, 20, 30, 39, 40, 59, 60, 85)) -> list[str | None]:
-    """The names of what holds something."""
+    """Return the names of its holders on these frames."""
     result = []
     for frame in frames:
         bpy.context.scene.frame_set(frame)
@@ -271,7 +271,7 @@ def test_what_is_held_is_baked_in_the_spaces_of_its_holders(live_file, kind, thr
     assert key_frames(prop).tolist() == list(range(1, 81))
     assert np.abs(worlds(prop) - before).max() < 1e-5
     assert holders_on(prop) == holders == [None, "Hand.L", "Hand.L", "Hand.L", "Hand.R", "Hand.R", None, None]
-    # Every key says so itself.
+    # Every key stores its holder itself.
     assert all((read_holds(fcurve) >= 0).all() for fcurve in moving_curves(prop))
     unbake(prop)
     assert snapshot(prop) == keys
@@ -300,7 +300,7 @@ def test_what_is_baked_to_the_world_is_held_no_more_and_shown_as_before(live_fil
 
 
 def test_what_is_held_to_the_end_is_baked_to_the_world_as_far_as_it_is_seen(live_file):
-    """Also with a constraint of the animator's on top, which stays."""
+    """A constraint added by the animator still applies on top, and stays."""
     prop, hands = new_prop("free"), new_hands()
     bpy.context.scene.frame_set(20)
     hold_in(prop, hands[0])

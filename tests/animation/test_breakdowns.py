@@ -1,4 +1,4 @@
-"""Breakdown, push and relax along modes: poses against `interpolate`, which is given the poses of the keys alone."""
+"""Breakdown, push and relax along modes, compared with `interpolate` between the poses of the keys alone."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NO_DELTAS = Own()
 
 
 def key_poses(obj: bpy.types.Object, own: Own = NO_DELTAS) -> Poses:
-    """What `key` has set on an object, with delta transforms of its own but for their scale."""
+    """Return the poses that `key` set on an object, with its own delta transforms except their scale."""
     return Poses.from_matrices(expected_bases(obj, FRAMES, replace(own, scale=NO_DELTAS.scale)))
 
 
@@ -32,7 +32,7 @@ def as_matrices(poses: Poses, own: Own = NO_DELTAS) -> np.ndarray:
 
 
 def on_path(keys: Poses, mode: str, factor: float, times=FRAMES) -> Poses:
-    """The pose of a factor between the second key and the third."""
+    """Return the pose at a factor between the second and the third key."""
     if KEYFRAME_MODES[mode].is_smooth and 0.0 <= factor <= 1.0:
         return interpolate(times, keys, np.array([times[1] + factor * (times[2] - times[1])]), mode)
     return interpolate((0.0, 1.0), keys[1:3], np.array([factor]), mode, extrapolate=True)
@@ -45,7 +45,7 @@ def test_a_breakdown_is_on_the_path_of_the_mode(live_file, mode, what):
     order, scale = what
     obj = new_object(rotation_mode=order)
     own = give_own_deltas(obj, 3)
-    # Handles would shape a smooth mode.
+    # In a smooth mode, handles would change the path.
     key(obj, seed=5, scale=scale, interpolation="LINEAR" if KEYFRAME_MODES[mode].is_smooth else "BEZIER")
     set_mode(obj, mode)
     bpy.context.scene.frame_set(int(NOW))
@@ -58,7 +58,7 @@ def test_a_breakdown_is_on_the_path_of_the_mode(live_file, mode, what):
         expected = as_matrices(on_path(keys, mode, factor), own)[0]
         np.testing.assert_allclose(world_now(), expected, atol=2e-5 * np.abs(expected).max())
         assert key_frames(obj).tolist() == [FRAMES[0], BEFORE, NOW, AFTER, FRAMES[3]]
-        # It is a key like any other: from frame to frame and back it stays.
+        # It is a key like any other: it stays when the frame changes.
         shown = shown_worlds([obj], [NOW])[0][0]
         np.testing.assert_allclose(shown, expected, atol=2e-5 * np.abs(expected).max())
 

@@ -1,5 +1,6 @@
-"""Cleaned keys, read back from the evaluated scene: nearer to the truth, moved by no more than was said, and the way
-back. Where keys cannot be cleaned, it says why and the way out, and changes nothing.
+"""Cleaned keys, read back from the evaluated scene: closer to the truth, moved by no more than reported, restorable.
+
+Where keys cannot be cleaned, the refusal names the cause and the way out, and nothing changes.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ SPIKE = 120
 
 
 def shaky(obj: bpy.types.Object, *, spike: float = 0.0) -> tuple[np.ndarray, Poses]:
-    """Give an object dense keys that tremble, and a spike; return the frames, and what it was without."""
+    """Give an object dense keys with jitter and a spike. Return the frames and the poses without both."""
     random, frames = np.random.default_rng(4), np.arange(1.0, COUNT + 1.0)
     places = np.stack((np.sin(frames / 20.0), np.cos(frames / 31.0), frames / 500.0), axis=1)
     angles = np.stack((np.sin(frames / 40.0), 0.0 * frames, np.cos(frames / 50.0)), axis=1)
@@ -77,7 +78,7 @@ def test_it_trembles_less_and_is_moved_by_no_more_than_was_said(live_file, rotat
     assert moved[SPIKE] > 0.1
     assert np.delete(moved, SPIKE).max() == pytest.approx(cleaning.moved, rel=1e-3)
     assert cleaning.moved <= strength * cleaning.trembling * (1.0 + 1e-6)
-    # By any point within the radius: of places, and of rotations there.
+    # Largest jitter of any point within the radius: that of locations plus that of rotations.
     assert cleaning.trembling == pytest.approx(3.0**0.5 * SIZE + 2.0**0.5 * TURN * RADIUS, rel=0.15)
     assert key_frames(obj).tolist() == frames.tolist()
     assert selected_frames(obj)[:6] == [[frames[SPIKE]]] * 6
@@ -130,7 +131,7 @@ def test_selected_keys_alone_are_cleaned_and_join_the_rest(live_file):
 
 
 def displacements(rig: bpy.types.Object, before: dict, after: dict) -> np.ndarray:
-    """How far any point of each bone's ball was displaced in the rig, shape (bones, n)."""
+    """Return how far any point of each bone's ball was displaced in the rig, shape (bones, n)."""
     reaches = reaches_of(rig)
     return np.array(
         [
@@ -168,7 +169,7 @@ def test_no_bone_is_moved_by_more_whatever_it_hangs_on(live_file, chosen, moves)
     if strength > 1.0:
         name = bones[-1].name
         jerks = [np.abs(np.diff(poses[name][:, :3, 1], n=4, axis=0)).mean() for poses in (before, after)]
-        # An arm in between that is not cleaned goes on trembling.
+        # An uncleaned arm in between keeps its jitter.
         assert jerks[1] < (0.9 if chosen == ("Spine", "Hand.L") else 0.7) * jerks[0]
 
 
@@ -180,7 +181,7 @@ LEG = (
 
 
 def shaky_leg(seed: int) -> bpy.types.Object:
-    """A hip that goes on and trembles, above a foot that stands, as by inverse kinematics, and steps forwards in
+    """Return a leg with IK-like keys: a moving hip with jitter, above a foot that stands and steps forwards in
     five frames out of thirty.
     """
     rig, random = new_rig("Leg", LEG), np.random.default_rng(seed)
@@ -195,7 +196,7 @@ def shaky_leg(seed: int) -> bpy.types.Object:
 
 
 def origins(rig: bpy.types.Object) -> np.ndarray:
-    """Where the bones begin in the world, as the scene evaluates them, shape (bones, n, 3)."""
+    """Return the evaluated world positions of the bones' heads, shape (bones, n, 3)."""
     (shown,) = shown_poses([rig], FRAMES)
     return np.stack([(np.array(rig.matrix_world) @ poses)[:, :3, 3] for poses in shown.values()])
 
@@ -206,7 +207,7 @@ def test_a_foot_that_stands_slides_no_further_than_it_did(live_file, monkeypatch
     for seed in range(3):
         rig = shaky_leg(seed)
         if not upright:
-            # The axes of the channels are others than the world's.
+            # The axes of the channels are not those of the world.
             rig.parent = new_object("Parent")
             rig.parent.rotation_euler, rig.rotation_euler = (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)
             bpy.context.view_layer.update()
@@ -237,7 +238,7 @@ def test_cameras_are_cleaned_in_pixels_of_their_pictures(live_file):
     (cleaning,) = clean_motion(camera)
     assert cleaning.trembling == pytest.approx(3.0**0.5 * SIZE + 2.0**0.5 * TURN * 4.0, rel=0.15)
     assert focus_of(camera) == 4.0
-    # The centre of the picture, and a corner, where a turn about the camera's axes shows most.
+    # The centre of the picture, and a corner, where a rotation about the camera's axes shows most.
     at_centre = 1920.0 * camera.data.lens / camera.data.sensor_width / 4.0
     corner = 1.0 + (camera.data.sensor_width / camera.data.lens / 2.0) ** 2 * (1.0 + (9.0 / 16.0) ** 2)
     assert pixels_of(camera, 4.0) == pytest.approx(at_centre * corner, rel=1e-4)

@@ -1,9 +1,9 @@
-"""Blender's commands on an in-between of a mode do what they do on a key with the same pose.
+"""Blender's commands do the same on an in-between of a mode as on a key with the same pose.
 
-Two objects or two bones have keys on frames 1, 21 and 41, linear ones of metres and wild turns. Their twins have linear
-keys on all eighths of frames with the values that the channels show, no modes, and nobody follows their edits: what
-Blender does to the twins it has to do to the others. What is seen is compared right after a command, after another
-frame was shown, and on the keys around.
+Two objects or two bones have linear keys on frames 1, 21 and 41, with locations in metres and wild rotations. Their
+twins have no modes, but linear keys on all eighths of frames with the values of the displayed channels, and their edits
+are not followed. Blender must do the same to both. Poses are compared right after a command, after another frame was
+shown, and on the surrounding keys.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ IN_BETWEEN, AWAY = 11, 12
 
 ORDERS = ("QUATERNION", "XYZ", "AXIS_ANGLE")
 KINDS = tuple(itertools.product(("OBJECT", "BONE"), ORDERS))
-"""What is edited, and how it turns."""
+"""The edited type, and its rotation order."""
 
 
 @dataclass
 class Stage:
-    """What is edited, selected; the first of it is active, and has a parent that is turned, or is in such a rig."""
+    """The edited carriers, selected. The first is active; its parent or its rig is rotated."""
 
     kind: str
     carriers: list[Carrier]
     auto: bool
-    """Whether what is done by hand is keyed."""
+    """Whether manual edits are keyed."""
 
     @property
     def first(self) -> Carrier:
@@ -58,13 +58,13 @@ class Stage:
         return self.first.id_data
 
     def key(self, carrier: Carrier, *paths: str, index: int = -1) -> None:
-        """Blender's buttons key what was typed into them; by default all."""
+        """Key channels as Blender's buttons key typed values; by default all channels."""
         for path in (paths or transform_paths(carrier)) if self.auto else ():
             carrier.keyframe_insert(path, index=index)
 
 
 def set_stage(kind: str, order: str, mode: str, *, auto: bool = False, of_twins: bool | None = None) -> Stage:
-    """A new file with them, on the in-between. Of those with twins that turn by quaternions, one has deltas."""
+    """Set up a new file on the in-between. With `of_twins` given and quaternions, one object has delta transforms."""
     animation.set_enabled(True)
     blank()
     if kind == "OBJECT":
@@ -97,7 +97,7 @@ def go_to(frame: int) -> None:
 
 
 def all_seen() -> np.ndarray:
-    """The world matrices of all objects and bones in the scene, and the 3D Cursor's, shape (n, 4, 4)."""
+    """Return the world matrices of all objects and bones in the scene and of the 3D Cursor, shape (n, 4, 4)."""
     bpy.context.view_layer.update()
     depsgraph, result = bpy.context.evaluated_depsgraph_get(), [bpy.context.scene.cursor.matrix]
     for obj in sorted(bpy.context.scene.objects, key=lambda obj: obj.name):
@@ -108,7 +108,7 @@ def all_seen() -> np.ndarray:
 
 
 def channels_seen(carriers: Sequence[Carrier]) -> np.ndarray:
-    """What the channels of these have, as drivers and scripts read it."""
+    """Return the channel values of these carriers, as drivers and scripts read them."""
     return np.concatenate(
         [[*carrier.location, *getattr(carrier, rotation_path(carrier)), *carrier.scale] for carrier in carriers]
     )
@@ -132,7 +132,7 @@ def target(name: str = "Target") -> bpy.types.Object:
 
 def visually_keyed(_: Stage) -> None:
     bpy.ops.anim.keyframe_insert_by_name(type="BUILTIN_KSI_VisualLocRotScale")
-    # Blender shows on the next frame what it keyed, which is in the world's space; where a mode is, it is seen at once.
+    # Blender shows world-space keys only on the next frame; a mode shows them at once.
     go_to(IN_BETWEEN)
 
 
@@ -144,7 +144,7 @@ def flipped(stage: Stage) -> None:
 
 
 def posed_by_action(stage: Stage) -> None:
-    """As the pose library does it."""
+    """Apply the pose as the pose library does."""
     asset = stage.owner.animation_data.action.copy()
     stage.owner.pose.apply_pose_from_action(asset, evaluation_time=16.0)
     bpy.data.actions.remove(asset)
@@ -166,7 +166,7 @@ def parented(stage: Stage, parent: bpy.types.Object, *children: bpy.types.Object
 
 
 def baked(stage: Stage, **settings: object) -> None:
-    """As an animator does who presses the button: Blender fills in the frames, and Pose Mode the type."""
+    """Bake as the button does: Blender fills in the frames, and Pose Mode the type."""
     kind = "OBJECT" if stage.kind == "OBJECT" else "POSE"
     assert bpy.ops.nla.bake(frame_start=1, frame_end=41, bake_types={kind}, **settings) == {"FINISHED"}
     assert len(curves_of(stage.first)["location", 0].keyframe_points) >= 41
@@ -202,7 +202,7 @@ OF_BONES: dict[str, Command] = {
     "pose of an Action": posed_by_action,
     "breakdowner": lambda _: bpy.ops.pose.breakdown(factor=0.3, prev_frame=1, next_frame=21),
 }
-"""A command of each kind: by what is seen, by the channels, or by the keys."""
+"""Commands of each kind: those that use displayed poses, channels or keys."""
 
 CASES = [
     *itertools.product(["OBJECT"], (*COMMANDS, *OF_OBJECTS)),
@@ -211,7 +211,7 @@ CASES = [
 
 
 def left_by(command: str, kind: str, order: str, auto: str, *, of_twins: bool) -> list[np.ndarray]:
-    """What a command leaves on the in-between: at once, after another frame was shown, and on the keys."""
+    """Return the matrices after a command: at once, after another frame was shown, and on the keys."""
     is_on, only_needed = AUTO_KEYS[auto]
     stage = set_stage(kind, order, "dq_sclerp", auto=is_on, of_twins=of_twins)
     bpy.context.scene.tool_settings.use_keyframe_insert_auto = is_on
@@ -238,14 +238,14 @@ def test_a_command_does_what_it_does_on_a_key(live_file, tmp_path, case, way):
 
 
 def test_what_is_made_deltas_stays_where_it_is_seen(live_file):
-    """Until another frame is shown: then it is moved twice, in Blender, too."""
+    """On the next frame the transform applies twice, as in Blender."""
     stage, before = set_stage("OBJECT", "XYZ", "dq_sclerp"), all_seen()
     bpy.ops.object.transforms_to_deltas(mode="ALL")
     np.testing.assert_allclose(all_seen(), before, atol=1e-5)
     assert tuple(stage.first.location) == (0.0, 0.0, 0.0)
 
 
-# Keys that are copied from in-betweens or between transforms
+# Keys copied from in-betweens or between transforms
 
 
 @pytest.mark.parametrize("kind", KINDS[3:], ids="-".join)
@@ -265,7 +265,7 @@ def select(stage: Stage, number: int) -> None:
 
 
 PASTED = itertools.product(("DOPESHEET_EDITOR", "GRAPH_EDITOR"), (0, 60), (("pga_lerp",) * 2, ("dq_sclerp", "BLENDER")))
-"""In which editor, how much later, and the modes of both segments."""
+"""The editor, the offset in frames, and the modes of both segments."""
 
 
 @pytest.mark.parametrize(("pasted", "kind"), in_turn(PASTED, KINDS))

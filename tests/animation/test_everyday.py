@@ -1,4 +1,4 @@
-"""What animators do with Actions all day: unlink, swap, share, reuse, delete. Nothing stale stays on any object."""
+"""Everyday edits of Actions: unlink, swap, share, reuse, delete. Objects keep nothing stale."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_what_is_deleted_with_an_edit_of_it_still_to_be_seen_is_asked_for_nothin
 
 @pytest.mark.parametrize("mode", ["dq_sclerp", "pga_lerp", "motor_spline"])
 def test_two_keys_on_one_frame_leave_a_mode_to_the_object(live_file, mode):
-    """As Shift D does it, until they are moved apart."""
+    """Shift D does this, until the keys are moved apart."""
     obj = key(new_object("Tool", "QUATERNION"), interpolation="LINEAR")
     set_mode(obj, mode)
     (before,) = shown_worlds([obj], PLAYED)

@@ -1,4 +1,4 @@
-"""How exact in-betweens are: at any time, far from frame 0, with any timing, and in the channels themselves."""
+"""Precision of in-betweens: at any time, far from frame 0, with any timing, and in the channels themselves."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ EIGHTHS = np.arange(FRAMES[0] - 1.0, FRAMES[-1] + 1.0, 0.125)
 SHIFTS = (0.0, -5000.0, 100_000.0)
 TIMINGS = ("LINEAR", "BEZIER", "SINE", "CUBIC", "EXPO", "BACK", "CIRC", "BOUNCE", "ELASTIC", "CONSTANT")
 BETWEEN, ON_FRAMES = 1e-4, 1e-5
-"""Metres that a point may be off, a metre away from the origin of something that moves metres."""
+"""Allowed error of a point, in metres, 1 m away from the origin of an object that moves by metres."""
 
 POINTS = np.concatenate((np.zeros((1, 3)), np.eye(3)))
 
 
 def errors(obj: bpy.types.Object, frames: np.ndarray, owns: dict) -> np.ndarray:
-    """How far off the origin of an object is, or a point along one of its axes, at most on each frame."""
+    """Return the largest error on each frame of the origin of an object and of points along its axes."""
     pairs = shown_worlds([obj], frames)[0], expected_worlds(obj, frames, owns)
     shown, expected = (m[:, None, :3, :3] @ POINTS[:, :, None] + m[:, None, :3, 3:] for m in pairs)
     return np.linalg.norm(shown - expected, axis=2).max(axis=(1, 2))

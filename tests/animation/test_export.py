@@ -1,4 +1,4 @@
-"""Objects and rigs that are exported and imported again move as their modes have it, with nothing to be set for it."""
+"""Exported and re-imported objects and rigs move as their modes say, with no export settings for modes."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ FORMATS: dict[str, Format] = {
     "usdc": (bpy.ops.wm.usd_export, bpy.ops.wm.usd_import, {"export_animation": True}, {}),
     "abc": (bpy.ops.wm.alembic_export, bpy.ops.wm.alembic_import, *2 * ({"as_background_job": False},)),
 }
-"""How to export and import, and what is to be chosen: that there shall be animation, each object's own, as it is."""
+"""Exporter, importer and their options, which request animation, separate for each object and unsimplified."""
 
 
 @pytest.fixture(autouse=True)
 def exporters(live_file) -> Iterator[None]:
-    """Blender's own exporters switched on."""
+    """Switch on Blender's own exporters."""
     with enabled("io_scene_gltf2", "io_scene_fbx"):
         yield
 
 
 def reimport(objects: list[bpy.types.Object], path: Path, how: Format) -> None:
-    """Export all there is, which changes none of these, and import it into a new file."""
+    """Export everything without changing these objects, and import the file into a new one."""
     save, load, options, loading = how
     keys, shown = [snapshot(obj) for obj in objects], shown_worlds(objects, PLAYED)
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = int(PLAYED[0]) - 3, int(PLAYED[-1]) + 3
@@ -57,7 +57,7 @@ def reimport(objects: list[bpy.types.Object], path: Path, how: Format) -> None:
 
 
 def assert_alike(names: Iterable[str], shown: Iterable[np.ndarray], expected: Iterable[np.ndarray]) -> None:
-    """These move alike from where they were at first on: importers lay axes as they like."""
+    """Check for equal motion relative to the first frame: importers change axes as they like."""
     for name, one, other in zip(names, shown, expected, strict=True):
         moved, right = (worlds @ np.linalg.inv(worlds[:1]) for worlds in (one, other))
         error = np.abs(moved - right).max()
@@ -84,20 +84,20 @@ def test_objects_that_are_exported_and_imported_move_alike(tmp_path, kind):
     by_name = {obj.name.replace("_", " "): obj for obj in bpy.data.objects}
     found = [by_name[name.replace("_", " ")] for name in expected]
     for data in (obj.animation_data for obj in found if obj.animation_data):
-        # Importers of clips put them aside.
+        # Importers of clips put them into NLA strips.
         for strip in (strip for track in data.nla_tracks for strip in track.strips):
             data.action, data.action_slot = strip.action, strip.action_slot
     assert_alike(expected, shown_worlds(found, PLAYED), expected.values())
 
 
-# Without this, FBX leaves keys out, and is off by up to 1e-3 of the reach with real keys, too.
+# Without this option, FBX omits keys and is off by up to 1e-3 of the reach, even with real keys.
 OF_RIGS = {"glb": FORMATS["glb"], "fbx": (*FORMATS["fbx"][:2], {"bake_anim_simplify_factor": 0.0}, {})}
 
 
 @pytest.mark.parametrize(("order", "kind"), in_turn(ORDERS, [*OF_RIGS]))
 def test_a_rig_that_is_exported_has_its_modes_in_one_animation_of_the_actions_own_range(tmp_path, kind, order):
     rig = key_all(new_rig("Rig", rotation_mode=order))
-    # Twelve bones in all orders, which are as many as there are modes or more.
+    # Twelve bones in all orders: at least as many as there are modes.
     for number, bone in enumerate(rig.pose.bones, 4 * ORDERS.index(order)):
         set_mode(bone, MODES[number % len(MODES)])
     expected = expected_poses(rig, PLAYED)

@@ -1,7 +1,7 @@
-"""Damaged and hostile files: nothing is raised out of a handler, what cannot move rigidly keeps Blender's own motion.
+"""Damaged and hostile files: handlers raise nothing, and damaged objects keep Blender's own motion.
 
-Files are damaged while edits are not followed, saved, and opened with the extension switched on. Beside the damaged
-object there is always a whole one, which gets its in-betweens whatever is wrong with the other.
+Files are damaged while edits are not followed, saved, and opened with the extension switched on. A second, intact
+object always gets its in-betweens, whatever is wrong with the damaged one.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ Damage = Callable[[bpy.types.Object], object]
 
 
 def make(damage: Damage, mode: str = "dq_sclerp") -> None:
-    """A new file with an object that gets damaged, and one that does not."""
+    """Set up a new file with a damaged and an intact object."""
     animation.set_enabled(True)
     blank()
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 40
@@ -50,7 +50,7 @@ def make(damage: Damage, mode: str = "dq_sclerp") -> None:
 
 
 def reopened(folder: Path, *, followed: bool = True) -> tuple[bpy.types.Object, bpy.types.Object]:
-    """The damaged and the whole object of the file, saved and opened again; followed by the extension or not."""
+    """Save and reopen the file. Return the damaged and the intact object, followed by the extension or not."""
     path = str(folder / "scene.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     animation.set_enabled(followed)
@@ -62,14 +62,14 @@ def reopened(folder: Path, *, followed: bool = True) -> tuple[bpy.types.Object, 
 
 @pytest.fixture(autouse=True)
 def soon(live_file) -> Iterator[None]:
-    """All is done in far less time than an animator would wait for."""
+    """Check that everything takes far less time than an animator would wait."""
     began = time.process_time()
     yield
     assert time.process_time() - began < 10.0
 
 
 def use(obj: bpy.types.Object) -> None:
-    """What an animator does next, and what the panel asks for."""
+    """Do the next actions of an animator, and the panel's queries."""
     for (path, _), fcurve in curves_of(obj).items():
         if path == "location" and len(fcurve.keyframe_points):
             fcurve.keyframe_points[-1].select_control_point = True
@@ -89,7 +89,7 @@ def use(obj: bpy.types.Object) -> None:
 
 
 def numbers(channel: tuple[str, int], field: str, value: float, *at: int) -> Damage:
-    """One number of these keys of a channel is another, of all without any; nothing else follows."""
+    """Damage one number of these keys of a channel (all keys by default); nothing else is updated."""
     name, _, axis = field.partition(".")
 
     def damage(obj: bpy.types.Object) -> None:
@@ -104,7 +104,7 @@ def numbers(channel: tuple[str, int], field: str, value: float, *at: int) -> Dam
 
 
 def everywhere(field: str, value: float, *at: int, paths: tuple[str, ...] = TRANSFORMS) -> Damage:
-    """The same in all channels of these properties."""
+    """Damage the same number in all channels of these properties."""
     return each(*(numbers((path, index), field, value, *at) for path in paths for index in range(WIDTHS[path])))
 
 
@@ -113,12 +113,12 @@ def each(*damages: Damage) -> Damage:
 
 
 def marks(*of_keys: int) -> Damage:
-    """The keys of all channels say these, of which those above the modes that there are mean nothing."""
+    """Write these marks to the keys of all channels. Numbers above those of existing modes mean nothing."""
     return lambda obj: [write_marks(fcurve, np.array(of_keys)) for fcurve in curves_of(obj).values()]
 
 
 def terms(change: Callable[[bpy.types.FCurve, bpy.types.FModifierGenerator], object]) -> Damage:
-    """The terms of all channels are changed, one after the other."""
+    """Change the terms of all channels, one after the other."""
     return lambda obj: [
         change(fcurve, term) for fcurve in curves_of(obj).values() for term in list(fcurve.modifiers) if is_term(term)
     ]
@@ -145,7 +145,7 @@ NUMBERS: dict[str, tuple[Damage, str]] = {
         product(FIELDS, (NAN, INF)), cycle(LABELS), cycle(range(4)), strict=False
     )
 }
-"""A number that is none in each field, in one of the channels and keys after the other."""
+"""NaN or infinity in each field, in one channel and key after the other."""
 
 REFUSED: dict[str, tuple[Damage, str]] = {
     "a period that is not a number": (
@@ -231,7 +231,7 @@ LATER: dict[str, Damage] = {
     "terms at the wrong time": terms(lambda _, term: setattr(term, "frame_end", 1e6)),
     "terms of a range that is none": terms(lambda _, term: setattr(term, "frame_end", NAN)),
 }
-"""What nobody sees before the next edit of a key."""
+"""Damage without visible effect before the next edit of a key."""
 
 
 @pytest.mark.parametrize("what", [*MENDED, *LATER])
@@ -254,7 +254,7 @@ def test_three_hundred_thousand_keys_are_refused_soon(tmp_path):
         points.clear()
         points.add(len(frames))
         points.foreach_set("co", np.stack((frames, np.sin(0.01 * frames)), axis=1).astype(np.float32).ravel())
-        # Blender itself takes its time where they are not all alike.
+        # Blender itself is slow if interpolations differ.
         points.foreach_set("interpolation", np.ones(len(frames), np.int32))
 
     make(damage)

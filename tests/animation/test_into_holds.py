@@ -1,6 +1,6 @@
-"""Dense keys become holds where a hand held something, within the tolerance on every frame as Blender shows it.
+"""Dense keys become holds where a hand held an object, within the tolerance on every frame as Blender shows it.
 
-What is shown is compared point by point, with nothing of the program's; and nothing is held that only lies about.
+Displayed poses are compared point by point without using the program. Objects that only lie about get no hold.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ OTHER = np.array(Matrix.LocRotScale((0.05, 0.08, -0.02), Quaternion((0.3, -0.2, 
 
 
 def off(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """How far any point within the radius is from where it is by other matrices, on each frame."""
+    """Return the largest distance of any point within the radius between two sets of matrices, on each frame."""
     apart = one - other
     return largest_displacements(apart[:, :3, 3], RADIUS * apart[:, :3, :3])
 
 
 def record(prop: Carrier, places: np.ndarray, frames: np.ndarray = FRAMES) -> None:
-    """Key something where it is to be in the world, on every frame."""
+    """Key the carrier at these world matrices, on every frame."""
     scene = bpy.context.scene
     for frame, place in zip(frames.tolist(), places, strict=True):
         scene.frame_set(int(frame))
@@ -60,7 +60,7 @@ def record(prop: Carrier, places: np.ndarray, frames: np.ndarray = FRAMES) -> No
 
 
 def moved(seed: int = 0, noise: float = NOISE, pick: int = 20, put_down: int = 60, over: int = 40) -> np.ndarray:
-    """A tool that lies about up to a frame, is held in the right hand, passed on to the left one, and put down."""
+    """Return the matrices of a tool that rests, is held in the right hand, passed to the left one, and put down."""
     body = bpy.data.objects["Body"].pose.bones
     right, left = worlds(body["Hand.R"], FRAMES) @ GRIP, worlds(body["Hand.L"], FRAMES) @ OTHER
     number = np.clip(FRAMES, pick, put_down)
@@ -89,7 +89,7 @@ def test_what_hands_held_gets_a_key_for_each_time_and_is_shown_within_the_tolera
     assert bpy.context.scene.frame_current == 33
     assert snapshot(prop) == keys
     left, right = found
-    # A frame more or less is within the tolerance, where a hand begins to move.
+    # Where a hand starts to move, one frame more or less is within the tolerance.
     assert (left.name, left.first, right.name, right.last) == ("Hand.L", 40.0, "Hand.R", 39.0)
     assert right.first in (20.0, 21.0)
     assert left.last in (59.0, 60.0)
@@ -102,7 +102,7 @@ def test_what_hands_held_gets_a_key_for_each_time_and_is_shown_within_the_tolera
     assert error[~inside].max() < 1e-5
     largest = max(left.largest, right.largest)
     assert largest == pytest.approx(error[inside].max(), abs=2e-6)
-    # The noise is as large along each axis, and what a hand moves by in a frame may come to it.
+    # The noise has this size along each axis, and the movement of a hand in one frame may add as much.
     assert 0.5 * NOISE < largest < 0.5 * TOLERANCE
     reduction = reduction_of(prop)
     assert (reduction.before, reduction.after) == (90, len(key_frames(prop)))
@@ -110,7 +110,7 @@ def test_what_hands_held_gets_a_key_for_each_time_and_is_shown_within_the_tolera
     assert [tuple(one) for one in reduction.held] == [
         (one.name, one.first, one.last, one.keys_before) for one in (right, left)
     ]
-    # It goes with the hand wherever that is by now.
+    # It follows the hand, wherever the hand is now.
     grip = np.linalg.inv(worlds(body.pose.bones["Hand.L"], [45.0])) @ worlds(prop, [45.0])
     for fcurve in curves_of(body.pose.bones["Hand.L"]).values():
         for point in fcurve.keyframe_points:
@@ -120,7 +120,7 @@ def test_what_hands_held_gets_a_key_for_each_time_and_is_shown_within_the_tolera
     assert np.abs(now - grip).max() < 1e-5
     assert np.abs(worlds(prop, [45.0]) - before[44:45]).max() > 0.01
     restore_keys(prop)
-    # Its constraints stay, and do nothing.
+    # Its constraints stay, but have no effect.
     assert {name: rows for name, rows in snapshot(prop).items() if name in keys} == keys
     assert holders_on(prop, (30, 50)) == ["", ""]
 
@@ -131,7 +131,7 @@ def test_all_rigs_are_looked_at_and_those_segments_that_are_wanted_are_done(live
     left, right = held_segments(prop, tolerance=TOLERANCE, radius=RADIUS)
     reduce_into_holds(prop, segments=[right])
     assert holders_on(prop, (30, 50)) == ["Hand.R", ""]
-    # What is held already stays so.
+    # Existing holds stay.
     assert held_segments(prop, tolerance=TOLERANCE, radius=RADIUS) == [left]
     reduce_into_holds(prop, tolerance=TOLERANCE, radius=RADIUS)
     assert holders_on(prop, (20, 30, 50, 61)) == ["", "Hand.R", "Hand.L", ""]
@@ -191,7 +191,7 @@ def test_what_was_held_and_baked_to_the_world_is_held_again(live_file):
     before = worlds(prop)
     bake_to_world(prop)
     (found,) = held_segments(prop, [body], 1e-4, RADIUS)
-    # Behind its last key it rests.
+    # After its last key the hand rests.
     assert (found.name, found.first, found.last) == ("Hand.R", 21.0, 61.0)
     reduce_into_holds(prop, [body], 1e-4, RADIUS)
     assert off(worlds(prop), before).max() < 1e-5

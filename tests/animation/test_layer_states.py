@@ -1,4 +1,4 @@
-"""Whatever is edited of a layer and of what is below it, in whatever order, one is seen on top of the other."""
+"""State machine for offset layers: after any edits in any order, the offset is seen on top of the motion below."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Layering(RuleBasedStateMachine):
         return self.tool.rigid_motion.base
 
     def _below(self) -> np.ndarray:
-        """Where the Empty is, relative to what `seen` is relative to."""
+        """Return the Empty's matrices, relative to the same parent as those of `seen`."""
         result, scene = [], bpy.context.scene
         for frame in FRAMES:
             scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
@@ -90,7 +90,7 @@ class Layering(RuleBasedStateMachine):
     def it_is_seen_where_the_motion_below_and_the_offset_say(self):
         if self.history and self.base is not None:
             strip = self.tool.id_data.animation_data.nla_tracks["Rigid Motion Layer"].strips[0]
-            # Outside of its strip a layer stays as it is at its ends.
+            # Outside its strip, a layer keeps its values at the ends of the strip.
             expected = self._below() @ offsets(self.tool, np.clip(FRAMES, strip.frame_start, strip.frame_end))
             error = np.abs(seen(self.tool, FRAMES) - expected).max()
             assert error < PRECISION * max(1.0, np.abs(expected).max()), f"it is off by {error}"
@@ -114,7 +114,7 @@ class Layering(RuleBasedStateMachine):
             return
         assert self.base is None
         assert not len(self.tool.id_data.animation_data.nla_tracks)
-        # Outside of all keys it stays where it was on the first and last of them.
+        # Before the first key and after the last, it stays where it was on those keys.
         frames = sorted({key.co.x for curve in curves_of(self.tool).values() for key in curve.keyframe_points})
         inside = (frames[0] <= WHOLE) & (frames[-1] >= WHOLE)
         off = displaced(seen(self.tool, WHOLE), before, radius_of(self.tool))[inside].max(initial=0.0)

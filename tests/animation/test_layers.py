@@ -1,4 +1,4 @@
-"""Offset layers: what is seen is the motion below times the offset, and merged it stays so within the tolerance."""
+"""Offset layers: the displayed pose is the motion below times the offset, and merging keeps it within the tolerance."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from tests.animation.scenes import key, linked, new_object, push_down
 
 PRECISION = 1e-5
 QUATERNION_PRECISION = 1e-3
-"""Blender takes a quaternion of a strip to the power of its influence by an arc cosine in single precision, which knows
-no angle below 0.04 degrees.
+"""Blender computes the power of a strip's quaternion by an arc cosine in single precision, which resolves no angle
+below 0.04 degrees.
 """
 
 WHOLE = np.arange(1.0, 41.0)
@@ -51,7 +51,7 @@ ORDERS = ("QUATERNION", "XYZ", "ZXY", "YZX")
 
 @pytest.mark.parametrize(("kind", "how"), in_turn(KINDS, [*zip(MODES, itertools.cycle(ORDERS), strict=False)]))
 def test_the_motion_below_times_the_offset_to_the_power_of_the_influence_is_seen_and_merged(live_file, kind, how):
-    """Within the tolerance on frames."""
+    """Merged keys are within the tolerance on frames."""
     (below, above), order = how
     carrier = key_base(new(kind, order), below)
     names = {*bpy.data.objects.keys()}, {*bpy.data.actions.keys()}

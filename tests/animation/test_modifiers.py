@@ -1,6 +1,6 @@
-"""F-curve modifiers of the animator's act on what is seen, of whatever kind and whenever they come.
+"""F-curve modifiers added by the animator act on the displayed motion, of any type and added at any time.
 
-Blender itself says what they do: to an object with a linear key on every eighth of a frame, of what channels had.
+The reference is Blender itself: the same modifiers on an object with linear keys on every eighth of a frame.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def modify(fcurves, *modifiers: tuple[str, dict[str, object]]) -> None:
 
 
 def some_of(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
-    """Channels that get modifiers: not all of any part."""
+    """Return the channels that get modifiers: only some channels of each part."""
     curves = curves_of(obj)
     return [curves["location", 1], curves["location", 2], curves[rotation_path(obj), 1], curves["scale", 0]]
 
@@ -96,7 +96,7 @@ def test_a_modifier_acts_on_what_is_seen(live_file, what, how):
 
 @pytest.mark.parametrize("step", [3.0, 40.0])
 def test_stepped_looks_at_frames_that_are_not_seen(live_file, step):
-    """Before the first frame of a scene, and from its last one on; and longer steps than ours to begin with."""
+    """Before the first frame of a scene, and after its last frame; also with steps longer than planned at first."""
     obj, dense = (key(new_object(name), seed=4) for name in ("Tool", "Dense"))
     live_file.scene.frame_start, live_file.scene.frame_end = 1, 40
     for fcurve in [*curves_of(obj).values(), *curves_of(dense).values()]:

@@ -1,4 +1,4 @@
-"""The radius that errors are measured at: how far an object or a bone reaches from its origin."""
+"""The radius for measuring errors: how far an object or a bone reaches from its origin."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Reduced keys, read back from the evaluated scene, keep to their tolerance; and what was there before comes back.
+"""Reduced keys, read back from the evaluated scene, stay within their tolerance, and the original keys can be restored.
 
-Where keys cannot be reduced, it says why and the way out, and changes nothing.
+Where keys cannot be reduced, the refusal names the cause and the way out, and nothing changes.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ TOLERANCE = 0.005
 
 
 def motion(name: str = "reach") -> tuple[np.ndarray, Poses]:
-    """One of the clips in assets/, imported with a pose on every frame."""
+    """Return one of the clips in assets/, imported with a pose on every frame."""
     trajectory = read_trajectories(str(ASSETS / f"{name}.csv")).trajectories[0]
     times, poses, _ = repair(trajectory.times, trajectory.poses)
     frames = np.arange(np.floor((times[-1] - times[0]) * RATE) + 1.0)
@@ -55,19 +55,19 @@ def motion(name: str = "reach") -> tuple[np.ndarray, Poses]:
 
 
 def recorded(name: str = "reach", obj: bpy.types.Object | None = None) -> bpy.types.Object:
-    """An object that moves as recorded."""
+    """Return an object that moves as recorded."""
     obj = obj or new_object()
     bake_poses(obj, *motion(name))
     return obj
 
 
 def off(obj: bpy.types.Object, frames: np.ndarray, truth: Poses) -> float:
-    """The largest shell error of what Blender shows on these frames."""
+    """Return the largest shell error of the poses that Blender shows on these frames."""
     return float(shell_error(read_poses(obj, frames), truth, RADIUS).max())
 
 
 def eighths(frames: np.ndarray) -> np.ndarray:
-    """All eighths of frames from the first to the last."""
+    """Return all eighths of frames from the first to the last."""
     return np.arange(8.0 * frames[0], 8.0 * frames[-1] + 1.0) / 8.0
 
 
@@ -144,7 +144,7 @@ def test_a_scale_goes_with_the_keys_but_where_it_differs_from_axis_to_axis(live_
     on = {path: [point.co.x for point in curves_of(obj)[path, 0].keyframe_points] for path in ("scale", "location")}
     assert (on["scale"] == on["location"]) == goes_along
     assert all(snapshot(obj)["scale", index] == before["scale", index] for index in range(3)) != goes_along
-    # The radius is that of the ball as it is seen at first.
+    # The radius is that of the ball as displayed before reducing.
     seen = RADIUS / np.cbrt(np.abs(scales[0].prod()))
     corners = np.vstack((seen * np.eye(3), np.ones(3))) if goes_along else np.eye(4)[:, 3:]
     moved = ((shown_worlds([obj], frames)[0] - truth) @ corners)[:, :3]
@@ -212,11 +212,11 @@ def test_what_was_done_last_is_taken_back_first_and_the_file_keeps_dense_keys_un
 
 
 COARSE = 0.03
-"""For what moves wildly from one frame to the next."""
+"""Tolerance for objects that move wildly from frame to frame."""
 
 
 def switches(prop: Carrier) -> list[tuple]:
-    """What something is passed to, and over how many frames, from frame to frame."""
+    """Return the holder, the switch and its number of frames, on every frame."""
     result = []
     for frame in range(1, 91):
         bpy.context.scene.frame_set(frame)
@@ -238,8 +238,8 @@ def test_what_is_held_is_reduced_in_its_holders_and_passes_as_before(live_file, 
     assert {20.0, 40.0, 60.0} <= set(key_frames(prop))
     assert switches(prop) == before
     apart = worlds(prop, frames) - truth
-    # Just before a switch it moves as far as whole frames have it.
-    # The radius is that of the scene, whatever it is scaled by.
+    # Just before a switch it moves as between whole frames.
+    # The radius is that of the scene, whatever the scale.
     turned = apart[:, :3, :3] / np.linalg.norm(truth[:, :3, :1], axis=1, keepdims=True)
     error = largest_displacements(apart[:, :3, 3], RADIUS * turned)
     at_once = [np.flatnonzero((frames > frame - 1.0) & (frames < frame)) for frame in (20.0, 60.0)]

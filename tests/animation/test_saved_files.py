@@ -1,6 +1,6 @@
-"""Files that leave the session: a Blender without the extension plays them alike, and loses nothing in saving them.
+"""Saved files: a Blender without the extension plays them the same way, and saving them there loses nothing.
 
-That Blender is another process at factory settings, in which nothing of this program is imported.
+That Blender is another process at factory settings, which imports nothing of this program.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ def save(path: Path) -> Path:
 
 
 def assert_same(worlds: Sequence[np.ndarray], expected: Sequence[np.ndarray], tolerance: float = 1e-6) -> None:
-    """To this share of the size."""
+    """Check that matrices are equal, relative to their size."""
     for one, other in zip(worlds, expected, strict=True):
         assert np.abs(one - other).max() <= tolerance * max(1.0, np.abs(other).max())
 
 
 def every_mode_and_kind() -> tuple[list[bpy.types.Object], dict[str, Own]]:
-    """An object for each mode and rotation order, and the delta transforms of their own that some have."""
+    """Return an object for each mode and rotation order, and the delta transforms that some have of their own."""
     objects, owns = [], {}
     for seed, (mode, order) in enumerate((mode, order) for mode in KEYFRAME_MODES for order in ORDERS):
         obj = new_object(f"{mode} {order}", order)
@@ -99,7 +99,7 @@ def test_the_numbers_of_modes_in_files_stay_what_they_are(live_file):
 
 
 def linked_action(path: Path) -> bpy.types.Object:
-    """Another object that is given the Action of a file."""
+    """Return another object with the linked Action of a file."""
     with bpy.data.libraries.load(str(path), link=True) as (source, chosen):
         chosen.actions = [name for name in source.actions if name.startswith("Tool")]
     obj, (action,) = new_object("Another"), chosen.actions

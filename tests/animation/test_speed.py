@@ -1,4 +1,4 @@
-"""*Equalise Speed*: bodies go evenly along the paths that they had, as Blender plays them between frames."""
+"""Equalise Speed: bodies keep their paths and move at even speed, as Blender plays them between frames."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def tool(mode: str, interpolation: str = "BEZIER", angles: np.ndarray = ANGLES) 
 
 
 def played(obj: bpy.types.Object, first: float = FRAMES[0], last: float = FRAMES[-1]) -> tuple[np.ndarray, np.ndarray]:
-    """Moments and matrices."""
+    """Return frames and world matrices."""
     frames = np.arange(first, last + STEP / 2.0, STEP)
     return frames, shown_worlds([obj], frames)[0]
 
@@ -53,14 +53,14 @@ def ways(worlds: np.ndarray) -> np.ndarray:
 
 
 def path_of(worlds: Sequence[np.ndarray], mode: str) -> np.ndarray:
-    """Places on the path from key to key, by the interpolation of two poses alone."""
+    """Return positions on the path from key to key, by interpolating two poses at a time."""
     keys, shares = Poses.from_matrices(np.array(worlds)), np.linspace(0.0, 1.0, 4001)
     parts = [interpolate((0.0, 1.0), keys[i : i + 2], shares, mode).positions for i in range(len(keys.positions) - 1)]
     return np.concatenate(parts)
 
 
 def off_path(points: np.ndarray, line: np.ndarray) -> float:
-    """How far points are from a line at most: by the pieces around the nearest of its points."""
+    """Return the largest distance of points from a polyline, by the segments around the nearest vertex."""
     most = 0.0
     for point in points:
         near = int(np.square(line - point).sum(axis=1).argmin())
@@ -72,11 +72,11 @@ def off_path(points: np.ndarray, line: np.ndarray) -> float:
 
 
 def unevenness(obj: bpy.types.Object, ease: str) -> float:
-    """The largest difference of Blender's speed from that which is meant, as a part of the mean."""
+    """Return the largest deviation of Blender's speed from the intended speed, as a fraction of the mean."""
     frames, worlds = played(obj)
     keys, done = key_frames(obj), ways(worlds)
     meant = np.diff(SHARES[ease]((frames - frames[0]) / (frames[-1] - frames[0]))) * done[-1]
-    # What is cut short round a corner says nothing.
+    # Steps across a key cut the corner and say nothing about speed.
     whole = ~np.any((keys[:, None] > frames[:-1]) & (keys[:, None] < frames[1:]), axis=0)
     return float(np.abs(np.diff(done) - meant)[whole].max() / meant.mean())
 
@@ -92,7 +92,7 @@ def test_the_speed_is_even_and_the_path_stays(live_file, mode, ease):
     assert key_frames(obj)[[0, -1]].tolist() == [1.0, 81.0]
     assert modes_of(obj, key_frames(obj)[:-1]) == [mode] * 4
     uneven = unevenness(obj, ease)
-    # Two handles say the timing of what is faster half-way all but exactly, and here it turns by up to 110 degrees.
+    # Two handles describe a timing that is faster half-way almost exactly; here the body turns by up to 110 degrees.
     assert uneven < (0.08 if mode in BLENDS else 0.01)
     assert result.unevenness == pytest.approx(uneven, abs=0.005)
     assert result.speed == pytest.approx(ways(worlds)[-1] / 80.0, rel=1e-3)
@@ -104,7 +104,7 @@ def test_keys_stay_on_whole_frames_unless_asked_for(live_file, mode):
     (result,) = equalise_speed(obj).values()
     frames = key_frames(obj)
     assert frames.tolist() == np.rint(frames).tolist()
-    # A key is off by half a frame at most on either side of a segment.
+    # A key is off by at most half a frame on either side of a segment.
     assert unevenness(obj, "CONSTANT") < 1.0 / np.diff(frames).min() + 0.01
     assert result.unevenness == pytest.approx(unevenness(obj, "CONSTANT"), abs=0.01)
 
@@ -116,8 +116,8 @@ def test_blenders_own_in_betweens_keep_their_path(live_file, interpolation):
     was = unevenness(obj, "CONSTANT")
     (result,) = equalise_speed(obj, between_frames=True).values()
     after = played(obj)[1][:, :3, 3]
-    assert off_path(after, before) < (2e-3 if interpolation == "BEZIER" else 1e-5)  # by chords of what was sampled
-    # Where values stay, two handles have times alone to say it.
+    assert off_path(after, before) < (2e-3 if interpolation == "BEZIER" else 1e-5)  # by chords of the samples
+    # Where values stay, the two handles have only their times to shape the speed.
     assert unevenness(obj, "CONSTANT") < (0.25 * was if interpolation == "BEZIER" else 0.01)
     assert result.unevenness == pytest.approx(unevenness(obj, "CONSTANT"), abs=0.05)
 

@@ -1,4 +1,4 @@
-"""How far channels have come between two keys, as `FCurve.evaluate` has it."""
+"""Oracle for timing: the progress of channels between two keys, by `FCurve.evaluate`."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import bpy
 import numpy as np
 
 Curves = dict[tuple[str, int], bpy.types.FCurve]
-"""F-curves with keys by data path and index."""
+"""F-curves with keys, by data path and index."""
 
 
 def progress(curves: Curves, first: float, last: float, frames: np.ndarray, turns: float = 0.0) -> np.ndarray:
-    """How far the channels have come between two keys: the share of the chord that they make up together."""
+    """Return the progress between two keys: the fraction of the chord that all channels cover together."""
     done, whole = np.zeros(len(frames)), 0.0
     for (path, _), fcurve in curves.items():
         weight = 4.0 if path == "rotation_quaternion" else 1.0
@@ -23,13 +23,13 @@ def progress(curves: Curves, first: float, last: float, frames: np.ndarray, turn
         whole += weight * (end - begin) ** 2
     if whole > 0.0:
         return done / whole
-    return _counted(curves, first, last, frames) if turns else done
+    return _progress_of_spin(curves, first, last, frames) if turns else done
 
 
-def _counted(curves: Curves, first: float, last: float, frames: np.ndarray) -> np.ndarray:
-    """The same where the body spins and no channel changes: of a value that goes up by one from key to key.
+def _progress_of_spin(curves: Curves, first: float, last: float, frames: np.ndarray) -> np.ndarray:
+    """Return the progress if the body spins but no channel changes: of a value that rises by one from key to key.
 
-    It has the keys of the first channel, with flat handles.
+    The spare curve has the keys of the first channel, with flat handles.
     """
     like = next(iter(curves.values()))
     with spare_curve() as fcurve:
@@ -50,7 +50,7 @@ def _counted(curves: Curves, first: float, last: float, frames: np.ndarray) -> n
 
 @contextmanager
 def spare_curve() -> Iterator[bpy.types.FCurve]:
-    """An F-curve of an Action that nothing uses."""
+    """Yield an F-curve of an unused Action."""
     action = bpy.data.actions.new("Timing")
     strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
     yield strip.channelbag(action.slots.new("OBJECT", "Timing"), ensure=True).fcurves.new("location")
@@ -58,24 +58,24 @@ def spare_curve() -> Iterator[bpy.types.FCurve]:
 
 
 def evaluated(fcurve: bpy.types.FCurve, frame: float) -> float:
-    """What `FCurve.evaluate` has in single precision, with the digits that slopes need where it is a Bezier segment."""
+    """Return `FCurve.evaluate`, in Bezier segments with the extra digits that slopes need over single precision."""
     value, keys = fcurve.evaluate(frame), fcurve.keyframe_points
     behind = next((number for number, key in enumerate(keys) if key.co[0] > frame), 0)
     if not behind or keys[behind - 1].interpolation != "BEZIER":
         return value
     first, last = keys[behind - 1], keys[behind]
     x, y = np.array((first.co, first.handle_right, last.handle_left, last.co), dtype=np.float64).T
-    # Handles that overlap are shortened.
+    # Overlapping handles are shortened.
     reach = max(abs(x[1] - x[0]) + abs(x[3] - x[2]), x[3] - x[0])
     for ends in (x, y) if reach > x[3] - x[0] else ():
         ends[1:3] += (1.0 - (x[3] - x[0]) / reach) * (ends[[0, 3]] - ends[1:3])
-    exact = _bezier(*y.tolist(), _reached(*x.tolist(), frame))
+    exact = _bezier(*y.tolist(), _bezier_parameter(*x.tolist(), frame))
     return exact if abs(exact - value) <= 1e-5 * max(1.0, abs(value)) else value
 
 
 @lru_cache(maxsize=2**16)
-def _reached(first: float, second: float, third: float, fourth: float, frame: float) -> float:
-    """How far along itself a Bezier segment with these frames is on a frame: the same for most channels of a body."""
+def _bezier_parameter(first: float, second: float, third: float, fourth: float, frame: float) -> float:
+    """Return the parameter of a Bezier segment at a frame. Cached, since most channels of a body share it."""
     low, high = 0.0, 1.0
     for _ in range(50):
         middle = 0.5 * (low + high)

@@ -1,4 +1,4 @@
-"""What animators do with tools on top of modes, as steps of a machine that edits: breakdowns, modifiers, bakes."""
+"""Steps of the editing state machine for tools used on top of modes: breakdowns, modifiers, bakes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tests.animation.scenes import editor, random_values
 
 
 class WithTools(Editing):
-    """An animator who also has these tools."""
+    """An animator who also uses breakdowns, modifiers and bakes."""
 
     @while_on(
         who=shares,
@@ -63,7 +63,7 @@ class WithTools(Editing):
             return
         rest = keys[np.abs(key_frames(obj)[:, None] - keys).min(axis=0) >= 0.01]
         assert not len(rest), "a key went"
-        # What has no key on the keys around changes there, too; and what is muted gets no key.
+        # Channels without a key on the surrounding keys change there, too. Muted channels get no key.
         frames = [{key.co[0] for key in curve.keyframe_points} for curve in moving_curves(obj)]
         is_whole = not any(curve.mute for curve in curves_of(obj).values())
         is_whole = is_whole and all(of_one.issuperset(ends) for of_one in frames)
@@ -138,7 +138,7 @@ class WithTools(Editing):
     @precondition(lambda self: self.on and self.place >= 0)
     @rule(who=shares, back=st.booleans())
     def turn_keys_to_samples(self, who, back):
-        """Blender samples what is shown. There are no modes in samples, nor in keys made of them, and nothing moves."""
+        """Blender samples the displayed motion. Samples and keys made from them have no modes, and the motion stays."""
         name = self._named(who)
         curves = moving_curves(self._found(name))
         first, last = int(self.shift) - 1, int(self.shift) + LAST
@@ -192,7 +192,7 @@ class WithTools(Editing):
             self.before_bake.setdefault(name, keyed[name])
             begin, end = baked if len(live) == 1 else keys[name][[0, -1]]
             is_step = (every >= np.ceil(begin)) & (every <= np.floor(end)) & ((every - begin) % step == 0.0)
-            # What goes on is baked from elsewhere on.
+            # Motion that extrapolates is baked over another range.
             kept = np.isin(every, keys[name]) | (is_step & (len(live) == 1 or not goes_on(self._found(name))))
             for (chosen, then), (_, now) in zip(before[name], self._baked(name, every), strict=True):
                 frames, then, now = every[kept & chosen], then[kept & chosen], now[kept & chosen]
@@ -205,12 +205,12 @@ class WithTools(Editing):
         return any(mode_at(self._found(name), frame) != "BLENDER" for frame in keys[:-1])
 
     def _baked(self, name: Hashable, frames: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Poses on frames that are the same on baked keys, (m, 4, 4) each, and on which of the frames, (m,)."""
+        """Return poses that stay the same on baked keys, (m, 4, 4) each, and a mask of the frames concerned, (m,)."""
         return [(np.ones(len(frames), bool), self._expected(name, frames))]
 
     @while_on(who=shares, how=st.sampled_from(("move", "turn", "snap")), seed=seeds)
     def grab_it_and_key_it(self, who, how, seed):
-        """With Blender's own tools. Where it was put it stays."""
+        """Transform it with Blender's own tools. It stays where it was put."""
         name, frame = self._named(who), bpy.context.scene.frame_current_final
         if self._sharing(name) != {name} or any(curve.mute for curve in curves_of(self._found(name)).values()):
             return
@@ -250,7 +250,7 @@ class WithTools(Editing):
         assert error < 1e-5 * max(1.0, np.abs(seen[0]).max()), f"{name} went on by {error}"
 
     def _snaps(self, name: Hashable) -> bool:
-        """Whether Blender's tools put it where they are to, now."""
+        """Whether Blender's tools now move it exactly to the requested place."""
         return True
 
     @while_on(who=shares, order=st.sampled_from(ORDERS), rekeyed=st.booleans(), seed=seeds)
@@ -271,7 +271,7 @@ class WithTools(Editing):
         self._edit(change)
 
     def _carrying(self, name: Hashable) -> list[Hashable]:
-        """The names of what something moves with, itself first."""
+        """Return the names of the carriers it moves with, itself first."""
         return [name]
 
     @while_on(who=shares, which=shares, at=shares, seed=seeds)
@@ -286,25 +286,25 @@ class WithTools(Editing):
             animation.set_enabled(True)
         self._edit(animation.refresh)
 
-    # Actions that go and come, and are shared
+    # Removing, restoring and sharing Actions
 
     def _animated(self, name: Hashable) -> bpy.types.Object:
-        """The object whose Action moves what has this name."""
+        """Return the object whose Action animates the carrier with this name."""
         return self._found(name).id_data
 
     def _users(self, obj: bpy.types.Object) -> set[bpy.types.Object]:
-        """The objects that move by the same slot as this one, itself among them."""
+        """Return the objects that share the slot of this one, including itself."""
         action, slot = self._linked(obj)
         return {obj} | {
             one for one in map(self._animated, self.names) if action and self._linked(one) == (action, slot)
         }
 
     def _is_free(self, obj: bpy.types.Object) -> bool:
-        """Whether its Action may be exchanged without losing a bake's way back, or leaving others behind."""
+        """Whether its Action may be replaced without losing the keys from before a bake or affecting other users."""
         return self._users(obj) == {obj} and obj not in map(self._animated, self.before_bake)
 
     def _copy(self, obj: bpy.types.Object, new: str, copied: bool) -> None:
-        """The same object once more, with the same Action or with a copy of it."""
+        """Duplicate the object, with the same Action or a copy of it."""
         made = obj.copy()
         made.name, made.data = new, obj.data and obj.data.copy()
         bpy.context.scene.collection.objects.link(made)
@@ -313,7 +313,7 @@ class WithTools(Editing):
         self.names += self._names_in(made)
 
     def _names_in(self, obj: bpy.types.Object) -> list[Hashable]:
-        """The names of all that moves in an object."""
+        """Return the names of all carriers in an object."""
         return [obj.name] if obj.pose is None else [(obj.name, bone.name) for bone in obj.pose.bones]
 
     def _make_single_user(self, obj: bpy.types.Object) -> None:
@@ -338,7 +338,7 @@ class WithTools(Editing):
 
     @while_on(who=shares, cleared=st.booleans(), there=frames_in)
     def take_the_animation_away_for_a_while(self, who, cleared, there):
-        """It stays where it is seen, and goes on as before with its Action."""
+        """The object stays where it is seen without its Action, and moves as before with it."""
         name = self._named(who)
         obj = self._animated(name)
         action, slot = self._linked(obj)
