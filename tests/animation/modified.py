@@ -56,7 +56,7 @@ def held_frames(fcurves: Sequence[bpy.types.FCurve], frames: Sequence[float]) ->
 
 @contextmanager
 def without_modifiers(fcurves: Sequence[bpy.types.FCurve]) -> Iterator[None]:
-    """Mute all modifiers except Cycles in the context. Nothing is evaluated."""
+    """Mute all modifiers except Cycles within the block. Nothing is evaluated."""
     muted = [item for fcurve in fcurves for item in fcurve.modifiers if item.type != "CYCLES" and not item.mute]
     for modifier in muted:
         modifier.mute = True

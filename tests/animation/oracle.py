@@ -62,7 +62,7 @@ def matrices(location: np.ndarray, quaternion: np.ndarray, scale: np.ndarray) ->
 
 
 def play(carriers: Iterable[Carrier], frame: float) -> None:
-    """Go to a frame, as playback does.
+    """Go to a frame as playback does.
 
     A driver of one component of a channel may run while Blender's animation still writes the other components, which
     then have their values of the previous frame. With a driver on Location X this happens to Y and Z once in 50 000 to

@@ -64,7 +64,7 @@ def write(carrier: Carrier, path: str, frames: np.ndarray, values: np.ndarray, i
 def turning(
     name: str, degrees: Sequence[float], frames: Sequence[float], rotation_mode: str = "QUATERNION", sign: float = 1.0
 ) -> bpy.types.Object:
-    """Return an object that turns about z to these angles and moves 2 along x per key; `sign` applies to every second."""
+    """Return an object that turns about z to these angles and moves 2 along x per key. Every second key has `sign`."""
     obj, angles, count = new_object(name, rotation_mode), np.radians(degrees), np.arange(len(frames))
     write_channel(obj, "location", np.array(frames), np.outer(count, (2.0, 0.0, 0.0)))
     if rotation_mode == "QUATERNION":
@@ -158,7 +158,7 @@ def linked(library: Path, name: str) -> bpy.types.Object:
 
 @contextmanager
 def enabled(*addons: str) -> Iterator[None]:
-    """Switch on Blender's own add-ons of these names in the context."""
+    """Switch on Blender's own add-ons of these names within the block. Those that were off are off again afterwards."""
     switched_on = [name for name in addons if addon_utils.check(name) != (True, True)]
     for name in switched_on:
         addon_utils.enable(name)
@@ -171,7 +171,7 @@ def enabled(*addons: str) -> Iterator[None]:
 
 @contextmanager
 def editor(kind: str, mode: str | None = None) -> Iterator[bpy.types.Space]:
-    """Run operators in an editor of this kind in the context."""
+    """Run operators within the block in an editor of this kind."""
     window = bpy.context.window_manager.windows[0]
     area = window.screen.areas[0]
     before, area.type = area.type, kind

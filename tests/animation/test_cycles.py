@@ -1,6 +1,6 @@
-"""Cycles: in each round the body moves as if its keys were real ones, and what is used up is Blender's own again.
+"""Cycles: in each round the body moves as if its keys were real, and after the last round as in Blender's own mode.
 
-With an offset that is so for what ends as it begins, but for its location, or turns about one axis.
+With Repeat with Offset, this requires equal rotation and scale at both ends, or turns about one axis.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ CYCLES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")
 FRAMES = (31.0, 35.0, 42.0)
 
 MIRRORED = np.array((FRAMES[:-1], (FRAMES[0], FRAMES[0] + FRAMES[2] - FRAMES[1])))
-"""The frames of keys, but for the last one, in rounds that run forwards and backwards."""
+"""The frames of the keys except the last, in rounds that run forwards and in rounds that run backwards."""
 
 AROUND = np.arange(0.0, 76.0, 0.25)
-"""The frames of the scene, and quarters: more than two rounds on both sides."""
+"""Quarters of the scene's frames: more than two rounds on both sides."""
 
 
 def cyclic(
     order: str = "QUATERNION", before: str = "REPEAT", after: str = "REPEAT", count: int = 0, how: str = "LINEAR"
 ) -> bpy.types.Object:
-    """An object with three keys, turned on the last as on the first, and Cycles."""
+    """Return an object with three keys and Cycles, with the same rotation on the first and the last key."""
     obj = new_object("Tool", order)
     for path in ("location", rotation_path(obj)):
         values = random_values(obj, path, 3)
@@ -50,10 +50,10 @@ def cyclic(
 def unrolled(
     obj: bpy.types.Object, before: str, after: str, count: int, frames: np.ndarray = AROUND, *, seams: bool = False
 ) -> np.ndarray:
-    """Where a cyclic object has to be on frames: in each round where it is in the first, which may run backwards, or go
-    on from where the one before has ended.
+    """Return a cyclic object's expected matrices on frames: those of the first round, possibly backwards or
+    continued from the end of the previous round.
 
-    On the seams, unless they are asked for, and where the rounds are used up, there is nothing but Blender's own.
+    On seams (unless requested) and after the last round, the matrices are Blender's own.
     """
     first, last = key_frames(obj)[[0, -1]]
     rounds = (frames - first) / (last - first)
@@ -91,7 +91,7 @@ CASES = [
     *((kind, kind, 0, mode) for kind in CYCLES[1:3] for mode, one in KEYFRAME_MODES.items() if not one.is_smooth),
     *(("REPEAT", "REPEAT", 0, mode) for mode, one in KEYFRAME_MODES.items() if one.is_smooth),
 ]
-"""What cycles are on either side, how often, and the mode; flowing on is another test's."""
+"""Cycles before and after, their number of rounds, and the mode. Smooth modes have another test."""
 
 
 @pytest.mark.parametrize(

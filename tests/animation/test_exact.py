@@ -19,7 +19,7 @@ EIGHTHS = np.arange(FRAMES[0] - 1.0, FRAMES[-1] + 1.0, 0.125)
 SHIFTS = (0.0, -5000.0, 100_000.0)
 TIMINGS = ("LINEAR", "BEZIER", "SINE", "CUBIC", "EXPO", "BACK", "CIRC", "BOUNCE", "ELASTIC", "CONSTANT")
 BETWEEN, ON_FRAMES = 1e-4, 1e-5
-"""Allowed error of a point, in metres, 1 m away from the origin of an object that moves by metres."""
+"""Allowed errors in metres between frames and on frames, 1 m from the origin of an object that moves by metres."""
 
 POINTS = np.concatenate((np.zeros((1, 3)), np.eye(3)))
 

@@ -191,7 +191,7 @@ def test_what_was_held_and_baked_to_the_world_is_held_again(live_file):
     before = worlds(prop)
     bake_to_world(prop)
     (found,) = held_segments(prop, [body], 1e-4, RADIUS)
-    # After its last key the hand rests.
+    # After its last key the tool rests.
     assert (found.name, found.first, found.last) == ("Hand.R", 21.0, 61.0)
     reduce_into_holds(prop, [body], 1e-4, RADIUS)
     assert off(worlds(prop), before).max() < 1e-5

@@ -238,7 +238,7 @@ def test_what_is_held_is_reduced_in_its_holders_and_passes_as_before(live_file, 
     assert {20.0, 40.0, 60.0} <= set(key_frames(prop))
     assert switches(prop) == before
     apart = worlds(prop, frames) - truth
-    # Just before a switch it moves as between whole frames.
+    # In the last frame before a switch, only the whole frames count.
     # The radius is that of the scene, whatever the scale.
     turned = apart[:, :3, :3] / np.linalg.norm(truth[:, :3, :1], axis=1, keepdims=True)
     error = largest_displacements(apart[:, :3, 3], RADIUS * turned)

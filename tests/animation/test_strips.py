@@ -1,5 +1,5 @@
-"""Actions in NLA strips, however they are placed, stretched, repeated and blended: at any time what Blender makes of
-channels that have the motion.
+"""Actions in NLA strips at any place, scale, repetition and blending: the displayed motion is always Blender's result
+for channels that have the motion.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ def carriers_of(obj: bpy.types.Object) -> list[Carrier]:
 
 
 def key_anew(obj: bpy.types.Object, mode: str = "dq_sclerp", seed: int = 0, **how: str) -> bpy.types.Object:
-    """Key it, or its bones, in this mode."""
+    """Key the object or its bones, in this mode."""
     (key_all if obj.pose else key)(obj, frames=KEYS, seed=seed, **how)
     set_mode(carriers_of(obj), mode, KEYS)
     return obj
 
 
 def expected_of(obj: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
-    """Where it has to be, or where its bones have to be in its space, shape (k, m, 4, 4)."""
+    """Return its expected matrices, or those of its bones in armature space, shape (k, m, 4, 4)."""
     return np.stack([*expected_poses(obj, frames).values()]) if obj.pose else expected_bases(obj, frames)[None]
 
 
@@ -54,7 +54,7 @@ PLACES = [
     *((-57, 1.0, 1.0, False), (11, 1.0, 2.5, False), (11, 2.0, 3.0, False), (-300, 3.0, 3.0, False)),
     *((21, 1.0, 1.0, True), (21, 0.5, 2.0, True), (21, 4.0, 2.0, True)),
 ]
-"""Where a strip starts, how it is scaled, how often it repeats, and whether it runs backwards."""
+"""A strip's start, scale, number of repetitions, and whether it runs backwards."""
 
 
 def animate(strip: bpy.types.NlaStrip, *points: tuple[float, float]) -> None:
@@ -89,7 +89,7 @@ BLENDS = ("REPLACE", "COMBINE", "ADD", "SUBTRACT", "MULTIPLY")
 )
 def test_a_strip_over_another_shows_what_dense_keys_would(live_file, place, case):
     (kind, how, blend), ((start, scale, repeat, reverse), order) = case, place
-    # In steps of three eighths of a frame, which are on all eighths, before and after the strip, too.
+    # Steps of three eighths of a frame visit all eighths, also before and after the strip.
     frames = start + np.arange(-9.0, LENGTH * repeat * scale + 9.0, 0.375 * max(scale, 1.0))
     shown = []
     for dense in (False, True):

@@ -13,7 +13,7 @@ LAST = 120
 """The last frame, at 24 fps."""
 
 THIRD, AUTOMATIC, OF_OLD = "third", "automatic", "automatic, without smoothing"
-"""Handles: set by hand to a third of the segment; automatic as in Blender; and automatic as in old files."""
+"""Handles: set by hand to a third of the segment; automatic; and automatic without smoothing, as in old files."""
 
 
 def _chain(first: str, names: str, head: tuple[float, float, float], step: tuple[float, float, float]) -> list[Rest]:

@@ -119,7 +119,7 @@ def test_a_bone_that_hardly_moves_is_left_with_one_key(live_file):
 
 @pytest.mark.parametrize("carried", [False, True])
 def test_a_foot_that_stands_is_held(live_file, carried):
-    """The hip above it sways. If carried, the rig moves on, and the hip moves back by the same amount."""
+    """The hip above sways. If carried, the rig moves on, and the hip moves back in it by the same distance."""
     rig = new_rig("Leg", LEG)
     # A pendulum that hangs from the swaying hip, with its end fixed.
     sway = 0.08 * np.sin(0.2 * FRAMES)

@@ -16,7 +16,7 @@ from tests.animation.keyed import rotation_path
 from tests.animation.scenes import new_object, push_down
 
 MOVES = np.array((1.0, 13.0, 22.0, 31.0, 46.0, 60.0, 80.0))
-"""The frames of the keys of hands."""
+"""The key frames of hands."""
 
 ARMS = (
     Rest("Body", (0.0, 0.0, 0.9), (0.0, 0.0, 1.4), roll=0.4),

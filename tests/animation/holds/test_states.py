@@ -124,7 +124,7 @@ class Holding(WithHolds):
 
     @while_on(which=st.sampled_from(("Parent", "Other")), parented=st.booleans(), by_command=st.booleans())
     def parent_the_tool(self, which, parented, by_command):
-        """A prop in a holder goes on with it: it does not move."""
+        """A held tool stays in its holder and does not move."""
         tool, is_held = self._found("Tool"), animation.hold_facts(self._found("Tool")).now is not None
         if is_held and not self._is_passing("Tool"):
             bpy.context.view_layer.update()
@@ -226,7 +226,7 @@ class Holding(WithHolds):
 
     @while_on(who=shares, start=st.integers(1, 30), scale=st.sampled_from((1.0, 2.0)), by=st.sampled_from(HANDS))
     def hold_in_a_strip(self, who, start, scale, by):
-        """As outside strips. The displayed pose stays when the strip is removed."""
+        """In tweak mode as anywhere else. The displayed pose stays when the strip is removed."""
         prop = self._found(self._named(who))
         name, obj = self._named(who), prop.id_data
         if obj.animation_data.action is None or not len(key_frames(prop)) or not self._is_free(obj):
