@@ -65,7 +65,7 @@ class Body:
         if not self.curves:
             self.curves = {(path, index): curve for path in curves for index, curve in curves[path].items()}
         self.is_filled, self.keys, self.is_uneven = bool(filled), keys, "scale" in changing and not self.scaled
-        self.shaping = np.array([key for number, key in enumerate(keys) if not self._is_passed(number)])
+        self.shaping = np.array([key for number, key in enumerate(keys) if not self._is_without_influence(number)])
 
     def components(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return location, quaternion and scale on frames."""
@@ -128,7 +128,7 @@ class Body:
         changes = [about_one_axis(*pair) if order == "AXIS_ANGLE" else np.subtract(*pair) for pair in pairs]
         return max((np.abs(change).max() for change in changes), default=0.0) >= np.pi - 1e-4
 
-    def _is_passed(self, number: int) -> bool:
+    def _is_without_influence(self, number: int) -> bool:
         """Whether a key is a breakdown: on the path, but without influence on its shape."""
         keys = self.keys
         before, mode = (mode_at(self.obj, frame) for frame in keys[[number - 1, number]])

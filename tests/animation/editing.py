@@ -154,7 +154,7 @@ class Editing(Machine):
         keys = key_frames(self._found(name))
         return sorted({float(keys[number % len(keys)]) for number in which}) if len(keys) else []
 
-    def _completes(self, frame: float) -> Callable[[dict, dict], None]:
+    def _inserted_keys_check(self, frame: float) -> Callable[[dict, dict], None]:
         """Return a check that keys are as edited, except for changes caused by keys inserted on this frame."""
 
         def settle(made: dict, after: dict) -> None:
@@ -179,7 +179,9 @@ class Editing(Machine):
         bpy.context.view_layer.update()
         paths = transform_paths(obj) if what is None else [transform_paths(obj)[part] for part in what]
         index = -1 if what is None or index is None else index
-        goes_by = self._frames_to_go_by(name) if what is None and not posed and not self._is_posed(obj) else np.empty(0)
+        goes_by = (
+            self._frames_kept_by_a_key(name) if what is None and not posed and not self._is_posed(obj) else np.empty(0)
+        )
         before = self._expected(name, goes_by)
         if posed:
             self._pose(obj, seed)
@@ -191,7 +193,7 @@ class Editing(Machine):
             for path in paths:
                 self._found(name).keyframe_insert(path, frame=frame, index=index)
 
-        self._edit(insert, self._completes(frame))
+        self._edit(insert, self._inserted_keys_check(frame))
         self._assert_in_place(seen)
         obj = self._found(name)
         for path in paths:
@@ -216,7 +218,7 @@ class Editing(Machine):
             error = np.abs(now - then).max()
             assert error < 1e-5 * max(1.0, np.abs(then).max()), f"{name} jumped from\n{then}\nto\n{now}"
 
-    def _frames_to_go_by(self, name) -> np.ndarray:
+    def _frames_kept_by_a_key(self, name) -> np.ndarray:
         """Return the frames on which the motion must stay if all keyed channels get a key now."""
         obj, frame = self._found(name), bpy.context.scene.frame_current_final
         keys, mode, body = key_frames(obj), mode_at(obj, frame), Body(obj, self.owns.get(name, Own()))
@@ -283,7 +285,7 @@ class Editing(Machine):
                     value = random_values(obj, path, 1, seed)[0, index]
                     fcurve.keyframe_points.insert(frame, value)
 
-        self._edit(insert, self._completes(frame))
+        self._edit(insert, self._inserted_keys_check(frame))
 
     @rule(who=shares, which=shares, to=frames_in, one_channel=st.booleans())
     def move_keys(self, who, which, to, one_channel):
@@ -310,7 +312,7 @@ class Editing(Machine):
                 for (path, _), fcurve in curves_of(obj).items():
                     if path == transform_paths(obj)[part]:
                         fcurve.keyframe_points.clear()
-            self._let_be_heard(name)
+            self._unmute_if_all_muted(name)
 
         self._edit(delete)
         if len(parts) == 3:
@@ -379,11 +381,11 @@ class Editing(Machine):
 
             def change(fcurve: bpy.types.FCurve) -> None:
                 fcurve.mute = not fcurve.mute
-                self._let_be_heard(name)
+                self._unmute_if_all_muted(name)
 
             self._edit_curve(name, which, change)
 
-    def _let_be_heard(self, name: Name) -> None:
+    def _unmute_if_all_muted(self, name: Name) -> None:
         """Unmute all channels if all keyed ones are muted: modes rightly report that they cannot act on these."""
         obj = self._found(name)
         for fcurve in curves_of(obj).values() if not moving_curves(obj) else ():
@@ -424,7 +426,7 @@ class Editing(Machine):
 
     @while_on(which=st.sets(st.integers(0, 5), min_size=1), mode=st.sampled_from(MODE_IDS), by_property=st.booleans())
     def set_the_mode_of_all_segments(self, which, mode, by_property):
-        names = self._several(which)
+        names = self._chosen_names(which)
 
         def change() -> None:
             carriers = [self._found(name) for name in names]

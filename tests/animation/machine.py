@@ -152,7 +152,7 @@ class Machine(RuleBasedStateMachine):
     def _named(self, share: float) -> Name:
         return self.names[int(share * len(self.names))]
 
-    def _several(self, which: set[int]) -> list[Name]:
+    def _chosen_names(self, which: set[int]) -> list[Name]:
         return [*dict.fromkeys(self.names[number % len(self.names)] for number in sorted(which))]
 
     @staticmethod
@@ -182,10 +182,10 @@ class Machine(RuleBasedStateMachine):
 
     def _start_history(self) -> None:
         bpy.ops.ed.undo_push(message="Begin")
-        self.history = [self._remembered()]
+        self.history = [self._current_state()]
         self.place = 0
 
-    def _remembered(self) -> tuple[dict, list, dict]:
+    def _current_state(self) -> tuple[dict, list, dict]:
         return self._keyed(), self.names.copy(), self.before_bake.copy()
 
     def _keyed(self) -> dict[Name, dict]:
@@ -209,7 +209,7 @@ class Machine(RuleBasedStateMachine):
         else:
             settle(made, after)
         if self.on:
-            self.history[self.place + 1 :] = [self._remembered()]
+            self.history[self.place + 1 :] = [self._current_state()]
             self.place += 1
 
     # Undo, redo, un-bake, files, on and off
@@ -221,9 +221,9 @@ class Machine(RuleBasedStateMachine):
         for _ in range(abs(place - self.place)):
             assert (bpy.ops.ed.undo if steps < 0 else bpy.ops.ed.redo)() == {"FINISHED"}
         self.place = place
-        self._is_as_remembered()
+        self._restore_remembered_names()
 
-    def _is_as_remembered(self) -> None:
+    def _restore_remembered_names(self) -> None:
         keyed, names, before_bake = self.history[self.place]
         self.names, self.before_bake = names.copy(), before_bake.copy()
         assert self._keyed() == keyed

@@ -34,7 +34,7 @@ class Path:
             ends = self.body.key_poses(np.array((self.first, self.last)))
             spin, ends.quaternions[1] = self.body.spin_and_end(self.first, self.last)
             return spin.add_to(interpolate((0.0, 1.0), ends, share, self.mode, extrapolate=True), share)
-        leaving, arriving = self._passings()
+        leaving, arriving = self._end_tangents()
         if elapsed is not None:
             share = share + leaving[1] * elapsed * (1.0 - elapsed) ** 2 - arriving[1] * elapsed**2 * (1.0 - elapsed)
         return self.body.spin(self.first, self.last).add_to(self._smooth(share, (leaving[0], arriving[0])), share)
@@ -55,15 +55,15 @@ class Path:
         ]
         return _with_tangents(around, self.body.key_poses(shown), before, share, tangents, spins)
 
-    def _passings(self) -> list[tuple[float, float]]:
+    def _end_tangents(self) -> list[tuple[float, float]]:
         """Return the length of the tangent, and the missing slope of progress, at both ends of a segment."""
         place, codes = int(np.flatnonzero(self.keys == self.first)[0]), self.body.codes(self.first)
         passings = [(1.0, 0.0), (1.0, 0.0)]
         if "BEZIER" in codes and codes <= {"LINEAR", "BEZIER"}:
             if place > 0:
-                passings[0] = _passing(self.body, self.keys[place - 1 : place + 2], after=True)
+                passings[0] = _key_tangent(self.body, self.keys[place - 1 : place + 2], after=True)
             if place + 2 < len(self.keys):
-                passings[1] = _passing(self.body, self.keys[place : place + 3], after=False)
+                passings[1] = _key_tangent(self.body, self.keys[place : place + 3], after=False)
         return passings
 
     def beside(self, frames: np.ndarray, share: np.ndarray) -> Poses:
@@ -74,8 +74,10 @@ class Path:
         blend = np.clip(share, 0.0, 1.0)
         if self.mode == "motor_spline":
             blend = blend * blend * (3.0 - 2.0 * blend)
-        change = steps(_moved(first[:, None]), _moved(second[:, None]))[:, :6].T
-        poses = _moved_along(_moved_along(poses, _moved(first[:, None] * np.ones(len(share)))), _moved(change * blend))
+        change = steps(_as_poses(first[:, None]), _as_poses(second[:, None]))[:, :6].T
+        poses = _moved_along(
+            _moved_along(poses, _as_poses(first[:, None] * np.ones(len(share)))), _as_poses(change * blend)
+        )
         if poses.scales is not None:
             poses = replace(poses, scales=poses.scales * np.exp(growths[0] + blend * (growths[1] - growths[0])))
         return poses
@@ -102,7 +104,7 @@ class Path:
         return np.array(places), steps(self.poses(np.array(places)), keys)
 
 
-def _passing(body: Body, keys: np.ndarray, *, after: bool) -> tuple[float, float]:
+def _key_tangent(body: Body, keys: np.ndarray, *, after: bool) -> tuple[float, float]:
     """Return the tangent's length, and the missing slope of progress, before or after the middle one of three keys."""
     times = np.diff(keys)
     begin, end = keys[after : after + 2]
@@ -162,7 +164,7 @@ def _with_tangents(
     second = np.where(u < 0.0, 0.0, np.where(u > 1.0, u - 1.0, -(u**2) * (1.0 - u)))
     added = np.outer(bends[0], first) + np.outer(bends[1], second)
     rigid = Poses(keys.positions, keys.quaternions)[segment : segment + 2]
-    result = _moved_along(interpolate((0.0, 1.0), rigid, u, "dq_sclerp", extrapolate=True), _moved(added[:6]))
+    result = _moved_along(interpolate((0.0, 1.0), rigid, u, "dq_sclerp", extrapolate=True), _as_poses(added[:6]))
     if keys.scales is None:
         return result
     return replace(result, scales=keys.scales[segment] * np.exp(u * screws[segment, 6] + added[6]))
@@ -182,7 +184,7 @@ def steps(first: Poses, second: Poses) -> np.ndarray:
     return np.vstack((result, grown)).T
 
 
-def _moved(rows: np.ndarray) -> Poses:
+def _as_poses(rows: np.ndarray) -> Poses:
     quaternions, translations = twists.exponential(rows)
     return Poses(translations.T, quaternions.T)
 

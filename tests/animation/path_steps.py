@@ -191,7 +191,7 @@ class WithPaths(WithTools):
         carrier = self._found(name)
         keys, modes = key_frames(carrier), {mode_at(carrier, key) for key in key_frames(carrier)}
         if how == "insert":
-            return self._frames_to_go_by(name)
+            return self._frames_kept_by_a_key(name)
         types = {
             t
             for c in moving_curves(carrier)

@@ -160,7 +160,7 @@ class WithTools(Editing):
         assert np.abs(self._bases([name], frames)[name] - before).max() < 1e-5 * max(1.0, np.abs(before).max())
         bpy.ops.ed.undo()
         self.place -= 1
-        self._is_as_remembered()
+        self._restore_remembered_names()
         self._edit(lambda: None)
 
     @while_on(
@@ -169,7 +169,7 @@ class WithTools(Editing):
         interpolation=st.sampled_from(("LINEAR", "CONSTANT")),
     )
     def bake(self, which, step, interpolation):
-        names = [name for name in self._several(which) if self._sharing(name) == {name}]
+        names = [name for name in self._chosen_names(which) if self._sharing(name) == {name}]
         live = [name for name in names if self._is_live(name)]
         keyed = {name: self._originals(name) for name in live}
         frames = np.concatenate(
@@ -198,7 +198,7 @@ class WithTools(Editing):
                 frames, then, now = every[kept & chosen], then[kept & chosen], now[kept & chosen]
                 error = np.abs(now - then).max(axis=(1, 2), initial=0.0) / max(1.0, np.abs(then).max(initial=0.0))
                 assert error.max(initial=0.0) < 2e-5, f"{name} is baked otherwise on {frames[error.argmax()]}"
-        self.history[self.place] = self._remembered()
+        self.history[self.place] = self._current_state()
 
     def _is_live(self, name: Hashable) -> bool:
         keys = key_frames(self._found(name))
@@ -229,7 +229,7 @@ class WithTools(Editing):
                     bpy.ops.transform.translate(value=by)
                 elif how == "turn":
                     bpy.ops.transform.rotate(value=by[0], orient_axis="Z", orient_type="GLOBAL")
-                elif self._snaps(name):
+                elif self._snaps_exactly(name):
                     bpy.context.scene.cursor.location = by
                     bpy.ops.view3d.snap_selected_to_cursor(use_offset=False)
             if carrier != carrier.id_data:
@@ -240,8 +240,8 @@ class WithTools(Editing):
             bpy.context.view_layer.update()
             seen.append(world_of(carrier))
 
-        self._edit(change, self._completes(frame))
-        if self._snaps(name):
+        self._edit(change, self._inserted_keys_check(frame))
+        if self._snaps_exactly(name):
             there = {"move": before[:3, 3] + by, "turn": before[:3, 3], "snap": by}[how]
             assert np.abs(seen[0][:3, 3] - there).max() < 1e-4 * max(1.0, np.abs(before).max(), np.abs(there).max())
         bpy.context.scene.frame_set(int(frame // 1) + 3)
@@ -249,7 +249,7 @@ class WithTools(Editing):
         error = np.abs(world_of(self._found(name)) - seen[0]).max()
         assert error < 1e-5 * max(1.0, np.abs(seen[0]).max()), f"{name} went on by {error}"
 
-    def _snaps(self, name: Hashable) -> bool:
+    def _snaps_exactly(self, name: Hashable) -> bool:
         """Whether Blender's tools now move it exactly to the requested place."""
         return True
 

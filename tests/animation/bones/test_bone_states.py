@@ -112,14 +112,16 @@ class EditingBones(WithHolds):
                 with_edit_bones(obj, rename)
             else:
                 rename(obj.data.bones)
-            self.names = [self._now(name, rig, names) for name in self.names]
-            self.before_bake = {self._now(name, rig, names): kept for name, kept in self.before_bake.items()}
+            self.names = [self._name_after_renaming(name, rig, names) for name in self.names]
+            self.before_bake = {
+                self._name_after_renaming(name, rig, names): kept for name, kept in self.before_bake.items()
+            }
 
         self._edit(change)
-        assert self._keyed() == {self._now(name, rig, names): kept for name, kept in keyed.items()}
+        assert self._keyed() == {self._name_after_renaming(name, rig, names): kept for name, kept in keyed.items()}
 
     @staticmethod
-    def _now(name: Name, rig: str, names: dict[str, str]) -> Name:
+    def _name_after_renaming(name: Name, rig: str, names: dict[str, str]) -> Name:
         return (rig, names.get(name[1], name[1])) if name[0] == rig else name
 
     @precondition(lambda self: self.on and 2 < len(self.names) < 8)

@@ -118,7 +118,7 @@ class EditingObjects(WithHolds):
             for path in (location, rotation):
                 obj.keyframe_insert(path, frame=frame)
 
-        self._edit(set_and_key, self._completes(frame))
+        self._edit(set_and_key, self._inserted_keys_check(frame))
         now = expected_bases(bpy.data.objects[name], [frame], self.owns[name])[0]
         size = max(1.0, np.abs(matrix).max())
         assert np.abs(now[:3, 3] - matrix.translation).max() < 2e-5 * size

@@ -39,8 +39,8 @@ class WithHolds(WithPaths):
     def _expected(self, name: Name, frames: Sequence[float]) -> np.ndarray:
         return poses_in_holders(self._found(name), frames) if self._is_held(name) else super()._expected(name, frames)
 
-    def _frames_to_go_by(self, name: Name) -> np.ndarray:
-        return np.empty(0) if self._is_held(name) else super()._frames_to_go_by(name)
+    def _frames_kept_by_a_key(self, name: Name) -> np.ndarray:
+        return np.empty(0) if self._is_held(name) else super()._frames_kept_by_a_key(name)
 
     def _keyed(self) -> dict[Name, dict]:
         """Return snapshots without influences, which follow from keys, and holders, which other edits may change."""
@@ -76,7 +76,7 @@ class WithHolds(WithPaths):
         passing = [(frames > switch.begin) & (frames < switch.frame) for switch in switches]
         return [(chosen & ~np.any(passing, axis=0), poses), (chosen, *shown_worlds([self._found(name)], frames))]
 
-    def _snaps(self, name: Name) -> bool:
+    def _snaps_exactly(self, name: Name) -> bool:
         """Blender moves passing props only partly, and snaps held props as if they were in the world."""
         return not self._is_held(name)
 
@@ -121,7 +121,7 @@ class WithHolds(WithPaths):
     def choose_over_how_many_frames_it_passes(self, who, over):
         self._if_possible(self._named(who), lambda prop: animation.pass_frames(prop, over))
 
-    def _brought(self, name: str, *, link: bool, is_local: bool) -> bpy.types.Object:
+    def _object_from_copy(self, name: str, *, link: bool, is_local: bool) -> bpy.types.Object:
         """Return an object from a copy of this file. All its dependencies come with it into the scene.
 
         A linked object may be made local with its Action; its other dependencies stay linked.
@@ -149,7 +149,7 @@ class WithHolds(WithPaths):
 
         def change() -> None:
             own, objects, libraries = self._found(name), set(bpy.data.objects), set(bpy.data.libraries)
-            linked = self._brought(own.id_data.name, link=True, is_local=is_local)
+            linked = self._object_from_copy(own.id_data.name, link=True, is_local=is_local)
             bpy.context.view_layer.update()
             both = [own, linked if own == own.id_data else linked.pose.bones[own.name]]
             here, there = shown_worlds(both, frames)

@@ -174,7 +174,7 @@ class Holding(WithHolds):
         name = self._named(who).split("/")[0]
 
         def change() -> None:
-            brought = self._brought(name, link=link, is_local=True)
+            brought = self._object_from_copy(name, link=link, is_local=True)
             self.names += self._names_in(brought)
             self._may_be_unbaked(name, brought.name)
 
