@@ -155,12 +155,12 @@ def run(
         overdue = bool(not frame and row)
         while overdue and sender.next - set_now < now:
             due = max(sender.next - set_now, before)
-            come(due)
+            deliver(due)
             said = sender.poll(due + set_now)
             post(said, due)
             # Where its clock was set there is nothing to say, as the sample is going to tell.
             overdue = bool(said)
-        come(now)
+        deliver(now)
         if frame:
             drawn += [(now, shown) for shown in receiver.show(clock(now)).values() if shown.moment >= times[0]]
         else:
