@@ -1,11 +1,11 @@
-"""Measures: how far a motion is from the recording it stands for.
+"""Error measures: how far a motion is from the recording that it approximates.
 
 Lengths are in the unit of the positions, rotations in radians, velocities in units per second. The shell error is the
-largest displacement of any point of the body within `radius` of its origin: position and rotation together, as a body
-of that size shows them. A tolerance in it is a promise for all of these points, however the body's axes lie.
+largest displacement of any point of the body within `radius` of its origin. It combines the position and rotation
+errors as they show on a body of that size. A tolerance on it holds for all of these points, in any direction.
 
-The Animation Compression Library has the name, and the reason for it (`docs/error_metrics.md` there); it looks at three
-points of the shell, which may move by less than half of it (0.41 in 20 000 random pairs).
+The name and the reasoning come from the Animation Compression Library (`docs/error_metrics.md` there). That library
+measures three points of the shell, which may move by less than half of the shell error (0.41 in 20 000 random pairs).
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from .poses import Poses, numbers
 from .quaternions import angle_between, components, cross
 
 ZERO_LENGTH = 1e-150
-"""Stands for zero, where only ratios count; its square is still above the smallest float."""
+"""Replaces zero where only ratios count. Its square is still above the smallest float."""
 
 NEWTON_STEPS = 6
-"""To all digits: the first guess is within a factor of 1.5, and each step doubles the digits."""
+"""Steps to full precision: the first guess is within a factor of 1.5, and each step doubles the correct digits."""
 
 
 @dataclass(frozen=True)
 class Errors:
-    """The errors of n poses, as `measure` finds them.
+    """The errors of n poses, as returned by `measure`.
 
     See Also
     --------
-    measure : What makes them.
-    rms : One number of many.
+    measure : Computes these errors.
+    rms : Reduces many errors to one number.
 
     Examples
     --------
@@ -48,27 +48,27 @@ class Errors:
     """The largest displacement of any point of the shell, shape (..., n), in the unit of the positions."""
 
     position: np.ndarray
-    """How far the origin is off, shape (..., n), in the unit of the positions."""
+    """The distance between the origins, shape (..., n), in the unit of the positions."""
 
     rotation: np.ndarray
     """The angle between the rotations, shape (..., n), in radians from 0 to pi."""
 
     velocity: np.ndarray
-    """How far the origin's velocity is off between samples, shape (..., n - 1), in units per second."""
+    """The error of the origin's velocity between samples, shape (..., n - 1), in units per second."""
 
 
 def measure(times: ArrayLike, poses: Poses, truth: Poses, radius: ArrayLike = 0.1) -> Errors:
-    """All errors of `poses` against `truth`, sample by sample.
+    """Return all errors of `poses` against `truth`, sample by sample.
 
     Parameters
     ----------
     times : array-like, shape (n,) or (..., n)
         Seconds, rising.
     poses, truth : Poses, shape (..., n)
-        With unit quaternions, both in one unit of length.
+        With unit quaternions, both in the same unit of length.
     radius : float or array-like, shape (..., n)
-        Of the ball around the origin in which no point is off by more than the shell error, in the unit of the
-        positions; not below zero.
+        The radius of the shell: no point this near the origin is displaced by more than the shell error. In the unit of
+        the positions; not below zero.
 
     Returns
     -------
@@ -78,23 +78,23 @@ def measure(times: ArrayLike, poses: Poses, truth: Poses, radius: ArrayLike = 0.
     Raises
     ------
     TypeError
-        Where one of the motions is no `Poses`.
+        If either motion is not a `Poses`.
     ValueError
-        Where the shapes do not fit one another, or the radius is no length.
+        If the shapes do not fit each other, or the radius is not a length.
 
     See Also
     --------
-    rms : One number of many errors.
+    rms : Reduces many errors to one number.
     shell_error : The shell error alone.
 
     Notes
     -----
-    The velocity error is that of the origin, by differences between successive samples: an in-between that runs
-    unevenly, or turns a corner at a key, shows there first. A motion that is merely displaced has none.
+    The velocity error compares the velocities of the origin, from differences between successive samples. Uneven
+    in-betweens and corners at keys show in it first. A motion that is merely displaced has no velocity error.
 
     Examples
     --------
-    A body that should turn by 90 degrees, and does not:
+    A body that should turn by 90 degrees, but does not:
 
     >>> from rigid_motion.motion import Poses, measure
     >>> rests = Poses([[0, 0, 0]] * 2, [[1, 0, 0, 0]] * 2)
@@ -120,7 +120,7 @@ def measure(times: ArrayLike, poses: Poses, truth: Poses, radius: ArrayLike = 0.
 
 
 def _check_pair(poses: Poses, truth: Poses) -> None:
-    """Raise an error where two motions cannot be compared."""
+    """Raise an error if two motions cannot be compared."""
     check_poses(poses, "poses")
     check_poses(truth, "the true poses")
     if poses.shape != truth.shape:
@@ -131,14 +131,14 @@ def _check_pair(poses: Poses, truth: Poses) -> None:
 
 
 def shell_error(poses: Poses, truth: Poses, radius: ArrayLike = 0.1) -> np.ndarray:
-    """Return the largest displacement of any point within `radius` of the origin: position and rotation in one.
+    """Return the largest displacement of any point within `radius` of the origin, due to position and rotation.
 
     Parameters
     ----------
     poses, truth : Poses, shape (..., n)
         With unit quaternions.
     radius : float or array-like, shape (..., n)
-        Of the ball around the origin, in the unit of the positions, before the body's own scale.
+        The radius of the ball around the origin, in the unit of the positions, before the body's own scale.
 
     Returns
     -------
@@ -148,9 +148,9 @@ def shell_error(poses: Poses, truth: Poses, radius: ArrayLike = 0.1) -> np.ndarr
     Raises
     ------
     TypeError
-        Where one of the motions is no `Poses`.
+        If either motion is not a `Poses`.
     ValueError
-        Where the shapes do not fit one another.
+        If the shapes do not fit each other.
 
     See Also
     --------
@@ -158,16 +158,17 @@ def shell_error(poses: Poses, truth: Poses, radius: ArrayLike = 0.1) -> np.ndarr
 
     Notes
     -----
-    The name is that of the Animation Compression Library (`docs/error_metrics.md` there), which looks at three points.
+    The name comes from the Animation Compression Library (`docs/error_metrics.md` there), which measures three points.
 
     From one pose to the other the origin moves by d, and the body turns by theta about the axis n. A point of the shell
-    moves by d and by a chord across the axis, of 2 radius sin(theta / 2) at most, in any direction across: the largest
-    displacement is the length of d_along + d_across (1 + chord / |d_across|). With v = n sin(theta / 2), the vector
-    part of the quaternion, its square is d.d + 4 radius |d x v| + 4 radius^2 v.v, where nothing is divided.
+    moves by d plus a chord perpendicular to the axis, at most 2 radius sin(theta / 2) long and in any such direction.
+    The largest displacement is therefore the length of d_along + d_across (1 + chord / |d_across|). With
+    v = n sin(theta / 2), the vector part of the quaternion, its square is d.d + 4 radius |d x v| + 4 radius^2 v.v,
+    which needs no division.
 
     Examples
     --------
-    Off by 3 cm, and then by 3 cm and a half turn, which takes some point of the shell 20 cm across:
+    An error of 3 cm, and then of 3 cm and a half turn, which moves some point of the shell 20 cm across:
 
     >>> from rigid_motion.motion import Poses, shell_error
     >>> truth = Poses([[0, 0, 0]] * 2, [[1, 0, 0, 0]] * 2)
@@ -192,10 +193,10 @@ def shell_error(poses: Poses, truth: Poses, radius: ArrayLike = 0.1) -> np.ndarr
 def largest_displacement(
     d: np.ndarray, v: np.ndarray, radius: np.ndarray, true_radius: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return the shell error (..., n) of balls that are off by d (3, ..., n) and turned by v, which it may overwrite.
+    """Return the shell error (..., n) of balls displaced by d and turned by v, both (3, ..., n). It may overwrite v.
 
-    v (3, ..., n) is the vector part of the unit quaternion of the turn. Balls that should be of a size of their own
-    have a `true_radius`.
+    v is the vector part of the unit quaternion of the turn. `true_radius` is the correct radius of the balls, if it
+    differs from `radius`.
     """
     if true_radius is not None:
         return _displacement_of_growing(d, v, radius, true_radius)
@@ -207,11 +208,12 @@ def largest_displacement(
 
 
 def _displacement_of_growing(d: np.ndarray, v: np.ndarray, radius: np.ndarray, true_radius: np.ndarray) -> np.ndarray:
-    """Return the same of a ball of two sizes, shape (..., n), from d and v (3, ..., n).
+    """Return the shell error (..., n) of balls with two different radii, from d and v (3, ..., n).
 
-    It is the longest sum of d and a vector to an ellipsoid about the axis: the difference of the radii along the axis,
-    and across it the third side of the triangle that they make with theta between them. Of the multiplier that belongs
-    to it, what it is above the square of the larger half-axis is found by Newton's method, from below.
+    It is the longest sum of d and a vector to an ellipsoid about the axis. The half-axis along the axis is the
+    difference of the radii. The half-axes across are the third side of the triangle that the radii form with theta
+    between them. Newton's method finds, from below, how far the Lagrange multiplier is above the square of the larger
+    half-axis.
 
     Source: Conn, Gould and Toint, "Trust-Region Methods", 2000, section 7.3.
     """
@@ -236,21 +238,21 @@ def _displacement_of_growing(d: np.ndarray, v: np.ndarray, radius: np.ndarray, t
 
 
 def rms(errors: ArrayLike) -> float:
-    """Return the root of the mean square over all samples.
+    """Return the root mean square over all samples.
 
     Parameters
     ----------
     errors : array-like, any shape
-        Of samples, in any unit.
+        Errors of samples, in any unit.
 
     Returns
     -------
     float
-        In the unit of the errors; 0 where there are none.
+        In the unit of the errors; 0 if there are none.
 
     See Also
     --------
-    measure : Errors, sample by sample.
+    measure : Computes errors, sample by sample.
 
     Examples
     --------
@@ -263,7 +265,7 @@ def rms(errors: ArrayLike) -> float:
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Of vectors (3, ...)."""
+    """Return the dot products of vectors (3, ...)."""
     return np.einsum("i...,i...->...", a, b)
 
 

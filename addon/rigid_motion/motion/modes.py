@@ -1,4 +1,4 @@
-"""The table of interpolation modes, and interpolation between keys by any of them."""
+"""The table of interpolation modes, and interpolation between keys in any mode."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from .segments import Curves, Segments, interpolate_along, prepare_within
 
 @dataclass(frozen=True)
 class Mode:
-    """One way of filling in between two keys: a row of the table `MODES`.
+    """One way to interpolate between two keys: a row of the table `MODES`.
 
     The formulas are in `docs/conventions.md`, and those of single modes in `algebras`. Source: Kamarianakis, Lydatakis
-    and Papagiannakis, "Never 'Drop the Ball' in the Operating Room"; the smooth modes are this program's own.
+    and Papagiannakis, "Never 'Drop the Ball' in the Operating Room". The smooth modes are new in this program.
 
     See Also
     --------
-    interpolate : Poses between keys, in a mode that is given by its name in `MODES`.
+    interpolate : Poses between keys, in a mode given by its name in `MODES`.
 
     Examples
     --------
@@ -37,48 +37,48 @@ class Mode:
     """
 
     number: int
-    """What files store for the mode. Never changed, never used again for another; 0 is Blender's own."""
+    """The number that files store for the mode. It never changes and is never reused; 0 is Blender's interpolation."""
 
     label: str
-    """As menus and reports show it."""
+    """The name shown in menus and reports."""
 
     description: str
-    """What it does for the motion, in one sentence, as a tooltip shows it."""
+    """The effect on the motion in one sentence, shown as a tooltip."""
 
     algebra: str
-    """What it is computed with, in a sentence of its own."""
+    """The algebra used for the computation, as a separate sentence."""
 
     curves: Callable[[Segments], Curves] = field(repr=False)
-    """The fast form."""
+    """The fast implementation."""
 
     reference: Callable[[Poses, Poses, np.ndarray], Poses] = field(repr=False)
-    """The same motion in that algebra, for single pairs of poses."""
+    """The same motion computed in `algebra`, for single pairs of poses."""
 
     behind: int = 0
-    """How many keys before a segment influence it; of `is_reference` those that a search for keys looks at."""
+    """How many keys before a segment influence it. With `is_reference`, how many the key search considers."""
 
     ahead: int = 0
-    """How many keys after a segment influence it: a stream has to wait for them."""
+    """How many keys after a segment influence it. A stream has to wait for them."""
 
     for_streams: bool = False
-    """Whether it uses no key after the segment's own. It is for streams alone: keyframes have better modes."""
+    """Whether the mode is only for streams. It uses no key after the segment's own; keyframes have better modes."""
 
     is_reference: bool = False
-    """Whether it is what there is without any mode, to compare the modes with, and none for keyframes. Keys far away
-    influence a segment a little."""
+    """Whether this is Blender's own interpolation, for comparison only and not for keyframes. Distant keys influence a
+    segment a little."""
 
     is_separable: bool = False
-    """Whether neither rotation nor location depends on the other, so that each can have keys of its own."""
+    """Whether rotation and location are independent, so that each can have separate keys."""
 
     same: str = ""
-    """Which other mode makes the same motion, and when, in one sentence."""
+    """Which other mode gives the same motion, and when, in one sentence."""
 
     twin: str = ""
-    """The name in `MODES` of the one that makes the same motion where nothing grows."""
+    """The name in `MODES` of the mode that gives the same motion if no scale changes."""
 
     @property
     def is_smooth(self) -> bool:
-        """Whether it leaves a segment as it arrived from the one before, and needs the keys around for it."""
+        """Whether velocity continues from segment to segment, which requires keys outside the segment."""
         return self.behind > 0 or self.ahead > 0
 
 
@@ -171,16 +171,16 @@ MODES: dict[str, Mode] = {
         is_reference=True,
     ),
 }
-"""Every mode, by the name that functions take it by."""
+"""All modes, by the name that functions accept."""
 
 KEYFRAME_MODES: dict[str, Mode] = {
     name: mode for name, mode in MODES.items() if not (mode.for_streams or mode.is_reference)
 }
-"""The modes for keys that are all known from the beginning."""
+"""The modes for keyframes, where all keys are known from the beginning."""
 
 
 def mode_named(name: str) -> Mode:
-    """Return the mode of a name in `MODES`. Raises ValueError for another, and says which there are."""
+    """Return the mode with this name in `MODES`. For any other name, raise a ValueError that lists the modes."""
     if not isinstance(name, str):
         raise TypeError(f"mode is {name!r}: give the name of one, such as 'dq_sclerp'")
     if name not in MODES:
@@ -189,29 +189,29 @@ def mode_named(name: str) -> Mode:
 
 
 def no_such_mode(name: str, modes: Iterable[str]) -> str:
-    """Return what there is to say of a name that is none of these modes."""
+    """Return the error message for a name that is not among these modes."""
     return f"there is no mode {name!r}; the modes are {', '.join(modes)}"
 
 
 def interpolate(
     key_times: ArrayLike, keys: Poses, times: ArrayLike, mode: str = "dq_sclerp", *, extrapolate: bool = False
 ) -> Poses:
-    """Return the poses at `times` of objects that have the poses `keys` at `key_times`.
+    """Return the poses at `times` of objects with the poses `keys` at `key_times`.
 
     Parameters
     ----------
     key_times : array-like, shape (n,) or (..., n)
-        Strictly rising, in any unit; the same for all objects, or a row for each.
+        Strictly rising, in any unit; the same for all objects, or one row for each.
     keys : Poses, shape (n,) or (..., n)
-        The leading axes count objects. Quaternions need not be normalised; those that differ from their predecessor
-        by more than 180 degrees are taken with the other sign, so that the motion goes the short way.
+        The leading axes count objects. Quaternions need not be normalised. A quaternion more than 180 degrees from its
+        predecessor is used with the opposite sign, so that the motion goes the short way.
     times : array-like, shape (m,) or (..., m)
-        In any order, in the unit of `key_times`; the same for all objects, or a row for each.
+        In any order, in the unit of `key_times`; the same for all objects, or one row for each.
     mode : str
-        A name in `MODES`. All are written out, with their sources, in `docs/conventions.md`.
+        A name in `MODES`. The formulas of all modes, with sources, are in `docs/conventions.md`.
     extrapolate : bool
-        Whether the motion of the first and last segment goes on outside the keys. Otherwise the end poses hold. Scales
-        stay positive: they stop at `1e40` and `1e-40`, and `cga_lerp` with growth stops before it has no scale.
+        Whether the motion of the first and last segment continues outside the keys. Otherwise the end poses hold.
+        Scales stay positive: they stop at `1e40` and `1e-40`, and `cga_lerp` with growth stops before a scale of zero.
 
     Returns
     -------
@@ -221,23 +221,24 @@ def interpolate(
     Raises
     ------
     TypeError
-        Where the keys are no `Poses`.
+        If the keys are not a `Poses`.
     ValueError
         For an unknown mode, shapes that do not fit, times that do not rise, numbers that are not finite, quaternions of
         length zero and scales that are not positive. The message names the key.
 
     See Also
     --------
-    interpolate_by_segments : A mode for each segment.
-    in_betweens : Segments at a timing of their own, such as an easing.
+    interpolate_by_segments : Interpolation with a mode for each segment.
+    in_betweens : Interpolation with a custom timing of each segment, such as an ease.
 
     Notes
     -----
-    Two rotations exactly 180 degrees apart have two shortest ways; the signs of the quaternions as given decide.
+    Between two rotations exactly 180 degrees apart there are two shortest ways. The signs of the given quaternions
+    decide which one is used.
 
     Examples
     --------
-    One metre along x with a quarter turn about z: the screw goes round an axis, and not along the straight line.
+    One metre along x with a quarter turn about z. The screw turns around an axis and does not follow the straight line:
 
     >>> from rigid_motion.motion import Poses, interpolate
     >>> keys = Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0], [1, 0, 0, 1]])
@@ -251,7 +252,7 @@ def interpolate(
     check_flag(extrapolate, "extrapolate")
     keys = _checked(key_times, keys)
     if keys.shape[-1] == 1:
-        # A motion with a single key is a rest at all times: the segment from that key to itself.
+        # A motion with a single key rests all the time: a segment from that key to itself.
         keys, key_times = keys[..., [0, 0]], np.array((0.0, 1.0))
     if times.ndim == 0:
         raise ValueError("times to interpolate at need the shape (m,): of a single one make a list, [time]")
@@ -259,7 +260,7 @@ def interpolate(
         raise ValueError(f"times of shape {times.shape} do not fit keys of shape {keys.shape}")
     if times.size == 0:
         return keys[..., :0]
-    # Rising times that end in finite numbers are finite throughout, and what is not finite does not rise.
+    # Rising times with finite ends are all finite, and NaN never compares as rising.
     if np.all(times[..., 1:] >= times[..., :-1]) and np.isfinite(times[..., [0, -1]]).all():
         return interpolate_along(curves_of_mode, key_times, keys, times, extrapolate)
     if not np.isfinite(times).all():
@@ -274,7 +275,7 @@ def interpolate(
 def in_betweens(
     key_times: ArrayLike, keys: Poses, counts: ArrayLike, progress: ArrayLike, mode: str = "dq_sclerp"
 ) -> Poses:
-    """Return the poses of segments that are run through at a timing of their own, such as an easing.
+    """Return poses within segments at a custom timing of each segment, such as an ease.
 
     Parameters
     ----------
@@ -283,10 +284,10 @@ def in_betweens(
     keys : Poses, shape (n,) or (..., n)
         As in `interpolate`, at least two a row.
     counts : array-like of int, shape (n - 1,) or (..., n - 1)
-        How many poses are wanted of each segment.
+        How many poses to return for each segment.
     progress : array-like, shape (m,), m the sum of the counts
-        How far each has come in its segment, from 0 at the first key to 1 at the second. Where it passes them, the
-        motion of the segment goes on, as in `interpolate` with `extrapolate`.
+        The progress of each pose within its segment, from 0 at the first key to 1 at the second. Outside this range,
+        the motion of the segment continues, as in `interpolate` with `extrapolate`.
     mode : str
         A name in `MODES`.
 
@@ -299,17 +300,17 @@ def in_betweens(
     Raises
     ------
     TypeError, ValueError
-        As `interpolate` does, and for counts that are no whole numbers from 0 on, or not of as many poses as there are
-        progresses.
+        As `interpolate` does, and for counts that are not whole numbers from 0 on, or whose sum is not the number of
+        progress values.
 
     See Also
     --------
     prepare : The same for several calls with the same keys.
-    interpolate : Poses at times.
+    interpolate : Poses at given times.
 
     Examples
     --------
-    Two poses of the first segment, early as an easing has them, and one of the second:
+    Two early poses of the first segment, as with an ease, and one pose of the second:
 
     >>> from rigid_motion.motion import Poses, in_betweens
     >>> keys = Poses([[0, 0, 0], [1, 0, 0], [1, 2, 0]], [[1, 0, 0, 0]] * 3)
@@ -320,7 +321,7 @@ def in_betweens(
 
 
 def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Callable[..., Poses]:
-    """`in_betweens` for several calls with the same keys: what depends on the keys alone is worked out once.
+    """Prepare several calls of `in_betweens` with the same keys: work that depends only on the keys is done once.
 
     Parameters
     ----------
@@ -334,14 +335,14 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
     Returns
     -------
     callable
-        From (counts, progress, selected=slice(None)) to Poses of shape (m,), with counts and progress as `in_betweens`
-        takes them. `selected` are the segments that they are for, counted through all objects, one after the other; its
-        step is 1 and its ends are not counted from the end.
+        Takes (counts, progress, selected=slice(None)) and returns Poses of shape (m,), with counts and progress as in
+        `in_betweens`. `selected` is the slice of segments to use, counted through all objects one after the other. Its
+        step is 1 and its bounds are not negative.
 
     Raises
     ------
     TypeError, ValueError
-        As `in_betweens` does; so does what is returned.
+        As `in_betweens` does; the returned callable raises the same errors.
 
     See Also
     --------
@@ -365,7 +366,7 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
     within = prepare_within(curves_of_mode, key_times, keys)
 
     def poses(counts: ArrayLike, progress: ArrayLike, selected: slice = slice(None)) -> Poses:
-        """Return poses (m,) of the selected segments, by how many are wanted of each and how far each of them is."""
+        """Return poses (m,) of the selected segments, from the pose count of each and the progress of each pose."""
         counts, progress = np.asarray(counts), numbers(progress, "progress")
         if counts.size and (not np.issubdtype(counts.dtype, np.integer) or counts.min() < 0):
             raise ValueError("counts of in-betweens need to be whole numbers from 0 on, one for each segment")
@@ -382,7 +383,7 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
 
 
 def _checked(key_times: np.ndarray, keys: Poses) -> Poses:
-    """Return the keys with unit quaternions, or a ValueError that names the first key that is wrong."""
+    """Return the keys with unit quaternions. Raise a ValueError that names the first invalid key."""
     check_poses(keys, "keys")
     if not keys.shape or keys.shape[-1] == 0:
         raise ValueError("interpolation needs at least one key")
@@ -401,7 +402,7 @@ def _checked(key_times: np.ndarray, keys: Poses) -> Poses:
 
 
 def _require(valid: np.ndarray, complaint: str, axes_of_a_key: int = 0) -> None:
-    """Raise a ValueError that names the first key that is not valid; a key's own axes come last."""
+    """Raise a ValueError that names the first invalid key. The last `axes_of_a_key` axes are within a key."""
     if not valid.all():
         index = np.argwhere(~valid)[0].tolist()
         *objects, key = index[: len(index) - axes_of_a_key]

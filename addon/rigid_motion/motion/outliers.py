@@ -1,6 +1,4 @@
-"""Spikes of a recording: a few samples that fit neither what is before them nor what is behind them, which fit each
-other.
-"""
+"""Spikes in recordings: a few samples that deviate from the samples before and after them, which fit each other."""
 
 from __future__ import annotations
 
@@ -17,42 +15,42 @@ MOST_ROWS = 6
 """The longest spike, in samples."""
 
 EXPECTING_SAMPLES = 3
-"""Samples on either side that say what is expected."""
+"""Samples on either side that predict the samples of a spike."""
 
 MIN_SPIKE_ENDS_RATIO, MIN_SPIKE_SAMPLE_RATIO = 3.5, 2.0
-"""By how many times of what is usual here a spike is off at its ends, and each sample of it."""
+"""The least deviation of a spike at its ends, and of each of its samples, as a multiple of the usual deviation here."""
 
 LONG_SPIKE_SAMPLES, LONG_SPIKE_FACTOR = 4, 1.4
-"""So many samples have to be off by so many times as much: hits of a foot look like such, and are none."""
+"""Spikes of this many samples or more need deviations this many times as large, as foot impacts look like spikes."""
 
 MIN_REPEAT_RATIO = 2.0
-"""The same for what is a sample before it once more."""
+"""Replaces `MIN_SPIKE_ENDS_RATIO` for samples that repeat the sample before them."""
 
 MAX_REPEATED_RATIO = 0.1
-"""The share of samples up to which those that repeat the one before are lost ones for certain where others tremble.
-Where there are more, the recording is made of steps."""
+"""If fewer than this fraction of samples repeat their predecessor while others jitter, they are certainly lost samples.
+Otherwise the recording consists of steps."""
 
 STILL_FACTOR = 3.0
-"""So many times as much where nothing trembles, as what is usual is not sure there."""
+"""The required deviations are this many times as large without jitter, as the usual deviation is uncertain there."""
 
 MAX_RETURN_RATIO = 3.0
-"""By how many times of what is usual what is behind a spike is off from what was before it, at most."""
+"""How far the samples after a spike may deviate from those before it, as a multiple of the usual deviation."""
 
 USUAL_RUNS = 12
-"""Runs on either side that say what is usual: the livelier side does."""
+"""Runs on either side that define the usual deviation; the side with the larger median counts."""
 
 USUAL_RATIO = 0.8
-"""The share of a recording that is usual, where nothing trembles."""
+"""The quantile of the deviations in a recording that is usual, if the recording has no jitter."""
 
 MEDIAN_NORM = 1.53817
-"""The norm below which half of normal vectors (3,) are."""
+"""The median norm of standard normal vectors (3,)."""
 
 
 def outliers(times: np.ndarray, poses: Poses, noise: Trembling) -> tuple[np.ndarray, np.ndarray]:
-    """Return which samples (n,) are spikes, and which repeat one before them while the body moved on.
+    """Return which samples (n,) are spikes, and which repeat the sample before them while the body moved on.
 
-    Of a recording of times (n,) and poses (n,) that trembles so much. Longer spikes are looked for first. A hit is
-    none: behind it another motion goes on.
+    The recording has times (n,), poses (n,) and this noise. Longer spikes are searched for first. An impact is not a
+    spike: the motion after it is a different one.
     """
     found = np.zeros(len(times), dtype=bool)
     repeats = np.zeros(len(times), dtype=bool)
@@ -63,7 +61,7 @@ def outliers(times: np.ndarray, poses: Poses, noise: Trembling) -> tuple[np.ndar
         firsts = np.arange(EXPECTING_SAMPLES, len(times) - length - EXPECTING_SAMPLES + 1)
         over = np.zeros(len(firsts))
         apart = np.zeros(len(firsts))
-        for surprise, each, across in _surprises(times, poses, noise, firsts, length):
+        for surprise, each, across in _run_deviations(times, poses, noise, firsts, length):
             over = np.maximum(over, np.where(each > MIN_SPIKE_SAMPLE_RATIO, surprise, 0.0))
             apart = np.maximum(apart, across)
         is_repeated = repeats[firsts[:, None] + np.arange(length)].all(axis=1)
@@ -74,18 +72,20 @@ def outliers(times: np.ndarray, poses: Poses, noise: Trembling) -> tuple[np.ndar
             if not found[row - 1 : row + length + 1].any():
                 found[row : row + length] = True
     lost = repeats & (trembles and 0.0 < repeats.mean() < MAX_REPEATED_RATIO)
-    # What repeats for longer stands still.
+    # A body whose samples repeat for longer stands still.
     edges = np.flatnonzero(np.diff(lost, prepend=False, append=False))
     for first, end in zip(edges[0::2], edges[1::2], strict=True):
         lost[first:end] = end - first <= MOST_ROWS
     return found & ~repeats, (found & repeats) | lost
 
 
-def _surprises(
+def _run_deviations(
     times: np.ndarray, poses: Poses, noise: Trembling, firsts: np.ndarray, length: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield for places and rotations how far each run that begins at `firsts` is off at its ends, how far each of its
-    samples is, and how far what is behind it is off from what was before it: in times of what is usual there.
+    """Yield deviations of the runs of samples that begin at `firsts`, first of positions and then of rotations.
+
+    The deviations are those of a run at its ends, of the least deviating sample of a run, and of the samples after a
+    run from those before it. All are multiples of the usual deviation there.
     """
 
     def samples(first: int, count: int) -> np.ndarray:
@@ -93,7 +93,7 @@ def _surprises(
 
     around = np.concatenate((samples(-2, 2), samples(length, 2)), axis=1)
     before, after = samples(-3, 3), samples(length, 3)
-    # What is expected of which samples, by which.
+    # Pairs: the samples that predict, and the samples that they predict.
     tried = (
         (around, samples(0, length)),
         (before, samples(0, 1)),
@@ -105,45 +105,48 @@ def _surprises(
     for position, smallest in ((True, noise.position), (False, noise.rotation)):
         offs = []
         for known, asked in tried:
-            shares = _shares(times[known], times[asked])
+            weights = _lagrange_weights(times[known], times[asked])
             if position:
                 values = poses.positions[known], poses.positions[asked]
             else:
                 first, last = seen[known[:, 1]], seen[known[:, -2]]
                 origin = turned(first, 0.5 * turns_between(first, last))[:, None]
                 values = turns_between(seen[known], origin), turns_between(seen[asked], origin)
-            off = np.linalg.norm(np.einsum("mrk,mkc->mrc", shares, values[0]) - values[1], axis=-1)
-            # As if each came of one noisy number.
-            off /= np.sqrt(1.0 + np.einsum("mrk,mrk->mr", shares, shares))
+            off = np.linalg.norm(np.einsum("mrk,mkc->mrc", weights, values[0]) - values[1], axis=-1)
+            # Scale the noise to that of a single sample.
+            off /= np.sqrt(1.0 + np.einsum("mrk,mrk->mr", weights, weights))
             most = off.max(axis=1)
-            # Where nothing trembles all that is usual anywhere is.
+            # Without jitter, the usual deviation of the whole recording is the minimum.
             least = MEDIAN_NORM * smallest or np.quantile(most, USUAL_RATIO)
-            offs.append(off / np.maximum(least, _usual(most, length + EXPECTING_SAMPLES))[:, None])
+            offs.append(off / np.maximum(least, _usual_sizes(most, length + EXPECTING_SAMPLES))[:, None])
         inside, at_first, at_last, *gaps = offs
         surprise = np.minimum(np.minimum(at_first[:, 0], at_last[:, 0]), inside.max(axis=1))
         yield surprise, inside.min(axis=1), np.maximum(*(gap.max(axis=1) for gap in gaps))
 
 
-def _shares(known: np.ndarray, asked: np.ndarray) -> np.ndarray:
-    """Return by how much of values at known times (m, k) polynomials through them are made at others (m, r): (m, r, k).
+def _lagrange_weights(known: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """Return weights (m, r, k) of values at known times (m, k) for their interpolating polynomials at times (m, r).
 
-    By Lagrange's formula.
+    They follow Lagrange's formula.
     """
     count = known.shape[1]
-    shares = np.empty((*asked.shape, count))
+    weights = np.empty((*asked.shape, count))
     for own in range(count):
         others = [other for other in range(count) if other != own]
         apart = known[:, None, [own]] - known[:, None, others]
-        shares[..., own] = np.prod((asked[..., None] - known[:, None, others]) / apart, axis=-1)
-    return shares
+        weights[..., own] = np.prod((asked[..., None] - known[:, None, others]) / apart, axis=-1)
+    return weights
 
 
-def _usual(values: np.ndarray, apart: int) -> np.ndarray:
-    """Return what is usual at each of values (n,): the median of some so far before it or behind it, above 0."""
+def _usual_sizes(values: np.ndarray, apart: int) -> np.ndarray:
+    """Return the usual size of each of values (n,): the larger median of values at least `apart` before or after it.
+
+    The result is above 0.
+    """
     count = len(values)
     width = min(USUAL_RUNS, count)
     medians = np.median(sliding_window_view(values, width), axis=-1)
-    # Near an end, the side that is there counts.
+    # Near an end, only the existing side counts.
     before, behind = np.arange(count) - apart - width + 1, np.arange(count) + apart
     sides = [
         np.where((at >= 0) & (at < len(medians)), medians[at.clip(0, len(medians) - 1)], 0.0) for at in (before, behind)

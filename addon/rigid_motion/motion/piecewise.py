@@ -1,7 +1,7 @@
-"""Functions that are put together piece by piece: each piece its own coefficients, over functions that all share.
+"""Piecewise functions: each piece combines the same basis functions with different coefficients.
 
-Pieces (segments of a motion, spans of an F-curve) stand one behind the other, and so do the samples in them: of piece i
-there are counts[i], none where it has none.
+Pieces (segments of a motion, spans of an F-curve) follow one another, and so do their samples. Piece i has counts[i]
+samples, possibly none.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ from collections.abc import Iterator
 import numpy as np
 
 BLOCK_SAMPLES = 32768
-"""Samples worked on at once: few enough for the processor's caches, enough that NumPy's calls cost little."""
+"""Samples processed at once: few enough for the processor's caches, enough that NumPy's call overhead is small."""
 
 DENSE_RUN_SAMPLES = 128
-"""Samples in a row of pieces with equally many each, from which on matrix products beat repeating coefficients."""
+"""Samples in a run of pieces with equal counts, from which on matrix products beat repeated coefficients."""
 
 DENSE_PIECE = 8
-"""Samples of a piece from which on they do."""
+"""Mean samples for each piece, from which on matrix products beat repeated coefficients."""
 
 
 def blocks(bounds: np.ndarray, size: int = BLOCK_SAMPLES) -> Iterator[tuple[slice, slice]]:
-    """Slices of pieces and of their samples, of about `size` samples each.
+    """Yield slices of pieces and of their samples, each with about `size` samples.
 
-    `bounds` (S + 1,) is where the samples of each piece begin, and the end.
+    `bounds` (S + 1,) are the first samples of the pieces, and the number of all samples.
     """
     if bounds[-1] <= size:
         yield slice(0, len(bounds) - 1), slice(0, int(bounds[-1]))
@@ -35,24 +35,24 @@ def blocks(bounds: np.ndarray, size: int = BLOCK_SAMPLES) -> Iterator[tuple[slic
 
 
 def is_dense(counts: np.ndarray) -> bool:
-    """Whether `multiply_matrices` is the quicker way for these counts (S,) of samples."""
+    """Whether `multiply_matrices` is the faster method for these counts (S,) of samples."""
     runs = 1 + np.count_nonzero(counts[1:] != counts[:-1])
     return bool(counts.sum() >= max(DENSE_RUN_SAMPLES * runs, DENSE_PIECE * len(counts)))
 
 
 def multiply_matrices(matrices: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-    """Fill out (k, n) with the matrix (k, b) of each of S pieces times the functions (b, n) at its samples.
+    """Fill `out` with the matrix of each of S pieces times the functions at its samples.
 
     Parameters
     ----------
     matrices : array, shape (S, k, b)
     functions : array, shape (b, n)
     counts : array of int, shape (S,)
-        Samples of each piece, n in all.
+        The number of samples of each piece, n in all.
     out : array, shape (k, n)
     """
     piece = sample = 0
-    for rounds, runs in _rounds(counts):
+    for rounds, runs in _repeated_runs(counts):
         pieces, samples = sum(length for length, _ in runs), sum(length * count for length, count in runs)
         last_piece, last_sample = piece + rounds * pieces, sample + rounds * samples
         of_pieces = matrices[piece:last_piece].reshape(rounds, pieces, *matrices.shape[1:])
@@ -69,14 +69,14 @@ def multiply_matrices(matrices: np.ndarray, functions: np.ndarray, counts: np.nd
         piece, sample = last_piece, last_sample
 
 
-def _rounds(counts: np.ndarray) -> Iterator[tuple[int, list[tuple[int, int]]]]:
-    """Yield counts (S,) as runs of equal ones, (length, count), and how often such runs come one after another.
+def _repeated_runs(counts: np.ndarray) -> Iterator[tuple[int, list[tuple[int, int]]]]:
+    """Yield how often a pattern of runs repeats, and the pattern: runs (length, count) of equal numbers in counts (S,).
 
-    Objects that are keyed alike repeat their counts: few large products take the place of many small ones.
+    Objects with keys at the same times repeat their counts, so that a few large products replace many small ones.
     """
     bounds = [0, *(np.flatnonzero(counts[1:] != counts[:-1]) + 1).tolist(), len(counts)]
     runs = [(last - first, int(counts[first])) for first, last in itertools.pairwise(bounds) if last > first]
-    # The outermost ones may have been cut.
+    # The outermost runs may have been cut.
     inner = runs[1:-1]
     period = inner.index(inner[0], 1) if inner[:1] and inner[0] in inner[1:] else 0
     rounds = len(inner) // period if period else 0
@@ -89,7 +89,7 @@ def _rounds(counts: np.ndarray) -> Iterator[tuple[int, list[tuple[int, int]]]]:
 
 
 def combine(coefficients: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-    """Do the same as `multiply_matrices`, from coefficients (k, b, S), the quicker way for these counts."""
+    """Do the same as `multiply_matrices` from coefficients (k, b, S), by the faster method for these counts."""
     nonempty = np.flatnonzero(counts)
     if len(nonempty) < len(counts):
         coefficients, counts = coefficients[..., nonempty], counts[nonempty]
@@ -98,7 +98,7 @@ def combine(coefficients: np.ndarray, functions: np.ndarray, counts: np.ndarray,
     if is_dense(counts):
         multiply_matrices(np.ascontiguousarray(coefficients.transpose(2, 0, 1)), functions, counts, out)
         return
-    # Few rows at a time, for repeating multiplies what there is.
+    # Few rows at a time, as repeated coefficients take much memory.
     batch_size = max(1, BLOCK_SAMPLES // max(1, functions.shape[1]))
     for row in range(0, len(out), batch_size):
         rows = slice(row, row + batch_size)

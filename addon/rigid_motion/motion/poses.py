@@ -1,8 +1,8 @@
-"""Poses: where a rigid body is and how it is turned, for many moments at once.
+"""Poses: positions, rotations and scales of rigid bodies at many moments.
 
-Positions are in the units of their source, quaternions are unit, scalar first (w, x, y, z) as in `mathutils`, and
-scales are uniform and positive. All arrays are float64 and share their leading axes; the last of those is time, so
-one object has arrays of shape (n, 3) and (n, 4), and many objects have (objects, n, 3) and (objects, n, 4).
+Positions are in the units of their source. Quaternions are unit, scalar first (w, x, y, z) as in `mathutils`. Scales
+are uniform and positive. All arrays are float64 and share their leading axes, the last of which is time: one object has
+arrays of shape (n, 3) and (n, 4), and many objects have (objects, n, 3) and (objects, n, 4).
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from numpy.typing import ArrayLike, DTypeLike
 from .quaternions import align_signs, components, conjugate, from_matrices, multiply, rotate, vectors
 
 MAX_ABS = 1e40
-"""A number beyond this is damage, not a measurement, and more than Blender can hold. Powers of it are still floats."""
+"""A larger number is damage, not a measurement, and beyond Blender's range. Powers of this limit are still floats."""
 
 MAX_AXES_ERROR_RATIO = 1e-3
-"""By what part of the scale the axes of a matrix may differ from three of one length at right angles to one another."""
+"""How far the axes of a matrix may differ from orthogonal axes of equal length, as a fraction of the scale."""
 
 MAX_UNIT_SCALE_ERROR = 1e-6
-"""A scale that differs less from 1 is 1: single precision has no better."""
+"""A scale that differs from 1 by less counts as 1, due to the rounding of single precision."""
 
 MIN_TIME_GAP = 1e-30
-"""Between two moments, for the same reason: what happens in less has a speed that is no float."""
+"""The least time between two moments: with less, a speed may exceed the range of floats."""
 
 
 def numbers(values: ArrayLike, name: str) -> np.ndarray:
-    """Return an argument of this name as an array of float64, kept where it is one.
+    """Return an argument of this name as an array of float64; such an array is returned as it is.
 
-    Raises TypeError where it is made of strings, complex numbers or anything else, ValueError for rows of different
+    Raises TypeError if it consists of strings, complex numbers or other objects, ValueError for rows of different
     lengths.
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
@@ -53,38 +53,37 @@ def numbers(values: ArrayLike, name: str) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Positions, rotations and, where the body grows or shrinks, scales.
+    """Positions, rotations and, if the body grows or shrinks, scales.
 
     Parameters
     ----------
     positions : array-like, shape (..., n, 3)
         In any unit of length. The last of the leading axes is time: one object has (n, 3), many have (objects, n, 3).
     quaternions : array-like, shape (..., n, 4)
-        w, x, y, z (Hamilton's, as in `mathutils`). Kept as given: neither normalised nor checked for signs, which
-        `repair` does.
+        w, x, y, z (Hamilton's, as in `mathutils`). Kept as given: `repair` normalises them and aligns their signs.
     scales : array-like, shape (..., n), optional
-        Uniform scales. None means 1 everywhere, and is what every mode runs fastest with.
+        Uniform scales. None means 1 everywhere, and is fastest in every mode.
 
     Raises
     ------
     ValueError
-        Where the shapes do not fit one another.
+        If the shapes do not fit each other.
     TypeError
-        Where positions, quaternions or scales are no numbers.
-        Also where NumPy is to make one array of poses, or work on them as if they were one: a mean or a sum of
-        quaternions is no rotation. Take `positions` and `quaternions`.
+        If positions, quaternions or scales are not numbers.
+        Also if NumPy should convert poses to one array, or use them as one: a mean or a sum of quaternions is not a
+        rotation. Use `positions` and `quaternions` instead.
 
     See Also
     --------
     interpolate : Poses between keys.
-    repair : Unit quaternions from recorded ones.
+    repair : Makes recorded poses fit for interpolation.
 
     Notes
     -----
-    Arrays of float64 are kept, not copied; all others become float64. Whatever indexes the leading axes by NumPy's
-    rules indexes poses, a slice is a view, and a number picks a single pose, of shape (). The length of poses is that
-    of their first axis, which is also what a loop runs over; a single pose has neither. To `==`, poses are the same
-    only where they are the same object.
+    Arrays of float64 are kept, not copied; all others are converted to float64. Poses are indexed like their leading
+    axes, by NumPy's rules: a slice is a view, and a number picks a single pose of one object, of shape (). The length
+    of poses is that of their first axis, and loops iterate over that axis; a single pose supports neither. `==`
+    compares identity: two `Poses` are equal only if they are the same object.
 
     Examples
     --------
@@ -123,7 +122,7 @@ class Poses:
 
     @classmethod
     def from_xyzw(cls, positions: ArrayLike, quaternions: ArrayLike, scales: ArrayLike | None = None) -> Poses:
-        """Poses whose quaternions are x, y, z, w, as ROS, Unity, Unreal, glTF and SciPy have them.
+        """Return poses from quaternions in the order x, y, z, w, as in ROS, Unity, Unreal, glTF and SciPy.
 
         Examples
         --------
@@ -138,17 +137,17 @@ class Poses:
 
     @classmethod
     def from_matrices(cls, matrices: ArrayLike) -> Poses:
-        """Poses of matrices (..., 4, 4) that multiply columns, as NumPy, Blender and OpenCV have them.
+        """Return poses from matrices (..., 4, 4) that multiply column vectors, as in NumPy, Blender and OpenCV.
 
         Raises
         ------
         ValueError
-            Where a matrix mirrors, shears or scales unevenly: no pose does. The message names the first.
+            If a matrix mirrors, shears or scales unevenly, or has a scale of zero. The message names the first one.
 
         Notes
         -----
-        Quaternions have successive signs only after `repair`. Scales are None where all are 1. A matrix with NaN is a
-        pose of NaN.
+        The signs of the quaternions are consistent only after `repair`. Scales are None if all are 1. A matrix with
+        NaN becomes a pose of NaN.
 
         Examples
         --------
@@ -191,20 +190,20 @@ class Poses:
         return self.shape[0]
 
     def __iter__(self) -> Iterator[Poses]:
-        """Return the poses along the first axis: single ones of one object, or those of each of many objects."""
+        """Iterate over the first axis: the single poses of one object, or the poses of each of many objects."""
         if not self.shape:
             raise TypeError("a single pose, of shape (), has nothing to go through")
         return (self[index] for index in range(len(self)))
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
-        """Refuse to be one array: NumPy would take means and sums of quaternions, and leave out scales."""
+        """Raise a TypeError: as one array, NumPy would compute means and sums of quaternions, and leave out scales."""
         raise TypeError(
             "poses are no single array: take poses.positions and poses.quaternions, or rows of x, y, z, w, x, y, z by "
             "np.concatenate((poses.positions, poses.quaternions), axis=-1)"
         )
 
     def __array_function__(self, function: Callable, types: tuple, args: tuple, kwargs: dict) -> np.ndarray:
-        """Refuse in words too where NumPy would keep quiet: to `np.array_equal`, what is no array is just not equal."""
+        """Raise a TypeError where NumPy would fail silently: `np.array_equal` just returns False without an array."""
         raise TypeError(f"np.{function.__name__} takes arrays: poses.positions and poses.quaternions are some")
 
     def __getitem__(self, index: Any) -> Poses:
@@ -213,34 +212,37 @@ class Poses:
         return of_each(self, lambda rows: rows[whole])
 
     def __setitem__(self, index: Any, poses: Poses) -> None:
-        """Put others in the place of those at `index`, in the same arrays. Scales only where both have some."""
+        """Replace the poses at `index` in place. Scales are replaced only if both have scales."""
         whole = (*(index if isinstance(index, tuple) else (index,)), slice(None))
         self.positions[whole], self.quaternions[whole] = poses.positions, poses.quaternions
         if self.scales is not None and poses.scales is not None:
             self.scales[index] = poses.scales
 
     def copy(self) -> Poses:
-        """Return the same in arrays of their own."""
+        """Return a copy with new arrays."""
         return of_each(self, np.ndarray.copy)
 
 
 @dataclass(frozen=True, eq=False)
 class PackedPoses:
-    """Poses (..., n) whose components are apart in memory, as what is picked from them is: quicker to work on."""
+    """Poses (..., n) with each component contiguous in memory, also in selections: faster to compute with."""
 
     rows: np.ndarray
-    """Positions, quaternions and, where there are some, scales, shape (7 or 8, ..., n)."""
+    """Positions, quaternions and, if the poses have them, scales, shape (7 or 8, ..., n)."""
 
     def __getitem__(self, samples: np.ndarray) -> Poses:
-        """Those at some numbers (m,) or (k, m) of the last axis, shape (..., m) or (..., k, m)."""
+        """Return the poses at indices (m,) or (k, m) of the last axis, shape (..., m) or (..., k, m)."""
         return of_rows(self.rows.take(samples, axis=-1))
 
     def of(self, objects: np.ndarray | slice) -> Poses:
-        """Those at some numbers (k,) of the first axis, shape (k, ..., n)."""
+        """Return the poses at indices (k,) of the first axis, shape (k, ..., n)."""
         return of_rows(self.rows[:, objects])
 
     def blocks(self, most: int) -> Iterator[PackedPoses]:
-        """Yield the same poses (k, ..., n) by ranges of their last axis, so many in each. Views: `put` is seen here."""
+        """Yield these poses (k, ..., n) in ranges of the last axis, each with at most `most` poses or one index.
+
+        The ranges are views, so `put` on a range changes these poses.
+        """
         count = self.rows.shape[-1] if self.rows.ndim > 2 else 0
         step = max(1, most // max(1, math.prod(self.rows.shape[1:-1])))
         for first in range(0, count, step) if count > step else ():
@@ -249,50 +251,50 @@ class PackedPoses:
             yield self
 
     def put(self, objects: np.ndarray, poses: Poses) -> None:
-        """Others (k, ..., n) in the place of those."""
+        """Replace the poses at indices (k,) of the first axis by other poses (k, ..., n)."""
         self.rows[:3, objects], self.rows[3:7, objects] = components(poses.positions), components(poses.quaternions)
         if poses.scales is not None:
             self.rows[7, objects] = poses.scales
 
 
 def packed(poses: Poses) -> PackedPoses:
-    """Return the same poses, components apart."""
+    """Return the poses with each component contiguous in memory."""
     scales = [] if poses.scales is None else [poses.scales[None]]
     rows = np.concatenate([components(poses.positions), components(poses.quaternions), *scales])
-    # NumPy keeps components that are side by side as they are, and `take` would copy them all every time.
+    # NumPy would keep components interleaved, and `take` would copy all of them every time.
     return PackedPoses(np.ascontiguousarray(rows))
 
 
 def of_rows(rows: np.ndarray) -> Poses:
-    """Return poses (...) of the rows of `PackedPoses`. Views."""
+    """Return poses (...) from the rows of `PackedPoses`, as views."""
     return Poses(vectors(rows[:3]), vectors(rows[3:7]), rows[7] if len(rows) > 7 else None)
 
 
 def of_each(poses: Poses, change: Callable[[np.ndarray], np.ndarray]) -> Poses:
-    """Return poses of arrays that are changed alike: positions (..., 3), quaternions (..., 4) and scales (..., 1)."""
+    """Return poses with `change` applied to positions (..., 3), quaternions (..., 4) and scales (..., 1)."""
     scales = None if poses.scales is None else change(poses.scales[..., None])[..., 0]
     return Poses(change(poses.positions), change(poses.quaternions), scales)
 
 
 def reshaped(poses: Poses, *shape: int) -> Poses:
-    """Return the same in arrays of these leading axes."""
+    """Return the poses with leading axes of this shape."""
     return of_each(poses, lambda rows: rows.reshape(*shape, rows.shape[-1]))
 
 
 def aligned(poses: Poses) -> Poses:
-    """Return poses (..., n) whose quaternions have successive signs."""
+    """Return poses (..., n) with the sign of each quaternion aligned with the one before."""
     return Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
 
 
 def joined(parts: Sequence[Poses], axis: int = 0) -> Poses:
-    """Poses one after another along an axis; all of them have scales, or none."""
+    """Return the concatenation of poses along an axis; either all of them have scales, or none."""
     scales = None if parts[0].scales is None else np.concatenate([part.scales for part in parts], axis=axis)
     positions = np.concatenate([part.positions for part in parts], axis=axis)
     return Poses(positions, np.concatenate([part.quaternions for part in parts], axis=axis), scales)
 
 
 def in_other_axes(poses: Poses, change: np.ndarray) -> Poses:
-    """Return poses (...) in the axes that a matrix (3, 3) takes points to, a rotation or a mirror.
+    """Return poses (...) in the coordinates to which a matrix (3, 3), a rotation or a mirror, maps points.
 
     Conjugation by C turns a rotation's axis v into det(C) C v and keeps its angle: a mirror image of a rotation turns
     the other way. So w stays and the vector part is mapped.
@@ -303,9 +305,9 @@ def in_other_axes(poses: Poses, change: np.ndarray) -> Poses:
 
 
 def placed(above: Poses, poses: Poses) -> Poses:
-    """Where poses (...) are that are given in the space of others (...), with a scale where either has one.
+    """Return poses (...), given in the space of the poses `above` (...), in the space in which `above` is given.
 
-    What has fewer leading axes is the same along the others.
+    The result has scales if either has them. Leading axes broadcast.
     """
     arms = rotate(above.quaternions, poses.positions)
     scales = poses.scales if above.scales is None else above.scales
@@ -317,7 +319,7 @@ def placed(above: Poses, poses: Poses) -> Poses:
 
 
 def inverse(poses: Poses) -> Poses:
-    """Return what takes poses (...) back to where they came from."""
+    """Return the inverse transforms of poses (...)."""
     back = conjugate(poses.quaternions)
     arms = -rotate(back, poses.positions)
     if poses.scales is None:
@@ -326,7 +328,7 @@ def inverse(poses: Poses) -> Poses:
 
 
 def beyond(last: Poses, before: Poses) -> Poses:
-    """Where a motion gets that goes on from `last` (...) as it went there from `before` (...): last before^-1 last."""
+    """Return the poses that repeat the step from `before` (...) to `last` (...): last before^-1 last."""
     turn = multiply(last.quaternions, conjugate(before.quaternions))
     return Poses(
         last.positions + rotate(turn, last.positions - before.positions),

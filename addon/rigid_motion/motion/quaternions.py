@@ -1,4 +1,4 @@
-"""Arrays of quaternions, w, x, y, z along the last axis. Hamilton's product, as in `mathutils`."""
+"""Quaternion arithmetic on arrays with w, x, y, z along the last axis and Hamilton's product, as in `mathutils`."""
 
 from __future__ import annotations
 
@@ -7,32 +7,33 @@ from collections.abc import Sequence
 import numpy as np
 
 ZERO_SINE = 1e-12
-"""Stands for the sine of no turn."""
+"""Replaces the sine of a zero turn in divisions."""
 
 ZERO_ANGLE_RAD = 1e-9
-"""An angle that stands for none: its sine is itself."""
+"""Replaces an angle of zero, in radians: its sine equals the angle itself."""
 
 MAX_COPIED_NUMBERS = 6000
-"""Numbers in vectors: up to so many, fewer calls of NumPy are worth copies of their components."""
+"""Vectors with at most this many numbers: fewer NumPy calls outweigh the copying of components."""
 
 NEXT_AXES, LAST_AXES = np.array((1, 2, 0)), np.array((2, 0, 1))
-"""The axes after each one, and after that."""
+"""The next axis after each axis, and the one after that."""
 
 
 def components(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., k) as their components (k, ...). A view."""
+    """Return vectors (..., k) as components (k, ...), a view."""
     return vectors.transpose(-1, *range(vectors.ndim - 1))
 
 
 def vectors(components: np.ndarray) -> np.ndarray:
-    """Vectors (..., k) of components (k, ...). A view."""
+    """Return components (k, ...) as vectors (..., k), a view."""
     return components.transpose(*range(1, components.ndim), 0)
 
 
 def multiply(a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
-    """Hamilton's product a b, shapes (..., 4): the rotation b first, then a. A view, components apart in memory.
+    """Return Hamilton's product a b, shapes (..., 4): the rotation b first, then a.
 
-    `out`, an array for the product, has none of its memory in common with a and b.
+    The result is a view with each component contiguous in memory. `out`, an array for the product, must not share
+    memory with a and b.
     """
     aw, ax, ay, az = (a[..., row] for row in range(4))
     bw, bx, by, bz = (b[..., row] for row in range(4))
@@ -55,12 +56,12 @@ def multiply(a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None) -> np.
 
 
 def conjugate(q: np.ndarray) -> np.ndarray:
-    """w, -x, -y, -z: the inverse of a unit quaternion."""
+    """Return w, -x, -y, -z: the inverse of a unit quaternion."""
     return q * np.array((1.0, -1.0, -1.0, -1.0))
 
 
 def rotate(q: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points of shape (..., 3) turned by unit quaternions of shape (..., 4). A view, components apart in memory."""
+    """Return points (..., 3) rotated by unit quaternions (..., 4), a view with each component contiguous in memory."""
     w, *xyz = (q[..., row] for row in range(4))
     across = cross(xyz, [points[..., row] for row in range(3)])
     across *= 2.0
@@ -82,9 +83,9 @@ def matrices(q: np.ndarray) -> np.ndarray:
 
 
 def from_matrices(rotations: np.ndarray) -> np.ndarray:
-    """Return unit quaternions (..., 4) of rotation matrices (..., 3, 3), of either sign.
+    """Return unit quaternions (..., 4) of rotation matrices (..., 3, 3), with arbitrary signs.
 
-    Each of four formulas divides by one component of the quaternion: that of the largest is taken.
+    Each of four formulas divides by one component of the quaternion. The one with the largest component is used.
     """
     (a, b, c), (d, e, f), (g, h, i) = (np.moveaxis(rotations[..., row, :], -1, 0) for row in range(3))
     candidates = np.stack(
@@ -101,7 +102,7 @@ def from_matrices(rotations: np.ndarray) -> np.ndarray:
 
 
 def cross(a: np.ndarray | Sequence[np.ndarray], b: np.ndarray | Sequence[np.ndarray]) -> np.ndarray:
-    """Return the vector product of vectors (3, ...), components first."""
+    """Return the cross product of vectors (3, ...), components first."""
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray) and a.size <= MAX_COPIED_NUMBERS:
         product = a.take(NEXT_AXES, axis=0) * b.take(LAST_AXES, axis=0)
         product -= a.take(LAST_AXES, axis=0) * b.take(NEXT_AXES, axis=0)
@@ -114,12 +115,12 @@ def cross(a: np.ndarray | Sequence[np.ndarray], b: np.ndarray | Sequence[np.ndar
 
 
 def normalise(q: np.ndarray) -> np.ndarray:
-    """Return unit quaternions of the same directions. Every quaternion needs a length above zero."""
+    """Return normalised quaternions. Every quaternion needs a length above zero."""
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
 def align_signs(q: np.ndarray) -> np.ndarray:
-    """Return the same rotations, with signs such that each quaternion is in the hemisphere of the one before.
+    """Return the same rotations with each quaternion in the hemisphere of the one before.
 
     q and -q are one rotation, but an in-between of q and -r runs the long way round. Shape (..., n, 4); the first
     quaternion of each list keeps its sign, and so does one at exactly 180 degrees from its predecessor.
@@ -133,20 +134,23 @@ def align_signs(q: np.ndarray) -> np.ndarray:
 
 
 def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the angle in radians, 0 to pi, of the rotation that takes a to b. Accurate for tiny angles too."""
+    """Return the angle in radians, 0 to pi, of the rotation from a to b. Accurate for tiny angles too."""
     difference = multiply(conjugate(a), b)
     return 2.0 * np.arctan2(np.linalg.norm(difference[..., 1:], axis=-1), np.abs(difference[..., 0]))
 
 
 def turned(quaternions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Return unit quaternions (..., 4) turned by rotation vectors (..., 3), radians in their own axes."""
+    """Return unit quaternions (..., 4) rotated by rotation vectors (..., 3), in radians along their own axes."""
     half = 0.5 * np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
     share = 0.5 * np.sinc(half / np.pi)
     return multiply(quaternions, np.concatenate((np.cos(half)[..., None], share[..., None] * vectors), axis=-1))
 
 
 def turns_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return shortest rotation vectors (..., 3) from unit quaternions (..., 4) to others, in the axes of the first."""
+    """Return the shortest rotation vectors (..., 3) from `first` to `second`, along the axes of `first`, in radians.
+
+    Both are unit quaternions (..., 4).
+    """
     turns = multiply(conjugate(first), second)
     w = turns[..., 0]
     sine = np.sqrt(np.einsum("...i,...i->...", turns[..., 1:], turns[..., 1:]))
@@ -155,7 +159,7 @@ def turns_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def turned_at(key_times: np.ndarray, keys: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return unit quaternions (m, 4) at times between keys (n, 4), each on the short way at an even speed."""
+    """Return unit quaternions (m, 4) at times between keys (n, 4): slerp on the shorter way."""
     keys = normalise(keys)
     first, second = keys[:-1], keys[1:]
     second = np.where(np.einsum("ij,ij->i", first, second)[:, None] < 0.0, -second, second)

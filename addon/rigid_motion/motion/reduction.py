@@ -1,7 +1,7 @@
-"""Key reduction: the few samples of a recording that, as keys of a mode, reproduce its motion.
+"""Key reduction: the few samples of a recording that reproduce its motion as keys of a mode.
 
-A key is a pose: all channels together. What is promised of them, and checked; `key_search` finds them, and
-`key_budget` so many of them.
+A key is a pose: all channels together. This module has the public function and checks its arguments. `key_search` finds
+the keys, and `key_budget` finds keys within a budget.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def reduce_keys(
     rms: bool = False,
     tries: int = 3,
 ) -> np.ndarray:
-    """Return fewest samples that keep the shell error of a mode within a tolerance, or the best ones within a budget.
+    """Return the fewest samples that keep a mode's shell error within a tolerance, or the best ones within a budget.
 
     Parameters
     ----------
@@ -38,53 +38,54 @@ def reduce_keys(
     mode : str
         A name in `MODES`.
     tolerance : float, optional
-        The largest shell error anywhere, in the unit of the positions; with `rms` the root mean square over all
+        The largest shell error at any sample, in the unit of the positions; with `rms` the root mean square over all
         samples.
     radius : float
-        Of the shell, in the unit of the positions; not below zero.
+        The radius of the shell, in the unit of the positions; not below zero.
     budget : int, optional
-        The most keys, at least 2, instead of a tolerance: the error is then as small as a few tries find, mostly no
-        larger than what bisecting the tolerance reaches, and seldom more than a twentieth above it. With `rms` it may
-        be up to a third above it. A body that does not move has two.
+        The maximum number of keys, at least 2, instead of a tolerance. The error is then as small as a few tries can
+        make it: mostly no larger than by bisecting the tolerance, and seldom more than a twentieth above that. With
+        `rms` it may be up to a third above. A body that does not move gets two keys.
     rms : bool
-        Go by the root mean square of the shell error instead of the largest.
+        Use the root mean square of the shell error instead of the largest.
     tries : int
-        How many more searches there are, up to three: what they have found is put together. Each begins with fewer keys
-        than the tolerance allows, and puts some back where the motion is off, which takes about half as long as the
-        first search; under `rms` it keeps to another tolerance, and takes as long. With a budget, 0 is the first
-        search alone; one try lays the keys out anew, and a second one does so again for splines with ten samples or
-        more for each key.
+        How many additional searches are made, up to three; their results are combined. Each begins with fewer keys than
+        the tolerance allows and adds keys where the error is too large, which takes about half as long as the first
+        search. With `rms` it uses a different tolerance and takes as long as the first. With a budget, 0 means the
+        first search alone; the first try distributes the keys anew, and the second does so again for splines with ten
+        samples or more for each key.
 
     Returns
     -------
     array of int, shape (k,)
-        Rising, the first and the last sample among them.
+        The samples to use as keys, rising, including the first and the last sample.
 
     Raises
     ------
     TypeError
-        Where the recording is no `Poses`, or an argument is of the wrong type: a tolerance in quotes, a budget that is
-        no int. The message names the argument.
+        If the recording is not a `Poses`, or an argument is of the wrong type: a tolerance in quotes, a budget that is
+        not an int. The message names the argument.
     ValueError
-        Where not exactly one of tolerance and budget is given, the mode is unknown, either of the two or the radius is
-        no sensible number, or a sample is not finite, out of order or of no size. The message names the sample.
+        Unless exactly one of tolerance and budget is given, or if the mode is unknown, the tolerance, the budget or the
+        radius is not a sensible number, or a sample is not finite, out of order, or has a quaternion of length zero or
+        a scale that is not positive. The message names the sample.
 
     See Also
     --------
-    decimate : Keys evenly in time.
-    fit_keys : Poses for the keys that are closer to the recording than its own.
-    best_modes : The mode of each segment.
-    reduce_skeleton_keys : The same for joints that hang on one another.
+    decimate : Keys evenly spaced in time.
+    fit_keys : Key poses that approximate the recording better than its own samples.
+    best_modes : The best mode for each segment.
+    reduce_skeleton_keys : The same for the joints of a skeleton.
 
     Notes
     -----
-    Keys are taken out and moved as long as that lowers their number or the error (Lyche and Mørken, "Knot removal for
-    parametric B-spline curves and surfaces", 1987), and what several searches found is put together by dynamic
-    programming. It is not always the least number of keys that there is.
+    Keys are removed and moved as long as this lowers their number or the error (Lyche and Mørken, "Knot removal for
+    parametric B-spline curves and surfaces", 1987). The results of several searches are combined by dynamic
+    programming. The number of keys is not always the smallest possible one.
 
     Examples
     --------
-    Ninety samples of a screw need two keys where screws are what fills in, and more where straight lines are:
+    Ninety samples of a screw need two keys with screw interpolation, and more with straight lines:
 
     >>> import numpy as np
     >>> from rigid_motion.motion import Poses, reduce_keys

@@ -1,6 +1,6 @@
-"""Repair: from a recording as devices deliver it to poses that can be interpolated.
+"""Repair: turns a recording as delivered by a device into poses that can be interpolated.
 
-Rows are dropped, quaternions normalised and their signs aligned; nothing is invented. Whatever was done is said.
+Rows are dropped, quaternions normalised and their signs aligned. No data is invented, and every change is reported.
 """
 
 from __future__ import annotations
@@ -16,34 +16,34 @@ from .poses import MIN_TIME_GAP, Poses, numbers
 from .quaternions import align_signs, normalise
 
 MIN_GAP_INTERVALS = 1.75
-"""A pause of more median intervals than this is reported as a gap: timer jitter stays below, a lost sample is above."""
+"""A longer pause, in median intervals, is reported as a gap: timer jitter stays below, a lost sample is above."""
 
 MOST_STRAYS = 0.05
-"""The share of the rows that at either end may be strays, whose time is wild, and no part of the recording."""
+"""The largest fraction of rows at either end that may be strays: rows with a wild time, not part of the recording."""
 
 MIN_STRAY_DISTANCE_RATIO = 10.0
-"""How many times further away than all the rest lasts strays are: nobody waits so long for so few samples."""
+"""The least distance of strays from the other rows, as a multiple of the duration of those rows."""
 
 MOST_NAMED = 5
-"""Rows that are named of one kind of fault."""
+"""The most rows that a message lists for one kind of fault."""
 
 MAX_MEASURE = 1e30
-"""A number beyond this is damage, and well within what can be interpolated: splines shoot over."""
+"""A larger number is damage. The limit is well within what can be interpolated, as splines overshoot."""
 
 LARGEST_SCALE = 1e6
-"""A scale beyond this, or below its inverse, is damage: growth goes by powers, and would leave the range of floats."""
+"""A scale above this, or below its inverse, is damage: growth is exponential and would exceed the range of floats."""
 
 UNIT_TOLERANCE = 1e-3
-"""How far a quaternion's length may be from 1 before normalising it is reported: three decimals are often kept."""
+"""How far a quaternion's length may be from 1 before normalising is reported: many files keep three decimals."""
 
 
 @dataclass(frozen=True)
 class Repair:
-    """One kind of fault that was found. As a string it is a sentence.
+    """One kind of fault found by `repair`. `str()` gives a sentence.
 
     See Also
     --------
-    repair : What finds and repairs it.
+    repair : Finds and repairs faults.
 
     Examples
     --------
@@ -54,10 +54,10 @@ class Repair:
     """
 
     fault: str
-    """What it was, and what was done about it."""
+    """The fault, and what was done about it."""
 
     rows: np.ndarray
-    """The rows of the recording where, from 0. For a gap, the row after it."""
+    """The affected rows of the recording, from 0. For a gap, the row after it."""
 
     def __str__(self) -> str:
         shown = ", ".join(str(row) for row in self.rows[:MOST_NAMED].tolist())
@@ -72,26 +72,26 @@ def repair(times: ArrayLike, poses: Poses, rate: float | None = None) -> tuple[n
     times : array-like, shape (n,)
         Seconds, as recorded.
     poses : Poses, shape (n,) or (joints, n)
-        As recorded, in any unit: rows of NaN, quaternions of any length and sign. Of several joints a row is as good as
-        its worst.
+        As recorded, in any unit: rows of NaN, quaternions of any length and sign. With several joints, a fault of one
+        joint counts for the whole row.
     rate : float, optional
-        Samples a second, which longer intervals are gaps in. Without, it is that of the median interval.
+        Samples per second; intervals that are clearly longer count as gaps. The default is that of the median interval.
 
     Returns
     -------
     times : array, shape (m,)
         Strictly rising.
     poses : Poses, shape (m,) or (joints, m)
-        Finite, with unit quaternions in successive hemispheres.
+        Finite, with unit quaternions, each in the hemisphere of the one before.
     repairs : list of Repair
-        What was done, in the order it was done; empty for a recording without a fault.
+        The changes, in the order in which they were made; empty for a recording without faults.
 
     Raises
     ------
     TypeError
-        Where the recording is no `Poses`.
+        If the recording is not a `Poses`.
     ValueError
-        Where there are not as many times as poses. No other fault of a recording is an error.
+        If there are not as many times as poses. No other fault of a recording is an error.
 
     See Also
     --------
@@ -99,9 +99,9 @@ def repair(times: ArrayLike, poses: Poses, rate: float | None = None) -> tuple[n
 
     Notes
     -----
-    Of several rows with one time the last is kept, being the newest. Of times that run backwards, as few rows are
-    dropped as can be, so that one wild time stamp does not cost the rest of the recording; nor does one at an end make
-    it last for years. Gaps stay gaps.
+    Of several rows with the same time the last is kept, as it is the newest. If times run backwards, as few rows as
+    possible are dropped, so that one wild timestamp does not cost the rest of the recording. A wild timestamp at an end
+    does not make the recording last for years. Gaps stay gaps.
 
     Examples
     --------
@@ -140,9 +140,11 @@ def repair(times: ArrayLike, poses: Poses, rate: float | None = None) -> tuple[n
     long_enough = np.linalg.norm(poses.quaternions, axis=-1) > 1e-6
     keep(long_enough.all(axis=of_joints), "dropped poses with a quaternion of length zero")
     forward = rising(times)
-    keep(forward, f"dropped rows whose time runs backwards, such as {_first(times, ~forward)}")
-    near = _near(times)
-    keep(near, f"dropped rows whose time is far from that of all others, such as {_first(times, ~near)}")
+    keep(forward, f"dropped rows whose time runs backwards, such as {_first_time_text(times, ~forward)}")
+    inliers = _time_inliers(times)
+    keep(
+        inliers, f"dropped rows whose time is far from that of all others, such as {_first_time_text(times, ~inliers)}"
+    )
     keep(np.diff(times, append=np.inf) > MIN_TIME_GAP, "dropped rows whose time comes again, keeping the last of each")
 
     lengths = np.linalg.norm(poses.quaternions, axis=-1)
@@ -163,29 +165,29 @@ def repair(times: ArrayLike, poses: Poses, rate: float | None = None) -> tuple[n
     return times, Poses(poses.positions, aligned, poses.scales), repairs
 
 
-def _near(times: np.ndarray) -> np.ndarray:
-    """Return a mask of rising times without those few at either end that are far from all between."""
+def _time_inliers(times: np.ndarray) -> np.ndarray:
+    """Return a mask of rising times without the few strays at either end that are far from all others."""
     ends = int(MOST_STRAYS * len(times))
     first, last = (times[ends], times[-1 - ends]) if len(times) else (0.0, 0.0)
     reach = MIN_STRAY_DISTANCE_RATIO * (last - first) if last > first else np.inf
     return (times >= first - reach) & (times <= last + reach)
 
 
-def _first(times: np.ndarray, rows: np.ndarray) -> str:
-    """Return the first time in the rows of a mask, to be read; nothing where there is none."""
+def _first_time_text(times: np.ndarray, rows: np.ndarray) -> str:
+    """Return the first time in the rows of a mask as text, empty if there is none."""
     return f"{times[rows][0]:.6g} s" if rows.any() else ""
 
 
 def _usable(numbers: np.ndarray) -> np.ndarray:
-    """Which numbers are there, finite and of a size that anything has: NaN is neither small nor large."""
+    """Return a mask of numbers that are finite and of a plausible size. Comparisons with NaN are False."""
     return np.abs(numbers) < MAX_MEASURE
 
 
 def rising(times: np.ndarray) -> np.ndarray:
-    """Return a mask of the longest part of `times` that never falls: the whole, where the recording is sound."""
+    """Return a mask of the longest non-decreasing subsequence of `times`: all of them, if the recording is sound."""
     if np.all(np.diff(times) >= 0.0):
         return np.ones(len(times), dtype=bool)
-    # Longest non-decreasing subsequence by patience sorting: the smallest last time of each length, and who was before.
+    # Patience sorting: the smallest last time of a subsequence of each length, and the row before each row.
     lasts: list[tuple[float, int]] = []
     before = np.full(len(times), -1)
     for row, time in enumerate(times.tolist()):
