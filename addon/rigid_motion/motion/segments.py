@@ -1,16 +1,16 @@
-"""Segments: everything between two successive keys that does not depend on the moment, worked out once.
+"""Segments: the quantities between two successive keys that do not depend on time, computed once.
 
-Both keys of a segment are described from the pose half-way, with s = 2 u - 1 from -1 to 1 instead of u from 0 to 1. Of
-the quaternions q0 and q1 on either side, the sum and the difference are orthogonal: with their directions m and d and
-with h, a quarter of the angle turned, every mode's rotation is
+Both keys of a segment are described relative to the pose half-way, with s = 2 u - 1 from -1 to 1 instead of u from 0 to
+1. The sum and the difference of the quaternions q0 and q1 at the two keys are orthogonal. With their directions m and d
+and with h, a quarter of the angle turned, the rotation in every mode is
 
     q = m cos(psi) + d sin(psi),        psi = s h (slerp)  or  tan(psi) = s tan(h) (normalised lerp),
 
 the axis of the turn is n = d m*, and every position is a sum of a few fixed vectors, each times a function of psi and
-s. Nothing is divided by an angle that may vanish but together with the sine of that same angle: there is no special
-case for small turns, and none at 180 degrees.
+s. Where a formula divides by an angle that may vanish, the numerator has the sine of the same angle. So there is no
+special case for small turns, and none at 180 degrees.
 
-A mode's fast form is a function from `Segments` to `Curves`; they are in `rigid_motion.motion.curves`.
+The fast implementation of a mode is a function from `Segments` to `Curves`, in `rigid_motion.motion.curves`.
 """
 
 from __future__ import annotations
@@ -28,47 +28,47 @@ from .poses import Poses, aligned, of_rows, reshaped
 from .quaternions import components, cross, multiply, rotate
 
 MAX_SAME_POSE_CHANGE = 1e-6
-"""Units of length, radians, and growth of the logarithm of scale between two keys that are one pose: what was computed
-for the same pose twice, in single precision, is not quite the same."""
+"""The largest change between two keys that count as the same pose: in units of length, in radians, and in the logarithm
+of scale. The same pose computed twice in single precision differs slightly."""
 
 MAX_PIECE_TURN_RAD = 1.5
-"""Radians that a piece of a bent curve may turn by at most, for a series to be the same but for rounding."""
+"""The largest turn in radians of a piece of a bent curve that a power series reproduces except for rounding."""
 
 POSE_ROWS = 8
-"""Position, quaternion and scale. Also where there is no scale: matrices of eight rows are multiplied quicker."""
+"""Rows for position, quaternion and scale. Used even without scale, as matrices of eight rows multiply faster."""
 
 MAX_NARROW_S = 4.0 / 3.0
 """The largest |s| at which psi, 45 degrees at the keys, is no more than the 60 of `trigonometry.MAX_NARROW_RAD`."""
 
 SMALLEST_ANGLE = 1e-150
-"""Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
+"""Replaces an angle of zero where only ratios of angles count. Its square is still above the smallest float."""
 
 MOST_GROWTH = 50.0
-"""The logarithm of what a bend may grow or shrink by: after a sudden growth splines shoot further than floats go."""
+"""The largest logarithm of growth by a bend: after sudden growth, splines overshoot beyond the range of floats."""
 
 
 Ends = tuple[np.ndarray, np.ndarray]
-"""Of the first keys of segments, and of the second ones."""
+"""Components at the first and at the second keys of segments."""
 
 
 @dataclass(frozen=True, eq=False)
 class Segments:
     """S segments, one after the other along the last axis of each array.
 
-    They may be some of those between the keys: then the others are there as their neighbours.
+    They may be a selection of the segments between the keys; arrays of all keys and gaps then include the others.
     """
 
     start: np.ndarray
-    """Rows (S,), seconds."""
+    """The time of the first key, shape (S,), seconds."""
 
     rate: np.ndarray
-    """Change of s in a second, shape (S,)."""
+    """Change of s per second, shape (S,)."""
 
     centre: np.ndarray
-    """Half-way between the positions, shape (3, S)."""
+    """The point half-way between the positions, shape (3, S)."""
 
     chord: np.ndarray
-    """From the first position to the second, shape (3, S)."""
+    """The vector from the first position to the second, shape (3, S)."""
 
     middle: np.ndarray
     """m, the rotation half-way, shape (4, S)."""
@@ -86,20 +86,20 @@ class Segments:
     """All keys of each object, shape (..., n)."""
 
     positions: Ends
-    """Of the keys, shapes (3, ..., n - 1)."""
+    """Positions at both ends of all segments, shapes (3, ..., n - 1)."""
 
     quaternions: Ends
-    """Of the keys, shapes (4, ..., n - 1)."""
+    """Quaternions at both ends of all segments, shapes (4, ..., n - 1)."""
 
     durations: np.ndarray
-    """From each key to the next in seconds, shape (..., n - 1), or without leading axes that objects share."""
+    """Seconds from each key to the next, shape (..., n - 1), or without the leading axes if objects share times."""
 
     desired: slice
-    """Which of the n - 1 of each object the S segments are."""
+    """The slice of the n - 1 segments of each object that the S segments are."""
 
     @classmethod
     def between(cls, key_times: np.ndarray, keys: Poses, desired: slice = slice(None)) -> Segments:
-        """Return the n - 1 segments of each object: times of shape (..., n), keys of shape (..., n), signs aligned."""
+        """Return the desired segments of each object, from times (..., n) and keys (..., n) with aligned signs."""
         rates, scales = 2.0 / (key_times[..., 1:] - key_times[..., :-1]), keys.scales
         positions, quaternions = _ends(keys.positions), _ends(keys.quaternions)
         shape = positions[0][0, ..., desired].shape
@@ -129,7 +129,7 @@ class Segments:
 
     @property
     def are_still(self) -> np.ndarray:
-        """Whether nothing moves between two keys, but for rounding, of all segments of each object, (..., n - 1)."""
+        """Whether nothing moves between two keys except for rounding, for all segments, shape (..., n - 1)."""
         still = in_one_place(*self.positions)
         if not still.any():
             return still
@@ -138,9 +138,9 @@ class Segments:
 
     @cached_property
     def screws(self) -> np.ndarray:
-        """The twists that lead from one key to the next in one unit of time, and the growth of log scale.
+        """The twists from each key to the next in one unit of time, and the growth of log scale.
 
-        Of all segments of each object, shape (7, ..., n - 1).
+        For all segments of each object, shape (7, ..., n - 1).
         """
         (begin, end), (first, second) = ([_flat(rows).T for rows in two] for two in (self.positions, self.quaternions))
         rows = np.zeros((7, *self.positions[0].shape[1:]))
@@ -152,7 +152,7 @@ class Segments:
     def decompose(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the chord's part along the axis n, its part across, and n x D, each of shape (3, S).
 
-        Where nothing turns there is no axis: n is zero, and the whole chord is across.
+        Without a turn there is no axis: n is zero, and the whole chord is across.
         """
         m, d = self.middle[1:], self.difference[1:]
         n = self.middle[0] * d - self.difference[0] * m - cross(d, m)
@@ -166,7 +166,7 @@ Basis = Callable[[np.ndarray, list[np.ndarray], bool], Rows]
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """What a mode makes of S segments: quaternion = Q b(s) and position = P c(s), with b and c of the mode's choice."""
+    """A mode's curves in S segments: quaternion = Q b(s) and position = P c(s), with basis functions b and c."""
 
     quaternions: np.ndarray
     """Q, shape (4, functions in b, S)."""
@@ -175,22 +175,22 @@ class Curves:
     """P, shape (3, functions in c, S)."""
 
     parameters: np.ndarray
-    """The numbers of each segment that b and c need, shape (parameters, S)."""
+    """The parameters of b and c in each segment, shape (parameters, S)."""
 
     basis: Basis
-    """From s (n,), parameters of (n,) each and whether |s| <= MAX_NARROW_S to b above c, (., n), and scales (n,) or
-    None.
+    """Function of s (n,), a list of parameters (n,), and whether |s| <= MAX_NARROW_S. It returns b stacked on c, shape
+    (., n), and scales (n,) or None.
     """
 
     bends: np.ndarray | None = None
-    """What is to be added to the twist at either end, with the growth of log scale, shape (7, 2, S), or None."""
+    """The twist and the growth of log scale to add at either end, shape (7, 2, S), or None."""
 
     fades: np.ndarray | None = None
-    """In what part of each segment the bend at its beginning dies away, shape (S,); None where all of them need all."""
+    """The fraction of each segment in which the bend at its beginning dies away, shape (S,); None means all of it."""
 
     @cached_property
     def matrices(self) -> np.ndarray:
-        """P and Q of each segment in one matrix, shape (S, POSE_ROWS, functions in b and c)."""
+        """P and Q of each segment as one matrix, shape (S, POSE_ROWS, functions in b and c)."""
         turning, (_, moving, segments) = self.quaternions.shape[1], self.positions.shape
         matrices = np.zeros((segments, POSE_ROWS, turning + moving))
         matrices[:, :3, turning:] = self.positions.transpose(2, 0, 1)
@@ -201,9 +201,9 @@ class Curves:
 def interpolate_along(
     curves: Callable[[Segments], Curves], key_times: np.ndarray, keys: Poses, times: np.ndarray, extrapolate: bool
 ) -> Poses:
-    """Poses of shape (..., m) between at least two keys (..., n), at rising times (..., m).
+    """Return poses (..., m) between at least two keys (..., n), at rising times (..., m).
 
-    `key_times` and `times` may leave out the leading axes, and all objects share them. Quaternions of keys are unit.
+    `key_times` and `times` may lack the leading axes if all objects share them. Quaternions of keys are unit.
     """
     shape = keys.shape[:-1] + times.shape[-1:]
     keys = reshaped(keys, -1, keys.shape[-1])
@@ -218,7 +218,7 @@ def interpolate_along(
 
 
 def _poses(rows: np.ndarray, keys: Poses) -> Poses:
-    """Return the poses (...) in rows (POSE_ROWS, ...), with scales where the keys have some."""
+    """Return the poses (...) from rows (POSE_ROWS, ...), with scales if the keys have them."""
     return of_rows(rows if keys.scales is not None else rows[:7])
 
 
@@ -230,7 +230,7 @@ def _fill(
     extrapolate: bool,
     out: np.ndarray,
 ) -> None:
-    """Fill out (POSE_ROWS, objects, m) with positions, quaternions and, where the keys have them, scales.
+    """Fill `out` (POSE_ROWS, objects, m) with positions, quaternions and, if the keys have them, scales.
 
     Key times are (objects or 1, n), keys (objects, n), times (objects or 1, m).
     """
@@ -248,10 +248,10 @@ def _fill(
 
     mode, reach = curves(segments), np.inf if outside and extrapolate else 1.0
     fill, numbers = _filler(mode, reach), np.stack((segments.start, segments.rate))
-    pieces = _pieces(segments, mode.bends) if mode.bends is not None and mode.fades is None and reach <= 1.0 else 0
+    pieces = _piece_count(segments, mode.bends) if mode.bends is not None and mode.fades is None and reach <= 1.0 else 0
     if 0 < DENSE_RUN_SAMPLES * pieces * segments.start.size <= samples.size:
         coefficients = _series(mode, pieces)
-        key_times = _divided(key_times, pieces)
+        key_times = _divided_key_times(key_times, pieces)
         start = np.broadcast_to(key_times[:, :-1], (len(keys), key_times.shape[-1] - 1)).ravel()
         numbers = np.stack((start, pieces * segments.rate.repeat(pieces)))
 
@@ -262,7 +262,7 @@ def _fill(
 
 
 Within = Callable[[np.ndarray, np.ndarray, slice], Poses]
-"""What makes poses (m,) of some of the segments, (s,) of them: from how many there are in each, and their progress."""
+"""Function of pose counts (s,), the progress of each pose (m,) and a slice of s segments that returns poses (m,)."""
 
 
 def prepare_within(
@@ -273,11 +273,12 @@ def prepare_within(
     *,
     is_aligned: bool = False,
 ) -> Within:
-    """Return what makes poses between keys where each segment says how many are in it, and each how far it is.
+    """Return a function that computes poses between keys from the pose count of each segment and their progress.
 
-    `key_times` and keys are (..., n), at least two a row and with unit quaternions; of each row, the `desired` segments
-    are counted throughout. Progress is 0 at a segment's first key and 1 at its second, and may pass both. Where
-    `is_aligned`, the signs of the quaternions say which way round a segment turns, which matters at half a turn.
+    `key_times` and keys are (..., n), at least two in each row and with unit quaternions. The function numbers the
+    `desired` segments of all rows one after the other. Progress is 0 at a segment's first key and 1 at its second, and
+    may go beyond both. With `is_aligned`, the signs of the quaternions define which way a segment turns, which matters
+    at half a turn.
     """
     segments = Segments.between(key_times, keys if is_aligned else aligned(keys), desired)
     mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
@@ -298,7 +299,10 @@ def prepare_within(
 
 
 Fill = Callable[[slice, np.ndarray, np.ndarray, np.ndarray], None]
-"""What fills out (POSE_ROWS, n) for some of the segments at s (n,), of which the i-th has counts[i]."""
+"""Function of a slice of segments, s (n,), counts and `out` that fills `out` (POSE_ROWS, n).
+
+The i-th segment of the slice has counts[i] of the values in s.
+"""
 
 
 def _evaluate(
@@ -308,9 +312,9 @@ def _evaluate(
     local_time: Callable[..., np.ndarray],
     out: np.ndarray,
 ) -> None:
-    """Fill out (POSE_ROWS, m) with what S segments are at the samples between their bounds (S + 1,), a block at once.
+    """Fill `out` (POSE_ROWS, m) with the poses of S segments at the samples between their bounds (S + 1,), in blocks.
 
-    `local_time` gives s of a slice of samples, from the rows of `numbers` (., S) repeated for each of them.
+    `local_time` returns s for a slice of samples, from the rows of `numbers` (., S) repeated for each sample.
     """
     all_counts = np.diff(bounds)
     for segment, sample in blocks(bounds, BLOCK_SAMPLES if is_dense(all_counts) else BLOCK_SAMPLES // 2):
@@ -319,7 +323,7 @@ def _evaluate(
 
 
 def _filler(mode: Curves, reach: float) -> Fill:
-    """Return what a mode's curves are, worked out for every sample, where no |s| is larger than `reach`."""
+    """Return a function that evaluates a mode's curves at every sample, if no |s| is larger than `reach`."""
 
     def fill(segment: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
         parameters = np.repeat(mode.parameters[:, segment], counts, axis=1)
@@ -334,15 +338,15 @@ def _filler(mode: Curves, reach: float) -> Fill:
     return fill
 
 
-def _pieces(segments: Segments, bends: np.ndarray) -> int:
-    """How many pieces a segment needs to be cut into for power series."""
+def _piece_count(segments: Segments, bends: np.ndarray) -> int:
+    """Return the number of pieces into which each segment must be cut for power series."""
     rates = np.concatenate((segments.screws.reshape(7, 1, -1), bends), axis=1)
     turns = np.sqrt(np.einsum("kbs,kbs->bs", rates[:3], rates[:3])) + np.abs(rates[6])
     return max(1, math.ceil((turns[0] + turns[1:].max(axis=0)).max() / MAX_PIECE_TURN_RAD))
 
 
 def _series(mode: Curves, pieces: int) -> np.ndarray:
-    """Every segment's curve in so many pieces as power series, shape (segments * pieces, POSE_ROWS, terms)."""
+    """Return power series of every segment's curve in pieces, shape (segments * pieces, POSE_ROWS, terms)."""
     count = mode.parameters.shape[1]
     moments = series.moments(pieces)
     values = np.zeros((POSE_ROWS, count * moments.size))
@@ -357,18 +361,18 @@ def _series(mode: Curves, pieces: int) -> np.ndarray:
     return series.fit(values)
 
 
-def _divided(key_times: np.ndarray, pieces: int) -> np.ndarray:
-    """Key times (k, n) with so many equal pieces to a segment, shape (k, (n - 1) * pieces + 1)."""
+def _divided_key_times(key_times: np.ndarray, pieces: int) -> np.ndarray:
+    """Return key times (k, n) with each segment divided into equal pieces, shape (k, (n - 1) * pieces + 1)."""
     starts = key_times[:, :-1, None] + np.diff(key_times)[..., None] * (np.arange(pieces) / pieces)
     return np.append(starts.reshape(len(key_times), -1), key_times[:, -1:], axis=1)
 
 
 def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np.ndarray:
-    """Where each segment's samples begin among the samples of all objects, shape (S + 1,)."""
+    """Return the first sample of each segment among the samples of all objects, and their number, shape (S + 1,)."""
     starts = np.zeros((objects, key_times.shape[-1] - 1), dtype=np.int64)
     inner_keys = key_times[:, 1:-1]
     if inner_keys.size:
-        # One search where all objects share their times, else one for each.
+        # One search if all objects share their times, else one for each.
         for row in range(max(len(inner_keys), len(times))):
             result = np.searchsorted(times[row % len(times)], inner_keys[row % len(inner_keys)], side="right")
             starts[row if len(inner_keys) > 1 or len(times) > 1 else slice(None), 1:] = result
@@ -377,9 +381,9 @@ def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np
 
 
 def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-    """Fill out (POSE_ROWS, n) with positions and quaternions: each sample's own coefficients times its basis (., n).
+    """Fill `out` (POSE_ROWS, n) with positions and quaternions: each segment's coefficients times the basis (., n).
 
-    The i-th of the segments has counts[i] samples, and at least one has any.
+    The i-th segment has counts[i] samples, and at least one segment has samples.
     """
     if not is_dense(counts):
         positions, quaternions = mode.positions[..., segment], mode.quaternions[..., segment]
@@ -393,11 +397,10 @@ def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray
 def _bend(
     bends: np.ndarray, fades: np.ndarray | None, s: np.ndarray, within: bool, counts: np.ndarray, out: np.ndarray
 ) -> None:
-    """Bend poses (POSE_ROWS, n) that run from key to key so that they leave and arrive with these twists (7, 2, S)
-    added.
+    """Bend poses (POSE_ROWS, n) between keys: add twists `bends` (7, 2, S) where each segment leaves and arrives.
 
-    Nothing is changed at the keys. Beyond them the bend goes on at the twist it has there. At each sample `fades` (n,)
-    is the part of its segment in which the first of the two dies away.
+    Poses at the keys stay the same. Beyond the keys the bend continues with its twist there. `fades` (n,) is, for each
+    sample, the fraction of its segment in which the first bend dies away.
     """
     u, left = 0.5 + 0.5 * s, 0.5 - 0.5 * s
     faded = left if fades is None else 1.0 - np.minimum(u / fades, 1.0)
@@ -415,18 +418,18 @@ def _bend(
 
 
 def _ends(vectors: np.ndarray) -> Ends:
-    """Vectors (..., n, k) that segments begin at and end at, as components without gaps, (k, ..., n - 1)."""
+    """Return vectors (..., n, k) at the beginnings and ends of segments, as contiguous components (k, ..., n - 1)."""
     rows = components(vectors)
     return np.ascontiguousarray(rows[..., :-1]), np.ascontiguousarray(rows[..., 1:])
 
 
 def _flat(rows: np.ndarray) -> np.ndarray:
-    """Components (k, ...) one after the other, (k, S)."""
+    """Return components (k, ...) flattened to (k, S), contiguous."""
     return np.ascontiguousarray(rows).reshape(len(rows), -1)
 
 
 def in_one_place(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return whether positions (3, ...) are others' but for rounding."""
+    """Return whether positions `begin` and `end` (3, ...) are equal except for rounding, shape (...)."""
     return np.asarray(np.abs(end - begin).max(axis=0) < MAX_SAME_POSE_CHANGE)
 
 

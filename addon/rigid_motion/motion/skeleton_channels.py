@@ -1,8 +1,8 @@
-"""Joints whose rotation and location have keys of their own: two joints stand for one, in modes that allow it.
+"""Separate keys for the rotation and location of joints: each joint is split into two nodes, in modes that allow it.
 
-A node that only translates has a node below it that only turns, and all that hangs on the joint hangs on that one. This
-is the same motion wherever neither channel depends on the other between keys, so that the search for keys of bodies
-finds those of channels. A joint with a channel that never changes stays a single node, and so does one that is fixed.
+A node that only translates is the parent of a node that only turns, and the joint's children become children of the
+latter. The motion stays the same if neither channel depends on the other between keys. The key search for bodies then
+finds the keys of channels. A joint with a channel that never changes stays a single node, and so does a fixed joint.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ NO_TURN = np.array((1.0, 0.0, 0.0, 0.0))
 
 
 class SeparateKeys(NamedTuple):
-    """The keys of one joint whose rotation and location are thinned apart, as `reduce_skeleton_keys` finds them.
+    """The separate keys of rotation and location of one joint, as returned by `reduce_skeleton_keys`.
 
-    A channel with a single sample rests: it holds what it has at that sample all the time.
+    A channel with a single sample rests: it holds the value at that sample all the time.
 
     See Also
     --------
-    reduce_skeleton_keys : What finds them, with `separate=True`.
+    reduce_skeleton_keys : Finds these keys, with `separate=True`.
 
     Examples
     --------
@@ -42,20 +42,20 @@ class SeparateKeys(NamedTuple):
     """
 
     rotation: np.ndarray
-    """Rising samples, shape (r,)."""
+    """The samples with rotation keys, rising, shape (r,)."""
 
     location: np.ndarray
-    """Rising samples, shape (l,)."""
+    """The samples with location keys, rising, shape (l,)."""
 
 
 class Channels:
-    """A body whose joints are taken apart where both channels of one change.
+    """A body in which every joint with both a changing rotation and a changing location is split into two nodes.
 
     Parameters
     ----------
     whole : Body
     turns, moves : array of bool, shape (joints,), optional
-        Which rotations and which locations change, where that is known of more than what is here.
+        Which rotations and locations change, if that is known from a longer recording. The default: those in `whole`.
     """
 
     def __init__(self, whole: Body, turns: np.ndarray | None = None, moves: np.ndarray | None = None) -> None:
@@ -64,10 +64,10 @@ class Channels:
         self.turns = changes(poses.quaternions) if turns is None else turns
         self.moves = changes(poses.positions) if moves is None else moves
         self.apart = np.flatnonzero(self.turns & self.moves & whole.free)
-        """The joints that two nodes stand for: a joint's own number turns, and the others come behind all joints."""
+        """The split joints: the node with a joint's number turns, and the translating nodes come after all joints."""
 
     def budget(self, budget: int) -> int:
-        """Return what a budget of keys leaves for nodes, or a ValueError where that is too little for what may move."""
+        """Convert a key budget of channels to one of nodes. Raise a ValueError if it is too small for all channels."""
         free, apart = int(np.count_nonzero(self.whole.free)), len(self.apart)
         moving = np.count_nonzero(self.turns & self.whole.free) + np.count_nonzero(self.moves & self.whole.free)
         if budget < 2 * free + moving:
@@ -79,7 +79,7 @@ class Channels:
 
     @cached_property
     def body(self) -> Body:
-        """The nodes as a body."""
+        """The body with nodes in place of joints."""
         whole, apart = self.whole, self.apart
         if not len(apart):
             return whole
@@ -94,18 +94,18 @@ class Channels:
         return Body(whole.times, nodes, Skeleton(parents), whole.mode, radii, weights, free, self._truth())
 
     def _truth(self) -> Poses:
-        """Where nodes should be in the root's space: those that only translate are where their joints are."""
+        """Return the true poses of nodes in the root's space: translating nodes have the positions of their joints."""
         truth, above = self.whole.truth, self.whole.skeleton.parents[self.apart]
         more = truth[self.apart]
         scales = None if truth.scales is None else np.where((above >= 0)[:, None], truth.scales[above], 1.0)
         return joined((truth, Poses(more.positions, more.quaternions, scales)))
 
     def of_nodes(self, keys: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-        """Return the keys of joints as those of nodes."""
+        """Return the keys of all nodes from the keys of joints."""
         return (*keys, *(keys[joint] for joint in self.apart.tolist()))
 
     def of_joints(self, keys: tuple[np.ndarray, ...]) -> tuple[SeparateKeys, ...]:
-        """Return the keys of nodes as those of channels."""
+        """Return the keys of both channels of each joint from the keys of nodes."""
         rotations = list(keys[: len(self.whole.skeleton)])
         locations = list(rotations)
         for node, joint in enumerate(self.apart.tolist(), len(rotations)):
@@ -118,12 +118,12 @@ class Channels:
 
 
 def changes(rows: np.ndarray) -> np.ndarray:
-    """Which joints have anything but the same numbers at all samples, from (joints, n, ...), shape (joints,)."""
+    """Return which joints have numbers (joints, n, ...) that change between samples, shape (joints,)."""
     return (rows != rows[:, :1]).reshape(len(rows), -1).any(axis=1)
 
 
 def check_separable(mode: str, poses: Poses) -> None:
-    """Raise a ValueError where channels of joints (joints, n) cannot have keys of their own, or are more than two."""
+    """Raise a ValueError if the mode does not allow separate keys, or if scales of poses (joints, n) change."""
     if not MODES[mode].is_separable:
         names = ", ".join(name for name, row in MODES.items() if row.is_separable)
         raise ValueError(

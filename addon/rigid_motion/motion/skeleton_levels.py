@@ -1,4 +1,4 @@
-"""Joints of a body that do not hang on one another, as tracks of one recording: what is on them counts."""
+"""Joints that do not depend on one another, as tracks of one recording: errors are those of the joints below them."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from .poses import Poses, inverse, packed, placed, reshaped
 from .quaternions import components, conjugate, cross, matrices, multiply
 
 AT_ONCE = 2**13
-"""Joints that are looked at in one go, for the processor's caches."""
+"""Poses processed at once, to fit the processor's caches."""
 
 
 class Level(SampleTracks):
-    """The error of a sample is the largest of what hangs on its joint.
+    """Tracks of joints. The error of a sample is the largest error of its joint and all joints below.
 
     Parameters
     ----------
     body : Body
     joints : array of int, shape (j,)
-        No two of them hang on one another.
+        The joints; none of them is below another.
     shown : Poses, shape (joints, n)
-        How all joints of the body are shown by now, in their parents' space.
+        The poses of all joints of the body with the present keys, in their parents' space.
     tolerance : float
-        Of the shell error.
+        The tolerance of the shell error.
     off_at_keys : bool
-        As `SampleTracks` has it.
+        As in `SampleTracks`.
     """
 
     def __init__(
@@ -58,19 +58,19 @@ class Level(SampleTracks):
 
     def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
         track, moment = np.divmod(samples, len(self.body.times))
-        # What moves a joint from where it is to where it would be moves all that hangs on it.
+        # The motion that moves a joint from its present pose to the new one moves all joints below it too.
         by = placed(placed(self.parents[samples], shown), self.back[samples])
         rows = [*matrices(by.quaternions).reshape(9, -1), *components(by.positions), *components(by.quaternions)]
         motions = np.stack(rows if by.scales is None else [*rows, by.scales])
         largest = np.empty(len(samples))
-        # Samples come track by track, or nearly so.
+        # Samples are sorted by track, or nearly so.
         for first, end in itertools.pairwise([0, *(np.flatnonzero(np.diff(track)) + 1).tolist(), len(samples)]):
             some = slice(first, end)
             largest[some] = self.carried[track[first]].largest_errors(moment[some], motions[:, some])
         return self.in_tolerances(largest, samples)
 
     def may_rest(self) -> np.ndarray:
-        """Which of the joints need not move at all, shape (joints,)."""
+        """Return which of the joints need not move at all, shape (j,)."""
         matter, count = self.counts > 0, len(self.body.times)
         still = self.body.at_rest()[np.repeat(self.joints[matter], count), 0]
         errors = self.errors(np.flatnonzero(np.repeat(matter, count)), still)
@@ -80,7 +80,7 @@ class Level(SampleTracks):
 
 
 class _Carried:
-    """Balls on joints (j,) that are carried along: where they are and where they should be, poses (j, n)."""
+    """Balls on joints (j,) that a joint above carries along: their present and desired poses (j, n)."""
 
     def __init__(self, there: Poses, desired: Poses, radii: np.ndarray, weights: np.ndarray) -> None:
         self.radii = radii[:, None]
@@ -89,7 +89,7 @@ class _Carried:
         self.rows = np.stack(rows if there.scales is None else [*rows, there.scales, desired.scales])
 
     def largest_errors(self, moments: np.ndarray, motions: np.ndarray) -> np.ndarray:
-        """Return the largest error of any of them at moments (m,), each moved on by a motion (.., m), shape (m,)."""
+        """Return the largest error of any ball at each of moments (m,), moved by motions (.., m), shape (m,)."""
         result, step = np.empty(len(moments)), max(1, AT_ONCE // len(self.radii))
         for first in range(0, len(moments), step):
             some = slice(first, first + step)
@@ -100,7 +100,7 @@ class _Carried:
 
 
 def _errors(motions: np.ndarray, rows: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Return the shell errors (j, m) of balls (.., j, m) as `_Carried` has them, all moved on by motions (.., 1, m)."""
+    """Return the shell errors (j, m) of balls in rows (.., j, m) of `_Carried`, moved by motions (.., 1, m)."""
     turn, positions, quaternions = motions[:9], motions[9:12], motions[12:16]
     there, desired, turned = rows[:3], rows[3:6], rows[6:10]
     d = turn[0::3] * there[0]

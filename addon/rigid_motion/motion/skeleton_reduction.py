@@ -1,11 +1,11 @@
-"""Key reduction of whole bodies: few keys for joints that hang on one another.
+"""Key reduction of skeletons: few keys for all joints of a body.
 
-What counts is where everything gets: an error of a joint moves all that hangs on it. The error is therefore looked at
-in the root's space, through the hierarchy, at every joint and sample. Joints have keys of their own, or all of them
-share *key poses*, as animators work from pose to pose.
+The final positions count: an error of a joint moves all joints below it. The error is therefore measured in the root's
+space, through the hierarchy, at every joint and sample. Joints have separate keys, or all of them share *key poses*, as
+animators work from pose to pose.
 
-Source: the error in the space of the whole object is that of the Animation Compression Library; key poses that bodies
-share are those of Roberts, Lewis and Anjyo, "Optimal and interactive keyframe selection for motion capture", 2019.
+Source: the error in the space of the whole object follows the Animation Compression Library. Shared key poses follow
+Roberts, Lewis and Anjyo, "Optimal and interactive keyframe selection for motion capture", 2019.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from .skeleton_stretches import Run, keys_in_stretches, stretches
 from .skeletons import Skeleton
 
 BUDGET_STEPS = 9
-"""Of a search for the tolerance that a budget of keys of their own can keep to."""
+"""Steps of the search for the tolerance that a budget of separate keys can meet."""
 
 MAX_LOG_TOLERANCE_STEP = 1.5
-"""How far the next tolerance is from one that needs too few keys, by its logarithm."""
+"""Decrease of the logarithm of the tolerance, until a tolerance needs more keys than the budget."""
 
 LOG_TOLERANCE_PRECISION = 0.01
-"""By how much of it the tolerance is known in the end."""
+"""Final precision of the logarithm of the tolerance."""
 
 MAX_JOINT_DEPTH = 1000
-"""How many joints a joint with keys of its own may hang on: the work grows with the square of it."""
+"""The most joints above a joint with separate keys: the work grows with the square of this number."""
 
 SHORTEST_STRETCH = 2
-"""Samples from one shared key to the next."""
+"""The least samples from one shared key to the next."""
 
 MAX_LOG_TOLERANCE_DROP = 12.0
-"""How much smaller than that of a body at rest the tolerance may be, by its logarithm."""
+"""The largest decrease of the logarithm of the tolerance, from the error of a body at rest."""
 
 
 def reduce_skeleton_keys(
@@ -64,7 +64,7 @@ def reduce_skeleton_keys(
     stretch: int | None = None,
     run: Run = map,
 ) -> tuple[np.ndarray, ...] | tuple[SeparateKeys, ...]:
-    """Return fewest keys of a body's joints that keep every joint within a tolerance, or the best ones within a budget.
+    """Return the fewest keys of joints that keep every joint within a tolerance, or the best ones within a budget.
 
     Parameters
     ----------
@@ -75,65 +75,67 @@ def reduce_skeleton_keys(
     parents : array-like of int, shape (joints,)
         The number of each joint's parent, -1 for roots.
     mode : str
-        What fills in between keys, a name in `MODES`.
+        The interpolation between keys, a name in `MODES`.
     tolerance : float, optional
         The largest shell error of any joint at any sample, in the root's space and in the unit of the positions.
     radius : float or array-like, shape (joints,)
-        Of the ball at each joint that the shell error is of, in the unit of the positions.
+        The radius of the ball at each joint for the shell error, in the unit of the positions.
     shared : bool
-        Key poses: all joints have keys at the same samples. Otherwise each has its own, the fewest in all.
+        Key poses: all joints have keys at the same samples. Otherwise each joint has separate keys, the fewest in
+        total.
     separate : bool
-        Each joint's rotation and its location have keys of their own, for modes where neither depends on the other, as
-        in `lerp_slerp`, and for joints whose scale does not change. There are never more numbers in them, at 4 to a
-        rotation and 3 to a location, than in the keys of joints, mostly a fifth to two fifths fewer.
+        Rotation and location of each joint have separate keys, for modes where they are independent, as in
+        `lerp_slerp`, and for joints whose scale does not change. With 4 numbers for a rotation and 3 for a location,
+        they never need more numbers than the keys of whole joints, and mostly a fifth to two fifths fewer.
     budget : int, optional
-        The most keys, instead of a tolerance: key poses, at least 2, or keys of all joints together, at least 2 for
-        each. With `separate` keys of rotations and of locations count, at least 2 for each, and 1 where it never
-        changes. The error is then as small as can be found: for key poses as `reduce_keys` does, for keys of their own
-        by bisecting the tolerance, which takes the time of ten searches or so.
+        The maximum number of keys, instead of a tolerance: key poses, at least 2, or keys of all joints together, at
+        least 2 for each joint. With `separate`, keys of rotations and locations count, at least 2 for each, or 1 if it
+        never changes. The error is then as small as possible: for key poses as in `reduce_keys`, for separate keys by
+        bisecting the tolerance, which takes about as long as ten searches.
     weights : array-like, shape (joints,) or (joints, n), optional
-        How many times the error of each joint counts, at each sample: more for feet that stand (see `standing`) and
-        hands that hold, 0 for joints that do not matter. With a tolerance, a joint of weight 2 keeps to half of it.
+        The weight of each joint's error, at each sample: more for feet that stand (see `standing`) and hands that hold,
+        0 for joints that do not matter. A joint of weight 2 stays within half the tolerance.
     fixed : array-like of bool, shape (joints,), optional
-        Joints that stay as they are recorded: they are carried along, and what hangs on them is measured.
+        Joints that stay as recorded: they move with their parents, and the joints below them are measured.
     tries : int
         With `shared`, as in `reduce_keys`.
     stretch : int, optional
-        For long recordings, with a tolerance and in modes that are not smooth: all that moves has keys after so many
-        samples, or fewer, and what is between them is searched for itself. It takes the memory of one stretch, less
-        time, and with 1000 to 2000 samples at 60 Hz up to 0.4 % more keys.
+        For long recordings, with a tolerance and in modes that are not smooth: all moving joints share keys after every
+        stretch of at most this many samples, and each stretch is searched separately. This takes the memory of one
+        stretch, less time, and with 1000 to 2000 samples at 60 Hz up to 0.4 % more keys.
     run : callable
-        What has stretches searched, called as `map` is: `ProcessPoolExecutor().map` has it done side by side.
+        Runs the searches of stretches, called like `map`: `ProcessPoolExecutor().map` runs them in parallel.
 
     Returns
     -------
     tuple of array of int, one for each joint
-        Rising samples. A joint that need not move has a single one, whose pose it holds; the others have the first and
-        the last among them, and all samples where they are fixed. With `separate`, a tuple of `SeparateKeys`, and the
-        same holds for rotations and locations; what never changes in the recording has the first sample alone.
+        The samples with keys, rising. A joint that need not move has a single sample, whose pose it holds. Other joints
+        include the first and the last sample, and fixed joints have all samples. With `separate`, a tuple of
+        `SeparateKeys`, and the same holds for rotations and locations. A channel that never changes in the recording
+        has only the first sample.
 
     Raises
     ------
     TypeError
-        Where the recording is no `Poses`.
+        If the recording is not a `Poses`.
     ValueError
-        As `reduce_keys` does, and where joints hang on one another in a circle, or without `shared` in chains of more
-        than 1000, or radii or weights make no sense. The message names the joint.
+        As `reduce_keys` does, and if parents form a cycle, if chains are longer than 1000 joints without `shared`, or
+        if radii or weights are not sensible numbers. The message names the joint.
 
     See Also
     --------
     reduce_keys : The same for one object.
-    SeparateKeys : What there is of each joint with `separate`.
+    SeparateKeys : The keys of each joint with `separate`.
     standing : Which joints stand on the ground, for weights.
 
     Notes
     -----
-    The error in the space of the whole object is that of the Animation Compression Library; key poses that bodies share
-    are those of Roberts, Lewis and Anjyo, "Optimal and interactive keyframe selection for motion capture", 2019.
+    The error in the space of the whole object follows the Animation Compression Library. Shared key poses follow
+    Roberts, Lewis and Anjyo, "Optimal and interactive keyframe selection for motion capture", 2019.
 
     Examples
     --------
-    An elbow that turns evenly about its z axis, on a shoulder that stays where it is:
+    An elbow that turns evenly about its z axis, below a shoulder that does not move:
 
     >>> import numpy as np
     >>> from rigid_motion.motion import Poses, reduce_skeleton_keys
@@ -156,12 +158,12 @@ def reduce_skeleton_keys(
     if poses.shape != (len(skeleton), *times.shape):
         raise ValueError(f"poses of shape {poses.shape} do not fit {len(skeleton)} joints and {times.size} times")
     check_body(times, poses)
-    radii = _one_for_each(radius, "radius", (len(skeleton),))
-    weights = _one_for_each(1.0 if weights is None else weights, "weight", (len(skeleton),), poses.shape)
+    radii = _values_for_joints(radius, "radius", (len(skeleton),))
+    weights = _values_for_joints(1.0 if weights is None else weights, "weight", (len(skeleton),), poses.shape)
     if not np.any(weights > 0.0):
         raise ValueError("every joint has a weight of 0: nothing would matter")
     weights = np.broadcast_to(weights if weights.ndim == 2 else weights[:, None], poses.shape)
-    free = ~_mask(fixed, len(skeleton))
+    free = ~_fixed_mask(fixed, len(skeleton))
     if separate:
         check_separable(mode, poses)
     if stretch is not None:
@@ -200,7 +202,7 @@ def reduce_skeleton_keys(
 
 
 def _check_stretch(stretch: int, mode: str, shared: bool, tolerance: float | None) -> None:
-    """Raise a TypeError where a stretch is no number of samples, a ValueError where there can be none."""
+    """Raise a TypeError if a stretch is not a whole number, a ValueError if it is too short or cannot be used here."""
     if whole_number(stretch, "stretch") < SHORTEST_STRETCH:
         raise ValueError(f"a stretch of {stretch} samples is too short: give {SHORTEST_STRETCH} or more")
     if shared or tolerance is None:
@@ -213,16 +215,16 @@ def _check_stretch(stretch: int, mode: str, shared: bool, tolerance: float | Non
 
 
 def _own_keys_within(search_for: Callable[[float], OwnKeys], budget: int) -> tuple[np.ndarray, ...]:
-    """Return the keys with the smallest error among those of several tolerances that a budget can keep to."""
+    """Return the keys with the smallest error among searches with several tolerances that stay within the budget."""
     best = search_for(math.inf)
     body = best.body
     free = np.flatnonzero(body.free).tolist()
     least = float(body.errors(body.at_rest()).max())
-    # The logarithms of tolerances that need more and that need no more keys, and how many by their logarithm.
+    # Pairs of log tolerance and log key count: `low` needs more keys than the budget, `high` does not.
     low, high = None, (math.log(max(least, ZERO_WEIGHT)), math.log(len(free) or 1))
     lowest = high[0] - MAX_LOG_TOLERANCE_DROP
     for _ in range(BUDGET_STEPS):
-        logarithm = _between(low, high, math.log(budget))
+        logarithm = _next_log_tolerance(low, high, math.log(budget))
         if logarithm < lowest or (low and high[0] - low[0] < LOG_TOLERANCE_PRECISION):
             break
         search = search_for(math.exp(logarithm))
@@ -237,11 +239,11 @@ def _own_keys_within(search_for: Callable[[float], OwnKeys], budget: int) -> tup
     return tuple(best.keys)
 
 
-def _between(low: tuple[float, float] | None, high: tuple[float, float], count: float) -> float:
-    """Return the logarithm of the tolerance to try next for the logarithm of a count of keys.
+def _next_log_tolerance(low: tuple[float, float] | None, high: tuple[float, float], count: float) -> float:
+    """Return the logarithm of the tolerance to try next for the logarithm of a key count.
 
-    It is where a straight line between a tolerance that is too low and one that is not has it, and never near its ends:
-    counts are no smooth function of tolerances.
+    It lies on a straight line between a tolerance that is too low and one that is not, but never near the ends of that
+    line, as key counts are not a smooth function of tolerances.
     """
     if low is None:
         return high[0] - MAX_LOG_TOLERANCE_STEP
@@ -250,10 +252,10 @@ def _between(low: tuple[float, float] | None, high: tuple[float, float], count: 
 
 
 class _WholeBody(SampleTracks):
-    """All joints at once, with the same keys: the error of a sample is the largest of any joint."""
+    """All joints at once, with the same keys. The error of a sample is the largest error of any joint."""
 
     def __init__(self, body: Body, tolerance: float) -> None:
-        # What stands still in its parent's space is the same between any keys.
+        # Joints that never move in their parents' space are the same with any keys.
         moves = that_move(body.poses) & body.free
         moves[0] |= not moves.any()
         super().__init__(body.times, body.poses[moves], body.mode, 0.0, tolerance)
@@ -265,8 +267,8 @@ class _WholeBody(SampleTracks):
         return self.in_tolerances(self.body.errors(everything, samples).max(axis=0), samples)
 
 
-def _mask(fixed: ArrayLike | None, joints: int) -> np.ndarray:
-    """Which joints are fixed, shape (joints,). Numbers of joints are refused: 0 and 1 could mean either."""
+def _fixed_mask(fixed: ArrayLike | None, joints: int) -> np.ndarray:
+    """Return which joints are fixed, shape (joints,). Joint indices raise a ValueError: 0 and 1 would be ambiguous."""
     mask = np.zeros(joints, dtype=bool) if fixed is None else np.asarray(fixed)
     if mask.dtype != bool or mask.shape not in ((), (joints,)):
         raise ValueError(
@@ -276,8 +278,8 @@ def _mask(fixed: ArrayLike | None, joints: int) -> np.ndarray:
     return np.broadcast_to(mask, (joints,))
 
 
-def _one_for_each(given: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.ndarray:
-    """Return a number for each joint or sample, or one for all: no damage and not below zero."""
+def _values_for_joints(given: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.ndarray:
+    """Return the numbers, with a single one broadcast to the first shape. Raise a ValueError for invalid numbers."""
     given = numbers(given, f"{name}s")
     if given.shape not in ((), *shapes):
         desired = " or ".join(map(str, shapes))

@@ -1,4 +1,4 @@
-"""The search for keys that joints of a body have of their own, and for those of their channels."""
+"""The search for separate keys of each joint of a body, or of each rotation and location of joints."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from .skeleton_channels import Channels, changes
 from .skeleton_levels import Level
 
 ZERO_WEIGHT = 1e-30
-"""Stands for a weight of zero."""
+"""Replaces a weight of zero in divisions."""
 
 
 class OwnKeys:
-    """The search for keys that each joint has of its own.
+    """The search for separate keys of each joint.
 
-    First every joint on a chain gets its share of the tolerance, for the largest displacement that its own error gives
-    to anything that hangs on it: by the triangle inequality that is enough. Errors of joints seldom add up, though, so
-    then keys are taken out for as long as the error in the root's space allows it: of all joints of a depth at once,
-    since these do not move one another, with what hangs on them and what they hang on as it is shown by then.
+    First every joint on a chain gets a share of the tolerance, for the largest displacement that its own error causes
+    at any joint below. By the triangle inequality, this is enough. As errors of joints seldom add up, keys are then
+    removed as long as the error in the root's space allows it. This is done for all joints of a depth at once, as they
+    do not move each other, with the joints above and below them as they are shown at that time.
 
-    With `may_rest` a joint that need not move has a single key. Otherwise only those that never do have one.
+    With `may_rest` a joint that need not move has a single key. Otherwise only joints that never move have one.
     """
 
     off_at_keys = False
@@ -34,19 +34,19 @@ class OwnKeys:
         self.keys = [body.middles[[joint]] if free else every for joint, free in enumerate(body.free.tolist())]
 
     def found(self) -> tuple[np.ndarray, ...]:
-        self._share_out()
+        self._select_within_shares()
         for joints in self.body.skeleton.levels:
-            self._take_out(joints)
-        self._prove()
+            self._remove_keys(joints)
+        self._enforce_tolerance()
         return tuple(self.keys)
 
     def spend(self, budget: int) -> None:
-        """Put keys in where errors are largest, one place after the other, as long as that makes them smaller."""
+        """Add keys where the error is largest, one place after the other, as long as this makes the error smaller."""
         least = self.body.errors(self.shown).max()
         while True:
             errors = self.body.errors(self.shown)
             keys, shown = list(self.keys), self.shown.copy()
-            self._put_back(np.argmax(errors, keepdims=False)[None])
+            self._add_keys(np.argmax(errors, keepdims=False)[None])
             count = sum(len(keys) for joint, keys in enumerate(self.keys) if self.body.free[joint])
             error = self.body.errors(self.shown).max()
             if count > budget or not error < least:
@@ -54,8 +54,8 @@ class OwnKeys:
                 return
             least = error
 
-    def _share_out(self) -> None:
-        """Keys of all joints, each within its share of the tolerance."""
+    def _select_within_shares(self) -> None:
+        """Find keys of all joints, each within its share of the tolerance."""
         body, count = self.body, len(self.body.times)
         sizes, shares = self._sizes_and_shares()
         rests = ~that_move(body.poses)
@@ -67,12 +67,12 @@ class OwnKeys:
             times, starts = np.tile(body.times, len(moving)), count * np.arange(len(moving))
             size, share = sizes[moving].ravel(), shares[moving].ravel()
             search = KeySearch(SampleTracks(times, reshaped(body.poses[moving], -1), body.mode, size, share, starts))
-            self._take(moving, search.thinned(search.measured(np.arange(len(times))), 1.0))
+            self._show_tracks(moving, search.thinned(search.measured(np.arange(len(times))), 1.0))
 
     def _sizes_and_shares(self) -> tuple[np.ndarray, np.ndarray]:
-        """How large what hangs on each joint is and how far it may be off by that joint, both (joints, n).
+        """Return the reach of everything below each joint, and the error that the joint may cause, both (joints, n).
 
-        Both in the unit of the joint's parent. Joints that never move need no share.
+        Both are in the unit of the joint's parent. Joints that never move need no share.
         """
         body, skeleton = self.body, self.body.skeleton
         longest_chains = skeleton.longest_chains((that_move(body.poses) & body.free).astype(np.int64))
@@ -83,8 +83,8 @@ class OwnKeys:
         on_joints = (skeleton.parents >= 0)[:, None]
         return body.sizes / body.truth.scales, shares / np.where(on_joints, body.truth.scales[skeleton.parents], 1.0)
 
-    def _take(self, joints: np.ndarray, keys: KeySelection) -> None:
-        """Note and show the keys of joints that were tracks."""
+    def _show_tracks(self, joints: np.ndarray, keys: KeySelection) -> None:
+        """Store and show the keys of joints that were searched as tracks."""
         count = len(self.body.times)
         bounds = np.searchsorted(keys.indices, count * np.arange(len(joints) + 1))
         for number, joint in enumerate(joints.tolist()):
@@ -94,8 +94,8 @@ class OwnKeys:
         self.keys[joint] = keys
         self.shown[joint] = self.body.shown(joint, keys)
 
-    def _take_out(self, joints: np.ndarray) -> None:
-        """Take keys out of joints that do not hang on one another, as far as the error in the root's space allows."""
+    def _remove_keys(self, joints: np.ndarray) -> None:
+        """Remove keys of joints of one level, as far as the error in the root's space allows."""
         movable = [joint for joint in joints.tolist() if len(self.keys[joint]) > 1 and self.body.free[joint]]
         joints = np.array(movable, dtype=np.int64)
         if not len(joints):
@@ -109,7 +109,7 @@ class OwnKeys:
             count = len(self.body.times)
             search = KeySearch(self._level(joints) if rests.any() else level)
             tracks = [count * number + self.keys[joint] for number, joint in enumerate(joints.tolist())]
-            self._take(joints, search.refined(search.thinned(search.measured(np.concatenate(tracks)), 1.0)))
+            self._show_tracks(joints, search.refined(search.thinned(search.measured(np.concatenate(tracks)), 1.0)))
 
     @property
     def _ends(self) -> np.ndarray:
@@ -118,23 +118,23 @@ class OwnKeys:
     def _level(self, joints: np.ndarray) -> Level:
         return Level(self.body, joints, self.shown, self.tolerance, self.off_at_keys)
 
-    def _prove(self) -> None:
-        """Put keys back where errors are over the tolerance after all, which takes more than rounding to happen."""
+    def _enforce_tolerance(self) -> None:
+        """Add keys where errors still exceed the tolerance by more than rounding."""
         allowed, many = self.tolerance * (1.0 + 1e-9), 1
         while True:
-            # What rests all over is in one place.
+            # If every joint rests, a single pose is enough.
             rests = all(len(keys) == 1 for keys in self.keys)
             errors = self.body.errors(self.body.at_rest() if rests else self.shown)
-            errors[self._keyed()] = 0.0  # Whatever is left there is rounding, and may be more than a tiny tolerance.
+            errors[self._keyed()] = 0.0  # Errors left there are rounding, and may exceed a tiny tolerance.
             over = np.flatnonzero(errors > allowed)
             if not len(over):
                 return
             worst = over[np.argsort(-errors.flat[over], kind="stable")[:many]]
-            self._put_back(worst)
+            self._add_keys(worst)
             many *= 2
 
     def _keyed(self) -> np.ndarray:
-        """Where joints and all that they hang on have keys, shape (joints, n)."""
+        """Return at which samples a joint and all joints above it have keys, shape (joints, n)."""
         keyed = np.zeros(self.body.poses.shape, dtype=bool)
         for joint, keys in enumerate(self.keys):
             keyed[joint, keys] = True
@@ -142,8 +142,8 @@ class OwnKeys:
             keyed[joints] &= keyed[self.body.skeleton.parents[joints]]
         return keyed
 
-    def _put_back(self, numbers: np.ndarray) -> None:
-        """Keys at these of all joints' samples (joints * n,), also for what the joints hang on."""
+    def _add_keys(self, numbers: np.ndarray) -> None:
+        """Add keys at these flat indices into (joints, n), also for the joints above."""
         desired = np.zeros(self.body.poses.shape, dtype=bool)
         desired.flat[numbers] = True
         desired = self.body.skeleton.most_below(desired)
@@ -153,10 +153,10 @@ class OwnKeys:
 
 
 class ChannelKeys(OwnKeys):
-    """The same for rotations and locations: from the keys of joints, which both begin with, more are taken out.
+    """The search for separate keys of rotations and locations: both begin with the joint's keys, and lose more of them.
 
-    So there are never more of them. As one channel's keys go the other's stay, and what is off at them by the other
-    counts: without that, the proof would put many back.
+    So there are never more keys than with `OwnKeys`. A channel may be wrong at the keys of the other channel, so errors
+    at keys count too. Without this, the last step would add many keys again.
     """
 
     off_at_keys = True
@@ -165,13 +165,13 @@ class ChannelKeys(OwnKeys):
         super().__init__(channels.body, tolerance, may_rest)
         self.channels = channels
 
-    def _share_out(self) -> None:
+    def _select_within_shares(self) -> None:
         whole = OwnKeys(self.channels.whole, self.tolerance, self.may_rest).found()
         for node, keys in enumerate(self.channels.of_nodes(whole)):
             self._show(node, keys)
 
 
 def that_move(poses: Poses) -> np.ndarray:
-    """Which joints (joints, n) ever change in their parents' space, shape (joints,)."""
+    """Return which joints, from poses (joints, n), ever move in their parents' space, shape (joints,)."""
     numbers = [poses.positions, poses.quaternions] + ([] if poses.scales is None else [poses.scales])
     return np.any([changes(rows) for rows in numbers], axis=0)

@@ -1,7 +1,7 @@
-"""Skeletons: joints in their parents' space, and where that puts them.
+"""Skeletons: hierarchies of joints, and their poses in the root's space.
 
 Arrays of a skeleton have the joints first: poses of shape (joints, n). `parents` has the number of each joint's parent,
--1 for roots, in any order. The root's space is the one that the poses of roots are given in.
+-1 for roots, in any order. The root's space is the space in which the poses of roots are given.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from .poses import Poses, packed, placed
 from .quaternions import rotate
 
 AT_ONCE = 2**15
-"""Poses that are looked at in one go, for the processor's caches."""
+"""Poses processed at once, to fit the processor's caches."""
 
 MAX_MATRIX_POSES = 64
-"""Poses of each joint for which products of matrices are the quicker way."""
+"""The most poses of each joint for which matrix products are faster."""
 
 _LEFT_PRODUCT_COMPONENTS = np.array(((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)))
 _LEFT_SIGNS = np.array(((1, -1, -1, -1), (1, 1, -1, 1), (1, 1, 1, -1), (1, -1, 1, 1)))
-"""A quaternion q as a matrix, of these components with these signs: matrix(p) @ matrix(q) is matrix(p q)."""
+"""Components and signs that write a quaternion q as a matrix, such that matrix(p) @ matrix(q) is matrix(p q)."""
 
 
 class Skeleton:
-    """Which joint hangs on which, and where that puts them.
+    """A hierarchy of joints, which converts their poses to the root's space.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Skeleton:
     Raises
     ------
     ValueError
-        Where a parent is no joint, or joints hang on one another in a circle. The message names the joint.
+        If a parent is not a joint, or parents form a cycle. The message names the joint.
 
     See Also
     --------
@@ -45,7 +45,7 @@ class Skeleton:
 
     Examples
     --------
-    A hip, a knee below it, and a head that hangs on nothing:
+    A hip, a knee below it, and a head without a parent:
 
     >>> from rigid_motion.motion import Poses, Skeleton
     >>> skeleton = Skeleton([-1, 0, -1])
@@ -66,7 +66,7 @@ class Skeleton:
             raise ValueError(f"joint {joint} has the parent {parents[joint]}: there are joints 0 to {len(parents) - 1}")
         self.parents = parents.astype(np.int64)
         self.depths = self._depths()
-        """How many joints each hangs on, shape (joints,)."""
+        """The number of joints above each joint, shape (joints,)."""
 
     def __len__(self) -> int:
         return len(self.parents)
@@ -84,18 +84,18 @@ class Skeleton:
             above = np.where(above >= 0, above[above], -1)
         if np.all(above < 0):
             return depths
-        # So far up there is nothing but the circle.
+        # Only joints of a cycle are left this far up.
         raise ValueError(f"joint {np.min(above[above >= 0])} hangs on itself, through its parents")
 
     @cached_property
     def levels(self) -> list[np.ndarray]:
-        """The joints of each depth, from the roots on. No two of a level hang on one another."""
+        """The joints of each depth, beginning with the roots. No joint of a level is below another one."""
         order = np.argsort(self.depths, kind="stable")
         return np.split(order, np.cumsum(np.bincount(self.depths))[:-1])
 
     @cached_property
     def sizes(self) -> np.ndarray:
-        """How many joints hang on each, and itself, shape (joints,)."""
+        """The number of joints below each joint, including itself, shape (joints,)."""
         sizes = np.ones(len(self), dtype=np.int64)
         for joints in self.levels[:0:-1]:
             np.add.at(sizes, self.parents[joints], sizes[joints])
@@ -103,7 +103,7 @@ class Skeleton:
 
     @cached_property
     def _depth_first(self) -> tuple[np.ndarray, np.ndarray]:
-        """The rank of each joint, (joints,), in an order that has all that hangs on a joint behind it, and that."""
+        """The rank of each joint in depth-first order, and the joints in this order, both (joints,)."""
         first, order = np.zeros(len(self), dtype=np.int64), np.empty(len(self), dtype=np.int64)
         for joints in self.levels:
             parents = self.parents[joints]
@@ -116,12 +116,12 @@ class Skeleton:
         return first, order
 
     def below(self, joint: int) -> np.ndarray:
-        """Return a joint and all that hang on it, rising, shape (sizes[joint],)."""
+        """Return a joint and all joints below it, rising, shape (sizes[joint],)."""
         first, order = self._depth_first
         return np.sort(order[first[joint] : first[joint] + self.sizes[joint]])
 
     def longest_chains(self, counts: np.ndarray) -> np.ndarray:
-        """Return the largest sum of counts (joints,) on any chain from a root to an end through each joint."""
+        """Return the largest sum of counts (joints,) along any chain from a root to a leaf through each joint."""
         above, beneath = counts.copy(), counts.copy()
         for joints in self.levels[1:]:
             above[joints] += above[self.parents[joints]]
@@ -131,14 +131,14 @@ class Skeleton:
         return above + beneath - counts
 
     def most_below(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the largest of the numbers (joints, ...) of each joint and all that hang on it."""
+        """Return the largest of the numbers (joints, ...) among each joint and all joints below it."""
         most = numbers.copy()
         for joints in self.levels[:0:-1]:
             np.maximum.at(most, self.parents[joints], most[joints])
         return most
 
     def in_root_space(self, poses: Poses) -> Poses:
-        """Where joints are that have these poses in their parents' space.
+        """Return the poses in the root's space of joints with these poses in their parents' space.
 
         Parameters
         ----------
@@ -148,14 +148,14 @@ class Skeleton:
         Returns
         -------
         Poses, shape (joints, ...)
-            In the space that the poses of roots are given in.
+            In the space in which the poses of roots are given.
 
         Raises
         ------
         TypeError
-            Where they are no `Poses`.
+            If the argument is not a `Poses`.
         ValueError
-            Where there are not as many as joints.
+            If its first axis does not have one entry for each joint.
         """
         check_poses(poses, "poses")
         if poses.shape[:1] != (len(self),):
@@ -171,7 +171,7 @@ class Skeleton:
     def _few_in_root_space(self, poses: Poses) -> Poses:
         turns = poses.quaternions[..., _LEFT_PRODUCT_COMPONENTS] * _LEFT_SIGNS
         for joints in self.levels[1:]:
-            # Equal poses stay equal to the last bit, which a product by @ does not promise.
+            # Equal poses stay equal to the last bit, which the operator @ does not guarantee.
             turns[joints] = np.einsum("...ij,...jk->...ik", turns[self.parents[joints]], turns[joints])
         quaternions = turns[..., 0]
         arms = rotate(quaternions[self.parents], poses.positions)

@@ -1,4 +1,4 @@
-"""How far bodies go and turn from moment to moment, how fast that is, and where it jumps."""
+"""Speeds of bodies: distances and turns from moment to moment, and sudden changes of velocity."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import numpy as np
 from .affine import AffineMaps
 
 MIN_LENGTH = 1e-12
-"""Axes that are shorter have no direction."""
+"""Shorter axes have no direction."""
 
 NEAR_STEPS = 8
-"""Steps on either side of one that say what is usual there."""
+"""Steps on either side of a step that define the usual change there."""
 
 ROUNDING_RATIO = 1e-5
-"""Jumps that are less than this part of how far the body gets are rounding."""
+"""Jumps below this fraction of the body's whole movement count as rounding."""
 
 
 def ways_and_turns(maps: AffineMaps) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far bodies (n,) go from each to the next, and by what angle they turn, in radians, both (n - 1,)."""
+    """Return the distances and the angles in radians from each of n moments to the next, both of shape (n - 1,)."""
     axes = _directions(maps.axes)
     # The Frobenius norm of the difference of two rotations by an angle a is sqrt(8) sin(a / 2).
     apart = np.sqrt(np.square(np.diff(axes, axis=0)).sum(axis=(1, 2)) / 8.0)
@@ -25,19 +25,19 @@ def ways_and_turns(maps: AffineMaps) -> tuple[np.ndarray, np.ndarray]:
 
 
 def jumps(maps: AffineMaps, size: float) -> np.ndarray:
-    """Return by how many times the velocity changes more at each of evenly timed moments (n,) than it does near it.
+    """Return the ratio of the velocity change at each of n evenly spaced moments to the usual change near it.
 
     Parameters
     ----------
     maps : AffineMaps, shape (n,)
     size : float
-        How far from its origin the points are that count as the body's own: of those the fastest counts.
+        The distance from the origin of the measured points on the axes; the largest change of any point counts.
 
     Returns
     -------
     array, shape (n,)
-        1 where it changes as it usually does, 0 at both ends. What is usual is the median of the changes around,
-        those next to it left out, as a pop makes three.
+        1 for a usual change, 0 at both ends. The usual change is the median of the changes nearby, without the adjacent
+        ones, as a pop makes three large changes.
     """
     result = np.zeros(len(maps.origins))
     if len(result) < 3:
@@ -56,5 +56,5 @@ def jumps(maps: AffineMaps, size: float) -> np.ndarray:
 
 
 def _directions(axes: np.ndarray) -> np.ndarray:
-    """Return axes (n, 3, 3) of length 1, as columns."""
+    """Return axes (n, 3, 3) normalised to length 1, as columns."""
     return axes / np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), MIN_LENGTH)

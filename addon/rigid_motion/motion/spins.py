@@ -1,8 +1,8 @@
-"""Spins: whole turns that a body makes more than its mode says, between two keys that it keeps.
+"""Spins: additional whole turns of a body between two keys, which stay unchanged.
 
-They are about an axis through the body's origin, which stands still in the body or in space, at the progress of the
-segment: a segment M(u) becomes M(u) exp(2 pi k u e) or, about an axis of space, exp(2 pi k u e) on the other side of
-its rotation. At both keys that is a turn by nothing, and the path of the origin stays what it is.
+A spin turns about an axis through the body's origin, fixed in the body or in space, in proportion to the progress of
+the segment. A segment M(u) becomes M(u) exp(2 pi k u e) or, for an axis fixed in space, has exp(2 pi k u e) on the
+other side of its rotation. At both keys, this leaves the rotation as it is. The path of the origin does not change.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ class Spins:
     """The spins of S segments."""
 
     turns: np.ndarray
-    """By their sign in the sense of the axis or against it, shape (S,). Whole ones end as they begin."""
+    """The number of turns, shape (S,); the sign gives the direction about the axis. Whole turns end as they begin."""
 
     axes: np.ndarray
     """Unit vectors, shape (3, S)."""
 
     in_space: np.ndarray
-    """Whether an axis stands still in space, and not in the body, shape (S,)."""
+    """Whether an axis is fixed in space instead of in the body, shape (S,)."""
 
     def twists(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Return the angular velocities (3, 2, S) that spins add at both keys in unit time, along the body's axes.
 
-        From the unit quaternions (S, 4) of the keys.
+        The arguments are the unit quaternions (S, 4) of the first and second keys.
         """
         turn = (FULL_TURN * self.turns * self.axes).T
         ends = [np.where(self.in_space[:, None], rotate(conjugate(key), turn), turn).T for key in (first, second)]
         return np.stack(ends, axis=1)
 
     def add_to(self, poses: Poses, counts: np.ndarray, progress: np.ndarray, some: slice = slice(None)) -> Poses:
-        """Return poses (m,) of some of the segments, counts[i] of the i-th, spun as far as their progress (m,)."""
+        """Return poses (m,) in `some` segments, counts[i] of them in the i-th, spun in proportion to progress (m,)."""
         turns = self.turns[some]
         if not turns.any():
             return poses

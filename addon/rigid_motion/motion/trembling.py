@@ -1,8 +1,8 @@
-"""How much a recording trembles: the part of it that no motion explains.
+"""The jitter of a recording: the part that no motion explains.
 
-White noise is as large in differences of any order, once they are divided by what they do to it; motion is the smaller
-the higher the order, where samples come often enough. So the noise is the least that is found in several orders and
-shares of the samples, and, as the least of several that are right would be too little, the mean of all that agree.
+Normalised differences of any order keep the size of white noise, while motion shrinks with the order if samples are
+frequent enough. So the noise is the smallest estimate from several orders and fractions of the samples. As the smallest
+of several correct estimates would be too small, the result is the mean of all estimates that agree with it.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from .differences import coefficients, differences
 from .poses import Poses
 
 DIFFERENCE_ORDERS = range(3, 9)
-"""Of the differences that are tried."""
+"""The orders of differences that give estimates."""
 
 QUIET_RATIOS, QUIET_NORMS = (0.25, 0.5, 0.75), (1.10123, 1.53817, 2.02691)
-"""These shares of the differences are the quietest, and the norms below which as many of normal vectors (3,) are. They
-leave hits and fast stretches out."""
+"""Fractions of the differences, the smallest ones, and the same quantiles of the norms of standard normal vectors (3,).
+They leave out impacts and fast stretches."""
 
 AGREEING_RATIO = 2.2
-"""Over the root of the number of samples: by this part what is found in one way may be more than the least, and agrees.
-Twice the standard deviation that it has in white noise."""
+"""Divided by the square root of the sample count: the fraction by which an estimate may exceed the smallest and agree.
+Twice the standard deviation of an estimate in white noise."""
 
 FILTERED_NOISE_RATIO = 0.8
-"""Where the highest order has less than this part of what a middle one has, the noise has been filtered out already."""
+"""If the estimate of the highest order is below this fraction of that of `MIDDLE_ORDER`, the noise was filtered out."""
 
 MIDDLE_ORDER = 5
 
 NOISE_REACH_SAMPLES = 8
-"""Samples on either side that say how much a recording trembles here."""
+"""Samples on either side that define the jitter at a sample."""
 
 
 class Trembling(NamedTuple):
-    """Noise of places, metres, and of rotations, radians: standard deviations along an axis, 0 where none is found.
+    """Jitter of positions, metres, and of rotations, radians: standard deviations along an axis, 0 if none is found.
 
-    `here` has the same for each sample, shape (2, n): more than the former where motion cannot be told from noise.
+    `here` has both for each sample, shape (2, n). They are larger where motion cannot be distinguished from jitter.
     """
 
     position: float
@@ -46,9 +46,9 @@ class Trembling(NamedTuple):
 
 
 def trembling(times: np.ndarray, poses: Poses) -> Trembling:
-    """Return how much a recording trembles, of times (n,) in seconds and poses (n,) with unit quaternions.
+    """Return the jitter of a recording with times (n,) in seconds and poses (n,) with unit quaternions.
 
-    It needs `ORDERS[-1] + 2` samples; with fewer nothing is found.
+    It needs `DIFFERENCE_ORDERS[-1] + 2` samples; with fewer, no jitter is found.
     """
     count = len(times)
     here = np.full((2, count), np.inf)
@@ -71,9 +71,9 @@ def trembling(times: np.ndarray, poses: Poses) -> Trembling:
 
 
 def mean_around(values: np.ndarray, reach: int) -> np.ndarray:
-    """Return the mean of each of values (n,) and so many on either side of it, of fewer at the ends."""
+    """Return the mean of each of values (n,) and its `reach` neighbours on either side, fewer at the ends."""
     sums = np.concatenate(([0.0], np.cumsum(values)))
     at = np.arange(len(values))
     first, last = np.maximum(at - reach, 0), np.minimum(at + reach + 1, len(values))
-    # A sum of what is not negative is not, whatever is rounded.
+    # Rounding must not make a sum of non-negative values negative.
     return np.maximum(sums[last] - sums[first], 0.0) / (last - first)

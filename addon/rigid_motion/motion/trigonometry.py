@@ -1,8 +1,8 @@
-"""Sines and cosines of many angles at once.
+"""Fast sines and cosines of many angles at once.
 
 In double precision NumPy takes 8 to 9 ns for a sine, and as much for a cosine, on every processor. Its tangent takes
-1 ns where it has vector code for it (AVX-512), and gives both by the half-angle formulas. Elsewhere a polynomial gives
-the sine of a small angle, and a root its cosine. All are correct to a few units in the last place.
+1 ns with vector code (AVX-512), and gives both by the half-angle formulas. Otherwise a polynomial gives the sine of a
+small angle, and a square root its cosine. All are correct to a few units in the last place.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 MAX_NARROW_RAD = np.pi / 3.0
-"""Radians up to which the polynomial is the sine, and the root loses nothing of the cosine."""
+"""The largest angle in radians for which the polynomial equals the sine, and the root keeps the cosine's precision."""
 
 _SINE_COEFFICIENTS = (
     -0.16666666666666666,
@@ -21,12 +21,12 @@ _SINE_COEFFICIENTS = (
     1.605689019222814e-10,
     -7.525258784607096e-13,
 )
-"""Of sin(x) / x - 1 in powers of x^2: the smallest relative error of the sine up to `MAX_NARROW_RAD`, 2.1e-19
-(Remez)."""
+"""Coefficients of sin(x) / x - 1 in powers of x^2, with the smallest relative error of the sine up to `MAX_NARROW_RAD`,
+2.1e-19 (Remez)."""
 
 
 def _has_vector_tangent() -> bool:
-    """Whether NumPy's tangent is not the C library's, one number at a time. NumPy before 2.1 does not tell."""
+    """Whether NumPy has vector code for the tangent, beyond the C library's scalar one. False for NumPy before 2.1."""
     introspect = getattr(np.lib, "introspect", None)
     if introspect is None:
         return False
@@ -38,10 +38,10 @@ VECTOR_TANGENT = _has_vector_tangent()
 
 
 def fill_sine_and_cosine(angles: np.ndarray, sine: np.ndarray, cosine: np.ndarray, *, narrow: bool) -> None:
-    """Fill in the sines and the cosines of angles in radians, three arrays that share no memory.
+    """Fill `sine` and `cosine` from angles in radians. The three arrays must not share memory.
 
-    `narrow` promises that no angle is beyond `MAX_NARROW_RAD` but for rounding. That is for the caller to know: looked
-    up here, it would depend on all angles what one of them has for a sine, in its last bit.
+    `narrow` asserts that no angle exceeds `MAX_NARROW_RAD`, except for rounding. The caller decides this: if this
+    function tested all angles, the last bit of one sine would depend on the other angles.
     """
     if narrow and not VECTOR_TANGENT:
         np.multiply(angles, angles, out=cosine)
@@ -55,8 +55,8 @@ def fill_sine_and_cosine(angles: np.ndarray, sine: np.ndarray, cosine: np.ndarra
         np.subtract(1.0, cosine, out=cosine)
         np.sqrt(cosine, out=cosine)
         return
-    # Of t, the tangent of half the angle: 2 t / (1 + t^2) and 2 / (1 + t^2) - 1. No double is at its pole, and next to
-    # it t is 1.6e16.
+    # With t, the tangent of half the angle: 2 t / (1 + t^2) and 2 / (1 + t^2) - 1. No double is at a pole of the
+    # tangent, and next to a pole t is 1.6e16.
     np.multiply(angles, 0.5, out=sine)
     np.tan(sine, out=sine)
     np.multiply(sine, sine, out=cosine)
