@@ -56,7 +56,7 @@ def outliers(times: np.ndarray, poses: Poses, noise: Trembling) -> tuple[np.ndar
     repeats = np.zeros(len(times), dtype=bool)
     same = poses.positions[1:] == poses.positions[:-1], poses.quaternions[1:] == poses.quaternions[:-1]
     repeats[1:] = same[0].all(axis=1) & same[1].all(axis=1)
-    trembles = bool(noise.position or noise.rotation)
+    has_jitter = bool(noise.position or noise.rotation)
     for length in range(min(MOST_ROWS, len(times) - 4 * EXPECTING_SAMPLES), 0, -1):
         firsts = np.arange(EXPECTING_SAMPLES, len(times) - length - EXPECTING_SAMPLES + 1)
         over = np.zeros(len(firsts))
@@ -65,13 +65,15 @@ def outliers(times: np.ndarray, poses: Poses, noise: Trembling) -> tuple[np.ndar
             over = np.maximum(over, np.where(each > MIN_SPIKE_SAMPLE_RATIO, surprise, 0.0))
             apart = np.maximum(apart, across)
         is_repeated = repeats[firsts[:, None] + np.arange(length)].all(axis=1)
-        enough = np.where(is_repeated, MIN_REPEAT_RATIO, MIN_SPIKE_ENDS_RATIO) * (1.0 if trembles else STILL_FACTOR)
-        enough *= LONG_SPIKE_FACTOR if length >= LONG_SPIKE_SAMPLES else 1.0
-        likely = np.flatnonzero((over > enough) & (apart < np.minimum(MAX_RETURN_RATIO, over)))
+        threshold = np.where(is_repeated, MIN_REPEAT_RATIO, MIN_SPIKE_ENDS_RATIO) * (
+            1.0 if has_jitter else STILL_FACTOR
+        )
+        threshold *= LONG_SPIKE_FACTOR if length >= LONG_SPIKE_SAMPLES else 1.0
+        likely = np.flatnonzero((over > threshold) & (apart < np.minimum(MAX_RETURN_RATIO, over)))
         for row in firsts[likely[np.argsort(-over[likely], kind="stable")]]:
             if not found[row - 1 : row + length + 1].any():
                 found[row : row + length] = True
-    lost = repeats & (trembles and 0.0 < repeats.mean() < MAX_REPEATED_RATIO)
+    lost = repeats & (has_jitter and 0.0 < repeats.mean() < MAX_REPEATED_RATIO)
     # A body whose samples repeat for longer stands still.
     edges = np.flatnonzero(np.diff(lost, prepend=False, append=False))
     for first, end in zip(edges[0::2], edges[1::2], strict=True):
