@@ -87,5 +87,5 @@ def _write_table(file: TextIO, motions: Sequence[ReceivedMotion]) -> None:
         for name, own in zip(motion.body.joints, poses, strict=True):
             device = motion.name if len(motion.body.joints) == 1 else f"{motion.name}.{name}"
             device = device.replace(",", "_").replace('"', "_")
-            for _, lines in lines_of_poses([motion.times, *own.positions.T, *own.quaternions.T]):
+            for lines in lines_of_poses([motion.times, *own.positions.T, *own.quaternions.T]):
                 file.write("".join(f"{device},{line}\n" for line in lines))
