@@ -1,6 +1,7 @@
-"""Rigid motion in NumPy: poses, the modes that fill in between them, measures, decimation and repair.
+"""Rigid motion in NumPy: poses, modes that interpolate between them, error measures, decimation and repair.
 
-No Blender here: importable anywhere. Quaternions are w, x, y, z; positions and times keep the units they come in.
+This package does not need Blender and can be imported anywhere. Quaternions are w, x, y, z; positions and times keep
+the units they come in.
 """
 
 from .best_of import best_modes, interpolate_by_segments

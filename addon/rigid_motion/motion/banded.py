@@ -1,8 +1,8 @@
-"""Least squares over a long row of samples, of which each is tied to the three before it: solved by cyclic reduction.
+"""Banded least squares: long rows of samples, each tied to the three before it, solved by cyclic reduction.
 
 The matrix is symmetric and positive definite, with three diagonals on either side, so it is block tridiagonal in blocks
-of three. Every second block is eliminated, and again, all of a level at once: ten calls of NumPy a level, and no loop
-over samples. Source: Golub and Van Loan, *Matrix Computations*, 4.5.4; the inverse by Takahashi's recursion.
+of three. Each level eliminates every second block, all at once: ten calls of NumPy a level, and no loop over samples.
+Source: Golub and Van Loan, *Matrix Computations*, 4.5.4; the inverse by Takahashi's recursion.
 """
 
 from __future__ import annotations
@@ -12,11 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 BLOCK_DIAGONALS = 3
-"""Diagonals on either side, and rows of a block."""
+"""Diagonals on either side of the main one, and rows of a block."""
 
 
 class _Level(NamedTuple):
-    """What was eliminated: inverses of those blocks, and what they have of the blocks before and behind them."""
+    """One level of elimination: the inverses of the eliminated blocks, and their products with the couplings to the
+    blocks before and behind.
+    """
 
     inverses: np.ndarray
     before: np.ndarray
@@ -24,7 +26,7 @@ class _Level(NamedTuple):
 
 
 class Banded:
-    """A factored matrix diag(d) + C' diag(w) C, of which each row of C has four numbers: those of samples i to i + 3.
+    """A factored matrix diag(d) + C' diag(w) C, where row i of C has four numbers, for the samples i to i + 3.
 
     Parameters
     ----------
@@ -64,7 +66,7 @@ class Banded:
         self._last = np.linalg.inv(own)
 
     def solve(self, sides: np.ndarray) -> np.ndarray:
-        """Return x of A x = b, for right-hand sides of shape (n, k)."""
+        """Return the solution x of A x = b, for right-hand sides of shape (n, k)."""
         padded = np.zeros((BLOCK_DIAGONALS * -(-self._count // BLOCK_DIAGONALS), sides.shape[1]))
         padded[: self._count] = sides
         blocks, odd = padded.reshape(-1, BLOCK_DIAGONALS, sides.shape[1]), []
@@ -78,22 +80,22 @@ class Banded:
         for level, known in zip(self._levels[::-1], odd[::-1], strict=True):
             found = level.inverses @ known - level.before @ blocks[: len(level.before)]
             found[: len(level.behind)] -= level.behind @ blocks[1 : 1 + len(level.behind)]
-            blocks = _woven(blocks, found)
+            blocks = _interleaved(blocks, found)
         return blocks.reshape(-1, sides.shape[1])[: self._count]
 
     def inverse_diagonals(self) -> np.ndarray:
-        """Return the diagonal of the inverse and the three above it, shape (4, n): [k, i] is in row i, column i + k."""
+        """Return the diagonal of the inverse and the three above it, shape (4, n): [k, i] is row i, column i + k."""
         own, across = self._last, np.zeros((0, BLOCK_DIAGONALS, BLOCK_DIAGONALS))
         for level in self._levels[::-1]:
             before, behind = level.before, level.behind
-            some, after = len(behind), slice(1, 1 + len(behind))
+            inner, after = len(behind), slice(1, 1 + len(behind))
             middle = level.inverses + before @ own[: len(before)] @ before.swapaxes(1, 2)
-            mixed = before[:some] @ across[:some] @ behind.swapaxes(1, 2)
-            middle[:some] += behind @ own[after] @ behind.swapaxes(1, 2) + mixed + mixed.swapaxes(1, 2)
+            mixed = before[:inner] @ across[:inner] @ behind.swapaxes(1, 2)
+            middle[:inner] += behind @ own[after] @ behind.swapaxes(1, 2) + mixed + mixed.swapaxes(1, 2)
             to_middle = -own[: len(before)] @ before.swapaxes(1, 2)
-            to_middle[:some] -= across[:some] @ behind.swapaxes(1, 2)
-            across = _woven(to_middle, -before[:some] @ across[:some] - behind @ own[after])
-            own = _woven(own, middle)
+            to_middle[:inner] -= across[:inner] @ behind.swapaxes(1, 2)
+            across = _interleaved(to_middle, -before[:inner] @ across[:inner] - behind @ own[after])
+            own = _interleaved(own, middle)
         diagonals = np.zeros((BLOCK_DIAGONALS + 1, BLOCK_DIAGONALS * len(own)))
         for row in range(BLOCK_DIAGONALS):
             for apart in range(BLOCK_DIAGONALS + 1):
@@ -105,8 +107,8 @@ class Banded:
         return diagonals[:, : self._count]
 
 
-def _woven(even: np.ndarray, odd: np.ndarray) -> np.ndarray:
-    """Return blocks of which every second one is of the second list."""
+def _interleaved(even: np.ndarray, odd: np.ndarray) -> np.ndarray:
+    """Return blocks taken alternately from two lists."""
     both = np.empty((len(even) + len(odd), *even.shape[1:]))
     both[0::2], both[1::2] = even, odd
     return both

@@ -1,8 +1,8 @@
-"""The best mode of each segment: of several modes, the one that comes closest to a recording from this key to the next.
+"""The best mode for each segment: the one of several that comes closest to the recording from one key to the next.
 
-Which that is can only be said where the recording is known: for reducing keys, not for a stream. The keys are the same
-whatever the modes, and a smooth mode looks at the keys around its segment and not at the modes there: so segments can
-be chosen for one by one, and any choice is a motion. Where two modes meet, it may turn a corner.
+This needs the recording, so it serves key reduction and not streams. The keys are the same for all modes, and a smooth
+mode depends on the keys around its segment but not on the modes there. So each segment can be chosen by itself, and any
+choice gives a motion. The motion may turn a corner where two modes meet.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from .modes import KEYFRAME_MODES, interpolate, mode_named
 from .poses import Poses, numbers, of_each
 
 MAX_SAME_ERROR_RATIO = 1e-6
-"""Errors that differ by less than this share are the same: those of modes that are one motion do."""
+"""Errors that differ by less than this fraction count as equal, such as those of two modes that give the same motion.
+"""
 
 MAX_ROUNDING_RATIO = 1e-12
-"""The same for errors compared with how far the motion gets."""
+"""The same, as a fraction of the largest coordinate plus the radius."""
 
 
 def best_modes(
@@ -33,7 +34,7 @@ def best_modes(
     radius: float = 0.1,
     tolerance: float | None = None,
 ) -> tuple[str, ...]:
-    """Return the mode of each segment between keys that comes closest to a recording.
+    """Return the mode that comes closest to a recording, for each segment between keys.
 
     Parameters
     ----------
@@ -42,37 +43,38 @@ def best_modes(
     poses : Poses, shape (n,)
         The recording, with unit quaternions.
     keys : array-like of int, shape (k,), or of bool, shape (n,)
-        The samples that are keys: their numbers, rising, or a mask; at least two. What is before the first and behind
-        the last does not count.
+        The samples that are keys: their numbers, rising, or a mask; at least two. Samples before the first key and
+        after the last do not count.
     modes : iterable of str
-        The names in `MODES` to choose from; all modes for keyframes where none are given. Of equally good ones the
-        first is taken, or the neighbour's.
+        The names in `MODES` to choose from; by default all modes for keyframes. Of equally good modes, the one of the
+        neighbouring segment is taken, or else the first.
     radius : float
-        Of the shell, in the unit of the positions.
+        The radius of the shell, in the unit of the positions.
     tolerance : float, optional
-        The largest shell error at any sample, in the unit of the positions. Modes that pass it are out, unless all do.
+        The largest shell error at any sample, in the unit of the positions. Modes that exceed it are excluded, unless
+        all do.
 
     Returns
     -------
     tuple of str, k - 1 modes
-        With the least RMS shell error in each segment, as `interpolate_by_segments` takes them.
+        The modes with the least RMS shell error in each segment, in the form that `interpolate_by_segments` takes.
 
     Raises
     ------
     TypeError
-        Where the recording is no `Poses`.
+        If the recording is not `Poses`.
     ValueError
-        For an unknown mode or none, keys that are no rising samples or fewer than two, and samples that are not finite,
-        out of order or of no size.
+        If a mode is unknown or none is given, if keys are not rising samples or fewer than two, or if samples are not
+        finite, out of order, or have a zero quaternion or a scale that is not positive.
 
     See Also
     --------
     interpolate_by_segments : The motion that these modes make.
-    reduce_keys : Few keys, for one mode.
+    reduce_keys : Find few keys, for one mode.
 
     Examples
     --------
-    A motion that was made of two modes is taken apart again:
+    Recover the two modes that a motion was made with:
 
     >>> import numpy as np
     >>> from rigid_motion.motion import Poses, best_modes, interpolate_by_segments
@@ -84,7 +86,7 @@ def best_modes(
     """
     if isinstance(modes, str):
         raise ValueError(f"modes to choose from need to be several names: of a single one make a list, [{modes!r}]")
-    modes = _named(modes, "modes to choose from")
+    modes = _checked_names(modes, "modes to choose from")
     if not modes:
         raise ValueError("there is no mode to choose from")
     check_radius(radius)
@@ -103,8 +105,8 @@ def best_modes(
     return tuple(modes[best] for best in least_errors(errors, keys - keys[0], rounding, allowed))
 
 
-def _named(modes: Iterable[str], what: str) -> tuple[str, ...]:
-    """Return names that are all of modes, or an error that says what they are for."""
+def _checked_names(modes: Iterable[str], what: str) -> tuple[str, ...]:
+    """Return the names as a tuple, or raise an error that says what they are for if one is not a mode."""
     if not isinstance(modes, Iterable):
         raise TypeError(f"{what} are {modes!r}: give a list of names")
     modes = tuple(modes)
@@ -116,23 +118,23 @@ def _named(modes: Iterable[str], what: str) -> tuple[str, ...]:
 def least_errors(
     errors: np.ndarray, keys: np.ndarray, rounding: float = 0.0, tolerance: float | None = None
 ) -> np.ndarray:
-    """In each segment, which of several errors has the least root mean square.
+    """Return which of several errors has the least root mean square, for each segment.
 
     Parameters
     ----------
     errors : array, shape (m, n)
-        Of m modes at n samples, from the first key on.
+        Errors of m modes at n samples, from the first key on.
     keys : array of int, shape (k,)
         The samples that are keys, rising from 0.
     rounding : float
-        Errors that differ by no more than this are the same, or by a share of `MAX_SAME_ERROR_RATIO`.
+        Errors count as equal if they differ by no more than this, plus the fraction `MAX_SAME_ERROR_RATIO`.
     tolerance : float, optional
-        The largest error at any sample. What passes it is out, unless everything does.
+        The largest error at any sample. Modes that exceed it are excluded, unless all do.
 
     Returns
     -------
     array of int, shape (k - 1,)
-        Of equally good ones what keeps the number of changes from segment to segment smallest, or else the first.
+        Of equally good modes, those with the fewest changes from segment to segment, or else the first.
     """
     starts, inside = keys[:-1], errors[:, : keys[-1]]
     rms = np.sqrt(np.add.reduceat(inside**2, starts, axis=1) / np.diff(keys))
@@ -145,9 +147,9 @@ def least_errors(
 
 
 def _fewest_changes(acceptable: np.ndarray) -> np.ndarray:
-    """One of the acceptable choices (m, s) for each of s segments, with the fewest changes; of equals the first."""
+    """Return one acceptable choice (m, s) for each of s segments, with the fewest changes; the first if equal."""
     sets = np.left_shift(1, np.arange(len(acceptable))) @ acceptable
-    # What all segments since the last change have in common, for as long as that is anything.
+    # The choices that all segments since the last change have in common, as long as there are any.
     shared = np.array(list(accumulate(sets.tolist(), lambda common, current: common & current or current)))
     ends = np.flatnonzero(np.append(shared[:-1] & sets[1:], 0) == 0)
     first = np.argmax(shared[ends, None] >> np.arange(len(acceptable)) & 1, axis=1)
@@ -155,7 +157,7 @@ def _fewest_changes(acceptable: np.ndarray) -> np.ndarray:
 
 
 def interpolate_by_segments(key_times: ArrayLike, keys: Poses, times: ArrayLike, modes: Sequence[str]) -> Poses:
-    """Return the poses at `times` of one object whose segments have modes of their own.
+    """Return the poses at `times` of one object, with a separate mode for each segment.
 
     Parameters
     ----------
@@ -164,7 +166,7 @@ def interpolate_by_segments(key_times: ArrayLike, keys: Poses, times: ArrayLike,
     keys : Poses, shape (k,)
         At least two, as in `interpolate`.
     times : array-like, shape (m,)
-        In any order, in the unit of `key_times`. Outside of the keys the end poses hold.
+        In any order, in the unit of `key_times`. Outside the keys, the end poses are held.
     modes : sequence of str, k - 1 of them
         Names in `MODES`.
 
@@ -176,9 +178,9 @@ def interpolate_by_segments(key_times: ArrayLike, keys: Poses, times: ArrayLike,
     Raises
     ------
     TypeError
-        Where the keys are no `Poses`.
+        If the keys are not `Poses`.
     ValueError
-        As `interpolate` does, and for another number of modes, or more than one object.
+        In the cases of `interpolate`, and if the number of modes is wrong or there is more than one object.
 
     See Also
     --------
@@ -199,7 +201,7 @@ def interpolate_by_segments(key_times: ArrayLike, keys: Poses, times: ArrayLike,
         raise ValueError("modes for segments need a row of at least two key times, and a row of times")
     if isinstance(modes, str):
         raise ValueError(f"{modes!r} is a single mode: give one for each segment, or use interpolate")
-    modes = _named(modes, "modes of segments")
+    modes = _checked_names(modes, "modes of segments")
     if len(modes) != len(key_times) - 1:
         raise ValueError(f"{len(modes)} modes do not fit {len(key_times)} keys")
     if keys.shape != key_times.shape:

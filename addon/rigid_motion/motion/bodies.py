@@ -1,4 +1,4 @@
-"""Recordings of whole bodies: joints that hang on one another, and how far off they are in the root's space."""
+"""Recordings of whole bodies: joints in a hierarchy, and their errors in root space."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .quaternions import components, normalise
 from .skeletons import AT_ONCE, Skeleton
 
 SOME_TURN = 1e-12
-"""What a mean of quaternions is turned by, so that it has a length."""
+"""Added to means of quaternions, so that none has length zero."""
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The recording of a body, and what it is measured by. Errors are weighted."""
+    """The recording of a body and how its errors are measured. Errors are weighted."""
 
     times: np.ndarray
     poses: Poses
@@ -30,7 +30,7 @@ class Body:
     weights: np.ndarray
     free: np.ndarray
     desired: Poses | None = None
-    """Where joints should be in the root's space, unless that is where their poses put them."""
+    """Where joints should be in root space, if not where `poses` put them."""
 
     @cached_property
     def truth(self) -> Poses:
@@ -42,14 +42,16 @@ class Body:
         return truth
 
     def errors(self, shown: Poses, samples: np.ndarray | None = None) -> np.ndarray:
-        """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown, at samples."""
+        """Return the errors of all joints (joints, m) for poses (joints, m) in their parents' space, at all samples or
+        these.
+        """
         there = self.skeleton.in_root_space(shown)
         if samples is None:
             return self.shell_errors(there, self.truth, self.radii[:, None]) * self.weights
         return shell_error(there, self.packed_truth[samples], self.radii[:, None]) * self.weights[:, samples]
 
     def shell_errors(self, shown: Poses, truth: Poses, sizes: np.ndarray) -> np.ndarray:
-        """Those of balls of some sizes where poses are shown, both (joints, 1) or (joints, n), shape (joints, n)."""
+        """Return shell errors (joints, n) of poses for balls of some sizes; both may be (joints, 1) or (joints, n)."""
         result = np.empty(truth.shape)
         for some in self._blocks:
             balls = sizes if sizes.shape[1] == 1 else sizes[:, some]
@@ -58,13 +60,13 @@ class Body:
 
     @cached_property
     def _blocks(self) -> list[slice]:
-        """Samples that are looked at in one go."""
+        """Slices of samples that are processed at a time."""
         step = max(1, AT_ONCE // len(self.skeleton))
         return [slice(first, first + step) for first in range(0, len(self.times), step)]
 
     @cached_property
     def off(self) -> np.ndarray:
-        """The errors of its own poses, shape (joints, n): zero, but for a truth of its own."""
+        """Errors of the recorded poses themselves, shape (joints, n): zero unless `desired` is given."""
         return self.errors(self.poses)
 
     @cached_property
@@ -72,7 +74,7 @@ class Body:
         return packed(self.truth)
 
     def shown(self, joint: int, keys: np.ndarray) -> Poses:
-        """Return what a joint does between keys (k,), shape (n,)."""
+        """Return the motion of a joint between keys (k,), shape (n,)."""
         return interpolate(self.times[keys], self.poses[joint][keys], self.times, self.mode)
 
     @cached_property
@@ -83,13 +85,13 @@ class Body:
         return np.argmin(self.shell_errors(means, self.poses, self.sizes), axis=1)
 
     def at_rest(self) -> Poses:
-        """Every joint in its middle pose all the time, shape (joints, 1)."""
+        """Return each joint's middle pose, shape (joints, 1)."""
         joints = np.arange(len(self.skeleton))
         return self.poses[joints[:, None], self.middles[:, None]]
 
     @cached_property
     def sizes(self) -> np.ndarray:
-        """How far everything that hangs on a joint is from it, with the balls around it, shape (joints, n)."""
+        """How far the balls of a joint and of all joints below it reach from the joint, shape (joints, n)."""
         balls = np.broadcast_to(self.radii[:, None], self.poses.shape)
         balls = balls if self.truth.scales is None else balls * self.truth.scales
         result = balls.copy()

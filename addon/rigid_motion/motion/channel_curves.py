@@ -1,13 +1,13 @@
-"""Blender's own curves, channel by channel: what an animator has without any mode, to compare the modes with.
+"""Blender's own F-curves with Auto Clamped handles: the motion without any mode, to compare the modes with.
 
-Blender joins new keys by Bezier curves with *Auto Clamped* handles, each of x, y, z and the four numbers of the
-quaternion by itself. Their handles are a third of the segment long, so the curves are cubics in time, and what handles
-say are slopes. These are nothing at the first key, the last one, and wherever a value is not between those of its
-neighbours. From one of these keys to the next the second derivative goes on (*Continuous Acceleration*), as far as no
-slope needs to be negative for it, or more than three times that of the line to either neighbour: there a curve would
-leave the range between its keys.
+Blender joins new keys by Bezier curves with *Auto Clamped* handles, separately for x, y, z and the four numbers of the
+quaternion. The handles are a third of the segment long, so the curves are cubics in time, and the handles set slopes.
+Slopes are zero at the first key, the last key, and wherever a value is not between those of its neighbours. Between
+these keys the second derivative is continuous (*Continuous Acceleration*), as far as no slope has to be negative for
+it, or more than three times that of the line to either neighbour: there a curve would leave the range between its keys.
 
-Source: the manual of Blender, "Editors - Graph Editor - F-Curves"; equal to Blender's own evaluation, which is tested.
+Source: the manual of Blender, "Editors - Graph Editor - F-Curves". Tests check that the result equals Blender's own
+evaluation.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from __future__ import annotations
 import numpy as np
 
 MAX_SLOPE_RATIO = 3.0
-"""How many times steeper than the line from key to key a cubic may be at either end without leaving their range."""
+"""How many times steeper than the line from key to key a cubic may be at either end without leaving the keys' range."""
 
 MAX_UNLOCKED_SLOPES = 2
-"""How often Blender lets go of a slope at its limit, at most."""
+"""How often Blender releases a slope that is locked at its limit, at most."""
 
 
 def auto_clamped_slopes(durations: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the slopes of curves at their keys, with Blender's Auto Clamped handles.
+    """Return the slopes of curves at their keys, for Blender's Auto Clamped handles.
 
     Parameters
     ----------
     durations : array, shape (..., n - 1)
-        From key to key, above zero; leading axes may be left out that values have.
+        From key to key, above zero. Leading axes of `values` may be missing here.
     values : array, shape (..., n)
 
     Returns
@@ -52,7 +52,9 @@ def auto_clamped_slopes(durations: np.ndarray, values: np.ndarray) -> np.ndarray
 
 
 class _Runs:
-    """Keys (k,) whose slopes are free, by their places among all; those that are neighbours depend on one another."""
+    """Runs of neighbouring keys (k,) with free slopes, which depend on one another; `places` are indices among all
+    keys.
+    """
 
     def __init__(self, places: np.ndarray) -> None:
         begins = np.diff(places, prepend=-2) > 1
@@ -60,12 +62,14 @@ class _Runs:
         self.run = np.cumsum(begins) - 1
         number = np.arange(len(places)) - self.first[self.run]
         order = np.argsort(number, kind="stable")
-        # Of all runs at once the first keys, then the second ones...
+        # The first keys of all runs, then the second ones, and so on.
         self.columns = np.split(order, np.flatnonzero(np.diff(number[order])) + 1)
 
     def clamped(self, before: tuple[np.ndarray, np.ndarray], after: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """Return the slopes (k,), from the slopes of the lines to the neighbours on either side and one over the time
-        to these, (k,) each.
+        """Return the slopes (k,).
+
+        `before` and `after` each hold the slope of the line to the neighbour on that side, and one over the time to it,
+        (k,).
         """
         (chord, lower), (next_chord, upper) = before, after
         sign = np.sign(chord)
@@ -73,31 +77,31 @@ class _Runs:
         most = MAX_SLOPE_RATIO * np.minimum(np.abs(chord), np.abs(next_chord))
         locked, at, unlocks = np.zeros(len(sign), dtype=bool), np.zeros(len(sign)), np.zeros(len(sign), dtype=int)
         while True:
-            slopes = self._solved(lower, diagonal, upper, right, locked, at)
+            slopes = self._solve(lower, diagonal, upper, right, locked, at)
             high, low = slopes > most, slopes < 0.0
-            # In runs where any are too steep only those are held at their limit.
-            held = high | (low & ~self._any(high))
-            pull = right - diagonal * slopes - self._beside(lower, upper, slopes)
-            loose = locked & (unlocks < MAX_UNLOCKED_SLOPES) & ~self._any(high | low)
+            # In a run with slopes that are too steep, only those are locked at their limit.
+            held = high | (low & ~self._any_in_run(high))
+            pull = right - diagonal * slopes - self._neighbour_terms(lower, upper, slopes)
+            loose = locked & (unlocks < MAX_UNLOCKED_SLOPES) & ~self._any_in_run(high | low)
             loose &= ((pull > 0.0) & (slopes < most)) | ((pull < 0.0) & (slopes > 0.0))
             if not (held.any() or loose.any()):
                 return sign * slopes
             locked, at = (locked | held) & ~loose, np.where(held, np.where(high, most, 0.0), at)
             unlocks += loose
 
-    def _any(self, flags: np.ndarray) -> np.ndarray:
-        """Return whether any in the run of each has the flag, (k,)."""
+    def _any_in_run(self, flags: np.ndarray) -> np.ndarray:
+        """Return for each key whether any key in its run has the flag, (k,)."""
         return np.logical_or.reduceat(flags, self.first)[self.run]
 
-    def _beside(self, lower: np.ndarray, upper: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-        """Return what the neighbours in its run contribute to the equation of each, (k,)."""
+    def _neighbour_terms(self, lower: np.ndarray, upper: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        """Return what the neighbours in a key's run contribute to its equation, (k,)."""
         same = self.run[1:] == self.run[:-1]
         result = np.zeros(len(slopes))
         result[1:] += np.where(same, lower[1:] * slopes[:-1], 0.0)
         result[:-1] += np.where(same, upper[:-1] * slopes[1:], 0.0)
         return result
 
-    def _solved(
+    def _solve(
         self,
         lower: np.ndarray,
         diagonal: np.ndarray,
@@ -106,7 +110,7 @@ class _Runs:
         locked: np.ndarray,
         at: np.ndarray,
     ) -> np.ndarray:
-        """Return the solutions (k,) of a tridiagonal system for each run, in which some are locked at a value."""
+        """Return the solution (k,) of each run's tridiagonal system, where `locked` keys have the value `at`."""
         lower, upper = (np.where(locked, 0.0, side) for side in (lower, upper))
         diagonal, right = np.where(locked, 1.0, diagonal), np.where(locked, at, right)
         share, result = np.empty(len(right)), np.empty(len(right))

@@ -1,4 +1,4 @@
-"""Checks of what callers give: each error names the argument or the sample, what is wrong with it, and the way out."""
+"""Argument checks: each error names the argument or sample, says what is wrong with it, and how to fix it."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ KEYS_WANTED = "give rising numbers of samples, as reduce_keys and decimate retur
 
 
 def check_poses(poses: Poses, name: str) -> None:
-    """Raise a TypeError where an argument of this name is an array, a list or something else instead of poses."""
+    """Raise a TypeError if the argument with this name is not `Poses`, but an array, a list or something else."""
     if not isinstance(poses, Poses):
         raise TypeError(f"{name} need to be Poses, not {type(poses).__name__}: Poses(positions, quaternions)")
 
 
 def check_times(times: np.ndarray, whose: str = "") -> None:
-    """Raise a ValueError that names the first of some times (n,) that is not later than the one before it."""
+    """Raise a ValueError that names the first of the times (n,) that is not later than the one before it."""
     if times.ndim != 1:
         raise ValueError(f"times of shape {times.shape}: give one row of them, in seconds")
     if not (finite := np.abs(times) < MAX_ABS).all():
@@ -52,18 +52,19 @@ def check_body(times: np.ndarray, poses: Poses, where: str = "") -> None:
 
 
 def key_samples(keys: ArrayLike, samples: int) -> np.ndarray:
-    """Which of so many samples are keys, as rising numbers, shape (k,), k at least 2.
+    """Return which samples are keys, as rising numbers, shape (k,), with k at least 2.
 
     Parameters
     ----------
     keys : array-like of int, shape (k,), or of bool, shape (samples,)
         Numbers of samples, or a mask of them.
     samples : int
+        The number of samples.
 
     Raises
     ------
     ValueError
-        For anything else. Whole numbers that are floats are refused as well: they could be times.
+        If keys are anything else. Whole numbers given as floats are refused too: they could be times.
     """
     try:
         given = np.asarray(keys)
@@ -98,7 +99,7 @@ def key_samples(keys: ArrayLike, samples: int) -> np.ndarray:
 
 
 def check_wishes(tolerance: float | None, budget: int | None, tries: int) -> None:
-    """Raise a TypeError or ValueError that says what is wrong with what is asked of key reduction."""
+    """Raise a TypeError or ValueError that says what is wrong with the arguments of key reduction."""
     if tolerance is None and budget is None:
         raise ValueError("key reduction needs a tolerance or a budget of keys: give one of the two")
     if tolerance is not None and budget is not None:
@@ -112,13 +113,13 @@ def check_wishes(tolerance: float | None, budget: int | None, tries: int) -> Non
 
 
 def check_tolerance(tolerance: float) -> None:
-    """Raise a TypeError where the tolerance is no number, a ValueError where it is no length."""
+    """Raise a TypeError if the tolerance is not a number, a ValueError if it is not a length."""
     if not 1.0 / MAX_ABS < number(tolerance, "tolerance") < MAX_ABS:
         raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / MAX_ABS:g} to {MAX_ABS:g}")
 
 
 def check_radius(radius: float) -> None:
-    """Raise a TypeError where the shell's radius is no number, a ValueError where it is no length, nor 0."""
+    """Raise a TypeError if the radius of the shell is not a number, a ValueError if it is neither a length nor 0."""
     if not (1.0 / MAX_ABS < (given := number(radius, "radius")) < MAX_ABS or given == 0.0):
         raise ValueError(
             f"a radius of {radius} is not a length: give 0, or a number from {1.0 / MAX_ABS:g} to {MAX_ABS:g}"
@@ -126,9 +127,9 @@ def check_radius(radius: float) -> None:
 
 
 def check_radii(radii: ArrayLike) -> np.ndarray:
-    """Return the same of one radius or many, in an array of any shape, which is returned."""
+    """Check one radius or an array of them as `check_radius` does, and return them as an array."""
     if not isinstance(radii, np.ndarray | list | tuple):
-        check_radius(radii)  # type: ignore[arg-type]  # refused there where it is no number
+        check_radius(radii)  # type: ignore[arg-type]  # raises there if it is not a number
     checked = numbers(radii, "radii")
     for radius in np.unique(checked):
         check_radius(radius)
@@ -136,13 +137,13 @@ def check_radii(radii: ArrayLike) -> np.ndarray:
 
 
 def check_flag(flag: bool, name: str) -> None:
-    """Raise a TypeError where an argument of this name is neither True nor False."""
+    """Raise a TypeError if the argument with this name is neither True nor False."""
     if not isinstance(flag, bool | np.bool_):
         raise TypeError(f"{name} is {flag!r}: give True or False")
 
 
 def number(value: float, name: str) -> float:
-    """One number, or a TypeError where an argument of this name is none, such as "5mm" or True."""
+    """Return a number as float, or raise a TypeError if the argument with this name is none, such as "5mm" or True."""
     is_one = isinstance(value, Real) and not isinstance(value, bool)
     if not is_one and not (isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf"):
         raise TypeError(f"a {name} of {value!r} is not a number: give a single one, without quotes or unit")
@@ -153,7 +154,7 @@ def number(value: float, name: str) -> float:
 
 
 def whole_number(value: int, name: str) -> int:
-    """One whole number, or a TypeError where an argument of this name is none: 1.5, "80" or True."""
+    """Return a whole number, or raise a TypeError if the argument with this name is none, such as 1.5, "80" or True."""
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(f"{name} is {value!r}: give a whole number, such as 3")
     return int(value)

@@ -1,8 +1,8 @@
-"""3D conformal geometric algebra: e1, e2, e3, e4 square to 1, e5 to -1; e_inf = e4 + e5. A pose is the versor M = T R
-S.
+"""Poses as versors of 3D conformal geometric algebra (CGA), with their LERP and SLERP.
 
-T = 1 - t e_inf / 2, R as in `pga`, and a uniform scale s is the dilator S = exp(-log(s) / 2 e45), the innermost factor.
-Of the rotor's terms the paper lists e1, e2, e3 too; a motor has none.
+The basis vectors e1, e2, e3, e4 square to 1 and e5 to -1; e_inf = e4 + e5. A pose is the versor M = T R S with T = 1 -
+t e_inf / 2, R as in `pga`, and the dilator S = exp(-log(s) / 2 e45) for a uniform scale s, the innermost factor. The
+paper also lists e1, e2 and e3 among the terms of the rotor; a motor has none of them.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ _T5 = CGA.indices("e15", "e25", "e35")
 
 
 def cga_lerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
-    """(1 - u) M0 + u M1, projected to a versor by the extraction.
+    """Return (1 - u) M0 + u M1, projected to a versor by `extract`.
 
-    Its scale is (1 + k) / (1 - k) with k = tanh(log(s) / 2) of the blend: 1.43 a quarter of the way from 1 to 4, where
-    even growth (`cga_slerp`) has 1.41.
+    The scale is (1 + k) / (1 - k) with k = tanh(log(s) / 2) of the blend: 1.43 a quarter of the way from 1 to 4, where
+    growth at a constant rate (`cga_slerp`) gives 1.41.
     """
     u = np.asarray(u)[..., None]
     return extract((1.0 - u) * encode(first) + u * encode(second), scaled=first.scales is not None)
 
 
 def cga_slerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
-    """M0 exp(u log(M0^-1 M1)): the geodesic of similarities, at an even rate of turning, of advance and of growth.
+    """Return M0 exp(u log(M0^-1 M1)): the geodesic of similarities, which turns, advances and grows at constant rates.
 
-    It does not depend on where the world has its origin, so the first position serves: far away from it, the squares of
-    e4 and e5 that cancel in M0^-1 M1 would take half of the digits with them.
+    The result does not depend on the origin of the world, so the first position is taken as the origin: far from the
+    origin, squares of e4 and e5 that cancel in M0^-1 M1 would cost half of the digits.
     """
     u, origin = np.asarray(u), first.positions
     start = encode(Poses(np.zeros_like(origin), first.quaternions, first.scales))
@@ -52,13 +52,13 @@ def encode(poses: Poses) -> np.ndarray:
 
 
 def extract(versor: np.ndarray, scaled: bool = True) -> Poses:
-    """R, S and t of the versor that a blend of versors is projected to.
+    """Return the pose of the versor that a blend of versors is projected to, as R, S and t.
 
-    A blend that turns and grows at once is no versor: the rotor A on 1, e12, e13, e23 and the rotor B of the block B
-    e45 point different ways. The rotation is that of A, and the scale is read from tanh(log(s) / 2) = -<B A~> / |A|^2.
-    The translation is where the blend takes the origin, T = C (A + B)^-1 with C the factor of e_inf, t = T . (e5 - e4);
-    A + B is what R S is to e_inf. So the path does not depend on where the world has its origin, and a motor, with B =
-    0, has the paper's own extraction.
+    A blend that turns and grows at once is not a versor: the rotor A on 1, e12, e13, e23 and the rotor B of the block B
+    e45 point in different directions. The rotation is that of A, and the scale follows from tanh(log(s) / 2) = -<B A~>
+    / |A|^2. The translation is where the blend takes the origin: T = C (A + B)^-1 with C the factor of e_inf, and t = T
+    . (e5 - e4); A + B acts on e_inf as R S does. So the path does not depend on the origin of the world. For a motor,
+    where B = 0, this is the extraction of the paper.
     """
     a, b = versor[..., _ROTOR], versor[..., _DILATED_ROTOR]
     squared = np.sum(a * a, axis=-1)
@@ -86,7 +86,7 @@ def logarithm(versor: np.ndarray) -> np.ndarray:
 
 
 def exponential(bivector: np.ndarray) -> np.ndarray:
-    """Return the versor of a bivector: advance, turn and growth at once, for one unit of time."""
+    """Return the versor of a bivector: advance, turn and growth together, for one unit of time."""
     velocity = -(bivector[..., _T4] + bivector[..., _T5])
     turn = bivector[..., CGA.indices("e23", "e13", "e12")] * np.array((-2.0, 2.0, -2.0))
     log_scales = -2.0 * bivector[..., CGA.index("e45")]
@@ -97,10 +97,10 @@ def exponential(bivector: np.ndarray) -> np.ndarray:
 
 
 def _swept(vector: np.ndarray, turn: np.ndarray, log_scales: np.ndarray, undo: bool = False) -> np.ndarray:
-    """Where a point gets to whose velocity starts as `vector` and turns and grows with the motion; or back from there.
+    """Return the displacement of a point whose velocity starts as `vector` and turns and grows with the motion.
 
-    Along the axis it advances by (exp(l) - 1) / l. Across it, it runs on a logarithmic spiral, with the complex number
-    l + i angle in the place of l.
+    With `undo`, return the starting velocity for a displacement. Along the axis the factor is (exp(l) - 1) / l. Across
+    the axis the point follows a logarithmic spiral, with the complex number l + i angle in the place of l.
     """
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     axis = turn / np.where(angle == 0.0, 1.0, angle)

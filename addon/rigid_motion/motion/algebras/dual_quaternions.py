@@ -1,7 +1,8 @@
-"""Unit dual quaternions d = A + eps B, shape (..., 8): A is the rotation r, and the translation t is 2 B A*.
+"""Poses as unit dual quaternions d = A + eps B, shape (..., 8), with the screw motion between them (ScLERP).
 
-A unit dual quaternion is the exponential of a dual vector: half the screw's angle along its axis, and in the dual part
-half its moment and pitch (Kavan et al., "Geometric skinning with approximate dual quaternion blending", 2008).
+A is the rotation r, and the translation t is 2 B A*. A unit dual quaternion is the exponential of a dual vector: its
+real part is half the angle of the screw along its axis, its dual part half the moment and the pitch (Kavan et al.,
+"Geometric skinning with approximate dual quaternion blending", 2008).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from .vector_quaternion import geometric_scales
 
 
 def dq_sclerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
-    """SLERP of dual quaternions, d0 (d0^-1 d1)^u: the screw motion from one pose to the other."""
+    """Return d0 (d0^-1 d1)^u, the SLERP of dual quaternions: the screw motion from one pose to the other."""
     u = np.asarray(u)
     start, end = encode(first), encode(second)
     screw = logarithm(product(inverse(start), end))
@@ -23,7 +24,7 @@ def dq_sclerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
 
 
 def encode(poses: Poses) -> np.ndarray:
-    """Return a = r, B = t r / 2."""
+    """Return the dual quaternions A = r, B = t r / 2."""
     pure = np.concatenate((np.zeros_like(poses.positions[..., :1]), poses.positions), axis=-1)
     return np.concatenate((poses.quaternions, 0.5 * multiply(pure, poses.quaternions)), axis=-1)
 
@@ -46,12 +47,12 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def inverse(d: np.ndarray) -> np.ndarray:
-    """Return A* + eps B*: the inverse of a unit dual quaternion."""
+    """Return A* + eps B*, the inverse of a unit dual quaternion."""
     return np.concatenate((conjugate(d[..., :4]), conjugate(d[..., 4:])), axis=-1)
 
 
 def logarithm(d: np.ndarray) -> np.ndarray:
-    """Return the dual vector, shape (..., 6), whose exponential is d. Needs a non-negative w."""
+    """Return the dual vector, shape (..., 6), whose exponential is d. Requires a non-negative w."""
     w, v, dual_w, dual_v = np.split(d, (1, 4, 5), axis=-1)
     half_angle = np.arctan2(np.linalg.norm(v, axis=-1, keepdims=True), w)
     # log d = f(d) v(d) with f = h / sin h; its dual part is f v' + f' v.

@@ -1,7 +1,7 @@
-"""3D projective geometric algebra: e0^2 = 0, e1^2 = e2^2 = e3^2 = 1. A pose is the motor M = T R.
+"""Poses as motors of 3D projective geometric algebra (PGA), with their LERP and SLERP.
 
-T = 1 - e0 (t1 e1 + t2 e2 + t3 e3) / 2, and the quaternion w, x, y, z is R = w - z e12 + y e13 - x e23, as the paper has
-it.
+The basis vectors square to e0^2 = 0, e1^2 = e2^2 = e3^2 = 1. A pose is the motor M = T R with T = 1 - e0 (t1 e1 + t2 e2
++ t3 e3) / 2. The quaternion w, x, y, z is R = w - z e12 + y e13 - x e23, as in the paper.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ _SCALAR, _PSEUDOSCALAR = PGA.indices("1", "e0123")
 
 
 def pga_lerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
-    """(1 - u) M0 + u M1, normalised by the extraction."""
+    """Return (1 - u) M0 + u M1, normalised by `extract`."""
     u = np.asarray(u)[..., None]
     motor = (1.0 - u) * encode(first) + u * encode(second)
     return extract(motor, geometric_scales(first, second, u[..., 0]))
 
 
 def pga_slerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
-    """M0 exp(u log(M0^-1 M1))."""
+    """Return M0 exp(u log(M0^-1 M1))."""
     u = np.asarray(u)
     start, end = encode(first), encode(second)
     bivector = logarithm(PGA.product(PGA.reverse(start), end))
@@ -45,9 +45,9 @@ def encode(poses: Poses) -> np.ndarray:
 
 
 def extract(motor: np.ndarray, scales: np.ndarray | None = None) -> Poses:
-    """R = a + b e12 + c e13 + d e23 from e0 M = e0 R, then T = M R^-1; the motor need not be normalised.
+    """Return R = a + b e12 + c e13 + d e23 from e0 M = e0 R, then T = M R^-1; the motor need not be normalised.
 
-    The paper writes the reverse for R^-1, which holds for unit R. A LERP is none, hence the division.
+    The paper writes the reverse for R^-1, which holds for unit R. The R of a LERP is not a unit, hence the division.
     """
     rotor = np.zeros_like(motor)
     rotor[..., _ROTOR] = motor[..., _ROTOR]
@@ -60,8 +60,8 @@ def extract(motor: np.ndarray, scales: np.ndarray | None = None) -> Poses:
 def logarithm(motor: np.ndarray) -> np.ndarray:
     """Return the bivector whose exponential is a unit motor with non-negative scalar.
 
-    A motor is s + b + p I with a bivector b whose square is a scalar plus a multiple of I; the function h / sin h of
-    that "Study number" has the part f that scales b and the part f' that moves b's rotation over to its translation.
+    A motor is s + b + p I, where the square of the bivector b is a scalar plus a multiple of I. The function h / sin h
+    of that "Study number" has two parts: f scales b, and f' adds a multiple of the rotation of b to its translation.
     """
     scalar, pseudoscalar = motor[..., [_SCALAR]], motor[..., [_PSEUDOSCALAR]]
     bivector = motor.copy()
@@ -81,10 +81,10 @@ def exponential(bivector: np.ndarray) -> np.ndarray:
 
 
 def _moment(bivector: np.ndarray) -> np.ndarray:
-    """I b: the rotation part of a bivector as a translation along its axis."""
+    """Return I b: the rotation part of a bivector as a translation along its axis."""
     return PGA.product(PGA.multivector(e0123=1.0), bivector)
 
 
 def _pitch(bivector: np.ndarray) -> np.ndarray:
-    """Return the coefficient of I in b^2 / 2: the translation along the axis of the rotation, times the rotation."""
+    """Return the coefficient of I in b^2 / 2: the translation along the rotation axis times the rotation."""
     return PGA.product(bivector, bivector)[..., [_PSEUDOSCALAR]] / 2.0

@@ -1,4 +1,4 @@
-"""Position and rotation apart, the state of the art of the paper: (1 - u) v + u w and q (q^-1 r)^u."""
+"""Positions and rotations interpolated separately, the paper's state of the art: (1 - u) v + u w and q (q^-1 r)^u."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from ..quaternions import conjugate, multiply, normalise
 
 
 def lerp_slerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
-    """Straight line and great arc."""
+    """Return poses on the straight line between the positions and the great arc between the rotations."""
     u = np.asarray(u)[..., None]
     turned = multiply(first.quaternions, power(multiply(conjugate(first.quaternions), second.quaternions), u))
     return Poses((1.0 - u) * first.positions + u * second.positions, turned, geometric_scales(first, second, u[..., 0]))
 
 
 def bezier(first: Poses, second: Poses, u: np.ndarray) -> Poses:
-    """Each number by itself, eased in and out: what Blender makes of two keys alone."""
+    """Return each number interpolated by itself with ease in and out, as Blender does between two keys alone."""
     u = np.clip(np.asarray(u), 0.0, 1.0)
     eased = (u * u * (3.0 - 2.0 * u))[..., None]
     position, quaternion = (
@@ -30,7 +30,7 @@ def bezier(first: Poses, second: Poses, u: np.ndarray) -> Poses:
 
 
 def power(q: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """q^u = exp(u log q) of unit quaternions (n, 4) with non-negative w, u of shape (n, 1)."""
+    """Return q^u = exp(u log q) of unit quaternions (n, 4) with non-negative w, for u of shape (n, 1)."""
     sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     half_angle = np.arctan2(sine, q[..., :1])
     axis = q[..., 1:] / np.where(sine == 0.0, 1.0, sine)
@@ -38,7 +38,7 @@ def power(q: np.ndarray, u: np.ndarray) -> np.ndarray:
 
 
 def geometric_scales(first: Poses, second: Poses, u: np.ndarray) -> np.ndarray | None:
-    """s0^(1 - u) s1^u: growth at an even rate. None where poses have no scales."""
+    """Return s0^(1 - u) s1^u, growth at a constant rate, or None if the poses have no scales."""
     if first.scales is None or second.scales is None:
         return None
     return np.exp((1.0 - u) * np.log(first.scales) + u * np.log(second.scales))
