@@ -1,7 +1,7 @@
-"""Cleaning: a shaky recording without its trembling, and no sample further from where it was than was allowed.
+"""Cleaning: removes the jitter of a shaky recording without moving any sample further than allowed.
 
-What is looked for is the motion that is likeliest for the noise that was found: its jerk is as large as it is around
-there, so that hits stay hits and what is calm gets smooth. Nothing is to be set.
+The result is the motion that is likeliest for the noise that was found. Its jerk is as large as the recording's around
+each sample, so that hits stay hits and calm stretches become smooth. There is nothing to set.
 """
 
 from __future__ import annotations
@@ -25,36 +25,37 @@ from .skeletons import Skeleton
 from .trembling import DIFFERENCE_ORDERS, Trembling, trembling
 
 CAP_ROUNDS = 12
-"""In which samples that are too far off are drawn back with the motion around, in as many alone, in as many fully."""
+"""Rounds of pulling back samples that moved too far: first with their surroundings, then alone, then completely. Each
+of the three stages has as many."""
 
 SLIDE_RATIO = 0.25
-"""Of the tolerance: how far a joint that stands may get from where it stood at first, unless it got further."""
+"""Fraction of the tolerance that a standing joint may slide from where it first stood, unless it did slide further."""
 
 LOOK_AGAIN_ROUNDS, GIVEN_BACK_SAMPLES = 4, 24
-"""What would be a spike if it were cleaned again, as what is at the bound beside what is smooth, gets so many samples
-back on either side as they were: where these tremble, too, it is none. Looked for so many times."""
+"""Rounds of looking for spikes in the cleaned recording, and the samples on either side of one that get their old poses
+back. A sample held at the tolerance looks like a spike beside smooth samples, but not where these have jitter, too."""
 
 MIN_NOISE_RATIO = 1e-3
-"""Of the tolerance, or else of the radius: what trembles less is still."""
+"""Jitter below this fraction of the tolerance (or of the radius, if there is no tolerance) counts as none."""
 
 MIN_MOVED_PER_NOISE = 0.3
-"""Mean squares of what samples are moved by, in those of the noise that was found: where they are less that is none, as
-most of it would go, but what motion leaves. So what has been cleaned is not cleaned again."""
+"""Mean square of the corrections, in squares of the noise that was found, below which this was no noise: removing noise
+moves samples by most of it, but little of motion. So a cleaned recording is not cleaned again."""
 
 MAX_STEADY_NOISE_RATIO = 0.97
-"""Of the noise by stamped times has to be left by steady ones for these to be right."""
+"""Steady times replace timestamps only if the noise with them is below this fraction of the noise with timestamps."""
 
 MAX_STAMP_JITTER_STEPS = 0.25
-"""Of a step: standard deviation of stamps from steady times, where there may be such."""
+"""Standard deviation of the timestamps from steady times, in steps, up to which steady times are tried."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cleaned:
-    """A recording that was cleaned: of one body arrays (n,), of several joints (joints, n).
+    """A cleaned recording: arrays have the shape (n,) for one body, (joints, n) for several joints.
 
     See Also
     --------
-    clean : What returns it.
+    clean : Returns it.
 
     Examples
     --------
@@ -68,24 +69,24 @@ class Cleaned:
     """
 
     times: np.ndarray
-    """Seconds (n,): as stamped, or in steady steps where only the clock trembled."""
+    """Seconds (n,): the timestamps, or steady steps if only the clock jittered."""
 
     poses: Poses
     moved: np.ndarray
-    """How far any point within the radius was moved in the root's space."""
+    """How far any point within the radius was moved, in root space."""
 
     spikes: np.ndarray
     repeats: np.ndarray
-    """Which samples were spikes, and which only repeated the one before: both were left out, and bridged."""
+    """Which samples were spikes, and which only repeated the one before. Both were left out and bridged."""
 
     alone: np.ndarray
-    """Which samples were left where they are, or nearly, as motion cannot be told from noise there."""
+    """Which samples were left unchanged, or nearly, because motion cannot be told from noise there."""
 
     noise: np.ndarray
-    """What was found to be noise, of places and of rotations in radians, along an axis: (2,), or (2, joints)."""
+    """Standard deviation of the noise along an axis, of positions and of rotations in radians: (2,), or (2, joints)."""
 
     stands: np.ndarray
-    """Which joints were held as they stood: those that were said to, where they hang on nothing that was left out."""
+    """Which joints were held where they stood, and when: as given, but not below or at samples that were left out."""
 
 
 def clean(
@@ -97,26 +98,26 @@ def clean(
     looks: Looks | None = None,
     stands: ArrayLike | None = None,
 ) -> Cleaned:
-    """Take the trembling and the spikes out of a recording.
+    """Remove the jitter and the spikes of a recording.
 
     Parameters
     ----------
     times : array-like, shape (n,)
         Seconds, strictly rising.
     poses : Poses, shape (n,) or (joints, n)
-        As `repair` returns them; those of joints in their parents' space. Scales stay as they are.
+        As `repair` returns them; joints in the space of their parents. Scales stay as they are.
     tolerance : float, optional
-        How far any point within `radius` may be moved, in the unit of the positions; of spikes and repeated samples,
-        which are replaced, anything, and of what hangs on them.
+        How far any point within `radius` may be moved, in the unit of the positions. Spikes and repeated samples, which
+        are replaced, may be moved any distance, and so may all joints below them.
     radius : float or array-like, shape (joints,)
-        Of the balls around the origins.
+        The radius of the ball around each origin.
     skeleton : Skeleton, optional
-        Which joint hangs on which. Without, none does.
+        The parent of each joint. Without a skeleton, no joint has a parent.
     looks : Looks, optional
-        What was found when this was cleaned within another tolerance, most of which is found once.
+        A cache of what was found in the same recording for other tolerances, most of which is the same for all.
     stands : array-like of bool, shape of the poses, optional
-        Which joints stand, and when, as `standing` finds them where a recording is shaky. There none gets further from
-        where it stood at first than it did, or than a quarter of the tolerance. Without, feet may slide.
+        Which joints stand, and when, as `standing` finds them in a shaky recording. A standing joint gets no further
+        from where it first stood than it did before, or than a quarter of the tolerance. Without it, feet may slide.
 
     Returns
     -------
@@ -125,15 +126,15 @@ def clean(
     Raises
     ------
     TypeError
-        Where the recording is no `Poses`.
+        If the recording is not `Poses`.
     ValueError
-        Where the shapes do not fit, times do not rise, or the tolerance is not above 0.
+        If the shapes do not fit, times do not rise, or the tolerance is not above 0.
 
     See Also
     --------
-    repair : Unit quaternions and rising times.
-    reduce_keys : Few keys of what was cleaned.
-    standing : Which joints of a body stand.
+    repair : Makes quaternions unit and times rise.
+    reduce_keys : Finds few keys of the cleaned recording.
+    standing : Finds which joints of a body stand.
 
     Examples
     --------
@@ -162,12 +163,12 @@ def clean(
     radii = np.broadcast_to(radii, len(skeleton))
     look = looks or Looks()
     times, trembles = _steadied(times, [joints[joint] for joint in range(len(skeleton))])
-    # The same for all tolerances that are much the same.
+    # Rounded to a power of ten, so that similar tolerances share the results in the cache.
     least = [MIN_NOISE_RATIO * 10.0 ** np.floor(np.log10(tolerance or own)) for own in radii.tolist()]
     found = [look(times, joints[own], trembles[own], least[own], radii[own]) for own in range(len(skeleton))]
-    cleaned, held = _within(found, skeleton, radii, tolerance, standing)
-    # Whatever would be found of these would be no noise.
-    still = [_some(each, (False, False)) for each in trembles]
+    cleaned, held = _corrected(found, skeleton, radii, tolerance, standing)
+    # The recording is clean now: look for spikes without any noise.
+    still = [_selected_noise(each, (False, False)) for each in trembles]
     for _ in range(LOOK_AGAIN_ROUNDS):
         parts = [cleaned[own] for own in range(len(found))]
         again = [look(times, *own) for own in zip(parts, still, least, radii, strict=True)]
@@ -175,7 +176,7 @@ def clean(
             break
         for each, other in zip(found, again, strict=True):
             each.give_back(other.out)
-        cleaned, held = _within(found, skeleton, radii, tolerance, standing)
+        cleaned, held = _corrected(found, skeleton, radii, tolerance, standing)
     moved = shell_error(skeleton.in_root_space(cleaned), skeleton.in_root_space(joints), radii[:, None])
     spikes, repeats, alone = (
         np.array([getattr(each, name) for each in found]) for name in ("spikes", "repeats", "alone")
@@ -187,7 +188,7 @@ def clean(
 
 
 class _Joint:
-    """What is found of one joint: its noise, the samples that are left out, and its corrections."""
+    """The analysis of one joint: its noise, the samples that are left out, and its corrections."""
 
     def __init__(self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float) -> None:
         left: Trembling | None = noise
@@ -195,8 +196,8 @@ class _Joint:
             left = self._find(times, poses, left, least, radius)
 
     def _find(self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float) -> Trembling | None:
-        """Find all that for such noise, or return what is left of the noise: the rest was none."""
-        self.start, self.noise = poses, _much(noise, least, radius)
+        """Find everything for this noise, or return the rest of the noise if part of it turns out not to be noise."""
+        self.start, self.noise = poses, _significant_noise(noise, least, radius)
         self.share = np.ones(len(times))
         self.spikes, self.repeats = outliers(times, poses, self.noise)
         self.out = self.spikes | self.repeats
@@ -208,28 +209,28 @@ class _Joint:
             return None
         taken = np.array(self.noise[:2]) > 0.0
         if self.out.any():
-            # What trembles is found again without them.
+            # Measure the jitter again without these samples.
             again = trembling(times[rows], poses[rows])
             here = np.array([np.interp(times, times[rows], each) for each in again.here])
-            self.noise = _much(_some(again, taken)._replace(here=here), least, radius)
+            self.noise = _significant_noise(_selected_noise(again, taken)._replace(here=here), least, radius)
             self.start = _bridged(times, poses, rows)
         self.corrections = Corrections(times, self.start, self.noise, self.out)
         is_noise = self.corrections.moved > MIN_MOVED_PER_NOISE
         if (is_noise != taken).any():
-            # Spikes have to be told by that, too.
-            return _some(noise, is_noise)
+            # Spikes depend on the noise, too: find them again.
+            return _selected_noise(noise, is_noise)
         sizes = np.array([[self.noise.position], [self.noise.rotation]])
         self.alone = ~self.out & ((self.noise.here > MIN_MOTION_PER_NOISE * sizes) & (sizes > 0.0)).any(axis=0)
         return None
 
     def copied(self) -> _Joint:
-        """Return the same, to be drawn back and given back."""
+        """Return a copy whose corrections can be changed."""
         result = copy(self)
         result.corrections = self.corrections and self.corrections.copied()
         return result
 
     def give_back(self, rows: np.ndarray) -> None:
-        """Leave what is around rows (n,) of a mask as it was."""
+        """Undo the corrections around the marked rows (n,)."""
         if not rows.any():
             return
         at, here = np.flatnonzero(rows), np.arange(len(rows))
@@ -240,14 +241,14 @@ class _Joint:
 
 
 class Looks:
-    """What was found of joints, for when the same are cleaned within another tolerance: of this time and the last."""
+    """A cache of joint analyses for cleaning the same joints within another tolerance."""
 
     def __init__(self) -> None:
         self._found: dict[bytes, _Joint] = {}
         self._before: dict[bytes, _Joint] = {}
 
     def turn_over(self) -> None:
-        """Forget what has not been looked for since this was called before."""
+        """Drop the entries that were not used since the previous call."""
         self._found, self._before = {}, self._found
 
     def __call__(self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float) -> _Joint:
@@ -258,11 +259,13 @@ class Looks:
         return found.copied()
 
 
-def _within(
+def _corrected(
     found: list[_Joint], skeleton: Skeleton, radii: np.ndarray, tolerance: float | None, standing: np.ndarray
 ) -> tuple[Poses, np.ndarray]:
-    """Return corrected poses (joints, n), of which all are within the tolerance that hang on nothing left out, and
-    which of them are held, as they stand besides: these slide no further than they did or may.
+    """Return corrected poses (joints, n), and which joints are held where they stand (joints, n).
+
+    All samples are within the tolerance, except those that are left out and the joints below them. Joints that are held
+    slide no further than they did before, or than allowed.
     """
     share = np.array([each.share for each in found])
     bounded = ~np.array([each.out for each in found])
@@ -277,14 +280,14 @@ def _within(
         cleaned = joined([poses[None] for poses in made])
         shown = skeleton.in_root_space(cleaned)
         off = np.where(bounded, shell_error(shown, there, radii[:, None]), 0.0)
-        # What is held back moves nothing around it further than it was to be moved.
+        # Without a tolerance, pulling samples back must not move the samples around them further than the first result.
         limits = off.max(axis=1, keepdims=True) + 1e-99 if limits is None else limits
         slid = slide_ratios(shown.positions, there.positions, held, SLIDE_RATIO * (tolerance or 0.0))
         over = skeleton.most_below(np.maximum(off / limits, slid))
         if (over <= 1.0).all():
             return cleaned, held
         if attempt < CAP_ROUNDS:
-            # As long as that helps, the motion around gives way, too.
+            # At first, the surrounding motion gives way, too.
             for each, own in zip(found, over, strict=True):
                 if each.corrections and own.max() > 1.0:
                     each.corrections.draw_back(own)
@@ -294,19 +297,19 @@ def _within(
     return cleaned, held
 
 
-def _much(noise: Trembling, least: float, radius: float) -> Trembling:
-    """Return noise without what is too little to be worth moving anything."""
+def _significant_noise(noise: Trembling, least: float, radius: float) -> Trembling:
+    """Return the noise, or zero where it is too small to be worth moving anything."""
     position, rotation = (size if size * arm > least else 0.0 for size, arm in ((noise[0], 1.0), (noise[1], radius)))
     return noise._replace(position=position, rotation=rotation)
 
 
-def _some(noise: Trembling, taken: Sequence[bool] | np.ndarray) -> Trembling:
-    """Return the noise of places, rotations, both or none."""
+def _selected_noise(noise: Trembling, taken: Sequence[bool] | np.ndarray) -> Trembling:
+    """Return the noise of positions, rotations, both or none."""
     return noise._replace(position=noise.position * taken[0], rotation=noise.rotation * taken[1])
 
 
 def _bridged(times: np.ndarray, poses: Poses, rows: np.ndarray) -> Poses:
-    """Return poses of which all but these rows are as the motion through these has them."""
+    """Return poses where all but these rows follow the interpolated motion through these rows."""
     through = interpolate(times[rows], poses[rows], times, "motor_spline")
     positions, quaternions = through.positions.copy(), through.quaternions.copy()
     positions[rows], quaternions[rows] = poses.positions[rows], poses.quaternions[rows]
@@ -314,7 +317,7 @@ def _bridged(times: np.ndarray, poses: Poses, rows: np.ndarray) -> Poses:
 
 
 def _steadied(times: np.ndarray, joints: list[Poses]) -> tuple[np.ndarray, list[Trembling]]:
-    """Return the times by which joints tremble less, as stamped or in steady steps, and by how much each does."""
+    """Return the times with less jitter, timestamps or steady steps, and the jitter of each joint with them."""
     stamped = [trembling(times, poses) for poses in joints]
     steps = np.diff(times)
     counts = np.concatenate(([0.0], np.cumsum(np.maximum(np.rint(steps / np.median(steps)), 1.0))))

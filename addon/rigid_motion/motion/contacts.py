@@ -1,6 +1,6 @@
 """Contacts: which joints of a body stand on the ground, and how far they slide there.
 
-A foot that stands still in a recording is the first thing that is seen to move when it does not stand still any more.
+When a foot that stood still in the recording moves, viewers notice that first.
 """
 
 from __future__ import annotations
@@ -11,45 +11,45 @@ from numpy.typing import ArrayLike
 from .poses import numbers
 
 MAX_STANDING_HEIGHT_RATIO = 0.12
-"""How far above the lowest place that any joint gets to what stands is at most, in heights of the body."""
+"""Greatest height of a standing joint above the lowest point of any joint, as a fraction of the body's height."""
 
 MAX_STANDING_HEIGHTS_PER_S = 0.06
-"""How fast it is at most, in heights of the body a second: 10 cm a second for a grown-up."""
+"""Greatest speed of a standing joint, in heights of the body per second: 10 cm/s for an adult."""
 
 MIN_STANDING_S = 0.1
-"""Seconds that something stands at least: what only turns back is not standing."""
+"""Shortest time that counts as standing, in seconds: shorter stops are turning points."""
 
 
 def standing(times: ArrayLike, positions: ArrayLike, *, shaky: bool = False) -> np.ndarray:
-    """Which joints stand on the ground, and when.
+    """Return which joints stand on the ground, and when.
 
     Parameters
     ----------
     times : array-like, shape (n,)
         Seconds, strictly rising.
     positions : array-like, shape (joints, n, 3)
-        In the world, the third axis upwards, in any unit: what is low and slow is measured by the body's height.
+        In the world, with the third axis upwards, in any unit: low and slow are relative to the body's height.
     shaky : bool
-        Look at means over twice as long as anything stands at least, for the positions tremble.
+        Whether the positions jitter: then averages over twice the shortest time of standing are used.
 
     Returns
     -------
     array of bool, shape (joints, n)
-        Low and slow, for a while.
+        Where a joint is low and slow for long enough.
 
     Raises
     ------
     ValueError
-        Where the shapes do not fit one another.
+        If the shapes do not fit one another.
 
     See Also
     --------
-    reduce_skeleton_keys : Takes it for weights: feet that stand count for more.
-    clean : Lets feet that stand slide no further than they did.
+    reduce_skeleton_keys : Uses it for weights: standing feet count for more.
+    clean : Lets standing feet slide no further than they did.
 
     Examples
     --------
-    A head that goes on, and a foot that stands for half a second:
+    A head that moves on, and a foot that stands for half a second:
 
     >>> import numpy as np
     >>> from rigid_motion.motion import standing
@@ -77,7 +77,7 @@ def standing(times: ArrayLike, positions: ArrayLike, *, shaky: bool = False) -> 
 
 
 def contacts(times: np.ndarray, low: np.ndarray, slow: np.ndarray) -> np.ndarray:
-    """When joints stand that are low at times (joints, n), and slow between them (joints, n - 1)."""
+    """Return when joints stand, given when they are low (joints, n) and slow between samples (joints, n - 1)."""
     stands = low & np.concatenate((slow[:, :1], slow), axis=1) & np.concatenate((slow, slow[:, -1:]), axis=1)
     for joint, first, last in spans(stands):
         if times[last] - times[first] < MIN_STANDING_S:
@@ -86,8 +86,10 @@ def contacts(times: np.ndarray, low: np.ndarray, slow: np.ndarray) -> np.ndarray
 
 
 def slide_ratios(positions: np.ndarray, before: np.ndarray, stands: np.ndarray, allowed: float = 0.0) -> np.ndarray:
-    """Return how many times as far as before at most (joints, n, 3), or as is allowed, joints are from where they stood
-    at first, while they stand (joints, n): at first that which is most, and 0 where none stands. Rounding is none.
+    """Return how far joints are from where they first stood, over how far they may be (joints, n); 0 where none stands.
+
+    They may be as far as they were at most in the positions `before` (joints, n, 3), or as far as `allowed`, but for
+    rounding. The first sample of each time of standing has the largest ratio of that time.
     """
     ratios, least = np.zeros(stands.shape), 1e-9 * float(np.abs(before).max(initial=0.0)) + 1e-99
     for joint, first, last in spans(stands):
@@ -99,7 +101,7 @@ def slide_ratios(positions: np.ndarray, before: np.ndarray, stands: np.ndarray, 
 
 
 def slide(positions: np.ndarray, stands: np.ndarray) -> float:
-    """Return farthest that anything (joints, n, 3) gets, while it stands (joints, n), from where it stood at first."""
+    """Return the greatest distance of a joint (joints, n, 3) from where it first stood, while it stands (joints, n)."""
     farthest = 0.0
     for joint, first, last in spans(stands):
         away = positions[joint, first : last + 1] - positions[joint, first]
@@ -108,7 +110,7 @@ def slide(positions: np.ndarray, stands: np.ndarray) -> float:
 
 
 def spans(stands: np.ndarray) -> list[tuple[int, int, int]]:
-    """Joint, first and last sample of every stretch of time (joints, n) that is marked."""
+    """Return joint, first and last sample of every marked stretch of time (joints, n)."""
     edges = np.diff(stands.astype(np.int8), axis=1, prepend=0, append=0)
     joints, firsts = np.nonzero(edges == 1)
     _, ends = np.nonzero(edges == -1)

@@ -1,9 +1,10 @@
-"""Corrections of a recording: how far each sample is moved, so that the jerk is as large as it is around there.
+"""Corrections of a shaky recording: how far to move each sample, so that the jerk fits that of the motion around it.
 
-Of corrections d and third derivatives s the sum of d^2 / noise^2 and h s^2 / J^2 is made least, for places and for
-rotation vectors in world axes; J^2, the density of the jerk around a sample, is found by MacKay's fixed point. Where it
-stands out of the noise, in places or rotations, there is a hit, and nothing is expected of the jerk of either. Source:
-D. MacKay, *Bayesian interpolation*, Neural Computation 4, 1992.
+The corrections d and third derivatives s minimise the sum of d^2 / noise^2 and h s^2 / J^2, for positions and for
+rotation vectors in world axes. J^2, the density of the jerk around a sample, is found by MacKay's fixed point. Where it
+stands out of the noise, in positions or rotations, there is a hit, and the jerk of both is left free.
+
+Source: D. MacKay, *Bayesian interpolation*, Neural Computation 4, 1992.
 """
 
 from __future__ import annotations
@@ -20,33 +21,33 @@ from .poses import Poses
 from .trembling import Trembling, mean_around
 
 JERK_ORDER = 3
-"""Of the derivative that is small: jerk."""
+"""Order of the derivative that is kept small: jerk."""
 
 JERK_ROUNDS = 12
-"""In which the size of the jerk is found."""
+"""Iterations to find the size of the jerk."""
 
 JERK_REACH_SAMPLES = 1
-"""Samples on either side over which it is as large: hits are as short."""
+"""Samples on either side over which the jerk counts as equally large: hits are this short."""
 
 MIN_JERK_RATIO = 1e-9
-"""Of the jerk that noise makes is always allowed: more would be lost in rounding."""
+"""Smallest density of the jerk, as a fraction of the noise's: less would be lost in rounding."""
 
 MIN_HIT_RATIO, HIT_POWER = 0.1, 2
-"""Where the density of the jerk is more than such a part of that of the noise, it counts by this power as many times as
-large: the edges of a hit, which is in one axis and shorter than what is averaged over, were cut by what is expected."""
+"""Where the density of the jerk exceeds this fraction of the noise's, it is multiplied by this power of the ratio by
+which it does: the edges of a hit, which is in one axis and shorter than the average, were cut by the expected jerk."""
 
 MIN_MOTION_PER_NOISE, STIFFNESS_POWER, MAX_STIFFNESS = 1.25, 6, 100.0
-"""Where a recording trembles by more than so many times its noise, that may be motion, and this power of what is above
-keeps samples where they are, up to so many times."""
+"""Where the jitter is more than this many times the noise, it may be motion. The excess ratio, up to the third number,
+to this power is the stiffness that keeps samples in place."""
 
 CAP_POWER = 2.5
-"""By this power of how many times too far they are off samples are drawn back."""
+"""The precision of a sample that is too far off is multiplied by this power of the ratio, which draws it back."""
 
 
 @dataclass
 class Channel:
-    """The corrections of places, or of rotations: `differences` returns the third derivatives (n - 3, 3) with
-    corrections (n, 3) made.
+    """Corrections of positions or of rotations; `differences` maps corrections (n, 3) to third derivatives (n
+    - 3, 3).
     """
 
     differences: Callable[[np.ndarray], np.ndarray]
@@ -54,12 +55,12 @@ class Channel:
     steps: np.ndarray
     noise: float
     precisions: np.ndarray
-    """One over the squares of the noise of samples (n,), 0 of those that are left out."""
+    """One over the squared noise of each sample (n,), 0 for samples that are left out."""
 
     corrections: np.ndarray = field(init=False)
     densities: np.ndarray = field(init=False)
     of_noise: np.ndarray = field(init=False)
-    """The densities that the noise alone would have."""
+    """The densities that noise alone would have."""
 
     def __post_init__(self) -> None:
         self.corrections = np.zeros((len(self.precisions), 3))
@@ -67,7 +68,7 @@ class Channel:
         self.densities = self._density(1.0)
 
     def _density(self, determined: np.ndarray | float) -> np.ndarray:
-        """Return how large the jerk is around each sample, where it determines so much of what is found."""
+        """Return the density of the jerk around each sample, given the fraction of it that the data determine."""
         found = self.differences(self.corrections)
         squares = np.einsum("nc,nc->n", found, found) / 3.0
         around = mean_around(self.steps * squares, JERK_REACH_SAMPLES) / determined
@@ -75,13 +76,13 @@ class Channel:
 
     @property
     def moved(self) -> float:
-        """Mean square of what samples are moved by, in squares of the noise."""
+        """Mean square of the corrections, in squares of the noise."""
         return float(np.einsum("n,nc->", self.precisions, self.corrections**2)) / (
             3.0 * np.count_nonzero(self.precisions)
         )
 
     def settle(self) -> None:
-        """Find how large the jerk is."""
+        """Find the size of the jerk."""
         c = self.coefficients
         for _ in range(JERK_ROUNDS):
             inverse = self.improve().inverse_diagonals()
@@ -95,7 +96,7 @@ class Channel:
             self.densities = self._density(np.maximum(determined, 1e-9))
 
     def improve(self) -> Banded:
-        """Make one step of Newton's towards the best corrections, and return the matrix of that."""
+        """Take one Newton step towards the best corrections, and return its matrix."""
         weights = self.steps / self.densities
         pulled = weights[:, None] * self.differences(self.corrections)
         gradient = self.precisions[:, None] * self.corrections
@@ -107,7 +108,7 @@ class Channel:
 
 
 class Corrections:
-    """Those of a body, from poses (n,) at times (n,), that trembles so much; samples (n,) are left out, and follow."""
+    """Corrections of poses (n,) at times (n,) for this noise; samples `out` (n,) are ignored, and follow the others."""
 
     def __init__(self, times: np.ndarray, start: Poses, noise: Trembling, out: np.ndarray) -> None:
         self._start = start
@@ -128,33 +129,33 @@ class Corrections:
 
         self.places = channel(of_places, noise.position, noise.here[0])
         self.turns = channel(of_rotations, noise.rotation, noise.here[1])
-        for each in self._all:
+        for each in self._channels:
             each.settle()
         self.moved = np.array([each.moved if each else 0.0 for each in (self.places, self.turns)])
-        """Mean squares of what samples are moved by, in those of the noise, of places and of rotations."""
-        hits = [each.densities / (MIN_HIT_RATIO * each.of_noise) for each in self._all]
-        for each in self._all:
+        """Mean squares of the corrections, in squares of the noise, of positions and of rotations."""
+        hits = [each.densities / (MIN_HIT_RATIO * each.of_noise) for each in self._channels]
+        for each in self._channels:
             each.densities = each.densities * np.maximum(1.0, np.max(hits, axis=0)) ** HIT_POWER
             each.improve()
 
     @property
-    def _all(self) -> list[Channel]:
+    def _channels(self) -> list[Channel]:
         return [each for each in (self.places, self.turns) if each]
 
     def copied(self) -> Corrections:
-        """Return the same, to be drawn back."""
+        """Return a copy that can be drawn back."""
         result = copy(self)
         result.places, result.turns = copy(self.places), copy(self.turns)
         return result
 
     def draw_back(self, over: np.ndarray) -> None:
-        """Draw samples back that are too far off by so many times (n,), as the motion around them allows."""
-        for each in self._all:
+        """Draw back samples that are too far off by these ratios (n,), as the motion around them allows."""
+        for each in self._channels:
             each.precisions = each.precisions * np.maximum(over, 1.0) ** CAP_POWER
             each.improve()
 
     def made(self, share: np.ndarray) -> Poses:
-        """Return poses with these shares (n,) of the corrections made."""
+        """Return the poses with these fractions (n,) of the corrections applied."""
         poses = self._start
         if self.places:
             poses = replace(poses, positions=poses.positions + share[:, None] * self.places.corrections)

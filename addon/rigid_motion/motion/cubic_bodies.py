@@ -1,8 +1,8 @@
-"""Whole bodies as the fewest cubic curves: joint by joint from the roots on, within a tolerance in the roots' space.
+"""Cubic curves for whole bodies with few keys: joint by joint from the roots, within a tolerance in root space.
 
-What a joint may be off is shared out along the chain that it is in, by the lengths of bones. What those above it left
-of their shares is left to it. A joint aims at where it should be in the roots' space, given its parent as its curves
-have that; or it keeps to its own rotation, where that needs no more keys.
+The tolerance is shared out along each chain of joints by the lengths of the bones. What the joints above leave of their
+shares goes to the joints below. A joint aims at its recorded place in root space, given its parent as shown by the
+parent's curves; or it keeps its own rotation, if that needs no more keys.
 """
 
 from __future__ import annotations
@@ -19,34 +19,34 @@ from .quaternions import conjugate, multiply, normalise, rotate, turned_at
 from .skeletons import Skeleton
 
 ROUNDING_TOLERANCE_RATIO = 1e-3
-"""The share of the tolerance that is left for single precision."""
+"""Fraction of the tolerance that is left for the rounding of single precision."""
 
 MIN_CHANNEL_TOLERANCE_RATIO = 1e-2
-"""The least share of the tolerance that a channel is allowed, where those above it left nothing."""
+"""Smallest fraction of the tolerance for a channel, even if the joints above leave nothing."""
 
 CHAIN_SHARE_POWER = 0.5
-"""The power of a joint's share of its chain that its share of the tolerance is: below 1 those above get more."""
+"""A joint gets its share of its chain to this power as its share of the tolerance: below 1, joints above get more."""
 
 
 @dataclass(frozen=True, eq=False)
 class CurvedBody:
-    """A body that is to get curves. Joints come first."""
+    """A body to fit curves to. Joints are the first axis."""
 
     times: np.ndarray
     """Shape (m,), seconds."""
 
     skeleton: Skeleton
     truth: Poses
-    """In the roots' space, shape (joints, m)."""
+    """In root space, shape (joints, m)."""
 
     local: Poses
-    """As their parents have them, shape (joints, m). What gets no curves is as it is stored."""
+    """In the space of the parents, shape (joints, m). Channels without curves stay as they are here."""
 
     lengths: np.ndarray
-    """How long the axes of local positions are in the roots' space, shape (joints, 1 or m, 3)."""
+    """Lengths of the axes of local positions in root space, shape (joints, 1 or m, 3)."""
 
     radii: np.ndarray
-    """Of the balls around joints, shape (joints,)."""
+    """Radii of the balls around joints, shape (joints,)."""
 
     curved: np.ndarray
     """Whether the location and the rotation of each joint get curves, shape (joints, 2)."""
@@ -55,11 +55,13 @@ class CurvedBody:
     """How far off any point of each ball may be at each sample, shape (joints, m)."""
 
     may_be_lines: bool = False
-    """Whether lines and even turns take the place of curves that need as many keys."""
+    """Whether straight lines and constant-rate turns replace curves that need as many keys."""
 
     @cached_property
     def carried(self) -> list[dict[int, float]]:
-        """What turns with each joint, up to what turns by itself: joints, and how far they are from it at most."""
+        """For each joint, the joints below that it turns, down to the first that turn by themselves, with their
+        greatest distance.
+        """
         arms = np.linalg.norm(self.local.positions * self.lengths, axis=-1).max(axis=1)
         result: list[dict[int, float]] = [{} for _ in arms]
         for joint in np.concatenate(self.skeleton.levels)[::-1].tolist():
@@ -71,7 +73,7 @@ class CurvedBody:
 
     @cached_property
     def shares(self) -> np.ndarray:
-        """How much of the tolerance the places of joints may take, shape (joints,)."""
+        """Fraction of the tolerance that the position of each joint may use, shape (joints,)."""
         moves, turns = self.curved.T
         levers = np.array(
             [
@@ -92,20 +94,20 @@ class CurvedBody:
 
 
 class JointCurves(NamedTuple):
-    """The curves of a joint; None of a channel that has none."""
+    """The curves of a joint; None for a channel without any."""
 
     location: CubicKeys | None
     rotation: CubicKeys | None
     lines: int
-    """How many keys lines would need."""
+    """Number of keys that lines would need."""
 
 
 Channel = tuple[Samples, np.ndarray]
-"""What a channel is to show, and its own values."""
+"""The samples that a channel aims at, and its own values."""
 
 
 def fitted_body(body: CurvedBody) -> list[JointCurves]:
-    """Return the curves of all joints of a body, as few keys as there are found."""
+    """Return the curves of all joints of a body, with as few keys as can be found."""
     return _Fitting(body).done()
 
 
@@ -115,7 +117,7 @@ class _Fitting:
         self.allowed = (ROUNDING_TOLERANCE_RATIO - 1.0) * body.skeleton.most_below(-body.tolerance)
         shape = body.truth.shape
         self.shown = Poses(np.zeros((*shape, 3)), np.zeros((*shape, 4)))
-        """In the roots' space, with curves."""
+        """The body as its curves show it, in root space."""
 
     def done(self) -> list[JointCurves]:
         order = np.concatenate(self.body.skeleton.levels).tolist()
@@ -129,7 +131,7 @@ class _Fitting:
         if not turns:
             self._turn(joint, None)
             return JointCurves(location, None, lines)
-        samples, own = self._rotation(joint, self._off(joint))
+        samples, own = self._rotation(joint, self._position_errors(joint))
         rotation, more = self._fewest(samples, own)
         if location is not None and len(location.times) != len(rotation.times):
             location, rotation = self._at_the_same_times(joint, location, rotation)
@@ -138,7 +140,7 @@ class _Fitting:
         return JointCurves(location, rotation, lines + more)
 
     def _at_the_same_times(self, joint: int, location: CubicKeys, rotation: CubicKeys) -> tuple[CubicKeys, CubicKeys]:
-        """Return both with keys at the same times where that takes no more of them."""
+        """Return both curves with keys at the same times, if that takes no more keys."""
         most = self.body.shares[joint] * self.allowed[joint]
         groups = [self._location(joint)[0], self._rotation(joint, most)[0]]
         first, second = fitted_together(self.body.times, groups)
@@ -155,7 +157,7 @@ class _Fitting:
         return Samples(aims / lengths, allowed), body.local.positions[joint]
 
     def _rotation(self, joint: int, off: np.ndarray) -> Channel:
-        """Where the joint itself is off by so much (m,)."""
+        """Return the rotation channel of a joint whose position is off by `off` (m,)."""
         body, parent, aims = self.body, self.parents[joint], self.body.truth.quaternions[joint]
         if parent >= 0:
             aims = multiply(conjugate(self.shown.quaternions[parent]), aims)
@@ -171,7 +173,9 @@ class _Fitting:
         return Samples(aims, allowed / 2.0, are_turns=True), body.local.quaternions[joint]
 
     def _fewest(self, aiming: Samples, own: np.ndarray) -> tuple[CubicKeys, int]:
-        """Return the curves of a channel that need fewer keys, through its own values or others, and those of lines."""
+        """Return a channel's curves with the fewest keys, aiming at samples or through its own values, and the keys of
+        lines.
+        """
         times = self.body.times
         (best,) = fitted_together(times, [aiming])
         kept = fitted_together(times, [Samples(own, aiming.allowed, aiming.are_turns, aiming.values)])
@@ -183,7 +187,7 @@ class _Fitting:
         return lines if len(lines.times) <= len(best.times) else best, len(lines.times)
 
     def _move(self, joint: int, location: CubicKeys | None) -> None:
-        """Show the joint where these curves have it."""
+        """Place the joint as these curves do."""
         body, parent = self.body, self.parents[joint]
         positions = body.local.positions[joint] if location is None else values_at(location, body.times)
         positions = positions * body.lengths[joint]
@@ -193,7 +197,7 @@ class _Fitting:
         self.shown.positions[joint] = positions
 
     def _turn(self, joint: int, rotation: CubicKeys | None) -> None:
-        """Show the joint turned as these curves have it."""
+        """Turn the joint as these curves do."""
         body, parent = self.body, self.parents[joint]
         if rotation is None:
             turns = body.local.quaternions[joint]
@@ -203,5 +207,5 @@ class _Fitting:
             turns = normalise(values_at(rotation, body.times))
         self.shown.quaternions[joint] = turns if parent < 0 else multiply(self.shown.quaternions[parent], turns)
 
-    def _off(self, joint: int) -> np.ndarray:
+    def _position_errors(self, joint: int) -> np.ndarray:
         return np.linalg.norm(self.shown.positions[joint] - self.body.truth.positions[joint], axis=-1)

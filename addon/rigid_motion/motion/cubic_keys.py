@@ -1,10 +1,10 @@
-"""The keys that an animator would have set: the fewest cubic curves through samples, found by dynamic programming.
+"""The keys an animator would set: the fewest cubic curves through samples, found by dynamic programming.
 
-A segment is a cubic Hermite polynomial in time from one sample to another. That is CUBICSPLINE of glTF, and a Bezier
-curve of Blender whose handles are a third of the segment long. Its slopes are those of least squares. They are the
-same on both sides of a key wherever that stays within what is allowed. What is promised holds at the samples.
+A segment is a cubic Hermite polynomial in time from one sample to another: CUBICSPLINE of glTF, or a Bezier curve of
+Blender whose handles are a third of the segment long. Slopes are fitted by least squares, and are the same on both
+sides of a key where the tolerance permits. The tolerance holds at the samples.
 
-Quaternions are four numbers whose length between keys is of no account: what plays them normalises them.
+Quaternions are four numbers. Their length between keys does not matter, because players normalise them.
 """
 
 from __future__ import annotations
@@ -19,45 +19,45 @@ from .quaternions import ZERO_ANGLE_RAD, align_signs
 CONSTANT_KIND, LINEAR_KIND, CUBIC_KIND = SEGMENT_KINDS = (0, 1, 2)
 
 FIRST_SEGMENT_SAMPLES = 64
-"""Samples that a segment spans at first. Such as meet are joined where one does for both."""
+"""Longest segment at first, in samples. Neighbouring segments are merged later where one curve suffices for both."""
 
 HOPELESS_ERROR_RATIOS = {False: 2.0, True: 1.2}
-"""No longer segments are tried from a sample once one is so many times as far off as is allowed; of lines, too."""
+"""Longer segments from a sample are not tried after one with this many times the allowed error; for lines if True."""
 
 EXACT_SEGMENT_WORTH_KEYS = 1.0
-"""How many keys it is worth that a segment is exact, and not just within what is allowed: so keys keep their frames."""
+"""What a segment with the largest allowed error costs more than an exact one, in keys. So keys keep their frames."""
 
 MAX_HELD_CHANGE_RATIO = 1e-3
-"""A sample that differs by less than this share of what is allowed from that before holds it."""
+"""A sample that differs from the one before by less than this fraction of what is allowed holds its value."""
 
 MAX_LINE_ERROR_RATIO = 0.1
-"""A line that is within this share of what is allowed is one."""
+"""A segment that is within this fraction of what is allowed of a line counts as one."""
 
 QUATERNION_LENGTH_WEIGHT = 1e-6
 """The weight of a quaternion's length between keys: just enough for there to be one solution."""
 
 
 SLOPE_DAMPING_WEIGHT = 1e-7
-"""The weight of what slopes differ from the line's, relative to samples, where these do not say."""
+"""Weight, relative to the samples, of keeping slopes equal to the line's, for slopes that the samples leave open."""
 
 JUMP_PRICE_KEYS = 1.5
-"""The price of a segment that ends with a jump, in keys."""
+"""Price in keys of a segment that ends with a jump."""
 
 THIRD_RATIO = 1.0 / 3.0
-"""The length of handles, as a share of the segment, with which values are cubics in time."""
+"""Length of handles, as a fraction of the segment, with which values are cubics in time."""
 
 NEWTON_STEPS = 6
-"""Steps to the last bit for handles that are not so much longer."""
+"""Newton steps to full precision, for handles not much longer than that."""
 
 AT_ONCE = 2**15
-"""Samples of segments that are looked at in one go."""
+"""Samples of segments that are processed at a time."""
 
 SLOPE_AGREEMENT_ROUNDS = 4
-"""How often slopes on both sides of keys are tried to be made the same."""
+"""Rounds of trying to make the slopes on both sides of keys the same."""
 
 
 class CubicKeys(NamedTuple):
-    """Keys of one group of channels, and how the value goes on behind each."""
+    """Keys of one group of channels, and the curves between them."""
 
     times: np.ndarray
     """Shape (k,), rising, seconds."""
@@ -66,43 +66,43 @@ class CubicKeys(NamedTuple):
     """Shape (k, n)."""
 
     arriving: np.ndarray
-    """Slopes per second before each key, shape (k, n)."""
+    """Slopes per second just before each key, shape (k, n)."""
 
     leaving: np.ndarray
-    """Slopes per second behind each key, shape (k, n)."""
+    """Slopes per second just after each key, shape (k, n)."""
 
     kinds: np.ndarray
-    """CONSTANT, LINEAR_KIND or CUBIC_KIND, of the segment behind each key, shape (k,)."""
+    """CONSTANT_KIND, LINEAR_KIND or CUBIC_KIND for the segment after each key, shape (k,)."""
 
 
 class Samples(NamedTuple):
-    """What a group of channels shows, and how far off it may be."""
+    """The values of a group of channels, and how far off curves may be."""
 
     values: np.ndarray
     """Shape (m, n)."""
 
     allowed: np.ndarray
-    """How far off each sample may be, the length of the difference of values, shape (m,)."""
+    """How far off each sample may be, as the length of the difference of values, shape (m,)."""
 
     are_turns: bool = False
-    """Whether they are quaternions."""
+    """Whether values are quaternions."""
 
     desired: np.ndarray | None = None
-    """What they are to be near, where that is something else, shape (m, n)."""
+    """What curves should be near, if not `values`, shape (m, n)."""
 
     handles: float = THIRD_RATIO
-    """The length of Bezier handles, 0.3 to 0.5 of the segment: time is then a cubic, too."""
+    """Length of Bezier handles, 0.3 to 0.5 of the segment: time is then a cubic, too."""
 
     lengths: float = QUATERNION_LENGTH_WEIGHT
-    """The weight of a quaternion's length between keys: with more of it, slopes are no steeper than they need be."""
+    """Weight of a quaternion's length between keys: with more of it, slopes are no steeper than needed."""
 
 
 Segments = tuple[np.ndarray, np.ndarray]
-"""What slopes of segments add to lines over their whole length (k, 2, n), and how far these are off at most (k,)."""
+"""What the slopes of segments add to lines over their length (k, 2, n), and their errors over what is allowed (k,)."""
 
 
 def values_at(keys: CubicKeys, times: np.ndarray) -> np.ndarray:
-    """Return the values (m, n) at times (m,); before the first key and behind the last they stay."""
+    """Return the values (m, n) at times (m,); before the first key and after the last they are held."""
     times = np.clip(times, keys.times[0], keys.times[-1])
     if len(keys.times) == 1:
         return np.repeat(keys.values, len(times), axis=0)
@@ -122,14 +122,14 @@ def values_at(keys: CubicKeys, times: np.ndarray) -> np.ndarray:
 
 
 def is_of_lines(keys: CubicKeys) -> bool:
-    """Whether no segment is curved."""
+    """Return whether no segment is curved."""
     return not np.any(keys.kinds == CUBIC_KIND)
 
 
 def joined(parts: Sequence[CubicKeys], *, are_turns: bool = False) -> CubicKeys:
-    """Return curves that follow one another, each of which begins with the last key of that before it.
+    """Return successive curves as one. Each begins with the last key of the one before.
 
-    Quaternions may begin with the other sign.
+    A quaternion may begin with the opposite sign.
     """
     result = parts[0]
     for part in parts[1:]:
@@ -154,7 +154,7 @@ def fitted(
     steps: bool = False,
     lines: bool = False,
 ) -> CubicKeys:
-    """Return the fewest keys whose curves are within what is allowed at all samples.
+    """Return the fewest keys whose curves are within the tolerance at all samples.
 
     Parameters
     ----------
@@ -163,14 +163,14 @@ def fitted(
     values : array, shape (m, n)
         Keys have these values.
     allowed : array, shape (m,), or float
-        How far off values may be at each sample: the length of the difference. Of quaternions it is half of the angle
-        in radians. Above zero.
+        How far off values may be at each sample, above zero: the length of the difference. For quaternions this is half
+        of the angle in radians.
     are_turns : bool, optional
         Whether values are unit quaternions.
     steps : bool, optional
-        Whether a value may stay until the next key and change there at once.
+        Whether a value may stay until the next key and jump there.
     lines : bool, optional
-        Whether all segments are to be lines.
+        Whether all segments must be lines.
 
     Returns
     -------
@@ -182,9 +182,9 @@ def fitted(
 def fitted_together(
     times: np.ndarray, groups: Sequence[Samples], *, steps: bool = False, lines: bool = False
 ) -> list[CubicKeys]:
-    """Return the fewest keys of several groups of channels that have them at the same times: see `fitted`.
+    """Return the fewest keys for several groups of channels with keys at the same times: see `fitted`.
 
-    None where there are no such keys, which may be if values are not what is desired.
+    The list is empty if there are no such keys, which can happen when desired values differ from the values.
     """
     fits = [_Fit(times, samples, lines=lines) for samples in groups]
     keys = _joined(fits, _fewest(fits, steps=steps))
@@ -192,22 +192,24 @@ def fitted_together(
 
 
 def keyed_at(times: np.ndarray, samples: Samples, keys: np.ndarray, *, steps: bool = False) -> CubicKeys:
-    """Return curves with keys at these samples (k,), whose slopes are those of least squares."""
+    """Return curves with keys at these samples (k,), with slopes by least squares."""
     return _Fit(times, samples).keys_at(keys, steps=steps)
 
 
 def errors_between(times: np.ndarray, samples: Samples, keys: np.ndarray) -> np.ndarray:
-    """How far off samples are at most, of what is allowed, in curves from each of these (k,) to the next, (k - 1,)."""
+    """Return the largest error, over what is allowed, of curves from each of these samples (k,) to the next:
+    (k - 1,).
+    """
     return _Fit(times, samples).between(keys[:-1], keys[1:])[1]
 
 
 def _bends(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return what slopes at both ends add to a line at the shares s of a segment."""
+    """Return what slopes at both ends add to a line at the fractions s of a segment."""
     return s * (1.0 - s) ** 2, s**2 * (s - 1.0)
 
 
 def _parameters(s: np.ndarray, handles: float) -> np.ndarray:
-    """Return the parameters of Bezier curves at shares s of their time, with handles so long."""
+    """Return the parameters of Bezier curves at fractions s of their time, with handles of this length."""
     if handles == THIRD_RATIO:
         return s
     result = s
@@ -236,25 +238,25 @@ class _Fit:
         self.outer = (self.values[:, :, None] * self.values[:, None, :]).reshape(len(times), -1)
 
     def still(self) -> np.ndarray:
-        """Which samples (m - 1,) the one behind them holds."""
+        """Return for each sample but the last (m - 1,) whether the next one holds its value."""
         least = MAX_HELD_CHANGE_RATIO * np.minimum(self.allowed[1:], self.allowed[:-1])
         return np.linalg.norm(np.diff(self.values, axis=0), axis=1) <= least
 
     def is_held(self, first: int, end: int) -> bool:
-        """Whether a sample stays, up to another one."""
+        """Return whether a sample's value holds up to another sample."""
         some = slice(first, end + 1)
         changes = np.linalg.norm(self.values[some] - self.values[first], axis=1) / self.allowed[some]
         return changes.max() <= MAX_LINE_ERROR_RATIO and self.off_line(first, end) <= 1.0 - MAX_LINE_ERROR_RATIO
 
     def off_line(self, first: int, end: int) -> float:
-        """How far samples are off the line from one of them to another at most, of what is allowed."""
+        """Return the largest error, over what is allowed, of the line between two samples."""
         nothing = np.zeros((1, 2, self.values.shape[1]))
         return float(self.segments(np.array([first]), end - first, nothing)[1][0])
 
     def errors(self, is_key: np.ndarray) -> np.ndarray:
-        """How far samples are off at most, of what is allowed, by the first of a segment and its length less one.
+        """Return the largest errors, over what is allowed, by the first sample of a segment and its length minus one.
 
-        Shape (m, FIRST_SEGMENT_SAMPLES); infinite where that is not known.
+        Shape (m, FIRST_SEGMENT_SAMPLES); infinite where not known.
         """
         count = len(self.times)
         result = np.full((count, FIRST_SEGMENT_SAMPLES), np.inf, dtype=np.float32)
@@ -269,7 +271,7 @@ class _Fit:
         return result
 
     def between(self, firsts: np.ndarray, ends: np.ndarray) -> Segments:
-        """Return what slopes of segments add to lines (k, 2, n), over the whole length, and the errors (k,)."""
+        """Return what slopes of segments add to lines (k, 2, n), over the whole length, and their errors (k,)."""
         bends, errors = np.zeros((len(firsts), 2, self.values.shape[1])), np.zeros(len(firsts))
         for length in np.unique(ends - firsts).tolist():
             some = ends - firsts == length
@@ -277,7 +279,7 @@ class _Fit:
         return bends, errors
 
     def segments(self, firsts: np.ndarray, length: int, given: np.ndarray | None = None) -> Segments:
-        """Return `between` of segments of one length, with slopes of least squares unless they are given."""
+        """Return `between` for segments of one length, with slopes by least squares unless given."""
         step = max(1, AT_ONCE // (length + 1))
         bends, errors = np.zeros((len(firsts), 2, self.values.shape[1])), np.zeros(len(firsts))
         for first in range(0, len(firsts), step):
@@ -294,7 +296,7 @@ class _Fit:
             bends = np.zeros((len(firsts), 2, own.shape[2]))
         else:
             basis = np.concatenate(_bends(_parameters(s, self.handles)), axis=2)
-            bends = self._bent(rows, basis, own, own - shown) if given is None else given
+            bends = self._fitted_bends(rows, basis, own, own - shown) if given is None else given
             shown += basis @ bends
         desired = own if self.desired is self.values else self.desired[rows]
         if self.is_turned:
@@ -307,15 +309,17 @@ class _Fit:
         return bends, np.sqrt((squares * self.weights[rows]).max(axis=1))
 
     def _line(self, s: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """Return what is a share s of the way from one value to another; where lines are stored, of even turns."""
+        """Return values at fractions s of the way between two values; where rotations are lines, they turn at a
+        constant rate.
+        """
         if not (self.lines and self.is_turned):
             return first + s * (last - first)
         angle = 2.0 * np.arctan2(np.linalg.norm(last - first, axis=-1), np.linalg.norm(last + first, axis=-1))
         angle = np.maximum(angle, ZERO_ANGLE_RAD)[..., None]
         return (np.sin((1.0 - s) * angle) * first + np.sin(s * angle) * last) / np.sin(angle)
 
-    def _bent(self, rows: np.ndarray, basis: np.ndarray, own: np.ndarray, rest: np.ndarray) -> np.ndarray:
-        """Return what slopes add to lines by least squares, (k, 2, n), where so much is missing."""
+    def _fitted_bends(self, rows: np.ndarray, basis: np.ndarray, own: np.ndarray, rest: np.ndarray) -> np.ndarray:
+        """Return what slopes add to lines by least squares, (k, 2, n), given what lines miss."""
         count, _, width = own.shape
         weights = self.weights[rows]
         weighted = np.swapaxes(basis * (weights / weights.max(axis=1, keepdims=True))[..., None], 1, 2)
@@ -343,13 +347,13 @@ class _Fit:
         chords = np.diff(self.values[keys], axis=0)
         slopes = (chords[:, None] + bends * (THIRD_RATIO / self.handles)) / spans[:, None]
         slopes[kinds[:-1] == CONSTANT_KIND] = 0.0
-        slopes = self._agreed(keys, slopes, kinds)
+        slopes = self._with_shared_slopes(keys, slopes, kinds)
         nothing = np.zeros((1, self.values.shape[1]))
         arriving, leaving = np.concatenate((nothing, slopes[:, 1])), np.concatenate((slopes[:, 0], nothing))
         return CubicKeys(self.times[keys], self.values[keys], arriving, leaving, kinds)
 
     def _kinds(self, firsts: np.ndarray, ends: np.ndarray, errors: np.ndarray, *, steps: bool) -> np.ndarray:
-        """Return what segments (k,) are that are so far off as curves."""
+        """Return the kinds of segments (k,), given their errors as curves."""
         still = np.append(0, np.cumsum(self.still()))
         held = still[ends] - still[firsts] == ends - firsts
         stepped = steps & (ends > firsts + 1) & (still[ends - 1] - still[firsts] == ends - 1 - firsts)
@@ -360,8 +364,8 @@ class _Fit:
             np.where(lines <= np.maximum(errors, MAX_LINE_ERROR_RATIO), LINEAR_KIND, CUBIC_KIND),
         )
 
-    def _agreed(self, keys: np.ndarray, slopes: np.ndarray, kinds: np.ndarray) -> np.ndarray:
-        """Return slopes (k - 1, 2, n) of segments that are the same on both sides of a key where that is allowed."""
+    def _with_shared_slopes(self, keys: np.ndarray, slopes: np.ndarray, kinds: np.ndarray) -> np.ndarray:
+        """Return slopes (k - 1, 2, n) of segments, made the same on both sides of a key where the tolerance permits."""
         curved = kinds[:-1] == CUBIC_KIND
         tried = curved[:-1] & curved[1:]
         spans, weights = np.diff(self.times[keys])[:, None], np.diff(self.times[keys])[:, None] ** 3
@@ -382,9 +386,7 @@ class _Fit:
 
 
 def _fewest(fits: Sequence[_Fit], *, steps: bool) -> np.ndarray:
-    """Return the fewest samples with segments between them that are within what is allowed, and among these such that
-    are nearest. Rising.
-    """
+    """Return the fewest samples, rising, with all segments between them within the tolerance; if equal, the nearest."""
     count = len(fits[0].times)
     still = np.stack([fit.still() for fit in fits]).all(axis=0)
     begins = np.flatnonzero(still & ~np.append(False, still[:-1]))
@@ -405,7 +407,7 @@ def _fewest(fits: Sequence[_Fit], *, steps: bool) -> np.ndarray:
         nearest = int(np.argmin(costs))
         best[sample], following[sample] = costs[nearest], sample + 1 + nearest
         if hold[sample] >= 0:
-            # A step ends with the sample that is another, and is one only where that saves a key.
+            # A step ends at the sample with another value, and is used only where that saves a key.
             prices = ((hold[sample], 1.0), (hold[sample] + 1, JUMP_PRICE_KEYS))[
                 : 2 if steps and hold[sample] + 1 < count else 1
             ]
@@ -421,7 +423,7 @@ def _fewest(fits: Sequence[_Fit], *, steps: bool) -> np.ndarray:
 
 
 def _joined(fits: Sequence[_Fit], keys: np.ndarray) -> np.ndarray:
-    """Return keys without those between segments that one that is longer than was tried does for."""
+    """Return the keys without those between two segments that one curve, longer than was tried so far, can replace."""
     while True:
         tried = np.flatnonzero(keys[2:] - keys[:-2] > FIRST_SEGMENT_SAMPLES)
         if not len(tried):

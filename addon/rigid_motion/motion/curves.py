@@ -1,4 +1,4 @@
-"""The fast forms: what each mode makes of the segments between keys, in the terms of `rigid_motion.motion.segments`.
+"""Fast forms of the modes: the curve of each mode between keys, in the terms of `rigid_motion.motion.segments`.
 
 With D the chord, n the axis and h a quarter of the angle turned, positions relative to the centre are
 
@@ -8,8 +8,8 @@ With D the chord, n the axis and h a quarter of the angle turned, positions rela
 
     a = sin(psi) cos(psi) / sin(2 h),    b = sin(psi)^2 / sin(2 h) - tan(h) / 2
 
-so that the normalised blend of motors, which needs no sine, is the screw's own curve but for its uneven speed and for
-its advance along the axis.
+So the normalised blend of motors, which needs no sine, is the curve of the screw, except for its uneven speed and its
+advance along the axis.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from .segments import SMALLEST_ANGLE, Basis, Curves, Rows, Segments
 from .trigonometry import fill_sine_and_cosine
 
 LATE_SEGMENT_RATIO = 2.0
-"""How many times as long as the segment before one may take for a stream, before its key counts as late."""
+"""A key of a stream counts as late if its segment takes more than this many times as long as the segment before."""
 
 MAX_LOG_SCALE = float(np.log(MAX_ABS))
-"""Outside of the keys the logarithm of a scale grows to this at most, and falls to its negative."""
+"""Outside the keys the logarithm of a scale grows to this at most, and falls to its negative."""
 
 
 def lerp_slerp(segments: Segments) -> Curves:
-    """Straight line and great arc."""
+    """Return straight lines for positions and great arcs for rotations."""
 
     def basis(s: np.ndarray, parameters: list[np.ndarray], narrow: bool) -> Rows:
         rows = np.empty((4, s.size))
@@ -45,14 +45,14 @@ def lerp_slerp(segments: Segments) -> Curves:
 
 
 def bezier(segments: Segments) -> Curves:
-    """Return Blender's own curves: each number by itself, with Auto Clamped handles, and quaternions made unit."""
+    """Return Blender's own curves: each number by itself, with Auto Clamped handles, and then unit quaternions."""
 
     def basis(s: np.ndarray, parameters: list[np.ndarray], _narrow: bool) -> Rows:
-        # Outside of its keys a curve of Blender's is constant.
+        # Outside its keys, an F-curve of Blender is constant.
         powers = np.vander(np.clip(0.5 + 0.5 * s, 0.0, 1.0), 7, increasing=True).T
         squared, scales = np.einsum("kn,kn->n", powers, parameters[:7]), None
         if parameters[7:]:
-            # It stays between the keys, but for rounding.
+            # It stays between the keys, except for rounding.
             scales = np.maximum(np.einsum("kn,kn->n", powers[:4], parameters[7:11]), parameters[11])
         return np.concatenate((powers[:4] / np.sqrt(squared), powers[:4])), scales
 
@@ -110,13 +110,13 @@ def motor_lerp(segments: Segments) -> Curves:
 
 
 def motor_spline(segments: Segments, tangents: np.ndarray | None = None, spins: np.ndarray | None = None) -> Curves:
-    """Return a screw from key to key, bent so that its twist goes on through every key.
+    """Return a screw from key to key, bent so that its twist is continuous at every key.
 
-    A key has a mean of the twists of the segments next to it, see `twist_shares`, the outermost ones have that of their
-    segment, and none has any where the body rests before or after. `tangents` is how many times as long the twist at
-    either end of each segment is, shape (2, ..., S), for keys that are passed at speeds of their own. `spins` are the
-    angular velocities (3, 2, ..., n - 1) that are added to the curve at both ends of the segments in their own time:
-    the twist that goes on through a key is that with them.
+    The twist at a key is a mean of the twists of the segments next to it, see `twist_shares`. The outermost keys have
+    the twist of their segment. A key has none if the body rests before or after it. `tangents`, shape (2, ..., S),
+    scales the twists at both ends of each segment, for keys that are passed at speeds of their own. `spins` (3, 2, ...,
+    n - 1) are angular velocities that are added to the curve at both ends of the segments, in the segments' own time:
+    the twist that is continuous at a key includes them.
     """
 
     def at_keys(
@@ -132,12 +132,12 @@ def motor_spline(segments: Segments, tangents: np.ndarray | None = None, spins: 
 
 
 def motor_spline_causal(segments: Segments) -> Curves:
-    """Return the same for streams, from no key after the segment.
+    """Return the spline for streams, which depends on no key after the segment.
 
-    A key has the twist of the screw that led to it, and half of what the same share of the screw before would add: all
-    of it overshoots. A rest is kept, although nothing told of it when the body arrived there. Nor did anything tell
-    that the next key comes late: where a segment takes more than `LATE_SEGMENT_RATIO` times as long as the one before,
-    the twist that it is left with dies away in that time, and the screw goes on alone.
+    The twist at a key is that of the screw leading to it, plus half of a share of its change from the screw before: the
+    whole share overshoots. A rest is kept, although the stream did not announce it when the body arrived there. Nor
+    does a stream announce that the next key comes late: where a segment takes more than `LATE_SEGMENT_RATIO` times as
+    long as the one before, the twist it starts with dies away in that time, and the screw goes on alone.
     """
 
     def at_keys(
@@ -157,22 +157,22 @@ def motor_spline_causal(segments: Segments) -> Curves:
 
 
 SHORT_SEGMENT_RATIO = 1.0 / 16.0
-"""The part of its neighbour's time up to which a segment passes no twist on."""
+"""Fraction of its neighbour's duration up to which a segment passes on no twist."""
 
 
 def twist_shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Return what the twist before a key counts for that of the key; the twist after it counts for the rest.
+    """Return the share of the twist before a key in the twist of the key; the twist after it has the rest.
 
     The parabola through the key and its neighbours would have
 
         h1 / (h0 + h1)
 
-    for segments of durations h0 and h1: nearly all for the shorter one, whose twist, kept up for as long as the longer
-    one takes, leads any distance away. So the shorter one's share is at most short / long: neither segment, in its own
-    time, is then given more than |r0| + |r1| of the two screws, wherever on the body that is measured. And it is none
-    up to `SHORT_SEGMENT_RATIO`: so short a segment is often a jump, as where something changes its parent from one
-    frame to the next, which would swing what is beside it by 4/27 of its way. Durations alone decide, for a screw has
-    no length that is the same for all choices of the body's origin.
+    for segments of durations h0 and h1. That gives nearly all to the shorter segment, and its twist, kept up for as
+    long as the longer one takes, leads any distance away. So the share of the shorter one is at most short / long:
+    neither segment then gets more than |r0| + |r1| of the two screws in its own time, measured anywhere on the body.
+    Up to `SHORT_SEGMENT_RATIO` the share is zero: a segment this short is often a jump, such as a change of parent from
+    one frame to the next, which would swing the neighbouring segment by 4/27 of its way. Durations alone decide,
+    because the length of a screw depends on the choice of the body's origin.
     """
     shares = np.clip(after / (before + after), 1.0 - after / before, before / after)
     return np.where(
@@ -186,18 +186,19 @@ def _bent(
     tangents: np.ndarray | float = 1.0,
     spins: np.ndarray | None = None,
 ) -> Curves:
-    """Return a screw from key to key, bent so that the body has certain twists at the keys.
+    """Return a screw from key to key, bent so that the body has the given twists at the keys.
 
-    Between the poses M and M exp(r), with twists of w and w' at either end, in the segment's own time from 0 to 1, runs
+    Between the poses M and M exp(r), with twists w and w' at the ends, in the segment's own time u from 0 to 1, it is
 
         M exp(u r) exp(u (1 - u)^2 (w - r) - u^2 (1 - u) (w' - r))
 
-    Each factor is a function of twists in the body's own axes, so that neither the axes of the world nor those of the
-    body matter. Where twists at keys do not tell before from after, it is the same motion backwards.
+    Each factor is a function of twists in the body's own axes, so neither the axes of the world nor those of the body
+    matter. If the twists at keys treat before and after equally, the motion backwards is the same.
 
-    `at_keys` makes the twists at the n + 1 keys (7, ..., n + 1) from those with which n segments leave their first
-    keys and arrive at their second ones, from how long the segments but the last and those but the first take, and
-    from where the body rests (..., n). Those are the twists of the screws, with the `spins` of `motor_spline` on top.
+    `at_keys` returns the twists at the n + 1 keys (7, ..., n + 1). It is given the twists with which the n segments
+    leave their first keys and arrive at their second ones, the durations of all segments but the last and of all but
+    the first, and where the body rests (..., n). The given twists are those of the screws, plus the `spins` of
+    `motor_spline`.
     """
     duration, rests, desired = segments.durations, segments.are_still, segments.desired
     ways = segments.screws[:, None]
@@ -215,7 +216,7 @@ def _bent(
 
 
 def similarity_slerp(segments: Segments) -> Curves:
-    """Return the geodesic of similarities: even rates of turning, advance and growth. A screw where nothing grows."""
+    """Return the geodesic of similarities: constant rates of turning, advance and growth. A screw if nothing grows."""
     if segments.scales is None:
         return screw(segments)
 
@@ -231,14 +232,14 @@ def similarity_slerp(segments: Segments) -> Curves:
         rows[4:] *= grown
         return rows, mean * grown
 
-    # Of the way along the axis, with z the growth of log scale, and of that across, with z + 4 i h, there is done
+    # The fraction done of the way along the axis, with z the growth of log scale, and across it, with z + 4 i h, is
     #     (exp(z u) - exp(z / 2)) / (exp(z) - 1) = (exp(z s / 2) - 1) / (2 sinh(z / 2)) - tanh(z / 4) / 2.
-    # Across, exp(z s / 2) - 1 = e + 2 (1 + e) (i sin(psi) cos(psi) - sin(psi)^2), where e is that of the growth alone.
+    # Across, exp(z s / 2) - 1 = e + 2 (1 + e) (i sin(psi) cos(psi) - sin(psi)^2), where e is this for the growth alone.
     # See `algebras.cga`.
     h, half_growth = segments.quarter_angle, 0.5 * np.log(segments.scales[1] / segments.scales[0])
     half_growth = np.where(half_growth == 0.0, SMALLEST_ANGLE, half_growth)
     along, across, around = segments.decompose()
-    (rate, middle), (turned_rate, turned_middle) = _growing_share(half_growth), _growing_share(half_growth + 2.0j * h)
+    (rate, middle), (turned_rate, turned_middle) = _growth_factors(half_growth), _growth_factors(half_growth + 2.0j * h)
     outward = turned_rate.real * across + turned_rate.imag * around
     sideward = turned_rate.real * around - turned_rate.imag * across
     mean = np.sqrt(segments.scales[0]) * np.sqrt(segments.scales[1])
@@ -252,11 +253,11 @@ def similarity_slerp(segments: Segments) -> Curves:
 
 
 def similarity_lerp(segments: Segments) -> Curves:
-    """Return the projected blend of two versors of CGA. A motor's where nothing grows.
+    """Return the projected blend of two versors of CGA, which is the blend of motors if nothing grows.
 
-    With the roots k0 and k1 of the scales, the blend has no scale at |s| = (k0 + k1) / |k0 - k1|, where nothing turns,
-    or later, and a negative one behind that: half-way from the key to there the motion stops. Where rounding could pass
-    that, it stops at the key.
+    With the roots k0 and k1 of the scales, the blend has no scale at |s| = (k0 + k1) / |k0 - k1| if nothing turns, or
+    later otherwise, and a negative scale beyond. So the motion stops half-way from the key to there. Where rounding
+    could pass that point, it stops at the key.
     """
     if segments.scales is None:
         return motor_lerp(segments)
@@ -264,8 +265,8 @@ def similarity_lerp(segments: Segments) -> Curves:
     def basis(s: np.ndarray, parameters: list[np.ndarray], _narrow: bool) -> Rows:
         cosine, last, *roots = parameters
         s = np.clip(s, -last, last)
-        # A versor of scale k has 1 / sqrt(k) for the weight of its translation, and the mean of that and its inverse
-        # for the weight of its rotor. See `algebras.cga.extract`.
+        # In a versor of scale k, the translation has the weight 1 / sqrt(k), and the rotor has the mean of that and its
+        # inverse. See `algebras.cga.extract`.
         shares = np.stack((1.0 - s, 1.0 + s))
         shrinking, growing = shares / roots, shares * roots
         rotor = 0.5 * (shrinking + growing)
@@ -295,7 +296,7 @@ def similarity_lerp(segments: Segments) -> Curves:
 
 
 def _curves(segments: Segments, positions: tuple, parameters: tuple, basis: Basis) -> Curves:
-    """Curves that turn about one axis and, where there are scales, grow geometrically."""
+    """Return curves that turn about one axis and, if there are scales, grow geometrically."""
     if segments.scales is not None:
         logarithms = np.log(segments.scales)
         parameters = (*parameters, logarithms[1] - logarithms[0], 0.5 * (logarithms[0] + logarithms[1]))
@@ -308,12 +309,12 @@ def _curves(segments: Segments, positions: tuple, parameters: tuple, basis: Basi
 
 
 def _slerp(s: np.ndarray, quarter_angle: np.ndarray, narrow: bool, turn: np.ndarray) -> None:
-    """cos(psi) and sin(psi) of psi = s h, which is `narrow` where it is at most 60 degrees."""
+    """Fill in cos(psi) and sin(psi) of psi = s h; `narrow` says that psi is at most 60 degrees."""
     fill_sine_and_cosine(s * quarter_angle, turn[1], turn[0], narrow=narrow)
 
 
 def _lerp(s: np.ndarray, tangent: np.ndarray, turn: np.ndarray) -> None:
-    """cos(psi) and sin(psi) of tan(psi) = s tan(h)."""
+    """Fill in cos(psi) and sin(psi) of tan(psi) = s tan(h)."""
     cosine, sine = turn
     np.multiply(s, tangent, out=sine)
     np.multiply(sine, sine, out=cosine)
@@ -324,18 +325,20 @@ def _lerp(s: np.ndarray, tangent: np.ndarray, turn: np.ndarray) -> None:
 
 
 def _geometric_scales(s: np.ndarray, parameters: list[np.ndarray]) -> np.ndarray | None:
-    """Growth at an even rate, from the logarithms that `_curves` has put last; None where there are no scales."""
+    """Return scales that grow at a constant rate, from the last two parameters of `_curves`; None if there are no
+    scales.
+    """
     if len(parameters) < 3:
         return None
     growth, middle = parameters[-2:]
     return np.exp(np.clip(middle + 0.5 * s * growth, -MAX_LOG_SCALE, MAX_LOG_SCALE))
 
 
-def _growing_share(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """1 / (2 sinh(w)) and tanh(w / 2) / 2."""
+def _growth_factors(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return 1 / (2 sinh(w)) and tanh(w / 2) / 2."""
     return 0.5 / _sinh(w), 0.5 * _sinh(0.5 * w) / np.cosh(0.5 * w)
 
 
 def _sinh(z: np.ndarray) -> np.ndarray:
-    """Of complex z, with both parts accurate where they are small."""
+    """Return sinh of complex z, with both parts accurate where they are small."""
     return np.sinh(z.real) * np.cos(z.imag) + 1j * np.cosh(z.real) * np.sin(z.imag)

@@ -1,4 +1,4 @@
-"""Decimation: which samples of a recording are kept as keys."""
+"""Decimation: selects the samples of a recording to keep as keys, at a fixed rate."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from .poses import numbers
 
 
 def decimate(times: ArrayLike, rate: float) -> np.ndarray:
-    """Return the samples that a sender of `rate` poses a second would have sent: those nearest to its ticks.
+    """Return the samples that a sender of `rate` poses per second would have sent: those nearest to its ticks.
 
     Parameters
     ----------
     times : array-like, shape (n,)
         Seconds, strictly rising, at least one.
     rate : float
-        Keys a second. The ticks start at the first sample.
+        Keys per second. The ticks start at the first sample.
 
     Returns
     -------
     array of int, shape (k,)
-        Rising indices without repetition, at least the first; where samples are rarer than ticks, all of them.
+        Rising indices without repetition, with at least the first; all samples where they are rarer than ticks.
 
     Raises
     ------
     ValueError
-        For a rate that is not a positive number, no times at all, and times that are not finite or do not rise. The
+        If the rate is not a positive number, or if there are no times or they are not finite or do not rise. The
         message names the sample.
 
     See Also
     --------
-    reduce_keys : The samples that a mode needs, unevenly in time.
+    reduce_keys : Finds the samples that a mode needs, unevenly in time.
 
     Examples
     --------
@@ -48,7 +48,7 @@ def decimate(times: ArrayLike, rate: float) -> np.ndarray:
     check_times(times)
     if not len(times):
         raise ValueError("there are no times to decimate")
-    # A tick more than the duration holds would repeat the last sample; the allowance is for rounding, as in 2.0 * 0.5.
+    # One more tick than fits the duration would repeat the last sample; the 1e-9 allows for rounding, as in 2.0 * 0.5.
     duration = times[-1] - times[0]
     if duration * rate > 4.0 * len(times):
         return np.arange(len(times))
@@ -57,7 +57,7 @@ def decimate(times: ArrayLike, rate: float) -> np.ndarray:
 
 
 def nearest(times: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """Return the index of the time nearest to each moment, the earlier of two that are equally near."""
+    """Return the index of the time nearest to each moment; of two equally near, the earlier one."""
     if len(times) == 1:
         return np.zeros(np.shape(moments), dtype=np.int64)
     after = np.clip(np.searchsorted(times, moments), 1, len(times) - 1)

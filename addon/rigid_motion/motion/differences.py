@@ -1,6 +1,6 @@
-"""Divided differences of a recording, of its places and of its rotations: nothing of a steady motion is left in them.
+"""Divided differences of the positions and rotations of a recording, which are zero for steady motion.
 
-Rotations are taken as rotation vectors in world axes, from one halfway between the two samples in the middle, so that a
+Rotations are rotation vectors in world axes, relative to the rotation halfway between the two middle samples. So a
 constant spin about a fixed axis has no second difference, and the differences turn with the world and not with time.
 """
 
@@ -14,7 +14,7 @@ from .quaternions import conjugate, turned, turns_between
 
 
 def coefficients(times: np.ndarray, order: int) -> np.ndarray:
-    """Return what each run of order + 1 samples is multiplied by, shape (n - order, order + 1), for its derivative.
+    """Return the factors of each run of order + 1 samples, shape (n - order, order + 1), that give its derivative.
 
     Times (n,) rise strictly, evenly or not.
     """
@@ -32,7 +32,7 @@ def differences_of_positions(positions: np.ndarray, coefficients: np.ndarray) ->
 def differences_of_rotations(quaternions: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
     """Return differences (n - order, 3) in radians of rotations (n, 4), in world axes."""
     count, width = coefficients.shape
-    # Seen from the body, rotations of the world are turned in their own axes.
+    # Seen from the body, the world rotates about world axes.
     seen = conjugate(quaternions)
     before, behind = seen[(width - 1) // 2 :][:count], seen[width // 2 :][:count]
     centre = turned(before, 0.5 * turns_between(before, behind))
@@ -46,7 +46,7 @@ def turned_in_world(quaternions: np.ndarray, turns: np.ndarray) -> np.ndarray:
 
 
 def differences(poses: Poses, coefficients: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return those of positions and of rotations."""
+    """Return the differences of positions and of rotations."""
     return (
         differences_of_positions(poses.positions, coefficients),
         differences_of_rotations(poses.quaternions, coefficients),

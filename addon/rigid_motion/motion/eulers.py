@@ -1,7 +1,7 @@
-"""Extrinsic Euler angles of a motion, continuous from moment to moment.
+"""Extrinsic Euler angles of a motion, continuous over time.
 
-Orders are Blender's: "XYZ" turns about the x axis first, then about y, then about z, all of them fixed. Angles are
-radians about x, y and z, in this order whatever the order of turning, as Blender has its channels.
+Orders are Blender's: "XYZ" turns about the x axis first, then about y, then about z, all of them fixed. Angles are in
+radians about x, y and z, listed like Blender's channels whatever the order of turning.
 
 Source: Bernardes and Viollet, "Quaternion to Euler angles conversion: a direct, general and computationally efficient
 method", PLoS ONE 17(11), 2022.
@@ -19,32 +19,32 @@ from .trigonometry import fill_sine_and_cosine
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 MIN_UNLOCKED_LENGTH = 1e-7
-"""Below this length a half sum or half difference of angles has no direction: the gimbal is locked."""
+"""Below this length, a half sum or half difference of angles has no direction: gimbal lock."""
 
 
 def extrinsic_eulers_from_quaternions(quaternions: np.ndarray, order: str, starts: Sequence[int] = (0,)) -> np.ndarray:
-    """Return the angles of a motion's rotations, each set of angles the one nearest to the set before it.
+    """Return the Euler angles of a motion's rotations, each set of angles as near as possible to the one before.
 
     Parameters
     ----------
     quaternions : array, shape (n, 4)
-        Unit, w, x, y, z, of any sign. Several motions may stand one behind the other.
+        Unit quaternions w, x, y, z, of any sign. Several motions may follow one another.
     order : str
         One of `ORDERS`.
     starts : sequence of int
-        Where each of the motions begins.
+        Where each motion begins.
 
     Returns
     -------
     array, shape (n, 3)
-        Radians about x, y and z. The angles may leave the range of a full turn, but for the first of each motion.
+        Radians about x, y and z. Angles may leave the range of a full turn, except the first ones of each motion.
 
     Notes
     -----
     The half sum and the half difference of the outer angles each have the direction of a plane vector of quaternion
-    components. Through gimbal lock one of the vectors passes zero and comes out on the other side: taken as directions
-    of a line, whose lengths may be negative, both go on smoothly, and so do the angles. Where one is zero it is free,
-    and gets what lies between its neighbours.
+    components. In gimbal lock, one of the vectors passes through zero to the other side. Taken as directions of lines,
+    with lengths that may be negative, both stay continuous, and so do the angles. Where a vector is zero, its direction
+    is free, and is interpolated between its neighbours.
     """
     i, j, k = ("XYZ".index(axis) for axis in order)
     sign = (i - j) * (j - k) * (k - i) // 2
@@ -55,14 +55,14 @@ def extrinsic_eulers_from_quaternions(quaternions: np.ndarray, order: str, start
     angles[i] = half_sum - half_difference
     angles[j] = _unwrapped(2.0 * np.arctan2(inner, outer), 2.0 * np.pi, starts)[0] - 0.5 * np.pi
     angles[k] = sign * (half_sum + half_difference)
-    # The first angles are within half a turn, as an animator would have keyed them.
+    # The first angles are within half a turn, as an animator would key them.
     turns = np.rint(angles[:, list(starts)] / (2.0 * np.pi))
     angles -= 2.0 * np.pi * turns.repeat(_counts(starts, len(quaternions)), axis=1)
     return angles.T
 
 
 def quaternions_from_extrinsic_eulers(angles: np.ndarray, order: str) -> np.ndarray:
-    """Return the rotations (n, 4) of angles (n, 3) in radians about x, y and z, turned about in this order."""
+    """Return the rotations (n, 4) of angles (n, 3) in radians about x, y and z, applied in this order."""
     i, j, k = ("XYZ".index(axis) for axis in order)
     sign = (i - j) * (j - k) * (k - i) // 2
     sines, cosines = np.empty((2, 3, len(angles)))
@@ -77,7 +77,7 @@ def quaternions_from_extrinsic_eulers(angles: np.ndarray, order: str) -> np.ndar
 
 
 def _direction(x: np.ndarray, y: np.ndarray, starts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return angle of the line through each plane vector, without jumps, and the vector's signed length along it."""
+    """Return the angle of the line through each plane vector, without jumps, and the signed length of the vector."""
     length = np.sqrt(x * x + y * y)
     angle = np.arctan2(y, x)
     free = length < MIN_UNLOCKED_LENGTH
@@ -95,7 +95,7 @@ def _direction(x: np.ndarray, y: np.ndarray, starts: Sequence[int]) -> tuple[np.
 
 
 def _unwrapped(angles: np.ndarray, period: float, starts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Angles (n,) that go on by half a period at most within each motion, and how many periods were taken off."""
+    """Return angles (n,) that change by half a period at most within each motion, and how many periods were removed."""
     turns = np.rint(np.diff(angles, prepend=angles[:1]) / period)
     turns[list(starts)] = 0.0
     np.cumsum(turns, out=turns)
@@ -105,5 +105,5 @@ def _unwrapped(angles: np.ndarray, period: float, starts: Sequence[int]) -> tupl
 
 
 def _counts(starts: Sequence[int], count: int) -> np.ndarray:
-    """How long each motion is."""
+    """Return the length of each motion."""
     return np.diff((*starts, count))

@@ -1,7 +1,7 @@
-"""Keys that are no samples of a recording: moved by least squares to where the motion between them follows it best.
+"""Key fitting: moves keys by least squares to poses from which the motion between them follows the recording best.
 
-A key that is a recorded pose has that sample's noise, and the in-betweens on either side of it pass through it whatever
-that costs. Fitted, it is where the error of the samples around it is smallest. Its time stays.
+A key that is a recorded pose has the noise of that sample, and the in-betweens on both sides pass through it at any
+cost. A fitted key is where the error of the samples around it is smallest. Its time stays.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from .poses import Poses, aligned, numbers
 from .quaternions import conjugate, multiply, normalise, rotate
 
 DIFFERENCE_STEP_RAD = 1e-5
-"""Of differences that stand for derivatives: in radians, and as a part of the radius."""
+"""Step of the finite differences that approximate derivatives, in radians and as a fraction of the radius."""
 
 KEY_SWEEPS = 4
-"""How often every key is moved. The third time gains a hundredth."""
+"""How often each key is moved. The third time gains a hundredth."""
 
 NORMAL_DAMPING_RATIO = 1e-9
-"""What is added to the normal equations, as a part of them: a key may have no samples of its own."""
+"""Damping of the normal equations, as a fraction of them: a key may have no samples of its own."""
 
 
 def fit_keys(times: ArrayLike, poses: Poses, keys: ArrayLike, mode: str = "motor_spline", radius: float = 0.1) -> Poses:
-    """Poses for keys at the times of some samples, such that the in-betweens are as close to the recording as can be.
+    """Return poses for keys at the times of some samples, with in-betweens as close as possible to the recording.
 
     Parameters
     ----------
@@ -35,41 +35,42 @@ def fit_keys(times: ArrayLike, poses: Poses, keys: ArrayLike, mode: str = "motor
     poses : Poses, shape (n,)
         The recording, with unit quaternions.
     keys : array-like of int, shape (k,), or of bool, shape (n,)
-        The samples whose times are those of the keys: their numbers, rising, or a mask; at least two.
+        The samples at whose times the keys are: their numbers, rising, or a mask; at least two.
     mode : str
         A name in `MODES`.
     radius : float
-        Of the shell, in the unit of the positions: how much turns count beside displacements. Above zero.
+        The radius of the shell, in the unit of the positions, above zero. It weights rotations against displacements.
 
     Returns
     -------
     Poses, shape (k,)
-        With d how far the origin is off at a sample and theta the angle that the body is off by, the squares of d and
-        of the chord 2 radius sin(theta / 2) have no larger sum, over all samples, than with the samples themselves for
-        keys. That is the square of the shell error, but for what the two may have in common. Scales stay as they are.
+        Let d be the displacement of the origin at a sample and theta the angle by which the body is off. The sum of
+        squares of d and of the chord 2 radius sin(theta / 2), over all samples, is no larger than with the samples
+        themselves as keys. That is the square of the shell error, except for what d and the chord have in common.
+        Scales stay as they are.
 
     Raises
     ------
     TypeError
-        Where the recording is no `Poses`.
+        If the recording is not `Poses`.
     ValueError
-        For an unknown mode, a radius that is not above zero, keys that are not rising samples or fewer than two, and
-        samples that are not finite, out of order or of no size.
+        If the mode is unknown, the radius is not above zero, keys are not rising samples or fewer than two, or samples
+        are not finite, out of order, or have a zero quaternion or a scale that is not positive.
 
     See Also
     --------
-    reduce_keys : Which samples are to be keys.
-    interpolate : The motion between them.
+    reduce_keys : Finds which samples should be keys.
+    interpolate : Returns the motion between keys.
 
     Notes
     -----
-    Gauss and Newton's method (Nocedal and Wright, "Numerical Optimization", 2006, section 10.3), a few keys at a time:
-    those that are so far from one another that no segment depends on two, and then their neighbours. Each is moved only
-    if that is better.
+    The Gauss-Newton method (Nocedal and Wright, "Numerical Optimization", 2006, section 10.3) moves several keys at a
+    time: keys so far from one another that no segment depends on two of them, and then their neighbours. A key is moved
+    only if that lowers the error.
 
     Examples
     --------
-    A body rests, but the sample that is the second of three keys was recorded 0.3 off:
+    A body rests, but the second of the three keys was recorded 0.3 off:
 
     >>> import numpy as np
     >>> from rigid_motion.motion import Poses, fit_keys
@@ -95,18 +96,20 @@ def fit_keys(times: ArrayLike, poses: Poses, keys: ArrayLike, mode: str = "motor
 
 
 class _Fitting:
-    """The keys as they are by now, and how far the motion between them is off."""
+    """The current keys, and the errors of the motion between them."""
 
     def __init__(self, times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str, radius: float) -> None:
         self.times, self.key_times, self.mode, self.radius = times, times[keys], mode, radius
         self.first_samples = np.append(0, keys[1:-1])
-        """Of each segment."""
+        """The first sample of each segment."""
         self.truth = poses
         self.fitted = poses[keys]
         self.residuals = self.displacements(self.fitted)
 
     def displacements(self, keys: Poses) -> np.ndarray:
-        """Of the origin, and chords of the shell along the axis that it is turned about, at all samples: (6, n)."""
+        """Return the displacements of the origin, and the chords of the shell along the axis of turning, at all
+        samples: (6, n).
+        """
         shown = interpolate(self.key_times, keys, self.times, self.mode)
         turn = multiply(shown.quaternions, conjugate(self.truth.quaternions)).T
         chords = 2.0 * self.radius * np.where(turn[0] < 0.0, -turn[1:], turn[1:])
@@ -140,7 +143,7 @@ class _Fitting:
         self.fitted, self.residuals = moved, residuals
 
     def sums(self, values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """Of values (..., n), over the segments that each of the chosen keys influences, shape (..., c)."""
+        """Return sums of values (..., n) over the segments that each chosen key influences, shape (..., c)."""
         of_segments = np.add.reduceat(values, self.first_samples, axis=-1)
         mode, last = MODES[self.mode], of_segments.shape[-1]
         begins = np.maximum(chosen - 1 - mode.ahead, 0)
@@ -150,7 +153,7 @@ class _Fitting:
 
 
 def _moved(keys: Poses, chosen: np.ndarray, steps: np.ndarray) -> Poses:
-    """Return the keys, some of them (c,) moved by twists (6, c) along their own axes."""
+    """Return the keys with the chosen ones (c,) moved by twists (6, c) along their own axes."""
     turns, advances = twists.exponential(steps)
     moved = keys.copy()
     moved.positions[chosen] += rotate(keys.quaternions[chosen], advances.T)

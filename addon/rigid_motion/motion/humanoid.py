@@ -1,7 +1,7 @@
-"""Humanoid bones: which joint of a skeleton is which, and how skeletons differ in where their bones point at rest.
+"""Humanoid bones: finds which joint of a skeleton is which bone, and how rest poses of skeletons differ.
 
-The names are those of Unity's `HumanBodyBones`, which VRM and VMC share. Arms hang down at rest in one skeleton, and
-are held out in another. Metres, Blender's axes.
+The names are those of Unity's `HumanBodyBones`, which VRM and VMC share. At rest, arms hang down in some skeletons and
+are held out in others. Metres, Blender's axes.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ BONES = (
         for part, above in FINGER_PARENTS.items()
     ),
 )
-"""What each bone hangs on, and what else it is called. Parents come first; * stands for a side, Left or Right. Other
+"""Each bone with its parent and its other names. Parents come first; * stands for a side, Left or Right. The other
 names are in lower case, without side, sign or namespace, the better ones first."""
 
 HUMANOID = {
@@ -50,15 +50,15 @@ HUMANOID = {
     for bone, above, _ in BONES
     if bone.startswith("*") == bool(side)
 }
-"""All bones and what they hang on where that is there, parents first."""
+"""All bones and their parents in a skeleton that has these, parents first."""
 
 SPINE = ("Spine", "Chest", "UpperChest")
 
 NEXT_BONES = {"UpperArm": "LowerArm", "LowerArm": "Hand", "UpperLeg": "LowerLeg", "LowerLeg": "Foot"}
-"""The bones that rests differ in, and where they point to."""
+"""The bones whose rest direction differs between skeletons, and the bones they point to."""
 
 HELD_OUT = {"LeftArm": (1.0, 0.0, 0.0), "RightArm": (-1.0, 0.0, 0.0)}
-"""Where arms point in a T-pose; legs point down."""
+"""Directions of the arms in a T-pose; legs point down."""
 
 _KNOWN_ALIASES = {
     alias: (bone.strip("*"), rank) for bone, _, names in BONES for rank, alias in enumerate(names.split())
@@ -69,7 +69,7 @@ _MECHANISM = ("def", "org", "mch", "vis", "wgt")
 
 
 def plain_name(name: str) -> tuple[str, str]:
-    """Return a name in lower case without its namespace and side; and the side, L, R or nothing."""
+    """Return a name in lower case without namespace and side, and the side: L, R or an empty string."""
     name = name.rpartition(":")[2]
     for side in ("Left", "Right"):
         if side.lower() in name.lower():
@@ -88,7 +88,7 @@ def _letters(name: str) -> str:
 
 
 def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
-    """Which joint each humanoid bone is, as far as names tell; joints are given parents first."""
+    """Return the joint number of each humanoid bone that can be told by names; joints are given parents first."""
     result: dict[str, tuple[int, int]] = {}
     trunk: list[int] = []
     is_rigify = any(name.startswith("ORG-") for name in joints)
@@ -112,7 +112,7 @@ def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
             result[bone] = (number, rank)
     bones = {bone: number for bone, (number, _) in result.items()}
     if is_rigify:
-        # The lower half of its spine hangs upside down on the middle, and carries the legs.
+        # The lower half of Rigify's spine hangs upside down from the middle, and carries the legs.
         trunk = sorted(trunk, key=lambda number: joints[number])[len(trunk) // 2 :]
     named = {plain_name(joints[number])[0]: number for number in trunk}
     if "chest" in named:
@@ -123,7 +123,7 @@ def humanoid_bones(joints: Sequence[str]) -> dict[str, int]:
 
 
 def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return shortest rotations (..., 4) that turn directions (..., 3) to others; none where either has no length."""
+    """Return the shortest rotations (..., 4) from directions (..., 3) to others; none where either has no length."""
     lengths = np.linalg.norm(first, axis=-1) * np.linalg.norm(second, axis=-1)
     w = lengths + np.einsum("...i,...i->...", first, second)
     turns = np.concatenate((w[..., None], np.cross(first, second)), axis=-1)
@@ -132,9 +132,9 @@ def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def alignments(bones: dict[str, int], first: np.ndarray, second: np.ndarray | None = None) -> dict[str, np.ndarray]:
-    """By what each bone of one skeleton is to be turned to be at rest as in another.
+    """Return the rotation that brings each bone of one skeleton to the rest direction of another.
 
-    `bones` are numbers of places (n, 3) at rest; without the second places the other is a T-pose.
+    `bones` are the numbers of places (n, 3) at rest. Without the second places, the other skeleton is in a T-pose.
     """
     result: dict[str, np.ndarray] = {}
     for bone in HUMANOID:
@@ -152,7 +152,7 @@ def alignments(bones: dict[str, int], first: np.ndarray, second: np.ndarray | No
 
 
 def beside(poses: Poses, follows: np.ndarray) -> Poses:
-    """Return poses (bones,) seen from those that each follows, by number; as they are where that is none, -1."""
+    """Return poses (bones,) relative to the poses they follow, by number; those that follow none (-1) are unchanged."""
     result, hanging = poses.copy(), follows >= 0
     result[hanging] = placed(inverse(poses[follows[hanging]]), poses[hanging])
     return result
