@@ -1,15 +1,15 @@
-"""The search for so many keys that are as near to a recording as can be.
+"""The search for a given number of keys that follow a recording as closely as possible.
 
-Keys are taken out until so many are left. For the largest error they are laid out anew and moved together. Where more
-keys than its two have a say in a segment, a search for a tolerance a little below the error that is left follows, as
-bisecting the tolerance would. Then the best is put together of all that this has led to, and such a search is tried
-once or twice more from there. Where a segment depends on its two keys alone and there are few samples for each key,
-nearly all of them are candidates, and the first layout is the best there is but for a few hundredths. For the mean
-square some more keys are put in, moved, and as many taken out.
+Keys are removed until the number is reached. For the largest error they are then laid out anew and moved together. If
+more keys than its two influence a segment, a search follows for a tolerance a little below the remaining error, as
+bisecting the tolerance would do. Then the best keys are combined from all that was found, and a search of this kind is
+tried once or twice more from there. If a segment depends on its two keys alone and there are few samples per key,
+nearly all samples are candidates, and the first layout is the best there is, except for a few hundredths. For the mean
+square, some more keys are inserted, moved, and as many removed.
 
-Within a tolerance a few budgets are tried, each for fewer keys than are known to keep to it; in long recordings it is
-only one, and in those of whole bodies none. Of Blender's own curves every key has a say everywhere, which no search
-sees: there the whole motion tells.
+Within a tolerance a few budgets are tried, each for fewer keys than are known to suffice; only one in long recordings,
+and none in those of whole bodies. With Blender's own curves every key influences the whole motion, which no search by
+segments sees: there the whole motion is evaluated.
 """
 
 from __future__ import annotations
@@ -28,84 +28,84 @@ from .modes import MODES, interpolate
 CANDIDATES_PER_KEY = 5, 6
 """Candidates for each key of a budget, when its keys are first laid out anew.
 
-Where a segment depends on its two keys alone, and where on more.
-"""
+The first is for segments that depend on their two keys alone, the second for others."""
 
 CANDIDATE_THINNING = 3
-"""How many times as few candidates there are each time after that."""
+"""Factor by which there are fewer candidates each time after that."""
 
 MAX_CALM_ERROR_RATIO = 0.005
-"""Of the largest error of the first keys: a sample that is off by no more, when it alone is left out, is calm."""
+"""A sample is calm if leaving it out alone makes at most this fraction of the largest error of the first keys."""
 
 CALM_CANDIDATE_STRIDE = 4
-"""Of calm samples, each how many-th is a candidate."""
+"""One in this many calm samples is a candidate."""
 
 SAMPLES_PER_KEY_LIMITS = 5, 10, 50
-"""Samples for each key that settings change at. In the middle, from 10 to 50, there is time for every step.
+"""Samples per key at which settings change. In the middle, from 10 to 50, there is time for every step.
 
-Where there are fewer, what is done for each key takes longer than looking at samples; where there are more, looking
-at samples takes so long that another try is worth more.
-"""
+With fewer, the work for each key takes longer than evaluating samples. With more, evaluating samples takes so long that
+another try is worth more."""
 
 JOINT_MOVES_BY_REACH = {0: ((5, 6), (5, 12), (5, 24)), 1: ((2, 6), (3, 12), (2, 24), (2, 48)), 2: ((2, 6), (2, 12))}
-"""How keys are moved together, by the reach of the mode: places for each, and how near to one another."""
+"""How keys are moved together, by the reach of the mode: places per key, and the divisor of their distance for the
+step."""
 
 STEPS_BY_LENGTH = slice(1, 2), slice(2), slice(None), slice(2)
-"""Which of these are done, by the lengths."""
+"""Which of these steps are done, by the ranges of samples per key."""
 
 FIRST_STEP = slice(1)
-"""The first alone: for splines where there are fewest samples for each key, and after the search for a tolerance."""
+"""The first step alone: for splines with the fewest samples per key, and after the search for a tolerance."""
 
 TIGHTER_ERROR_PER_TOLERANCE, LOOSER_ERROR_PER_TOLERANCE = 1.05, 1.6
-"""The largest error over the tolerance that better keys are then searched for, and the looser one on the way there."""
+"""The largest error over the tolerance of the search for better keys, and how much looser that is on the way."""
 
 CLOSING_ERROR_PER_TOLERANCE, MAX_CLOSINGS = 1.03, 2
-"""The same at last, without a looser one, and how often at most."""
+"""The same for the last searches, without a looser factor, and their number at most."""
 
 MAX_INSERTED_KEYS = 8
-"""Keys that are put in at once where each makes the error less; else half of those that are left."""
+"""Keys inserted at a time at most, where each lowers the error; or else half of those that are missing."""
 
 MAX_SWAPPED_BUDGET_RATIO = 1.15
-"""How many times the budget keys may be in between, for the mean square, to find better places."""
+"""For the mean square, the number of keys may temporarily be this many times the budget to find better places."""
 
 FEWER_KEYS_RATIOS, NEAR_KEYS_RATIO = (0.9, 0.95), 0.03
-"""Of the keys within a tolerance: how many are tried first, and next, and how near they are to too few at last."""
+"""Budgets tried first and later, as fractions of the keys known to suffice, and the fraction of these by which the last
+budget may differ from too few."""
 
 MAX_ERROR_POWER = 4.0
-"""The power of the number of keys by which an error mostly falls, or less: what is too far off needs no more tries."""
+"""Greatest power of the number of keys with which an error mostly falls. It gives the next budget to try."""
 
 HOPELESS_ERROR_PER_TOLERANCE = 1.25
-"""The largest error in tolerances of keys that will not come within one, by all that follows."""
+"""Largest error, in tolerances, above which nothing that follows brings keys within the tolerance."""
 
 MANY_POSES = 2**10
-"""Poses, of more of which only one budget is tried, and of whole bodies none: that found nothing in any of 12 trials,
-and took 2.5 times as long."""
+"""Above this many poses only one budget is tried, and for whole bodies none: none of 12 trials found anything, and they
+took 2.5 times as long."""
 
 
 def fewest_keys(recording: SampleTracks, budget: int | None, tries: int, *, rms: bool = False) -> np.ndarray:
-    """Return fewest samples within the tolerance of a recording, or the best ones within a budget."""
+    """Return the fewest samples within the tolerance of a recording, or the best ones within a budget."""
     if len(recording.times) <= 2:
         return np.arange(len(recording.times))
     if budget is not None:
         return BudgetSearch(recording, budget, rms=rms).least(tries)
     search = KeySearch(recording, rms=rms)
-    return _of_budgets(search, search.within(tries), tries)
+    return _with_smaller_budgets(search, search.within(tries), tries)
 
 
-def _of_budgets(search: KeySearch, keys: np.ndarray, tries: int) -> np.ndarray:
-    """Return the fewest keys whose motion is within the tolerance, of keys to begin with and of some budgets."""
+def _with_smaller_budgets(search: KeySearch, keys: np.ndarray, tries: int) -> np.ndarray:
+    """Return the fewest keys whose motion is within the tolerance, from given keys and searches with a few budgets."""
     recording, best, too_few = search.recording, _mended(search, keys), 1
     budgets = tries + 1 if tries else 0
     if len(recording.times) * recording.poses_each > MANY_POSES:
         budgets = min(tries, 1) if recording.poses_each == 1.0 else 0
-    # Where much had to be put in, fewest are near to what was without that.
+    # Where many keys had to be inserted, the fewest are near the number before that.
     budget = min(math.floor(FEWER_KEYS_RATIOS[0] * len(best)), 1 + math.ceil(len(keys) / FEWER_KEYS_RATIOS[0]))
     for _ in range(budgets):
         budget = max(budget, too_few + 1)
         if budget >= len(best) or len(best) - too_few <= max(1, NEAR_KEYS_RATIO * len(best)):
             break
         other = BudgetSearch(recording, budget, rms=search.power == 2, enough=1.0)
-        other.costs = search.costs  # What is known of segments goes for all budgets.
+        other.costs = search.costs  # Costs of segments are the same for all budgets.
         fewer = other.least(tries)
         error = _error(search, fewer)
         if error > MAX_LINK_ERROR_PER_TOLERANCE:
@@ -122,7 +122,7 @@ def _of_budgets(search: KeySearch, keys: np.ndarray, tries: int) -> np.ndarray:
 
 
 def _without_needless(search: KeySearch, keys: np.ndarray) -> np.ndarray:
-    """Return keys without those that the motion does without, within the tolerance."""
+    """Return the keys without those that the motion does not need to stay within the tolerance."""
     if not MODES[search.recording.mode].is_reference:
         return search.refined(search.measured(keys)).indices
     inner = (measured := search.measured(keys)).inner
@@ -135,7 +135,7 @@ def _without_needless(search: KeySearch, keys: np.ndarray) -> np.ndarray:
 
 
 def _mended(search: KeySearch, keys: np.ndarray) -> np.ndarray:
-    """Return keys with more of them where the motion passes the tolerance."""
+    """Return the keys with more of them where the motion exceeds the tolerance."""
     while _error(search, keys) > MAX_LINK_ERROR_PER_TOLERANCE:
         errors = _errors(search, keys)
         worst = np.array([first + int(np.argmax(errors[first:second])) for first, second in pairwise(keys.tolist())])
@@ -145,26 +145,26 @@ def _mended(search: KeySearch, keys: np.ndarray) -> np.ndarray:
 
 
 def _errors(search: KeySearch, keys: np.ndarray) -> np.ndarray:
-    """Return how far the whole motion between keys is off at every sample, in tolerances, shape (n,)."""
+    """Return the error of the whole motion between keys at every sample, in tolerances, shape (n,)."""
     recording = search.recording
     if not MODES[recording.mode].is_reference:
         return search.costs.errors(search.segments(search.measured(keys))[1])
     shown = interpolate(recording.times[keys], recording.poses[..., keys], recording.times, recording.mode)
     errors = recording.errors(np.arange(len(recording.times)), shown)
-    errors[keys] = 0.0  # Whatever is left there is rounding.
+    errors[keys] = 0.0  # Only rounding is left there.
     return errors
 
 
 def _error(search: KeySearch, keys: np.ndarray) -> float:
-    """Return what counts of the errors at all samples."""
+    """Return the error that counts: the largest, or the root mean square."""
     errors = _errors(search, keys)
     return float(np.sqrt(np.square(errors).mean()) if search.power == 2 else errors.max())
 
 
 class BudgetSearch(KeySearch):
-    """The search for a number of keys, under one mode: for the largest error, or with `rms` for its mean square.
+    """The search for a number of keys under one mode: for the largest error, or with `rms` for the mean square.
 
-    A largest error may be `enough`, in tolerances: then the search ends where it has that, or is far from it.
+    If a largest error is `enough`, in tolerances, the search ends when it is reached or far away.
     """
 
     def __init__(self, recording: SampleTracks, budget: int, *, rms: bool = False, enough: float = 0.0) -> None:
@@ -172,12 +172,12 @@ class BudgetSearch(KeySearch):
         self.budget, self.enough = budget, enough
         self._length = int(np.searchsorted(SAMPLES_PER_KEY_LIMITS, len(recording.times) / budget, side="right"))
         self._is_short = self._length < 2
-        """Whether there are few samples for each key."""
+        """Whether there are few samples per key."""
         self._takes_all = self.reach == 0 and self._is_short
         """Whether all samples are candidates."""
 
     def least(self, tries: int) -> np.ndarray:
-        """So many samples that are keys with as small an error as can be found, or two where nothing moves."""
+        """Return keys within the budget with the smallest error that can be found, or two keys if nothing moves."""
         count = len(self.recording.times)
         if not np.ptp(self.recording.truth.rows, axis=-1).any():
             return np.array((0, count - 1))
@@ -191,7 +191,7 @@ class BudgetSearch(KeySearch):
         return self._least_peak(keys, candidates, tries) if tries else self._settled(keys).indices
 
     def _lively(self, calm: float) -> np.ndarray:
-        """All samples, but of those that are off by so little when left out alone only every few."""
+        """Return all samples, but only every few of those whose error is at most `calm` when left out alone."""
         samples = np.arange(len(self.recording.times))
         _, peak = self.costs.of(np.stack((samples[:-2], samples[2:]), axis=1))
         is_lively = samples % CALM_CANDIDATE_STRIDE == 0
@@ -200,7 +200,7 @@ class BudgetSearch(KeySearch):
         return samples[is_lively]
 
     def _least_peak(self, keys: KeySelection, candidates: np.ndarray, tries: int) -> np.ndarray:
-        """Return the keys with the smallest largest error of all that tries lead to from some."""
+        """Return the keys with the smallest largest error of all that the tries lead to."""
         if self._takes_all:
             candidates = self._lively(MAX_CALM_ERROR_RATIO * keys.peak.max())
         if self.reach and not self._is_short:
@@ -214,46 +214,46 @@ class BudgetSearch(KeySearch):
                 break
             samples, is_complete = spread_keys(self.costs, candidates, samples, self.budget)
             moved = self._moved_together(samples, steps)
-            # Where there is time for many, what differs little only takes time from putting them together.
+            # With many samples per key, similar sets only make combining them slower.
             result += [min(moved, key=self.costs.peak)] if self.reach and not self._is_short else moved
             samples = moved[-1]
             if self._takes_all and is_complete:
                 return min(result, key=self.costs.peak)
             candidates = candidates[::CANDIDATE_THINNING]
         best = min(result, key=self.costs.peak)
-        # Without neighbours there is little left to gain, and in long recordings it takes long.
+        # If segments depend on their two keys alone there is little left to gain, and long recordings take long.
         is_long = len(self.recording.times) > MAX_FULL_START_SAMPLES and not self.reach
         if is_long or self._is_over(best):
             return best
         if self.reach:
-            result += self._of_tolerance(best)
+            result += self._searched_by_tolerance(best)
             best = min(result, key=self.costs.peak)
         if self.is_linkable and not self._is_over(best):
-            # Without neighbours all are near to one another: the two best have what the others have.
+            # If segments depend on their two keys alone, all sets are similar: the two best suffice.
             by_peak = {self.costs.peak(keys): keys for keys in result}
             result = [by_peak[peak] for peak in sorted(by_peak)[: None if self.reach else 2]]
             joined = self.filled(self.measured(joined_keys(self.costs, result, self.budget))).indices
             best = min(best, joined, key=self.costs.peak)
-        return self._closed(best) if self.reach and not self._is_over(best) else best
+        return self._improved_at_worst(best) if self.reach and not self._is_over(best) else best
 
     def _is_over(self, best: np.ndarray) -> bool:
-        """Whether there is no more to be done for the best keys."""
+        """Return whether no more can be done for the best keys."""
         peak = self.costs.peak(best)
         return peak <= self.enough or 0.0 < HOPELESS_ERROR_PER_TOLERANCE * self.enough < peak
 
-    def _of_tolerance(self, best: np.ndarray) -> list[np.ndarray]:
-        """Return what a search for a tolerance makes of the best keys, brought to the budget."""
+    def _searched_by_tolerance(self, best: np.ndarray) -> list[np.ndarray]:
+        """Return keys found from the best ones by a search for a tolerance, brought to the budget."""
         tolerance = self.costs.peak(best) / TIGHTER_ERROR_PER_TOLERANCE
         keys = self.loosened(self.measured(best), tolerance, LOOSER_ERROR_PER_TOLERANCE)
         if len(keys.indices) > self.budget:
             keys = self.thinned(keys, math.inf, self.budget)
         result = [self.filled(keys).indices]
-        if self._length == 1:  # With fewer samples for each key it takes too long, with more it finds little.
+        if self._length == 1:  # With fewer samples per key this takes too long, with more it finds little.
             result += self._moved_together(min(best, *result, key=self.costs.peak), FIRST_STEP)
         return result
 
-    def _closed(self, best: np.ndarray) -> np.ndarray:
-        """Return the best keys, or better ones that put in a few at the worst places and do without others."""
+    def _improved_at_worst(self, best: np.ndarray) -> np.ndarray:
+        """Return the best keys, or better ones with some inserted at the worst places and others removed."""
         for _ in range(MAX_CLOSINGS):
             tolerance = self.costs.peak(best) / CLOSING_ERROR_PER_TOLERANCE
             if tolerance == 0.0:
@@ -265,7 +265,7 @@ class BudgetSearch(KeySearch):
         return best
 
     def filled(self, keys: KeySelection, most: int | None = None) -> KeySelection:
-        """Keys with more of them where the motion is off most, as many as the budget, or this, has left."""
+        """Return keys with more inserted where the error is largest, up to the budget or to `most`."""
         most = min(most or self.budget, len(self.recording.times))
         columns = np.arange(-2 * self.reach, 2 + 2 * self.reach)
         while (left := most - len(keys.indices)) > 0:
@@ -275,7 +275,7 @@ class BudgetSearch(KeySearch):
             worst = np.array([first + np.argmax(errors[first:second]) for first, second in ends])
             windows = np.insert(keys.windows(trials, columns), 1 + 2 * self.reach, worst, axis=1)
             peak, before = self.evaluate(windows)[1].max(axis=1), keys.peak[trials]
-            # Those that are off most get one each, but those where that makes it worse come last.
+            # The worst segments get one key each, but segments where that raises the error come last.
             is_better = peak < before
             order = np.argsort(np.where(is_better, -before, peak), kind="stable")
             picked = np.searchsorted(trials, spaced(trials[order], self.spacing, len(keys.indices)))
@@ -284,18 +284,18 @@ class BudgetSearch(KeySearch):
         return keys
 
     def _moved_together(self, samples: np.ndarray, steps: slice) -> list[np.ndarray]:
-        """As many keys as the budget, these among them, and what moving them together makes of them step by step."""
+        """Return the keys filled up to the budget, and what each step of moving them together makes of them."""
         result = [self.filled(self.measured(samples)).indices]
         for ways, part in JOINT_MOVES_BY_REACH[min(self.reach, 2)][steps]:
             result.append(moved_together(self.costs, result[-1], ways, part))
         return result
 
     def _least_squares(self, best: KeySelection, tries: int) -> np.ndarray:
-        """Return the same for the mean square, from keys that are many enough."""
+        """Return keys with the smallest mean square, starting from keys within the budget."""
         result = [best.indices]
         links = tries and self.is_linkable  # The last try.
         for _ in range(tries - bool(links)):
-            # Some more where the motion is off most, moved together.
+            # Insert some more where the error is largest, then move all.
             more = self.filled(self.measured(best.indices), math.ceil(MAX_SWAPPED_BUDGET_RATIO * self.budget))
             more = self.moved(more, math.inf)
             result.append(more.indices)
@@ -306,7 +306,7 @@ class BudgetSearch(KeySearch):
         return best.indices
 
     def _better_of(self, best: KeySelection, other: KeySelection) -> KeySelection:
-        """Of keys and others, brought to the budget, those with the smaller sum of squares."""
+        """Return the keys with the smaller sum of squares, after bringing the others to the budget."""
         keys = self.measured(other.indices)
         if len(keys.indices) > self.budget:
             keys = self.thinned(keys, math.inf, self.budget)
@@ -314,7 +314,7 @@ class BudgetSearch(KeySearch):
         return keys if keys.cost.sum() < best.cost.sum() else best
 
     def _settled(self, keys: KeySelection) -> KeySelection:
-        """Keys moved to where the sum of the powers of errors is least."""
+        """Return keys moved to where the sum of powers of the errors is smallest."""
         for _ in range(MAX_SEARCH_ROUNDS):
             before = keys.cost.sum()
             keys = self.moved(keys, math.inf)

@@ -1,7 +1,7 @@
-"""What it costs to leave out the samples between keys: errors of a recording, segment by segment.
+"""Costs of leaving out the samples between keys: errors of a recording, segment by segment.
 
-The search for keys comes back to the same segments again and again: a segment is worked out once, and remembered by
-the keys that have a say in it.
+The search for keys comes back to the same segments again and again. Each segment is worked out once and cached by the
+keys that influence it.
 """
 
 from __future__ import annotations
@@ -23,38 +23,38 @@ MAX_ERROR = 1e30
 """Errors are clipped to this, so that their powers stay finite."""
 
 BATCH_POSES = 2**14
-"""Poses looked at in one go: few enough for the processor's caches."""
+"""Poses processed at a time: few enough for the processor's caches."""
 
 LOOKED_UP = 2**16
-"""Segments looked up in one go."""
+"""Segments looked up at a time."""
 
 MAX_REMEMBERED_SEGMENTS = 2**18
-"""Segments at most, so that long recordings do not fill the memory."""
+"""Segments in the cache at most, so that long recordings do not fill the memory."""
 
 REMEMBERED_EACH = 16
-"""Segments for each sample of a shorter recording."""
+"""Segments in the cache per sample of a shorter recording."""
 
 Found = tuple[np.ndarray, np.ndarray]
-"""The costs and the peaks of segments."""
+"""Costs and peaks of segments."""
 
 
 class SampleTracks:
-    """What keys are searched for: tracks of samples, one behind the other, each of which gets keys of its own.
+    """Tracks of samples to search keys for, one after the other; each track gets its own keys.
 
     Parameters
     ----------
     times : array, shape (n,)
         Rising within each track.
     poses : Poses, shape (..., n)
-        At these times; what has leading axes moves together and has the same keys.
+        At these times. Poses along leading axes share the same keys.
     mode : str
-        What fills in between keys.
+        The mode that interpolates between keys.
     radius, tolerance : float or array, shape (n,)
-        Of the shell error. Errors are counted in tolerances.
+        Radius and tolerance of the shell error. Errors are counted in tolerances.
     starts : array of int, optional
-        The first sample of each track; one track, otherwise.
+        The first sample of each track; by default there is one track.
     off_at_keys : bool
-        Whether errors at keys count as well, but for the last of a track: what else moves may be off there.
+        Whether errors at keys count too, except at the last of a track: other things that move may be off there.
     """
 
     def __init__(
@@ -73,25 +73,25 @@ class SampleTracks:
         self.ends = np.append(self.starts[1:], len(times)) - 1
         self.truth = packed(poses)
         self.poses_each = float(math.prod(poses.shape[:-1]))
-        """How many poses are looked at for the error of a sample, on average."""
+        """How many poses the error of a sample needs, on average."""
 
     def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
-        """How far what is shown (..., m) is off at some samples (m,), in tolerances, shape (m,)."""
+        """Return the errors of poses (..., m) at some samples (m,), in tolerances, shape (m,)."""
         return self.in_tolerances(shell_error(shown, self.truth[samples], _at(self.radius, samples)), samples)
 
     def in_tolerances(self, errors: np.ndarray, samples: np.ndarray) -> np.ndarray:
-        """Errors (m,) at some samples (m,) in multiples of the tolerance there."""
+        """Return errors (m,) at some samples (m,) as multiples of the tolerance there."""
         return errors / _at(self.tolerance, samples)
 
 
 class Costs:
-    """What segments of a recording cost, and their peaks.
+    """Costs and peaks of the segments of a recording.
 
     Parameters
     ----------
-    recording : Recording
+    recording : SampleTracks
     power : int
-        Of two. The cost is the sum of this power of the errors at the samples between two keys, the peak is the
+        A power of two. The cost is the sum of this power of the errors at the samples between two keys, the peak is the
         largest of these errors.
     """
 
@@ -99,9 +99,9 @@ class Costs:
         self.recording, self.power = recording, power
         mode = MODES[recording.mode]
         self.reach = max(mode.behind, mode.ahead)
-        """How many segments beyond the two next to it a key influences, on either side."""
+        """How many segments a key influences on either side, beyond the two next to it."""
         self.keys = 2 + 2 * self.reach
-        """How many keys have a say in a segment. A segment is a row of them: samples, -1 where there is none."""
+        """How many keys influence a segment. A segment is a row of these keys: samples, -1 where there is none."""
         self._first = 0 if recording.off_at_keys else 1
         is_plain = type(recording) is SampleTracks and not recording.off_at_keys
         is_plain &= recording.poses.scales is None and len(recording.poses.shape) == 1
@@ -109,7 +109,7 @@ class Costs:
         self._memory = Memory(min(MAX_REMEMBERED_SEGMENTS, REMEMBERED_EACH * len(recording.times)), 2)
 
     def of(self, segments: np.ndarray) -> Found:
-        """Costs and peaks (...) of segments (..., keys), zero where no sample counts."""
+        """Return costs and peaks (...) of segments (..., keys), zero where no sample counts."""
         rows = segments.reshape(-1, self.keys)
         filled = np.flatnonzero(self._counts(rows) > 0)
         result = np.zeros((len(rows), 2))
@@ -127,16 +127,18 @@ class Costs:
         return float(self.of_keys(keys)[1].max())
 
     def of_keys(self, keys: np.ndarray) -> Found:
-        """Costs and peaks (k - 1,) of the segments between keys (k,) of a recording of one track."""
+        """Return costs and peaks (k - 1,) of the segments between keys (k,) of a recording of one track."""
         ended = np.pad(keys, self.reach, constant_values=-1)
         return self.of(np.lib.stride_tricks.sliding_window_view(ended, self.keys))
 
     def effort(self, segments: np.ndarray) -> float:
-        """How many poses are to be looked at, at most, for segments (..., keys)."""
+        """Return how many poses segments (..., keys) need at most."""
         return self.recording.poses_each * self._counts(segments.reshape(-1, self.keys)).sum()
 
     def errors(self, segments: np.ndarray) -> np.ndarray:
-        """Return error at every sample between the keys of segments (s, keys), in tolerances, zero elsewhere, (n,)."""
+        """Return the errors at all samples between the keys of segments (s, keys), in tolerances, zero
+        elsewhere: (n,).
+        """
         errors = np.zeros(len(self.recording.times))
         filled = segments[self._counts(segments) > 0]
         for batch, counts in self._batches(filled) if len(filled) else ():
@@ -145,7 +147,7 @@ class Costs:
         return errors
 
     def _work_out(self, rows: np.ndarray) -> np.ndarray:
-        """Costs beside peaks, shape (s, 2), of segments (s, keys) with samples in them."""
+        """Return costs and peaks, shape (s, 2), of segments (s, keys) with samples in them."""
         out, done = np.empty((len(rows), 2)), 0
         for batch, counts in self._batches(rows):
             _, errors = self._errors(batch, counts)
@@ -159,19 +161,19 @@ class Costs:
         return out
 
     def _batches(self, rows: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Segments (s, keys), a batch at a time, and how many samples there are in each, (s,)."""
+        """Yield segments (s, keys) in batches, with the number of samples in each, (s,)."""
         counts = self._counts(rows)
         bounds = math.prod(self.recording.poses.shape[:-1]) * np.append(0, np.cumsum(counts))
         for some, _ in blocks(bounds, BATCH_POSES):
             yield rows[some], counts[some]
 
     def _counts(self, rows: np.ndarray) -> np.ndarray:
-        """How many samples count in each of some segments (s, keys), none where there are no keys, (s,)."""
+        """Return how many samples count in each segment (s, keys), zero if it lacks a key: (s,)."""
         first, second = rows[:, self.reach], rows[:, self.reach + 1]
         return np.where((first >= 0) & (second >= 0), second - first - self._first, 0)
 
     def _errors(self, rows: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return samples (n,) and their errors (n,) in segments (s, keys) with so many of them in each, (s,)."""
+        """Return samples (n,) and their errors (n,) in segments (s, keys), given the number of samples in each (s,)."""
         recording, before = self.recording, self.reach
         if self._spline is not None:
             samples, errors = self._spline.errors(rows, counts)
@@ -191,12 +193,12 @@ class Costs:
 
 
 def _at(numbers: np.ndarray, samples: np.ndarray) -> np.ndarray:
-    """Return the number of each of some samples (m,), or the one that all have."""
+    """Return the numbers at some samples (m,), or the one number that holds for all."""
     return numbers[samples] if numbers.ndim else numbers
 
 
 def _with_ends(recording: SampleTracks, rows: np.ndarray, reach: int) -> tuple[np.ndarray, Poses]:
-    """Return times (s, keys) and poses (..., s, keys) of samples; beyond them the motion of the ends goes on.
+    """Return times (s, keys) and poses (..., s, keys) of samples; beyond the ends, the motion there is continued.
 
     Blender's curves come to rest there.
     """

@@ -1,15 +1,15 @@
-"""The shortest way through recordings, key by key: few keys, put together from what several searches have found.
+"""Shortest paths through a recording, key by key: combines the keys that several searches found into fewer.
 
-Of two good sets of keys each may be better than the other in places. The candidates are the samples of all of them and
-those next to them; every segment that joins two and keeps to the tolerance is a link, and the fewest links from the
-first sample to the last are found by dynamic programming. Where a segment depends on its two keys alone that is exact
-for these candidates. Where it depends on one key more on either side, a link is made of four keys; segments that are
-far from the tolerance with neighbours as far away as they are long are left out. Of links that are off by less and less
-the same tells how small the largest error of so many keys can be.
+Each of two good sets of keys may be better than the other in places. The candidates are the samples of all sets and
+those next to them. Every segment that joins two candidates within the tolerance is a link, and dynamic programming
+finds the fewest links from the first sample to the last. Where a segment depends on its two keys alone, the result is
+exact for these candidates. Where it depends on one more key on either side, a link consists of four keys, and segments
+that are far from the tolerance when their neighbours are as far away as they are long are left out. Links with smaller
+and smaller errors tell in the same way how small the largest error of a number of keys can be.
 
-Where the mean square of the errors counts, no link is good enough or too bad by itself. There a key has a price, and
-the way is the cheapest, errors and keys together: the highest price at which the errors keep to the tolerance leaves
-the fewest keys (Lagrange's multiplier).
+For the mean square of the errors, no link is good enough or too bad by itself. There a key has a price, and the
+cheapest path counts errors and keys together. The highest price at which the errors are within the tolerance leaves the
+fewest keys (Lagrange's multiplier).
 
 Source: dynamic programming over the samples of a recording as in Roberts, Lewis and Anjyo, "Optimal and interactive
 keyframe selection for motion capture", 2019.
@@ -25,54 +25,55 @@ import numpy as np
 from .key_costs import Costs
 
 LIVE_ERROR_PER_TOLERANCE = 1.5
-"""Tolerances that a segment may be off by, for it or a longer one to be looked at further."""
+"""Error in tolerances up to which a segment is kept where it depends on more than two keys. Longer segments from its
+first key are tried up to the square of this."""
 
 CANDIDATE_WIDTHS_BY_REACH = {0: (3, 1), 1: (1, 0)}
-"""By how many samples candidates may be beside keys, by the reach of the mode: as many as the effort allows."""
+"""How many samples next to keys are candidates, by the reach of the mode: the first width that the effort allows."""
 
 MAX_LOOKS_PER_SAMPLE = 100
-"""Times that every sample may be looked at, on average."""
+"""How many times each sample may be evaluated, on average."""
 
 MAX_PAIR_LOOKS_PER_SAMPLE = 200
-"""The same for pairs of candidates, where a segment depends on more keys than its two: more finds no fewer keys."""
+"""The same for pairs of candidates if a segment depends on more than its two keys; more does not find fewer keys."""
 
 BUDGET_WIDTH_BY_REACH = {0: 2, 1: 0}
-"""The same for keys of a budget, whatever the effort."""
+"""The width for keys within a budget, for any effort."""
 
 LIVE_ERROR_PER_LEAST = 1.2
-"""How many times the least error so far a segment may be off by for a longer one to be looked at, for these."""
+"""Longer segments are tried up to this many times the least error so far, for keys within a budget."""
 
 MAX_BUDGET_LOOKS_PER_SAMPLE = 300
-"""Times that every sample may be looked at, on average, for these."""
+"""How many times each sample may be evaluated, on average, for keys within a budget."""
 
 BEST_KEYS_KEPT = 4
-"""Of the best keys, where all that were found have too many links for that."""
+"""How many of the best sets of keys are combined, if all sets have too many links."""
 
 MAX_LINK_ERROR_PER_TOLERANCE = 1.0 + 1e-12
-"""Tolerances that a link may be off by: those of the keys that were found are among them, whatever the rounding."""
+"""Largest error of a link, in tolerances. It allows for rounding, so the links of known keys are always included."""
 
 BATCH_LENGTHS = 8
-"""Lengths of segments that are looked at in one go, though that of some would be enough, where a pose costs little."""
+"""Lengths of segments evaluated at a time where a pose costs little, even if some would be enough."""
 
 MAX_SEGMENT_COST_KEYS = 3.0
-"""Prices of a key that a segment may cost: beyond that one more key is worth it."""
+"""Largest cost of a segment, in prices of a key: beyond that one more key is worth it."""
 
 MAX_PRICE_RATIO = 8.0
-"""How many times as high, or as low, the price may be as it is first thought to be."""
+"""Largest factor between the price and its first estimate, in either direction."""
 
 PRICE_STEPS = 10
-"""Of bisection for the price."""
+"""Steps of bisecting the price."""
 
 
 def linked_keys(costs: Costs, result: list[np.ndarray]) -> np.ndarray:
-    """Return the fewest keys that candidates allow, or the fewest that were found; at all costs that are too high.
+    """Return the fewest keys that candidates allow, or the smallest set of `result` if that takes too long.
 
     Parameters
     ----------
     costs : Costs
         Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
     result : list of array of int
-        Keys that keep to the tolerance, each from the first sample to the last.
+        Sets of keys within the tolerance, each from the first sample to the last.
     """
     for width in CANDIDATE_WIDTHS_BY_REACH[costs.reach]:
         candidates = beside(costs, result, width)
@@ -86,23 +87,23 @@ def linked_keys(costs: Costs, result: list[np.ndarray]) -> np.ndarray:
         if links is not None:
             _, peak = costs.of(links)
             links = links[peak <= MAX_LINK_ERROR_PER_TOLERANCE]
-            keys = _Ways(links, candidates).shortest()
+            keys = _Paths(links, candidates).shortest()
             assert keys is not None  # what was found is a way
             return keys
     return min(result, key=len)
 
 
 def traded_keys(costs: Costs, result: list[np.ndarray], *, budget: int | None = None) -> np.ndarray:
-    """Return the fewest keys that prices allow, or the first that were found; at all costs that are too high.
+    """Return the fewest keys found by varying the price of a key, or the first of `result` if that takes too long.
 
-    With a budget, those of them that cost least, as many as it at most.
+    With a budget, return the keys within it that have the lowest cost.
 
     Parameters
     ----------
     costs : Costs
         Of one track, for the mean square, under a mode that reaches no further than one key beyond a segment.
     result : list of array of int
-        Keys from the first sample to the last: some that keep to the tolerance, and then more and fewer.
+        Sets of keys from the first sample to the last: one within the tolerance, then larger and smaller ones.
     budget : int, optional
         The most keys, instead of a tolerance.
     """
@@ -116,7 +117,7 @@ def traded_keys(costs: Costs, result: list[np.ndarray], *, budget: int | None = 
     links = _links(costs, candidates, result, MAX_SEGMENT_COST_KEYS * price, MAX_SEGMENT_COST_KEYS**2 * price)
     if links is None:
         return best
-    (cost, _), ways = costs.of(links), _Ways(links, candidates)
+    (cost, _), ways = costs.of(links), _Paths(links, candidates)
     low, high = -math.log(MAX_PRICE_RATIO), math.log(MAX_PRICE_RATIO)
     for _ in range(PRICE_STEPS):
         middle = 0.5 * (low + high)
@@ -125,7 +126,7 @@ def traded_keys(costs: Costs, result: list[np.ndarray], *, budget: int | None = 
         total = costs.total(keys)
         worth = (len(keys), total) if budget is None else (total, len(keys))
         fits = total <= allowed if budget is None else len(keys) <= budget
-        # What does not fit has keys that are too dear, or with a budget too cheap.
+        # If the result does not fit, keys are too dear, or with a budget too cheap.
         low, high = (middle, high) if fits == (budget is None) else (low, middle)
         if fits and worth < least:
             best, least = keys, worth
@@ -133,14 +134,14 @@ def traded_keys(costs: Costs, result: list[np.ndarray], *, budget: int | None = 
 
 
 def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarray:
-    """Return keys within a budget with the smallest largest error that candidates allow, or the best that were found.
+    """Return the keys within a budget with the smallest largest error that candidates allow, or the best of `result`.
 
     Parameters
     ----------
     costs : Costs
         Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
     result : list of array of int
-        Keys within the budget, each from the first sample to the last.
+        Sets of keys, each from the first sample to the last, with at least one within the budget.
     budget : int
     """
     within = sorted((keys for keys in result if len(keys) <= budget), key=costs.peak)
@@ -155,7 +156,7 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
     _, peak = costs.of(links)
     better = peak < high
     links, peak = links[better], peak[better]
-    ways, levels = _Ways(links, candidates), _rising(peak)
+    ways, levels = _Paths(links, candidates), _sorted_distinct(peak)
     low, high = 0, len(levels)
     while low < high:
         middle = (low + high) // 2
@@ -168,9 +169,9 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
 
 
 def beside(costs: Costs, result: list[np.ndarray], width: int) -> np.ndarray:
-    """Return the samples that are keys in what was found, and so many on either side of each."""
+    """Return the samples that are keys in any set, and this many samples on either side of each."""
     beside = np.concatenate(result)[:, None] + np.arange(-width, width + 1)
-    return _rising(np.clip(beside, 0, len(costs.recording.times) - 1).ravel())
+    return _sorted_distinct(np.clip(beside, 0, len(costs.recording.times) - 1).ravel())
 
 
 def _links(
@@ -181,10 +182,10 @@ def _links(
     alive: float,
     effort: float = MAX_LOOKS_PER_SAMPLE,
 ) -> np.ndarray | None:
-    """Return the links that candidates allow: samples, -1 beyond the ends, (l, keys of a segment); None for many.
+    """Return the links that candidates allow: samples, -1 beyond the ends, (l, keys of a segment); None if too many.
 
-    Segments whose peak, or for the mean square whose cost, is above `good` are left out, and those above `alive` are
-    made no longer; with neighbours as far away as they are long.
+    Segments whose peak (or cost, for the mean square) is above `good` are left out, and those above `alive` are not
+    made longer. For this their neighbours are as far away as they are long.
     """
     pairs = _pairs(costs, candidates, result, good, alive)
     if pairs is None:
@@ -192,7 +193,7 @@ def _links(
     if costs.reach == 0:
         return candidates[pairs]
     before, after = _neighbours(pairs, len(candidates))
-    # Links are many times the pairs: they are counted before any is made.
+    # There are many more links than pairs: they are counted before any is made.
     poses = (before * after * (candidates[pairs[:, 1]] - candidates[pairs[:, 0]] - 1)).sum()
     if poses > effort * len(costs.recording.times):
         return None
@@ -203,7 +204,7 @@ def _links(
 def _pairs(
     costs: Costs, candidates: np.ndarray, result: list[np.ndarray], good: float, alive: float
 ) -> np.ndarray | None:
-    """Return the candidates that a segment may join, (p, 2), by the first and then the second; None for many."""
+    """Return pairs of candidates that a segment may join, (p, 2), sorted; None if they take too long."""
     last, reach = len(candidates) - 1, costs.reach
     left = MAX_PAIR_LOOKS_PER_SAMPLE * len(costs.recording.times) * costs.recording.poses_each if reach else math.inf
     pairs = [np.searchsorted(candidates, np.stack((keys[:-1], keys[1:]), axis=1)) for keys in result]
@@ -211,7 +212,7 @@ def _pairs(
     while len(first):
         gaps = gap + np.arange(BATCH_LENGTHS if costs.recording.poses_each == 1.0 else 1)
         second = first[:, None] + gaps
-        # A segment at the end has no neighbour there; all others have one, if not as far away.
+        # A segment at the end has no neighbour there. All others have one, even if it is not as far away.
         numbers = first[:, None, None] + gaps[:, None] * np.arange(-reach, 2 + reach)
         windows = candidates[np.clip(numbers, 0, last)]
         windows[first == 0, :, :reach] = -1
@@ -229,23 +230,23 @@ def _pairs(
         first, gap = first[lives[:, -1]], gap + len(gaps)
         first = first[first + gap <= last]
     numbers = np.concatenate(pairs) @ (last + 1, 1)
-    return np.stack(np.divmod(_rising(numbers), last + 1), axis=1)
+    return np.stack(np.divmod(_sorted_distinct(numbers), last + 1), axis=1)
 
 
-def _rising(numbers: np.ndarray) -> np.ndarray:
-    """Each of some numbers once, rising. Quicker than `np.unique` where most of them differ."""
+def _sorted_distinct(numbers: np.ndarray) -> np.ndarray:
+    """Return the distinct numbers, sorted. Faster than `np.unique` if most of them differ."""
     numbers = np.sort(numbers)
     return numbers[np.append(True, numbers[1:] != numbers[:-1])[: len(numbers)]]
 
 
 def _neighbours(pairs: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """How many pairs end where each begins, and begin where it ends: 1 beyond the ends. Both (p,)."""
+    """Return how many pairs end where each begins, and begin where it ends, 1 beyond the ends. Both (p,)."""
     begun, ended = (np.bincount(column, minlength=count) for column in pairs.T)
     return np.maximum(ended[pairs[:, 0]], pairs[:, 0] == 0), np.maximum(begun[pairs[:, 1]], pairs[:, 1] == count - 1)
 
 
 def _with_neighbours(pairs: np.ndarray, count: int) -> np.ndarray:
-    """Every pair with all pairs that end where it begins and begin where it ends: (l, 4), -1 beyond the ends."""
+    """Return every pair with all pairs that end where it begins and begin where it ends: (l, 4), -1 beyond the ends."""
     by_end = pairs[np.argsort(pairs[:, 1], kind="stable")]
     begins, ends = (np.searchsorted(column, np.arange(count + 1)) for column in (pairs[:, 0], by_end[:, 1]))
     before, after = _neighbours(pairs, count)
@@ -265,15 +266,15 @@ def _with_neighbours(pairs: np.ndarray, count: int) -> np.ndarray:
     )
 
 
-class _Ways:
-    """Ways over links (l, keys) from the first candidate to the last: successive links share all keys but one."""
+class _Paths:
+    """Paths over links (l, keys) from the first candidate to the last: successive links share all keys but one."""
 
     def __init__(self, links: np.ndarray, candidates: np.ndarray) -> None:
         second = links.shape[1] // 2
         self._order = np.argsort(links[:, second - 1], kind="stable")
         links, self._end = links[self._order], int(candidates[-1])
         self._begins = links[:, second - 1]
-        # What a link shares with the one before it and the one after it, as numbers: 0 at the start, 1 at the end.
+        # The keys that a link shares with the link before and the link after, as numbers: 0 at the start, 1 at the end.
         shared = np.zeros((2, len(links)), dtype=np.int64)
         for column in range(links.shape[1] - 1):
             shared = shared * (self._end + 2) + links[:, column : column + 2].T + 1
@@ -283,9 +284,9 @@ class _Ways:
         self._from, self._to, self._count = *numbers[:-2].reshape(2, -1), len(result)
 
     def shortest(self, lengths: np.ndarray | None = None, among: np.ndarray | None = None) -> np.ndarray | None:
-        """All samples on the way that is shortest by the length of each link (l,), or has the fewest of them.
+        """Return all samples on the path with the smallest sum of `lengths` (l,), or by default with the fewest links.
 
-        Only over links that are `among` them (l,), where that is given. None where they lead nowhere.
+        Only links `among` (l,) are used, if given. None if no path reaches the end.
         """
         taken = slice(None) if among is None else among[self._order]
         begins, ends = self._from[taken].tolist(), self._to[taken].tolist()

@@ -1,4 +1,4 @@
-"""What is known of segments: found again by the samples that their keys are."""
+"""A cache of results by segment, where the samples of a segment's keys identify it."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
-"""Spreads segments over the places that they are remembered in: 2^64 over the golden ratio."""
+"""Spreads segments over the slots of the cache: 2^64 over the golden ratio."""
 
 
 class Memory:
-    """Numbers of segments, each in a place that its samples make; another one for that place replaces it."""
+    """Results of segments, each in a slot hashed from its samples; a later segment for the same slot replaces it."""
 
     def __init__(self, most: int, columns: int) -> None:
         bits = max(1, (most - 1).bit_length())
@@ -20,10 +20,11 @@ class Memory:
         self._last = np.empty(2**bits, dtype=np.int64)
 
     def find(self, rows: np.ndarray, samples: int, work_out: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Return what there is for segments (s, keys), shape (s, columns), worked out where it is not remembered.
+        """Return the results for segments (s, keys), shape (s, columns), worked out if they are not in the cache.
 
-        `samples` is how many there are: a segment is the number that has its samples for digits. Where that has more
-        than 64 bits, another one with the same last bits is none that anybody will ever see.
+        `samples` is the number of samples in the recording. It makes a segment one number, with samples for digits. If
+        this takes more than 64 bits, segments with the same last bits are mistaken for one another, which never happens
+        in practice.
         """
         numbers = np.zeros(len(rows), dtype=np.uint64)
         for column in range(rows.shape[1]):
@@ -34,7 +35,7 @@ class Memory:
         new = np.flatnonzero(self._numbers.take(places) != numbers)
         if len(new):
             numbers, places, order = numbers[new], places[new], np.arange(len(new))
-            # Of those for one place the last stays: others are worked out only where they are not the same.
+            # The last segment for a slot stays in it. Others for that slot are worked out only if they differ from it.
             self._last[places] = order
             last = self._last[places]
             differs = numbers != numbers[last]

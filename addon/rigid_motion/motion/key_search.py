@@ -1,13 +1,13 @@
-"""The search for few keys among the samples of recordings.
+"""Key search: finds few keys among the samples of recordings, within a tolerance.
 
-Keys are taken out as long as the motion stays near enough to the recording, those first that matter least, many at a
-time where they do not influence the same segments; then the rest are moved along the recording to where the error is
-smallest, which lets more of them go, and so on. A key changes the segments around it alone, so that all keys can be
-tried at once, and a key is tried again only after one near it has changed: the work grows with the length of the
+Keys are removed as long as the motion stays near enough to the recording: those that matter least first, and many at a
+time where they do not influence the same segments. The remaining keys are then moved along the recording to where the
+error is smallest, which lets more keys be removed, and so on. A key changes only the segments around it, so all keys
+can be tried at once, and a key is tried again only after one near it has changed. The work grows with the length of the
 recordings and not with its square.
 
-Source: keys are taken out as knots are from splines in Lyche and Mørken, "Knot removal for parametric B-spline curves
-and surfaces", 1987.
+Source: keys are removed like knots from splines in Lyche and Mørken, "Knot removal for parametric B-spline curves and
+surfaces", 1987.
 """
 
 from __future__ import annotations
@@ -23,45 +23,45 @@ from .key_costs import Costs, Found, SampleTracks
 from .key_links import linked_keys, traded_keys
 
 PEAK_POWER = 8
-"""The power of errors whose sum stands for the largest of them: one of two."""
+"""Power of errors whose sum stands for the largest of them; a power of two."""
 
 MOVE_STEPS_SAMPLES = {PEAK_POWER: np.array((1, -1, 3, -3)), 2: np.array((1, -1, 2, -2, 4, -4, 8, -8))}
-"""By how many samples keys are moved, on trial, for the largest error and for its mean square."""
+"""Steps in samples by which moving a key is tried, for the largest error and for the mean square."""
 
 MAX_SEARCH_ROUNDS = 12
-"""Of moving keys and taking out more of them, at most."""
+"""Rounds of moving keys and removing more of them, at most."""
 
 NEIGHBOUR_OFFSETS = np.arange(-1, 2)
-"""The keys that are moved anew after one of them has changed."""
+"""Offsets of the keys that are tried again after a key has changed."""
 
 MOVES_PER_ROUND = 4
 """How often keys are moved in a round."""
 
 MIN_MOVE_GAIN_RATIO = 1e-4
-"""The least that moving a key has to gain, as a part of the mean cost of a segment."""
+"""Smallest gain of moving a key, as a fraction of the mean cost of a segment."""
 
 LOOSER_TOLERANCE_FACTORS = (1.6, 1.3, 1.15)
-"""How many times the tolerance keys may pass while more of them are taken out, before some are put back."""
+"""Multiples of the tolerance within which more keys are removed, before some are put back."""
 
 START_TOLERANCE_RATIOS = {PEAK_POWER: 0.5, 2: 0.25}
-"""Of the tolerance: a stretch that is off by this at most begins with a key in its middle."""
+"""A stretch whose error is at most this fraction of the tolerance starts with a single key in its middle."""
 
 OTHER_TOLERANCE_FACTORS = (0.9, 1.1, 1.25)
-"""Of how many times the tolerance keys are found, whose places may be better for the mean square, too."""
+"""Multiples of the tolerance for which keys are searched as well: their places may be better for the mean square."""
 
 MIN_POSTPONED_POSES = 2**13
-"""Poses to look at in one go, that are worth being put off for what may make some of them needless."""
+"""From this many poses on, evaluation is split in two, because the first part may make some of the second needless."""
 
 MAX_FULL_START_SAMPLES = 2**13
-"""Samples, to which every one of them is a key at first: it takes longer, and finds fewer keys."""
+"""Up to this many samples, each is a key at first: this takes longer, and finds fewer keys."""
 
 MAX_KEY_SWEEPS = 8
-"""Of all keys, for those to be changed at once."""
+"""Sweeps over all keys to pick those that are changed together."""
 
 
 @dataclass(eq=False)
 class KeySelection:
-    """Keys among the samples, and what lies between them."""
+    """Keys among the samples, with the costs and peaks between them."""
 
     indices: np.ndarray
     """Samples, shape (k,)."""
@@ -70,10 +70,10 @@ class KeySelection:
     """The number of the first key of each key's track, shape (k,)."""
 
     last: np.ndarray
-    """That of the last, shape (k,)."""
+    """The number of the last one, shape (k,)."""
 
     cost: np.ndarray
-    """The sum of powers of the errors from each key to the next, shape (k,), zero behind a track's last."""
+    """The sum of powers of the errors from each key to the next, shape (k,), zero after the last key of a track."""
 
     peak: np.ndarray
     """The largest error there, shape (k,)."""
@@ -83,41 +83,41 @@ class KeySelection:
 
     @property
     def inner(self) -> np.ndarray:
-        """The numbers of those that can be moved and removed."""
+        """The numbers of the keys that can be moved and removed."""
         numbers = np.arange(len(self.indices))
         return numbers[(numbers > self.first) & (numbers < self.last)]
 
     def around(self, numbers: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the keys in these columns from each of some keys, (c, m), and whether they belong to its track."""
+        """Return the keys in these columns relative to each key, (c, m), and whether they belong to its track."""
         result = numbers[:, None] + columns
         inside = (result >= self.first[numbers][:, None]) & (result <= self.last[numbers][:, None])
         return np.clip(result, 0, len(self.indices) - 1), inside
 
     def windows(self, numbers: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Return samples of the keys in these columns from each of some keys, -1 where the track has none, (c, m)."""
+        """Return the samples of the keys in these columns relative to each key, -1 where its track has none, (c, m)."""
         result, inside = self.around(numbers, columns)
         return np.where(inside, self.indices[result], -1)
 
 
 class KeySearch:
-    """The search for keys of recordings under one mode: for the largest error, or with `rms` for its mean square."""
+    """The search for keys of recordings under one mode: for the largest error, or with `rms` for the mean square."""
 
     def __init__(self, recording: SampleTracks, *, rms: bool = False) -> None:
         self.recording, self.power = recording, 2 if rms else PEAK_POWER
         self.costs = Costs(recording, self.power)
         self.reach = self.costs.reach
         self.spacing = 2 + 2 * self.reach
-        """Keys this far from one another, or further, can be tried without regard to each other."""
+        """Keys at least this far apart, counted in keys, can be tried independently."""
 
     def within(self, tries: int) -> np.ndarray:
-        """Few samples that, as keys, keep to the tolerance."""
-        best = self._first(1.0)
+        """Return few samples that, as keys, are within the tolerance."""
+        best = self._first_result(1.0)
         if self.power == 2:
             return self._traded(best, tries).indices
         result = [best.indices]
         for looser in LOOSER_TOLERANCE_FACTORS[:tries]:
             keys = self.loosened(best, 1.0, looser)
-            best = self._better(best, keys)
+            best = self._smaller_sets(best, keys)
             result.append(keys.indices)
         if self.is_linkable and tries:
             linked = linked_keys(self.costs, result)
@@ -125,14 +125,14 @@ class KeySearch:
                 best = self.refined(self.measured(linked))
         return best.indices
 
-    def _first(self, tolerance: float) -> KeySelection:
-        """Return what is left of keys that are more than needed."""
+    def _first_result(self, tolerance: float) -> KeySelection:
+        """Start with more keys than needed, and return those that are left."""
         return self.refined(self.thinned(self.started(tolerance), tolerance), tolerance)
 
     def started(self, tolerance: float) -> KeySelection:
-        """Keys to begin with: two for a track where that is enough, else at the ends of stretches of 2, 4, 8 samples...
+        """Return keys to start from: two for a track if they suffice, else the ends of stretches of 2, 4, 8 samples...
 
-        Stretches double where their errors are a part of the tolerance, and those of both halves were.
+        Stretches double if their errors are within a fraction of the tolerance, and those of both halves were.
         """
         recording, count, reach = self.recording, len(self.recording.times), self.reach
         ends, ending = np.zeros(count, dtype=bool), np.full((len(recording.starts), reach), -1)
@@ -146,7 +146,7 @@ class KeySearch:
         last = np.repeat(recording.ends, lengths)
         places, half = np.arange(count) - np.repeat(recording.starts, lengths), 1
         while good.any():
-            keys = self._at(np.flatnonzero((places % (2 * half) == 0) | ends))
+            keys = self._unmeasured(np.flatnonzero((places % (2 * half) == 0) | ends))
             numbers = np.flatnonzero(~ends[keys.indices])
             begins = keys.indices[numbers]
             middles = np.minimum(begins + half, last[begins])
@@ -156,7 +156,7 @@ class KeySearch:
             fine = (peak <= START_TOLERANCE_RATIOS[self.power] * tolerance) & ~ends[middles]
             good[:] = False
             good[begins[fine]] = True
-            # Half as long as is good enough, for the search to have a choice.
+            # Stretches half as long as possible leave the search a choice.
             for quarter in (begins[fine], middles[fine]) if half > 1 else ():
                 is_key[np.minimum(quarter + half // 2, last[quarter])] = False
             is_key[recording.ends] = True
@@ -165,27 +165,29 @@ class KeySearch:
         return self.densified(keys, tolerance) if self.power != 2 else keys
 
     def _traded(self, best: KeySelection, tries: int) -> KeySelection:
-        """Keys put together from those of several tolerances, where they are fewer than the best of this one."""
+        """Return keys combined from searches for several tolerances, if they are fewer than the best for this one."""
         if not (self.is_linkable and tries):
             return best
-        result = [best.indices, *(self._first(other).indices for other in OTHER_TOLERANCE_FACTORS[:tries])]
+        result = [best.indices, *(self._first_result(other).indices for other in OTHER_TOLERANCE_FACTORS[:tries])]
         traded = traded_keys(self.costs, result)
         return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
 
     @property
     def is_linkable(self) -> bool:
-        """Whether keys of several searches can be put together."""
+        """Whether the keys of several searches can be combined."""
         return self.reach <= 1 and len(self.recording.starts) == 1
 
     def measured(self, indices: np.ndarray) -> KeySelection:
-        """Keys at these samples, rising, the outermost of each track among them, and everything between them."""
-        keys = self._at(indices)
+        """Return keys at these rising samples, with their costs and peaks. The outermost samples of each track are
+        included.
+        """
+        keys = self._unmeasured(indices)
         numbers, segments = self.segments(keys)
         keys.cost[numbers], keys.peak[numbers] = self.costs.of(segments)
         return keys
 
-    def _at(self, indices: np.ndarray) -> KeySelection:
-        """Return the same, and nothing known of what is between them."""
+    def _unmeasured(self, indices: np.ndarray) -> KeySelection:
+        """Return keys at these samples, without costs and peaks."""
         recording = self.recording
         first, end = np.searchsorted(indices, recording.starts), np.searchsorted(indices, recording.ends)
         counts = end - first + 1
@@ -199,12 +201,14 @@ class KeySearch:
         )
 
     def segments(self, keys: KeySelection) -> tuple[np.ndarray, np.ndarray]:
-        """Return numbers of the keys that segments begin at, (s,), and the samples of all keys with a say in each."""
+        """Return the numbers of the keys where segments begin, (s,), and the samples of all keys that
+        influence each.
+        """
         numbers = np.flatnonzero(np.arange(len(keys.indices)) < keys.last)
         return numbers, keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
 
     def densified(self, keys: KeySelection, tolerance: float) -> KeySelection:
-        """Keys with more of them where the motion is off, each where it is so most, until it keeps to the tolerance."""
+        """Return keys with more added where each segment's error is largest, until all are within the tolerance."""
         while keys.peak.max() > tolerance:
             errors = self.costs.errors(self.segments(keys)[1])
             of_segments = np.maximum.reduceat(errors, keys.indices)
@@ -212,18 +216,18 @@ class KeySearch:
             worst = (errors == of_segments.repeat(counts)) & (errors > tolerance)
             more = np.union1d(keys.indices, np.flatnonzero(worst))
             if len(more) == len(keys.indices):
-                break  # It is off by no more than rounding.
+                break  # The rest is rounding.
             keys = self.measured(more)
         return keys
 
     def loosened(self, keys: KeySelection, tolerance: float, looser: float) -> KeySelection:
-        """Keys that keep to a tolerance, put back between some that are too few, which find better places."""
+        """Return keys within a tolerance, made by putting keys back between too few, which find better places."""
         looser *= tolerance
         fewer = self.moved(self.thinned(self.measured(keys.indices), looser), looser)
         return self.refined(self.densified(fewer, tolerance), tolerance)
 
-    def _better(self, best: KeySelection, other: KeySelection) -> KeySelection:
-        """Of each track the keys that are fewer."""
+    def _smaller_sets(self, best: KeySelection, other: KeySelection) -> KeySelection:
+        """Return for each track the smaller set of keys."""
         chosen = []
         for start, end in zip(self.recording.starts, self.recording.ends, strict=True):
             rows = [slice(*np.searchsorted(keys.indices, (start, end + 1))) for keys in (best, other)]
@@ -233,7 +237,7 @@ class KeySearch:
         return self.measured(np.concatenate(chosen))
 
     def refined(self, keys: KeySelection, tolerance: float = 1.0) -> KeySelection:
-        """Keys moved and thinned until none can be removed."""
+        """Return keys moved and thinned until none can be removed."""
         for _ in range(MAX_SEARCH_ROUNDS):
             before = len(keys.indices)
             keys = self.thinned(self.moved(keys, tolerance), tolerance)
@@ -242,7 +246,7 @@ class KeySearch:
         return keys
 
     def thinned(self, keys: KeySelection, tolerance: float, fewest: int = 2) -> KeySelection:
-        """Keys without all those that can be removed, down to the fewest that are wanted."""
+        """Return keys without those that can be removed, but no fewer than `fewest`."""
         reach = self.reach
         seen = np.zeros(len(keys.indices), dtype=bool)
         cost, peak = np.zeros((2, len(keys.indices), 1 + 2 * reach))
@@ -270,14 +274,14 @@ class KeySearch:
         return keys
 
     def without(self, keys: KeySelection, numbers: np.ndarray) -> np.ndarray:
-        """Return samples of the keys around each of some keys, without it, that have a say where it has, (c, m)."""
+        """Return the samples of the keys around each key that share a segment with it, without that key, (c, m)."""
         columns = np.arange(-1 - 2 * self.reach, 2 + 2 * self.reach)
         return keys.windows(numbers, columns[columns != 0])
 
     def _removable(
         self, rise: np.ndarray, peak: np.ndarray, keys: KeySelection, tolerance: float, most: int
     ) -> np.ndarray:
-        """Which of the inner keys go next: those whose removal raises the cost least, far enough from one another."""
+        """Return which inner keys to remove next: those that raise the cost least, far enough from one another."""
         order = np.argsort(rise, kind="stable")
         order = order[: max(1, len(order) // 4)] if self.power == 2 or not math.isfinite(tolerance) else order
         if self.power != 2:
@@ -290,8 +294,8 @@ class KeySearch:
         return picked
 
     def _remove(self, keys: KeySelection, picked: np.ndarray, cost: np.ndarray, peak: np.ndarray) -> None:
-        """Remove these keys, and set the costs and peaks of the segments that take their place."""
-        # The segment from the key before takes the place of two.
+        """Remove the picked keys, and set the costs and peaks of the segments that replace theirs."""
+        # The segment from the key before replaces two.
         columns = np.concatenate((np.arange(-1 - self.reach, 0), np.arange(1, 1 + self.reach)))
         segments, inside = keys.around(picked, columns)
         keys.cost[segments[inside]], keys.peak[segments[inside]] = cost[picked][inside], peak[picked][inside]
@@ -306,7 +310,7 @@ class KeySearch:
             setattr(keys, name, getattr(keys, name)[left])
 
     def moved(self, keys: KeySelection, tolerance: float) -> KeySelection:
-        """As many keys, moved along the recording as long as that lowers the cost by much."""
+        """Return the same number of keys, moved along the recording as long as that lowers the cost by much."""
         reach, steps = self.reach, MOVE_STEPS_SAMPLES[self.power]
         columns, of_segments = np.arange(-1 - 2 * reach, 2 + 2 * reach), np.arange(-1 - reach, 1 + reach)
         for _ in range(MOVES_PER_ROUND):
@@ -346,20 +350,23 @@ class KeySearch:
         return keys
 
     def _rises(self, cost: np.ndarray, peak: np.ndarray, around: np.ndarray, tolerance: float) -> np.ndarray:
-        """By how much the cost around keys rises from what it was (c,) to these of segments (c, s), where they may."""
+        """Return how much the cost around keys rises from `around` (c,) to that of segments (c, s); infinite if
+        refused.
+        """
         refused = (self.power != 2) & (peak.max(axis=1) > tolerance)
         return np.where(refused, math.inf, cost.sum(axis=1) - around)
 
     def _cost_around(self, keys: KeySelection, numbers: np.ndarray) -> np.ndarray:
-        """Return the sum over the segments that each key influences."""
+        """Return the sum of costs over the segments that each key influences."""
         segments, inside = keys.around(numbers, np.arange(-1 - self.reach, 1 + self.reach))
         return np.where(inside, keys.cost[segments], 0.0).sum(axis=1)
 
     def evaluate(self, windows: np.ndarray, promising: Callable[..., np.ndarray] | None = None) -> Found:
-        """Costs and peaks, each (c, s), of all segments between keys of windows (c, m) that have all their neighbours.
+        """Return costs and peaks, each (c, s), of all segments of windows of keys (c, m) that have all their
+        neighbours.
 
-        Where there is much to do, the segments half-way through windows come first. The others are left at zero where
-        `promising` tells, from what these are, that a window will not be taken.
+        If there is much to do, the segments half-way through windows come first. The others stay zero where
+        `promising`, given those results, rejects a window.
         """
         rows = np.lib.stride_tricks.sliding_window_view(windows, self.costs.keys, axis=1)
         last = rows.shape[1] - 1
@@ -374,11 +381,11 @@ class KeySearch:
 
 
 def spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
-    """Of the numbers below `count`, in the order of their worth, those that are `distance` from any better one."""
+    """Return those numbers below `count`, ordered by worth, that are at least `distance` from any better one."""
     rank = np.full(count + 2 * distance, len(order))
     rank[order + distance] = np.arange(len(order))
     picked: list[np.ndarray] = []
-    # All at once that are the best in their neighbourhood, and again with what is left.
+    # Pick all numbers that are the best in their neighbourhood, then repeat with the rest.
     for _ in range(MAX_KEY_SWEEPS):
         centre = rank[distance - 1 : len(rank) - distance + 1]
         best = functools.reduce(np.minimum, (rank[begin : begin + len(centre)] for begin in range(2 * distance - 1)))
@@ -388,7 +395,7 @@ def spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
         picked.append(chosen - 1)
         near = chosen[:, None] + distance - 1 + np.arange(1 - distance, distance)
         rank[near.ravel()] = len(order)
-    # Where each is better than the next, as at rest where all are worth the same, one after the other is quicker.
+    # If each number is better than the next, as at rest where all are equal, picking one by one is quicker.
     for number in order[rank[order + distance] < len(order)].tolist():
         if rank[number + distance] < len(order):
             picked.append(np.array([number]))

@@ -1,8 +1,8 @@
-"""What splines of motors are off by between keys, for the search: with little to do for each segment and sample.
+"""Errors of motor splines between keys, for the key search: with little work for each segment and sample.
 
-A segment of `motor_spline` is the screw from key to key, bent by what the two keys beside it ask for (`curves`). Seen
-from a sample of the recording, the pose on the screw depends on the two keys of the segment alone: it is worked out
-once, and remembered for all neighbours that these keys are tried with. What is left for each is the bend.
+A segment of `motor_spline` is the screw from key to key, bent by the two neighbouring keys (`curves`). Relative to a
+sample of the recording, the pose on the screw depends only on the two keys of the segment. It is worked out once and
+cached for all neighbours that are tried with these keys. Only the bend is left to compute for each.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from .key_costs import SampleTracks
 
 MAX_REMEMBERED_SAMPLES = 2**18
-"""Samples between two keys at most, so that long recordings do not fill the memory."""
+"""Samples between two keys in the cache at most, so that long recordings do not fill the memory."""
 
 REMEMBERED_EACH = 200
-"""The same for each sample of a shorter recording."""
+"""The same per sample of a shorter recording."""
 
 MAX_KNOWN_PAIRS = 2**14
-"""Pairs of keys at most."""
+"""Pairs of keys in the cache at most."""
 
 
 class SplineErrors:
@@ -36,12 +36,12 @@ class SplineErrors:
 
     def __init__(self, recording: SampleTracks) -> None:
         self._recording, self._times, self._rows = recording, recording.times, recording.truth.rows
-        # Of two keys the twist from one to the other and whether nothing moves there, and then the poses in between.
+        # For two keys: the twist from one to the other and whether nothing moves there, then the poses in between.
         self._blocks = np.empty((7, min(MAX_REMEMBERED_SAMPLES, REMEMBERED_EACH * len(self._times))))
         self._forget()
 
     def errors(self, rows: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return samples (m,) and their errors (m,) in segments (s, 4) with so many of them in each, (s,)."""
+        """Return samples (m,) and their errors (m,) in segments (s, 4), given the number of samples in each (s,)."""
         before, first, second, after = rows.T
         blocks = self._blocks_of(rows[:, 1:3], counts)
         offsets = np.cumsum(counts) - counts
@@ -65,8 +65,8 @@ class SplineErrors:
     def _bends(
         self, before: np.ndarray, first: np.ndarray, second: np.ndarray, after: np.ndarray, own: np.ndarray
     ) -> np.ndarray:
-        """Return what is added to the twists (7, s) at both ends of segments, shape (6, 2, s), as `curves` have it."""
-        # At the ends the motion goes on as it does in the segment.
+        """Return what is added to the twists (7, s) at both ends of segments, shape (6, 2, s), as in `curves`."""
+        # At the ends, the motion of the segment continues.
         starts, stops = before < 0, after < 0
         begins = np.stack((np.where(starts, first, before), np.where(stops, first, second)))
         ends = np.stack((np.where(starts, second, first), np.where(stops, second, after)))
@@ -83,7 +83,9 @@ class SplineErrors:
         return bends
 
     def _between(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return the twists from samples to others (p,), and whether nothing moves there, as for `Segments`: (7, p)."""
+        """Return the twists between pairs of samples (p,), and whether nothing moves there, as `Segments` do:
+        (7, p).
+        """
         begin, end = self._rows.take(first, axis=1), self._rows.take(second, axis=1)
         result = np.zeros((7, len(first)))
         result[:6] = twists.logarithm(*_seen_from(begin, end))
@@ -93,12 +95,12 @@ class SplineErrors:
         return result
 
     def _progress(self, samples: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """How far samples (m,) are from the one key to the other, from 0 to 1."""
+        """Return how far samples (m,) are from one key to the next, from 0 to 1."""
         start = self._times[first]
         return (self._times[samples] - start) / (self._times[second] - start)
 
     def _blocks_of(self, pairs: np.ndarray, counts: np.ndarray) -> np.ndarray:
-        """Return where the blocks of two keys (s, 2) with so many samples between them begin, (s,)."""
+        """Return where the blocks of pairs of keys (s, 2) begin, (s,), given the number of samples between them."""
         needed = int(counts.sum()) + len(pairs)
         if self._used + needed > self._blocks.shape[1]:
             self._forget()
@@ -110,9 +112,9 @@ class SplineErrors:
         self._known, self._used = Memory(MAX_KNOWN_PAIRS, 1), 0
 
     def _work_out(self, pairs: np.ndarray) -> np.ndarray:
-        """Fill the blocks of two keys (p, 2), and return where they begin, (p, 1).
+        """Fill the blocks of pairs of keys (p, 2), and return where they begin, (p, 1).
 
-        A pose is seen from the recording: the turn, and the way in the axes of the body that has been turned.
+        Poses are relative to the recording: the turn, and the displacement in the axes of the turned body.
         """
         first, second = pairs.T
         counts = second - first - 1
@@ -134,12 +136,12 @@ class SplineErrors:
 
 
 def _seen_from(begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the turns (4, m) and ways (3, m) from poses to others (7, m), in the axes of the first."""
+    """Return the turns (4, m) and displacements (3, m) between poses (7, m), in the axes of the first."""
     return _turned_back(begin[3:], end[3:]), _carried_back(begin[3:], end[:3] - begin[:3])
 
 
 def _turned_back(turns: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-    """Return conjugate(turns) quaternions, components first."""
+    """Return conjugate(turns) times quaternions, components first."""
     result = np.empty(quaternions.shape)
     np.einsum("km,km->m", turns, quaternions, out=result[0])
     result[1:] = turns[0] * quaternions[1:]
@@ -149,7 +151,7 @@ def _turned_back(turns: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
 
 
 def _carried_back(turns: np.ndarray, ways: np.ndarray) -> np.ndarray:
-    """Return ways (3, m) in the axes of bodies that have been turned (4, m)."""
+    """Return displacements (3, m) in the axes of turned bodies (4, m)."""
     across = cross(ways, turns[1:])
     across *= 2.0
     result = cross(across, turns[1:])

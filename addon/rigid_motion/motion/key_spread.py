@@ -1,10 +1,10 @@
-"""Keys spread over a recording so that the largest error is as small as so many of them can make it.
+"""Key spreading: distributes a number of keys over a recording so that the largest error is as small as possible.
 
-Two steps take turns. Keys are laid out anew: of all ways over candidates that have few enough keys, the one whose worst
-segment is best is found by dynamic programming, for larger and larger errors until there is a way. Where a segment
-depends on more keys than its two, the others are taken to be as far away as the keys of before are there. Then all keys
-are moved together, each to one of a few samples near it: for these the best is found exactly, with all keys that have
-a say in a segment.
+Two steps take turns. First, keys are laid out anew: of all paths over candidates with few enough keys, dynamic
+programming finds the one whose worst segment is best, for larger and larger errors until there is a path. Where a
+segment depends on more than its two keys, the others are taken to be as far away as the previous keys are there. Then
+all keys are moved together, each to one of a few samples near it. The best choice of these is found exactly, with all
+keys that influence a segment.
 
 Source: dynamic programming over the samples of a recording as in Roberts, Lewis and Anjyo, "Optimal and interactive
 keyframe selection for motion capture", 2019.
@@ -20,46 +20,47 @@ import numpy as np
 from .key_costs import Costs
 
 FIRST_ERROR_RATIO = 0.7
-"""Of the largest error of keys: what the next ones are first asked for, and less where that is easy."""
+"""Error that is first asked of new keys, as a fraction of the largest error of the old ones; less if that is easy."""
 
 MIN_ERROR_RATIO = 1e-6
-"""Of it: no less is asked for, where some keys leave no error at all."""
+"""Smallest error that is asked for, as the same fraction, for keys that leave no error at all."""
 
 RAISED_ERROR_RATIO = 1.15
-"""How many times as large the error may be each time that there is no way with few enough keys."""
+"""Factor by which the error is raised each time that no path has few enough keys."""
 
 STEP_HALVINGS = 3
-"""Of the last step up, by its logarithm."""
+"""Bisections of the last step up, on a logarithmic scale."""
 
 LIVE_ERROR_RATIOS = 1.5, 1.2
-"""Times the error that a segment may be off by, for longer ones from its first key to be looked at.
+"""Multiples of the error up to which longer segments from the same first key are tried.
 
-Where it depends on its two keys alone, and where on more."""
+The first is for segments that depend on their two keys alone, the second for others."""
 
 MAX_SEGMENT_CANDIDATES = 4, 36
-"""The most candidates that a segment may reach over: so many times the mean from key to key, and at least so many."""
+"""Longest segment in candidates: this multiple of the mean from key to key, but at least this number."""
 
 MAX_LOOKS_PER_SAMPLE = 200
-"""Times that every sample may be looked at for segments, on average."""
+"""How many times each sample may be evaluated for segments, on average."""
 
 FULL_REACH_CANDIDATES = 8
-"""Candidates that a segment reaches over, up to which it may reach over any number of them: beyond, steps grow."""
+"""Divisor of a segment's length, in candidates, that gives the step to the next length tried. The step is at
+least one."""
 
 BATCH_LENGTHS = 8
-"""Lengths of segments that are looked at in one go."""
+"""Lengths of segments evaluated at a time."""
 
 AT_ONCE = 2**13
-"""Candidates, or segments, whose possibilities are worked out in one go."""
+"""Candidates, or segments, processed at a time."""
 
 LARGEST_ERROR_POWER = 16
-"""The power of the largest errors of segments whose sum is least for keys that are moved together."""
+"""Power of the largest errors of segments whose sum is minimised when keys are moved together."""
 
 KEY_MOVE_STEPS = np.array((0, 1, -1, 2, -2))
-"""Where a key may go, in steps towards the worse one of the segments beside it."""
+"""Where a key may move, in steps towards the worse of its two segments."""
 
 
 def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: int) -> tuple[np.ndarray, bool]:
-    """Keys laid out anew: as many as a budget at most, whose worst segment is as good as candidates allow.
+    """Return keys laid out anew within a budget, with the worst segment as good as candidates allow.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: 
     candidates : array of int, shape (m,)
         Samples, rising.
     keys : array of int, shape (k,)
-        From the first sample to the last, within the budget. They are candidates too.
+        From the first sample to the last, within the budget. They are candidates, too.
     budget : int
         At least 2.
 
@@ -76,9 +77,9 @@ def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: 
     -------
     keys : array of int, rising
     is_complete : bool
-        Whether all segments that might have been better were looked at.
+        Whether all segments that could be better were evaluated.
     """
-    ways = _Ways(costs, np.union1d(candidates, keys), keys)
+    ways = _CandidateSegments(costs, np.union1d(candidates, keys), keys)
     worst = costs.peak(keys)
     high = FIRST_ERROR_RATIO * worst
     ways.look(high)
@@ -101,8 +102,8 @@ def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: 
     return best, ways.is_complete
 
 
-class _Ways:
-    """Segments that join candidates, and how far each is off, looked at as far as errors need it."""
+class _CandidateSegments:
+    """Segments between candidates with their errors, evaluated as far as needed."""
 
     def __init__(self, costs: Costs, candidates: np.ndarray, keys: np.ndarray) -> None:
         self._costs, self._candidates, self._alive = costs, candidates, LIVE_ERROR_RATIOS[min(costs.reach, 1)]
@@ -114,16 +115,16 @@ class _Ways:
             lengths.append(lengths[-1] + max(1, lengths[-1] // FULL_REACH_CANDIDATES))
         self._lengths = np.array(lengths)
         self._left = float(MAX_LOOKS_PER_SAMPLE * len(costs.recording.times) * costs.recording.poses_each)
-        # The samples of keys 1, 2... further, before each candidate and after it, -1 beyond the ends.
+        # The samples 1, 2... keys before each candidate and after it, -1 beyond the ends.
         number = np.arange(len(keys))
         places = np.interp(candidates, keys, number) + np.array(
             [way for way in range(-costs.reach, costs.reach + 1) if way]
         ).reshape(-1, 1)
-        # Halves all go up, so that keys stay a sample apart; the last digits are left out, which could say otherwise.
+        # All halves are rounded up, so that keys stay a sample apart. Rounding to 6 digits first keeps halves exact.
         near = np.floor(np.round(np.interp(places, number, keys), 6) + 0.5).astype(np.int64)
         near = np.where((places < 0) | (places > number[-1]), -1, near)
         self._before, self._after = near[: costs.reach], near[costs.reach :]
-        # How many lengths of segments from each candidate have been good enough, and the error of the next.
+        # How many lengths of segments from each candidate were good enough, and the error of the next.
         self._looked, self._ended = np.zeros(len(candidates), dtype=np.int64), np.zeros(len(candidates))
         own = np.searchsorted(candidates, keys)
         self._pairs = [np.stack((own[:-1], own[1:]))]
@@ -131,16 +132,16 @@ class _Ways:
 
     @property
     def is_complete(self) -> bool:
-        """Whether there was time to look at all segments for the errors that were asked for."""
+        """Whether there was time to evaluate all segments for the errors asked for."""
         return self._left >= 0.0
 
     def _windows(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return the samples of all keys with a say in segments between candidates (...), shape (..., keys)."""
+        """Return the samples of all keys that influence segments between candidates (...), shape (..., keys)."""
         rows = (*self._before[:, first], self._candidates[first], self._candidates[second], *self._after[:, second])
         return np.stack(rows, axis=-1)
 
     def look(self, error: float) -> None:
-        """Look at all segments that may be off by an error at most."""
+        """Evaluate all segments whose error may be at most this."""
         last = len(self._candidates) - 1
         most = np.searchsorted(self._lengths, last - np.arange(last + 1), side="right")
         while True:
@@ -153,7 +154,7 @@ class _Ways:
                 self._look_from(open_ones[begin : begin + AT_ONCE], self._alive * error)
 
     def _look_from(self, first: np.ndarray, error: float) -> None:
-        """Look at the next few lengths of segments from some candidates."""
+        """Evaluate the next few lengths of segments from some candidates."""
         numbers = self._looked[first, None] + np.arange(BATCH_LENGTHS)
         second = first[:, None] + self._lengths[np.minimum(numbers, len(self._lengths) - 1)]
         there = (numbers < len(self._lengths)) & (second < len(self._candidates))
@@ -171,23 +172,25 @@ class _Ways:
         self._peaks.append(peak[rows, columns])
 
     def fewest(self, error: float, budget: int) -> np.ndarray | None:
-        """Return the samples of a way of segments that are off by an error at most, with as few keys as a budget.
+        """Return the samples of a path over segments with at most this error, with no more keys than the budget.
 
-        None where there is no such way.
+        None if there is no such path.
         """
         pairs, peaks = np.concatenate(self._pairs, axis=1), np.concatenate(self._peaks)
         self._pairs, self._peaks = [pairs], [peaks]
         first, second = pairs[:, peaks <= error]
-        # How far each candidate gets at once, and how far it or any before it does.
+        # How far one segment gets from each candidate, and how far from it or any before it.
         last, farthest = len(self._candidates) - 1, np.arange(len(self._candidates))
         np.maximum.at(farthest, first, second)
-        if _steps(np.maximum.accumulate(farthest).tolist(), last, budget) is None:
+        if _greedy_path(np.maximum.accumulate(farthest).tolist(), last, budget) is None:
             return None
-        way = _steps(farthest.tolist(), last, budget)
-        return self._candidates[way] if way else self._exactly(first, second, budget)
+        way = _greedy_path(farthest.tolist(), last, budget)
+        return self._candidates[way] if way else self._shortest_path(first, second, budget)
 
-    def _exactly(self, first: np.ndarray, second: np.ndarray, budget: int) -> np.ndarray | None:
-        """Return the same over segments that join these candidates."""
+    def _shortest_path(self, first: np.ndarray, second: np.ndarray, budget: int) -> np.ndarray | None:
+        """Return the path with the fewest of the segments that join these candidates, or None if it exceeds
+        the budget.
+        """
         order = np.argsort(first, kind="stable")
         bounds = np.searchsorted(first[order], np.arange(len(self._candidates) + 1)).tolist()
         onwards, back = second[order].tolist(), [0] * len(self._candidates)
@@ -205,8 +208,8 @@ class _Ways:
         return self._candidates[way[::-1]]
 
 
-def _steps(farthest: list[int], last: int, budget: int) -> list[int] | None:
-    """From the first candidate to the last, always as far as one gets; None where that takes more than the budget."""
+def _greedy_path(farthest: list[int], last: int, budget: int) -> list[int] | None:
+    """Return the path from the first candidate to the last with the longest steps; None if it exceeds the budget."""
     way = [0]
     while way[-1] < last:
         if len(way) == budget:
@@ -216,7 +219,7 @@ def _steps(farthest: list[int], last: int, budget: int) -> list[int] | None:
 
 
 def moved_together(costs: Costs, keys: np.ndarray, ways: int, part: int) -> np.ndarray:
-    """All keys but the outermost, each moved to one of a few samples near it, for the best of all choices together.
+    """Return keys, each but the outermost moved to one of a few samples near it, as the best of all choices together.
 
     Parameters
     ----------
@@ -225,9 +228,9 @@ def moved_together(costs: Costs, keys: np.ndarray, ways: int, part: int) -> np.n
     keys : array of int, shape (k,)
         From the first sample to the last.
     ways : int
-        How many samples each has for a choice, the one where it is among them, up to five.
+        How many samples each key can choose from, including its own, up to five.
     part : int
-        The samples are apart by the smaller distance to the keys beside it over this.
+        The step between these samples is the smaller distance to the neighbouring keys, divided by this.
     """
     reach, count = costs.reach, costs.keys
     _, peak = costs.of_keys(keys)
@@ -252,7 +255,7 @@ def moved_together(costs: Costs, keys: np.ndarray, ways: int, part: int) -> np.n
 
 
 def _of_choices(costs: Costs, choices: np.ndarray, worst: float) -> np.ndarray:
-    """Return the cost of segments for all choices of the keys with a say in each, (s, ways, ...), of keys (k, ways)."""
+    """Return the cost of segments for all choices of the keys (k, ways) that influence them, (s, ways, ...)."""
     ways, segments = choices.shape[1], len(choices) - costs.keys + 1
     windows = np.empty((segments, *(ways,) * costs.keys, costs.keys), dtype=np.int64)
     for column in range(costs.keys):
