@@ -162,13 +162,13 @@ def clean(
     standing = np.broadcast_to(np.asarray(stands is not None and stands, dtype=bool), poses.shape)
     radii = np.broadcast_to(radii, len(skeleton))
     look = looks or Looks()
-    times, trembles = _steadied(times, [joints[joint] for joint in range(len(skeleton))])
+    times, jitters = _steadied(times, [joints[joint] for joint in range(len(skeleton))])
     # Rounded to a power of ten, so that similar tolerances share the results in the cache.
     least = [MIN_NOISE_RATIO * 10.0 ** np.floor(np.log10(tolerance or own)) for own in radii.tolist()]
-    found = [look(times, joints[own], trembles[own], least[own], radii[own]) for own in range(len(skeleton))]
+    found = [look(times, joints[own], jitters[own], least[own], radii[own]) for own in range(len(skeleton))]
     cleaned, held = _corrected(found, skeleton, radii, tolerance, standing)
     # The recording is clean now: look for spikes without any noise.
-    still = [_selected_noise(each, (False, False)) for each in trembles]
+    still = [_selected_noise(each, (False, False)) for each in jitters]
     for _ in range(LOOK_AGAIN_ROUNDS):
         parts = [cleaned[own] for own in range(len(found))]
         again = [look(times, *own) for own in zip(parts, still, least, radii, strict=True)]

@@ -71,7 +71,7 @@ def linked_keys(costs: Costs, result: list[np.ndarray]) -> np.ndarray:
     Parameters
     ----------
     costs : Costs
-        Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
+        Costs of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
     result : list of array of int
         Sets of keys within the tolerance, each from the first sample to the last.
     """
@@ -101,7 +101,7 @@ def traded_keys(costs: Costs, result: list[np.ndarray], *, budget: int | None = 
     Parameters
     ----------
     costs : Costs
-        Of one track, for the mean square, under a mode that reaches no further than one key beyond a segment.
+        Costs of one track, for the mean square, under a mode that reaches no further than one key beyond a segment.
     result : list of array of int
         Sets of keys from the first sample to the last: one within the tolerance, then larger and smaller ones.
     budget : int, optional
@@ -139,7 +139,7 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
     Parameters
     ----------
     costs : Costs
-        Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
+        Costs of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
     result : list of array of int
         Sets of keys, each from the first sample to the last, with at least one within the budget.
     budget : int

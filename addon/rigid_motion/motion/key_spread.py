@@ -65,7 +65,7 @@ def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: 
     Parameters
     ----------
     costs : Costs
-        Of one track, for the largest error.
+        Costs of one track, for the largest error.
     candidates : array of int, shape (m,)
         Samples, rising.
     keys : array of int, shape (k,)
@@ -224,7 +224,7 @@ def moved_together(costs: Costs, keys: np.ndarray, ways: int, part: int) -> np.n
     Parameters
     ----------
     costs : Costs
-        Of one track.
+        Costs of one track.
     keys : array of int, shape (k,)
         From the first sample to the last.
     ways : int
