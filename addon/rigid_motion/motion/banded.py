@@ -16,8 +16,8 @@ BLOCK_DIAGONALS = 3
 
 
 class _Level(NamedTuple):
-    """One level of elimination: the inverses of the eliminated blocks, and their products with the couplings to the
-    blocks before and behind.
+    """One level of elimination: inverses of the eliminated blocks, times their couplings to the blocks before and
+    behind.
     """
 
     inverses: np.ndarray

@@ -42,7 +42,7 @@ class Body:
         return truth
 
     def errors(self, shown: Poses, samples: np.ndarray | None = None) -> np.ndarray:
-        """Return the errors of all joints (joints, m) for poses (joints, m) in their parents' space, at all samples or
+        """Return the errors of all joints (joints, m) for poses (joints, m) in parent space, at all samples or at
         these.
         """
         there = self.skeleton.in_root_space(shown)

@@ -52,8 +52,8 @@ def auto_clamped_slopes(durations: np.ndarray, values: np.ndarray) -> np.ndarray
 
 
 class _Runs:
-    """Runs of neighbouring keys (k,) with free slopes, which depend on one another; `places` are indices among all
-    keys.
+    """Runs of neighbouring keys (k,) with free slopes that depend on one another; `places` are indices among
+    all keys.
     """
 
     def __init__(self, places: np.ndarray) -> None:

@@ -143,9 +143,7 @@ def check_flag(flag: bool, name: str) -> None:
 
 
 def number(value: float, name: str) -> float:
-    """Return a number as float, or raise a TypeError with the argument's name if it is not one, such as "5mm"
-    or True.
-    """
+    """Return a number as float, or raise a TypeError with its name if it is not one, such as "5mm" or True."""
     is_one = isinstance(value, Real) and not isinstance(value, bool)
     if not is_one and not (isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf"):
         raise TypeError(f"a {name} of {value!r} is not a number: give a single one, without quotes or unit")
@@ -156,9 +154,7 @@ def number(value: float, name: str) -> float:
 
 
 def whole_number(value: int, name: str) -> int:
-    """Return a whole number, or raise a TypeError with the argument's name if it is not one, such as 1.5, "80"
-    or True.
-    """
+    """Return a whole number, or raise a TypeError with its name if it is not one, such as 1.5, "80" or True."""
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(f"{name} is {value!r}: give a whole number, such as 3")
     return int(value)

@@ -193,9 +193,11 @@ class _Joint:
     def __init__(self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float) -> None:
         left: Trembling | None = noise
         while left is not None:
-            left = self._find(times, poses, left, least, radius)
+            left = self._analyse(times, poses, left, least, radius)
 
-    def _find(self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float) -> Trembling | None:
+    def _analyse(
+        self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float
+    ) -> Trembling | None:
         """Find everything for this noise, or return the rest of the noise if part of it turns out not to be noise."""
         self.start, self.noise = poses, _significant_noise(noise, least, radius)
         self.share = np.ones(len(times))

@@ -46,7 +46,7 @@ CAP_POWER = 2.5
 
 @dataclass
 class Channel:
-    """Corrections of positions or of rotations; `differences` maps corrections (n, 3) to third derivatives (n
+    """Corrections of positions or rotations; `differences` turns corrections (n, 3) into third derivatives (n
     - 3, 3).
     """
 

@@ -59,8 +59,8 @@ class CurvedBody:
 
     @cached_property
     def carried(self) -> list[dict[int, float]]:
-        """For each joint, the joints below that it turns, down to the first that turn by themselves, with their
-        greatest distance.
+        """For each joint, the joints it turns, down to the first that turn by themselves, with their greatest
+        distance.
         """
         arms = np.linalg.norm(self.local.positions * self.lengths, axis=-1).max(axis=1)
         result: list[dict[int, float]] = [{} for _ in arms]
@@ -173,9 +173,7 @@ class _Fitting:
         return Samples(aims, allowed / 2.0, are_turns=True), body.local.quaternions[joint]
 
     def _fewest(self, aiming: Samples, own: np.ndarray) -> tuple[CubicKeys, int]:
-        """Return a channel's curves with the fewest keys, aiming at samples or through its own values, and the keys of
-        lines.
-        """
+        """Return a channel's curves with the fewest keys, through the aims or its own values, and the keys of lines."""
         times = self.body.times
         (best,) = fitted_together(times, [aiming])
         kept = fitted_together(times, [Samples(own, aiming.allowed, aiming.are_turns, aiming.values)])

@@ -197,9 +197,7 @@ def keyed_at(times: np.ndarray, samples: Samples, keys: np.ndarray, *, steps: bo
 
 
 def errors_between(times: np.ndarray, samples: Samples, keys: np.ndarray) -> np.ndarray:
-    """Return the largest error, over what is allowed, of curves from each of these samples (k,) to the next:
-    (k - 1,).
-    """
+    """Return the largest errors, over what is allowed, of curves between successive samples of these (k,): (k - 1,)."""
     return _Fit(times, samples).between(keys[:-1], keys[1:])[1]
 
 
@@ -309,8 +307,8 @@ class _Fit:
         return bends, np.sqrt((squares * self.weights[rows]).max(axis=1))
 
     def _line(self, s: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """Return values at fractions s of the way between two values; where rotations are lines, they turn at a
-        constant rate.
+        """Return values at fractions s of the way between two values; rotations stored as lines turn at a constant
+        rate.
         """
         if not (self.lines and self.is_turned):
             return first + s * (last - first)

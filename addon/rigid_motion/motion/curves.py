@@ -325,7 +325,7 @@ def _lerp(s: np.ndarray, tangent: np.ndarray, turn: np.ndarray) -> None:
 
 
 def _geometric_scales(s: np.ndarray, parameters: list[np.ndarray]) -> np.ndarray | None:
-    """Return scales that grow at a constant rate, from the last two parameters of `_curves`; None if there are no
+    """Return scales that grow at a constant rate, from the last parameters of `_curves`; None if there are no
     scales.
     """
     if len(parameters) < 3:

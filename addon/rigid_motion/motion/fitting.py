@@ -107,8 +107,8 @@ class _Fitting:
         self.residuals = self.displacements(self.fitted)
 
     def displacements(self, keys: Poses) -> np.ndarray:
-        """Return the displacements of the origin, and the chords of the shell along the axis of turning, at all
-        samples: (6, n).
+        """Return displacements of the origin, and chords of the shell along the axis of turning, at all samples: (6,
+        n).
         """
         shown = interpolate(self.key_times, keys, self.times, self.mode)
         turn = multiply(shown.quaternions, conjugate(self.truth.quaternions)).T

@@ -94,7 +94,7 @@ def fewest_keys(recording: SampleTracks, budget: int | None, tries: int, *, rms:
 
 def _with_smaller_budgets(search: KeySearch, keys: np.ndarray, tries: int) -> np.ndarray:
     """Return the fewest keys whose motion is within the tolerance, from given keys and searches with a few budgets."""
-    recording, best, too_few = search.recording, _mended(search, keys), 1
+    recording, best, too_few = search.recording, _with_more_keys(search, keys), 1
     budgets = tries + 1 if tries else 0
     if len(recording.times) * recording.poses_each > MANY_POSES:
         budgets = min(tries, 1) if recording.poses_each == 1.0 else 0
@@ -109,7 +109,7 @@ def _with_smaller_budgets(search: KeySearch, keys: np.ndarray, tries: int) -> np
         fewer = other.least(tries)
         error = _error(search, fewer)
         if error > MAX_LINK_ERROR_PER_TOLERANCE:
-            too_few, fewer = budget, _mended(search, fewer)
+            too_few, fewer = budget, _with_more_keys(search, fewer)
         if len(fewer) < len(best):
             best = _without_needless(search, fewer)
             too_few = too_few if too_few < len(best) else 1
@@ -134,7 +134,7 @@ def _without_needless(search: KeySearch, keys: np.ndarray) -> np.ndarray:
     return keys
 
 
-def _mended(search: KeySearch, keys: np.ndarray) -> np.ndarray:
+def _with_more_keys(search: KeySearch, keys: np.ndarray) -> np.ndarray:
     """Return the keys with more of them where the motion exceeds the tolerance."""
     while _error(search, keys) > MAX_LINK_ERROR_PER_TOLERANCE:
         errors = _errors(search, keys)
@@ -190,7 +190,7 @@ class BudgetSearch(KeySearch):
             return self._least_squares(self._settled(keys), tries)
         return self._least_peak(keys, candidates, tries) if tries else self._settled(keys).indices
 
-    def _lively(self, calm: float) -> np.ndarray:
+    def _moving_samples(self, calm: float) -> np.ndarray:
         """Return all samples, but only every few of those whose error is at most `calm` when left out alone."""
         samples = np.arange(len(self.recording.times))
         _, peak = self.costs.of(np.stack((samples[:-2], samples[2:]), axis=1))
@@ -202,7 +202,7 @@ class BudgetSearch(KeySearch):
     def _least_peak(self, keys: KeySelection, candidates: np.ndarray, tries: int) -> np.ndarray:
         """Return the keys with the smallest largest error of all that the tries lead to."""
         if self._takes_all:
-            candidates = self._lively(MAX_CALM_ERROR_RATIO * keys.peak.max())
+            candidates = self._moving_samples(MAX_CALM_ERROR_RATIO * keys.peak.max())
         if self.reach and not self._is_short:
             keys = self._settled(keys)
         elif self._length == 2:

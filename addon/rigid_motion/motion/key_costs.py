@@ -136,9 +136,7 @@ class Costs:
         return self.recording.poses_each * self._counts(segments.reshape(-1, self.keys)).sum()
 
     def errors(self, segments: np.ndarray) -> np.ndarray:
-        """Return the errors at all samples between the keys of segments (s, keys), in tolerances, zero
-        elsewhere: (n,).
-        """
+        """Return errors at all samples between the keys of segments (s, keys), in tolerances, zero elsewhere: (n,)."""
         errors = np.zeros(len(self.recording.times))
         filled = segments[self._counts(segments) > 0]
         for batch, counts in self._batches(filled) if len(filled) else ():

@@ -178,9 +178,7 @@ class KeySearch:
         return self.reach <= 1 and len(self.recording.starts) == 1
 
     def measured(self, indices: np.ndarray) -> KeySelection:
-        """Return keys at these rising samples, with their costs and peaks. The outermost samples of each track are
-        included.
-        """
+        """Return keys at these rising samples, the outermost of each track included, with their costs and peaks."""
         keys = self._unmeasured(indices)
         numbers, segments = self.segments(keys)
         keys.cost[numbers], keys.peak[numbers] = self.costs.of(segments)
@@ -201,9 +199,7 @@ class KeySearch:
         )
 
     def segments(self, keys: KeySelection) -> tuple[np.ndarray, np.ndarray]:
-        """Return the numbers of the keys where segments begin, (s,), and the samples of all keys that
-        influence each.
-        """
+        """Return the numbers of the keys where segments begin, (s,), and the samples of all keys influencing each."""
         numbers = np.flatnonzero(np.arange(len(keys.indices)) < keys.last)
         return numbers, keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
 
@@ -350,8 +346,8 @@ class KeySearch:
         return keys
 
     def _rises(self, cost: np.ndarray, peak: np.ndarray, around: np.ndarray, tolerance: float) -> np.ndarray:
-        """Return how much the cost around keys rises from `around` (c,) to that of segments (c, s); infinite if
-        refused.
+        """Return how much the cost around keys rises from `around` (c,) to that of segments (c, s); infinite if too far
+        off.
         """
         refused = (self.power != 2) & (peak.max(axis=1) > tolerance)
         return np.where(refused, math.inf, cost.sum(axis=1) - around)
@@ -362,8 +358,7 @@ class KeySearch:
         return np.where(inside, keys.cost[segments], 0.0).sum(axis=1)
 
     def evaluate(self, windows: np.ndarray, promising: Callable[..., np.ndarray] | None = None) -> Found:
-        """Return costs and peaks, each (c, s), of all segments of windows of keys (c, m) that have all their
-        neighbours.
+        """Return costs and peaks, each (c, s), of all complete segments between the keys of windows (c, m).
 
         If there is much to do, the segments half-way through windows come first. The others stay zero where
         `promising`, given those results, rejects a window.

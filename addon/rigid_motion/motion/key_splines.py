@@ -83,9 +83,7 @@ class SplineErrors:
         return bends
 
     def _between(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """Return the twists between pairs of samples (p,), and whether nothing moves there, as `Segments` do:
-        (7, p).
-        """
+        """Return twists between pairs of samples (p,), and whether nothing moves there as in `Segments`: (7, p)."""
         begin, end = self._rows.take(first, axis=1), self._rows.take(second, axis=1)
         result = np.zeros((7, len(first)))
         result[:6] = twists.logarithm(*_seen_from(begin, end))

@@ -188,9 +188,7 @@ class _CandidateSegments:
         return self._candidates[way] if way else self._shortest_path(first, second, budget)
 
     def _shortest_path(self, first: np.ndarray, second: np.ndarray, budget: int) -> np.ndarray | None:
-        """Return the path with the fewest of the segments that join these candidates, or None if it exceeds
-        the budget.
-        """
+        """Return the path with the fewest segments that join these candidates, or None if it exceeds the budget."""
         order = np.argsort(first, kind="stable")
         bounds = np.searchsorted(first[order], np.arange(len(self._candidates) + 1)).tolist()
         onwards, back = second[order].tolist(), [0] * len(self._candidates)
