@@ -65,7 +65,7 @@ def selected_frames(obj: bpy.types.Object) -> list[list[float]]:
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY", "AXIS_ANGLE"])
 @pytest.mark.parametrize("strength", [3.0, 0.5])
-def test_it_trembles_less_and_is_moved_by_no_more_than_was_said(live_file, rotation_mode, strength):
+def test_it_jitters_less_and_is_moved_by_no_more_than_was_said(live_file, rotation_mode, strength):
     obj = new_object(rotation_mode=rotation_mode)
     obj.delta_location, obj.delta_rotation_euler, obj.delta_scale = (0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (1.0, 1.0, 1.0)
     obj.delta_rotation_quaternion = (0.8, 0.0, 0.6, 0.0)
@@ -77,9 +77,9 @@ def test_it_trembles_less_and_is_moved_by_no_more_than_was_said(live_file, rotat
     assert (cleaning.spikes, cleaning.repeats) == (1, 0)
     assert moved[SPIKE] > 0.1
     assert np.delete(moved, SPIKE).max() == pytest.approx(cleaning.moved, rel=1e-3)
-    assert cleaning.moved <= strength * cleaning.trembling * (1.0 + 1e-6)
+    assert cleaning.moved <= strength * cleaning.jitter * (1.0 + 1e-6)
     # Largest jitter of any point within the radius: that of locations plus that of rotations.
-    assert cleaning.trembling == pytest.approx(3.0**0.5 * SIZE + 2.0**0.5 * TURN * RADIUS, rel=0.15)
+    assert cleaning.jitter == pytest.approx(3.0**0.5 * SIZE + 2.0**0.5 * TURN * RADIUS, rel=0.15)
     assert key_frames(obj).tolist() == frames.tolist()
     assert selected_frames(obj)[:6] == [[frames[SPIKE]]] * 6
 
@@ -161,7 +161,7 @@ def test_no_bone_is_moved_by_more_whatever_it_hangs_on(live_file, chosen, moves)
     (after,) = shown_poses([rig], FRAMES)
     moved = 2.0 * displacements(rig, before, after)
     assert 0.0 < moved.max() == pytest.approx(cleaning.moved, rel=1e-3)
-    assert cleaning.moved <= strength * cleaning.trembling * (1.0 + 1e-5)
+    assert cleaning.moved <= strength * cleaning.jitter * (1.0 + 1e-5)
     kept = {
         name: keys for name, keys in snapshot(rig).items() if chosen and not any(f'"{b}"' in name[0] for b in chosen)
     }
@@ -223,7 +223,7 @@ def test_a_foot_that_stands_slides_no_further_than_it_did(live_file, monkeypatch
             most.append(slide_ratios(after, before, stands).max())
             slides = slide(after, stands), slide(before, stands)
             assert cleaning.contacts == (pytest.approx((len(spans(stands)), *slides), abs=1e-6) if hold else (0, 0, 0))
-            assert 0.0 < cleaning.moved <= 3.0 * cleaning.trembling
+            assert 0.0 < cleaning.moved <= 3.0 * cleaning.jitter
             restore_keys(targets)
     assert max(ratios[True]) < 1.0 + 1e-4
     assert max(ratios[False]) > 1.1
@@ -236,7 +236,7 @@ def test_cameras_are_cleaned_in_pixels_of_their_pictures(live_file):
     camera.data.dof.focus_distance = 4.0
     frames, _ = shaky(camera)
     (cleaning,) = clean_motion(camera)
-    assert cleaning.trembling == pytest.approx(3.0**0.5 * SIZE + 2.0**0.5 * TURN * 4.0, rel=0.15)
+    assert cleaning.jitter == pytest.approx(3.0**0.5 * SIZE + 2.0**0.5 * TURN * 4.0, rel=0.15)
     assert focus_of(camera) == 4.0
     # The centre of the picture, and a corner, where a rotation about the camera's axes shows most.
     at_centre = 1920.0 * camera.data.lens / camera.data.sensor_width / 4.0
@@ -261,7 +261,7 @@ def test_cameras_are_cleaned_in_pixels_of_their_pictures(live_file):
     assert focus_of(camera) == pytest.approx(camera.matrix_world.translation.length)
 
 
-def test_what_has_no_trembling_or_no_dense_keys_says_so_and_others_are_cleaned(live_file):
+def test_what_has_no_jitter_or_no_dense_keys_says_so_and_others_are_cleaned(live_file):
     calm, sparse, few, held = (new_object(name) for name in ("Calm", "Sparse", "Few", "Shaky"))
     write_channel(calm, "location", FRAMES, np.stack([FRAMES, FRAMES**2 / 90.0, 0.0 * FRAMES], axis=1))
     key(sparse, np.arange(1.0, 300.0, 10.0))

@@ -11,8 +11,8 @@ from rigid_motion.motion import Poses, Skeleton, clean, shell_error, standing
 from rigid_motion.motion.banded import Banded
 from rigid_motion.motion.contacts import slide, slide_ratios
 from rigid_motion.motion.differences import turned_in_world
+from rigid_motion.motion.jitter import jitter
 from rigid_motion.motion.quaternions import align_signs, multiply, normalise, rotate
-from rigid_motion.motion.trembling import trembling
 from tests.motion.bodies import random_parents
 from tests.thoroughness import combined, tried
 
@@ -72,7 +72,7 @@ def test_white_noise_is_measured_as_it_is_however_short_the_recording(count):
     found = []
     for seed in range(200 if count < 600 else 10):
         times, truth = hand(seed, count)
-        found += trembling(times, shaken(truth, seed))[:2]
+        found += jitter(times, shaken(truth, seed))[:2]
     parts = np.reshape(found, (-1, 2)) / (NOISE, TURNS)
     # Not too low with few samples, and no more scattered than this many numbers must be.
     assert parts.mean() == pytest.approx(1.0, abs=0.02)
@@ -112,7 +112,7 @@ def test_samples_that_repeat_the_one_before_are_bridged():
 
 
 @pytest.mark.parametrize(("length", "lost"), [(2, True), (6, True), (9, False)])
-def test_a_pose_that_comes_again_where_others_tremble_is_a_lost_sample_but_not_what_stands_still(length, lost):
+def test_a_pose_that_comes_again_where_others_jitter_is_a_lost_sample_but_not_what_stands_still(length, lost):
     times, truth = hand(3)
     shaky = shaken(truth, 3)
     rows = np.arange(300, 300 + length)
@@ -211,7 +211,7 @@ def test_the_world_the_clock_and_the_direction_of_time_do_not_matter(seed):
         assert shell_error(other, expected).max() < 1e-4 * tolerance
 
 
-def test_a_clock_that_trembles_is_steadied():
+def test_a_clock_that_jitters_is_steadied():
     times, truth = hand(4)
     stamped = times + np.random.default_rng(4).normal(size=len(times)) * 0.001
     cleaned = clean(stamped, shaken(truth, 4))
@@ -232,7 +232,7 @@ def test_what_cannot_be_cleaned_is_said():
 
 def test_noise_is_not_found_in_what_is_short():
     times, truth = hand(1, 9)
-    assert trembling(times, truth)[:2] == (0.0, 0.0)
+    assert jitter(times, truth)[:2] == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("tolerance", [0.002, 0.01])

@@ -59,7 +59,7 @@ def test_the_slide_is_the_farthest_from_where_it_stood_at_first():
     assert slide(positions, np.zeros_like(stands)) == 0.0
 
 
-def test_a_foot_that_trembles_stands_as_long():
+def test_a_foot_that_jitters_stands_as_long():
     stops = (TIMES > 0.5) & (TIMES < 1.5)
     shaky = body(stepping(stops)) + 0.003 * np.random.default_rng(1).normal(size=(3, 90, 3))
     assert not standing(TIMES, shaky).any()

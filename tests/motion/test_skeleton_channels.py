@@ -80,11 +80,11 @@ def test_every_joint_stays_within_the_tolerance_with_no_more_numbers(count, join
     assert errors.max() <= tolerance * (1.0 + 1e-9) + rounding
 
 
-def test_a_channel_that_trembles_below_the_tolerance_rests_at_one_sample():
+def test_a_channel_that_jitters_below_the_tolerance_rests_at_one_sample():
     times, poses, parents = wandering_body(90, 4, 5, resting=0.0)
-    trembling = poses.positions[:, :1] + np.random.default_rng(5).uniform(-1e-5, 1e-5, poses.positions.shape)
+    jitter = poses.positions[:, :1] + np.random.default_rng(5).uniform(-1e-5, 1e-5, poses.positions.shape)
     keys = reduce_skeleton_keys(
-        times, Poses(trembling, poses.quaternions), parents, "lerp_slerp", tolerance=0.001, separate=True
+        times, Poses(jitter, poses.quaternions), parents, "lerp_slerp", tolerance=0.001, separate=True
     )
     assert [len(own.location) for own in keys] == [1] * 4
     assert sum(len(own.rotation) for own in keys) > 20

@@ -51,11 +51,11 @@ def test_every_joint_stays_within_the_tolerance_everywhere(count, joints, seed, 
 
 
 @TWO_WAYS
-def test_what_trembles_below_the_tolerance_rests_from_beginning_to_end(separate):
+def test_what_jitters_below_the_tolerance_rests_from_beginning_to_end(separate):
     times, poses, parents = wandering_body(200, 5, 3, resting=0.0)
-    trembling = poses.positions[:, :1] + np.random.default_rng(5).uniform(-1e-5, 1e-5, poses.positions.shape)
+    jitter = poses.positions[:, :1] + np.random.default_rng(5).uniform(-1e-5, 1e-5, poses.positions.shape)
     poses.quaternions[:2] = poses.quaternions[:2, :1]
-    poses = Poses(trembling, poses.quaternions)
+    poses = Poses(jitter, poses.quaternions)
     keys = reduce_skeleton_keys(times, poses, parents, "lerp_slerp", tolerance=0.002, separate=separate, stretch=50)
     if separate:
         assert [len(own.location) for own in keys] == [1] * 5

@@ -125,7 +125,7 @@ def test_a_pixel_is_as_large_as_the_nearest_thing_has_it(shaky, tmp_path):
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
 
 
-def test_a_clock_that_trembles_is_written_in_steady_steps(tmp_path, capsys):
+def test_a_clock_that_jitters_is_written_in_steady_steps(tmp_path, capsys):
     jitter = np.random.default_rng(4).normal(size=300) * 0.001
     poses = shaken(TRUTH, 4)
     rows = np.column_stack([TIMES + jitter, poses.positions, poses.quaternions])

@@ -99,7 +99,7 @@ def test_a_step_and_a_hit_stay_as_sharp_as_they_came():
     assert errors[0] < 1.1 * errors[1]
 
 
-def test_by_vmc_it_is_shown_at_the_same_moments_and_trembles_less():
+def test_by_vmc_it_is_shown_at_the_same_moments_and_jitters_less():
     times, truth = recorded("reach")
     poses = shaken(truth)
     receivers = [Receiver(DELAY), Receiver(DELAY, steady=True)]
@@ -117,7 +117,7 @@ def test_by_vmc_it_is_shown_at_the_same_moments_and_trembles_less():
     assert np.sqrt(np.mean(np.square(errors[1]))) < 0.6 * np.sqrt(np.mean(np.square(errors[0])))
 
 
-def test_where_a_stream_sends_every_sample_it_trembles_less_too():
+def test_where_a_stream_sends_every_sample_it_jitters_less_too():
     times, truth = recorded("pivot")
     poses, errors = shaken(truth), ([], [])
     for steady, which in zip((False, True), errors, strict=True):

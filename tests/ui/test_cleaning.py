@@ -43,7 +43,7 @@ def report_of(extension, capfd):
     return act
 
 
-def test_it_says_how_much_trembled_and_by_how_much_it_was_moved(report_of):
+def test_it_says_how_much_jittered_and_by_how_much_it_was_moved(report_of):
     obj = shaky(new_object())
     before = snapshot(obj)
     assert operators.clean_motion.poll()

@@ -17,12 +17,12 @@ from numpy.typing import ArrayLike
 from .checks import check_poses, check_radii
 from .contacts import slide_ratios
 from .corrections import MIN_MOTION_PER_NOISE, Corrections
+from .jitter import DIFFERENCE_ORDERS, Jitter, jitter
 from .measures import shell_error
 from .modes import interpolate
 from .outliers import outliers
 from .poses import Poses, joined, numbers
 from .skeletons import Skeleton
-from .trembling import DIFFERENCE_ORDERS, Trembling, trembling
 
 CAP_ROUNDS = 12
 """Rounds of pulling back samples that moved too far: first with their surroundings, then alone, then completely. Each
@@ -190,14 +190,12 @@ def clean(
 class _Joint:
     """The analysis of one joint: its noise, the samples that are left out, and its corrections."""
 
-    def __init__(self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float) -> None:
-        left: Trembling | None = noise
+    def __init__(self, times: np.ndarray, poses: Poses, noise: Jitter, least: float, radius: float) -> None:
+        left: Jitter | None = noise
         while left is not None:
             left = self._analyse(times, poses, left, least, radius)
 
-    def _analyse(
-        self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float
-    ) -> Trembling | None:
+    def _analyse(self, times: np.ndarray, poses: Poses, noise: Jitter, least: float, radius: float) -> Jitter | None:
         """Find everything for this noise, or return the rest of the noise if part of it turns out not to be noise."""
         self.start, self.noise = poses, _significant_noise(noise, least, radius)
         self.share = np.ones(len(times))
@@ -212,7 +210,7 @@ class _Joint:
         taken = np.array(self.noise[:2]) > 0.0
         if self.out.any():
             # Measure the jitter again without these samples.
-            again = trembling(times[rows], poses[rows])
+            again = jitter(times[rows], poses[rows])
             here = np.array([np.interp(times, times[rows], each) for each in again.here])
             self.noise = _significant_noise(_selected_noise(again, taken)._replace(here=here), least, radius)
             self.start = _bridged(times, poses, rows)
@@ -253,7 +251,7 @@ class Looks:
         """Drop the entries that were not used since the previous call."""
         self._found, self._before = {}, self._found
 
-    def __call__(self, times: np.ndarray, poses: Poses, noise: Trembling, least: float, radius: float) -> _Joint:
+    def __call__(self, times: np.ndarray, poses: Poses, noise: Jitter, least: float, radius: float) -> _Joint:
         arrays = times, poses.positions, poses.quaternions, np.array([least, radius, *noise[:2]])
         key = blake2b(b"".join(each.tobytes() for each in arrays)).digest()
         found = self._found.get(key) or self._before.get(key) or _Joint(times, poses, noise, least, radius)
@@ -299,13 +297,13 @@ def _corrected(
     return cleaned, held
 
 
-def _significant_noise(noise: Trembling, least: float, radius: float) -> Trembling:
+def _significant_noise(noise: Jitter, least: float, radius: float) -> Jitter:
     """Return the noise, or zero where it is too small to be worth moving anything."""
     position, rotation = (size if size * arm > least else 0.0 for size, arm in ((noise[0], 1.0), (noise[1], radius)))
     return noise._replace(position=position, rotation=rotation)
 
 
-def _selected_noise(noise: Trembling, taken: Sequence[bool] | np.ndarray) -> Trembling:
+def _selected_noise(noise: Jitter, taken: Sequence[bool] | np.ndarray) -> Jitter:
     """Return the noise of positions, rotations, both or none."""
     return noise._replace(position=noise.position * taken[0], rotation=noise.rotation * taken[1])
 
@@ -318,15 +316,15 @@ def _bridged(times: np.ndarray, poses: Poses, rows: np.ndarray) -> Poses:
     return replace(poses, positions=positions, quaternions=quaternions)
 
 
-def _steadied(times: np.ndarray, joints: list[Poses]) -> tuple[np.ndarray, list[Trembling]]:
+def _steadied(times: np.ndarray, joints: list[Poses]) -> tuple[np.ndarray, list[Jitter]]:
     """Return the times with less jitter, timestamps or steady steps, and the jitter of each joint with them."""
-    stamped = [trembling(times, poses) for poses in joints]
+    stamped = [jitter(times, poses) for poses in joints]
     steps = np.diff(times)
     counts = np.concatenate(([0.0], np.cumsum(np.maximum(np.rint(steps / np.median(steps)), 1.0))))
     pace, begin = np.polyfit(counts, times, 1)
     steady = begin + pace * counts
     if not 1e-6 * pace < np.std(times - steady) < MAX_STAMP_JITTER_STEPS * pace:
         return times, stamped
-    even = [trembling(steady, poses) for poses in joints]
+    even = [jitter(steady, poses) for poses in joints]
     before, after = (np.array([each[:2] for each in noises]).sum(axis=0) for noises in (stamped, even))
     return (steady, even) if (after < MAX_STEADY_NOISE_RATIO * before).all() else (times, stamped)

@@ -17,8 +17,8 @@ import numpy as np
 
 from .banded import Banded
 from .differences import coefficients, differences_of_positions, differences_of_rotations, turned_in_world
+from .jitter import Jitter, mean_around
 from .poses import Poses
-from .trembling import Trembling, mean_around
 
 JERK_ORDER = 3
 """Order of the derivative that is kept small: jerk."""
@@ -110,7 +110,7 @@ class Channel:
 class Corrections:
     """Corrections of poses (n,) at times (n,) for this noise; samples `out` (n,) are ignored, and follow the others."""
 
-    def __init__(self, times: np.ndarray, start: Poses, noise: Trembling, out: np.ndarray) -> None:
+    def __init__(self, times: np.ndarray, start: Poses, noise: Jitter, out: np.ndarray) -> None:
         self._start = start
         shares = coefficients(times, JERK_ORDER)
         steps = (times[JERK_ORDER:] - times[:-JERK_ORDER]) / JERK_ORDER

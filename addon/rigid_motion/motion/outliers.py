@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from .jitter import Jitter
 from .poses import Poses
 from .quaternions import conjugate, turned, turns_between
-from .trembling import Trembling
 
 MOST_ROWS = 6
 """The longest spike, in samples."""
@@ -46,7 +46,7 @@ MEDIAN_NORM = 1.53817
 """The median norm of standard normal vectors (3,)."""
 
 
-def outliers(times: np.ndarray, poses: Poses, noise: Trembling) -> tuple[np.ndarray, np.ndarray]:
+def outliers(times: np.ndarray, poses: Poses, noise: Jitter) -> tuple[np.ndarray, np.ndarray]:
     """Return which samples (n,) are spikes, and which repeat the sample before them while the body moved on.
 
     The recording has times (n,), poses (n,) and this noise. Longer spikes are searched for first. An impact is not a
@@ -82,7 +82,7 @@ def outliers(times: np.ndarray, poses: Poses, noise: Trembling) -> tuple[np.ndar
 
 
 def _run_deviations(
-    times: np.ndarray, poses: Poses, noise: Trembling, firsts: np.ndarray, length: int
+    times: np.ndarray, poses: Poses, noise: Jitter, firsts: np.ndarray, length: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield deviations of the runs of samples that begin at `firsts`, first of positions and then of rotations.
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..motion import Poses
 from ..motion.differences import coefficients
+from ..motion.jitter import jitter
 from ..motion.poses import joined
 from ..motion.quaternions import turned, turns_between
-from ..motion.trembling import trembling
 from .paths import KnotPath
 
 MIN_NOISE_SAMPLES, MAX_NOISE_SAMPLES, SAMPLES_PER_LOOK = 60, 240, 4
@@ -62,7 +62,7 @@ class Steady:
             return poses
         if self._shown % SAMPLES_PER_LOOK == 0 and len(self._times) >= MIN_NOISE_SAMPLES:
             joint = self._shown // SAMPLES_PER_LOOK % count
-            self._noise[:, joint] = trembling(self._times, self._poses[joint])[:2]
+            self._noise[:, joint] = jitter(self._times, self._poses[joint])[:2]
         self._shown += 1
         holders = self._holders[:, window]
         joints = np.flatnonzero(self._noise.any(axis=0) & (holders == holders[:, :1]).all(axis=1))

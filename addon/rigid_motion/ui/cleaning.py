@@ -100,17 +100,17 @@ class RIGID_MOTION_OT_clean_motion(OfRigsToo, OnTargets):
         """Return a summary of all cleanings, with lengths, or with pixels if all of them are cameras."""
         cameras: list[Any] = [one.transforms[0].carrier for one in cleanings]
         spoken = partial(length, cast(bpy.types.Scene, context.scene), precision=3)
-        spans = [(one.trembling, one.moved) for one in cleanings]
+        spans = [(one.jitter, one.moved) for one in cleanings]
         if all(isinstance(camera, bpy.types.Object) and camera.type == "CAMERA" for camera in cameras):
             by = [pixels_of(camera, self.nearest or focus_of(camera)) for camera in cameras]
             most = [
                 max(one * pixels for one, pixels in zip(ends, by, strict=True)) for ends in zip(*spans, strict=True)
             ]
-            trembling, moved = (iface_("{count:.2g} pixels").format(count=pixels) for pixels in most)
+            jitter, moved = (iface_("{count:.2g} pixels").format(count=pixels) for pixels in most)
         else:
-            trembling, moved = (spoken(max(ends)) for ends in zip(*spans, strict=True))
+            jitter, moved = (spoken(max(ends)) for ends in zip(*spans, strict=True))
         parts = [
-            rpt_("jitters by {length}").format(length=trembling),
+            rpt_("jitters by {length}").format(length=jitter),
             rpt_("moved at most {length}").format(length=moved),
         ]
         spikes, repeats = sum(one.spikes for one in cleanings), sum(one.repeats for one in cleanings)

@@ -21,7 +21,7 @@ from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 
 MAX_REST_RMS = 0.01
-"""A body is at rest if its RMS distance from its mean pose is below this, in metres: less than a hand trembles."""
+"""A body is at rest if its RMS distance from its mean pose is below this, in metres: less than the tremor of a hand."""
 
 Read = TypeVar("Read")
 

@@ -1,7 +1,7 @@
 """Remove jitter and spikes from recordings, and move nothing by more than the tolerance.
 
 There is nothing else to set: the jitter of each recording is estimated. Every file keeps its format, with other numbers
-where something was moved and the same text everywhere else. For each body the program reports how much it trembles, how
+where something was moved and the same text everywhere else. For each body the program reports its jitter, how
 far anything was moved, and which rows were spikes.
 """
 

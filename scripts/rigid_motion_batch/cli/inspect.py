@@ -15,7 +15,7 @@ from dataclasses import asdict
 from rigid_motion_batch.command_line import INSTALLED, Parser, complain, listed, not_empty, printable
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.recordings import TrajectoryError, files_of
-from rigid_motion_batch.recordings.inspecting import Contents, Inspection, MeasuredTrembling, inspect
+from rigid_motion_batch.recordings.inspecting import Contents, Inspection, MeasuredJitter, inspect
 from rigid_motion_batch.recordings.options import add_reading_options, reading_options
 
 PROGRAM = f"{'python scripts/bootstrap.py' if CHECKOUT else INSTALLED} inspect"
@@ -112,8 +112,8 @@ def _body_lines(body: Contents) -> Iterator[str]:
     motion = f"{extent} m along x, y, z; {size.path:.3g} m of path; mostly below {size.speed:.3g} m/s and "
     motion += f"{size.turning:.3g} degrees/s; turns up to {size.turned:.3g} degrees away from its first pose"
     yield from _row("  motion", motion + "; it grows or shrinks" * body.scaled)
-    if body.trembling:
-        yield from _row("  jitter", _trembling(body.trembling))
+    if body.jitter:
+        yield from _row("  jitter", _jitter(body.jitter))
     for repair in body.repairs:
         yield from _row("  repaired", repair)
     for warning in body.warnings:
@@ -122,7 +122,7 @@ def _body_lines(body: Contents) -> Iterator[str]:
             yield from _row("", f"-> {warning.way_out}")
 
 
-def _trembling(found: MeasuredTrembling) -> str:
+def _jitter(found: MeasuredJitter) -> str:
     text = "not distinguishable from motion"
     if found.position or found.rotation:
         text = f"{1e3 * found.position:.2g} mm and {found.rotation:.2g} degrees"

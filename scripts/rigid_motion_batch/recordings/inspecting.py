@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigid_motion.motion.jitter import jitter
 from rigid_motion.motion.outliers import outliers
 from rigid_motion.motion.quaternions import angle_between
 from rigid_motion.motion.repair import MIN_GAP_INTERVALS
-from rigid_motion.motion.trembling import trembling
 from rigid_motion_batch.axes import AXES, DESCRIBED, NERF
 
 from .clip_reading import make_clip
@@ -33,7 +33,7 @@ MAX_EVEN_INTERVAL_RATIO = 0.1
 ABOVE_THE_FLOOR = 0.3, 2.5
 """Lowest and highest metres above the floor for hands, heads and cameras of people."""
 
-LEAST_TREMBLING = 1e-6, 1e-4
+LEAST_JITTER = 1e-6, 1e-4
 """Metres and degrees: less jitter is rounding."""
 
 
@@ -99,7 +99,7 @@ class Size:
 
 
 @dataclass(frozen=True)
-class MeasuredTrembling:
+class MeasuredJitter:
     """Jitter and spikes of a measured body, which no motion explains: see `rigid_motion.motion.clean`."""
 
     position: float
@@ -134,7 +134,7 @@ class Contents:
 
     warnings: tuple[ClipWarning, ...]
 
-    trembling: MeasuredTrembling | None
+    jitter: MeasuredJitter | None
     """None for whole bodies and animations."""
 
 
@@ -197,8 +197,8 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
             clip = make_clip(
                 trajectory, source, trajectory.name, axes or recording.axes, options, measured=result.measured
             )
-            trembling = _trembling(clip) if result.measured and clip.rest_body is None else None
-            contents.append(_contents(clip, trajectory, _unit(clip, trajectory, result, options), trembling))
+            jitter = _jitter(clip) if result.measured and clip.rest_body is None else None
+            contents.append(_contents(clip, trajectory, _unit(clip, trajectory, result, options), jitter))
         except TrajectoryError as error:
             unreadable.append((trajectory.name, error.problem))
     if not contents:
@@ -212,7 +212,7 @@ def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_T
     return Inspection(source, result.label, size, bodies, taken, tuple(contents), tuple(unreadable), note)
 
 
-def _contents(clip: Clip, trajectory: Trajectory, unit: Unit, trembling: MeasuredTrembling | None) -> Contents:
+def _contents(clip: Clip, trajectory: Trajectory, unit: Unit, jitter: MeasuredJitter | None) -> Contents:
     said = {str(warning) for warning in clip.warnings}
     return Contents(
         trajectory.name,
@@ -224,16 +224,16 @@ def _contents(clip: Clip, trajectory: Trajectory, unit: Unit, trembling: Measure
         _up_axis(clip),
         tuple(repair for repair in clip.repairs if repair not in said),
         clip.warnings,
-        trembling,
+        jitter,
     )
 
 
-def _trembling(clip: Clip) -> MeasuredTrembling:
-    noise = trembling(clip.times, clip.poses)
+def _jitter(clip: Clip) -> MeasuredJitter:
+    noise = jitter(clip.times, clip.poses)
     found = np.logical_or(*outliers(clip.times, clip.poses, noise))
     sizes = np.array([noise.position * clip.metres_per_unit, np.degrees(noise.rotation)])
-    position, rotation = np.where(sizes > LEAST_TREMBLING, sizes, 0.0).tolist()
-    return MeasuredTrembling(position, rotation, tuple(clip.times[found].tolist()))
+    position, rotation = np.where(sizes > LEAST_JITTER, sizes, 0.0).tolist()
+    return MeasuredJitter(position, rotation, tuple(clip.times[found].tolist()))
 
 
 def _unit(clip: Clip, trajectory: Trajectory, result: Format, options: ReadingOptions) -> Unit:

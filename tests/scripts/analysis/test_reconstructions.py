@@ -144,13 +144,13 @@ def test_the_point_that_stays_is_found_and_how_far_each_mode_moves_it() -> None:
         assert min(off["bezier"], off["lerp_slerp"]) > 1e-3
 
 
-@pytest.mark.parametrize("kind", ["flies", "rests", "trembles"])
+@pytest.mark.parametrize("kind", ["flies", "rests", "jitters"])
 def test_what_flies_or_rests_all_over_has_no_point_that_stays(kind: str) -> None:
     random, count = np.random.default_rng(0), 90
     rest = np.tile((1.0, 0.0, 0.0, 0.0), (count, 1))
     positions = {
         "flies": np.linspace((0.0, 0.0, 0.0), (3.0, 1.0, 0.0), count),
         "rests": np.zeros((count, 3)),
-        "trembles": 1e-3 * random.normal(size=(count, 3)),
+        "jitters": 1e-3 * random.normal(size=(count, 3)),
     }[kind]
     assert still_point(Poses(positions, rest)) is None

@@ -38,13 +38,13 @@ def test_a_log_is_described(write) -> None:
     assert 0.5 * timing.seconds < size.path < 1.2 * timing.seconds
 
 
-def test_what_trembles_is_measured_and_spikes_are_named(write, capsys) -> None:
+def test_what_jitters_is_measured_and_spikes_are_named(write, capsys) -> None:
     header, *rows = log().splitlines()
     numbers = np.array([row.split(",") for row in rows], dtype=float)
     numbers[:, 1:4] += np.random.default_rng(1).normal(size=(300, 3)) * 0.0004
     numbers[90, 1] += 0.05
     source = write("hand.csv", "\n".join([header, *(",".join(map(repr, row)) for row in numbers.tolist())]))
-    found = inspect(source).contents[0].trembling
+    found = inspect(source).contents[0].jitter
     assert found.position == pytest.approx(0.0004, rel=0.15)
     assert found.rotation == 0.0
     assert found.spikes == (1.0,)

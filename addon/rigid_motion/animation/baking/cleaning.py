@@ -18,8 +18,8 @@ from ...blender import scene
 from ...motion import Poses, Skeleton, clean, standing
 from ...motion.cleaning import SLIDE_RATIO, Looks
 from ...motion.contacts import slide, slide_ratios, spans
+from ...motion.jitter import DIFFERENCE_ORDERS, jitter
 from ...motion.quaternions import conjugate, multiply, rotate, turned, turns_between
-from ...motion.trembling import DIFFERENCE_ORDERS, trembling
 from ..actions.channels import key_fields, set_key_fields
 from ..actions.refusals import refuse_drivers, refuse_linked, refuse_modified
 from ..actions.slots import Binding
@@ -64,7 +64,7 @@ class Cleaning(NamedTuple):
     """The result of cleaning an object, or all bones of a rig together."""
 
     transforms: Sequence[Transform]
-    trembling: float
+    jitter: float
     """The root mean square jitter of any point within the radius; for a rig, of the point with the most jitter."""
 
     moved: float
@@ -333,7 +333,7 @@ def _correction_shares(obj: bpy.types.Object, frames: np.ndarray, bindings: Sequ
 
 def _noise_floor(frames: np.ndarray, poses: Poses, reaches: np.ndarray, skeleton: Skeleton) -> float:
     """Return the root mean square jitter of the point with the most jitter, of joints with these reaches."""
-    noises = [trembling(frames, poses[joint])[:2] for joint in range(len(skeleton))]
+    noises = [jitter(frames, poses[joint])[:2] for joint in range(len(skeleton))]
     squares = np.array(
         [(math.sqrt(3.0) * p + math.sqrt(2.0) * r * reach) ** 2 for (p, r), reach in zip(noises, reaches, strict=True)]
     )

@@ -34,7 +34,7 @@ NOISE_REACH_SAMPLES = 8
 """Samples on either side that define the jitter at a sample."""
 
 
-class Trembling(NamedTuple):
+class Jitter(NamedTuple):
     """Jitter of positions, metres, and of rotations, radians: standard deviations along an axis, 0 if none is found.
 
     `here` has both for each sample, shape (2, n). They are larger where motion cannot be distinguished from jitter.
@@ -45,7 +45,7 @@ class Trembling(NamedTuple):
     here: np.ndarray
 
 
-def trembling(times: np.ndarray, poses: Poses) -> Trembling:
+def jitter(times: np.ndarray, poses: Poses) -> Jitter:
     """Return the jitter of a recording with times (n,) in seconds and poses (n,) with unit quaternions.
 
     It needs `DIFFERENCE_ORDERS[-1] + 2` samples; with fewer, no jitter is found.
@@ -53,7 +53,7 @@ def trembling(times: np.ndarray, poses: Poses) -> Trembling:
     count = len(times)
     here = np.full((2, count), np.inf)
     if count <= DIFFERENCE_ORDERS[-1] + 1:
-        return Trembling(0.0, 0.0, np.zeros((2, count)))
+        return Jitter(0.0, 0.0, np.zeros((2, count)))
     found = np.empty((len(DIFFERENCE_ORDERS), len(QUIET_RATIOS), 2))
     for row, order in enumerate(DIFFERENCE_ORDERS):
         scaled = coefficients(times, order)
@@ -67,7 +67,7 @@ def trembling(times: np.ndarray, poses: Poses) -> Trembling:
     falls = found[-1, 0] < FILTERED_NOISE_RATIO * found[MIDDLE_ORDER - DIFFERENCE_ORDERS[0], 0]
     agrees = found <= found.min(axis=(0, 1)) * (1.0 + AGREEING_RATIO / np.sqrt(count))
     position, rotation = np.where(falls, 0.0, found.mean(axis=(0, 1), where=agrees)).tolist()
-    return Trembling(position, rotation, here)
+    return Jitter(position, rotation, here)
 
 
 def mean_around(values: np.ndarray, reach: int) -> np.ndarray:
