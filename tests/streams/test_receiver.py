@@ -104,7 +104,7 @@ def test_copies_and_old_datagrams_change_nothing() -> None:
 
 @pytest.mark.parametrize(("number", "answers"), combined([1, 2, 3, *range(4, 24, 4)], [True, False]))
 def test_a_datagram_that_is_lost_costs_no_later_one_its_meaning(number: int, answers: bool) -> None:
-    own = body()
+    own = body(8)
     sent: list[float] = []
 
     def lost(now: float, count: int) -> bool:
