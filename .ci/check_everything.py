@@ -87,7 +87,7 @@ def every_part(folder: Path) -> list[Part]:
     )
     # The seed comes from the commit: a commit always gets the same random examples, so only its changes turn it red.
     commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True).stdout
-    options = ["--hypothesis-seed", str(int(commit or "0", 16))]
+    options = ["--hypothesis-seed", str(int(commit or "0", 16)), "--durations", "15"]
     options += ["-o", f"faulthandler_timeout={60 * MINUTES_A_TEST}", "-o", "faulthandler_exit_on_timeout=true"]
 
     def tests(name: str, python: str, *arguments: str, **variables: str) -> Part:
