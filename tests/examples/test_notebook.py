@@ -45,6 +45,7 @@ def test_it_is_small_and_has_no_errors_in_it():
 
 
 @pytest.mark.slow
+@pytest.mark.once
 def test_its_code_runs_without_jupyter_and_shows_what_the_notebook_shows(monkeypatch):
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")

@@ -33,7 +33,7 @@ from rigid_motion_batch.streaming.rooms import LOOPBACK_ADDRESS, Room, is_local,
 from rigid_motion_batch.streaming.sending import samples_of
 from tests.streams.links import body, dance
 
-pytestmark = pytest.mark.network
+pytestmark = [pytest.mark.network, pytest.mark.once]
 
 ROOT = Path(__file__).resolve().parents[3]
 COMMAND = (sys.executable, str(ROOT / "scripts" / "stream.py"))
