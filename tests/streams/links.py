@@ -116,10 +116,11 @@ def run(
 ) -> Outcome:
     """Play samples (n,) of poses (joints, n), and draw the shown motion.
 
-    At some samples it is said who holds what from then on. Of datagrams `loss` is lost, and what `lost` says by the
-    time and the number of a datagram; `set_by` is what somebody added to the sender's clock; `drained` says when what
-    came is taken out of the receiver's socket; `heard_from` is when the receiver begins. With a `lag`, what is shown is
-    compared with what was so long ago, and not with what was at the moment that is said to be shown.
+    `says` maps the number of a sample to the arguments of `Sender.hold` from then on. A fraction `loss` of all
+    datagrams is lost, and those for which `lost` is true, given the time and the number of a datagram. `set_by` is an
+    offset added to the sender's clock. `drained` gives the time when an arrived datagram is taken out of the receiver's
+    socket. `heard_from` is when the receiver starts. With a `lag`, the shown motion is compared with the motion that
+    long ago, instead of the motion at the moment that the receiver reports.
     """
     rng, sender, receiver = np.random.default_rng(seed), Sender(bodies, tolerance, delay, rate), Receiver()
     outcome, pending, count = Outcome(sender, receiver), [], 0
