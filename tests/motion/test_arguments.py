@@ -6,12 +6,10 @@ import pytest
 from rigid_motion.motion import (
     Poses,
     Skeleton,
-    best_modes,
     decimate,
     fit_keys,
     in_betweens,
     interpolate,
-    interpolate_by_segments,
     measure,
     prepare,
     reduce_keys,
@@ -33,24 +31,17 @@ GROWING = Poses(BODY.positions, BODY.quaternions, np.tile(1.0 + TIMES, (2, 1)))
 KEYS = [0, 4, 11]
 MASK = np.isin(np.arange(COUNT), KEYS)
 
-TAKING_KEYS = pytest.mark.parametrize(
-    "use",
-    [lambda keys: best_modes(TIMES, POSES, keys), lambda keys: fit_keys(TIMES, POSES, keys).positions.tolist()],
-    ids=["best_modes", "fit_keys"],
-)
 
-
-@TAKING_KEYS
 @pytest.mark.parametrize(
     "keys",
     [tuple(KEYS), KEYS, np.array(KEYS, dtype=np.uint8), np.array(KEYS, dtype=np.uint64), MASK, MASK.tolist()],
     ids=["tuple", "list", "uint8", "uint64", "mask", "list of bool"],
 )
-def test_keys_are_samples_in_any_form_that_has_one_meaning(use, keys):
-    assert use(keys) == use(np.array(KEYS))
+def test_keys_are_samples_in_any_form_that_has_one_meaning(keys):
+    expected = fit_keys(TIMES, POSES, np.array(KEYS))
+    np.testing.assert_array_equal(fit_keys(TIMES, POSES, keys).positions, expected.positions)
 
 
-@TAKING_KEYS
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
@@ -65,9 +56,9 @@ def test_keys_are_samples_in_any_form_that_has_one_meaning(use, keys):
         (None, r"keys have the shape \(\)"),
     ],
 )
-def test_keys_that_could_mean_something_else_are_refused_with_a_way_out(use, keys, message):
+def test_keys_that_could_mean_something_else_are_refused_with_a_way_out(keys, message):
     with pytest.raises(ValueError, match=message):
-        use(keys)
+        fit_keys(TIMES, POSES, keys)
 
 
 ROWS = np.concatenate((POSES.positions, POSES.quaternions), axis=1)
@@ -79,8 +70,6 @@ ROWS = np.concatenate((POSES.positions, POSES.quaternions), axis=1)
         (lambda given: interpolate(TIMES, given, TIMES), "keys"),
         (lambda given: in_betweens(TIMES, given, [1] * 11, [0.5] * 11), "keys"),
         (lambda given: prepare(TIMES, given), "keys"),
-        (lambda given: interpolate_by_segments(TIMES, given, TIMES, ["dq_sclerp"] * 11), "keys"),
-        (lambda given: best_modes(TIMES, given, KEYS), "poses"),
         (lambda given: fit_keys(TIMES, given, KEYS), "poses"),
         (lambda given: measure(TIMES, given, POSES), "poses"),
         (lambda given: measure(TIMES, POSES, given), "the true poses"),
@@ -102,7 +91,6 @@ def test_what_is_no_poses_is_refused_by_name(use, name, given):
 @pytest.mark.parametrize(
     "use",
     [
-        lambda times: interpolate_by_segments(times, POSES, times, ["dq_sclerp"] * 11).positions.tolist(),
         lambda times: decimate(times, 5.0).tolist(),
         lambda times: fit_keys(times, POSES, KEYS).positions.tolist(),
         lambda times: measure(times, POSES, POSES).velocity.tolist(),
@@ -135,13 +123,6 @@ BROKEN.positions[7] = np.nan
         (lambda: interpolate(TIMES, POSES, TIMES, "slerp"), "no mode 'slerp'; the modes are lerp_slerp, "),
         (lambda: in_betweens([0.0], POSES[:1], [], []), "at least two keys"),
         (lambda: in_betweens([0.0, 1.0], POSES[:2], [1.0], [0.5]), "whole numbers from 0 on"),
-        (lambda: interpolate_by_segments(TIMES, POSES, TIMES, "dq_sclerp"), "'dq_sclerp' is a single mode"),
-        (lambda: interpolate_by_segments(TIMES, BODY, TIMES, ["dq_sclerp"] * 11), r"fit keys of shape \(2, 12\)"),
-        (lambda: interpolate_by_segments(TIMES, POSES, TIMES, ["dq_sclerp"] * 12), "12 modes do not fit 12 keys"),
-        (lambda: best_modes(TIMES, POSES, KEYS, "dq_sclerp"), r"make a list, \['dq_sclerp'\]"),
-        (lambda: best_modes(TIMES, POSES, KEYS, ()), "no mode to choose from"),
-        (lambda: best_modes(TIMES, POSES, KEYS, tolerance=0.0), "a tolerance of 0.0 is not a positive number"),
-        (lambda: best_modes(TIMES[:-1], POSES, KEYS), "11 times do not fit"),
         (lambda: decimate([], 5.0), "no times"),
         (lambda: decimate([0.0, np.nan, 1.0], 5.0), "sample 1 has a time that is not finite"),
         (lambda: decimate(TIMES, 0.0), "rate"),
@@ -199,7 +180,6 @@ def test_what_makes_no_sense_is_refused_in_words(use, message):
         (lambda: body_reduced(tries=1.0), "tries is 1.0: give a whole number"),
         (lambda: body_reduced(stretch=2.5, **STRAIGHT), "stretch is 2.5: give a whole number"),
         *((lambda given=given: reduced(mode=given), "mode is .*: give the name of one") for given in (None, 7, ["x"])),
-        (lambda: best_modes(TIMES, POSES, KEYS, 7), "modes .*7: give a list of names"),
         *((lambda given=given: reduced(rms=given), "rms is .*: give True or False") for given in (1, "yes", None)),
         (lambda: body_reduced(shared=1), "shared is .*: give True or False"),
         (lambda: interpolate(TIMES, POSES, TIMES, extrapolate=1), "extrapolate is .*: give True or False"),
@@ -212,7 +192,6 @@ def test_what_has_the_wrong_type_is_refused_by_name(use, message):
 
 
 WITH_NUMBERS = [
-    ("times", lambda rows: best_modes(rows, POSES, KEYS)),
     ("times", lambda rows: decimate(rows, 5.0)),
     ("times", lambda rows: interpolate(TIMES, POSES, rows)),
     ("times", lambda rows: reduce_skeleton_keys(rows, BODY, [-1, 0], tolerance=0.1)),

@@ -4,7 +4,6 @@ This package does not need Blender and can be imported anywhere. Quaternions are
 the units they come in.
 """
 
-from .best_of import best_modes, interpolate_by_segments
 from .cleaning import Cleaned, clean
 from .contacts import standing
 from .decimation import decimate
@@ -28,13 +27,11 @@ __all__ = [
     "Repair",
     "SeparateKeys",
     "Skeleton",
-    "best_modes",
     "clean",
     "decimate",
     "fit_keys",
     "in_betweens",
     "interpolate",
-    "interpolate_by_segments",
     "measure",
     "prepare",
     "reduce_keys",

@@ -228,7 +228,6 @@ def interpolate(
 
     See Also
     --------
-    interpolate_by_segments : Interpolation with a mode for each segment.
     in_betweens : Interpolation with a custom timing of each segment, such as an ease.
 
     Notes

@@ -74,7 +74,6 @@ def reduce_keys(
     --------
     decimate : Keys evenly spaced in time.
     fit_keys : Key poses that approximate the recording better than its own samples.
-    best_modes : The best mode for each segment.
     reduce_skeleton_keys : The same for the joints of a skeleton.
 
     Notes
