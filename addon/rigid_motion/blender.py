@@ -42,20 +42,20 @@ def with_properties(cls: Class) -> Class:
 
 
 class Operator(bpy.types.Operator):
-    """An operator as it is while it is drawn: with a layout. One step of undo unless it says otherwise."""
+    """An operator whose `layout` is never None, as in `draw`; by default one undo step."""
 
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 - Blender reads it
     layout: bpy.types.UILayout
 
 
 class Panel(bpy.types.Panel):
-    """A panel as it is while it is drawn: with a layout."""
+    """A panel whose `layout` is never None, as in `draw`."""
 
     layout: bpy.types.UILayout
 
 
 class Menu(bpy.types.Menu):
-    """A menu as it is while it is drawn: with a layout."""
+    """A menu whose `layout` is never None, as in `draw`."""
 
     layout: bpy.types.UILayout
 

@@ -58,7 +58,7 @@ TURN_AXIS_ITEMS = [
 
 @with_properties
 class ChangedKeys(bpy.types.PropertyGroup):
-    """A note on keys that were changed, and on where those from before are."""
+    """A record of how the keys were changed, and of the Action with the keys from before."""
 
     kind: str = EnumProperty(
         items=[
@@ -104,7 +104,7 @@ def _transform_with(motion: RigidMotion) -> Transform:
 
 @with_properties
 class RigidMotion(bpy.types.PropertyGroup):
-    """What all that is moved has: objects, and the bones of rigs."""
+    """The settings of an object, or of a bone of a rig."""
 
     mode: str = EnumProperty(
         name="Mode",

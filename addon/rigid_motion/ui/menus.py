@@ -52,7 +52,7 @@ def _draw_breakdowns(self: Menu, _context: bpy.types.Context) -> None:
 
 
 class _Menu(Menu):
-    """All there is for one scope; the other one is in a menu of its own."""
+    """All entries for one scope, and a submenu for the other scope."""
 
     bl_label = "Rigid Motion"
     scope: str

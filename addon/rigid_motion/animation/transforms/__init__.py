@@ -54,7 +54,7 @@ Channel = tuple[str, int]
 
 
 class Note(Protocol):
-    """A note on keys that were changed, see `properties`."""
+    """A record of changed keys, see `properties`."""
 
     kind: str
     changed: bpy.types.Action | None
