@@ -22,7 +22,7 @@ from ..animation.holds.placing import world_of
 from ..blender import armature, pose_bones, scene, view_layer
 from ..motion import Poses
 from ..motion.eulers import ORDERS
-from ..motion.humanoid import SPINE, alignments, beside, humanoid_bones, plain_name
+from ..motion.humanoid import SPINE, alignments, humanoid_bones, plain_name, relative_to_followed
 from ..motion.poses import inverse, placed
 from ..motion.quaternions import conjugate, from_matrices, multiply, rotate
 from ..streams import StreamBody
@@ -213,7 +213,7 @@ class RigDriver(Driver):
         are_free = lengths <= np.abs(in_space.positions).max(initial=0.0)
         are_free[self.follows[self.follows >= 0]] = False
         self.ends = np.where(are_free, lengths, 0.0)
-        self._offsets = beside(in_space, self.follows)[:, None]
+        self._offsets = relative_to_followed(in_space, self.follows)[:, None]
         """The unkeyed pose of each bone, in the space of the bone that it follows, or of the armature."""
         _, turn, scale = obj.matrix_basis.decompose()
         self._turn, self.unit = np.array(turn), max(sum(map(abs, scale[:])) / 3.0, 1e-9)
@@ -249,7 +249,7 @@ class RigDriver(Driver):
     def values(self, poses: Poses) -> Poses:
         target, back = self._retarget(self.body.skeleton.in_root_space(poses)), conjugate(self._turn)
         there = Poses(rotate(back, target.positions) / self.unit, multiply(back, target.quaternions))
-        return placed(inverse(self._offsets), beside(there, self.follows))
+        return placed(inverse(self._offsets), relative_to_followed(there, self.follows))
 
     def owners(self, obj: bpy.types.Object) -> Iterable[bpy.types.PoseBone | None]:
         return [obj.pose.bones.get(name) if obj.pose else None for name in self.bones]

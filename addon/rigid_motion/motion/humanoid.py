@@ -151,7 +151,7 @@ def alignments(bones: dict[str, int], first: np.ndarray, second: np.ndarray | No
     return {bone: turn for bone, turn in result.items() if bone in bones}
 
 
-def beside(poses: Poses, follows: np.ndarray) -> Poses:
+def relative_to_followed(poses: Poses, follows: np.ndarray) -> Poses:
     """Return poses (bones,) relative to the poses they follow, by number; those that follow none (-1) are unchanged."""
     result, hanging = poses.copy(), follows >= 0
     result[hanging] = placed(inverse(poses[follows[hanging]]), poses[hanging])

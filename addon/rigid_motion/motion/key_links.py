@@ -76,7 +76,7 @@ def linked_keys(costs: Costs, result: list[np.ndarray]) -> np.ndarray:
         Sets of keys within the tolerance, each from the first sample to the last.
     """
     for width in CANDIDATE_WIDTHS_BY_REACH[costs.reach]:
-        candidates = beside(costs, result, width)
+        candidates = samples_near(costs, result, width)
         links = _links(
             costs,
             candidates,
@@ -113,7 +113,7 @@ def traded_keys(costs: Costs, result: list[np.ndarray], *, budget: int | None = 
     if max(counts) == min(counts) or max(totals) == min(totals):
         return best
     price = (max(totals) - min(totals)) / (max(counts) - min(counts))
-    candidates = beside(costs, result, 0)
+    candidates = samples_near(costs, result, 0)
     links = _links(costs, candidates, result, MAX_SEGMENT_COST_KEYS * price, MAX_SEGMENT_COST_KEYS**2 * price)
     if links is None:
         return best
@@ -147,7 +147,7 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
     within = sorted((keys for keys in result if len(keys) <= budget), key=costs.peak)
     best, high = within[0], costs.peak(within[0])
     for some in (result, within[:BEST_KEYS_KEPT]):
-        candidates = beside(costs, some, BUDGET_WIDTH_BY_REACH[costs.reach])
+        candidates = samples_near(costs, some, BUDGET_WIDTH_BY_REACH[costs.reach])
         links = _links(costs, candidates, some, high, LIVE_ERROR_PER_LEAST * high, MAX_BUDGET_LOOKS_PER_SAMPLE)
         if links is not None:
             break
@@ -168,10 +168,10 @@ def joined_keys(costs: Costs, result: list[np.ndarray], budget: int) -> np.ndarr
     return best
 
 
-def beside(costs: Costs, result: list[np.ndarray], width: int) -> np.ndarray:
+def samples_near(costs: Costs, result: list[np.ndarray], width: int) -> np.ndarray:
     """Return the samples that are keys in any set, and this many samples on either side of each."""
-    beside = np.concatenate(result)[:, None] + np.arange(-width, width + 1)
-    return _sorted_distinct(np.clip(beside, 0, len(costs.recording.times) - 1).ravel())
+    near = np.concatenate(result)[:, None] + np.arange(-width, width + 1)
+    return _sorted_distinct(np.clip(near, 0, len(costs.recording.times) - 1).ravel())
 
 
 def _links(

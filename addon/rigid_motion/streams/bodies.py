@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..motion import Poses, Skeleton, shell_error
-from ..motion.humanoid import beside
+from ..motion.humanoid import relative_to_followed
 from ..motion.poses import joined
 from ..motion.quaternions import normalise
 
@@ -216,7 +216,7 @@ class Forest:
         result, held = poses.copy(), self.holders >= 0
         if held.any():
             there = Skeleton(parents).in_root_space(poses[:, None])[:, 0]
-            result[held] = beside(there, self.holders)[held]
+            result[held] = relative_to_followed(there, self.holders)[held]
         return result
 
     def out_of_hands(self, poses: Poses, holders: np.ndarray) -> Poses:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..motion import Poses
-from ..motion.humanoid import HUMANOID, alignments, beside, humanoid_bones
+from ..motion.humanoid import HUMANOID, alignments, humanoid_bones, relative_to_followed
 from ..motion.poses import in_other_axes
 from ..motion.quaternions import conjugate, multiply
 from .bodies import LONGEST_NAME, MAX_CLOCK_S, MAX_LENGTH_M, MIN_SAMPLE_GAP_S, Forest, StreamBody
@@ -86,7 +86,9 @@ class Performer:
     def __call__(self, poses: Poses) -> dict[str, Poses]:
         """Return the pose () of each bone in its parent's space, given poses (joints,) in the space of the roots."""
         there = poses[self._numbers]
-        local = beside(Poses(there.positions, multiply(there.quaternions, self._from_rest)), self._follows)
+        local = relative_to_followed(
+            Poses(there.positions, multiply(there.quaternions, self._from_rest)), self._follows
+        )
         return {ROOT: Poses(np.zeros(3), [1.0, 0.0, 0.0, 0.0]), **dict(zip(self.bones, local, strict=True))}
 
 

@@ -17,7 +17,7 @@ from ..animation.transforms import Transform
 from ..blender import IntProperty, Operator, Returned, existing, view_layer, with_properties
 from ..motion.speeds import jumps
 from .overlay.cache import drawn_paths
-from .overlay.drawing import Pen, batch_of, beside
+from .overlay.drawing import Pen, batch_of, path_drawers
 from .overlay.held import motion_now
 from .overlay.kinds import axis_length_of
 from .overlay.points import DrawnPath
@@ -113,9 +113,9 @@ NO_MORE = n_("No more deviations in this direction")
 
 
 def register() -> None:
-    beside.append(draw)
+    path_drawers.append(draw)
 
 
 def unregister() -> None:
-    beside.remove(draw)
+    path_drawers.remove(draw)
     _deviations_by_path.clear()

@@ -56,7 +56,7 @@ class _Menu(Menu):
 
     bl_label = "Rigid Motion"
     scope: str
-    beside: str
+    other_menu: str
     """The name of the menu of modes for the other scope."""
 
     pie: str
@@ -66,7 +66,7 @@ class _Menu(Menu):
         layout.operator_context = "INVOKE_REGION_WIN"
         _draw_modes(context, layout, self.scope)
         layout.separator()
-        layout.menu(self.beside)
+        layout.menu(self.other_menu)
         layout.menu(RIGID_MOTION_MT_hold.__name__)
         layout.separator()
         layout.operator("rigid_motion.set_turns", text="Set Turns...")
@@ -87,12 +87,12 @@ class _Menu(Menu):
 
 class RIGID_MOTION_MT_view(_Menu):
     bl_description = "How the selected objects or bones move from key to key"
-    scope, beside, pie = WHOLE, "RIGID_MOTION_MT_current", "RIGID_MOTION_MT_pie_view"
+    scope, other_menu, pie = WHOLE, "RIGID_MOTION_MT_current", "RIGID_MOTION_MT_pie_view"
 
 
 class RIGID_MOTION_MT_keys(_Menu):
     bl_description = "How objects and bones move from the selected keys to the next"
-    scope, beside, pie = SELECTED, "RIGID_MOTION_MT_whole", "RIGID_MOTION_MT_pie_keys"
+    scope, other_menu, pie = SELECTED, "RIGID_MOTION_MT_whole", "RIGID_MOTION_MT_pie_keys"
 
 
 class RIGID_MOTION_MT_other_keys(Menu):

@@ -95,7 +95,7 @@ class RIGID_MOTION_OT_reduce_keys(OfRigsToo, OnTargets):
         " poses"
     )
     offered: float = FloatProperty(
-        description="The tolerance that was offered last, for as long as nobody sets another", options={"HIDDEN"}
+        description="The tolerance that was offered last, until another one is set", options={"HIDDEN"}
     )
     count: int = IntProperty(
         name="Number",
@@ -129,7 +129,7 @@ class RIGID_MOTION_OT_reduce_keys(OfRigsToo, OnTargets):
         translation_context=OWN_WORDS,
     )
     offered_mode: str = StringProperty(
-        description="The mode that was chosen last, for as long as nobody chooses another", options={"HIDDEN"}
+        description="The mode that was chosen last, until another one is chosen", options={"HIDDEN"}
     )
     is_chosen: bool = BoolProperty(
         description="Whether a mode was chosen since the operator was called", options={"HIDDEN", "SKIP_SAVE"}

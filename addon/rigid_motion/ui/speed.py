@@ -119,8 +119,8 @@ def _draw(context: Any, target: Transform, speeds: Speeds) -> None:
     bottom, top = (ratio * region.height for ratio in BAND_RATIOS)
     to_scene = partial(frame_in_action, target.animated)
     zero, one = (region.view2d.view_to_region(frame - to_scene(0.0), 0.0, clip=False)[0] for frame in (0.0, 1000.0))
-    beside = [part.x - region.x for part in context.area.regions if part.type == "UI" and part.width > 1]
-    right = min(region.width, *beside, region.width) - MARGIN_PX * pen.scale
+    sidebars = [part.x - region.x for part in context.area.regions if part.type == "UI" and part.width > 1]
+    right = min(region.width, *sidebars, region.width) - MARGIN_PX * pen.scale
     spent = (bottom - MARGIN_PX, top + 2.0 * TEXT_SIZE_PX * pen.scale)
     corners = [(0, spent[0], 0), (region.width, spent[0], 0), (0, spent[1], 0), (region.width, spent[1], 0)]
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")

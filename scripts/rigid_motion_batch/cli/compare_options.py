@@ -103,7 +103,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "-o",
         "--output",
         type=folder_path,
-        help="folder to write to (renders/NAME, by the first recording, with a number where that is another's)",
+        help="folder to write to (renders/NAME after the first recording, numbered if another comparison is there)",
     )
     parser.add_argument(
         "--radius",
@@ -117,8 +117,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--against",
         type=not_empty,
         metavar="MODE|FILE",
-        help="what the modes are held against: another mode, such as lerp_slerp, as most game engines do it "
-        f"({REFERENCE}, Blender's own curves); or a file with somebody else's motion of the same clip, to show beside",
+        help="what the modes are compared with: another mode, such as lerp_slerp, as most game engines do it "
+        f"({REFERENCE}, Blender's own curves); or a file with another motion of the same clip, to show as well",
     )
     parser.add_argument(
         "--held",

@@ -42,7 +42,7 @@ and on several machines, one with the router:
   python scripts/stream.py send walk.bvh --room studio --at studio.local
 
 `python scripts/stream.py send --help`, `receive --help`, `router --help` and `measure --help` have the options.
-Exit code: 0 done, 2 a wrong option or input, a room that cannot be reached, or nobody in it; 130 stopped by Ctrl-C, 143
+Exit code: 0 done, 2 a wrong option or input, or a room that is empty or cannot be reached; 130 stopped by Ctrl-C, 143
 by SIGTERM, with the statistics and the file of what was shown.
 """
 

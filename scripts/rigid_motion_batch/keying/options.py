@@ -41,7 +41,7 @@ def add_file_options(parser: argparse.ArgumentParser, *, blend: bool = True) -> 
         help="where to write (beside each file); for a single input also the name of a file",
     )
     places.add_argument(
-        "--overwrite", action="store_true", help="replace files that are of others, or were edited since"
+        "--overwrite", action="store_true", help="replace files that were edited, or that this program did not write"
     )
     if blend:
         places.add_argument("--in-place", action="store_true", help="save the .blend files themselves")

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion.motion.humanoid import beside
+from rigid_motion.motion.humanoid import relative_to_followed
 from rigid_motion.motion.poses import joined
 from rigid_motion.streams import Sender, StreamBody
 from rigid_motion.streams.bodies import DEFAULT_RADIUS_M
@@ -67,7 +67,7 @@ def body_of(clip: Clip, poses: Poses, radius: float | None = None) -> StreamBody
         return StreamBody.rigid(clip.name, poses[:, 0], radius or DEFAULT_RADIUS_M)
     radii = radii_of(clip) if radius is None else radius
     parents = clip.rest_body.parents
-    turns = beside(to_blender(clip.rest_body.rest, clip.axes), parents).quaternions
+    turns = relative_to_followed(to_blender(clip.rest_body.rest, clip.axes), parents).quaternions
     sliding = np.ptp(poses.positions, axis=1).max(axis=1) > MIN_SLIDE_M
     rest = Poses(poses.positions[:, 0], turns)
     return StreamBody(clip.name, clip.rest_body.joints, parents, rest, radii, sliding | (parents < 0))

@@ -218,7 +218,7 @@ class Pen:
             batch.draw(self.dots)
 
 
-beside: list[Callable[[Pen, Transform, DrawnPath, float, RigidMotionOverlay], None]] = []
+path_drawers: list[Callable[[Pen, Transform, DrawnPath, float, RigidMotionOverlay], None]] = []
 """Functions that draw more for each path, below it and in its space, on a frame of its Action."""
 
 
@@ -253,7 +253,7 @@ def blended() -> Iterator[None]:
 
 @drawn
 def draw_paths() -> None:
-    """Draw the paths of the selected objects or bones, and what `beside` adds, in a viewport."""
+    """Draw the paths of the selected objects or bones, and what `path_drawers` adds, in a viewport."""
     if is_shown(bpy.context):
         _draw(bpy.context)
 
@@ -289,7 +289,7 @@ def _draw(context: Any) -> None:
             frame = frame_in_action(target.animated, scene.frame_current_final)
             with own_space():
                 gpu.matrix.multiply_matrix(space)
-                for draw in beside:
+                for draw in path_drawers:
                     draw(pen, target, path, frame, settings)
                 if not settings.show_paths:
                     continue

@@ -78,9 +78,11 @@ def bodies_of(transform: Transform) -> list[bpy.types.Object]:
     if rig is None:
         return []
     # A skinned mesh is a child of the rig, or in one of its collections.
-    beside = [item for collection in rig.users_collection for item in collection.objects]
+    neighbours = [item for collection in rig.users_collection for item in collection.objects]
     return [
-        item for item in dict.fromkeys((*rig.children, *beside)) if item.type == "MESH" and item.find_armature() == rig
+        item
+        for item in dict.fromkeys((*rig.children, *neighbours))
+        if item.type == "MESH" and item.find_armature() == rig
     ]
 
 

@@ -18,7 +18,7 @@ from ...animation.transforms import Transform
 from ...blender import existing, original_uid, persistent, view_layer
 from ...handlers import append_drawing, append_handlers, remove_drawing, remove_handlers
 from ..preferences import Color
-from .drawing import Pen, batch_of, beside, blended, drawn, own_space
+from .drawing import Pen, batch_of, blended, drawn, own_space, path_drawers
 from .ghost_bodies import OnCard, SeenBody, seen_bodies
 from .ghosts import Ghosts, shape_of
 from .points import DrawnPath
@@ -68,13 +68,13 @@ HANDLERS: dict[str, Callable] = {
 
 def register() -> None:
     append_handlers(HANDLERS)
-    beside.append(draw_ghosts)
+    path_drawers.append(draw_ghosts)
     append_drawing(bpy.types.SpaceView3D, draw_bodies)
 
 
 def unregister() -> None:
     remove_drawing(bpy.types.SpaceView3D, draw_bodies)
-    beside.remove(draw_ghosts)
+    path_drawers.remove(draw_ghosts)
     remove_handlers(HANDLERS)
     forget()
 

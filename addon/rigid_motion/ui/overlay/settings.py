@@ -40,8 +40,8 @@ _enum = partial(EnumProperty, options=set(), translation_context=OWN_WORDS)
 class RigidMotionOverlay(bpy.types.PropertyGroup):
     show_paths: bool = _bool(
         name="Rigid Motion Paths",
-        description="Draw the paths of the selected objects or bones: Blender's own, and beside it that of a "
-        "rigid-motion mode. Of a bone it is the path of its head, or of its tail where the bone only turns. "
+        description="Draw the paths of the selected objects or bones: Blender's own, and that of a rigid-motion "
+        "mode. For a bone it is the path of its head, or of its tail where the bone only turns. "
         "Parents that move by keys are followed; by constraints they are taken as they are on the current frame, "
         "and what holds something as it was when its frames were last played",
     )

@@ -30,7 +30,7 @@ from ...blender import (
     view_layer,
     with_properties,
 )
-from ..overlay.drawing import KEY_COLOUR, Pen, batch_of, beside
+from ..overlay.drawing import KEY_COLOUR, Pen, batch_of, path_drawers
 from ..overlay.parents import maps_of
 from ..overlay.points import DrawnPath
 from ..overlay.settings import RigidMotionOverlay
@@ -239,8 +239,8 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
 
 
 def register() -> None:
-    beside.append(draw)
+    path_drawers.append(draw)
 
 
 def unregister() -> None:
-    beside.remove(draw)
+    path_drawers.remove(draw)
