@@ -19,7 +19,7 @@ MANIFEST = (CHECKOUT or EXTENSION) / "blender_manifest.toml"
 LICENSE = (CHECKOUT or EXTENSION) / "LICENSE"
 
 
-def brings(extra: str, command: str) -> str:
+def install_command(extra: str, command: str) -> str:
     """Return the command that installs an extra: bootstrap.py in a checkout, otherwise pip."""
     return f"`python scripts/bootstrap.py {command}`" if CHECKOUT else f"`pip install 'rigid-motion[{extra}]'`"
 

@@ -7,7 +7,7 @@ import re
 import sys
 
 from rigid_motion_batch.command_line import program_of
-from rigid_motion_batch.places import CHECKOUT, brings
+from rigid_motion_batch.places import CHECKOUT, install_command
 from rigid_motion_batch.silencing import silenced
 from rigid_motion_batch.supervising import ended_at_once
 
@@ -58,9 +58,10 @@ def problem_of(error: ImportError, script: str = "compare.py") -> str:
     if CHECKOUT or not isinstance(error, ModuleNotFoundError):
         return f"{error}\n{way_out(str(error), script)}"
     if error.name != "bpy":
-        return f"this needs the module {error.name}, which {brings('compare', 'compare')} brings"
+        return f"this needs the module {error.name}, which {install_command('compare', 'compare')} brings"
     return (
-        f"this needs Blender, which {brings('blender', 'compare')} brings, with Python {' or '.join(BLENDER_PYTHONS)}"
+        f"this needs Blender, which {install_command('blender', 'compare')} brings, with Python "
+        f"{' or '.join(BLENDER_PYTHONS)}"
     )
 
 
@@ -93,6 +94,6 @@ def without_blender(what: str, *, films: bool) -> str:
     where = "" if fits else f" with Python {' or '.join(BLENDER_PYTHONS)}"
     lines = [
         f"{what} Blender, which is not here{'' if fits else f', and has no wheel for Python {here}'}.",
-        f"  {brings('blender', 'compare')}{where} brings it; --blender PROGRAM uses one that is installed.",
+        f"  {install_command('blender', 'compare')}{where} brings it; --blender PROGRAM uses one that is installed.",
     ]
     return "\n".join([*lines, *(["  --no-video does without: numbers and report."] if films else [])])

@@ -219,7 +219,7 @@ class ClipReduction:
         best, farthest = [], np.inf
         for weight in FEET_WEIGH:
             weights = np.ones((len(self.world.moving), len(self.world.times)))
-            weights[self.feet.rows] += (weight - 1.0) * self.feet.stand
+            weights[self.feet.rows] += (weight - 1.0) * self.feet.stands
             tracks = self._key_poses(search.so_many_key_poses(count, weights))
             farther = self.feet.farther(self._shown(tracks))
             if farther < farthest:

@@ -322,7 +322,7 @@ class Feet:
         self.rows = np.flatnonzero(np.isin(world.moving, list(joints)))
 
     @cached_property
-    def stand(self) -> np.ndarray:
+    def stands(self) -> np.ndarray:
         """Whether each joint stands at each moment, shape (rows, m)."""
         world, times, shape = self.world, self.world.times, (len(self.rows), len(self.world.times))
         if not len(self.rows) or len(times) < 2:
@@ -347,7 +347,7 @@ class Feet:
     @cached_property
     def spans(self) -> np.ndarray:
         """Spans in which a joint stands: row of the joint, first and last sample, shape (s, 3)."""
-        result = np.array(spans(self.stand), dtype=np.int64).reshape(-1, 3)
+        result = np.array(spans(self.stands), dtype=np.int64).reshape(-1, 3)
         result[:, 0] = self.rows[result[:, 0]]
         return result
 
@@ -362,9 +362,9 @@ class Feet:
 
     def farther(self, tracks: Tracks) -> float:
         """Return by how much more than before any foot slides, at most."""
-        return float(self.more(tracks).max(initial=0.0))
+        return float(self.extra_slides(tracks).max(initial=0.0))
 
-    def more(self, tracks: Tracks) -> np.ndarray:
+    def extra_slides(self, tracks: Tracks) -> np.ndarray:
         """Return by how much more than before the joint of each span slides, shape (s,)."""
         ways = zip(self._before, self._slide_distances(tracks), strict=True)
         return np.array([after.max() - before.max() for before, after in ways])

@@ -16,7 +16,7 @@ from .key_splines import SplineErrors
 from .measures import shell_error
 from .modes import MODES
 from .piecewise import blocks
-from .poses import Poses, beyond, packed, reshaped
+from .poses import Poses, packed, reshaped, step_repeated
 from .segments import prepare_within
 
 MAX_ERROR = 1e30
@@ -216,5 +216,5 @@ def _with_ends(recording: SampleTracks, rows: np.ndarray, reach: int) -> tuple[n
         key_times[here, column] = key_times[here, outermost[some]] - step * duration[some]
         last = keys[..., here, column + inward]
         goes_on = not MODES[recording.mode].is_reference
-        keys[..., here, column] = beyond(last, keys[..., here, column + 2 * inward]) if goes_on else last
+        keys[..., here, column] = step_repeated(last, keys[..., here, column + 2 * inward]) if goes_on else last
     return key_times, keys

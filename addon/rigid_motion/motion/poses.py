@@ -327,7 +327,7 @@ def inverse(poses: Poses) -> Poses:
     return Poses(arms / poses.scales[..., None], back, 1.0 / poses.scales)
 
 
-def beyond(last: Poses, before: Poses) -> Poses:
+def step_repeated(last: Poses, before: Poses) -> Poses:
     """Return the poses that repeat the step from `before` (...) to `last` (...): last before^-1 last."""
     turn = multiply(last.quaternions, conjugate(before.quaternions))
     return Poses(

@@ -108,7 +108,7 @@ class Playing:
         step = min(took for _, took in before) - (arrival - sent)
         return step if step > CLOCK_AHEAD_S else 0.0
 
-    def leap(self, moment: float, step: float) -> None:
+    def skip(self, moment: float, step: float) -> None:
         """Skip `step` seconds after a moment, once it has been shown."""
         if self._leap and self._moment is not None:
             self._moment += self._leap[1]

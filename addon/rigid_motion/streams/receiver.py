@@ -180,7 +180,7 @@ class _Coded(Playback):
             and self._transit - (arrival - end) > CLOCK_AHEAD_S
             and (step := self.playing.set_ahead(end, arrival))
         ):
-            self.playing.leap(self._end, step)
+            self.playing.skip(self._end, step)
         if lost >= 0:
             self._newest, self._needs, self._end, self._transit = sequence, 0, end, arrival - end
             self.heard = max(self.heard, arrival)

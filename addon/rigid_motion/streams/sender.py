@@ -339,7 +339,7 @@ class Sender:
 
     def _all_have(self, sequence: int) -> bool:
         """Whether all answering receivers have a message."""
-        return all(answer.has(sequence) for answer, _ in self._receivers.values())
+        return all(answer.has_arrived(sequence) for answer, _ in self._receivers.values())
 
     def _usable(self, now: float) -> int | None:
         """Return the number of the message to build on, or None."""

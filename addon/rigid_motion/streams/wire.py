@@ -70,7 +70,7 @@ class Answer(NamedTuple):
     before: int
     needs: int
 
-    def has(self, sequence: int) -> bool:
+    def has_arrived(self, sequence: int) -> bool:
         """Whether a sequence has arrived, as far as this answer tells."""
         back = (self.newest - sequence) & 0xFFFF
         there = (self.before << 1 | 1) >> back & 1 if back <= 32 else 0

@@ -67,7 +67,7 @@ class Slider(MouseInput):
         self.overshoots ^= key == "E"
         return key == "E"
 
-    def tell(self, context: bpy.types.Context, label: str) -> None:
+    def show_status(self, context: bpy.types.Context, label: str) -> None:
         """Show the factor in the header of the area, and the keys in the status bar."""
         overshoot = iface_("On") if self.overshoots else iface_("Off")
         keys = iface_(
@@ -125,7 +125,7 @@ class _Breakdown(OnTargets):
             return self._finish()
         self._slider = Slider(self.factor, event.mouse_x, existing(context.preferences).system.ui_scale)
         self._breakdowns.apply(self.factor)
-        self._slider.tell(context, iface_(self.short, OWN_WORDS))
+        self._slider.show_status(context, iface_(self.short, OWN_WORDS))
         existing(context.window_manager).modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -139,7 +139,7 @@ class _Breakdown(OnTargets):
         if self._slider.handle(event) and self._slider.factor != self.factor:
             self.factor = self._slider.factor
             self._breakdowns.apply(self.factor)
-        self._slider.tell(context, iface_(self.short, OWN_WORDS))
+        self._slider.show_status(context, iface_(self.short, OWN_WORDS))
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:

@@ -308,7 +308,7 @@ class RIGID_MOTION_OT_merge_layer(OnTargets):
 
     def execute(self, context: bpy.types.Context) -> Returned:
         if not self.properties.is_property_set("tolerance"):
-            self.tolerance = first_tolerance(existing(context.scene), self.meant(context))
+            self.tolerance = first_tolerance(existing(context.scene), self.acted_on(context))
         return super().execute(context)
 
     def do(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:

@@ -263,10 +263,10 @@ class OnTargets(Operator):
         return tip_(cls.nothing_to_do if targets else nothing_meant)
 
     def execute(self, context: bpy.types.Context) -> Returned:
-        targets = self.meant(context)
+        targets = self.acted_on(context)
         return self.act(targets, lambda refused: self.do(context, targets, refused))
 
-    def meant(self, context: bpy.types.Context) -> list[Transform]:
+    def acted_on(self, context: bpy.types.Context) -> list[Transform]:
         """Return the targets that the operator will act on."""
         targets = list(self.each_target(context))
         return list(self.with_work(targets)) if self.leaves_others else targets
@@ -335,5 +335,5 @@ class OnChanged(OnTargets):
         cls.poll_message_set(reason)
         return False
 
-    def meant(self, context: bpy.types.Context) -> list[Transform]:
+    def acted_on(self, context: bpy.types.Context) -> list[Transform]:
         return [target for target, kind in self.last_changes(self.each_target(context)).items() if kind in self.kinds]

@@ -26,11 +26,11 @@ from rigid_motion_batch.command_line import as_typed, complain, path_line, progr
 from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline.comparison import IN_BLENDER, TABLES, ComparisonPlan
 from rigid_motion_batch.pipeline.executors import Executor, ProcessExecutor, processors
-from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, share_of, survey
+from rigid_motion_batch.pipeline.running import FAILED, STATES, Plan, Run, share_of, tasks_left
 from rigid_motion_batch.pipeline.steps import VERSION_VARIABLE, RunError, version_here
 from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.pipeline.studies import Comparison
-from rigid_motion_batch.places import brings, manifest
+from rigid_motion_batch.places import install_command, manifest
 from rigid_motion_batch.progress import FARM_VARIABLE, Progress
 from rigid_motion_batch.report.held import slip_sentences, still_sentences
 from rigid_motion_batch.report.numbers import error_is
@@ -60,7 +60,7 @@ def main(arguments: list[str]) -> int:
         if (requested := os.environ.get(VERSION_VARIABLE)) and requested != (result := version_here()):
             raise RunError(f"this machine has {result}, and the bundle is of {requested}")
         if not find_spec("vl_convert"):
-            raise RunError(f"this needs the module vl_convert, which {brings('compare', 'compare')} brings")
+            raise RunError(f"this needs the module vl_convert, which {install_command('compare', 'compare')} brings")
         blender = _blender(options)
         said = [argument for argument in arguments if argument not in TEXT_OPTIONS]
         comparison = comparison_of(options, as_typed(PROGRAM, said, options.inputs), blender)
@@ -224,7 +224,7 @@ class _Comparing:
         self.plan.conclude()
         self._show_numbers()
         films = (task.name for task in self.plan.tasks() if isinstance(task.step, steps.Encode))
-        if not survey(self.plan.tasks, self.store)[0].keys().isdisjoint(films):
+        if not tasks_left(self.plan.tasks, self.store)[0].keys().isdisjoint(films):
             # Pages take seconds and films minutes: show the pages first.
             self._do_tasks("Reporting", lambda: self.plan.tasks(films=False))
             if self.work.interrupted or self.work.problem:
@@ -284,7 +284,7 @@ class _Comparing:
             terminal.show(
                 error_is(rigid, joint, len(found.numbers.clips)),
                 terminal.table_of(terminal.lines_of(found.numbers)),
-                *terminal.also(found.numbers),
+                *terminal.notes_below(found.numbers),
                 *slip_sentences(found.slips, found.numbers, choice),
                 *still_sentences(found.numbers, choice),
                 "",

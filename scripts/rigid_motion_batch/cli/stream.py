@@ -23,7 +23,14 @@ from rigid_motion_batch.streaming import vmc
 from rigid_motion_batch.streaming.measuring import HEADER_BYTES
 from rigid_motion_batch.streaming.receiving import Receiving
 from rigid_motion_batch.streaming.rooms import ANY_ADDRESS, LOOPBACK_ADDRESS, MOTION, Room, opened
-from rigid_motion_batch.streaming.sending import RoomSending, even_rate, found_held, hand_of, samples_of, together
+from rigid_motion_batch.streaming.sending import (
+    RoomSending,
+    even_rate,
+    found_held,
+    hand_of,
+    samples_of,
+    starting_together,
+)
 from rigid_motion_batch.streaming.written import ReceivedMotion, Tracks, write_motions
 from rigid_motion_batch.supervising import report, stop_signals
 
@@ -69,7 +76,7 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
     rate = options.rate
     if options.to_vmc and not rate and clips[0].samples_a_second > vmc.MAX_FRAMES_PER_S:
         rate = vmc.MAX_FRAMES_PER_S
-    bodies, moments, poses = together(clips, rate)
+    bodies, moments, poses = starting_together(clips, rate)
     if options.to_vmc:
         with Progress() as progress, progress.stage("Playing", float(moments[-1] - moments[0])) as stage:
             _say(f"datagrams: {vmc.play(bodies[0], moments, poses, options.to_vmc, stopped, stage.reach)}")

@@ -25,7 +25,7 @@ from rigid_motion_batch.recordings.bvh_writing import write_bvh
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming.measuring import measure, measure_held
-from rigid_motion_batch.streaming.sending import body_of, hand_of, samples_of, together
+from rigid_motion_batch.streaming.sending import body_of, hand_of, samples_of, starting_together
 
 EPILOG = """
 examples:
@@ -92,7 +92,7 @@ def run_held(options: argparse.Namespace, clips: list[Clip]) -> None:
     """Measure how far a tool slips in a hand, and print the result."""
     if options.output:
         raise ValueError("--held writes no file; leave --output out")
-    bodies, times, poses = together(clips, radius=options.radius)
+    bodies, times, poses = starting_together(clips, radius=options.radius)
     tool, hand = options.held
     tolerance = options.tolerance.tolerance(clips[0])
     ways = measure_held(bodies, times, poses, tolerance, options.delay, options.loss, tool, hand_of(hand))

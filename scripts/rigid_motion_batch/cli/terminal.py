@@ -81,7 +81,7 @@ def lines_of(numbers: Numbers) -> list[Line]:
     return lines
 
 
-def also(numbers: Numbers) -> list[str]:
+def notes_below(numbers: Numbers) -> list[str]:
     """Return notes below the table: modes that are one motion, modes that go straight, and what the numbers mean."""
     groups = [[numbers.label(mode) for mode in group] for group in numbers.groups()]
     result = [f"{first} is also the motion of {listed(others)}." for first, *others in groups if others]

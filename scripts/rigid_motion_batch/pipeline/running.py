@@ -43,7 +43,7 @@ def share_of(plan: Plan, stage: str = "", number: int = 1, of: int = 1) -> Itera
                 yield task
 
 
-def survey(plan: Plan, store: Store) -> tuple[dict[str, float], int]:
+def tasks_left(plan: Plan, store: Store) -> tuple[dict[str, float], int]:
     """Return the names of the tasks still to do, with their seconds, and the number of tasks already done.
 
     Raises RunError if a file would be replaced that must stay.
@@ -96,7 +96,7 @@ class Run:
         self._done = 0.0
         """Seconds of the tasks that have ended."""
         with self.progress.stage(title, 1.0) as self._stage:
-            self._left, up_to_date = survey(plan, self.store)
+            self._left, up_to_date = tasks_left(plan, self.store)
             self._stage.total = sum(self._left.values())
             # This plan finds the results of an earlier plan up to date.
             self.counts = Counter({DONE: (done := self.counts[DONE]), UP_TO_DATE: up_to_date - done})

@@ -268,7 +268,7 @@ def likely_metres(parents: np.ndarray, places: np.ndarray, metres_per_unit: floa
     return metres_per_unit * (unit_of(size)[1] if np.isfinite(size) else 1.0)
 
 
-def sureness(size: float, length: float) -> str:
+def certainty(size: float, length: float) -> str:
     """Return how certain a unit of this length in metres is, judged by the size of the body alone."""
     fitting = [(name, size * metres) for name, metres in UNITS if GROWN_UP[0] <= size * metres <= GROWN_UP[1]]
     others = [f"{name} ({metres:.3g} m)" for name, metres in fitting if metres != size * length]

@@ -109,7 +109,7 @@ def merged(even: np.ndarray, keys: np.ndarray, step: float) -> np.ndarray:
     """
     keys = np.unique(keys[(keys > even[0]) & (keys < even[-1])])
     kept: list[float] = []
-    for key in keys[away(keys, even) >= MIN_KEY_GAP_STEPS * step].tolist():
+    for key in keys[distances_to_nearest(keys, even) >= MIN_KEY_GAP_STEPS * step].tolist():
         if not kept or key - kept[-1] >= MIN_KEY_GAP_STEPS * step:
             kept.append(key)
     return np.sort(np.concatenate((even, kept)))
@@ -150,7 +150,7 @@ def rate_of(keys: Iterable[np.ndarray], fps: float) -> float | None:
     return max(of_recordings[0] or of_recordings[1], default=None)
 
 
-def away(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+def distances_to_nearest(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return the distance of each frame to the nearest of `others`, which are increasing; shape of the frames."""
     return np.abs(frames - others[nearest(others, frames)]) if len(others) else np.full(len(frames), np.inf)
 

@@ -20,8 +20,8 @@ from .rest_bodies import (
     PLAUSIBLE_HEIGHTS_M,
     ZERO_SIZE,
     RestBody,
+    certainty,
     part_of_body,
-    sureness,
     unit_above_floor,
 )
 
@@ -46,7 +46,7 @@ def sized(path: Path, trajectory: Trajectory, axes: str, *, unit_given: bool) ->
     remark, warnings = trajectory.remark, trajectory.warnings
     if length != 1.0:
         taken = f"{shown(path.name)} is {size:.4g} units large, which are taken for {unit}: {metres:.3g} m"
-        taken += f", {why or sureness(size, length)} (otherwise: --scale METRES)"
+        taken += f", {why or certainty(size, length)} (otherwise: --scale METRES)"
         remark = "; ".join(filter(None, (taken, remark)))
     if not PLAUSIBLE_HEIGHTS_M[0] <= metres <= PLAUSIBLE_HEIGHTS_M[1]:
         doubt = f"it is {metres:.3g} m large if its unit, which the file does not tell, is that of {unit}"

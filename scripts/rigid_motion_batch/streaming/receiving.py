@@ -52,7 +52,7 @@ class Receiving:
             if self._last_heard > -math.inf and not self._heard and now - self._last_heard > LINGER_S + self._margin:
                 break
             due = began + frame / self._fps
-            for came in self._room.come(min(due, until) - now):
+            for came in self._room.received(min(due, until) - now):
                 self._take(came, time.monotonic())
             self._answer(now := time.monotonic())
             if now >= due:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from rigid_motion.live.sockets import is_loopback
 from rigid_motion.streams.wire import MAX_BYTES
-from rigid_motion_batch.places import brings
+from rigid_motion_batch.places import install_command
 
 if TYPE_CHECKING:
     import zenoh
@@ -93,7 +93,7 @@ def opened(role: str, at: str | None = None, network: bool = False, config: Path
     try:
         import zenoh
     except ImportError:
-        way = brings("stream", "stream")
+        way = install_command("stream", "stream")
         raise ValueError(f"rooms need Zenoh, which is not installed; {way} brings it") from None
     chosen = settings(role, at, network)
     try:
@@ -168,7 +168,7 @@ class Room:
         else:
             self._declared[key].put(datagram)
 
-    def come(self, seconds: float) -> list[Came]:
+    def received(self, seconds: float) -> list[Came]:
         """Return all datagrams since the last call; if there are none, wait up to `seconds` for the first."""
         result = []
         with suppress(queue.Empty):

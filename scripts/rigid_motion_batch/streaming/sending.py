@@ -73,7 +73,7 @@ def body_of(clip: Clip, poses: Poses, radius: float | None = None) -> StreamBody
     return StreamBody(clip.name, clip.rest_body.joints, parents, rest, radii, sliding | (parents < 0))
 
 
-def together(
+def starting_together(
     clips: Sequence[Clip], rate: float | None = None, radius: float | None = None
 ) -> tuple[list[StreamBody], np.ndarray, Poses]:
     """Return the bodies of clips that begin together, their times (n,), and the poses (joints, n) of all.
@@ -137,7 +137,7 @@ class RoomSending:
 
     def answer(self, seconds: float) -> None:
         """Wait this long for answers and joining receivers, and respond to them."""
-        for came in self.room.come(seconds):
+        for came in self.room.received(seconds):
             said = []
             if came.stream == LISTENING and came.datagram is not None:
                 self.joined += 1

@@ -46,7 +46,7 @@ def set_mode(
     """
 
     def plan(transform: Transform, readings: Readings) -> list[Binding]:
-        bindings = [binding for binding, _ in readings] if mode == "BLENDER" else able(transform, readings)
+        bindings = [binding for binding, _ in readings] if mode == "BLENDER" else for_modes(transform, readings)
         return bindings if frames is None else [editable_binding(transform, bindings)]
 
     def act(transform: Transform, bindings: list[Binding]) -> None:
@@ -95,7 +95,7 @@ def copy_modes(model: Target, targets: Targets, *, refused: list[Refused] | None
     is_blenders = first == "BLENDER" and not modes_on(key_frames(model)).any()
 
     def plan(transform: Transform, readings: Readings) -> list[Binding]:
-        return [binding for binding, _ in readings] if is_blenders else able(transform, readings)
+        return [binding for binding, _ in readings] if is_blenders else for_modes(transform, readings)
 
     def act(transform: Transform, bindings: list[Binding]) -> None:
         _mark_or_store(transform, bindings, first, lambda binding: _mark(binding, modes_on))
@@ -125,7 +125,7 @@ def set_turns(
     """
 
     def plan(transform: Transform, readings: Readings) -> Binding:
-        binding = editable_binding(transform, able(transform, readings))
+        binding = editable_binding(transform, for_modes(transform, readings))
         if turns and not any(modes_in(binding, frames_in(binding) if frames is None else np.asarray(frames))):
             text = n_("{name}: Blender's own in-betweens cannot add turns: choose a mode first")
             raise Refused(text, name=transform.name)
@@ -176,7 +176,7 @@ def repeat(targets: Targets, mode: str = "REPEAT", *, refused: list[Refused] | N
     apply_edit(targets, plan, act, refused)
 
 
-def able(transform: Transform, readings: Readings) -> list[Binding]:
+def for_modes(transform: Transform, readings: Readings) -> list[Binding]:
     """Return those of a transform's bindings that can have a mode other than Blender's own.
 
     These must include its Action, or one of its strips if it has none; otherwise `Refused` is raised. Other strips keep

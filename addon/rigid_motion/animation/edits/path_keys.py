@@ -111,7 +111,7 @@ class _Keys(TriedEdit):
     def move(self, delta: AffineMaps) -> None:
         """Move the keys by maps of the world (n,). Breakdown keys become ordinary keys, which shape the path."""
         frames, values, source = self.spaces.frames, self.moved(delta), self.source
-        passed = source.key_frames[source.passed]
+        passed = source.key_frames[source.on_path]
         for row in self.rows:
             channel = self.transform.channels[row]
             kept, fcurve = self.keys[channel], self.binding.curves[channel]

@@ -24,7 +24,7 @@ from ..actions.reading import read
 from ..actions.slots import Binding
 from ..evaluation.components import SMOOTH_MODES
 from ..evaluation.differences import in_betweens
-from ..evaluation.marks import vary
+from ..evaluation.marks import which_vary
 from ..evaluation.sources import SAME_FRAME, KeyedTransform, distinct
 from ..fcurves.keys import BEZIER, LINEAR
 from ..fcurves.keys import CONSTANT as CONSTANT_KEY
@@ -213,7 +213,7 @@ def _run_of(transform: Transform, source: KeyedTransform, frames: Sequence[float
     if source.switches:
         text = n_("{name} passes from hand to hand: its keys are in the spaces of the hands, not on one path")
         raise Refused(text, name=transform.name)
-    varying = [keys for _, keys in source.channels if vary(keys).any()]
+    varying = [keys for _, keys in source.channels if which_vary(keys).any()]
     keyed = distinct(np.unique(np.concatenate([np.empty(0), *(keys.times for keys in varying)])))
     if frames is not None:
         first, last = min(frames, default=np.inf), max(frames, default=-np.inf)
@@ -267,7 +267,7 @@ def _time_handles(source: KeyedTransform, frames: np.ndarray) -> tuple[np.ndarra
     ends, constant = [], []
     for _, keys in source.channels:
         at = np.abs(frames[:, None] - keys.times).argmin(axis=1)
-        for curve in np.flatnonzero(vary(keys)):
+        for curve in np.flatnonzero(which_vary(keys)):
             codes = keys.interpolation[curve, at[:-1]]
             both = np.tile(EVEN_HANDLE_RATIOS, (len(codes), 1))
             if keys.left is not None and keys.right is not None:

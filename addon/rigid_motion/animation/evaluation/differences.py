@@ -181,7 +181,7 @@ def _groups_of_similar(sources: Sequence[KeyedTransform]) -> list[list[int]]:
     """
     alike: dict[tuple, list[int]] = {}
     for number, source in enumerate(sources):
-        alike.setdefault((source.order, source.uniform_scale, bool(source.passed.any())), []).append(number)
+        alike.setdefault((source.order, source.uniform_scale, bool(source.on_path.any())), []).append(number)
     return [*alike.values()]
 
 
@@ -250,7 +250,7 @@ class _Motion:
         """Return the motion of sources whose paths, with these modes and ends of segments, pass some of their keys."""
         segments = _segments(sources)
         bounds = channels_at_ends(segments)
-        passed = np.concatenate([source.passed[:-1] for source in sources])
+        passed = np.concatenate([source.on_path[:-1] for source in sources])
         keys = Ends.of(*bounds, segments, np.zeros(len(passed), dtype=bool)).keys
         many = np.diff(np.append(np.flatnonzero(~passed), len(passed)))
         passages = Passages.of(passed, keys, lambda *at: _poses(ends, modes, *at), np.isin(modes, SMOOTH_MODES))

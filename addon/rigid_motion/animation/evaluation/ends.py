@@ -25,7 +25,7 @@ import numpy as np
 
 from ...motion import KEYFRAME_MODES, Poses
 from ...motion.curves import twist_shares
-from ...motion.poses import beyond
+from ...motion.poses import step_repeated
 from ...motion.segments import prepare_within
 from .bodies import between, body_poses, location_axes
 from .sources import KeyedTransform
@@ -64,7 +64,7 @@ def with_neighbours(
     as in the segment; if the neighbour holds, it rests.
     """
     rows = packed(keys)
-    previous, following = packed(beyond(keys[:, 0], keys[:, 1])), packed(beyond(keys[:, 1], keys[:, 0]))
+    previous, following = packed(step_repeated(keys[:, 0], keys[:, 1])), packed(step_repeated(keys[:, 1], keys[:, 0]))
     # Segments between two keys on one frame are empty, and the segments on either side meet there.
     lasts = times[:, 1] > times[:, 0]
     duration = np.where(lasts, times[:, 1] - times[:, 0], 1.0)

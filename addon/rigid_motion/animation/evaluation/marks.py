@@ -67,7 +67,7 @@ class Marks:
         return f"{np.asarray(self.frames, dtype=float).tolist()} {np.asarray(self.numbers, dtype=int).tolist()}"
 
 
-def vary(keys: Keys) -> np.ndarray:
+def which_vary(keys: Keys) -> np.ndarray:
     """Return which curves (c,) have more than one value, in keys or handles."""
     if len(keys.times) < 2:
         return np.zeros(len(keys.points), dtype=bool)

@@ -32,7 +32,7 @@ from .marks import (
     distinct,
     sweeps,
     turns_at,
-    vary,
+    which_vary,
 )
 from .runs import MOST_FRAMES, Stretch, Switch, keys_in, resting_in, stretches_of, switches_of
 
@@ -134,7 +134,7 @@ class KeyedTransform:
         parts = {
             PART_OF[row]
             for rows, keys in self.channels
-            for row, varies in zip(rows, vary(keys).tolist(), strict=True)
+            for row, varies in zip(rows, which_vary(keys).tolist(), strict=True)
             if varies
         }
         if ROTATION in self.keyed and self.turns is not None and self.turns.values.any():
@@ -169,7 +169,7 @@ class KeyedTransform:
     @cached_property
     def cyclic(self) -> Keys | None:
         """The keys of the first channel that changes and repeats."""
-        return next((keys for keys in self.curves if keys.cycles is not None and vary(keys).any()), None)
+        return next((keys for keys in self.curves if keys.cycles is not None and which_vary(keys).any()), None)
 
     @cached_property
     def key_frames(self) -> np.ndarray:
@@ -280,7 +280,7 @@ class KeyedTransform:
         return bool(np.abs(by).max() >= HALF_TURN)
 
     @cached_property
-    def passed(self) -> np.ndarray:
+    def on_path(self) -> np.ndarray:
         """Return which keys lie on the path between the neighbouring keys instead of shaping it, shape (n,).
 
         These are breakdowns in all filled channels with a key there. They lie between keys of one mode, whose path
@@ -299,10 +299,10 @@ class KeyedTransform:
     @cached_property
     def path(self) -> KeyedTransform:
         """Source without the keys that are `passed`, but otherwise the same."""
-        if not self.passed.any():
+        if not self.on_path.any():
             return self
         # Channels keep these keys: without them, a channel that has no key on other frames would be elsewhere.
-        return replace(self, shaping=self.key_frames[~self.passed])
+        return replace(self, shaping=self.key_frames[~self.on_path])
 
     @cached_property
     def is_live(self) -> bool:
@@ -425,7 +425,7 @@ def repeat(channels: tuple[tuple[list[int], Keys], ...], cyclic: Keys, order: st
     """
     cycles, ends = cyclic.cycles, cyclic.times[[0, -1]].tolist()
     assert cycles is not None
-    changing = [(rows, keys) for rows, keys in channels if vary(keys).any()]
+    changing = [(rows, keys) for rows, keys in channels if which_vary(keys).any()]
     if any(keys.cycles != cycles or keys.times[[0, -1]].tolist() != ends for _, keys in changing):
         return False
     if "REPEAT_OFFSET" not in (cycles.before, cycles.after):
@@ -433,7 +433,7 @@ def repeat(channels: tuple[tuple[list[int], Keys], ...], cyclic: Keys, order: st
     change, turning = np.zeros(10), 0
     for rows, keys in changing:
         change[rows] = keys.values[:, -1] - keys.values[:, 0]
-        turning += int(np.count_nonzero(vary(keys)[[3 <= row < 7 for row in rows]]))
+        turning += int(np.count_nonzero(which_vary(keys)[[3 <= row < 7 for row in rows]]))
     if order is not None:
         # The axes of the other angles are fixed if a single one changes.
         angles = slice(3, 4) if order == AXIS_ANGLE else slice(3, 6)

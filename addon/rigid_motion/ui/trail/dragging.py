@@ -93,7 +93,7 @@ class Dragging(OnPath):
             return self.without_keys(handles, self._refused)
         self._input = DragInput(place)
         self.begin(context)
-        self.tell(context)
+        self.show_status(context)
         existing(context.window_manager).modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -150,10 +150,10 @@ class Dragging(OnPath):
         if not self.takes_neighbours or event.value != "PRESS" or not proportional.change(event):
             return False
         self._edits.cancel()
-        self.tell(context)
+        self.show_status(context)
         return self.read(handles_of(context))
 
-    def tell(self, context: Any) -> None:
+    def show_status(self, context: Any) -> None:
         """Show the shortcuts in the status bar, and the range of Proportional Editing in the viewport."""
         Dragging.shown_reach = proportional.reach() if self.takes_neighbours else 0.0
         existing(context.workspace).status_text_set(self.keys_shown())

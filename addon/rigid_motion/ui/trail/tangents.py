@@ -138,7 +138,7 @@ class RIGID_MOTION_OT_drag_path_tangent(Dragging):
         self._is_bending = not self._is_bending and self._ensure_bending_key()
         if self._is_bending:
             self._measure_bending()
-        self.tell(context)
+        self.show_status(context)
         return True
 
     def drag(self, context: Any) -> str:
